@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 
-from sim.io.commands import JOBS, ROBOT, Program, argument, out
+from sim.io.commands import JOBS, ROBOT, UNIT, Program, argument, out
 from sim.io.errors import InputError
 
 program = Program("calibration", "Find from measured runs what the model of a robot lacks, and correct it.")
@@ -32,9 +32,10 @@ main = program.main
         "--path",
         action="append",
         metavar="PATH",
-        help="a path, as for softflagella plan, on which the error is stated before and after (default: square:3, "
-        "in tail lengths); may be given again",
+        help="a path, as for softflagella plan, on which the error is stated before and after (default: "
+        "square:3l); may be given again",
     ),
+    UNIT,
     argument(
         "--no-path",
         action="store_true",
@@ -60,6 +61,7 @@ def _calibrate(arguments: Namespace) -> None:
         own=own,
         laws=not arguments.no_laws,
         paths=() if arguments.no_path else arguments.path or DEFAULT_PATHS,
+        unit=arguments.unit,
         seed=arguments.seed,
         jobs=arguments.jobs,
         tell=lambda line: print(line, file=sys.stderr),

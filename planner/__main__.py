@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
@@ -12,8 +11,7 @@ from planner.command_line import (
     OBSTACLES,
     TABLE,
     arrival_time,
-    ask_for_unit,
-    ask_for_unit_across,
+    length_of,
     progress_bar,
     say,
     say_job,
@@ -24,15 +22,9 @@ from planner.command_line import (
 from planner.fleet_command import FLEET, fleet_command
 from planner.job_commands import JOBS, planned_cover, planned_tour
 from planner.page_command import PAGE
-from planner.paths.units import (
-    UNITS,
-    describe,
-    hinting_at_units,
-    in_lab,
-    in_tails,
-)
+from planner.paths.units import describe, in_lab, read_length, read_pose
 from planner.tracking_commands import POSES, REPLAN, START, track, without_robot
-from sim.io.commands import ROBOT, Program, argument, out
+from sim.io.commands import ROBOT, UNIT, Program, argument, out
 from sim.io.errors import InputError, naming
 
 if TYPE_CHECKING:
@@ -47,14 +39,14 @@ main = program.main
 
 _PLANNING = (
     argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE, polygon:CORNERS:SIDE "
-             "(polygon:6:2)"),
+             "(square:24cm, polygon:6:2l)"),
     ROBOT,
     *TABLE,
-    argument("--unit", choices=("l", *UNITS), help="unit of the path's numbers (default: tail lengths)"),
+    UNIT,
     argument("--scale", type=float, default=1.0, help="multiply the path's coordinates"),
     argument("--shape", help="which path of an SVG with several"),
     argument("--closed", action="store_true", help="join the path's end to its start"),
-    argument("--smooth", type=float, help="smooth the path over this length, in tail lengths"),
+    argument("--smooth", metavar="LENGTH", help="smooth the path over this length, such as 1cm"),
     argument("--point", default="head_centre", choices=("head_centre", "head_tip", "pivot"),
              help="which point follows the path (default: head_centre)"),
     argument("--corner", default="nearest", choices=("nearest", "minimax", "fillet", "error"),
@@ -109,14 +101,14 @@ def _plan(arguments: Namespace) -> None:
 @program.command(
     "goal",
     "plan the way from one pose to another, around obstacles; exit status 3 where there is none",
-    argument("--goal", nargs=3, type=float, required=True, metavar=("X", "Y", "DEGREES"),
+    argument("--goal", nargs=3, required=True, metavar=("X", "Y", "DEGREES"),
              help="of the head's centre at the end"),
-    argument("--start", nargs=3, type=float, default=(0.0, 0.0, 0.0), metavar=("X", "Y", "DEGREES"),
+    argument("--start", nargs=3, default=("0", "0", "0"), metavar=("X", "Y", "DEGREES"),
              help="of the head's centre at the start, at rest (default: 0 0 0)"),
-    argument("--via", nargs=2, type=float, action="append", default=[], metavar=("X", "Y"),
+    argument("--via", nargs=2, action="append", default=[], metavar=("X", "Y"),
              help="a place that the pivot passes; may be given again"),
     *OBSTACLES,
-    argument("--unit", choices=("l", *UNITS), help="unit of all lengths (default: tail lengths)"),
+    UNIT,
     ROBOT,
     *TABLE,
     argument("--objective", default="time", choices=("error", "time", "flips"),
@@ -134,34 +126,18 @@ def _goal(arguments: Namespace) -> None:
 
 def _goal_planned(arguments: Namespace) -> GoalPlan:
     """Plan the way that the command asks for."""
-    import numpy as np
-
     from planner.files.goal_files import read_free_space
     from planner.goal.to_goal import to_goal
-    from planner.planning.request import PlanRequest
     from planner.vehicle.calibration_table import read_knowledge
-    from planner.vehicle.tracked_point import tracked_vehicle
     from sim.inputs import load_robot
 
     seconds = arrival_time(arguments)
     robot = load_robot(arguments.robot)
-    scale = in_tails(arguments.unit or "l", robot)
-    start, goal = (
-        (scale * x, scale * y, math.radians(math.fmod(angle, 360)))
-        for x, y, angle in (arguments.start, arguments.goal)
-    )
-    space = read_free_space(arguments.keep_out, arguments.walls, scale, robot)
-    via = [(scale * x, scale * y) for x, y in arguments.via]
+    unit = arguments.unit
+    start, goal = (read_pose(getattr(arguments, end), unit, robot, f"--{end}") for end in ("start", "goal"))
+    space = read_free_space(arguments.keep_out, arguments.walls, unit, robot)
+    via = [tuple(read_length(each, unit, robot, "--via") for each in place) for place in arguments.via]
     knowledge = read_knowledge(arguments.robot)
-    table = table_of(arguments, robot, knowledge)
-    if arguments.unit is None:
-        tracked = tracked_vehicle(robot, table, "head_centre", knowledge)
-        request = PlanRequest(
-            objective=arguments.objective,
-            minimum_dwell=arguments.min_dwell,
-            minimum_seconds=arguments.min_dwell_s,
-        )
-        ask_for_unit_across(np.array([start[:2], *via, goal[:2]]), tracked, request, "start and goal")
     return to_goal(
         start,
         goal,
@@ -169,11 +145,11 @@ def _goal_planned(arguments: Namespace) -> GoalPlan:
         via=via,
         keep_out=space.regions,
         walls=space.walls,
-        lookup=table,
+        lookup=table_of(arguments, robot, knowledge),
         objective=arguments.objective,
         minimum_dwell=arguments.min_dwell,
         minimum_seconds=arguments.min_dwell_s,
-        tolerance=arguments.tolerance,
+        tolerance=length_of(arguments, "tolerance", robot),
         feedback=arguments.feedback,
         arrive_seconds=seconds,
         knowledge=knowledge,
@@ -199,45 +175,33 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
 
     seconds = arrival_time(arguments)
     robot = load_robot(arguments.robot)
-    path, unit, given_in = _path(arguments, robot)
-    space = read_free_space(arguments.keep_out, arguments.walls, unit, robot)
+    path = _path(arguments, robot)
+    space = read_free_space(arguments.keep_out, arguments.walls, arguments.unit, robot)
     print(f"path: {describe(path, robot)}")
     tracked, request = vehicle_and_request(arguments, robot)
-    if given_in and arguments.unit is None:
-        ask_for_unit(path, tracked, request)
-    with hinting_at_units(path, robot, tracked.vehicle.turn_radius, given_in), progress_bar() as progress:
+    with progress_bar() as progress:
         feedback, loop = arguments.feedback, arguments.loop
         return plan_path(
             path, tracked, request, space, seconds, loop=loop, feedback=feedback, progress=progress
         ), request
 
 
-def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, float, tuple[str, ...]]:
-    """Make the path that the command asks for, in l; return the unit of its numbers, and its name."""
+def _path(arguments: Namespace, robot: Robot) -> Path2D:
+    """Make the path that the command asks for, in l."""
     from planner.paths.path import smoothed
     from planner.paths.path_files import read_path
 
     drawing = read_path(arguments.path, closed=True if arguments.closed else None, shape=arguments.shape)
-    given_in = (arguments.unit or "l",) if drawing.unit is None else ()
-    if drawing.unit is None:
-        unit = in_tails(arguments.unit or "l", robot)
-    elif arguments.unit is None:
-        unit = drawing.unit / robot.tail_length
-    else:
-        metres = drawing.path.length * drawing.unit
-        raise InputError(
-            f"--unit {arguments.unit}: {arguments.path} has a size of its own, it is {metres:.3g} m long; "
-            "leave --unit out, or use --scale to make it larger or smaller"
-        )
-    scale = arguments.scale * unit
-    if not 0 < scale < float("inf"):
+    if not 0 < arguments.scale < float("inf"):
         raise InputError(f"--scale {arguments.scale}; give a number above 0")
-    path = drawing.path.scaled(scale)
-    if arguments.smooth is None:
-        return path, unit, given_in
-    smooth, moved = smoothed(path, arguments.smooth)
-    print(f"smoothed over {in_lab(arguments.smooth, robot)}, which moves the path by up to {in_lab(moved, robot)}")
-    return smooth, unit, given_in
+    with naming(arguments.path):
+        path = drawing.in_tails(robot, arguments.unit).scaled(arguments.scale)
+    length = length_of(arguments, "smooth", robot)
+    if length is None:
+        return path
+    smooth, moved = smoothed(path, length)
+    print(f"smoothed over {in_lab(length, robot)}, which moves the path by up to {in_lab(moved, robot)}")
+    return smooth
 
 
 @program.command(

@@ -9,24 +9,22 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from planner.paths.units import check_unstated_unit, heading_in_degrees, in_lab, place_in_lab, read_time
+from planner.paths.units import heading_in_degrees, in_lab, place_in_lab, read_length, read_time
 from sim.io.commands import MODEL, argument
 from sim.io.units import format_time
 
 if TYPE_CHECKING:
-    from planner.paths.path import Path2D
     from planner.planning.planned import Plan
     from planner.planning.request import PlanRequest
     from planner.vehicle.calibration_table import CalibrationKnowledge
     from planner.vehicle.tracked_point import TrackedVehicle
-    from sim.arrays import Floats
     from sim.model.robot import Robot
     from surrogate.interface import LookupTable
 
 DWELLS = (
     argument("--min-dwell", type=float, help="shortest dwell, in time units μ0 l⁴/EI"),
     argument("--min-dwell-s", type=float, help="shortest dwell that the motor allows, in seconds"),
-    argument("--tolerance", type=float, help="largest stated error, in tail lengths"),
+    argument("--tolerance", metavar="LENGTH", help="largest stated error, such as 5mm"),
 )
 ARRIVE = argument(
     "--arrive",
@@ -109,7 +107,18 @@ def table_of(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge
     return table_for(robot, arguments.robot, knowledge, own=arguments.own_table)
 
 
-def request_of(arguments: Namespace) -> PlanRequest:
+def length_of(arguments: Namespace, name: str, robot: Robot) -> float | None:
+    """Read the option of a name, a length above 0, in tail lengths; None where it is not given.
+
+    Raises:
+        InputError: it is no such length, or has no unit.
+    """
+    words = getattr(arguments, name)
+    option = f"--{name.replace('_', '-')}"
+    return None if words is None else read_length(words, arguments.unit, robot, option, above_zero=True)
+
+
+def request_of(arguments: Namespace, robot: Robot) -> PlanRequest:
     """Return what the command asks of a plan."""
     from planner.planning.request import PlanRequest
 
@@ -119,7 +128,7 @@ def request_of(arguments: Namespace) -> PlanRequest:
         objective=arguments.objective,
         minimum_dwell=arguments.min_dwell,
         minimum_seconds=arguments.min_dwell_s,
-        tolerance=arguments.tolerance,
+        tolerance=length_of(arguments, "tolerance", robot),
         **of_paths,
     )
 
@@ -129,38 +138,8 @@ def vehicle_and_request(arguments: Namespace, robot: Robot) -> tuple[TrackedVehi
     from planner.vehicle.calibration_table import read_knowledge
     from planner.vehicle.tracked_point import tracked_vehicle
 
-    request, knowledge = request_of(arguments), read_knowledge(arguments.robot)
+    request, knowledge = request_of(arguments, robot), read_knowledge(arguments.robot)
     return tracked_vehicle(robot, table_of(arguments, robot, knowledge), request.point, knowledge), request
-
-
-def ask_for_unit(path: Path2D, tracked: TrackedVehicle, request: PlanRequest, what: str = "path") -> None:
-    """Ask for the unit of lengths that nobody stated, if they make no sense as tail lengths.
-
-    Raises:
-        InputError: the path is very long for this robot.
-    """
-    from planner.vehicle.dwell_choice import dwells_for
-    from planner.vehicle.zigzag import zigzag
-
-    vehicle = tracked.vehicle
-    dwell = dwells_for(vehicle, request.objective, request.least_dwell(tracked.robot))[0]
-    speed = zigzag(vehicle, dwell, tracked.offset).speed
-    check_unstated_unit(path, tracked.robot, vehicle.turn_radius, speed, what)
-
-
-def ask_for_unit_across(points: Floats, tracked: TrackedVehicle, request: PlanRequest, what: str) -> None:
-    """Ask for the unit of points (n, 2) that nobody stated: the way is at least the diagonal of their box.
-
-    Raises:
-        InputError: the points are very far apart for this robot.
-    """
-    import numpy as np  # the help of a command does not need it
-
-    from planner.paths.path import Path2D
-
-    ends = [points.min(0), points.max(0)]
-    if np.isfinite(ends).all() and (ends[0] != ends[1]).any():
-        ask_for_unit(Path2D.of(ends), tracked, request, f"way across {what}")
 
 
 @contextmanager

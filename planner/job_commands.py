@@ -10,13 +10,12 @@ from planner.command_line import (
     DWELLS,
     OBSTACLES,
     TABLE,
-    ask_for_unit_across,
     progress_bar,
     say_job,
     vehicle_and_request,
 )
-from planner.paths.units import UNITS, read_time
-from sim.io.commands import ROBOT, Argument, Run, argument, out
+from planner.paths.units import read_length, read_time
+from sim.io.commands import ROBOT, UNIT, Argument, Run, argument, out
 from sim.io.errors import InputError
 
 if TYPE_CHECKING:
@@ -36,7 +35,7 @@ class Job(NamedTuple):
 _COMMON = (
     ROBOT,
     *TABLE,
-    argument("--unit", choices=("l", *UNITS), help="unit of all lengths (default: the file's, or tail lengths)"),
+    UNIT,
     argument("--point", default="head_centre", choices=("head_centre", "head_tip", "pivot"),
              help="which point of the robot does the job (default: head_centre)"),
     argument("--objective", default="error", choices=("error", "time", "flips"),
@@ -62,11 +61,9 @@ def planned_tour(arguments: Namespace) -> TourPlan:
     from sim.inputs import load_robot
 
     robot = load_robot(arguments.robot)
-    places, scale = read_places(arguments.places, arguments.unit, robot)
-    space = read_free_space(arguments.keep_out, arguments.walls, scale, robot)
+    places = read_places(arguments.places, arguments.unit, robot)
+    space = read_free_space(arguments.keep_out, arguments.walls, arguments.unit, robot)
     tracked, request = vehicle_and_request(arguments, robot)
-    if arguments.unit is None and scale == 1.0:
-        ask_for_unit_across(places, tracked, request, "the places")
     with progress_bar() as progress:
         return tour(
             places.tolist(),
@@ -89,22 +86,18 @@ def _cover(arguments: Namespace) -> None:
 
 def planned_cover(arguments: Namespace) -> CoveragePlan:
     """Plan the coverage that the command asks for."""
-    import numpy as np
-
     from planner.files.goal_files import read_free_space
-    from planner.files.job_files import read_field, read_length
+    from planner.files.job_files import read_field
     from planner.jobs.cover import cover
     from planner.jobs.region import Field
     from sim.inputs import load_robot
 
     robot = load_robot(arguments.robot)
-    field, scale = read_field(arguments.region, arguments.hole, arguments.unit, robot)
-    space = read_free_space(arguments.keep_out, arguments.walls, scale, robot)
+    field = read_field(arguments.region, arguments.hole, arguments.unit, robot)
+    space = read_free_space(arguments.keep_out, arguments.walls, arguments.unit, robot)
     field = Field(field.outline, (*field.holes, *space.regions))
-    width = read_length(arguments.width, scale, robot, "--width")
+    width = read_length(arguments.width, arguments.unit, robot, "--width", above_zero=True)
     tracked, request = vehicle_and_request(arguments, robot)
-    if arguments.unit is None and scale == 1.0:
-        ask_for_unit_across(np.array(field.outline.box), tracked, request, "the region")
     angle = None if arguments.angle is None else math.radians(math.fmod(arguments.angle, 360))
     with progress_bar() as progress:
         return cover(
@@ -121,9 +114,9 @@ def _hold(arguments: Namespace) -> None:
     seconds = None if arguments.seconds is None else read_time(arguments.seconds, "--for")
     robot = load_robot(arguments.robot)
     if "," not in arguments.place:
-        raise InputError(f"place {arguments.place!r}; write X,Y, for example 3,1.5")
-    (place,), scale = read_places([arguments.place], arguments.unit, robot)
-    space = read_free_space(arguments.keep_out, arguments.walls, scale, robot)
+        raise InputError(f"place {arguments.place!r}; write X,Y, for example 30cm,15cm")
+    (place,) = read_places([arguments.place], arguments.unit, robot)
+    space = read_free_space(arguments.keep_out, arguments.walls, arguments.unit, robot)
     tracked, request = vehicle_and_request(arguments, robot)
     with progress_bar() as progress:
         result = hold(

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from planner.command_line import DWELLS, TABLE, request_of, table_of
+from planner.command_line import DWELLS, TABLE, length_of, request_of, table_of
 from planner.job_commands import Job
-from planner.paths.units import UNITS, in_tails
-from sim.io.commands import argument, out
-from sim.io.errors import InputError
+from sim.io.commands import UNIT, argument, out
+from sim.io.errors import naming
 
 
 def _write(arguments: Namespace) -> None:
@@ -20,22 +19,20 @@ def _write(arguments: Namespace) -> None:
     from sim.inputs import load_robot
 
     robot = load_robot(arguments.robot)
-    unit = in_tails(arguments.unit or "l", robot) * robot.tail_length
     paths = []
     for name in arguments.path:
-        drawing = read_path(name)
-        if drawing.unit is not None and arguments.unit is not None:
-            raise InputError(f"--unit {arguments.unit}: {name} has a size of its own; leave --unit out")
-        paths.append(NamedPath(_short(name), drawing.path.scaled(unit if drawing.unit is None else drawing.unit)))
+        with naming(name):
+            path = read_path(name).in_tails(robot, arguments.unit).scaled(robot.tail_length)
+        paths.append(NamedPath(_short(name), path))
     knowledge = read_knowledge(arguments.robot)
     page = write_page(
         arguments.out,
         robot,
         table_of(arguments, robot, knowledge),
-        request_of(arguments),
+        request_of(arguments, robot),
         knowledge=knowledge,
         paths=paths,
-        smooth=arguments.smooth,
+        smooth=length_of(arguments, "smooth", robot),
         title=arguments.title or TITLE,
     )
     print(f"{page.stat().st_size / 1e6:.2f} MB, opens in a browser -> {page}")
@@ -59,10 +56,10 @@ PAGE = Job(
                  help="robot.toml or the name of a preset (default: paper-control)"),
         *TABLE,
         argument("--path", action="append", default=[], metavar="PATH",
-                 help="a path that the page offers: CSV, SVG, or a shape such as circle:2; may be given again"),
-        argument("--unit", choices=("l", *UNITS), help="unit of the paths' numbers (default: tail lengths)"),
+                 help="a path that the page offers: CSV, SVG, or a shape such as circle:20cm; may be given again"),
+        UNIT,
         argument("--title", help="title of the page"),
-        argument("--smooth", type=float, help="smooth drawn strokes over this length, in tail lengths"),
+        argument("--smooth", metavar="LENGTH", help="smooth drawn strokes over this length, such as 1cm"),
         argument("--point", default="head_centre", choices=("head_centre", "head_tip", "pivot"),
                  help="which point follows the path at first (default: head_centre)"),
         argument("--corner", default="nearest", choices=("nearest", "minimax", "fillet", "error"),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from planner.command_line import TABLE, say_job
 from planner.job_commands import Job
-from planner.paths.units import in_tails
+from planner.paths.units import read_length, read_pose
 from sim.io.commands import ROBOT, Argument, argument, out
 from sim.io.errors import InputError, naming
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from planner.planning.planned import Plan
     from planner.tracking.tracker import Tracker
 
-START = argument("--start", nargs=3, type=float, metavar=("X", "Y", "DEGREES"),
-                 help="of the head's centre, at rest, in --unit; the robot finds its way to the path from there "
+START = argument("--start", nargs=3, metavar=("X", "Y", "DEGREES"),
+                 help="of the head's centre, at rest; the robot finds its way to the path from there "
                  "(default: a path's start; the first pose that comes in, for a saved plan)")  # fmt: skip
 POSES = (
-    argument("--noise", type=float, default=0.01, help="standard deviation of x and y, in tail lengths"),
+    argument("--noise", metavar="LENGTH", default="0.01l", help="standard deviation of x and y (default: 0.01l)"),
     argument("--noise-rad", type=float, default=0.01, help="standard deviation of the heading"),
     argument("--latency", type=float, default=0.0, help="age of a pose when it comes in, in seconds"),
 )
@@ -43,9 +43,8 @@ def track(arguments: Namespace, planned: Callable[[Namespace], Plan], planning: 
     from planner.tracking.pipe import answers
     from planner.tracking.tracker import Tracker
 
-    for name in ("noise", "noise_rad"):
-        if not 0 < getattr(arguments, name) < math.inf:
-            raise InputError(f"--{name.replace('_', '-')} {getattr(arguments, name)}; give a number above 0")
+    if not 0 < arguments.noise_rad < math.inf:
+        raise InputError(f"--noise-rad {arguments.noise_rad}; give a number above 0")
     if not 0 <= arguments.latency < math.inf:
         raise InputError(f"--latency {arguments.latency}; give a number of seconds, 0 or more")
     if isinstance(sys.stdin, TextIOWrapper):  # a damaged line must not end the tracker
@@ -61,25 +60,18 @@ def track(arguments: Namespace, planned: Callable[[Namespace], Plan], planning: 
             plan = planned(arguments)
     robot = plan.robot
     scale = robot.time_scale
-    latency, noise = arguments.latency / scale, (arguments.noise, arguments.noise_rad)
+    latency = arguments.latency / scale
+    noise = (read_length(arguments.noise, arguments.unit, robot, "--noise", above_zero=True), arguments.noise_rad)
 
     def begin(pose: tuple[float, float, float], now: float) -> Tracker:
         return Tracker(plan, noise=noise, latency=latency, begin=now, start=pose)
 
     if arguments.start is not None:
-        tracker: Tracker | None = begin(_pose(arguments.start, in_tails(arguments.unit or "l", robot)), 0.0)
+        tracker: Tracker | None = begin(read_pose(arguments.start, arguments.unit, robot, "--start"), 0.0)
     else:
         tracker = None if saved else Tracker(plan, noise=noise, latency=latency)
     for answer in answers(tracker, sys.stdin, robot, begin):
         print(answer, flush=True)
-
-
-def _pose(words: Sequence[float], unit: float) -> tuple[float, float, float]:
-    """Return the pose that --start gives, in tail lengths and rad."""
-    x, y, degrees = words
-    if not all(map(math.isfinite, words)):
-        raise InputError(f"--start {x:g} {y:g} {degrees:g}; give finite numbers")
-    return unit * x, unit * y, math.radians(math.remainder(degrees, 360))
 
 
 def saved_plan(arguments: Namespace, path: str) -> Plan:

@@ -66,9 +66,9 @@ class Case:
 
 
 CASES = (
-    Case("circle", "paper-control", "circle:1.5"),
-    Case("square", "paper-control", "square:3"),
-    Case("triangle", "paper-triangle", "triangle:4"),
+    Case("circle", "paper-control", "circle:1.5l"),
+    Case("square", "paper-control", "square:3l"),
+    Case("triangle", "paper-triangle", "triangle:4l"),
 )
 # The robot behind the two tables; calibration starts from the paper's coefficients.
 HIDDEN = {"C_t": 3.1, "C_r": 2.4, "C_yr": 4.4}

@@ -334,7 +334,7 @@ def _add_own_robot(page: Page, folder: Path) -> None:
     page.commands(
         [
             "softflagella sim robot paper-control --out robot.toml",
-            "softflagella plan square:30 --unit cm --robot robot.toml --out plan",
+            "softflagella plan square:30l --unit cm --robot robot.toml --out plan",
             "softflagella replay plan/plan.json --out track.csv",
         ]
     )

@@ -45,7 +45,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pd.DataFrame([{**groups, "omega_bar": speed} for speed in (8.0, -12.0)]).to_csv(
         folder / "points.csv", index=False
     )
-    done("planner", "plan", "circle:1.5", "--robot", folder / "robot.toml", "--out", folder / "plan")
+    done("planner", "plan", "circle:1.5l", "--robot", folder / "robot.toml", "--out", folder / "plan")
     done("sim", "replay", folder / "plan" / "plan.json", "--out", folder / "track.csv")
     (folder / "sweep.toml").write_text(SMALL)
     done("dataset", "build", "--config", folder / "sweep.toml", "--out", folder / "sweep", "--jobs", 1)
@@ -93,8 +93,8 @@ def film(made: Path, out: Path) -> str:
 
 
 def page(made: Path, out: Path) -> str:
-    done("planner", "page", "--robot", made / "robot.toml", "--path", "circle:2", "--out", out / "page.html")
-    assert "circle:2" in (out / "page.html").read_text()
+    done("planner", "page", "--robot", made / "robot.toml", "--path", "circle:2l", "--out", out / "page.html")
+    assert "circle:2l" in (out / "page.html").read_text()
     return "opens in a browser"
 
 
@@ -171,7 +171,7 @@ def errors(made: Path, out: Path) -> str:
 
 def own_table(made: Path, out: Path) -> str:
     done("surrogate", "robot", made / "robot.toml", "--out", out / "table.json")
-    done("planner", "plan", "circle:1.5", "--robot", made / "robot.toml", "--model", out / "table.json",
+    done("planner", "plan", "circle:1.5l", "--robot", made / "robot.toml", "--model", out / "table.json",
          "--out", out / "plan")  # fmt: skip
     assert len(load_plan(out / "plan" / "plan.json")["dwell_bar"]) > 20
     return "largest error"
@@ -184,14 +184,14 @@ def export(made: Path, out: Path) -> str:
 
 
 def plan(made: Path, out: Path) -> str:
-    done("planner", "plan", "square:3", "--robot", made / "robot.toml", "--out", out / "plan")
+    done("planner", "plan", "square:3l", "--robot", made / "robot.toml", "--out", out / "plan")
     written = {path.name for path in (out / "plan").iterdir()}
     assert written == {"plan.json", "plan.csv", "plan.svg", "schedule.h", "tracker.h"}
     return "of the declared path"
 
 
 def follow(made: Path, out: Path) -> str:
-    words = ["planner", "track", "circle:1.5", "--robot", made / "robot.toml"]
+    words = ["planner", "track", "circle:1.5l", "--robot", made / "robot.toml"]
     answer = subprocess.run(
         [sys.executable, "-m", "softflagella", *map(str, words)],
         input="0\n0.5 0 0 0\n", capture_output=True, text=True, check=True, timeout=LIMIT,
@@ -205,7 +205,7 @@ def follow(made: Path, out: Path) -> str:
 
 
 def goal(made: Path, out: Path) -> str:
-    words = ["--robot", made / "robot.toml", "--goal", 3, 1, 90, "--keep-out", "circle:1.5,3,0.5"]
+    words = ["--robot", made / "robot.toml", "--goal", "3l", "1l", 90, "--keep-out", "circle:1.5l,3l,0.5l"]
     done("planner", "goal", *words, "--out", out / "trip")
     written = {path.name for path in (out / "trip").iterdir()}
     assert written == {"plan.json", "plan.csv", "plan.svg", "schedule.h", "tracker.h", "goal.json", "goal.svg"}
@@ -216,7 +216,7 @@ def goal(made: Path, out: Path) -> str:
 
 
 def tour(made: Path, out: Path) -> str:
-    done("planner", "tour", "0,0", "3,0", "1,2", "--robot", made / "robot.toml", "--out", out / "tour")
+    done("planner", "tour", "0,0", "3l,0", "1l,2l", "--robot", made / "robot.toml", "--out", out / "tour")
     written = {path.name for path in (out / "tour").iterdir()}
     assert written == {"plan.json", "plan.csv", "plan.svg", "schedule.h", "tracker.h", "tour.json", "tour.svg"}
     assert json.loads((out / "tour" / "tour.json").read_text())["order"][0] == 0
@@ -225,7 +225,7 @@ def tour(made: Path, out: Path) -> str:
 
 def cover(made: Path, out: Path) -> str:
     (out / "tank.csv").write_text("x,y\n0,0\n3,0\n3,2\n0,2\n")
-    words = [out / "tank.csv", "--width", "0.6", "--robot", made / "robot.toml"]
+    words = [out / "tank.csv", "--unit", "l", "--width", "0.6", "--robot", made / "robot.toml"]
     done("planner", "cover", *words, "--out", out / "swept")
     written = {path.name for path in (out / "swept").iterdir()}
     assert {"plan.json", "plan.csv", "plan.svg", "schedule.h", "tracker.h"} < written
@@ -233,7 +233,7 @@ def cover(made: Path, out: Path) -> str:
 
 
 def hold(made: Path, out: Path) -> str:
-    done("planner", "hold", "2,1", "--for", "10min", "--robot", made / "robot.toml", "--out", out / "held")
+    done("planner", "hold", "2l,1l", "--for", "10min", "--robot", made / "robot.toml", "--out", out / "held")
     written = {path.name for path in (out / "held").iterdir()}
     assert written == {"plan.json", "plan.csv", "plan.svg", "schedule.h", "tracker.h", "hold.json", "hold.svg"}
     return "no schedule stays nearer"

@@ -94,6 +94,8 @@ def test_any_table_of_a_path(
         "planner",
         "plan",
         tmp_path / "path.csv",
+        "--unit",
+        "l",
         "--robot",
         "paper-control",
         "--out",

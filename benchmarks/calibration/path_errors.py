@@ -34,7 +34,7 @@ HIDDEN = (
 
 def main(robots: str = "8", first: str = "0") -> None:
     given = PRESETS["paper-measured"]
-    wanted = wanted_paths(["square:3"], given)
+    wanted = wanted_paths(["square:3l"], given)
     print(
         "distance from a square of side 3 l [l]: rms, and at the end; stated: the distance within which 95 % stay"
     )

@@ -62,7 +62,7 @@ def main(*words: str) -> None:
     print(f"{'processor time [s]':20}{'command':>9}{'imports':>9}{'loading':>9}{'answer':>9}")
     with TemporaryDirectory() as folder:
         commands = {
-            "plan circle:1.5": (["plan", "circle:1.5", "--robot", "paper-control", "--out", folder], _PLAN),
+            "plan circle:1.5l": (["plan", "circle:1.5l", "--robot", "paper-control", "--out", folder], _PLAN),
             "steady": (["steady", "paper-control"], _STEADY),
             "query": (["query", "paper-control"], _QUERY),
         }

@@ -36,14 +36,14 @@ from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from sim.arrays import Floats
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 from sim.io.units import format_length
 from sim.model.robot import Robot
 from surrogate.one_robot.tabulate import tabulate
 
 Model = Literal["as_given", "corrected"]
 WORDS: dict[Model, str] = {"as_given": "the robot as given", "corrected": "the corrected robot"}
-DEFAULT_PATHS = ("square:3",)  # of the command
+DEFAULT_PATHS = ("square:3l",)  # of the command
 _INTERVAL = (0.025, 0.975)
 
 
@@ -111,21 +111,22 @@ class PathError:
         return record | {"refused": list(self.refusals)}
 
 
-def wanted_paths(words: Sequence[str], robot: Robot) -> tuple[WantedPath, ...]:
+def wanted_paths(words: Sequence[str], robot: Robot, unit: str | None = None) -> tuple[WantedPath, ...]:
     """Read the paths on which the error is asked for.
 
     Args:
-        words: files or shapes, as for `planner.paths.path_files.read_path`; numbers without a unit are in l.
+        words: files or shapes, as for `planner.paths.path_files.read_path`.
         robot: as given.
+        unit: of numbers without one.
 
     Raises:
-        InputError: there is no such file or shape, or it has no path.
+        InputError: there is no such file or shape, or it has no path or no unit.
     """
-    drawings = [(each, read_path(each)) for each in dict.fromkeys(words)]
-    return tuple(
-        WantedPath(each, drawing.path.scaled(1.0 if drawing.unit is None else drawing.unit / robot.tail_length))
-        for each, drawing in drawings
-    )
+    wanted = []
+    for each in dict.fromkeys(words):
+        with naming(each):
+            wanted.append(WantedPath(each, read_path(each).in_tails(robot, unit)))
+    return tuple(wanted)
 
 
 def path_errors(

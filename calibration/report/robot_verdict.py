@@ -117,6 +117,7 @@ def calibrate_robot(
     own: Owned | None = None,
     laws: bool = True,
     paths: Sequence[str] = (),
+    unit: str | None = None,
     seed: int = 0,
     jobs: int | None = None,
     progress: bool = True,
@@ -130,7 +131,8 @@ def calibrate_robot(
         protocol: what is fitted and tested.
         own: what the lab can set in its next runs.
         laws: whether laws are looked for where no effect explains the runs, or something else could imitate it.
-        paths: files or shapes, such as square:3, on which the error is stated before and after.
+        paths: files or shapes, such as square:24cm, on which the error is stated before and after.
+        unit: of paths that do not say theirs.
         seed: of the bootstrap.
         jobs: threads; default all processors.
         progress: show progress bars.
@@ -140,7 +142,7 @@ def calibrate_robot(
         InputError: the table or a path cannot be used.
     """
     check_given(robot)
-    wanted = wanted_paths(paths, robot)
+    wanted = wanted_paths(paths, robot, unit)
     data = read_measurements(table)
     for line in data.converted:
         tell(line)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from calibration.verdict.verdict import DISAGREES, Verdict
 
-_PLAN = "Plan with the corrected robot: `softflagella plan square:3 --robot corrected.toml --out plan`."
+_PLAN = "Plan with the corrected robot: `softflagella plan square:3l --robot corrected.toml --out plan`."
 _NEW_SESSION = "add the new runs to the table with a session of their own (column `session`)"
 
 

@@ -25,10 +25,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from planner.files.job_files import read_length
 from planner.files.plan_files import EXTRA, FILES, write_plan_files
 from planner.jobs.fleet_plan import FleetPlan
-from planner.paths.units import in_tails
+from planner.paths.units import number_and_unit, read_length
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_text
 from sim.io.reading import read_json, read_toml
@@ -137,19 +136,18 @@ def _beside(folder: Path, key: str, value: Any) -> str:
 
 
 def distance_apart(words: str | float, unit: str | None, robots: Sequence[Robot]) -> float:
-    """Read a distance such as 10cm in m; a bare number has the unit given, or is in tail lengths of all robots.
+    """Read a distance such as 10cm in m.
 
     Raises:
-        InputError: the words are no length above 0, or the robots have different tail lengths.
+        InputError: the words are no length above 0 or have no unit, or the robots have different tail lengths.
     """
-    text, first = str(words).replace(" ", ""), robots[0]
-    bare = not text.endswith(("m", "l"))
-    relative = text.endswith("l") or (bare and unit in (None, "l"))
+    text, first = str(words), robots[0]
+    relative = (number_and_unit(text)[1] or unit) == "l"
     if relative and any(robot.tail_length != first.tail_length for robot in robots):
         raise InputError(
             f"distance apart {words}: the robots have different tail lengths; say its unit, as in 10cm"
         )
-    return read_length(text, in_tails(unit or "l", first), first, "distance apart") * first.tail_length
+    return read_length(text, unit, first, "distance apart", above_zero=True) * first.tail_length
 
 
 def write_fleet(fleet: FleetPlan, folder: str | Path) -> list[Path]:

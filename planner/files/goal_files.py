@@ -12,6 +12,7 @@ from planner.goal.goal_plan import GoalPlan
 from planner.paths.obstacles import Circle, FreeSpace, Polygon, Region
 from planner.paths.path_files import Drawing, read_path
 from planner.paths.shapes import like_a_shape, shape_of
+from planner.paths.units import read_length
 from sim.io.errors import InputError, naming
 from sim.io.files import files_together, write_text
 from sim.model.robot import Robot
@@ -19,23 +20,20 @@ from sim.model.robot import Robot
 _SHAPES = {"circle": "circle:X,Y,RADIUS", "box": "box:LEFT,LOW,RIGHT,HIGH"}
 
 
-def read_region(words: str, scale: float, robot: Robot) -> Region:
+def read_region(words: str, unit: str | None, robot: Robot) -> Region:
     """Read a region, in tail lengths.
 
     Args:
         words: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG with a closed outline.
-        scale: length of one unit of the numbers, in l; a drawing with physical units has its own.
+        unit: of numbers without one; a drawing with a size has its own.
         robot: its tail length.
 
     Raises:
-        InputError: the words are no region.
+        InputError: the words are no region, or a length has no unit.
     """
     shape, _, numbers = words.partition(":")
     if shape in _SHAPES and numbers:
-        try:
-            values = [scale * float(number) for number in numbers.split(",")]
-        except ValueError:
-            values = []
+        values = [read_length(number, unit, robot, words) for number in numbers.split(",")]
         if shape == "circle" and len(values) == 3:
             return Circle(*values)
         if shape == "box" and len(values) == 4:
@@ -43,9 +41,8 @@ def read_region(words: str, scale: float, robot: Robot) -> Region:
             return Polygon.of([[left, low], [right, low], [right, high], [left, high]])
         raise InputError(f"{words!r}; write {_SHAPES[shape]}")
     drawing = read_outline(words)
-    unit_length = scale if drawing.unit is None else drawing.unit / robot.tail_length
     with naming(words):
-        return Polygon.of(drawing.path.scaled(unit_length))
+        return Polygon.of(drawing.in_tails(robot, unit if drawing.unit is None else None))
 
 
 def read_outline(words: str) -> Drawing:
@@ -63,16 +60,16 @@ def read_outline(words: str) -> Drawing:
     return read_path(words, closed=True)
 
 
-def read_free_space(keep_out: Sequence[str], walls: str | None, scale: float, robot: Robot) -> FreeSpace:
+def read_free_space(keep_out: Sequence[str], walls: str | None, unit: str | None, robot: Robot) -> FreeSpace:
     """Read what a robot must keep out of, and what it must stay within; see `read_region`.
 
     Raises:
         InputError: the words are no regions, or the walls are round.
     """
-    outline = None if walls is None else read_region(walls, scale, robot)
+    outline = None if walls is None else read_region(walls, unit, robot)
     if outline is not None and not isinstance(outline, Polygon):
         raise InputError(f"--walls {walls!r}; give a box or an outline")
-    return FreeSpace(tuple(read_region(words, scale, robot) for words in keep_out), outline)
+    return FreeSpace(tuple(read_region(words, unit, robot) for words in keep_out), outline)
 
 
 def write_goal_plan(goal_plan: GoalPlan, folder: str | Path) -> list[Path]:

@@ -111,6 +111,7 @@ def controller_header(result: Plan, identity: str) -> str:
     lines = [", ".join(map(str, entries[i : i + 12])) for i in range(0, len(entries), 12)]
     body = ",\n    ".join(lines)
     x, y, heading = result.start
+    cm = 100 * result.robot.tail_length
     checkpoints = _checkpoints(result)
     places = ",\n    ".join(checkpoints)
     return f"""/* Plan {identity}.
@@ -118,8 +119,9 @@ def controller_header(result: Plan, identity: str) -> str:
  * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
  * lengthens the dwell before it. {_after(result)} Look-up table {result.tracked.model}.
 {DIRECTIONS}
- * Put the head's centre at START_X, START_Y with heading START_HEADING, at rest. Checkpoints say where it should
- * be later. x and y in tail lengths, heading in rad, counter-clockwise from the x axis, seen from above.
+ * Put the head's centre at START_X_CM, START_Y_CM with heading START_HEADING_DEG, at rest: in cm and degrees,
+ * counter-clockwise from the x axis, seen from above. START_X and START_Y are the same in tail lengths,
+ * START_HEADING in rad. Checkpoints say where it should be later, in tail lengths and rad.
  * C99 or C++11. Include it in one file only, since it holds the tables. */
 #ifndef SCHEDULE_H
 #define SCHEDULE_H
@@ -128,6 +130,9 @@ def controller_header(result: Plan, identity: str) -> str:
 #define SCHEDULE_COUNT {len(entries)}{_repeats(result)}
 #define SCHEDULE_TOTAL_MS {sum(entries)}UL
 #define SCHEDULE_MOTOR_RPM {result.robot.motor_speed * 30 / np.pi:.3f}
+#define SCHEDULE_START_X_CM {cm * x:.4f}
+#define SCHEDULE_START_Y_CM {cm * y:.4f}
+#define SCHEDULE_START_HEADING_DEG {np.degrees(heading):.3f}
 #define SCHEDULE_START_X {x:.6f}
 #define SCHEDULE_START_Y {y:.6f}
 #define SCHEDULE_START_HEADING {heading:.6f}

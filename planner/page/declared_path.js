@@ -7,7 +7,7 @@ import { general, pythonText } from "./format.js";
 import { InputError } from "./input_error.js";
 import { remedy } from "./remedy.js";
 import { reference } from "./tractrix.js";
-import { TooTightError, extent, inLab, placeInLab } from "./units.js";
+import { extent, inLab, placeInLab } from "./units.js";
 import { pivotRadius, turnRadius } from "./vehicle.js";
 
 const CORNERS = ["nearest", "minimax", "fillet", "error"];
@@ -29,7 +29,7 @@ function declare(raw, feasibility, progress = null) {
     throw new InputError(`a time weight needs corner = nearest or minimax, not ${corner}`, "options");
   }
   const accepted = feasible(raw, feasibility, progress);
-  if (accepted === null) throw new TooTightError(tooTight(raw, feasibility, progress));
+  if (accepted === null) throw new InputError(tooTight(raw, feasibility, progress));
   const { reference: followed, offDrawn, missed } = accepted, warnings = [];
   const distance = Math.max(offDrawn, missed), size = Math.max(...extent(raw));
   if (distance > WARN * size) {

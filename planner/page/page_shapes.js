@@ -1,21 +1,24 @@
-/* Shapes that the page offers besides those in words: a figure of eight and a wave. Any unit of length. */
+/* Shapes that the page offers. Any unit of length. */
 import { InputError } from "./input_error.js";
-import { pathOf } from "./path.js";
-import { SHAPES, nearestShape, shapeOf } from "./shapes.js";
+import { circle, pathOf, polygon } from "./path.js";
 
 const POINTS = 400;
 const WAVES = 2;
 const HEIGHT = 0.12; // of a wave, over its length, to each side
 
-/* Make the shape of a name and a size: words of the command line, such as polygon:6, or eight, or wave. */
+const SHAPES = {
+  circle,
+  eight,
+  wave,
+  triangle: (side) => polygon(3, side),
+  square: (side) => polygon(4, side),
+  "polygon:6": (side) => polygon(6, side),
+};
+
+/* Make the shape of a name and a size. */
 function pageShape(name, size) {
   if (!(size > 0 && size < Infinity)) throw new InputError(`${name}: its size must be above 0`);
-  if (name === "eight") return eight(size);
-  if (name === "wave") return wave(size);
-  const words = `${name}:${size}`, path = shapeOf(words);
-  if (path) return path;
-  const near = nearestShape(words);
-  throw new InputError(`${words}: no such shape; ${near && `is it ${near}? `}shapes are ${SHAPES}, eight, wave`);
+  return SHAPES[name](size);
 }
 
 /* The lemniscate of Gerono, of a width. */

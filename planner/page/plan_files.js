@@ -55,15 +55,16 @@ function milliseconds(seconds) {
 function controllerHeader(plan, id, { directions, flash, schedule }) {
   const { robot, model } = plan.tracked, seconds = planSeconds(plan), entries = milliseconds(seconds), lines = [];
   for (let i = 0; i < entries.length; i += A_LINE) lines.push(entries.slice(i, i + A_LINE).join(", "));
-  const [x, y, heading] = plan.switches.poses[0].map((value) => fixed(value, 6));
+  const [x, y, heading] = plan.switches.poses[0], cm = 100 * robot.tailLength;
   const places = checkpoints(plan, seconds), total = entries.reduce((some, entry) => some + entry, 0);
   return `/* Plan ${id}.
  * Motor schedule for robot "${safeName(robot)}": turn in FIRST_DIRECTION for the first entry,
  * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
  * lengthens the dwell before it. Stop after the last entry. Look-up table ${model}.
 ${directions}
- * Put the head's centre at START_X, START_Y with heading START_HEADING, at rest. Checkpoints say where it should
- * be later. x and y in tail lengths, heading in rad, counter-clockwise from the x axis, seen from above.
+ * Put the head's centre at START_X_CM, START_Y_CM with heading START_HEADING_DEG, at rest: in cm and degrees,
+ * counter-clockwise from the x axis, seen from above. START_X and START_Y are the same in tail lengths,
+ * START_HEADING in rad. Checkpoints say where it should be later, in tail lengths and rad.
  * C99 or C++11. Include it in one file only, since it holds the tables. */
 #ifndef SCHEDULE_H
 #define SCHEDULE_H
@@ -72,9 +73,12 @@ ${directions}
 #define SCHEDULE_COUNT ${entries.length}
 #define SCHEDULE_TOTAL_MS ${total}UL
 #define SCHEDULE_MOTOR_RPM ${fixed((robot.motorSpeed * 30) / Math.PI, 3)}
-#define SCHEDULE_START_X ${x}
-#define SCHEDULE_START_Y ${y}
-#define SCHEDULE_START_HEADING ${heading}
+#define SCHEDULE_START_X_CM ${fixed(cm * x, 4)}
+#define SCHEDULE_START_Y_CM ${fixed(cm * y, 4)}
+#define SCHEDULE_START_HEADING_DEG ${fixed((180 / Math.PI) * heading, 3)}
+#define SCHEDULE_START_X ${fixed(x, 6)}
+#define SCHEDULE_START_Y ${fixed(y, 6)}
+#define SCHEDULE_START_HEADING ${fixed(heading, 6)}
 #define SCHEDULE_CHECKPOINTS ${places.length}
 
 ${flash}

@@ -26,7 +26,7 @@ function remedy(raw, feasibility, progress = null) {
     return (
       `it looks noisy: smoothed over ${inLab(smooth.length, robot)} it is ` +
       `${inLab(pathLength(smooth.path), robot)} long, not ${inLab(pathLength(raw), robot)}, and moves by up to ` +
-      `${inLab(smooth.moved, robot)}; give --smooth ${general(smooth.length)}`
+      `${inLab(smooth.moved, robot)}; give --smooth ${general(smooth.length)}l`
     );
   }
   const scale = search.scale(raw);
@@ -37,7 +37,7 @@ function remedy(raw, feasibility, progress = null) {
   }
   return (
     `smooth it over ${inLab(smooth.length, robot)}, which moves it by up to ${inLab(smooth.moved, robot)}: give ` +
-    `--smooth ${general(smooth.length)}`
+    `--smooth ${general(smooth.length)}l`
   );
 }
 

@@ -20,7 +20,6 @@ import { inflated, readData } from "./table_data.js";
 import { openFile } from "./open_file.js";
 import { comparedRuns } from "./compared_runs.js";
 import { comparedTrack } from "./compared_track.js";
-import { hintingAtUnits } from "./units.js";
 
 const STROKE = 60; // a drawn stroke is smoothed over this part of its length
 const TRADED = 10; // dwells of the trade-off
@@ -53,9 +52,7 @@ async function service(data) {
       cm = 100 * swims.robot.tailLength;
     const drawn = inTails(drawnPath(wish.path), cm);
     const request = requestOf(wish.options, cm);
-    const plan = hintingAtUnits(drawn, swims.robot, turnRadius(swims.vehicle), [], () =>
-      makePlan(drawn, swims, request, progress),
-    );
+    const plan = makePlan(drawn, swims, request, progress);
     last = { key, plan };
     return plan;
   }

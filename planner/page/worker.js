@@ -22,7 +22,7 @@ async function answerTo({ id, what, content }) {
   try {
     postMessage({ id, answer: await (await answers)[what](content, progress) });
   } catch (error) {
-    const refused = error.name === "InputError" || error.name === "TooTightError";
+    const refused = error.name === "InputError";
     postMessage({
       id,
       refusal: refused ? error.message : "this cannot be planned",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,9 +12,11 @@ import numpy as np
 from planner.paths.path import Path2D
 from planner.paths.shapes import SHAPES, like_a_shape, nearest_shape, shape_of
 from planner.paths.svg_drawing import read_svg
+from planner.paths.units import NO_UNIT, in_tails
 from sim.arrays import Floats
 from sim.io.errors import InputError, naming
 from sim.io.units import split, to_si
+from sim.model.robot import Robot
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,25 +24,49 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A path, and the size of its unit in metres if the file has physical units.
+    """A path, and its unit, if the file has one.
 
     Example:
         >>> from softflagella import Drawing, load_robot, plan, polygon
         >>> robot = load_robot("paper-control")
-        >>> square = Drawing(polygon(4, side=33.0), unit=0.01)  # a side of 33 cm
+        >>> square = Drawing(polygon(4, side=33.0), unit="cm")  # a side of 33 cm
         >>> round(plan(square, robot).drawn.length, 9)  # four sides of three tail lengths
         12.0
     """
 
     path: Path2D  # in the unit of the file
-    unit: float | None  # [m]; None: the numbers have no unit
+    unit: float | str | None  # its size in m, or "m", "cm", "mm", "l"; None: the numbers have no unit
+
+    def in_tails(self, robot: Robot, unit: str | None = None) -> Path2D:
+        """Return the path in tail lengths of a robot.
+
+        Args:
+            robot: its tail length.
+            unit: of numbers that have none; one of their own must agree with it.
+
+        Raises:
+            InputError: there is no unit, or there are two.
+        """
+        if self.unit is None and unit is None:
+            raise InputError(NO_UNIT)
+        given, own = (
+            in_tails(each, robot) if isinstance(each, str) else each and each / robot.tail_length
+            for each in (unit, self.unit)
+        )
+        if given and own and not math.isclose(given, own):
+            metres = self.path.length * own * robot.tail_length
+            raise InputError(
+                f"--unit {unit}: it has a size of its own, it is {metres:.3g} m long; leave --unit out"
+            )
+        return self.path.scaled(own or given or 1.0)
 
 
 def read_path(source: str | Path, *, closed: bool | None = None, shape: str | None = None) -> Drawing:
     """Read a path from a table with columns x, y (or x_mm, y_mm and so on), from an SVG file, or from words.
 
     Args:
-        source: the file, or a shape: circle:RADIUS, square:SIDE, triangle:SIDE or polygon:CORNERS:SIDE.
+        source: the file, or a shape: circle:RADIUS, square:SIDE, triangle:SIDE or polygon:CORNERS:SIDE, with the
+            unit of its size, as in square:24cm or square:3l.
         closed: join the end to the start; by default as in the file.
         shape: name of the path, for an SVG with several; without it the error message lists the names.
 
@@ -58,7 +85,7 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
     words = str(source)
     path = shape_of(words)
     if path is not None:
-        return Drawing(path, None)
+        return Drawing(*path)
     if like_a_shape(words) and not Path(source).exists():
         near = nearest_shape(words)
         raise InputError(f"{words}: no such file or shape; {f'is it {near}? ' if near else ''}shapes are {SHAPES}")

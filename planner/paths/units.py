@@ -1,31 +1,29 @@
 """Lengths in the units of a laboratory, and paths whose size makes no sense for a robot.
 
-A message gives lengths in mm, cm or m first and in tail lengths l second.
+Every length of a command has a unit: its own, as in 24cm and 3l, or that of --unit. A message gives lengths in mm,
+cm or m first and in tail lengths l second.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from sim.io.errors import InputError
-from sim.io.units import format_length, format_time, of_kind, to_si
+from sim.io.units import LENGTHS, format_length, format_time, of_kind, to_si
 
-if TYPE_CHECKING:  # the command needs UNITS before it loads NumPy
+if TYPE_CHECKING:  # the command needs them before it loads NumPy
     from planner.paths.path import Path2D
     from sim.model.robot import Robot
 
-UNITS = ("m", "cm", "mm")
-ANY_UNIT = ("l", *UNITS)
 LONGEST = 12_000.0  # l
 SMALLEST = 0.25  # of the radius of the robot's circle, largest extent of a path
-MOST_CIRCLES = 30.0  # of the robot, across a path whose unit is not stated
-MOST_SECONDS = 4 * 3600.0  # that such a path may take
-_LITTLE = 2.0  # turn radii across: a path whose unit may be wrong
-_SENSIBLE = (3.0, 300.0)  # length in l
+NO_UNIT = (
+    "its lengths have no unit; write it behind them, 24cm or 3l (tail lengths), name columns x_cm and y_cm, or "
+    'give --unit cm (in Python unit="cm")'
+)
 
 
 def in_lab(value: float, robot: Robot) -> str:
@@ -91,8 +89,60 @@ def describe(path: Path2D, robot: Robot) -> str:
 
 
 def in_tails(unit: str, robot: Robot) -> float:
-    """Convert a unit of length to tail lengths; l is the tail length itself."""
+    """Convert a unit of length to tail lengths; l is the tail length itself.
+
+    Raises:
+        InputError: there is no such unit.
+    """
+    if unit not in LENGTHS:
+        raise InputError(f"unit {unit!r}; allowed are {', '.join(LENGTHS)}")
     return 1.0 if unit == "l" else to_si(1.0, unit) / robot.tail_length
+
+
+def number_and_unit(words: str) -> tuple[float, str | None]:
+    """Split a length: 24cm into 24.0 and cm, 3 into 3.0 and None; what is no number into nan."""
+    text = words.strip()
+    unit = next((unit for unit in reversed(LENGTHS) if text.endswith(unit)), None)
+    try:
+        return float(text.removesuffix(unit or "")), unit
+    except ValueError:
+        return math.nan, unit
+
+
+def read_length(words: str, unit: str | None, robot: Robot, name: str, *, above_zero: bool = False) -> float:
+    """Read a length, in tail lengths.
+
+    Args:
+        words: a number with its unit, such as 4cm or 0.3l; a number alone is in `unit`. Zero needs no unit.
+        unit: of numbers alone; None: they are refused.
+        robot: its tail length.
+        name: with which a message begins.
+        above_zero: refuse 0 and less.
+
+    Raises:
+        InputError: the words are no length, or have no unit.
+    """
+    value, own = number_and_unit(words)
+    if not math.isfinite(value) or (above_zero and value <= 0):
+        raise InputError(f"{name}: {words}; write a length{' above 0' if above_zero else ''}, such as 4cm")
+    if value and not (own or unit):
+        raise InputError(
+            f"{name}: {words} has no unit; write {words}cm, or {words}l in tail lengths, or give --unit cm"
+        )
+    return value * in_tails(own or unit or "l", robot)
+
+
+def read_pose(words: Sequence[str], unit: str | None, robot: Robot, name: str) -> tuple[float, float, float]:
+    """Read a pose, in tail lengths and rad, from two lengths and an angle in degrees.
+
+    Raises:
+        InputError: the words are none, or have no unit.
+    """
+    x, y = (read_length(each, unit, robot, name) for each in words[:2])
+    try:
+        return x, y, math.radians(math.remainder(float(words[2]), 360))
+    except ValueError:
+        raise InputError(f"{name}: {words[2]}; write the heading in degrees, such as 90") from None
 
 
 def extent(path: Path2D) -> tuple[float, float]:
@@ -105,82 +155,12 @@ def check_size(path: Path2D, robot: Robot, turn_radius: float) -> None:
     """Refuse a path that no schedule can be meant for.
 
     Raises:
-        InputError: the path is far too long or too small; the message names a unit that would make sense.
+        InputError: the path is far too long or too small.
     """
     if path.length > LONGEST:
-        raise InputError(f"the path is {describe(path, robot)}; at most {LONGEST:g} l can be planned"
-                         f"{_remedy(path, robot, ANY_UNIT)}")  # fmt: skip
+        raise InputError(f"the path is {describe(path, robot)}; at most {LONGEST:g} l can be planned; scale it")
     if max(extent(path)) < SMALLEST * turn_radius:
         raise InputError(
             f"the path is {describe(path, robot)}: too small, the robot's circle has a radius of "
-            f"{in_lab(turn_radius, robot)}{_remedy(path, robot, ANY_UNIT)}"
+            f"{in_lab(turn_radius, robot)}; scale it"
         )
-
-
-def check_unstated_unit(path: Path2D, robot: Robot, turn_radius: float, speed: float, what: str = "path") -> None:
-    """Ask for the unit of a path that is very large if its numbers are tail lengths, which nobody said.
-
-    Args:
-        path: in tail lengths.
-        robot: its tail length and unit of time.
-        turn_radius: of the robot's circle, in l.
-        speed: net speed along a path, in l per unit of time.
-        what: what the path is, for the message.
-
-    Raises:
-        InputError: the path is more than MOST_CIRCLES circles across, or takes more than MOST_SECONDS.
-    """
-    circles = max(extent(path)) / (2 * turn_radius)
-    seconds = path.length / max(speed, 1e-9) * robot.time_scale
-    if circles > MOST_CIRCLES or seconds > MOST_SECONDS:
-        raise InputError(
-            f"the {what} is {describe(path, robot)} if its numbers are tail lengths: {circles:.0f} of the robot's "
-            f"circles across, about {format_time(seconds)}; say its unit, --unit l if this is meant"
-            f"{_remedy(path, robot, ('l',))}"
-        )
-
-
-class TooTightError(InputError):
-    """A path is too tight for a robot."""
-
-
-@contextmanager
-def hinting_at_units(path: Path2D, robot: Robot, turn_radius: float, given_in: tuple[str, ...]) -> Iterator[None]:
-    """Add advice on its unit where a path is too tight, and not much larger than the robot's circle.
-
-    Args:
-        path: in tail lengths.
-        robot: its tail length.
-        turn_radius: of the robot's circle, in l.
-        given_in: units in which the user may have given the numbers; none: the path has a size of its own.
-
-    Raises:
-        TooTightError: with the advice.
-    """
-    try:
-        yield
-    except TooTightError as refusal:
-        hint = unit_hint(path, robot, given_in) if max(extent(path)) < _LITTLE * turn_radius else ""
-        raise TooTightError(f"{refusal}; or, {hint}" if hint else str(refusal)) from None
-
-
-def unit_hint(path: Path2D, robot: Robot, given_in: tuple[str, ...]) -> str:
-    """Suggest at most two units with which the numbers of a path would make sense; empty if there is none.
-
-    Args:
-        path: in tail lengths.
-        robot: its tail length.
-        given_in: units in which the user may have given the numbers; none: the path has a size of its own.
-    """
-    hints = []
-    for given in given_in:
-        for meant in ANY_UNIT:
-            length = path.length / in_tails(given, robot) * in_tails(meant, robot)
-            if given != meant and _SENSIBLE[0] <= length <= _SENSIBLE[1]:
-                hints.append(f"if you gave {given} and mean {meant}, it is {length:.3g} l: --unit {meant}")
-    return "; or ".join(hints[:2])
-
-
-def _remedy(path: Path2D, robot: Robot, given_in: tuple[str, ...]) -> str:
-    """Suggest units that would make sense, or another scale."""
-    return f"; {unit_hint(path, robot, given_in) or 'scale it'}"

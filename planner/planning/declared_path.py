@@ -16,7 +16,7 @@ import numpy as np
 
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Reference, reference
-from planner.paths.units import TooTightError, extent, in_lab, place_in_lab
+from planner.paths.units import extent, in_lab, place_in_lab
 from planner.planning.arrival import Swing
 from planner.planning.feasible import TIGHTEST, Feasibility, feasible, place_of_largest, spacing
 from planner.planning.progress import Progress
@@ -54,7 +54,7 @@ def declare(raw: Path2D, feasibility: Feasibility, progress: Progress | None = N
         raise InputError(f"a time weight needs corner = nearest or minimax, not {feasibility.corner}")
     accepted = feasible(raw, feasibility, progress)
     if accepted is None:
-        raise TooTightError(_too_tight(raw, feasibility, progress))
+        raise InputError(_too_tight(raw, feasibility, progress))
     followed, off_drawn, missed = accepted
     warnings, robot = [], feasibility.robot
     distance = max(off_drawn, missed)

@@ -40,7 +40,8 @@ def remedy(raw: Path2D, feasibility: Feasibility, progress: Progress | None = No
         length, smooth, moved = found
         return (
             f"it looks noisy: smoothed over {in_lab(length, robot)} it is {in_lab(smooth.length, robot)} long, "
-            f"not {in_lab(raw.length, robot)}, and moves by up to {in_lab(moved, robot)}; give --smooth {length:g}"
+            f"not {in_lab(raw.length, robot)}, and moves by up to {in_lab(moved, robot)}; "
+            f"give --smooth {length:g}l"
         )
     scale = search.scale(raw)
     if scale is not None:
@@ -51,7 +52,7 @@ def remedy(raw: Path2D, feasibility: Feasibility, progress: Progress | None = No
     length, _, moved = found
     return (
         f"smooth it over {in_lab(length, robot)}, which moves it by up to {in_lab(moved, robot)}: "
-        f"give --smooth {length:g}"
+        f"give --smooth {length:g}l"
     )
 
 

@@ -11,12 +11,14 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, NoReturn
 
 from sim.io.errors import InputError, run_command
+from sim.io.units import LENGTHS
 
 Run = Callable[[Namespace], None]
 
@@ -40,11 +42,18 @@ def out(what: str, **options: Any) -> Argument:
 
 ROBOT = argument("--robot", required=True, help="robot.toml or the name of a preset")
 JOBS = argument("--jobs", type=int, help="processes or threads (default: all processors)")
+UNIT = argument("--unit", choices=LENGTHS, metavar="UNIT",
+                help="of all lengths that are given without one: m, cm, mm, or l for tail lengths. 24cm and 3l, "
+                "columns x_cm and y_cm, and drawings with a size have their own")  # fmt: skip
 MODEL = argument("--model", help="look-up table (default: the one that comes with the package)")
 
 
 class Parser(ArgumentParser):
-    """A parser that refuses wrong words in one line, as all bad input is refused."""
+    """A parser that refuses wrong words in one line, as all bad input is refused; -3cm is a value, no option."""
+
+    def __init__(self, **options: Any):
+        super().__init__(**options)
+        self._negative_number_matcher = re.compile(r"-\.?\d")
 
     def error(self, message: str) -> NoReturn:
         """End with exit status 2."""

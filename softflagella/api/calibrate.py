@@ -30,6 +30,7 @@ def calibrate(
     own: Owned | None = None,
     laws: bool = True,
     paths: Sequence[str] = (),
+    unit: str | None = None,
     jobs: int | None = None,
     progress: bool = True,
 ) -> RobotVerdict:
@@ -44,8 +45,9 @@ def calibrate(
         own: what the lab can set in its next runs, such as `{"l_cm": (5, 7, 9)}`; for `N`, `l_cm` and `omega_rpm`
             (both directions). Default: the table's range.
         laws: whether laws are looked for where no effect explains the runs; it takes up to two minutes.
-        paths: files or shapes, such as `("square:3",)`, on which the error with the robot as given and with the
+        paths: files or shapes, such as `("square:24cm",)`, on which the error with the robot as given and with the
             corrected one is stated; `verdict.paths` has it.
+        unit: "m", "cm", "mm" or "l", of paths that do not say theirs.
         jobs: threads; default all processors.
         progress: show progress bars.
 

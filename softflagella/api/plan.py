@@ -25,7 +25,7 @@ from planner.jobs.tour_plan import TourPlan
 from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.path_files import Drawing, read_path
-from planner.paths.units import hinting_at_units
+from planner.paths.units import in_tails
 from planner.planning.planned import Plan
 from planner.planning.request import RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge
@@ -47,6 +47,7 @@ def plan(
     path: Path2D | Drawing | ArrayLike | str | Path,
     robot: OneRobot,
     *,
+    unit: str | None = None,
     lookup: LookupTable | None = None,
     own_table: bool = False,
     knowledge: CalibrationKnowledge | None = None,
@@ -62,8 +63,9 @@ def plan(
 
     Args:
         path: (n, 2) points or a Path2D, lengths in tail lengths l; or what `read_path` reads, or its file; or a
-            shape in words, such as "polygon:6:3". Where a file says its unit, its lengths are converted.
+            shape in words, such as "square:24cm" or "polygon:6:3l".
         robot: the robot, its robot.toml, or the name of a preset; its motor speed is used in both directions.
+        unit: "m", "cm", "mm" or "l", of lengths of the path that do not say theirs.
         lookup: trained table, or the table of this one robot. Default: the one that comes with the package. Where
             that one does not know the robot, the robot's own table is simulated, and kept beside its file.
         own_table: simulate the robot's own table in any case. For long paths it is the better model, since the
@@ -106,22 +108,22 @@ def plan(
         (True, True)
     """
     tracked, request = vehicle_and_request(robot, lookup, knowledge, options, own_table=own_table)
-    drawn, given_in = _in_tails(path, tracked.robot)
+    drawn = _in_tails(path, tracked.robot, unit)
     space = FreeSpace.of(keep_out, walls)
-    with hinting_at_units(drawn, tracked.robot, tracked.vehicle.turn_radius, given_in):
-        return plan_path(
-            drawn, tracked, request, space, arrive_seconds, loop=loop, feedback=feedback, progress=progress
-        )
+    return plan_path(
+        drawn, tracked, request, space, arrive_seconds, loop=loop, feedback=feedback, progress=progress
+    )
 
 
-def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot) -> tuple[Path2D, tuple[str, ...]]:
-    """Read a path where a file is given, and convert it to tail lengths; return the unit of bare numbers, too."""
-    drawing = read_path(path) if isinstance(path, str | Path) else path
-    if not isinstance(drawing, Drawing):
-        return drawing if isinstance(drawing, Path2D) else Path2D.of(drawing), ("l",)
-    if drawing.unit is None:
-        return drawing.path, ("l",)
-    return drawing.path.scaled(drawing.unit / robot.tail_length), ()
+def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot, unit: str | None) -> Path2D:
+    """Read a path where a file is given, and convert it to tail lengths."""
+    if isinstance(path, str | Path):
+        with naming(path):
+            return read_path(path).in_tails(robot, unit)
+    if isinstance(path, Drawing):
+        return path.in_tails(robot, unit)
+    drawn = path if isinstance(path, Path2D) else Path2D.of(path)
+    return drawn if unit is None else drawn.scaled(in_tails(unit, robot))
 
 
 def check(

@@ -34,7 +34,6 @@ from planner.files.plan_json import load_plan
 from planner.files.saved_plan import restore_plan
 from planner.files.tracking_error import tracking_error
 from planner.paths.path_files import read_path
-from planner.paths.units import in_tails
 from planner.tracking.tracker import Tracker
 from planner.vehicle.calibration_table import read_knowledge
 from planner.vehicle.from_table import default_table
@@ -287,7 +286,7 @@ FORMATS: dict[str, FileFormat] = {
     "drawing": FileFormat(file("path.svg", lambda: SVG), _read_path, SVG_TOKENS),
     "region": FileFormat(
         file("region.csv", lambda: text({"x": [0, 1, 1, 0], "y": [0, 0, 1, 1]})),
-        lambda path: read_region(str(path), in_tails("cm", ROBOT), ROBOT), TABLE,
+        lambda path: read_region(str(path), "cm", ROBOT), TABLE,
     ),
     "plan": FileFormat(file("plan.json", plan_file), _read_plan, JSON),
     "plan to track": FileFormat(file("plan.json", plan_file), _read_saved_plan, JSON),

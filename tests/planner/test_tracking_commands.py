@@ -47,13 +47,17 @@ def test_a_saved_plan_gives_the_orders_of_the_plan_in_memory(
     tracker = Tracker(plan(circle(2.0), ROBOT), start=POSE)
     pose = f"{POSE[0]} {POSE[1]} {POSE[2]}"
     start = [str(cm * POSE[0]), str(cm * POSE[1]), str(math.degrees(POSE[2]))]
+    in_l = [f"{x}l" for x in POSE[:2]]
     commands = [tracker.command, tracker.update(1.0 / scale), tracker.update(2.0 / scale, (0.31, -2.49, 1.01))]
     expected = [[command.direction, command.flip_at * scale] for command in commands]
     later = "1\n2 0.31 -2.49 1.01\n"
     for words, lines in (
         ([str(folder / "plan.json")], f"0 {pose}\n{later}"),
         ([str(folder), "--start", *start, "--unit", "cm"], f"0\n{later}"),
-        (["circle:2", "--robot", "paper-control", "--start", *map(str, POSE[:2]), start[2]], f"0\n{later}"),
+        (
+            ["circle:2l", "--robot", "paper-control", "--start", *in_l, start[2]],
+            f"0\n{later}",
+        ),
     ):
         answers = [[float(word) for word in line.split()[:2]] for line in told(words, lines, monkeypatch, capsys)]
         assert answers == [pytest.approx(order, abs=1e-4) for order in expected]
@@ -76,9 +80,9 @@ def test_a_goal_trip_is_tracked_from_its_goal_json(
         (["{}", "--robot", "paper-control"], "--robot: {} is planned already"),
         (["{}", "--keep-out", "circle:0,0,1"], "--keep-out: {} is planned already"),
         (["{}", "--closed"], "--closed: {} is planned already"),
-        (["{}", "--start", "0", "inf", "0"], "--start 0 inf 0; give finite numbers"),
-        (["{}", "--noise", "0"], "--noise 0.0; give a number above 0"),
-        (["circle:2"], "circle:2 is no saved plan, so --robot is needed"),
+        (["{}", "--start", "0", "inf", "0"], "--start: inf; write a length"),
+        (["{}", "--noise", "0"], "--noise: 0; write a length above 0"),
+        (["circle:2l"], "circle:2l is no saved plan, so --robot is needed"),
         (["{}/tour.json"], "tour.json"),
     ],
 )

@@ -66,8 +66,8 @@ def test_a_word_that_is_no_command_is_told_which_one_is_meant(
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["plan", "square:3"], "required: --robot, --out; softflagella plan --help"),
-        (["plan", "square:3", "--robot", "r", "--out", "o", "--objective", "speed"], "invalid choice: 'speed'"),
+        (["plan", "square:3l"], "required: --robot, --out; softflagella plan --help"),
+        (["plan", "square:3l", "--robot", "r", "--out", "o", "--objective", "speed"], "invalid choice: 'speed'"),
         (["planner", "goal", "--goal", "3", "0"], "expected 3 arguments; softflagella planner goal --help"),
         (["planner", "fly"], "invalid choice: 'fly'"),
         (["sim"], "required: COMMAND; softflagella sim --help"),

@@ -31,7 +31,7 @@ def loaded(code: str, *words: str, slow: tuple[str, ...] = (*SLOW, *TABLES)) -> 
 
 @pytest.mark.parametrize(
     "words",
-    [("query", "paper-control"), ("steady", "paper-control"), ("plan", "circle:1.5", "--robot", "paper-control")],
+    [("query", "paper-control"), ("steady", "paper-control"), ("plan", "circle:1.5l", "--robot", "paper-control")],
 )
 def test_a_command_loads_no_torch(words: tuple[str, ...], tmp_path: Path) -> None:
     folder = ("--out", str(tmp_path)) if words[0] == "plan" else ()

@@ -83,7 +83,7 @@ def test_from_a_table_to_a_path_whose_stated_error_holds(
     words = ["calibrate", str(tmp_path / "runs.csv"), "--robot", str(tmp_path / "given.toml")]
     assert run_command(calibration, [*words, "--out", str(tmp_path / "out")]) == 0
     assert run_command(surrogate, ["robot", robot, "--out", table]) == 0
-    assert run_command(planner, ["plan", "circle:2", "--robot", robot, "--model", table, "--out", out]) == 0
+    assert run_command(planner, ["plan", "circle:2l", "--robot", robot, "--model", table, "--out", out]) == 0
     record = load_plan(Path(out) / "plan.json")
     error = tracking_error(record, _swum(load_schedule(Path(out) / "plan.json"), load_robot(robot), truth))
     assert error.largest < record["stated_error_over_l"] < 6 * error.largest

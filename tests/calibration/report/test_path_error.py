@@ -38,7 +38,7 @@ def error_on(words: str, knowledge_index: int = 0) -> PathError:
 
 @pytest.mark.parametrize("name", ["as_given", "corrected"])
 def test_the_error_is_that_of_a_replay_in_time_steps(name: str) -> None:
-    error = error_on("circle:1.2")
+    error = error_on("circle:1.2l")
     carried = error.carried_out[name]  # type: ignore[index]
     track = replay([carried.plan.schedule(CORRECTED)])[0]
     places = CORRECTED.tail_length * track[["x_over_l", "y_over_l"]].to_numpy()
@@ -53,7 +53,7 @@ def test_the_error_is_that_of_a_replay_in_time_steps(name: str) -> None:
 
 
 def test_the_corrected_robot_s_plan_leads_along_the_path_and_the_other_does_not() -> None:
-    error = error_on("circle:1.2")
+    error = error_on("circle:1.2l")
     as_given, corrected = error.carried_out["as_given"], error.carried_out["corrected"]
     assert corrected.rms < 0.03 * LENGTH
     assert as_given.rms > 5 * corrected.rms
@@ -65,7 +65,7 @@ def test_the_corrected_robot_s_plan_leads_along_the_path_and_the_other_does_not(
 
 
 def test_a_less_certain_calibration_states_wider_errors() -> None:
-    sure, unsure = error_on("circle:1.2"), error_on("circle:1.2", 1)
+    sure, unsure = error_on("circle:1.2l"), error_on("circle:1.2l", 1)
     for one, two in zip(sure.carried_out.values(), unsure.carried_out.values(), strict=True):
         assert two.rms == pytest.approx(one.rms, rel=0.2)
         assert two.within > one.within
@@ -73,7 +73,7 @@ def test_a_less_certain_calibration_states_wider_errors() -> None:
 
 
 def test_a_current_carries_the_robot_and_only_the_corrected_plan_knows_it() -> None:
-    still, carried = error_on("circle:1.2").carried_out, error_on("circle:1.2", 2).carried_out
+    still, carried = error_on("circle:1.2l").carried_out, error_on("circle:1.2l", 2).carried_out
     seconds = float(still["as_given"].plan.seconds.sum())
     moved = carried["as_given"].track[-1] - still["as_given"].track[-1]
     np.testing.assert_allclose(moved, seconds * np.array([2e-5, -1e-5]), rtol=1e-6)
@@ -81,7 +81,7 @@ def test_a_current_carries_the_robot_and_only_the_corrected_plan_knows_it() -> N
 
 
 def test_the_record_has_each_length_in_l_and_in_cm() -> None:
-    error = error_on("circle:1.2")
+    error = error_on("circle:1.2l")
     record = error.record()
     assert record["refused"] == []
     for name, carried in error.carried_out.items():
@@ -96,7 +96,7 @@ def test_the_record_has_each_length_in_l_and_in_cm() -> None:
 
 
 def test_what_cannot_be_planned_is_said_and_nothing_else_is_lost() -> None:
-    small, good = path_errors(wanted_paths(["circle:0.001", "circle:1.2"], GIVEN), GIVEN, CORRECTED, KNOWN)
+    small, good = path_errors(wanted_paths(["circle:0.001l", "circle:1.2l"], GIVEN), GIVEN, CORRECTED, KNOWN)
     assert not small.carried_out
     assert len(small.refusals) == 2
     assert all("too small" in refusal for refusal in small.refusals)
@@ -108,7 +108,7 @@ def test_what_cannot_be_planned_is_said_and_nothing_else_is_lost() -> None:
 def test_a_corrected_robot_outside_its_runs_is_refused() -> None:
     elsewhere = [replace(GIVEN, tail_length=length).group_values() for length in (0.05, 0.06)]
     outside = replace(CORRECTED, learnt_from=learnt_range(elsewhere))
-    (error,) = path_errors(wanted_paths(["circle:1.2"], GIVEN), GIVEN, outside, KNOWN)
+    (error,) = path_errors(wanted_paths(["circle:1.2l"], GIVEN), GIVEN, outside, KNOWN)
     assert not error.carried_out
     assert len(error.refusals) == 1
     assert error.refusals[0].startswith("not planned with the corrected robot: ")
@@ -116,10 +116,10 @@ def test_a_corrected_robot_outside_its_runs_is_refused() -> None:
 
 def test_no_path_needs_no_table_and_a_path_that_is_none_is_refused_at_once() -> None:
     assert path_errors([], GIVEN, CORRECTED, KNOWN) == ()
-    with pytest.raises(InputError, match="square:3"):
-        wanted_paths(["squre:3"], GIVEN)
-    twice = wanted_paths(["square:3", "circle:2", "square:3"], GIVEN)
-    assert [each.words for each in twice] == ["square:3", "circle:2"]
+    with pytest.raises(InputError, match="square:3l"):
+        wanted_paths(["squre:3l"], GIVEN)
+    twice = wanted_paths(["square:3l", "circle:2l", "square:3l"], GIVEN)
+    assert [each.words for each in twice] == ["square:3l", "circle:2l"]
 
 
 def test_a_path_in_physical_units_keeps_its_size(tmp_path: Path) -> None:
@@ -133,11 +133,11 @@ def test_a_path_in_physical_units_keeps_its_size(tmp_path: Path) -> None:
 def test_a_verdict_and_its_report_have_the_error_on_a_path(tmp_path: Path) -> None:
     verdict = verdict_of(5, end_over_end_drag=5.0)
     assert verdict.to_dict()["path"] is None
-    small = path_errors(wanted_paths(["circle:0.001"], GIVEN), GIVEN, CORRECTED, KNOWN)
-    paths = replace(verdict, paths=(error_on("circle:1.2"), *small)).save(tmp_path / "out")
+    small = path_errors(wanted_paths(["circle:0.001l"], GIVEN), GIVEN, CORRECTED, KNOWN)
+    paths = replace(verdict, paths=(error_on("circle:1.2l"), *small)).save(tmp_path / "out")
     record = json.loads(paths[0].read_text())["path"]
-    assert set(record) == {"circle:1.2", "circle:0.001"}
-    assert record["circle:1.2"]["corrected"]["rms_cm"] < record["circle:1.2"]["as_given"]["rms_cm"]
+    assert set(record) == {"circle:1.2l", "circle:0.001l"}
+    assert record["circle:1.2l"]["corrected"]["rms_cm"] < record["circle:1.2l"]["as_given"]["rms_cm"]
     seen = PageText(paths[1]).text
     assert "On a path" in seen
     assert "planned with the corrected robot" in seen
@@ -153,15 +153,15 @@ def test_the_command_states_it_on_a_square_or_the_paths_asked_for(
 
     toy_table(3, lengths_cm=(6.0, 9.0)).to_csv(tmp_path / "t.csv", index=False)
     words = ["calibrate", str(tmp_path / "t.csv"), "--robot", "paper-measured", "--out", str(tmp_path / "out")]
-    for refused in (["--path", "squre:3"], ["--path", "circle:2", "--no-path"]):
+    for refused in (["--path", "squre:3l"], ["--path", "circle:2l", "--no-path"]):
         assert run_command(main, [*words, *refused]) == 2
         assert not (tmp_path / "out").exists()
     capsys.readouterr()
     assert run_command(main, [*words, "--no-path"]) == 0
     assert "on the path" not in capsys.readouterr().out
     assert json.loads((tmp_path / "out" / "verdict.json").read_text())["path"] is None
-    both = ["--path", "square:3", "--path", "circle:2"]
-    for options, paths in (([], {"square:3"}), (both, {"square:3", "circle:2"})):
+    both = ["--path", "square:3l", "--path", "circle:2l"]
+    for options, paths in (([], {"square:3l"}), (both, {"square:3l", "circle:2l"})):
         assert run_command(main, [*words, *options]) == 0
         printed = capsys.readouterr().out
         assert all(f"on the path {path}: planned with the robot as given" in printed for path in paths)

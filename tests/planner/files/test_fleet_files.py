@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -64,7 +65,7 @@ def test_the_command_plans_for_all_robots(tmp_path: Path, capsys: pytest.Capture
     [
         (TWO, "apart = 1\n", "no robots"),
         ('apart = "3cm"', "", "how far apart"),
-        ('apart = "3cm"', 'apart = "3 apples"', "distance apart 3apples; write a length"),
+        ('apart = "3cm"', 'apart = "3 apples"', "distance apart: 3 apples; write a length"),
         ('apart = "3cm"', 'apart = "30cm"', "right and robot-2 start"),
         ('"right"', '"../right"', "names a folder"),
         ('"right"', '"robot-2"', "two robots are named robot-2"),
@@ -105,9 +106,10 @@ def test_distances_have_units() -> None:
     control, other = PRESETS["paper-control"], PRESETS["paper-measured"]
     assert distance_apart("10 cm", None, [control, other]) == pytest.approx(0.1)
     assert distance_apart(10, "cm", [control, other]) == pytest.approx(0.1)
-    assert distance_apart(0.5, None, [control, control]) == pytest.approx(0.5 * control.tail_length)
-    if control.tail_length != other.tail_length:
-        with pytest.raises(InputError, match="say a unit"):
-            distance_apart(0.5, None, [control, other])
+    assert distance_apart("0.5l", None, [control, control]) == pytest.approx(0.5 * control.tail_length)
+    with pytest.raises(InputError, match=r"distance apart: 0\.5 has no unit"):
+        distance_apart(0.5, None, [control, control])
+    with pytest.raises(InputError, match="different tail lengths"):
+        distance_apart(0.5, "l", [control, replace(other, tail_length=0.1)])
     with pytest.raises(InputError, match="above 0"):
         distance_apart("0cm", None, [control])

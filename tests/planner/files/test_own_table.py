@@ -32,7 +32,7 @@ def test_a_corrected_robot_is_planned_for_at_once(tmp_path: Path, capsys: pytest
     """The command used to refuse until the user had made the robot's table by hand."""
     robot, kept = tmp_path / "robot.toml", tmp_path / "robot.table.json"
     save_robot(BIASED, robot)
-    words = ["plan", "circle:2", "--robot", str(robot), "--out"]
+    words = ["plan", "circle:2l", "--robot", str(robot), "--out"]
     assert run_command(main, [*words, str(tmp_path / "first")]) == 0
     said = capsys.readouterr().err
     assert "left_right_bias" in said

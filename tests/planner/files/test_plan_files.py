@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import subprocess
 from dataclasses import replace
@@ -50,7 +51,7 @@ def test_the_header_compiles(tmp_path: Path) -> None:
     (tmp_path / "main.c").write_text(
         '#include "schedule.h"\n#include <stdio.h>\nint main(void){long s=0;'
         "for(int i=0;i<SCHEDULE_COUNT;i++)s+=schedule_ms[i];"
-        'printf("%ld %ld %f %f %ld",s,(long)SCHEDULE_TOTAL_MS,SCHEDULE_START_X,SCHEDULE_START_HEADING,'
+        'printf("%ld %ld %f %f %ld",s,(long)SCHEDULE_TOTAL_MS,SCHEDULE_START_X_CM,SCHEDULE_START_HEADING_DEG,'
         "(long)schedule_checkpoints[SCHEDULE_CHECKPOINTS-1].ms);return 0;}"
     )
     subprocess.run(
@@ -65,8 +66,11 @@ def test_the_header_compiles(tmp_path: Path) -> None:
     content = json.loads((header.parent / "plan.json").read_text())
     seconds = content["dwell_s"]
     assert int(words[1]) == int(words[4]) == total
-    start = [content["start"]["x_over_l"], content["start"]["heading_rad"]]
-    assert [float(words[2]), float(words[3])] == pytest.approx(start, abs=1e-6)
+    start = [
+        100 * CONTROL.tail_length * content["start"]["x_over_l"],
+        math.degrees(content["start"]["heading_rad"]),
+    ]
+    assert [float(words[2]), float(words[3])] == pytest.approx(start, abs=1e-3)
     assert total == pytest.approx(1000 * sum(seconds), abs=1)
 
 

@@ -130,7 +130,7 @@ def test_the_files_of_jobs_and_their_folder_lead_to_the_plan(tmp_path: Path) -> 
 
 def test_paths_are_no_plans(tmp_path: Path) -> None:
     (tmp_path / "path.csv").write_text("x,y\n0,0\n3,0\n")
-    assert not any(map(is_plan, (tmp_path / "path.csv", tmp_path, "circle:2", tmp_path / "none.json")))
+    assert not any(map(is_plan, (tmp_path / "path.csv", tmp_path, "circle:2l", tmp_path / "none.json")))
 
 
 @pytest.mark.parametrize(

@@ -122,7 +122,7 @@ def test_a_wish_below_the_fastest_plan_is_refused(tracked: TrackedVehicle) -> No
 def test_the_command_arrives_or_refuses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from planner.__main__ import main
 
-    words = ["plan", "circle:2", "--unit", "l", "--robot", "paper-control", "--out", str(tmp_path / "out")]
+    words = ["plan", "circle:2l", "--unit", "l", "--robot", "paper-control", "--out", str(tmp_path / "out")]
     for time, expected in (("1min", "the fastest plan takes"), ("30", "with its unit"), ("-3min", "above 0")):
         assert run_command(main, [*words, f"--arrive={time}"]) == 2
         error = capsys.readouterr().err

@@ -126,7 +126,7 @@ def test_no_way_around_is_one_line_and_exit_2(tmp_path: Path, capsys: pytest.Cap
 
     (tmp_path / "line.csv").write_text("x,y\n0,0\n6,0\n")
     words = ["plan", str(tmp_path / "line.csv"), "--robot", "paper-control", "--out", str(tmp_path / "out")]
-    words += ["--objective", "flips"]
+    words += ["--objective", "flips", "--unit", "l"]
     for options, expected in (
         (["--keep-out", "circle:0,0.2,0.4"], "the path begins at"),
         (["--keep-out", "box:3,-2,3.5,2", "--walls", "box:-2,-1.5,8,1.5"], "there is no way around that leaves"),
@@ -139,15 +139,14 @@ def test_no_way_around_is_one_line_and_exit_2(tmp_path: Path, capsys: pytest.Cap
         assert not (tmp_path / "out").exists()
 
 
-def test_regions_have_the_unit_of_the_path(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_regions_are_in_the_unit_that_is_given(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from planner.__main__ import main
 
     cm = 100 * CONTROL.tail_length
     (tmp_path / "line.csv").write_text(f"x_cm,y_cm\n0,0\n{6 * cm},0\n")
     words = ["plan", str(tmp_path / "line.csv"), "--robot", "paper-control", "--out", str(tmp_path / "out")]
-    assert (
-        run_command(main, [*words, "--objective", "flips", "--keep-out", f"circle:{3 * cm},0.1,{0.4 * cm}"]) == 0
-    )
+    words += ["--unit", "cm", "--objective", "flips", "--keep-out", f"circle:{3 * cm},0.1,0.4l"]
+    assert run_command(main, words) == 0
     said = capsys.readouterr().out
     assert said.count("the way around leaves it at") == 1
     kept = load_plan(tmp_path / "out" / "plan.json")["kept_clear"]

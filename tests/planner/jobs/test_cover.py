@@ -116,8 +116,8 @@ def test_the_command_reads_units_and_writes_all_files(tmp_path: Path, capsys: py
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        (["box:0,0,2,1", "--width", "4km"], "--width 4km; write a length"),
-        (["box:0,0,2", "--width", "4cm"], "write box"),
+        (["box:0,0,2l,1l", "--width", "4km"], "--width: 4km; write a length"),
+        (["box:0,0,2l", "--width", "4cm"], "write box"),
         (["none.csv", "--width", "4cm"], "none.csv"),
     ],
 )

@@ -116,7 +116,7 @@ def test_the_command_holds_a_place(tmp_path: Path, capsys: pytest.CaptureFixture
     for place, time, expected in (
         ("1", "5min", "write X,Y"),
         ("1,2", "5", "with its unit"),
-        ("nan,0", "1h", "finite"),
+        ("nan,0", "1h", "nan; write a length"),
     ):
         assert run_command(main, ["hold", place, "--for", time, *words]) == 2
         error = capsys.readouterr().err

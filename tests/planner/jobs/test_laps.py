@@ -172,7 +172,7 @@ def test_the_command_plans_laps(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert "a path that repeats is closed" in error
     assert len(error.splitlines()) == 1
     assert not (tmp_path / "out").exists()
-    assert run_command(main, ["plan", "circle:1.5", *words]) == 0
+    assert run_command(main, ["plan", "circle:1.5l", *words]) == 0
     assert "repeat it: a lap ends where it began" in capsys.readouterr().out
     content = json.loads((tmp_path / "out" / "plan.json").read_text())
     assert set(content["lap"]) == {"closes_over_l", "closes_rad", "drift_over_l", "drift_rad"}

@@ -116,9 +116,10 @@ def test_a_tracked_robot_with_wrong_coefficients_visits_all(tracked: TrackedVehi
     [
         (["0,0"], [], "two or more"),
         (["0,0", "1,1", "0,0"], [], "places 1 and 3 are the same"),
-        (["0,0", "one,1"], [], "write X,Y"),
+        (["0,0", "one,1"], [], "place one,1: one; write a length"),
+        (["0,0", "1"], [], "write X,Y"),
         (["0,0", "2,0", "4,0"], ["--keep-out", "circle:2,0,0.5"], "place 2 at"),
-        (["0,0", "nan,0"], [], "finite"),
+        (["0,0", "nan,0"], [], "nan; write a length"),
     ],
 )
 def test_the_command_refuses_in_one_line(
@@ -126,7 +127,7 @@ def test_the_command_refuses_in_one_line(
 ) -> None:
     from planner.__main__ import main
 
-    words = ["tour", *places, "--robot", "paper-control", "--out", str(tmp_path / "out"), *options]
+    words = ["tour", *places, "--unit", "l", "--robot", "paper-control", "--out", str(tmp_path / "out"), *options]
     assert run_command(main, words) == 2
     error = capsys.readouterr().err
     assert expected in error
@@ -142,7 +143,7 @@ def test_the_command_reads_places_from_words_and_files(tmp_path: Path, capsys: p
     common = ["--robot", "paper-control", "--objective", "time", "--out"]
     assert run_command(main, ["tour", str(tmp_path / "places.csv"), *common, str(tmp_path / "one")]) == 0
     assert "order: 1 3 2; no other order is quicker" in capsys.readouterr().out
-    assert run_command(main, ["tour", "0,0", "4,0", "2,1", *common, str(tmp_path / "two")]) == 0
+    assert run_command(main, ["tour", "0,0", "4l,0", "2l,1l", *common, str(tmp_path / "two")]) == 0
     one, two = (json.loads((tmp_path / name / "tour.json").read_text()) for name in ("one", "two"))
     assert one["order"] == two["order"] == [0, 2, 1]
     assert np.array(one["places"]) == pytest.approx(np.array(two["places"]))

@@ -4,21 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
-
 from planner.paths.path import Path2D, circle, polygon
-from planner.paths.units import (
-    ANY_UNIT,
-    check_size,
-    check_unstated_unit,
-    describe,
-    extent,
-    in_lab,
-    in_tails,
-    place_in_lab,
-    time_in_lab,
-    unit_hint,
-)
+from planner.paths.units import check_size, describe, extent, in_lab, place_in_lab, time_in_lab
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from tests.planner.page.page_core import answers
@@ -44,24 +31,16 @@ def test_lengths_times_and_places() -> None:
     places = [(x, -0.0001 * y) for x in LENGTHS for y in LENGTHS]
     found = answers([("units.js", "placeInLab", *place, PAGE_ROBOT) for place in places])
     assert found == [place_in_lab(*place, ROBOT) for place in places]
-    units = answers([("units.js", "inTails", unit, PAGE_ROBOT) for unit in ANY_UNIT])
-    assert units == [in_tails(unit, ROBOT) for unit in ANY_UNIT]
 
 
 def test_paths_in_words() -> None:
     described = answers([("units.js", "describe", path, PAGE_ROBOT) for path in PATHS])
     assert described == [describe(path, ROBOT) for path in PATHS]
     assert answers([("units.js", "extent", path) for path in PATHS]) == [list(extent(path)) for path in PATHS]
-    hints = answers([("units.js", "unitHint", path, PAGE_ROBOT, ANY_UNIT) for path in PATHS])
-    assert hints == [unit_hint(path, ROBOT, ANY_UNIT) for path in PATHS]
 
 
-@pytest.mark.parametrize(
-    ("name", "function", "numbers"),
-    [("checkSize", check_size, (1.3,)), ("checkUnstatedUnit", check_unstated_unit, (1.3, 0.004))],
-)
-def test_sizes_are_refused_in_the_same_words(name: str, function: Any, numbers: tuple[float, ...]) -> None:
-    found = answers([("units.js", name, path, PAGE_ROBOT, *numbers) for path in PATHS])
-    wanted = [outcome(function, path, ROBOT, *numbers) for path in PATHS]
+def test_sizes_are_refused_in_the_same_words() -> None:
+    found = answers([("units.js", "checkSize", path, PAGE_ROBOT, 1.3) for path in PATHS])
+    wanted = [outcome(check_size, path, ROBOT, 1.3) for path in PATHS]
     assert list(map(str, found)) == wanted
     assert any(text != "None" for text in wanted)

@@ -75,7 +75,12 @@ def test_of_a_table_without_errors_of_the_response_the_vehicle_is_written(tmp_pa
 
 def test_bad_input_ends_in_one_line_and_leaves_no_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = str(tmp_path / "page.html")
-    for words in (["--robot", "nobody"], ["--path", "squre:3"], ["--tolerance", "-1"], ["--min-dwell-s", "nan"]):
+    for words in (
+        ["--robot", "nobody"],
+        ["--path", "squre:3l"],
+        ["--tolerance", "-1cm"],
+        ["--min-dwell-s", "nan"],
+    ):
         assert run_command(main, ["page", *words, "--out", out]) == 2
         assert len(capsys.readouterr().err.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
@@ -86,12 +91,14 @@ def test_paths_have_the_names_of_their_shapes_and_files(tmp_path: Path) -> None:
     words = [
         "page",
         "--path",
-        "circle:1.5",
+        "circle:1.5l",
         "--path",
         str(tmp_path / "my path.csv"),
+        "--unit",
+        "l",
         "--out",
         str(tmp_path / "p.html"),
     ]
     assert run_command(main, words) == 0
     shapes = data_of(tmp_path / "p.html")["shapes"]
-    assert [shape["name"] for shape in shapes[:3]] == ["circle:1.5", "my path", "circle"]
+    assert [shape["name"] for shape in shapes[:3]] == ["circle:1.5l", "my path", "circle"]

@@ -3,63 +3,23 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from planner.__main__ import main
-from planner.paths.path import Path2D, circle
+from planner.paths.path import Path2D
 from planner.paths.units import (
     check_size,
-    check_unstated_unit,
     heading_in_degrees,
     in_lab,
     place_in_lab,
     read_time,
 )
 from planner.planning.plan import plan
-from sim.io.errors import InputError, run_command
+from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 
 CONTROL = PRESETS["paper-control"]
-
-
-def test_millimetres_taken_for_tail_lengths_are_refused() -> None:
-    with pytest.raises(InputError, match=r"if you gave l and mean mm, it is 273 l: --unit mm"):
-        plan([[0, 0], [9000, 0], [9000, 7000], [0, 7000], [0, 2000]], CONTROL)
-
-
-def test_a_path_in_tail_lengths_that_nobody_stated_is_asked_about(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A circle of 150 mm used to be planned as one of 150 l: 104 m, 37 h."""
-    words = ["plan", "circle:150", "--robot", "paper-control", "--out", str(tmp_path / "plan")]
-    assert run_command(main, words) == 2
-    (refusal,) = capsys.readouterr().err.splitlines()
-    for part in ("104 m (942 l) long", "36 h 4", "of the robot's circles across", "--unit l if this is meant",
-                 "if you gave l and mean mm, it is 8.57 l: --unit mm"):  # fmt: skip
-        assert part in refusal
-    assert not (tmp_path / "plan").exists()
-    assert run_command(main, [*words, "--unit", "mm"]) == 0
-    assert "94.2 cm (8.57 l) long" in capsys.readouterr().out
-
-
-def test_tail_lengths_are_not_taken_for_metres() -> None:
-    """The numbers of this path are tail lengths, so only other units are suggested."""
-    with pytest.raises(InputError, match=r"--unit l if this is meant; if you gave l and mean cm") as caught:
-        check_unstated_unit(circle(23.0), CONTROL, 0.3, 0.05)
-    assert "if you gave m" not in str(caught.value)
-    assert str(caught.value).count("--unit l") == 1
-
-
-def test_a_stated_unit_is_not_asked_about() -> None:
-    path = circle(60.0)
-    with pytest.raises(InputError, match="of the robot's circles across"):
-        check_unstated_unit(path, CONTROL, 0.9, 0.5)
-    with pytest.raises(InputError, match="about 4 h"):
-        check_unstated_unit(circle(20.0), CONTROL, 0.9, 0.5 * CONTROL.time_scale / 60)
-    check_unstated_unit(circle(20.0), CONTROL, 0.9, 0.5)
 
 
 def test_lengths_in_messages_are_in_a_laboratory_s_units_first() -> None:

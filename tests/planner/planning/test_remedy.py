@@ -76,7 +76,7 @@ def test_what_is_advised_is_accepted(path: Path2D, corner: Corner) -> None:
     if "scale the path by" in advice:
         changed_path = path.scaled(float(advice.rsplit(" ", 1)[1]))
     elif "--smooth" in advice:
-        changed_path, _ = smoothed(path, float(advice.rsplit(" ", 1)[1]))
+        changed_path, _ = smoothed(path, float(advice.rsplit(" ", 1)[1].removesuffix("l")))
     else:
         assert "neither a larger scale nor smoothing" in advice
         return

@@ -25,9 +25,18 @@ def test_a_file_with_a_unit_is_converted(tmp_path: Path) -> None:
     square = 33 * np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
     np.savetxt(tmp_path / "cm.csv", square, delimiter=",", header="x_cm,y_cm", comments="")
     np.savetxt(tmp_path / "l.csv", square / 11, delimiter=",", header="x,y", comments="")
-    for name in ("cm.csv", "l.csv"):
-        assert sf.plan(tmp_path / name, ROBOT).drawn.length == pytest.approx(12.0)
-    assert sf.plan(sf.read_path(tmp_path / "cm.csv"), ROBOT).drawn.length == pytest.approx(12.0)
+    for path, unit in (
+        (tmp_path / "cm.csv", None), (tmp_path / "cm.csv", "cm"), (tmp_path / "l.csv", "l"),
+        (sf.read_path(tmp_path / "cm.csv"), None), (sf.read_path(tmp_path / "l.csv"), "l"),
+        (sf.Drawing(sf.polygon(4, 33.0), "cm"), None), (square, "cm"), (sf.polygon(4, 3.0), None),
+        ("square:33cm", None), ("square:3l", None), ("square:330", "mm"),
+    ):  # fmt: skip
+        assert sf.plan(path, ROBOT, unit=unit, objective="flips").drawn.length == pytest.approx(12.0)
+    for path in (tmp_path / "l.csv", sf.read_path(tmp_path / "l.csv"), "square:3"):
+        with pytest.raises(sf.InputError, match="have no unit; write it behind them, 24cm or 3l"):
+            sf.plan(path, ROBOT)
+    with pytest.raises(sf.InputError, match=r"unit 'inch'; allowed are l, m, cm, mm"):
+        sf.plan("square:3", ROBOT, unit="inch")
 
 
 def test_a_robot_that_the_shipped_table_does_not_know_gets_its_own_once(

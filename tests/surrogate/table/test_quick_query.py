@@ -36,7 +36,7 @@ print(*sys.modules)
 PLAN = """
 import sys
 from softflagella.__main__ import main
-main(["plan", "circle:3", "--robot", "paper-control", "--out", sys.argv[1]])
+main(["plan", "circle:3l", "--robot", "paper-control", "--out", sys.argv[1]])
 print(*sys.modules)
 """
 

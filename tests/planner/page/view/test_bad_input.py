@@ -197,7 +197,7 @@ def test_a_bad_robot_is_refused_in_the_words_of_the_command(
     page: Any, folder: Path, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
     file = write(folder, name, ROBOTS[name])
-    assert told(page, "robot", file) == refused(capsys, "plan", "circle:2", "--robot", name, "--out", "out")
+    assert told(page, "robot", file) == refused(capsys, "plan", "circle:2l", "--robot", name, "--out", "out")
 
 
 @pytest.mark.parametrize("name", PLANS)
