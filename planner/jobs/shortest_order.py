@@ -3,6 +3,7 @@
 A visit has C options, such as the headings at a place or the directions of a lane. Going from option c of visit i
 to option d of visit j costs costs[i, c, j, d]. With up to EXACT visits the order is exact: dynamic programming
 over the sets of visits that are done (Held and Karp, J. SIAM 10, 1962), with the options beside the last visit.
+Where the cost of ending depends on the first visit, as on a closed tour, this is done for each first visit.
 With more, moves of up to three visits and reversals improve the order until none helps. A lower bound says how far
 it may be from the shortest: the shortest walk of as many visits, which may visit one twice and another never, with
 prices that make such walks expensive (Christofides, Mingozzi and Toth, Networks 11, 1981), found by subgradient
@@ -11,6 +12,9 @@ ascent.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from heapq import heapify, heappop, heappush
+from itertools import chain, pairwise, repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +24,8 @@ from sim.io.errors import InputError
 
 EXACT = 12  # visits
 MOST = 80
+_RIVALS = 40  # next best orders that are listed at most
+_NEAR = 1.05  # times the cost of the best one; rivals cost no more
 _STARTS = 6  # of the search for a short order
 _LONGEST_MOVED = 3  # visits that are moved together
 _PASSES = 200
@@ -34,6 +40,7 @@ class Order(NamedTuple):
     options: list[int]
     cost: float
     bound: float
+    rivals: list[list[int]]  # the next best orders, if they cost little more; none where the order is not exact
 
     @property
     def gap(self) -> float:
@@ -47,7 +54,7 @@ def shortest_order(costs: Floats, start: Floats, end: Floats) -> Order:
     Args:
         costs: (n, C, n, C), from an option of one visit to an option of another; infinite where there is no way.
         start: (n, C), of beginning with a visit; infinite where that is not allowed.
-        end: (n, C), of ending with it.
+        end: (n, C), of ending with it; or (n, n, C), of ending with the second visit, begun with the first.
 
     Raises:
         InputError: there are too many visits, or there is no order.
@@ -61,35 +68,72 @@ def shortest_order(costs: Floats, start: Floats, end: Floats) -> Order:
     return order
 
 
+def best_options(legs: Sequence[Floats], start: Floats, end: Floats) -> tuple[list[int], float]:
+    """Choose an option at each stop of a chain; return the options and what the chain costs.
+
+    Args:
+        legs: (C, C') each, from the options of a stop to those of the next one.
+        start: (C,), of the options of the first stop.
+        end: (C',), of those of the last one.
+    """
+    total, back = start, []
+    for leg in legs:
+        sums = total[:, None] + leg
+        back.append(sums.argmin(0))
+        total = sums.min(0)
+    total = total + end
+    options = [int(total.argmin())]
+    for came in reversed(back):
+        options.append(int(came[options[-1]]))
+    return options[::-1], float(total.min())
+
+
 def _exact(costs: Floats, start: Floats, end: Floats) -> Order:
-    """Find the shortest order by dynamic programming over sets of visits."""
+    """Find the shortest order, and its rivals."""
+    count = len(costs)
+    if end.ndim == 2:
+        found = _shortest(costs, start, end)
+    else:
+        begins = [np.where(np.arange(count)[:, None] == first, start, np.inf) for first in range(count)]
+        found = sorted(chain.from_iterable(map(_shortest, repeat(costs), begins, end)))
+    if not found:
+        return Order([], [], np.inf, np.inf, [])
+    (cost, visits), *others = found
+    rivals = [order for total, order in others[:_RIVALS] if total <= _NEAR * cost]
+    return Order(visits, _options(costs, start, end, visits), cost, cost, rivals)
+
+
+def _shortest(costs: Floats, start: Floats, end: Floats) -> list[tuple[float, list[int]]]:
+    """List the shortest orders with their costs, by dynamic programming over sets of visits."""
     count, options = start.shape
-    flat = costs.reshape(count * options, count, options)
-    best = np.full((1 << count, count, options), np.inf)
-    came = np.full((1 << count, count, options), -1, dtype=np.int32)
-    for j in range(count):
-        best[1 << j, j] = start[j]
+    arriving = np.ascontiguousarray(costs.transpose(2, 0, 1, 3)).reshape(count, count * options, options)
+    best = np.full((1 << count, count, options), np.inf)  # of a set of visits that ends with one of them
+    best[1 << np.arange(count), np.arange(count)] = start
     for done in range(1, 1 << count):
-        inside = [j for j in range(count) if done >> j & 1]
-        outside = [j for j in range(count) if not done >> j & 1]
-        if not outside:
-            continue
-        rows = (np.array(inside)[:, None] * options + np.arange(options)).ravel()
-        totals = best[done, inside].reshape(-1, 1, 1) + flat[rows][:, outside]
-        chosen = totals.argmin(0)
-        least = np.take_along_axis(totals, chosen[None], 0)[0]
-        for place, j in enumerate(outside):
-            best[done | 1 << j, j], came[done | 1 << j, j] = least[place], rows[chosen[place]]
-    done = (1 << count) - 1
-    total = best[done] + end
-    at = int(total.argmin())
-    cost, visits, chosen_options = float(total.ravel()[at]), [], []
-    while at >= 0:
-        j, option = divmod(at, options)
-        visits.append(j)
-        chosen_options.append(option)
-        at, done = int(came[done, j, option]), done & ~(1 << j)
-    return Order(visits[::-1], chosen_options[::-1], cost, cost)
+        for j in _members(done):
+            before = best[done ^ 1 << j]
+            if np.isfinite(before).any():
+                best[done, j] = (before.reshape(-1, 1) + arriving[j]).min(0)
+    # Orders are put together from their ends; what their begins cost is known, so the shortest come first.
+    found: list[tuple[float, list[int]]] = []
+    done, limit = (1 << count) - 1, np.inf
+    ends = [(float((best[done, j] + end[j]).min()), [j], done, end[j]) for j in range(count)]
+    heapify(ends)
+    while ends and len(found) <= _RIVALS and ends[0][0] < limit:
+        total, visits, done, after = heappop(ends)
+        done ^= 1 << visits[0]
+        if not done:
+            found.append((total, visits))
+            limit = _NEAR * found[0][0] + 1e-9
+        for i in _members(done):
+            onward = (costs[i, :, visits[0]] + after).min(-1)
+            heappush(ends, (float((best[done, i] + onward).min()), [i, *visits], done, onward))
+    return found
+
+
+def _members(done: int) -> list[int]:
+    """List the visits of a set."""
+    return [j for j in range(done.bit_length()) if done >> j & 1]
 
 
 def _searched(costs: Floats, start: Floats, end: Floats) -> Order:
@@ -111,7 +155,8 @@ def _searched(costs: Floats, start: Floats, end: Floats) -> Order:
             order, cost = neighbours[at], float(totals[at])
         if cost < lowest:
             best, lowest = order, cost
-    return Order(best.tolist(), _options(costs, start, end, best), lowest, _bound(costs, start, end, lowest))
+    visits = best.tolist()
+    return Order(visits, _options(costs, start, end, visits), lowest, _bound(costs, start, end, lowest), [])
 
 
 def _greedy(nearest: Floats, first: int) -> Integers:
@@ -150,26 +195,25 @@ def _costs(costs: Floats, start: Floats, end: Floats, orders: Integers) -> Float
         total = start[some[:, 0]]
         for k in range(1, some.shape[1]):
             total = (total[:, :, None] + by_pair[some[:, k - 1], some[:, k]]).min(1)
-        parts.append((total + end[some[:, -1]]).min(1))
+        parts.append((total + _ending(end, some[:, 0], some[:, -1])).min(1))
     return np.concatenate(parts)
 
 
-def _options(costs: Floats, start: Floats, end: Floats, order: Integers) -> list[int]:
+def _options(costs: Floats, start: Floats, end: Floats, order: Sequence[int]) -> list[int]:
     """Choose the best option of each visit of an order."""
-    total, back = start[order[0]], []
-    for i, j in zip(order[:-1].tolist(), order[1:].tolist(), strict=True):
-        sums = total[:, None] + costs[i, :, j]
-        back.append(sums.argmin(0))
-        total = sums.min(0)
-    options = [int((total + end[order[-1]]).argmin())]
-    for came in reversed(back):
-        options.append(int(came[options[-1]]))
-    return options[::-1]
+    legs = [costs[i, :, j] for i, j in pairwise(order)]
+    return best_options(legs, start[order[0]], _ending(end, order[0], order[-1]))[0]
+
+
+def _ending(end: Floats, first: Integers | int, last: Integers | int) -> Floats:
+    """Return what ending with a visit costs (..., C) after beginning with another."""
+    return np.asarray(end[last] if end.ndim == 2 else end[first, last])
 
 
 def _bound(costs: Floats, start: Floats, end: Floats, cost: float) -> float:
     """Bound the cost of all orders from below."""
     count, options = start.shape
+    end = end if end.ndim == 2 else end.min(0)
     flat = costs.reshape(count * options, count * options).copy()
     for j in range(count):  # no visit twice in a row
         flat[j * options : (j + 1) * options, j * options : (j + 1) * options] = np.inf

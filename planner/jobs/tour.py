@@ -2,7 +2,9 @@
 
 The tracked point passes every place; its heading there is free. The order is the one in which this vehicle needs
 the least time (`planner.jobs.travel_times`, `planner.jobs.shortest_order`), with COURSES directions of motion at
-each place. Then the directions are refined. The tracks between the places are joined to one reference, which is
+each place. The directions of this order and of its rivals are then refined, and the quickest of them is taken.
+Where places are nearer to each other than a turn, a direction that is a few degrees off costs a whole circle, so
+COURSES is large. The tracks between the places are joined to one reference, which is
 followed as every declared path is. Obstacles are left to the ways around (`planner.jobs.detours`); where a track
 is blocked, the order is chosen as if that took some turn radii more. Lengths in l, times in μ0 l⁴/EI.
 """
@@ -13,13 +15,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
+from operator import itemgetter
 
 import numpy as np
 
 from planner.goal.route import Route
 from planner.jobs.planned_track import pivot_poses, plan_track
-from planner.jobs.shortest_order import EXACT, shortest_order
+from planner.jobs.shortest_order import EXACT, best_options, shortest_order
 from planner.jobs.tour_plan import TourPlan
 from planner.jobs.travel_times import SLACK, Travel
 from planner.paths.distance import distance_to
@@ -35,7 +37,8 @@ from planner.vehicle.zigzag import zigzag
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
-COURSES = 16  # directions of motion at a place
+COURSES = 72  # directions of motion at a place, for an exact order
+FEWER_COURSES = 16  # for many places, and among obstacles
 _SPACING = 0.02  # of the reference's points
 _FINER = 4  # refinements of the directions
 _MARGINS = 3  # around obstacles, with which orders are sought
@@ -108,6 +111,7 @@ class _Ordered:
     estimate: float
     exact: bool
     gap: float
+    tried: int  # directions of motion at each place
     travel: Travel
 
 
@@ -124,46 +128,46 @@ class _Tour:
     def ordered(self, travel: Travel) -> _Ordered:
         """Find the order, and refine the directions of motion."""
         count = len(self.places)
-        turns = 2 * math.pi * np.arange(COURSES) / COURSES
-        courses = np.broadcast_to(turns, (count, COURSES))
-        poses = pivot_poses(self.places[:, None], courses, self.tracked, travel.limits.drift)
-        blocked = np.flatnonzero((travel.limits.clearance(poses) < travel.margin + SLACK).all(1))
-        if len(blocked):
-            x, y = self.places[blocked[0]].tolist()
+        exact = count - (not self.any_start) <= EXACT and self.space.empty
+        options = COURSES if exact else FEWER_COURSES
+        courses = 2 * math.pi * np.arange(options) / options
+        poses = pivot_poses(self.places[:, None], np.tile(courses, (count, 1)), self.tracked, travel.limits.drift)
+        free = travel.limits.clearance(poses) >= travel.margin + SLACK
+        if not free.any(1).all():
+            blocked = int(free.any(1).argmin())
+            x, y = self.places[blocked].tolist()
             raise InputError(
-                f"place {blocked[0] + 1} at {place_in_lab(x, y, self.tracked.robot)} cannot be visited: with "
+                f"place {blocked + 1} at {place_in_lab(x, y, self.tracked.robot)} cannot be visited: with "
                 "every heading the robot touches what it must keep clear of; move the place away from it"
             )
         flat = poses.reshape(-1, 3)
-        rows, columns = (part.ravel() for part in np.indices((len(flat), len(flat))))
-        costs = travel.times(flat[rows], flat[columns]).reshape((count, COURSES, count, COURSES))
+        costs = travel.times(np.repeat(flat, len(flat), 0), np.tile(flat, (len(flat), 1)))
+        costs = costs.reshape(count, options, count, options)
+        closing = costs.min(-1).transpose(2, 0, 1) if self.back else np.zeros((count, count, options))
         if self.any_start:
-            free = travel.limits.clearance(poses) >= travel.margin + SLACK
-            start, visits = np.where(free, 0.0, np.inf), np.arange(count)
+            first, start, end = 0, np.where(free, 0.0, np.inf), closing if self.back else closing[0]
         else:
-            start, visits = costs[0, :, 1:].min(0), np.arange(1, count)
-        end = np.zeros((len(visits), COURSES))
-        if self.back and not self.any_start:
-            end = costs[1:, :, 0].min(-1)
-        best = shortest_order(costs[np.ix_(visits, np.arange(COURSES), visits, np.arange(COURSES))], start, end)
-        order = [int(visits[k]) for k in best.visits]
-        order = order if self.any_start else [0, *order]
-        order += order[:1] if self.back else []
-        courses, estimate = self._refined(order, travel)
-        exact = len(visits) <= EXACT and self.space.empty
-        return _Ordered(tuple(order), courses, estimate, exact, best.gap, travel)
+            first, start, end = 1, costs[0, :, 1:].min(0), closing[0, 1:]
+        best = shortest_order(costs[first:, :, first:], start, end)
+        refined = []
+        for visits in (best.visits, *best.rivals):
+            order = [*range(first), *(first + k for k in visits)]
+            order += order[: self.back]
+            refined.append((*self._refined(order, courses, travel), order))
+        chosen, estimate, order = min(refined, key=itemgetter(1))
+        return _Ordered(tuple(order), chosen, estimate, exact, best.gap, options, travel)
 
-    def _refined(self, order: list[int], travel: Travel) -> tuple[Floats, float]:
+    def _refined(self, order: list[int], courses: Floats, travel: Travel) -> tuple[Floats, float]:
         """Find the directions of motion with which an order takes the least time."""
         places = self.places[order]
-        step = 2 * math.pi / COURSES
-        choices = np.tile(step * np.arange(COURSES), (len(order), 1))
+        step = float(courses[1])
+        choices = np.tile(courses, (len(order), 1))
         for _ in range(_FINER + 1):
             poses = pivot_poses(places[:, None], choices, self.tracked, travel.limits.drift)
-            courses, total = _quickest(poses, travel)
+            chosen, total = _quickest(poses, travel)
             step /= 3
-            choices = courses[:, None] + step * np.arange(-3, 4)
-        return courses, total
+            choices = chosen[:, None] + step * np.arange(-3, 4)
+        return chosen, total
 
     def track(self, found: _Ordered, drift: Drift) -> Route:
         """Join the places by tracks of the pivot."""
@@ -189,21 +193,19 @@ class _Tour:
         samples = (len(plan.track) - 1) // len(plan.dwells)
         times = np.concatenate([[0.0], np.cumsum(np.repeat(plan.dwells / samples, samples))])
         reached, distance = _passed(plan.track, times, visited, before=plan.predicted_max)
-        return TourPlan(plan, self.places, found.order, found.exact, found.gap, found.estimate, reached, distance)
+        return TourPlan(
+            plan, self.places, found.order, found.exact, found.gap, found.estimate, reached, distance, found.tried
+        )
 
 
 def _quickest(poses: Floats, travel: Travel) -> tuple[Floats, float]:
     """Choose among poses (k, C, 3) at each stop those of the quickest chain; return courses (k,) and its time."""
-    total, back = np.zeros(poses.shape[1]), []
-    for here, there in pairwise(poses):
-        rows, columns = (part.ravel() for part in np.indices((len(here), len(there))))
-        sums = total[:, None] + travel.times(here[rows], there[columns]).reshape(len(here), len(there))
-        back.append(sums.argmin(0))
-        total = sums.min(0)
-    options = [int(total.argmin())]
-    for came in reversed(back):
-        options.append(int(came[options[-1]]))
-    return poses[np.arange(len(poses)), options[::-1], 2], float(total.min())
+    stops, options, _ = poses.shape
+    here, there = np.repeat(poses[:-1], options, 1), np.tile(poses[1:], (1, options, 1))
+    times = travel.times(here.reshape(-1, 3), there.reshape(-1, 3))
+    free = np.zeros(options)
+    chosen, total = best_options(list(times.reshape(stops - 1, options, options)), free, free)
+    return poses[np.arange(stops), chosen, 2], total
 
 
 def _passed(track: Floats, times: Floats, visited: Floats, *, before: float) -> tuple[Floats, Floats]:

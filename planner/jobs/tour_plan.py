@@ -36,14 +36,16 @@ class TourPlan:
     estimate: float  # time of the tour by which orders were compared
     reached: Floats  # (k,), time at which the predicted track is nearest to each place of the order
     distance: Floats  # (k,), from the predicted track then
+    courses: int  # directions of motion that were tried at each place
 
     def lines(self) -> list[str]:
         """Say order, times and distances."""
         robot = self.plan.robot
+        tried = f"with {self.courses} headings tried at each place"
         if self.exact:
-            proven = "no other order is quicker"
+            proven = f"no other order is quicker, {tried}"
         elif self.plan.kept_clear is None:
-            proven = f"at most {100 * self.gap:.0f} % longer than the quickest order"
+            proven = f"at most {100 * self.gap:.0f} % longer than the quickest order, {tried}"
         else:
             proven = "the quickest one of those with direct ways; ways around obstacles were estimated"
         return [
