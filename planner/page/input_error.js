@@ -11,4 +11,13 @@ class InputError extends Error {
   }
 }
 
-export { InputError };
+/* Do some work, and write the name of a file before its refusals. naming */
+function naming(where, work) {
+  try {
+    return work();
+  } catch (refusal) {
+    throw refusal instanceof InputError ? new InputError(`${where}: ${refusal.message}`) : refusal;
+  }
+}
+
+export { InputError, naming };

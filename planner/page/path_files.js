@@ -2,7 +2,7 @@
  *
  * Mirrors planner/paths/path_files.py. A drawing is {path, unit}: unit is the size of the path's unit in metres,
  * null: the numbers have no unit. */
-import { InputError } from "./input_error.js";
+import { InputError, naming } from "./input_error.js";
 import { pathOf } from "./path.js";
 import { splitName, toSi } from "./si_units.js";
 import { parseTable } from "./text_tables.js";
@@ -26,15 +26,6 @@ function readTablePath(bytes, where, closed = null) {
   const [size, other] = units.length ? units.map((unit) => toSi(1, unit.suffix)) : [1, 1];
   const points = Array.from(x, (value, i) => [value, y[i] * (other / size)]);
   return { path: naming(where, () => pathOf(points, closed)), unit: units.length ? size : null };
-}
-
-/* Do some work, and write the name of a file before its refusals. */
-function naming(where, work) {
-  try {
-    return work();
-  } catch (refusal) {
-    throw refusal instanceof InputError ? new InputError(`${where}: ${refusal.message}`) : refusal;
-  }
 }
 
 /* Choose the column of a coordinate, a bare number or a length. */

@@ -5,10 +5,12 @@
  * points; an arc has start, end, centre, and the points of the ellipse at 0 and at a quarter turn, and its sweep
  * [rad]. Matrices are [a, b, c, d, e, f] as in SVG. */
 import { TAU, mod } from "./arrays.js";
+import { pythonText } from "./format.js";
+import { InputError } from "./input_error.js";
 
 const COMMAND = /[MmZzLlHhVvCcSsQqTtAa]/y;
 const BLANK = /[ ,\t\n\f\r]+/y;
-const FLOAT = /[-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?/y;
+const FLOAT = /[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?/y;
 const COORDINATES = { l: 1, t: 1, c: 3, s: 2, q: 2 }; // of a command, after one another
 
 /* Multiply two matrices: the second is applied first. */
@@ -76,11 +78,13 @@ function arcTo(start, [rx, ry, degrees, large, clockwise], end) {
   return { kind: "arc", points: [start, end, centre, first, quarter], sweep };
 }
 
-/* The segments of the data of a path, up to the first mistake. */
+/* The segments of the data of a path, all of them. */
 function pathSegments(data) {
   const reader = new Reader(data), segments = [];
-  for (let command = reader.command(); command !== null; command = reader.command()) {
-    if (!reader.take(command, segments)) break;
+  let command = reader.command();
+  while (command !== null && reader.take(command, segments)) command = reader.command();
+  if (command !== null || reader.left()) {
+    throw new InputError(`the data of a path are not read, ${pythonText(data.slice(0, 40))}; correct them`);
   }
   return segments;
 }
@@ -109,6 +113,12 @@ class Reader {
 
   command() {
     return this.match(COMMAND);
+  }
+
+  /* Tell whether something is left that is no blank. */
+  left() {
+    this.match(/$/y);
+    return this.at < this.data.length;
   }
 
   more() {
@@ -190,7 +200,7 @@ class Reader {
   }
 
   takeArcs(segments, relative) {
-    while (this.more()) {
+    do {
       const numbers = [this.number(), this.number(), this.number()];
       const flags = [this.match(/[01]/y), this.match(/[01]/y)];
       const places = this.places(1, relative);
@@ -199,7 +209,7 @@ class Reader {
       segments.push(arcTo(this.here, [Math.abs(rx), Math.abs(ry), turn, large, clockwise], places[0]));
       [this.here] = places;
       this.control = null;
-    }
+    } while (this.more());
     return true;
   }
 }

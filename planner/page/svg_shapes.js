@@ -1,43 +1,85 @@
-/* Basic shapes and transforms of drawings.
+/* Numbers, lengths, transforms, views and outlines of SVG drawings, from the words of their attributes.
  *
- * Stands for the library svgelements in planner/paths/svg_drawing.py. Segments are those of svg_segments.js. */
+ * Mirrors planner/paths/svg_shapes.py; stands for the library svgelements there, too. Segments are those of
+ * svg_segments.js. */
 import { TAU } from "./arrays.js";
+import { pythonText } from "./format.js";
+import { InputError } from "./input_error.js";
+import { NAMES } from "./svg_names.js";
 import { pathSegments, product } from "./svg_segments.js";
 
-const FLOAT = /[-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?/g;
-const TRANSFORM = /(matrix|translate[xy]?|scale[xy]?|rotate|skew[xy]?)\s*\(([^)]+)\)/g;
-const PARAMETER = /([-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*(deg|grad|rad|turn|px|pt|pc|%)?/g;
-const ANGLES = { deg: TAU / 360, grad: TAU / 400, rad: 1, turn: TAU };
+const N = "[-+]?(?:\\d+\\.?\\d*|\\.\\d+)(?:[eE][-+]?\\d+)?";
+const NUMBER = new RegExp(N, "g");
+const LENGTH = new RegExp(`^(${N})\\s*([a-zA-Z]*|%)$`);
+const FUNCTION = /[\s,]*([a-zA-Z]+)\s*\(([^()]*)\)/g;
+const ASPECT = /^(?:none|x(Min|Mid|Max)Y(Min|Mid|Max))(?:\s+(?:meet|(slice)))?$/;
+const SHARES = { Min: 0, Mid: 0.5, Max: 1 };
 
-/* The segments of a shape, before its transform; null: the element is none, or shows nothing.
- *
- * values: its attributes. size(name, axis, missing): a length among them in pixels, of which percentages belong to
- * the view's "width" or "height". */
-function shapeSegments(kind, values, size) {
-  if (kind === "path") return pathSegments(values.d ?? "");
-  if (kind === "line") {
-    const [start, end] = ["1", "2"].map((n) => [size(`x${n}`, "width", 0), size(`y${n}`, "height", 0)]);
-    return [{ kind: "move", points: [start] }, { kind: "line", points: [end] }];
+/* Lengths in pixels, and whether pixels have a size. */
+class Lengths {
+  constructor() {
+    this.physical = false; // a length was given in mm or another unit of the laboratory
+    this.sized = true; // the drawing says how large its pixels are
   }
-  if (kind === "polyline" || kind === "polygon") return polySegments(values.points ?? "", kind === "polygon");
-  if (kind === "rect") return rectSegments(size);
-  return kind === "circle" || kind === "ellipse" ? roundSegments(values, size) : null;
+
+  /* Read an attribute, in pixels; missing: where it is not given. view: width and height for percentages. */
+  read(own, name, view, missing = null) {
+    const text = own[name] ?? "", found = LENGTH.exec(text);
+    if (["", "auto"].includes(text.toLowerCase())) return missing;
+    const unit = found?.[2].toLowerCase();
+    if (unit === "%" && !view.includes(null)) {
+      return (Number(found[1]) * [...view, Math.hypot(...view) / Math.SQRT2][NAMES.lengths[name]]) / 100;
+    }
+    if (!found || !(unit in NAMES.pixels)) {
+      const words = "give a number, with mm, cm, in, pt, pc, px or without";
+      throw new InputError(`${name}=${pythonText(text)} is not read; ${words}`);
+    }
+    if (unit !== "" && unit !== "px") {
+      if (!this.sized) {
+        const words = `in a drawing without a size; give its <svg> a width in ${unit}`;
+        throw new InputError(`${name}=${pythonText(text)} ${words}`);
+      }
+      this.physical = true;
+    }
+    return Number(found[1]) * NAMES.pixels[unit];
+  }
 }
 
-function polySegments(text, closed) {
-  const numbers = (text.match(FLOAT) ?? []).map(Number), segments = [];
-  for (let i = 0; i + 1 < numbers.length; i += 2) {
+/* Read an attribute that is numbers between blanks and commas. */
+function numbersIn(own, name) {
+  const text = own[name] ?? "";
+  if (/[^,\s]/.test(text.replace(NUMBER, ""))) {
+    throw new InputError(`${name}=${pythonText(text.slice(0, 40))} is not read; give numbers`);
+  }
+  return (text.match(NUMBER) ?? []).map(Number);
+}
+
+/* The segments of a shape, before its transform; null: it shows nothing. */
+function shapeSegments(kind, own, lengths, view) {
+  if (kind === "path") return pathSegments(own.d ?? "");
+  if (kind === "polyline" || kind === "polygon") return polySegments(kind, numbersIn(own, "points"));
+  const given = Object.fromEntries(Object.keys(NAMES.lengths).map((name) => [name, lengths.read(own, name, view)]));
+  const { x, y, width, height, cx, cy, r, x1, y1, x2, y2 } = given, rx = given.rx ?? given.ry, ry = given.ry ?? rx;
+  if (kind === "line") {
+    return [{ kind: "move", points: [[x1 ?? 0, y1 ?? 0]] }, { kind: "line", points: [[x2 ?? 0, y2 ?? 0]] }];
+  }
+  if (kind === "rect") return rectSegments(x ?? 0, y ?? 0, width ?? 0, height ?? 0, rx ?? 0, ry ?? 0);
+  return kind === "circle" ? roundSegments(cx ?? 0, cy ?? 0, r ?? 0, r ?? 0)
+    : roundSegments(cx ?? 0, cy ?? 0, rx ?? 0, ry ?? 0);
+}
+
+function polySegments(kind, numbers) {
+  const segments = [];
+  if (numbers.length % 2) throw new InputError(`a ${kind} has an odd number of coordinates; correct its points`);
+  for (let i = 0; i < numbers.length; i += 2) {
     segments.push({ kind: i ? "line" : "move", points: [[numbers[i], numbers[i + 1]]] });
   }
-  if (closed && segments.length) segments.push({ kind: "close", points: segments[0].points });
+  if (kind === "polygon" && segments.length) segments.push({ kind: "close", points: segments[0].points });
   return segments;
 }
 
-function rectSegments(size) {
-  const x = size("x", "width", 0), y = size("y", "height", 0), width = size("width", "width", 1);
-  const height = size("height", "height", 1), given = [size("rx", "width", null), size("ry", "height", null)];
-  if (!width || !height) return null;
-  const [rx, ry] = [given[0] ?? given[1] ?? 0, given[1] ?? given[0] ?? 0];
+function rectSegments(x, y, width, height, rx, ry) {
+  if (Math.min(width, height) <= 0) return null;
   const a = rx && ry ? Math.min(rx, width / 2) : 0, b = rx && ry ? Math.min(ry, height / 2) : 0;
   const right = x + width, low = y + height, segments = [];
   if (!(a > 0 && b > 0)) {
@@ -61,10 +103,8 @@ function rectSegments(size) {
 }
 
 /* Four quarters of an ellipse. */
-function roundSegments(values, size) {
-  const x = size("cx", "width", 0), y = size("cy", "height", 0), radius = size("r", "width", null);
-  const a = radius ?? size("rx", "width", 1), b = radius ?? size("ry", "height", 1);
-  if (!a || !b) return null;
+function roundSegments(x, y, a, b) {
+  if (Math.min(a, b) <= 0) return null;
   const at = (turn) => [x + a * Math.cos(turn), y + b * Math.sin(turn)];
   const segments = [{ kind: "move", points: [at(0)] }];
   for (let i = 0; i < 4; i++) {
@@ -77,35 +117,35 @@ function roundSegments(values, size) {
 /* The matrix of the attribute `transform`. */
 function transformOf(text) {
   let matrix = [1, 0, 0, 1, 0, 0];
-  for (const [, name, inside] of text.toLowerCase().matchAll(TRANSFORM)) {
-    const given = Array.from(inside.matchAll(PARAMETER), ([, number, unit]) => ({ number: Number(number), unit }));
-    matrix = product(matrix, oneTransform(name, given));
+  if (text.toLowerCase() === "none") return matrix;
+  const functions = Array.from(text.matchAll(FUNCTION), ([, name, inside]) => oneTransform(name.toLowerCase(), inside));
+  if (functions.includes(null) || /[^,\s]/.test(text.replace(FUNCTION, ""))) {
+    const words = "give matrix, translate, scale, rotate or skew, in px and deg";
+    throw new InputError(`transform=${pythonText(text.slice(0, 40))} is not read; ${words}`);
   }
+  for (const each of functions) matrix = product(matrix, each);
   return matrix;
 }
 
-function oneTransform(name, given) {
-  const [p, q, r] = given.map(({ number }) => number), none = [1, 0, 0, 1, 0, 0];
-  if (name === "matrix") {
-    if (given.length < 6) throw new TypeError("tuple index out of range");
-    return given.slice(0, 6).map(({ number }) => number);
-  }
-  if (name === "translate") return given.length ? [1, 0, 0, 1, p, q ?? 0] : none;
-  if (name === "scale") return given.length ? [p, 0, 0, q ?? p, 0, 0] : none;
-  if (!given.length) throw new TypeError("list index out of range");
+/* The matrix of one function of a transform; null: it is not known. */
+function oneTransform(name, inside) {
+  const given = inside.trim().split(/[\s,]+/).map((word) => LENGTH.exec(word));
+  const kinds = (NAMES.transforms[name] ?? []).find(({ length }) => length === given.length);
+  const values = given.map((word, i) => word && kinds && Number(word[1]) * NAMES.units[kinds[i]][word[2].toLowerCase()]);
+  if (!kinds || !values.every((value) => typeof value === "number" && !Number.isNaN(value))) return null;
+  const [p, q, r] = values, [tan, tan2] = [p, q ?? 0].map((degrees) => Math.tan((degrees * TAU) / 360));
+  if (name === "matrix") return values;
+  if (name === "translate") return [1, 0, 0, 1, p, q ?? 0];
+  if (name === "scale") return [p, 0, 0, q ?? p, 0, 0];
   if (name === "translatex") return [1, 0, 0, 1, p, 0];
   if (name === "translatey") return [1, 0, 0, 1, 0, p];
   if (name === "scalex") return [p, 0, 0, 1, 0, 0];
   if (name === "scaley") return [1, 0, 0, p, 0, 0];
-  const angles = given.map(({ number, unit }) => number * (ANGLES[unit ?? "deg"] ?? ANGLES.deg));
-  if (name === "rotate") {
-    const c = Math.cos(angles[0]), s = Math.sin(angles[0]);
-    return about([c, s, -s, c, 0, 0], q ?? 0, r ?? 0);
-  }
-  if (name === "skewx") return about([1, 0, Math.tan(angles[0]), 1, 0, 0], q ?? 0, r ?? 0);
-  if (name === "skewy") return about([1, Math.tan(angles[0]), 0, 1, 0, 0], q ?? 0, r ?? 0);
-  if (given.length < 2) return none;
-  return about([1, Math.tan(angles[1]), Math.tan(angles[0]), 1, 0, 0], r ?? 0, given[3]?.number ?? 0);
+  if (name === "skewx") return [1, 0, tan, 1, 0, 0];
+  if (name === "skewy") return [1, tan, 0, 1, 0, 0];
+  if (name === "skew") return [1, tan2, tan, 1, 0, 0];
+  const c = Math.cos((p * TAU) / 360), s = Math.sin((p * TAU) / 360);
+  return about([c, s, -s, c, 0, 0], q ?? 0, r ?? 0);
 }
 
 /* A matrix about another point than the origin. */
@@ -113,4 +153,20 @@ function about(matrix, x, y) {
   return product(product([1, 0, 0, 1, x, y], matrix), [1, 0, 0, 1, -x, -y]);
 }
 
-export { shapeSegments, transformOf };
+/* Fit the viewBox (left, top, width, height) of an <svg> into its place and size. */
+function fitted(aspect, place, size, box) {
+  const found = ASPECT.exec(aspect || "xMidYMid");
+  if (!found) {
+    const words = "give none, or xMidYMid and meet or slice";
+    throw new InputError(`preserveAspectRatio=${pythonText(aspect)} is not read; ${words}`);
+  }
+  let scale = [0, 1].map((i) => size[i] / box[2 + i]);
+  if (found[1]) scale = Array(2).fill(found[3] ? Math.max(...scale) : Math.min(...scale));
+  const at = [0, 1].map((i) => {
+    const spare = (SHARES[found[1 + i]] ?? 0) * (size[i] - box[2 + i] * scale[i]);
+    return place[i] - box[i] * scale[i] + spare;
+  });
+  return [scale[0], 0, 0, scale[1], ...at];
+}
+
+export { Lengths, NUMBER, fitted, numbersIn, shapeSegments, transformOf };

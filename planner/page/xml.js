@@ -1,15 +1,16 @@
-/* XML as drawings are written in it: elements with attributes; texts and comments are left out.
+/* XML as drawings are written in it: elements with attributes and text; comments are left out.
  *
  * Stands for xml.etree.ElementTree in planner/paths/svg_drawing.py; refusals have the words of its parser. Nothing
  * of a drawing is put into the page. */
 
 const NAME = /[^\s<>/=!?"'&]+/y;
 const ENTITIES = { lt: "<", gt: ">", amp: "&", quot: '"', apos: "'" };
-const MARKS = [["<!--", "-->"], ["<![CDATA[", "]]>"], ["<?", "?>"]]; // what is skipped, from and to
+const MARKS = [["<!--", "-->"], ["<?", "?>"]]; // what is skipped, from and to
+const VERBATIM = "<![CDATA[", OWN_ENTITY = /<!ENTITY\s+([^\s%]+)\s+(?:"([^"&%]*)"|'([^'&%]*)')\s*>/g;
 
 class XmlError extends Error {}
 
-/* Parse a document: {tag, attributes, children}. A tag or attribute in a namespace is "{namespace}name". */
+/* Parse a document: {tag, attributes, children, text}. A tag or attribute in a namespace is "{namespace}name". */
 function parseXml(text) {
   return new XmlParser(text.replace(/^\ufeff/, "")).document();
 }
@@ -18,6 +19,7 @@ class XmlParser {
   constructor(text) {
     this.text = text;
     this.at = 0;
+    this.entities = { ...ENTITIES };
   }
 
   refuse(reason, at = this.at) {
@@ -37,6 +39,11 @@ class XmlParser {
         this.refuse("no element found", this.text.length);
       }
       this.at = next;
+      if (open.length) open[open.length - 1].text += this.decoded(between);
+      if (open.length && this.text.startsWith(VERBATIM, next)) {
+        open[open.length - 1].text += this.verbatim();
+        continue;
+      }
       if (this.skipped()) continue;
       if (this.text.startsWith("</", next)) {
         this.close(open);
@@ -50,7 +57,16 @@ class XmlParser {
     }
   }
 
-  /* Skip a comment, a declaration or a text that is marked as such. */
+  /* Read a text that is marked as such. */
+  verbatim() {
+    const end = this.text.indexOf("]]>", this.at);
+    if (end < 0) this.refuse("unclosed CDATA section");
+    const text = this.text.slice(this.at + VERBATIM.length, end);
+    this.at = end + 3;
+    return text;
+  }
+
+  /* Skip a comment or a declaration, of which entities are kept. */
   skipped() {
     for (const [from, to] of MARKS) {
       if (!this.text.startsWith(from, this.at)) continue;
@@ -62,6 +78,7 @@ class XmlParser {
     if (!this.text.startsWith("<!", this.at)) return false;
     const end = /^<![^[>]*(?:\[[^\]]*\]\s*)?>/.exec(this.text.slice(this.at));
     if (!end) this.refuse("unclosed token");
+    for (const [, name, one, two] of end[0].matchAll(OWN_ENTITY)) this.entities[name] ??= one ?? two;
     this.at += end[0].length;
     return true;
   }
@@ -111,7 +128,7 @@ class XmlParser {
       const isSpace = key === "xmlns" || key.startsWith("xmlns:");
       if (!isSpace) attributes[key.includes(":") ? full(key, spaces) : key] = value;
     }
-    return { element: { tag: full(name, spaces), name, attributes, children: [], spaces }, empty };
+    return { element: { tag: full(name, spaces), name, attributes, children: [], text: "", spaces }, empty };
   }
 
   quoted(start) {
@@ -122,13 +139,17 @@ class XmlParser {
     const value = this.text.slice(this.at + 1, end);
     if (value.includes("<")) this.refuse("not well-formed (invalid token)", this.at + 1 + value.indexOf("<"));
     this.at = end + 1;
-    return value.replace(/[\t\n\r]/g, " ").replace(/&([^;]*);/g, (_, entity) => this.entity(entity));
+    return this.decoded(value.replace(/[\t\n\r]/g, " "));
+  }
+
+  decoded(text) {
+    return text.replace(/&([^;]*);/g, (_, name) => this.entity(name));
   }
 
   entity(name) {
     const code = /^#(?:x([\da-fA-F]+)|(\d+))$/.exec(name);
     if (code) return String.fromCodePoint(code[1] ? parseInt(code[1], 16) : Number(code[2]));
-    return ENTITIES[name] ?? this.refuse("undefined entity");
+    return this.entities[name] ?? this.refuse("undefined entity");
   }
 }
 

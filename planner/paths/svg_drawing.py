@@ -1,18 +1,15 @@
 """Paths from SVG drawings.
 
-SVG is read by svgelements, with transforms, viewBox, curves, basic shapes and <use>; <defs> is ignored. In SVG y
-points down; here it points up. Every shape, and every subpath of a shape, is a separate path. A file with several
-paths is rejected unless one is chosen by name. Curves become polylines. A few lines of <use> can stand for
-millions of shapes, so the size of a drawing is computed first.
+In SVG y points down; here it points up. Every shape that is seen (`planner.paths.svg_tree`), and every subpath of
+a shape, is a separate path. A file with several paths is rejected unless one is chosen by name. Curves become
+polylines.
 """
 
 from __future__ import annotations
 
-import io
 import math
-import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -22,20 +19,15 @@ from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.reading import read_bytes
 
+if TYPE_CHECKING:  # svgelements is loaded where a drawing is read
+    from planner.paths.svg_tree import Shape
+
 METRES_PER_PIXEL = 0.0254 / 96  # of SVG
-_PHYSICAL = re.compile(r"\s*[0-9.eE+-]+\s*(mm|cm|in|pt|pc)\s*$")
 _TURN = math.radians(2.0)  # largest turn of a curve between two points
 _PROBES = 64  # places on a curve where its direction is measured
-_MOST_NUMBERS, _MOST_POINTS, _DEEPEST = 50_000, 200_000, 100
-_NUMBER = re.compile(r"[0-9.eE+-]+")
-_XLINK = "{http://www.w3.org/1999/xlink}href"
+_MOST_POINTS = 200_000
 
-
-# Raised by svgelements for invalid drawings: a transform without numbers, a path that begins with a curve
-_BROKEN = (
-    ElementTree.ParseError, AttributeError, TypeError, UnicodeDecodeError, ValueError, ArithmeticError,
-    LookupError,
-)  # fmt: skip
+_BROKEN = (ElementTree.ParseError, ValueError, ArithmeticError, LookupError)  # XML or its encoding; no <svg>
 
 
 def read_svg(path: Path, closed: bool | None, shape: str | None) -> tuple[Path2D, float | None]:
@@ -44,20 +36,20 @@ def read_svg(path: Path, closed: bool | None, shape: str | None) -> tuple[Path2D
     Raises:
         InputError: the file has no path, or several and none is chosen, or is larger than a drawing may be.
     """
-    from svgelements import SVG
+    from planner.paths.svg_tree import Drawing
 
     data = read_bytes(path)
+    if b"<?xml-stylesheet" in data:
+        raise InputError(f"{path}: <?xml-stylesheet> is not read; save the drawing with its style")
     try:
-        _check_size(path, ElementTree.fromstring(data))
-        drawing = SVG.parse(io.BytesIO(data), reify=True)
-        elements = list(drawing.elements())
+        with np.errstate(all="ignore"):  # `Path2D.of` refuses what is not finite
+            drawing = Drawing(ElementTree.fromstring(data))
+            subpaths = _subpaths(drawing.shapes)
     except InputError:
         raise
     except _BROKEN as broken:
         reason = next(iter(str(broken).splitlines()), type(broken).__name__)
         raise InputError(f"{path} is not SVG: {reason}") from None
-    with np.errstate(all="ignore"):  # `Path2D.of` refuses what is not finite
-        subpaths = _subpaths(elements)
     if not subpaths:
         raise InputError(f"{path} has no path, line, polyline, polygon, rectangle, circle or ellipse; draw one")
     if shape is None and len(subpaths) > 1:
@@ -69,68 +61,32 @@ def read_svg(path: Path, closed: bool | None, shape: str | None) -> tuple[Path2D
     if name not in subpaths:
         raise InputError(f"{path} has no shape {name!r}; there are {', '.join(subpaths)}")
     points, ends = subpaths[name]
-    physical = bool(_PHYSICAL.match(str(drawing.values.get("width", ""))))
-    unit = METRES_PER_PIXEL if physical else None
     upright = points * [1.0, -1.0] + 0.0  # no negative zeros
-    return Path2D.of(upright, closed=ends or closed), unit
+    return Path2D.of(upright, closed=ends or closed), METRES_PER_PIXEL if drawing.physical else None
 
 
-def _check_size(path: Path, root: ElementTree.Element) -> None:
-    """Count what a drawing holds when every <use> has been replaced by what it shows, without replacing it.
+def _subpaths(shapes: list[Shape]) -> dict[str, tuple[Floats, bool]]:
+    """Find the points (n, 2) of every subpath by name, and whether it is closed.
 
     Raises:
-        InputError: it holds more than a drawing may, or a <use> shows a group that holds it.
+        InputError: a part of one is hidden.
     """
-    named = {f"#{element.get('id')}": element for element in root.iter() if element.get("id")}
-    sizes: dict[ElementTree.Element, tuple[int, int]] = {}  # numbers and elements, depth
-    open_elements: set[ElementTree.Element] = set()
-    stack = [root]
-    while stack:
-        element = stack[-1]
-        parts = list(element)
-        shown = named.get(element.get("href") or element.get(_XLINK) or "")
-        if element.tag.rpartition("}")[2] == "use" and shown is not None:
-            parts.append(shown)
-        if element in open_elements or element in sizes:
-            stack.pop()
-            if element not in sizes:
-                open_elements.discard(element)
-                numbers = sum(len(_NUMBER.findall(element.get(key, ""))) for key in ("d", "points"))
-                size = 1 + numbers + sum(sizes[part][0] for part in parts)
-                depth = 1 + max((sizes[part][1] for part in parts), default=0)
-                if size > _MOST_NUMBERS or depth > _DEEPEST:
-                    raise InputError(
-                        f"{path} has more than {_MOST_NUMBERS} shapes and coordinates, or groups in more than "
-                        f"{_DEEPEST} levels; simplify the drawing"
-                    )
-                sizes[element] = size, depth
-            continue
-        open_elements.add(element)
-        for part in parts:
-            if part in open_elements:
-                raise InputError(f"{path}: a <use> shows a group that it belongs to; remove it")
-            if part not in sizes:
-                stack.append(part)
-
-
-def _subpaths(elements: list[Any]) -> dict[str, tuple[Floats, bool]]:
-    """Find the points (n, 2) of every subpath by name, and whether it is closed."""
     from svgelements import Path as SvgPath
-    from svgelements import Shape
 
     subpaths: dict[str, tuple[Floats, bool]] = {}
     counts: dict[str, int] = {}
-    for element in elements:
-        if not isinstance(element, Shape):
-            continue
-        kind = str(element.values.get("tag", type(element).__name__)).lower()
+    for kind, identity, outline, matrix, clips in shapes:
         counts[kind] = counts.get(kind, 0) + 1
-        name = str(element.id) if element.id else f"{kind}{counts[kind]}"
-        outline = SvgPath(element).reify()  # a turned circle or rectangle still has its transform
-        parts = [_points(SvgPath(part)) for part in outline.as_subpaths()]
+        name = identity or f"{kind}{counts[kind]}"
+        parts = [_points(SvgPath(part)) for part in abs(SvgPath(outline) * matrix).as_subpaths()]
         parts = [part for part in parts if len(part[0]) > 1]
         for i, part in enumerate(parts):
             part_name = name if len(parts) == 1 else f"{name}/{i + 1}"
+            hiding = [clip.name for clip in clips if clip.hides(part[0])]
+            if hiding:
+                raise InputError(
+                    f"{hiding[0]} hides a part of {part_name}; cut it off in the drawing, or remove {hiding[0]}"
+                )
             subpaths[part_name if part_name not in subpaths else f"{part_name}-{kind}{counts[kind]}"] = part
     return subpaths
 

@@ -9,7 +9,8 @@ import pytest
 
 from planner.paths.svg_drawing import read_svg
 from sim.io.errors import InputError
-from tests.planner.page.page_core import EXACT, answer, without_digits
+from tests.planner.page.page_core import EXACT, answer, answers, check_near, without_digits
+from tests.planner.paths.svg_cases import ALIKE, REFUSED
 
 BODIES = [
     "<polyline points='0,0 3,0 3,-4'/>", "<polygon points='0,0 3,0 3,-4'/>", "<path d='M 0 0 h 3 v -4 Z'/>",
@@ -27,7 +28,7 @@ BODIES = [
     "<path d='M0 0A3 1 20 0 0 5 5' transform='rotate(40)'/>",
     "<defs><path id='p' d='M0 0L1 2 3 1'/></defs><use href='#p' x='3' y='1' transform='scale(2)'/>",
     "<g style='display:none'><path d='M0 0L9 9'/></g><path d='M0 0L1 1'/>", "<path d='M0 0L1e1,2.5e-1.5.5'/>",
-    "<path d='M0 0 L1 0 L1 1 bad'/>", "<!-- c --><path d='M0 0L&#49; 1'/><text>no path</text><title>t</title>",
+    "<!-- c --><path d='M0 0L&#49; 1'/><text>no path</text><title>t</title>",
 ]  # fmt: skip
 ROOTS = ["", "width='5cm' height='5cm' viewBox='0 0 100 100'", "width='70mm' height='30mm' viewBox='1 2 100 100'",
          "viewBox='0 0 10 10' width='200' height='100' preserveAspectRatio='xMaxYMin slice'"]  # fmt: skip
@@ -65,7 +66,7 @@ def test_drawings(body: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("root", ROOTS)
 def test_views_and_units(root: str, tmp_path: Path) -> None:
-    for body in (BODIES[5], BODIES[11], "<circle cx='50%' r='3cm'/>"):
+    for body in (BODIES[5], BODIES[11], "<circle cx='5' r='3cm'/>"):
         check_drawing(f"<svg xmlns='http://www.w3.org/2000/svg' {root}>{body}</svg>", tmp_path)
 
 
@@ -88,3 +89,27 @@ def test_bad_drawings_are_refused_in_the_same_words(text: str, shape: str | None
     assert isinstance(found, InputError)
     words = str(wanted.value) if str(file) in str(wanted.value) else f"{file}: {wanted.value}"
     assert without_digits(found) == without_digits(words)
+
+
+def test_what_moves_scales_or_hides_is_read_as_by_the_command(tmp_path: Path) -> None:
+    texts = [text for pair in ALIKE for text in pair]
+    file = tmp_path / "a.svg"
+    for text, found in zip(
+        texts, answers([("svg_drawing.js", "readSvg", text, str(file)) for text in texts]), strict=True
+    ):
+        file.write_text(text)
+        wanted, unit = read_svg(file, None, None)
+        assert not isinstance(found, InputError), (text, found)
+        assert (found["unit"], found["path"]["closed"]) == (unit, wanted.closed), text
+        check_near(found["path"]["points"], wanted.points)
+
+
+def test_what_is_not_read_is_refused_as_by_the_command(tmp_path: Path) -> None:
+    file = tmp_path / "a.svg"
+    refusals = answers([("svg_drawing.js", "readSvg", text, str(file)) for text, _ in REFUSED])
+    for (text, _), found in zip(REFUSED, refusals, strict=True):
+        file.write_text(text)
+        with pytest.raises(InputError) as wanted:
+            read_svg(file, None, None)
+        words = str(wanted.value)
+        assert str(found) == (words if words.startswith(str(file)) else f"{file}: {words}"), text

@@ -1,0 +1,149 @@
+"""Numbers, lengths, transforms, views and outlines of SVG drawings, from the words of their attributes.
+
+svgelements reads data of paths, makes outlines, and multiplies transforms; what it would leave out in silence is
+refused here. Names and units are in planner/page/svg_names.js, which the page reads, too.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from svgelements import Ellipse, Matrix, Polygon, Polyline, Rect, SimpleLine
+from svgelements import Path as SvgPath
+
+from sim.io.errors import InputError
+
+_TEXT = Path(__file__).parents[1].joinpath("page", "svg_names.js").read_text(encoding="utf-8")
+NAMES: dict[str, Any] = json.JSONDecoder().raw_decode(_TEXT, _TEXT.index("{"))[0]
+_N = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+NUMBER = re.compile(_N)
+_LENGTH = re.compile(rf"({_N})\s*([a-zA-Z]*|%)")
+_FUNCTION = re.compile(r"[\s,]*([a-zA-Z]+)\s*\(([^()]*)\)")
+_NO_DATA = re.compile(r"[^MZLHVCSQTAE\d\s,.+-]|[MLHVCSQTA][\s,]*(?:[MZLHVCSQTA]|$)|^\s*[^M\s]", re.IGNORECASE)
+_POINT = re.compile(r"(?<=\d)\.(?!\d)")  # of "5.", which svgelements does not read
+_ASPECT = re.compile(r"(?:none|x(Min|Mid|Max)Y(Min|Mid|Max))(?:\s+(?:meet|(slice)))?")
+_SHARES = {None: 0.0, "Min": 0.0, "Mid": 0.5, "Max": 1.0}
+_BROKEN = (AttributeError, TypeError, ValueError, ArithmeticError, LookupError)  # data of a path, to svgelements
+
+View = tuple[float | None, float | None]  # width and height that percentages belong to
+
+
+class Lengths:
+    """Lengths in pixels, and whether pixels have a size."""
+
+    physical = False  # a length was given in mm or another unit of the laboratory
+    sized = True  # the drawing says how large its pixels are
+
+    def read(self, own: Mapping[str, str], name: str, view: View, missing: float | None = None) -> float | None:
+        """Read an attribute, in pixels; `missing` where it is not given.
+
+        Raises:
+            InputError: it is no length that is read.
+        """
+        text = own.get(name, "")
+        if text.lower() in ("", "auto"):
+            return missing
+        found = _LENGTH.fullmatch(text)
+        unit = found[2].lower() if found else "?"
+        if found and unit == "%" and view[0] is not None and view[1] is not None:
+            bases = (view[0], view[1], math.hypot(view[0], view[1]) / math.sqrt(2))
+            return float(found[1]) * bases[NAMES["lengths"][name]] / 100
+        if found is None or unit not in NAMES["pixels"]:
+            raise InputError(f"{name}={text!r} is not read; give a number, with mm, cm, in, pt, pc, px or without")
+        if unit not in ("", "px"):
+            if not self.sized:
+                raise InputError(f"{name}={text!r} in a drawing without a size; give its <svg> a width in {unit}")
+            self.physical = True
+        return float(found[1]) * float(NAMES["pixels"][unit])
+
+
+def numbers(own: Mapping[str, str], name: str) -> list[float]:
+    """Read an attribute that is numbers between blanks and commas.
+
+    Raises:
+        InputError: there is something else.
+    """
+    text = own.get(name, "")
+    if NUMBER.sub("", text).strip(", \t\n\r"):
+        raise InputError(f"{name}={text[:40]!r} is not read; give numbers")
+    return [float(number) for number in NUMBER.findall(text)]
+
+
+def transform_of(text: str) -> Matrix:
+    """Read a transform.
+
+    Raises:
+        InputError: a part of it is not known.
+    """
+    if text.lower() == "none":
+        return Matrix()
+    known = []
+    for name, inside in _FUNCTION.findall(text):
+        given = [_LENGTH.fullmatch(word) for word in re.split(r"[\s,]+", inside.strip())]
+        kinds = next((k for k in NAMES["transforms"].get(name.lower(), ()) if len(k) == len(given)), "")
+        units = [NAMES["units"][kind] for kind in kinds]
+        if not kinds or not all(word and word[2].lower() in of for word, of in zip(given, units, strict=True)):
+            break
+        values = [float(word[1]) * of[word[2].lower()] for word, of in zip(given, units, strict=True) if word]
+        known.append(f"{name}({', '.join(map(repr, values))})")
+    else:
+        if not _FUNCTION.sub("", text).strip(", \t\n\r"):
+            return Matrix(" ".join(known))
+    raise InputError(
+        f"transform={text[:40]!r} is not read; give matrix, translate, scale, rotate or skew, in px and deg"
+    )
+
+
+def fitted(aspect: str, place: Sequence[float], size: Sequence[float], box: Sequence[float]) -> Matrix:
+    """Fit the viewBox (left, top, width, height) of an <svg> into its place and size, by preserveAspectRatio.
+
+    Raises:
+        InputError: `aspect` is not known.
+    """
+    found = _ASPECT.fullmatch(aspect or "xMidYMid")
+    if found is None:
+        raise InputError(f"preserveAspectRatio={aspect!r} is not read; give none, or xMidYMid and meet or slice")
+    scale = [size[i] / box[2 + i] for i in (0, 1)]
+    if found[1]:
+        scale = [max(scale) if found[3] else min(scale)] * 2
+    spare = [_SHARES[found[1 + i]] * (size[i] - box[2 + i] * scale[i]) for i in (0, 1)]
+    return Matrix(scale[0], 0, 0, scale[1], *(place[i] - box[i] * scale[i] + spare[i] for i in (0, 1)))
+
+
+def outline(kind: str, own: Mapping[str, str], lengths: Lengths, view: View) -> Any:
+    """Return the path of a shape before its transform; None: it shows nothing.
+
+    Raises:
+        InputError: an attribute is not read.
+    """
+    if kind == "path":
+        return _path(own.get("d", ""))
+    if kind in ("polyline", "polygon"):
+        values = numbers(own, "points")
+        if len(values) % 2:
+            raise InputError(f"a {kind} has an odd number of coordinates; correct its points")
+        return (Polyline if kind == "polyline" else Polygon)(*zip(values[::2], values[1::2], strict=True))
+    given = {name: lengths.read(own, name, view) for name in NAMES["lengths"]}
+    x, y, width, height, cx, cy, r, rx, ry, *ends = (value or 0.0 for value in given.values())
+    if kind == "line":
+        return SimpleLine(*ends)
+    rx, ry = rx if given["rx"] is not None else ry, ry if given["ry"] is not None else rx
+    if kind == "rect":
+        return Rect(x, y, width, height, max(rx, 0.0), max(ry, 0.0)) if min(width, height) > 0 else None
+    rx, ry = (r, r) if kind == "circle" else (rx, ry)
+    return Ellipse(cx, cy, rx, ry) if min(rx, ry) > 0 else None
+
+
+def _path(data: str) -> SvgPath:
+    """Read the data of a path, all of them."""
+    try:
+        if _NO_DATA.search(data):
+            raise ValueError
+        return SvgPath(_POINT.sub(".0", data))
+    except _BROKEN:
+        raise InputError(f"the data of a path are not read, {data[:40]!r}; correct them") from None
