@@ -2,6 +2,7 @@
  *
  * Lengths in cm, spins in rpm, as in the table of runs. The rules for the runs are those of
  * docs/howto/tank.md. */
+import { inPage } from "./advice.js";
 import { largest, median, smallest } from "./arrays.js";
 import { InputError } from "./input_error.js";
 import { labColumns } from "./lab_units.js";
@@ -67,7 +68,7 @@ function answerTo([tails, length, speed], fields, lookup) {
     return { answer: labColumns(motion, length, robot.timeScale), outside: "" };
   } catch (refusal) {
     if (!(refusal instanceof InputError)) throw refusal;
-    return { answer: null, outside: refusal instanceof OutsideError ? refusal.reason : refusal.message };
+    return { answer: null, outside: refusal instanceof OutsideError ? refusal.reason : inPage(refusal.message, fields) };
   }
 }
 

@@ -1,4 +1,5 @@
 /* What the page asks of the planner: questions and answers in plain data. Lengths in cm, times in s. */
+import { inPage } from "./advice.js";
 import { pathOf, pathLength, polyline, scaled, smoothed } from "./path.js";
 import { repr } from "./format.js";
 import { geomspace } from "./arrays.js";
@@ -186,7 +187,8 @@ function pictured(plan) {
     predictedMax: errors.predictedMax * cm,
     offDrawn: declared.offDrawn * cm,
     missed: declared.missed * cm,
-    warnings: planWarnings(plan),
+    netSpeed: (plan.straight.speed * cm) / robot.timeScale,
+    warnings: planWarnings(plan).map((words) => inPage(words, robot)),
     body: {
       headLength: 100 * robot.headLength,
       headRadius: 100 * robot.headRadius,

@@ -2,6 +2,8 @@
  * {id, progress} go out.
  *
  * The first message is {what: "start", content: the planner's data}. Errors of the program go out as `broken`. */
+import { inPage } from "./advice.js";
+import { InputError } from "./input_error.js";
 import { service } from "./service.js";
 
 const PAUSE = 100; // ms between two words of progress
@@ -22,10 +24,10 @@ async function answerTo({ id, what, content }) {
   try {
     postMessage({ id, answer: await (await answers)[what](content, progress) });
   } catch (error) {
-    const refused = error.name === "InputError";
+    const refused = error instanceof InputError;
     postMessage({
       id,
-      refusal: refused ? error.message : "this cannot be planned",
+      refusal: refused ? inPage(error.message, content.robot ?? content.wish?.robot) : "this cannot be planned",
       about: error.about ?? null,
       broken: refused ? null : String(error.stack ?? error),
     });

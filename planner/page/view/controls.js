@@ -58,9 +58,14 @@ function connectPath(page) {
     if (size > 0) page.change({ path: { ...page.state.path, size } }, "size");
     else say(byId("path-problem"), "Give a size above 0.", true);
   });
+  byId("size").addEventListener("change", () => page.history.settle());
   for (const input of document.querySelectorAll("[name=mode]"))
     input.addEventListener("change", () => page.mode(input.value));
   page.mode("move");
+  byId("new").addEventListener("click", () => {
+    document.querySelector("[value=corners]").checked = true;
+    page.mode("corners", true);
+  });
   byId("undo").addEventListener("click", () => page.step("undo"));
   byId("redo").addEventListener("click", () => page.step("redo"));
   byId("close").addEventListener("click", () => page.setPoints(page.editor.path.points, !page.drawn.closed));

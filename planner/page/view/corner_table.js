@@ -7,7 +7,7 @@ import { HANDLES } from "./path_editor.js";
 function showCorners(host, points, changed) {
   if (points.length > HANDLES) {
     host.replaceChildren(
-      element("p", { class: "soft" }, `The path has ${points.length} points: more than can be typed.`),
+      element("p", { class: "soft" }, `The path has ${points.length} points: more than can be typed or moved.`),
     );
     return;
   }

@@ -142,7 +142,7 @@ class Page {
     say(byId("path-problem"), answer.refusal ?? this.notice, true);
     if (answer.refusal) return;
     this.drawn = answer.answer;
-    this.editor.path = answer.answer.corners;
+    this.editor.take(answer.answer.corners);
     byId("close").textContent = this.drawn.closed ? "Open path" : "Close path";
     showCorners(byId("corner-table"), this.editor.path.points, (points) =>
       this.setPoints(points, this.drawn.closed),
@@ -271,10 +271,9 @@ class Page {
   setPoints(points, closed, name = "my path") {
     const grid = onGrid(points);
     const refusal = pointsRefusal(grid);
-    if (refusal) {
-      say(byId("path-problem"), refusal, true);
-      return;
-    }
+    say(byId("path-problem"), refusal, true);
+    if (refusal) return;
+    this.editor.take({ points, closed });
     this.change({ path: { points: grid, closed, name } });
   }
 
@@ -387,8 +386,8 @@ class Page {
     if (this.history[way]()) this.refresh();
   }
 
-  mode(name) {
-    this.editor.mode = name;
+  mode(name, anew = false) {
+    this.editor.use(name, anew);
     byId("view").dataset.mode = name;
     say(byId("mode-words"), WORDS[name]);
     this.view.place();

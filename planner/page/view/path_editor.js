@@ -22,15 +22,33 @@ class PathEditor {
     this.changed = changed;
     this.mode = "move";
     this.path = { points: [], closed: false };
+    this.begun = null; // the corners of a new path as long as they are too few for one
     this.stroke = null;
     this.held = null;
     this.snaps = false;
     this.view = null;
   }
 
-  /* The corners, which can be edited where they are few. */
-  get editable() {
-    return this.path.points.length <= HANDLES;
+  /* Show a path. */
+  take(path) {
+    this.path = path;
+    this.begun = null;
+  }
+
+  /* Choose what the pointer does; `anew`: corners are those of a new path. */
+  use(mode, anew = false) {
+    this.mode = mode;
+    this.begun = anew ? [] : null;
+  }
+
+  /* The corners that can be moved: those of a new path, or of a path that has few. */
+  get corners() {
+    return this.begun ?? (this.path.points.length <= HANDLES ? this.path.points : []);
+  }
+
+  /* Whether the corners are those of the path. */
+  get continues() {
+    return this.corners === this.path.points;
   }
 
   press(place, event) {
@@ -39,7 +57,7 @@ class PathEditor {
       return true;
     }
     if (this.mode !== "corners") return false;
-    const points = this.editable ? this.path.points : [];
+    const points = this.corners;
     const index = points.findIndex((point) => this.near(point, place));
     if (index >= 0) {
       this.held = { index, points: [...points] };
@@ -84,15 +102,16 @@ class PathEditor {
     if (stroke && stroke.length > 2) this.finished(stroke, closes(stroke));
     if (!held) return;
     const first = held.points[0];
-    const added = held.points.length > this.path.points.length;
-    if (added && held.points.length > 3 && this.near(first, held.points[held.index])) {
+    const added = held.points.length > this.corners.length;
+    if (held.points.length < 2) this.begun = held.points;
+    else if (added && held.points.length > 3 && this.near(first, held.points[held.index])) {
       this.changed(held.points.slice(0, -1), true);
-    } else this.changed(held.points, this.path.closed);
+    } else this.changed(held.points, this.continues && this.path.closed);
   }
 
   /* Remove the corner at a place. */
   remove(place) {
-    if (this.mode !== "corners" || !this.editable) return;
+    if (this.mode !== "corners" || !this.continues) return;
     const kept = this.path.points.filter((point) => !this.near(point, place));
     if (kept.length < this.path.points.length) this.changed(kept, this.path.closed && kept.length > 2);
   }
@@ -106,13 +125,14 @@ class PathEditor {
   overlay(view) {
     this.view = view;
     const shapes = [];
-    const points = this.held?.points ?? this.path.points;
+    const points = this.held?.points ?? this.corners;
     const line = this.stroke ?? (this.held ? points : null);
     if (line) {
       const pixels = line.map((point) => pixelOf(view, point));
-      shapes.push(figure("path", { class: "stroke", d: lineData(pixels, !this.stroke && this.path.closed) }));
+      const closed = !this.stroke && this.continues && this.path.closed;
+      shapes.push(figure("path", { class: "stroke", d: lineData(pixels, closed) }));
     }
-    if (this.mode === "corners" && this.editable) {
+    if (this.mode === "corners") {
       points.forEach((point, i) => {
         const [cx, cy] = pixelOf(view, point);
         shapes.push(

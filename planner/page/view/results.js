@@ -18,6 +18,7 @@ function showResults(plan, tails) {
   const pairs = [
     ["Start pose", `x ${digits(x)} cm, y ${digits(y)} cm, heading ${degrees(heading)} degrees, at rest`],
     ["Time", `${time(plan.seconds)}, ${plan.dwells.length} dwells`],
+    ["Net speed along a straight path", `${digits(60 * plan.netSpeed)} cm/min`],
     ["Shortest dwell", time(plan.minimumDwell)],
     ["Predicted error", `${size(plan.predictedRms)} rms, ${size(plan.predictedMax)} at most`],
     ["Stated error, without feedback", size(plan.stated)],

@@ -81,7 +81,7 @@ function showMotion(answer) {
   describe(byId("motion"), [
     ["Turn radius", length(turnRadius)],
     ["Yaw rate", `${degrees(yawRate)} degrees/s`],
-    ["Net speed", `${digits(60 * speed)} cm/min`],
+    ["Speed round the circle", `${digits(60 * speed)} cm/min`],
     ["Slip angle", `${degrees(slip)} degrees`],
     ["Gap of the tails", `${digits(tailGap)} tail diameters`],
     ["Motor speed ω̄", digits(omegaBar)],

@@ -77,12 +77,17 @@ function flips(plan, view) {
   return drawn ? figure("path", { class: "flip", d, "vector-effect": "non-scaling-stroke" }) : null;
 }
 
+/* Where a tail is clamped, seen from above, in radii of the disc, which is turned so that no tail hides another. */
+function acrossOf(k, tails) {
+  return Math.cos((Math.PI * (4 * k + 1)) / (2 * tails));
+}
+
 /* The robot from above, to scale, at the origin, heading to the right. */
 function robotShape({ headLength, headRadius, tailLength, tailRadius, discOffset, tails }) {
   const shape = figure("g", { class: "robot" });
   const rear = -headLength / 2;
   for (let k = 0; k < tails; k++) {
-    const across = discOffset * Math.cos((2 * Math.PI * k) / tails);
+    const across = discOffset * acrossOf(k, tails);
     shape.append(
       figure("rect", {
         class: "tail",
@@ -142,4 +147,4 @@ function axes(view, width, height, unit = "cm") {
   return group;
 }
 
-export { axes, flips, lineData, planLayers, poseTransform, robotShape };
+export { acrossOf, axes, flips, lineData, planLayers, poseTransform, robotShape };

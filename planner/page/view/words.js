@@ -20,9 +20,8 @@ function duration(seconds) {
 
 /* Minutes and seconds of a clock: 3:07.5 */
 function clock(seconds) {
-  const minutes = Math.floor(seconds / 60);
-  const rest = (seconds - 60 * minutes).toFixed(1).padStart(4, "0");
-  return `${minutes}:${rest}`;
+  const tenths = Math.round(10 * seconds);
+  return `${Math.floor(tenths / 600)}:${((tenths % 600) / 10).toFixed(1).padStart(4, "0")}`;
 }
 
 function degrees(radians) {

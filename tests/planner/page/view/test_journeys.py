@@ -98,6 +98,27 @@ def check_headers(ours: str, theirs: str) -> None:
     np.testing.assert_allclose(*numbers, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize(("shape", "anew"), [("circle", False), ("eight", False), ("square", True)])
+def test_corners_begin_a_new_path(browser: Any, address: str, shape: str, anew: bool) -> None:
+    """A path of many points has no corners to add to, and one of few can be left."""
+    with opened_page(browser, address) as page:
+        planned(page)
+        page.select_option("#shape", shape)
+        planned(page)
+        page.click("#new" if anew else "[value=corners]")
+        box = page.locator("#view").bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        for right, down in ((-250, 100), (0, 60), (250, -60)):
+            page.mouse.click(x + right, y + down)
+        assert "dwells" in planned(page)
+        assert not page.is_visible("#path-problem")
+        assert page.locator("#corner-table tbody tr").count() == 3
+        page.keyboard.press("Control+z")
+        page.keyboard.press("Control+z")
+        planned(page)
+        assert page.input_value("#shape") == shape
+
+
 def test_a_finger_draws_on_a_phone(browser: Any, address: str) -> None:
     phone = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
     with opened_page(browser, address, **phone) as page:
@@ -280,10 +301,10 @@ def test_an_opened_path_is_smoothed(browser: Any, address: str, tmp_path: Path) 
         page.locator("#path-problem", has_text="it looks noisy").wait_for()
         planned(page)
         refusal = text_of(page, "#path-problem")
-        advised = re.search(r"smoothed over ([\d.]+) (mm|cm)", refusal)
+        advised = re.search(r'set "Smooth over" to ([\d.]+) cm', refusal)
         assert advised, refusal
         page.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
-        page.fill("#smooth", f"{float(advised[1]) / (10 if advised[2] == 'mm' else 1):g}")
+        page.fill("#smooth", advised[1])
         page.get_by_role("button", name="Smooth this path").click()
         page.locator("#path-problem").wait_for(state="hidden")
         assert "dwells. 95 of 100" in planned(page)

@@ -75,3 +75,16 @@ def test_the_pose_between_samples() -> None:
     poses = answers([("view/player.js", "poseAt", plan, [0, 2, 6], time) for time in (-1, 0.5, 2, 3, 99)])
     assert [each["pose"] for each in poses] == [[0, 0, 0], [0.5, 0, 0], [2, 0, 0], [2, 1, 0.5], [2, 4, 1]]
     assert [each["dwell"] for each in poses] == [0, 0, 1, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(0, "0:00.0"), (59.94, "0:59.9"), (179.96, "3:00.0"), (3599.99, "60:00.0")]
+)
+def test_the_clock_never_shows_sixty_seconds(seconds: float, words: str) -> None:
+    assert answer("view/words.js", "clock", seconds) == words
+
+
+@pytest.mark.parametrize("tails", range(1, 9))
+def test_no_tail_is_drawn_behind_another(tails: int) -> None:
+    across = sorted(answer("view/scene.js", "acrossOf", k, tails) for k in range(tails))
+    assert np.diff(across).min(initial=1) > 0.05
