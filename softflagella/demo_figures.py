@@ -91,7 +91,7 @@ def draw_path(plan: dict[str, Any], error: TrackingError) -> Figure:
     figure = Figure(figsize=(_NARROW, 3.4))
     axes = figure.add_subplot()
     declared = cm * np.array(plan["reference"])
-    axes.fill(*_band(declared, cm * error.stated).T, color=BLUE, alpha=0.15, lw=0, label="stated error")
+    axes.fill(*_band(declared, cm * error.stated).T, color=BLUE, alpha=0.3, lw=0, label="stated error")
     axes.plot(*(cm * np.array(plan["raw_path"])).T, color=PALE, lw=1.4, label="path as given")
     axes.plot(*declared.T, color=INK, lw=1.2, label="declared path")
     axes.plot(*(cm * error.track).T, color=RED, lw=0.8, label="replayed")

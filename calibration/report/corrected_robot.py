@@ -32,6 +32,8 @@ from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml
 from surrogate.input_ranges import COEFFICIENTS
 
+_CERTAIN = 1e-12  # least variance of a logarithm, and of a correlated combination of them
+
 
 def check_given(robot: Robot) -> None:
     """Refuse a robot that already has a correction or a law: its table of runs belongs to the robot as given."""
@@ -107,7 +109,25 @@ def handed_on(
     if isinstance(learnt, HeadCorrection):
         known = _with_correction(known, learnt, corrected)
         corrected = replace(corrected, correction=learnt.correction)
-    return corrected, known
+    return significant(corrected, known), known
+
+
+def significant(robot: Robot, known: CalibrationKnowledge) -> Robot:
+    """Round what was fitted to two digits of its standard deviation, all others being known."""
+    scale = np.sqrt(np.maximum(np.diag(known.covariance), _CERTAIN))
+    correlation = known.covariance / np.outer(scale, scale)
+    precision = np.diag(np.linalg.inv(correlation + _CERTAIN * np.eye(len(scale))))
+    sigmas = dict(zip(known.names, (scale / np.sqrt(precision)).tolist(), strict=True))
+    numbers = {name: getattr(robot, name) for name in (*COEFFICIENTS, *NUMBERS) if name in sigmas}
+    return replace(
+        robot,
+        **{name: _rounded(value, value * sigmas[name]) for name, value in numbers.items() if value},
+        effects={name: _rounded(size, sigmas.get(name, 0.0)) for name, size in robot.effects.items()},
+    )
+
+
+def _rounded(value: float, sigma: float) -> float:
+    return round(value, 1 - math.floor(math.log10(abs(sigma)))) if sigma else value
 
 
 def _with_correction(known: CalibrationKnowledge, learnt: HeadCorrection, robot: Robot) -> CalibrationKnowledge:

@@ -25,7 +25,7 @@ import numpy as np
 from calibration.laws.inputs import EXPONENTS
 from calibration.laws.law import Law
 from calibration.laws.law_model import LEVER, SIZE
-from calibration.report.corrected_robot import calibration_knowledge, corrected_robot
+from calibration.report.corrected_robot import calibration_knowledge, corrected_robot, significant
 from calibration.statistics.held_out import FinalRefit, refit_to_all
 from calibration.statistics.statistical_model import Parameters
 from planner.vehicle.calibration_table import CalibrationKnowledge
@@ -40,7 +40,8 @@ def law_handed_on(given: Robot, law: Law, rows: Flags) -> tuple[Robot, Calibrati
     """Return the corrected robot with a law, fitted once more to the runs in `rows` (n,), and its covariance."""
     final = refit_to_all(law.model, law.fit, rows)
     robot = robot_with_law(given, law, final.parameters)
-    return robot, calibration_knowledge(given, final, _slopes(robot, law, final))
+    known = calibration_knowledge(given, final, _slopes(robot, law, final))
+    return significant(robot, known), known
 
 
 def robot_with_law(given: Robot, law: Law, parameters: Parameters) -> Robot:

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from planner.jobs.clear_plan import plan_clear
 from planner.paths.obstacles import FreeSpace
-from planner.planning.picture import DECLARED, PREDICTED, RAW, REPLAYED
+from planner.planning.picture import DECLARED, PREDICTED, RAW, REPLAYED, label_points
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.dwell_choice import QUICK, longest_dwell
@@ -74,12 +74,13 @@ def draw_trade_off(comparison: TradeOff) -> Figure:
         axes.plot(
             value(comparison.chosen), comparison.chosen.stated_error, "s", color=REPLAYED, ms=7, label="this plan"
         )
-        for plan, at in zip(comparison.plans, x, strict=True):
-            axes.annotate(f"{plan.minimum_dwell:.2g}", (at, plan.stated_error), textcoords="offset points",
-                          xytext=(0, 6), ha="center", fontsize=7, color=PREDICTED)  # fmt: skip
         axes.set_xlabel(name)
     by_time.set_ylabel("error / l")
     by_time.set_ylim(bottom=0)
+    numbers = [f"{plan.minimum_dwell:.2g}" for plan in comparison.plans]
+    for axes, (_, value) in zip((by_time, by_flips), values, strict=True):
+        places = np.array([[value(plan), plan.stated_error] for plan in comparison.plans])
+        label_points(axes, places, numbers, [PREDICTED] * len(places), 7)
     by_time.legend(fontsize=8, frameon=False)
     figure.suptitle(
         f"{comparison.chosen.robot.name}: error against time and flips; numbers are dwells", fontsize=10

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from planner.paths.obstacles import Footprint
-from planner.planning.picture import DECLARED, REPLAYED
+from planner.planning.picture import BODY, REPLAYED
 
 
 def draw_places(
@@ -24,8 +24,8 @@ def draw_places(
     axis = cm * np.array([body.places.min() - body.radius, body.places.max() + body.radius])
     for x, y, heading in poses:
         along = np.array([[math.cos(heading)], [math.sin(heading)]])
-        axes.plot(*(np.array([[cm * x], [cm * y]]) + along * axis), color=DECLARED, lw=3, alpha=0.3)
-        axes.plot(cm * x, cm * y, "o", color=DECLARED, ms=5)
+        axes.plot(*(np.array([[cm * x], [cm * y]]) + along * axis), color=BODY, lw=4, alpha=0.6)
+        axes.plot(cm * x, cm * y, "o", color=BODY, ms=5)
     for x, y in via:
         axes.plot(cm * x, cm * y, "+", color=REPLAYED, ms=10)
     axes.autoscale_view()

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from planner.jobs.separation import Scheduled
-from planner.planning.picture import draw_regions
+from planner.planning.picture import draw_regions, label_points
 from sim.arrays import Floats
 
 _COLOURS = ("#2a7fba", "#c8452f", "#3f8f4f", "#8a5ca8", "#b8860b", "#4d4d4d")
@@ -22,6 +22,7 @@ def draw_motions(axes: Axes, names: Sequence[str], scheduled: Sequence[Scheduled
     minutes = max(each.end for each in scheduled) / 60
     interval = next((each for each in _INTERVALS_MIN if minutes / each <= _MARKS), minutes / _MARKS)
     marks = np.asarray(np.arange(1, math.floor(minutes / interval) + 1) * interval, dtype=float)
+    labels: list[tuple[Floats, str, str]] = []
     for k, each in enumerate(scheduled):
         colour, motion = _COLOURS[k % len(_COLOURS)], each.motion
         plan = motion.plan
@@ -35,11 +36,11 @@ def draw_motions(axes: Axes, names: Sequence[str], scheduled: Sequence[Scheduled
         shown = marks[(60 * marks > each.begin) & (60 * marks < each.end)]
         places = 100 * each.places(60 * shown).poses[:, :2]
         axes.plot(*places.T, "o", color=colour, ms=4)
-        for minute, place in zip(shown.tolist(), places.tolist(), strict=True):
-            axes.annotate(
-                f"{minute:g}", place, textcoords="offset points", xytext=(4, 4), fontsize=7, color=colour
-            )
+        labels += [(place, f"{minute:g}", colour) for minute, place in zip(shown.tolist(), places, strict=True)]
     axes.set_aspect("equal")
+    if labels:
+        places, words, colours = zip(*labels, strict=True)
+        label_points(axes, np.array(places), words, colours, 7)
     axes.set_xlabel("x [cm]")
     axes.set_ylabel("y [cm]")
     return axes

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from planner.paths.units import in_lab
+from planner.planning.picture import REPLAYED, label_points
 from planner.planning.planned import Plan
 from sim.arrays import Floats
 from sim.io.notebook import as_html
@@ -69,9 +70,10 @@ class TourPlan:
         """
         ax = self.plan.plot(ax)
         cm = 100 * self.plan.robot.tail_length
-        for index, (x, y) in enumerate((cm * self.places).tolist()):
-            ax.plot(x, y, "o", color="#c8452f", ms=5)
-            ax.annotate(str(index + 1), (x, y), textcoords="offset points", xytext=(5, 5), color="#c8452f")
+        places = cm * self.places
+        ax.plot(*places.T, "o", color=REPLAYED, ms=5)
+        numbers = [str(index + 1) for index in range(len(places))]
+        label_points(ax, places, numbers, [REPLAYED] * len(places), 9)
         return ax
 
     def to_dict(self) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,8 +15,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 RAW, DECLARED, PREDICTED, REPLAYED = "#b0b0b0", "#1a1a1a", "#2a7fba", "#c8452f"
-KEEP_OUT = "#d8b365"
+KEEP_OUT, BODY = "#d8b365", "#8a4fa3"
 _ROUND = 121  # points of a circle
+_WIDE, _HIGH = 0.65, 1.2  # of a letter, over the size of the font
+_ASIDE = (1.0, 2.0, 3.0)  # distances of a label from its point, over the size of the font
+_WAYS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1], [0, 1], [0, -1], [1, 0], [-1, 0]])
 
 
 def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float, tail_length: float) -> None:
@@ -30,7 +34,7 @@ def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float, tail_l
     cm = 100 * tail_length
     edges = cm * _band(declared, stated)
     axes.fill(
-        *edges.T, color="#2a7fba", alpha=0.10, lw=0, label=f"stated error {format_length(stated * tail_length)}"
+        *edges.T, color="#2a7fba", alpha=0.25, lw=0, label=f"stated error {format_length(stated * tail_length)}"
     )
     axes.plot(*(cm * raw.T), color=RAW, lw=1.0, label="path as given")
     axes.plot(*(cm * declared.T), color=DECLARED, lw=1.2, label="declared")
@@ -59,6 +63,34 @@ def draw_regions(axes: Axes, free_space: FreeSpace, tail_length: float) -> None:
     if free_space.walls is not None:
         corners = cm * free_space.walls.corners
         axes.plot(*np.concatenate([corners, corners[:1]]).T, color=KEEP_OUT, lw=3)
+
+
+def label_points(axes: Axes, points: Floats, words: Sequence[str], colours: Sequence[str], size: float) -> None:
+    """Write words beside points (n, 2), each on the side where it covers least of other words and points.
+
+    Args:
+        axes: with all that is drawn, so that their limits are known.
+        points: in the axes' own units.
+        words, colours: one for each point.
+        size: of the font, in points.
+    """
+    axes.apply_aspect()
+    dots = axes.transData.transform(points) * 72 / axes.figure.get_dpi() if len(points) else points
+    half = 0.5 * size * np.array([0.5, 0.5])
+    taken = [(dot, half) for dot in dots]
+    for point, dot, text, colour in zip(points, dots, words, colours, strict=True):
+        box = 0.5 * size * np.array([_WIDE * len(text), _HIGH])
+        places = [way * (box + 0.4 * size * aside) for aside in _ASIDE for way in _WAYS]
+
+        def covered(place: Floats, dot: Floats = dot, box: Floats = box) -> float:
+            return sum(
+                float(np.maximum(box + other - np.abs(dot + place - centre), 0).prod()) for centre, other in taken
+            )
+
+        best = min(places, key=covered)
+        taken.append((dot + best, box))
+        axes.annotate(text, point, textcoords="offset points", xytext=best, ha="center", va="center",
+                      fontsize=size, color=colour)  # fmt: skip
 
 
 def _band(polyline: Floats, width: float) -> Floats:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 from pandas import DataFrame
 
 from sim.arrays import Floats
@@ -22,7 +23,7 @@ from sim.motion.slow_sweep import Settled
 
 UP, DOWN = "time steps, up", "time steps, down"
 _MARKS = {FOLD: ("o", RED), HOPF: ("s", VIOLET), DOUBLING: ("D", GREEN)}
-_SHOWN = 4.0  # of the growth, beyond the one that is nearest to 0
+_LINEAR = 1.0  # growth up to which its axis is linear; beyond, it is logarithmic
 _NAMES = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z")
 
 
@@ -131,11 +132,8 @@ def draw_branches(result: Branches) -> Figure:
     for label, sweep, mark in ((UP, result.up, "^"), (DOWN, result.down, "v")):
         _draw_sweep(upper, result, sweep, label, mark)
     lower.axhline(0.0, color=SOFT, lw=0.8)
-    growths = [m.leading.growth for b in result.branches for m in b.motions if np.isfinite(m.leading.growth)]
-    if growths:
-        least = min(map(abs, growths))
-        low, high = np.clip([min(*growths, 0.0), max(*growths, 0.0)], -_SHOWN - least, _SHOWN + least)
-        lower.set_ylim(low - 0.1, high + 0.1)
+    lower.set_yscale("symlog", linthresh=_LINEAR)
+    lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     upper.set_ylabel("yaw rate [rpm]")
     lower.set_ylabel("growth in a motor revolution")
     lower.set_xlabel(result.swept.label)

@@ -19,6 +19,7 @@ from sim.model.schedule import Schedule
 from sim.motion.film_frames import Frames, film_frames
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from PIL.Image import Image
 
 ENDINGS = (".gif", ".webp", ".mp4")
@@ -123,6 +124,7 @@ def _pictures(content: Mapping[str, Any], schedule: Schedule, frames: Frames, fi
     axes.add_patch(head)
     words = axes.text(0.02, 0.02, "", transform=axes.transAxes, fontsize=11, color=_INK)
     sense = axes.text(0.98, 0.02, "", transform=axes.transAxes, fontsize=11, ha="right")
+    _draw_scale_bar(axes, cm * size[0], "cm" if schedule.tail_length else "l")
     radius = 1 / schedule.robot["l_over_R"]
     length = radius * schedule.robot["L_over_R"]
     corners = np.array([[-length, -radius], [length, -radius], [length, radius], [-length, radius]]) * [0.5, 1]
@@ -142,6 +144,16 @@ def _pictures(content: Mapping[str, Any], schedule: Schedule, frames: Frames, fi
         canvas.draw()  # type: ignore[no-untyped-call]
         pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
         yield Image.fromarray(pixels).convert("RGB")
+
+
+def _draw_scale_bar(axes: Axes, width: float, unit: str) -> None:
+    """Draw a bar of 1, 2 or 5 times a power of ten, at most a fifth of the width, below the middle."""
+    power = 10.0 ** math.floor(math.log10(width / 5))
+    length = max(step * power for step in (1, 2, 5) if step * power <= width / 5)
+    middle, below = sum(axes.get_xlim()) / 2, axes.get_xaxis_transform()
+    axes.plot([middle - length / 2, middle + length / 2], [0.025, 0.025], color=_INK, lw=2.5, transform=below,
+              solid_capstyle="butt")  # fmt: skip
+    axes.text(middle, 0.04, f"{length:g} {unit}", transform=below, fontsize=11, color=_INK, ha="center")
 
 
 def _write_animation(pictures: Iterator[Image], path: Path, film: Film, ending: str) -> None:

@@ -33,9 +33,16 @@ def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -
     path = tmp_path / "corrected.toml"
     path.write_text(corrected_toml(START, result.fits.final_refit))
     robot, knowledge = load_robot(path), read_knowledge(path)
-    assert robot == corrected_robot(START, result.fits.final_refit.parameters)
+    fitted = corrected_robot(START, result.fits.final_refit.parameters)
     sigma = dict(zip(knowledge.names, np.sqrt(np.diag(knowledge.covariance)), strict=True))
     assert {"C_t", "C_r", "C_yr", "youngs_modulus", "tail_length", "end_over_end_drag"} <= set(sigma)
+    for name in sigma:  # written to the digits that the runs have determined
+        value, exact = (each.effects.get(name) or getattr(each, name) for each in (robot, fitted))
+        error = sigma[name] * (1 if name in robot.effects else exact)
+        assert abs(value - exact) <= 0.05 * error
+    written = [word for line in path.read_text().split("[calibration]")[0].splitlines() if "speed" not in line
+               for word in line.split("#")[0].split("=")[1:]]  # fmt: skip
+    assert max(sum(map(str.isdigit, word)) for word in written if "[" not in word) < 10
     low, high = result.final.interval("end_over_end_drag")
     assert 2 * 1.96 * sigma["end_over_end_drag"] == pytest.approx(high - low, rel=0.35)  # a session more
     assert sigma["youngs_modulus"] < START.sigma("youngs_modulus").of(1.0)
@@ -83,7 +90,7 @@ def test_from_a_table_to_a_path_whose_stated_error_holds(
     words = ["calibrate", str(tmp_path / "runs.csv"), "--robot", str(tmp_path / "given.toml")]
     assert run_command(calibration, [*words, "--out", str(tmp_path / "out")]) == 0
     assert run_command(surrogate, ["robot", robot, "--out", table]) == 0
-    assert run_command(planner, ["plan", "circle:2l", "--robot", robot, "--model", table, "--out", out]) == 0
+    assert run_command(planner, ["plan", "circle:2l", "--robot", robot, "--lookup", table, "--out", out]) == 0
     record = load_plan(Path(out) / "plan.json")
     error = tracking_error(record, _swum(load_schedule(Path(out) / "plan.json"), load_robot(robot), truth))
     assert error.largest < record["stated_error_over_l"] < 6 * error.largest

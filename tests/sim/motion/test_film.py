@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 
 from sim.__main__ import main
 from sim.io.errors import InputError, run_command
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
-from sim.motion.film import Film, fitting_speed, write_film
+from sim.motion.film import Film, _draw_scale_bar, fitting_speed, write_film
 from sim.motion.film_frames import film_frames
 from sim.motion.replay import replay
 from sim.motion.shapes import tails_over_a_revolution
@@ -77,6 +78,16 @@ def test_a_film_has_a_picture_for_each_of_its_times(tmp_path: Path) -> None:
         assert np.abs(np.asarray(image.convert("RGB")).astype(int) - first).max() > 100
     write_film(CONTENT, wanted, tmp_path / "swim.webp", film)
     assert (tmp_path / "swim.webp").read_bytes()[8:12] == b"WEBP"
+
+
+@pytest.mark.parametrize(("width", "words"), [(60.0, "10 cm"), (24.0, "2 cm"), (99.0, "10 cm"), (3.0, "0.5 cm")])
+def test_the_scale_bar_is_as_long_as_it_says(width: float, words: str) -> None:
+    axes = Figure().add_subplot()
+    axes.set_xlim(-5.0, width - 5.0)
+    _draw_scale_bar(axes, width, "cm")
+    low, high = axes.lines[0].get_xdata()
+    assert axes.texts[0].get_text() == words == f"{high - low:g} cm"
+    assert low + high == pytest.approx(sum(axes.get_xlim()))
 
 
 def test_a_film_that_cannot_be_written_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
