@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from planner.paths.units import heading_in_degrees, in_lab, place_in_lab, read_length, read_time
-from sim.io.commands import MODEL, argument
+from sim.io.commands import LOOKUP, argument
 from sim.io.units import format_time
 
 if TYPE_CHECKING:
@@ -22,8 +22,13 @@ if TYPE_CHECKING:
     from surrogate.interface import LookupTable
 
 DWELLS = (
-    argument("--min-dwell", type=float, help="shortest dwell, in time units μ0 l⁴/EI"),
-    argument("--min-dwell-s", type=float, help="shortest dwell that the motor allows, in seconds"),
+    argument("--minimum-dwell", old="--min-dwell", type=float, help="shortest dwell, in time units μ0 l⁴/EI"),
+    argument(
+        "--minimum-seconds",
+        old="--min-dwell-s",
+        type=float,
+        help="shortest dwell that the motor allows, in seconds",
+    ),
     argument("--tolerance", metavar="LENGTH", help="largest stated error, such as 5mm"),
 )
 ARRIVE = argument(
@@ -32,7 +37,7 @@ ARRIVE = argument(
     help="when the robot is at the end, such as 12min: dwells are changed, or waiting circles added",
 )
 TABLE = (
-    MODEL,
+    LOOKUP,
     argument("--own-table", action="store_true",
              help="simulate a look-up table of this robot, once; it is more accurate on long paths"),
 )  # fmt: skip
@@ -102,8 +107,8 @@ def table_of(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge
     from planner.files.own_table import table_for
     from surrogate.table.model_file import load_table
 
-    if arguments.model:
-        return load_table(arguments.model)
+    if arguments.lookup:
+        return load_table(arguments.lookup)
     return table_for(robot, arguments.robot, knowledge, own=arguments.own_table)
 
 
@@ -126,8 +131,8 @@ def request_of(arguments: Namespace, robot: Robot) -> PlanRequest:
     return PlanRequest(
         point=arguments.point,
         objective=arguments.objective,
-        minimum_dwell=arguments.min_dwell,
-        minimum_seconds=arguments.min_dwell_s,
+        minimum_dwell=arguments.minimum_dwell,
+        minimum_seconds=arguments.minimum_seconds,
         tolerance=length_of(arguments, "tolerance", robot),
         **of_paths,
     )

@@ -79,7 +79,7 @@ def saved_plan(arguments: Namespace, path: str) -> Plan:
     from planner.files.saved_plan import restore_plan
     from surrogate.table.model_file import load_table
 
-    lookup = load_table(arguments.model) if arguments.model else None
+    lookup = load_table(arguments.lookup) if arguments.lookup else None
     return restore_plan(path, lookup=lookup, own_table=arguments.own_table)
 
 
@@ -113,7 +113,7 @@ def replan(arguments: Namespace) -> None:
     from sim.io.tables import read_table
     from surrogate.table.model_file import load_table
 
-    lookup = load_table(arguments.model) if arguments.model else None
+    lookup = load_table(arguments.lookup) if arguments.lookup else None
     plan = saved_trip(arguments.plan, lookup=lookup, own_table=arguments.own_table)
     with naming(arguments.track):
         rest = replan_from(plan, read_table(arguments.track))

@@ -132,6 +132,17 @@ def _branches(arguments: Namespace) -> None:
     print(f"-> {', '.join(map(str, files))}")
 
 
+@program.command("effects", "list the effects that the base model leaves out, a sentence each")
+def _effects(arguments: Namespace) -> None:
+    from importlib import import_module
+
+    from sim.effects import catalogue
+
+    for name in catalogue():
+        sentence = str(import_module(f"sim.effects.{name}").__doc__).splitlines()[0]
+        print(f"{name:22} {sentence}")
+
+
 @program.command(
     "replay",
     "simulate a planned schedule",

@@ -15,6 +15,7 @@ from sim.arrays import Floats
 from sim.effects import catalogue, check_effects, check_size
 from sim.io.errors import InputError, naming
 from sim.io.files import write_text
+from sim.io.keywords import checks_keywords
 from sim.io.reading import read_toml
 from sim.model.correction import read_correction
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, checked_values
@@ -60,6 +61,7 @@ def names_robot(source: str | Path) -> bool:
     return str(source) in PRESETS or path.suffix == ".toml" or not (path.suffix or path.exists())
 
 
+@checks_keywords()
 def load_robot(source: str | Path) -> Robot:
     """Load a robot from a preset's name or a robot.toml.
 
@@ -97,6 +99,7 @@ def _read_robot(path: Path) -> Robot:
     return Robot(name=str(name), effects=dict(effects), correction=correction, learnt_from=learnt_from, **values)
 
 
+@checks_keywords()
 def save_robot(robot: Robot, path: str | Path) -> None:
     """Write a robot.toml that `load_robot` reads back to the same robot.
 

@@ -11,8 +11,12 @@ from sim.io.commands import Command, Program, out
 from sim.io.errors import run_command
 
 WORDS = {  # the most important commands -> package and command
+    "robot": ("sim", "robot"),
     "steady": ("sim", "steady"),
+    "branches": ("sim", "branches"),
+    "effects": ("sim", "effects"),
     "plan": ("planner", "plan"),
+    "goal": ("planner", "goal"),
     "tour": ("planner", "tour"),
     "cover": ("planner", "cover"),
     "hold": ("planner", "hold"),
@@ -22,8 +26,10 @@ WORDS = {  # the most important commands -> package and command
     "replan": ("planner", "replan"),
     "sweep": ("dataset", "build"),
     "train": ("surrogate", "train"),
+    "tracks": ("calibration", "tracks"),
     "calibrate": ("calibration", "calibrate"),
     "replay": ("sim", "replay"),
+    "check": ("planner", "check"),
     "film": ("sim", "film"),
     "query": ("surrogate", "query"),
     "demo": ("softflagella", "demo"),

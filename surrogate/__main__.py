@@ -6,7 +6,7 @@ import sys
 from argparse import Namespace
 from pathlib import Path
 
-from sim.io.commands import MODEL, Program, argument, out
+from sim.io.commands import LOOKUP, Program, argument, out
 from sim.io.errors import InputError, naming
 
 program = Program("surrogate", "Train look-up tables and query them.")
@@ -29,7 +29,13 @@ main = program.main
 def _train(arguments: Namespace) -> None:
     from dataclasses import replace
 
+    from dataset.storage.data_set import read_manifest
     from sim.io.files import write_text
+
+    if arguments.epochs is not None and arguments.epochs < 1:
+        raise InputError(f"--epochs {arguments.epochs}; give a whole number from 1")
+    for folder in arguments.data:  # before torch is loaded
+        read_manifest(folder)
     from surrogate.networks.checkpoints import device_named, remove_states
     from surrogate.networks.training_loop import Settings
     from surrogate.table.errors import error_table, shortcomings
@@ -41,8 +47,6 @@ def _train(arguments: Namespace) -> None:
     print(f"trains on the device {device}", flush=True)
     tails, curves = Settings(), SETTINGS
     if arguments.epochs is not None:
-        if arguments.epochs < 1:
-            raise InputError(f"--epochs {arguments.epochs}; give a whole number from 1")
         tails, curves = (replace(s, epochs=arguments.epochs, iterations=arguments.epochs) for s in (tails, curves))
     lookup = train(arguments.data, tails, curves, device=device, states=states)
     lookup.save(arguments.out)
@@ -63,7 +67,7 @@ def _train(arguments: Namespace) -> None:
     argument("robot", metavar="ROBOT", help="robot.toml, the name of a preset, or a table of points like that of "
              "softflagella steady, dwell_bar optional"),
     out("CSV; needed for a table of points", default=None),
-    MODEL,
+    LOOKUP,
     argument(
         "--flag", action="store_true", help="answer outside the domain, too; the column `outside` says where"
     ),
@@ -92,7 +96,7 @@ def _query_robot(arguments: Namespace) -> None:
     from surrogate.table.model_file import load_table
     from surrogate.table.refusals import refusing_robots
 
-    robot, table = load_robot(arguments.robot), load_table(arguments.model)
+    robot, table = load_robot(arguments.robot), load_table(arguments.lookup)
     columns = group_columns([robot])
     with refusing_robots([robot], table):
         answer = answer_with_error(table, columns, flag=arguments.flag, certify=arguments.certify)
@@ -119,7 +123,7 @@ def _query_points(arguments: Namespace) -> None:
     from surrogate.table.model_file import load_table
 
     points = read_table(arguments.robot)
-    table = load_table(arguments.model)
+    table = load_table(arguments.lookup)
     columns = {str(c): points[c].to_numpy() for c in points}
     with naming(arguments.robot):
         if isinstance(table, NeuralTable):
@@ -136,7 +140,7 @@ def _query_points(arguments: Namespace) -> None:
     "find robots that have given motions",
     argument("targets", help="CSV: the given inputs of the robots, and outputs that they shall have"),
     out("CSV: a row for each solution"),
-    MODEL,
+    LOOKUP,
     argument("--free", default="C_t,C_r,C_yr", help="inputs to find, with commas (default: C_t,C_r,C_yr)"),
 )
 def _inverse(arguments: Namespace) -> None:
@@ -148,17 +152,17 @@ def _inverse(arguments: Namespace) -> None:
     points = read_table(arguments.targets)
     names = [name.strip() for name in arguments.free.split(",")]
     with naming(arguments.targets):
-        table = inverse_table(load(arguments.model), points, names, where=arguments.targets)
+        table = inverse_table(load(arguments.lookup), points, names, where=arguments.targets)
     write_csv(table, arguments.out)
     print(f"solutions: {len(table)}, targets: {len(points)} -> {arguments.out}")
 
 
-@program.command("errors", "print the stored held-out errors", MODEL)
+@program.command("errors", "print the stored held-out errors", LOOKUP)
 def _errors(arguments: Namespace) -> None:
     from surrogate.table.errors import error_table
     from surrogate.table.model_file import load
 
-    lookup = load(arguments.model)
+    lookup = load(arguments.lookup)
     rows = lookup.provenance["rows"]
     print(f"model {lookup.identity}: {rows['train']} rows, held-out error on {rows['held_out']}")
     print(error_table(lookup.errors))

@@ -165,13 +165,13 @@ def inverse(made: Path, out: Path) -> str:
 
 
 def errors(made: Path, out: Path) -> str:
-    done("surrogate", "errors", "--model", SHIPPED)
+    done("surrogate", "errors", "--lookup", SHIPPED)
     return f"model {load().identity}"
 
 
 def own_table(made: Path, out: Path) -> str:
     done("surrogate", "robot", made / "robot.toml", "--out", out / "table.json")
-    done("planner", "plan", "circle:1.5l", "--robot", made / "robot.toml", "--model", out / "table.json",
+    done("planner", "plan", "circle:1.5l", "--robot", made / "robot.toml", "--lookup", out / "table.json",
          "--out", out / "plan")  # fmt: skip
     assert len(load_plan(out / "plan" / "plan.json")["dwell_bar"]) > 20
     return "largest error"

@@ -85,7 +85,7 @@ CIRCLE = pd.DataFrame({"x": 2 * np.cos(np.linspace(0, 5, 60)), "y": 2 * np.sin(n
 @pytest.mark.long
 @few
 @given(table=changed(CIRCLE), options=st.dictionaries(
-    st.sampled_from(["--scale", "--min-dwell", "--tolerance"]), number, max_size=2))  # fmt: skip
+    st.sampled_from(["--scale", "--minimum-dwell", "--tolerance"]), number, max_size=2))  # fmt: skip
 def test_any_table_of_a_path(
     table: pd.DataFrame, options: dict[str, float], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -80,6 +80,11 @@ class Candidate:
         """Titles of all effects of its refit."""
         return " and ".join(e.title for e in self.claimed)
 
+    @property
+    def words(self) -> str:
+        """Titles and names of all effects of its refit."""
+        return " and ".join(e.words for e in self.claimed)
+
 
 def unexamined(
     misfit: Misfit, effects: Sequence[Parameter], threshold: float, beside: tuple[Parameter, ...] = ()

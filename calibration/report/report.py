@@ -177,7 +177,7 @@ def _add_halved_tolerances(page: Page, result: Verdict) -> None:
         ),
         [
             (
-                halved.effect.effect.title,
+                halved.effect.effect.words,
                 detectable(halved.effect.effect, halved.today),
                 nuisances[halved.nuisance].title,
                 tolerance(nuisances[halved.nuisance]),
@@ -296,7 +296,7 @@ def _add_evidence(page: Page, result: Verdict) -> None:
         ("effect", "score z", "not absorbed", "smallest detectable size", "with exact numbers", "judgement"),
         [
             (
-                c.effect.title,
+                c.effect.words,
                 f"{c.z:+.1f}",
                 f"{100 * c.survived:.0f} %",
                 detectable(c.effect, c.detectable),
@@ -306,7 +306,7 @@ def _add_evidence(page: Page, result: Verdict) -> None:
             for c in seen
         ],
     )
-    unseen = [c.effect.title for c in result.evidence.candidates if c.detectable >= UNSEEN]
+    unseen = [c.effect.words for c in result.evidence.candidates if c.detectable >= UNSEEN]
     if unseen:
         page.text(f"These effects change nothing in these runs, whatever their size: {'; '.join(unseen)}.")
     for c in result.explaining:

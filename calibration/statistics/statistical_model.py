@@ -65,6 +65,11 @@ class Parameter:
     second: Parameter | None = None  # of an effect: its second number, which shows only with the effect
     grid: tuple[float, ...] = ()  # of a second number: values at which the effect is looked for
 
+    @property
+    def words(self) -> str:
+        """The number in words, and as one types it."""
+        return f"{self.title} ({self.name})"
+
 
 @dataclass(frozen=True)
 class Runs:

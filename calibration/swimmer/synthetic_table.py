@@ -18,11 +18,13 @@ import pandas as pd
 from sim.effects import catalogue
 from sim.inputs import group_columns
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from sim.model.robot import Robot
 from sim.motion.batches import stepped_columns
 from sim.motion.lab_units import RPM, lab_columns
 
 
+@checks_keywords()
 def make_table(
     robot: Robot,
     *,

@@ -216,7 +216,7 @@ class Verdict:
                 low, high = self.fits.final_intervals[effect.name]
                 like = "something in form like " if effect.name in self.in_form_only else ""
                 size = best.refit.parameters[effect.name]
-                sizes.append(f"{like}{effect.title}, size {size:.3g} ({low:.3g} to {high:.3g})")
+                sizes.append(f"{like}{effect.words}, size {size:.3g} ({low:.3g} to {high:.3g})")
             rivals = "other effect" if len(sizes) == 1 else "single effect or other pair"
             said = " and ".join(sizes) + self._outside
             return (
@@ -224,7 +224,7 @@ class Verdict:
                 f"{self._beside}"
             )
         if self.verdict == "ambiguous":
-            names = " or ".join(c.title for c in self.explaining)
+            names = " or ".join(c.words for c in self.explaining)
             names += self._outside + self._or_number
             return f"The residual ({p}) is explained by {names}: these runs cannot tell them apart.{self._beside}"
         none = "no effect and no pair of effects of the catalogue explains"

@@ -9,12 +9,14 @@ from typing import Any
 from planner.goal.goal_plan import FORMAT
 from planner.paths.obstacles import FreeSpace
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from sim.io.reading import ContentError, read_json
 
 _NUMBERS = ("end_error_over_l", "end_error_rad", "length_over_l", "margin_over_l")
 _POSES = ("start", "goal", "predicted_end")
 
 
+@checks_keywords()
 def load_goal(path: str | Path) -> dict[str, Any]:
     """Read and check the content of a goal.json, which is that of `GoalPlan.to_dict`.
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from planner.planning.planned import GUARANTEE
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from sim.model.plan_file import read_plan_file
 
 _NUMBERS = ("stated_error_over_l", "feedback_error_over_l", "predicted_rms_over_l", "predicted_max_over_l",
@@ -17,6 +18,7 @@ LARGEST = 1e100  # of a number, so that sums and squares of them are finite
 _TABLES = {"reference": 2, "raw_path": 2, "predicted_poses": 3}
 
 
+@checks_keywords()
 def load_plan(path: str | Path) -> dict[str, Any]:
     """Read and check the content of a plan.json, which is that of `Plan.to_dict`.
 

@@ -38,6 +38,7 @@ from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.arrays import Floats
 from sim.io.errors import InputError, naming
+from sim.io.keywords import checks_keywords
 from sim.io.reading import ContentError, read_json
 from sim.model.plan_file import check_format
 from sim.model.robot import Robot
@@ -59,6 +60,7 @@ def is_plan(path: str | Path) -> bool:
         return False
 
 
+@checks_keywords()
 def restore_plan(
     source: Mapping[str, Any] | str | Path, *, lookup: LookupTable | None = None, own_table: bool = False
 ) -> Plan:

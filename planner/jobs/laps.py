@@ -51,7 +51,7 @@ def looped(plan: Plan, seed: int = 0, progress: Callable[[float], object] | None
     tried = [_closed(long, first, last, turn, plan) for first, last in _ends(long, len(plan.dwells), turn)]
     laps = [lap for lap in tried if lap is not None]
     if not laps:
-        raise InputError("no schedule of this path repeats; change the dwell a little (--min-dwell)")
+        raise InputError("no schedule of this path repeats; change the dwell a little (--minimum-dwell)")
     _, switches = min(laps, key=lambda lap: lap[0])
     errors = plan_errors(
         tracked, plan.drawn, plan.declared, switches, guaranteed=plan.errors.guaranteed, seed=seed

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 
 _CIRCLE_POINTS = 720
 _LARGEST = 1e100  # coordinate: squares of larger ones overflow
@@ -77,6 +78,7 @@ class Path2D:
         return float(np.linalg.norm(np.diff(self.polyline(), axis=0), axis=1).sum())
 
 
+@checks_keywords()
 def circle(radius: float) -> Path2D:
     """Make a circle about the origin, counter-clockwise from (radius, 0).
 
@@ -89,6 +91,7 @@ def circle(radius: float) -> Path2D:
     return Path2D.of(radius * np.stack([np.cos(angle), np.sin(angle)], 1), closed=True)
 
 
+@checks_keywords()
 def polygon(corners: int, side: float) -> Path2D:
     """Make a regular polygon about the origin, counter-clockwise; it starts in the middle of its lower side.
 

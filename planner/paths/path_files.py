@@ -15,6 +15,7 @@ from planner.paths.svg_drawing import read_svg
 from planner.paths.units import NO_UNIT, in_tails
 from sim.arrays import Floats
 from sim.io.errors import InputError, naming
+from sim.io.keywords import checks_keywords
 from sim.io.units import split, to_si
 from sim.model.robot import Robot
 
@@ -61,6 +62,7 @@ class Drawing:
         return self.path.scaled(own or given or 1.0)
 
 
+@checks_keywords()
 def read_path(source: str | Path, *, closed: bool | None = None, shape: str | None = None) -> Drawing:
     """Read a path from a table with columns x, y (or x_mm, y_mm and so on), from an SVG file, or from words.
 

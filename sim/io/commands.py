@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import SUPPRESS, Action, ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, NoReturn
 
@@ -31,7 +31,7 @@ class Argument(NamedTuple):
 
 
 def argument(*names: str, **options: Any) -> Argument:
-    """Declare an argument of a command, written as for argparse."""
+    """Declare an argument of a command, written as for argparse; `old`: its name of the last release."""
     return Argument(names, options)
 
 
@@ -45,7 +45,7 @@ JOBS = argument("--jobs", type=int, help="processes or threads (default: all pro
 UNIT = argument("--unit", choices=LENGTHS, metavar="UNIT",
                 help="of all lengths that are given without one: m, cm, mm, or l for tail lengths. 24cm and 3l, "
                 "columns x_cm and y_cm, and drawings with a size have their own")  # fmt: skip
-MODEL = argument("--model", help="look-up table (default: the one that comes with the package)")
+LOOKUP = argument("--lookup", old="--model", help="look-up table (default: the one that comes with the package)")
 
 
 class Parser(ArgumentParser):
@@ -60,6 +60,16 @@ class Parser(ArgumentParser):
         raise InputError(f"{message}; {self.prog} --help lists what can be given")
 
 
+class _Renamed(Action):
+    """An old name of an option: it works, with a warning; `const` is the new one."""
+
+    def __call__(
+        self, parser: ArgumentParser, namespace: Namespace, values: Any, option: str | None = None
+    ) -> None:
+        print(f"warning: {option} is deprecated; use {self.const}", file=sys.stderr)
+        setattr(namespace, self.dest, values)
+
+
 class Command(NamedTuple):
     """A command of a program."""
 
@@ -72,7 +82,11 @@ class Command(NamedTuple):
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Add the arguments to a parser, and the function that runs the command."""
         for names, options in self.arguments:
-            parser.add_argument(*names, **options)
+            old = options.get("old")
+            added = parser.add_argument(*names, **{key: value for key, value in options.items() if key != "old"})
+            if old:
+                parser.add_argument(old, dest=added.dest, type=added.type, action=_Renamed, const=names[0],
+                                    default=SUPPRESS, help=SUPPRESS)  # fmt: skip
         parser.set_defaults(run=self.run)
 
     def parser(self, prog: str) -> ArgumentParser:

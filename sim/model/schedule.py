@@ -10,6 +10,7 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from sim.model.plan_file import read_plan_file
 
 
@@ -58,6 +59,7 @@ class Schedule:
             raise InputError(f"tail_length_m = {self.tail_length}; it must be a finite number above 0")
 
 
+@checks_keywords()
 def load_schedule(path: str | Path) -> Schedule:
     """Load the schedule in a plan.json.
 

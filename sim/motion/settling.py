@@ -15,8 +15,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from multiprocessing import parent_process
 
 import numpy as np
+from tqdm import tqdm
 
 from sim.arrays import Floats
 from sim.mechanics.balance import motor_gain
@@ -37,6 +39,9 @@ NO_REVOLUTION = "the tails do not complete a revolution"
 _WINDOW = 0.5  # shortest averaging time
 _CHUNK = 0.25  # time units after which the means are compared
 _MEANS = [PHASE, YAW, SWAY, SURGE]
+_SILENT = 3.0  # s, before a robot that is stepped says so
+_VERY_FAST = 1000.0  # ω̄; the robots of the paper have 10 to 33
+_BAR = "{desc}: {n:.2f} time units, {elapsed}"
 _GAP_SHAPES = 12  # shapes of the last revolution in which the gap between tails is measured
 
 
@@ -102,18 +107,22 @@ def settle_one(body: Body, tails: int, resolution: Resolution) -> Settled:
     dt = run.time_step
     count = int(steps_in(_CHUNK, dt))
     poses = [np.zeros((1, 6))]
-    while True:
-        poses.append(run.steps(count, dt * count)[0])
-        if run.failed:
-            return lost()
-        time = dt * count * (len(poses) - 1)
-        if time < SETTLED:
-            continue
-        track = np.concatenate(poses)
-        means, drift, known = _means(np.asarray(np.arange(len(track)) * dt), track, body.omega, tails)
-        converged = known and drift < DRIFT
-        if converged or (known and time > LONGEST) or time > 8 * LONGEST:
-            break
+    doubt = ", which is very fast: are all units right?" if abs(body.omega) > _VERY_FAST else ""
+    words = f"stepping in time at ω̄ = {abs(body.omega):.3g}{doubt}"
+    with tqdm(desc=words, delay=_SILENT, bar_format=_BAR, leave=False, disable=bool(parent_process())) as bar:
+        while True:
+            poses.append(run.steps(count, dt * count)[0])
+            if run.failed:
+                return lost()
+            time = dt * count * (len(poses) - 1)
+            bar.update(dt * count)
+            if time < SETTLED:
+                continue
+            track = np.concatenate(poses)
+            means, drift, known = _means(np.asarray(np.arange(len(track)) * dt), track, body.omega, tails)
+            converged = known and drift < DRIFT
+            if converged or (known and time > LONGEST) or time > 8 * LONGEST:
+                break
     if not known:
         run.failed = NO_REVOLUTION
         return lost()

@@ -18,9 +18,11 @@ from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.sequential_test import Decision, read_explanations
 from calibration.verdict.sequential_test import decide as decide_between
 from calibration.verdict.verdict import Verdict
+from sim.io.keywords import checks_keywords
 from softflagella.api.robots import OneRobot, one_robot, with_units
 
 
+@checks_keywords()
 def calibrate(
     table: str | Path | pd.DataFrame,
     robot: OneRobot,
@@ -77,6 +79,7 @@ def calibrate(
     )
 
 
+@checks_keywords()
 def decide(
     table: str | Path | pd.DataFrame, verdict: Verdict | str | Path, robot: OneRobot, *, jobs: int | None = None
 ) -> Decision:
@@ -107,6 +110,7 @@ def decide(
     return decide_between(model, explanations, before, with_law)
 
 
+@checks_keywords()
 def tracks(
     tracks: str | Path | pd.DataFrame,
     runs: str | Path | pd.DataFrame,

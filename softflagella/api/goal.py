@@ -13,6 +13,7 @@ from planner.paths.obstacles import Circle, Polygon
 from planner.paths.path import Path2D
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.dwell_choice import Objective
+from sim.io.keywords import checks_keywords
 from softflagella.api.robots import OneRobot
 from softflagella.api.vehicles import robot_with_table
 from surrogate.interface import LookupTable
@@ -33,6 +34,7 @@ class GoalOptions(TypedDict, total=False):
     seed: int
 
 
+@checks_keywords()
 def to_goal(
     start: Sequence[float],
     goal: Sequence[float],

@@ -25,11 +25,13 @@ from planner.planning.planned import Plan
 from planner.planning.request import RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from softflagella.api.robots import OneRobot
 from softflagella.api.vehicles import vehicle_and_request
 from surrogate.interface import LookupTable
 
 
+@checks_keywords()
 def tour(
     places: Sequence[Sequence[float]],
     robot: OneRobot,
@@ -78,6 +80,7 @@ def tour(
                      progress=progress)  # fmt: skip
 
 
+@checks_keywords()
 def cover(
     region: Circle | Path2D | ArrayLike,
     width: float,
@@ -127,6 +130,7 @@ def cover(
     return sweep_field(field, width, tracked, request, space, angle=angle, feedback=feedback, progress=progress)
 
 
+@checks_keywords()
 def hold(
     place: Sequence[float],
     robot: OneRobot,
@@ -171,6 +175,7 @@ def hold(
     return orbit(place, tracked, request, seconds, space, feedback=feedback, progress=progress)
 
 
+@checks_keywords()
 def fleet(
     plans: Sequence[Plan | GoalPlan | TourPlan | CoveragePlan],
     apart: float | str,

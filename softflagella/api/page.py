@@ -14,11 +14,13 @@ from planner.page.write_page import write_page as write
 from planner.paths.path import Path2D
 from planner.planning.request import PlanRequest, RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge
+from sim.io.keywords import checks_keywords
 from softflagella.api.robots import OneRobot
 from softflagella.api.vehicles import robot_with_table
 from surrogate.interface import LookupTable
 
 
+@checks_keywords()
 def write_page(
     path: str | Path,
     robot: OneRobot = "paper-control",

@@ -30,6 +30,7 @@ from planner.planning.planned import Plan
 from planner.planning.request import RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.io.errors import InputError, naming
+from sim.io.keywords import checks_keywords
 from sim.io.tables import read_table
 from sim.model.robot import Robot
 from softflagella.api.robots import OneRobot
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 AnyPlan = Plan | GoalPlan | TourPlan | CoveragePlan | HoldPlan
 
 
+@checks_keywords()
 def plan(
     path: Path2D | Drawing | ArrayLike | str | Path,
     robot: OneRobot,
@@ -126,6 +128,7 @@ def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot, uni
     return drawn if unit is None else drawn.scaled(in_tails(unit, robot))
 
 
+@checks_keywords()
 def check(
     plan: AnyPlan | Mapping[str, Any] | str | Path,
     track: pd.DataFrame | str | Path,
@@ -160,6 +163,7 @@ def check(
         return tracking_error(dict(content), track if isinstance(track, pd.DataFrame) else read_table(track))
 
 
+@checks_keywords()
 def write_plan(
     result: AnyPlan | FleetPlan,
     folder: str | Path,
@@ -197,6 +201,7 @@ def write_plan(
     return write_tour(result, folder) if isinstance(result, TourPlan) else write_cover(result, folder)
 
 
+@checks_keywords()
 def replan(
     plan: AnyPlan | str | Path, track: pd.DataFrame | str | Path, *, lookup: LookupTable | None = None
 ) -> Plan | GoalPlan:

@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from sim.motion.lab_units import lab_motion
 from softflagella.api.robots import Robots, robot_rows, with_units
 from surrogate.export.small_copy_files import save_small_copy
@@ -21,14 +22,15 @@ from surrogate.table.model_file import load_table
 from surrogate.table.refusals import refusing_robots
 
 
+@checks_keywords(table="lookup")
 def query(
-    robots: Robots, *, table: LookupTable | str | Path | None = None, flag: bool = False, certify: bool = False
+    robots: Robots, *, lookup: LookupTable | str | Path | None = None, flag: bool = False, certify: bool = False
 ) -> pd.DataFrame:
     """Ask a look-up table for the mean motion at constant motor speed, without simulating.
 
     Args:
         robots: as for `steady`.
-        table: the table, or its file; default: the one that comes with the package.
+        lookup: the table, or its file; default: the one that comes with the package.
         flag: answer for robots outside the domain as well; the column `outside` says which.
         certify: simulate each robot as well; the column `certified_error` is the actual error of its answer.
 
@@ -46,17 +48,18 @@ def query(
         >>> motion[["robot", "R_yr_cm", "v_cm_s"]].round(2).values.tolist()
         [['paper-control', 10.36, 0.23], ['paper-triangle', 10.11, 0.36]]
     """
-    rows, lookup = robot_rows(robots), _table(table)
-    with refusing_robots(rows.robots, lookup) if rows.robots else nullcontext():
-        answer = answer_with_error(lookup, rows.columns, flag=flag, certify=certify)
+    rows, table = robot_rows(robots), _table(lookup)
+    with refusing_robots(rows.robots, table) if rows.robots else nullcontext():
+        answer = answer_with_error(table, rows.columns, flag=flag, certify=certify)
     return rows.frame(lab_motion(rows.robots, answer) if rows.robots else {}, answer)
 
 
+@checks_keywords(table="lookup")
 def inverse(
     targets: Mapping[str, Any] | pd.DataFrame,
     *,
     free: Sequence[str] = ("C_t", "C_r", "C_yr"),
-    table: LookupTable | str | Path | None = None,
+    lookup: LookupTable | str | Path | None = None,
 ) -> pd.DataFrame:
     """Find robots that have given motions, with a trained look-up table.
 
@@ -64,7 +67,7 @@ def inverse(
         targets: M rows (single values stand for all rows): the given inputs of the robots, and one or more
             outputs that they shall have, such as `omega_yr_bar`.
         free: inputs to find.
-        table: a trained table, or its file; default: the one that comes with the package.
+        lookup: a trained table, or its file; default: the one that comes with the package.
 
     Returns:
         A row for each solution: `target` (the row of the target, from 1), the inputs, `misfit`, `outside`.
@@ -79,7 +82,7 @@ def inverse(
         >>> sf.inverse({**given, "omega_yr_bar": 0.06}, free=["C_yr"])["C_yr"].round(2).tolist()
         [2.45]
     """
-    return with_units(inverse_table(_trained(table), pd.DataFrame(dict(targets), index=_index(targets)), free))
+    return with_units(inverse_table(_trained(lookup), pd.DataFrame(dict(targets), index=_index(targets)), free))
 
 
 def _index(targets: Mapping[str, Any] | pd.DataFrame) -> Any:
@@ -89,12 +92,13 @@ def _index(targets: Mapping[str, Any] | pd.DataFrame) -> Any:
     return [0]
 
 
-def export(folder: str | Path, *, table: LookupTable | str | Path | None = None) -> str:
+@checks_keywords(table="lookup")
+def export(folder: str | Path, *, lookup: LookupTable | str | Path | None = None) -> str:
     """Write a trained look-up table for other programs: at most 150 kB, with a reader in C99.
 
     Args:
         folder: it is made if it is missing.
-        table: a trained table, or its file; default: the one that comes with the package.
+        lookup: a trained table, or its file; default: the one that comes with the package.
 
     Returns:
         What the copy loses in accuracy, in words.
@@ -109,7 +113,7 @@ def export(folder: str | Path, *, table: LookupTable | str | Path | None = None)
         ...     print(sf.export(folder)[:3])
         148
     """
-    return save_small_copy(_trained(table), folder)
+    return save_small_copy(_trained(lookup), folder)
 
 
 def _table(table: LookupTable | str | Path | None) -> LookupTable:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from planner.planning.planned import Plan
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from sim.model.groups import DWELL, Groups
 from sim.model.response import BEFORE, DWELLS, Responses
 from sim.model.robot import Robot
@@ -26,6 +27,7 @@ from sim.motion.switching import switch_response as respond
 from softflagella.api.robots import NAME, OneRobot, RobotRows, Robots, one_robot, robot_rows, with_units
 
 
+@checks_keywords()
 def steady(robots: Robots, *, stability: bool = True, jobs: int | None = None) -> pd.DataFrame:
     """Simulate the mean motion at constant motor speed, as reached from rest.
 
@@ -94,6 +96,7 @@ def switch_response(robots: Robots, dwell: ArrayLike) -> pd.DataFrame:
     return table
 
 
+@checks_keywords()
 def response(robots: Robots) -> pd.DataFrame:
     """Simulate the response to a flip of the motor: one row for each robot, direction, preceding dwell and dwell.
 
@@ -175,6 +178,7 @@ def _lab_response(table: pd.DataFrame, robot: Robot) -> pd.DataFrame:
     return pd.DataFrame(lab)
 
 
+@checks_keywords()
 def sensitivities(robots: Robots, parameters: Sequence[str], *, jobs: int | None = None) -> pd.DataFrame:
     """Differentiate the steady motion in inputs and effect sizes, by the implicit function theorem.
 
@@ -206,6 +210,7 @@ def sensitivities(robots: Robots, parameters: Sequence[str], *, jobs: int | None
     return pd.DataFrame(columns)
 
 
+@checks_keywords()
 def replay(schedule: Schedule | Plan | str | Path, robot: OneRobot | None = None) -> pd.DataFrame:
     """Simulate a schedule, from rest with straight tails.
 

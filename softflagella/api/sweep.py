@@ -12,9 +12,11 @@ from dataset.build.build import build
 from dataset.rows.design import design_around, load_design
 from dataset.storage.data_set import read
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from sim.model.robot import Robot
 
 
+@checks_keywords()
 def sweep(
     config: str | Path | Robot,
     out: str | Path,
@@ -53,6 +55,7 @@ def sweep(
     return build(load_design(config).with_rows(rows), out, jobs=jobs)
 
 
+@checks_keywords()
 def read_sweep(folder: str | Path) -> pd.DataFrame:
     """Read all rows of a finished sweep, in the order of its design; units are in the Parquet schema.
 

@@ -13,9 +13,10 @@ import pickle
 import platform
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ from sim.io.files import whole_file
 from sim.io.provenance import fingerprint
 
 DEVICES = ("cpu", "cuda", "auto")
-EVERY = 30.0  # s of wall time between two states of a network
+EVERY = 5.0  # s of wall time between two states of a network
 _SHARE = 20.0  # and at least this many times as long as writing one took
 _ENDING = ".state"
 State = dict[str, Any]  # tensors and plain values
@@ -57,10 +58,19 @@ class TrainingContext:
     title: str = ""  # of the progress bars; empty for none
     device: str = "cpu"
     folder: Path | None = None  # of the states; None: none are kept
+    networks: int = 0  # that are trained in all; 0: nobody has counted them
+    numbers: Iterator[int] = field(default_factory=lambda: count(1))  # of the networks, shared by all parts
 
     def part(self, name: str) -> TrainingContext:
         """Return the same for one part of the work, named in the title."""
         return replace(self, title=f"{self.title}: {name}" if self.title else "")
+
+    def of_network(self) -> TrainingContext:
+        """Return the same for the next network, numbered in the title where their total is known."""
+        number = next(self.numbers)
+        if not (self.title and self.networks):
+            return self
+        return replace(self, title=f"{self.title}, network {number} of {self.networks}")
 
     def checkpoint(self, network: Mapping[str, Tensor], data: Sequence[Tensor], settings: object) -> Checkpoint:
         """Return the place of the state of a network that starts from these numbers."""

@@ -99,6 +99,7 @@ def fit(
         unit: in words, of the error that the progress bar shows: the residual that 95 % of the rows do not reach.
     """
     weights = torch.ones(len(inputs), dtype=inputs.dtype) if weights is None else weights
+    work = work.of_network()
     checkpoint = work.checkpoint(network.state_dict(), (inputs, *data, weights), asdict(settings))
     state = checkpoint.read() or {"stage": "start"}
     network.to(work.device)

@@ -20,6 +20,7 @@ import numpy as np
 from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from sim.io.provenance import provenance
 from sim.mechanics import planar
 from sim.model.groups import Groups
@@ -42,6 +43,7 @@ _CHECKED = 24  # dwells of the random schedule
 _RANGE = (0.35, 1.8)  # of their lengths
 
 
+@checks_keywords()
 def tabulate(robot: Robot) -> RobotTable:
     """Simulate one robot's steady motion and its response to flips, in both directions of the motor.
 

@@ -13,6 +13,7 @@ from shlex import quote
 from typing import Any
 
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from surrogate.interface import LookupTable
 from surrogate.networks.ensemble import Ensemble
 from surrogate.one_robot.robot_table import load_robot_table
@@ -47,6 +48,7 @@ def load(path: str | Path | None = None) -> NeuralTable:
         raise InputError(f"{path} is no complete look-up table; {remedy}") from None
 
 
+@checks_keywords()
 def load_table(path: str | Path | None = None) -> LookupTable:
     """Read a model file, or the table of one robot (.json); by default the one that comes with the package.
 

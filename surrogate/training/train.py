@@ -19,6 +19,7 @@ import numpy as np
 from dataset.storage.data_set import read_manifest
 from sim.arrays import Flags, Floats, Integers
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from sim.io.provenance import fingerprint, provenance
 from surrogate.input_ranges import ROBOT
 from surrogate.loops import compile_once
@@ -29,7 +30,7 @@ from surrogate.table.compiled_query import BRANCHES
 from surrogate.table.errors import curve_errors, relative_errors, summary
 from surrogate.table.intervals import Intervals
 from surrogate.table.lookup import NeuralTable, steady_outputs
-from surrogate.table.response_table import Basis
+from surrogate.table.response_table import PARTS, Basis
 from surrogate.table.support import Support
 from surrogate.table.wrench_table import CLASSES, INPUT_COUNTS, network_index
 from surrogate.training.fit_response import SETTINGS, fit_part, fit_response
@@ -50,6 +51,7 @@ def split(rows: Integers) -> Integers:
     return np.where(tenth == 8, 1, np.where(tenth == 9, 2, 0))
 
 
+@checks_keywords()
 def train(
     folder: str | Sequence[str],
     settings: Settings | None = None,
@@ -150,6 +152,8 @@ def learn(
         tenth = np.arange(len(flipped)) % 10 == 9
         flipped, flips_held_out = flipped.at(~tenth), flipped.at(tenth)
     rows = _learnable(learned)
+    classes = len(np.unique(network_index(rows.tails.number)))
+    work = replace(work, networks=classes + 1 + len(PARTS))  # one of the gap, and those of the response
     table = fit_wrench(rows, wrench_settings, work, single_settings=single_settings)
     flipped, flips_held_out = _several_tails(flipped), _several_tails(flips_held_out)
     flip_samples = _learnable(flipped)

@@ -10,6 +10,7 @@ import pytest
 
 import softflagella as sf
 from sim.io.errors import run_command
+from sim.io.keywords import keywords_of
 from softflagella.__main__ import PACKAGES, WORDS, command, main
 
 
@@ -49,8 +50,8 @@ def test_a_word_runs_its_command(tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 @pytest.mark.parametrize(
     ("word", "answer"),
-    [("goal", "it is softflagella planner goal"), ("report", "it is softflagella dataset report"),
-     ("calibrat", "is it calibrate?"), ("qqq", "there are steady, plan")],
+    [("export", "it is softflagella surrogate export"), ("report", "it is softflagella dataset report"),
+     ("calibrat", "is it calibrate?"), ("qqq", "there are robot, steady")],
 )  # fmt: skip
 def test_a_word_that_is_no_command_is_told_which_one_is_meant(
     word: str, answer: str, capsys: pytest.CaptureFixture[str]
@@ -95,6 +96,35 @@ def test_the_command_runs_what_the_package_runs(tmp_path: Path, capsys: pytest.C
     assert sf.load_robot(tmp_path / "robot.toml") == sf.load_robot("paper-control")
     assert run_command(main, ["sim", "robot", "nobody", "--out", str(tmp_path / "other.toml")]) == 2
     assert "no preset 'nobody'" in capsys.readouterr().err
+
+
+PYTHON = {"plan": sf.plan, "goal": sf.to_goal, "tour": sf.tour, "cover": sf.cover, "hold": sf.hold,
+          "page": sf.write_page, "query": sf.query, "steady": sf.steady,
+          "calibrate": sf.calibrate, "tracks": sf.tracks}  # fmt: skip
+OF_COMMANDS = {  # files, units and words of the command line
+    "out", "unit", "scale", "shape", "closed", "trade_off", "smooth", "path", "no_path", "hole", "check", "arrive",
+    "back", "no_laws", "no_stability",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("word", PYTHON)
+def test_an_option_has_the_name_of_the_keyword(word: str) -> None:
+    options = {action.dest for action in command(word).parser("x")._actions if action.option_strings} - {"help"}
+    assert options - OF_COMMANDS <= set(keywords_of(PYTHON[word]))
+
+
+def test_an_old_option_works_with_a_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["plan", "circle:1.5", "--robot", "paper-control", "--objective", "flips", "--min-dwell-s", "3"]
+    assert run_command(main, [*words, "--out", str(tmp_path)]) == 0
+    assert "warning: --min-dwell-s is deprecated; use --minimum-seconds\n" in capsys.readouterr().err
+    assert min(sf.load_plan(tmp_path / "plan.json")["dwell_s"]) >= 3
+
+
+def test_effects_are_listed_with_a_sentence_each(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["effects"])
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(sf.effects())
+    assert all(len(line.split()) > 3 and line.endswith(".") for line in lines)
 
 
 def test_version_and_unknown_words(capsys: pytest.CaptureFixture[str]) -> None:

@@ -39,6 +39,12 @@ def test_a_command_loads_no_torch(words: tuple[str, ...], tmp_path: Path) -> Non
     assert bool(folder) == (tmp_path / "plan.json").exists()
 
 
+def test_training_looks_at_its_files_before_it_loads_torch(tmp_path: Path) -> None:
+    code = "import sys; from sim.io.errors import run_command; from softflagella.__main__ import main; "
+    refused = "assert run_command(main, sys.argv[1:]) == 2; "
+    assert loaded(code + refused, "train", str(tmp_path), "--out", str(tmp_path / "m"), slow=("torch",)) == []
+
+
 def test_a_replay_loads_no_torch(tmp_path: Path) -> None:
     write_plan(plan(circle(1.0), PRESETS["paper-control"]), tmp_path)
     assert (

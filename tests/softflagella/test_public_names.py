@@ -6,10 +6,12 @@ import doctest
 import subprocess
 import sys
 from importlib import import_module
+from inspect import isfunction
 
 import pytest
 
 import softflagella as sf
+from sim.io.keywords import keywords_of
 from tests.processes import LIMIT
 
 NAMES = [name for name in sf.__all__ if not name.startswith("_")]
@@ -20,6 +22,29 @@ def test_every_name_is_what_its_module_has(name: str) -> None:
     module, attribute = sf._HOMES[name]
     assert getattr(sf, name) is getattr(import_module(module), attribute)
     assert name in dir(sf)
+
+
+def test_nothing_else_is_listed() -> None:
+    assert dir(sf) == sf.__all__
+
+
+def test_a_wrong_keyword_is_refused_with_a_proposal() -> None:
+    functions = [thing for name in NAMES if isfunction(thing := getattr(sf, name))]
+    assert len(functions) > 30
+    for function in functions:
+        *_, known = keywords_of(function.__wrapped__)  # type: ignore[attr-defined]
+        with pytest.raises(
+            sf.InputError, match=rf"{function.__name__} has no keyword '{known}x'; is it {known}\?"
+        ):
+            function(**{f"{known}x": 1})
+    with pytest.raises(sf.InputError, match="plan has no keyword 'colour'; there are path, robot, lookup, "):
+        sf.plan(sf.circle(2.0), "paper-control", colour="red")  # type: ignore[call-arg]
+
+
+def test_an_old_keyword_works_with_a_warning() -> None:
+    with pytest.warns(DeprecationWarning, match="query\\(table=…\\) is deprecated; use lookup=…"):
+        old = sf.query("paper-control", table=None)  # type: ignore[call-arg]
+    assert old.equals(sf.query("paper-control"))
 
 
 def test_the_stub_lists_each_name_once() -> None:

@@ -123,6 +123,8 @@ def test_a_claim_that_does_not_lower_the_error_says_so_first(tmp_path: Path) -> 
     assert record["held_out_error_falls"] is False
     seen = page(risen, runs, tmp_path)
     assert words in seen.text
+    assert [c.effect.name for c in risen.evidence.candidates if f"({c.effect.name})" not in seen.text] == []
+    assert f"({risen.explaining[0].effect.name})" in risen.sentence  # as one types it
     assert next_steps(risen)[0].startswith("Do not rely on this claim yet")
     assert not next_steps(fallen)[0].startswith("Do not rely")
 

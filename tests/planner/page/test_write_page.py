@@ -79,7 +79,7 @@ def test_bad_input_ends_in_one_line_and_leaves_no_page(tmp_path: Path, capsys: p
         ["--robot", "nobody"],
         ["--path", "squre:3l"],
         ["--tolerance", "-1cm"],
-        ["--min-dwell-s", "nan"],
+        ["--minimum-seconds", "nan"],
     ):
         assert run_command(main, ["page", *words, "--out", out]) == 2
         assert len(capsys.readouterr().err.splitlines()) == 1

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import sim.motion.settling
 import sim.motion.steady
 from sim.model.presets import PRESETS
 from sim.motion.batches import steady_columns, stepped_columns
@@ -126,6 +127,14 @@ def test_a_row_without_an_orbit_is_stepped_and_says_so(monkeypatch: pytest.Monke
 
 
 @pytest.mark.slow
+def test_a_robot_that_is_stepped_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sim.motion.settling, "_SILENT", 0.0)
+    settle(control(1))
+    assert "stepping in time at ω̄ = 10: 0." in capsys.readouterr().err
+
+
 def test_a_quick_turn_is_followed_from_rest() -> None:
     """Both robots turn fast beside their discs; straight tails take one of them to another motion."""
     size = {"l_over_R": 3.82, "L_over_R": 4.24, "l_over_r0": 16.2, "omega_bar": 117.0}

@@ -30,7 +30,7 @@ def test_a_robot_is_found_by_its_motion() -> None:
 def test_a_small_copy_is_of_a_trained_table(tmp_path: Path) -> None:
     own = sf.tabulate(ROBOT)
     with pytest.raises(sf.InputError, match="table of a single robot"):
-        sf.export(tmp_path, table=own)
-    assert sf.query(ROBOT, table=own)["error"].item() < 0.01
+        sf.export(tmp_path, lookup=own)
+    assert sf.query(ROBOT, lookup=own)["error"].item() < 0.01
     own.save(tmp_path / "own.json")
-    assert sf.query(ROBOT, table=tmp_path / "own.json").equals(sf.query(ROBOT, table=own))
+    assert sf.query(ROBOT, lookup=tmp_path / "own.json").equals(sf.query(ROBOT, lookup=own))

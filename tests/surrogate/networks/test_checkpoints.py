@@ -97,7 +97,8 @@ def trained(
 @pytest.mark.long
 def test_training_that_is_killed_twice_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
     folder = tmp_path / "model.pt.states"
-    for count, where in ((10, None), (120, "train: tails of N = 3 and more: goes on after epoch 10 of 40")):
+    goes_on = "train: tails of N = 3 and more, network 1 of 5: goes on after epoch 10 of 40"
+    for count, where in ((10, None), (120, goes_on)):
         killed = run(folder, count)
         assert killed.returncode == -signal.SIGKILL
         assert where is None or where in killed.stderr
@@ -107,7 +108,7 @@ def test_training_that_is_killed_twice_goes_on_to_the_same_bytes(tmp_path: Path)
     assert done.stdout.split() == [table().identity]
     again = run(folder, 10**9)
     assert again.stdout == done.stdout
-    assert "tails of N = 3 and more: was finished before" in again.stderr
+    assert "tails of N = 3 and more, network 1 of 5: was finished before" in again.stderr
     assert "iteration" not in again.stderr
 
 
@@ -144,6 +145,13 @@ def test_a_state_of_other_data_or_settings_is_not_used(tmp_path: Path) -> None:
         alone = trained(TrainingContext(), settings, wanted).state_dict()
         assert all(torch.equal(with_others[name], part) for name, part in alone.items())
     assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_networks_are_numbered_where_their_total_is_known() -> None:
+    work = TrainingContext("train", networks=2)
+    titles = [work.part(name).of_network().title for name in ("tails", "gap")]
+    assert titles == ["train: tails, network 1 of 2", "train: gap, network 2 of 2"]
+    assert TrainingContext("train").of_network().title == "train"
 
 
 def test_a_broken_state_is_not_used(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,53 @@
+"""Keywords of public functions: a wrong one is refused, with a proposal; an old one works for one release."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+from functools import wraps
+from inspect import Parameter, signature
+from typing import Any, ParamSpec, TypeVar
+
+from sim.io.deprecated import warn_deprecated
+from sim.io.errors import InputError
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def checks_keywords(**renamed: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Make a function refuse keywords that it does not have with an `InputError` that proposes the nearest.
+
+    Args:
+        renamed: old keywords of the function, and what they are called now.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        known = keywords_of(function)
+
+        @wraps(function)
+        def checked(*arguments: Any, **given: Any) -> R:
+            for name in [name for name in given if name not in known]:
+                if name not in renamed:
+                    near = difflib.get_close_matches(name, known, 1)
+                    proposal = f"is it {near[0]}?" if near else f"there are {', '.join(known)}"
+                    raise InputError(f"{function.__name__} has no keyword {name!r}; {proposal}")
+                warn_deprecated(f"{function.__name__}({name}=…)", f"{renamed[name]}=…", callers=1)
+                given[renamed[name]] = given.pop(name)
+            return function(*arguments, **given)
+
+        return checked
+
+    return decorate
+
+
+def keywords_of(function: Callable[..., Any]) -> list[str]:
+    """List the keywords of a function, those of `**options: Unpack[Options]` among them."""
+    known: list[str] = []
+    for parameter in signature(function).parameters.values():
+        if parameter.kind is Parameter.VAR_KEYWORD:
+            options = str(parameter.annotation).removeprefix("Unpack[").removesuffix("]")
+            known += function.__globals__[options].__annotations__
+        elif parameter.kind in (Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY):
+            known.append(parameter.name)
+    return known
