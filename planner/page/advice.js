@@ -7,9 +7,7 @@ const ADVICE = [ // what a message of the planner says, and what the page says i
   [/simulate this robot's own table \([^)]*\), or measure/, "measure"],
   [/give --smooth (\S+)/, 'set "Smooth over" to $1 cm and press "Smooth this path"'],
   [/scale the path by (\S+)/, `scale it by $1 ${NUMBERS}`],
-  [/(if you gave .*?--unit [^\s;]+(; or )?)+/, `scale it ${NUMBERS}, or open it again in another unit`],
   [/; scale it$/, `; scale it ${NUMBERS}`],
-  [", --unit l if this is meant", ""],
   ["allow corner = nearest", 'choose another answer to "Corners that are too tight"'],
   [/change the robot, or simulate it \([^)]*\)/, 'change it under "Robot"'],
   ["simulate it (softflagella replay)", 'set "Number of tails N" to 2 or more'],
@@ -18,7 +16,7 @@ const ADVICE = [ // what a message of the planner says, and what the page says i
 
 /* A message of the planner with its advice in the page's words; lengths over which a path is smoothed become cm. */
 function inPage(message, robot) {
-  const cm = message.replace(/(?<=--smooth )\S+/, (length) => general(100 * robot.tailLength * length, 3));
+  const cm = message.replace(/(?<=--smooth )(\S+)l/, (_, tails) => general(100 * robot.tailLength * tails, 3));
   return ADVICE.reduce((words, [from, to]) => words.replace(from, to), cm);
 }
 

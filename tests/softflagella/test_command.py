@@ -114,7 +114,7 @@ def test_an_option_has_the_name_of_the_keyword(word: str) -> None:
 
 
 def test_an_old_option_works_with_a_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["plan", "circle:1.5", "--robot", "paper-control", "--objective", "flips", "--min-dwell-s", "3"]
+    words = ["plan", "circle:1.5l", "--robot", "paper-control", "--objective", "flips", "--min-dwell-s", "3"]
     assert run_command(main, [*words, "--out", str(tmp_path)]) == 0
     assert "warning: --min-dwell-s is deprecated; use --minimum-seconds\n" in capsys.readouterr().err
     assert min(sf.load_plan(tmp_path / "plan.json")["dwell_s"]) >= 3

@@ -12,10 +12,9 @@ ROBOT = {"tailLength": 0.11}
 NUMBERS = 'under "Corners as numbers; move, scale, turn"'
 OUTSIDE = "robot 'a' is outside the look-up table: motor speed 9 rpm; "
 ADVICE = {
-    "by 1 mm: give --smooth 0.03": 'by 1 mm: set "Smooth over" to 0.33 cm and press "Smooth this path"',
+    "by 1 mm: give --smooth 0.03l": 'by 1 mm: set "Smooth over" to 0.33 cm and press "Smooth this path"',
     "too tight; scale the path by 1.5": f"too tight; scale it by 1.5 {NUMBERS}",
-    "too long; if you gave cm and mean mm, it is 20 l: --unit mm; or if you gave l and mean m, it is 9 l: --unit "
-    "m": f"too long; scale it {NUMBERS}, or open it again in another unit",
+    "at most 12000 l can be planned; scale it": f"at most 12000 l can be planned; scale it {NUMBERS}",
     f"{OUTSIDE}change the robot, or simulate it (softflagella steady, softflagella surrogate robot)":
         f'{OUTSIDE}change it under "Robot"',
     "allow more, or make a table of this robot with softflagella surrogate robot":
