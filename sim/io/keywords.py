@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable
 from functools import wraps
-from inspect import Parameter, signature
+from inspect import Parameter, signature, unwrap
 from typing import Any, ParamSpec, TypeVar
 
 from sim.io.deprecated import warn_deprecated
@@ -43,7 +43,7 @@ def checks_keywords(**renamed: str) -> Callable[[Callable[P, R]], Callable[P, R]
 
 def keywords_of(function: Callable[..., Any]) -> list[str]:
     """List the keywords of a function, those of `**options: Unpack[Options]` among them."""
-    known: list[str] = []
+    function, known = unwrap(function), list[str]()
     for parameter in signature(function).parameters.values():
         if parameter.kind is Parameter.VAR_KEYWORD:
             options = str(parameter.annotation).removeprefix("Unpack[").removesuffix("]")
