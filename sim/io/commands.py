@@ -85,7 +85,8 @@ class Command(NamedTuple):
             old = options.get("old")
             added = parser.add_argument(*names, **{key: value for key, value in options.items() if key != "old"})
             if old:
-                parser.add_argument(old, dest=added.dest, type=added.type, action=_Renamed, const=names[0],
+                kind = options.get("type", str)
+                parser.add_argument(old, dest=added.dest, type=kind, action=_Renamed, const=names[0],
                                     default=SUPPRESS, help=SUPPRESS)  # fmt: skip
         parser.set_defaults(run=self.run)
 
