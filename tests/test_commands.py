@@ -103,6 +103,11 @@ def check_paper(made: Path, out: Path) -> str:
     return "this simulator, its fit     0.403"
 
 
+def effects(made: Path, out: Path) -> str:
+    done("sim", "effects")
+    return "end_over_end_drag      Drag moment on the head when it turns end over end."
+
+
 def compiled(made: Path, out: Path) -> str:
     done("sim", "compile")
     return "loops compiled in"
@@ -335,6 +340,7 @@ def adopt(made: Path, out: Path) -> str:
 
 RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("sim", "steady"): steady, ("sim", "replay"): replay, ("sim", "robot"): robot, ("sim", "check"): check_paper,
+    ("sim", "effects"): effects,
     ("sim", "film"): film, ("sim", "branches"): branches, ("planner", "page"): page,
     ("sim", "compile"): compiled, ("surrogate", "compile"): compiled_queries,
     ("dataset", "build"): build, ("dataset", "report"): report,
