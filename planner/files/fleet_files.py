@@ -1,13 +1,13 @@
 """Robots of a fleet from a TOML file, and the files of their plans.
 
     apart = "10cm"            # least distance between bodies; or --apart
-    unit = "cm"               # options of the planning commands that hold for all robots
+    robot = "paper-control"   # robot.toml or the name of a preset, of members without their own
+    unit = "cm"               # options of the planning commands, too
 
-    [[robot]]
-    robot = "paper-control"   # robot.toml or the name of a preset
+    [[member]]
     path = "right.csv"        # what `softflagella plan` takes
 
-    [[robot]]
+    [[member]]
     name = "second"           # of its folder; default: robot-2
     robot = "second.toml"
     goal = [60, 20, 90]       # what `planner goal` takes: x, y and degrees, with start = [0, 0, 0]
@@ -35,7 +35,8 @@ from sim.model.robot import Robot
 
 _JOBS = {"path": "plan", "goal": "goal", "places": "tour", "region": "cover"}  # key -> command
 _OWN = ("robot", "name", "delay_s")
-_OF_ALL = ("apart", "feedback", "robot")
+_OF_ALL = ("apart", "feedback")
+_MEMBERS = ("member", "robot")  # what the array of robots is called, and what it was called before
 _FILES = ("robot", "path", "region", "model", "walls", "keep_out", "hole")  # keys whose values may be files
 _NAME = re.compile(r"\w[\w-]*")
 _WRITTEN = ("fleet.json", "fleet.svg")
@@ -66,9 +67,10 @@ def read_fleet(path: str | Path) -> FleetFile:
         InputError: the file cannot be read, or a robot has no plan, or several.
     """
     content = read_toml(path)
-    entries = content.get("robot")
+    array = next((key for key in _MEMBERS if isinstance(content.get(key), list)), _MEMBERS[0])
+    entries = content.pop(array, None)
     if not (isinstance(entries, list) and entries and all(isinstance(entry, dict) for entry in entries)):
-        raise InputError(f"{path}: no robots; write a table [[robot]] for each")
+        raise InputError(f"{path}: no robots; write a table [[{_MEMBERS[0]}]] for each")
     feedback = content.get("feedback", False)
     if not isinstance(feedback, bool):
         raise InputError(f"{path}: feedback = {feedback!r}; write true or false")
@@ -93,7 +95,7 @@ def _robot(path: str | Path, number: int, entry: Mapping[str, Any]) -> FleetRobo
     if isinstance(delay, bool) or not isinstance(delay, int | float):
         raise InputError(f"{path}: {name}: delay_s = {delay!r}; give seconds, 0 or more")
     jobs = [key for key in _JOBS if key in entry]
-    if len(jobs) != 1 or "robot" not in entry:
+    if len(jobs) != 1 or not isinstance(entry.get("robot"), str):
         raise InputError(f"{path}: {name}: give robot, and one of {', '.join(_JOBS)}")
     folder = Path(path).parent
     words = ["--robot", _beside(folder, "robot", entry["robot"])]

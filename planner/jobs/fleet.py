@@ -1,10 +1,9 @@
 """fleet(members, apart): plans of several robots in one tank that keep apart by a distance at all times.
 
-The robots get a priority. The first one moves as planned. Each later one keeps its path, and gives way to those
-before it: it begins later, or makes waiting circles on its way (`planner.jobs.timetable`). Robots that have not
-begun and robots that have ended count, too. The distance asked for is kept although both robots are off by their
-errors in place (`planner.jobs.timed_motion`). If a robot finds no timing, other orders of priority are tried.
-This is prioritized planning, of Erdmann and Lozano-Pérez (1987), Algorithmica 2.
+Of two robots that come too near to each other one gives way (`planner.jobs.priorities`): it keeps its path, and
+begins later or makes waiting circles on its way (`planner.jobs.timetable`). Robots that have not begun and robots
+that have ended count, too. The distance asked for is kept although both robots are off by their errors in place
+(`planner.jobs.timed_motion`).
 
 Left out: what the flow of one robot does to another (`benchmarks flow_between_robots`). Lengths in m, times in s.
 """
@@ -14,7 +13,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations, islice, permutations
+from functools import cache
+from itertools import combinations
 
 import numpy as np
 
@@ -22,7 +22,8 @@ from planner.goal.goal_plan import GoalPlan, Pose
 from planner.jobs.coverage_plan import CoveragePlan
 from planner.jobs.error_in_place import times_at
 from planner.jobs.fleet_plan import FleetPlan
-from planner.jobs.separation import Places, Scheduled, distances, instants, too_near
+from planner.jobs.priorities import Priorities
+from planner.jobs.separation import Places, Scheduled, approach, distances, too_near
 from planner.jobs.timed_motion import TimedMotion
 from planner.jobs.timetable import Timetable, Timing, Turn
 from planner.jobs.tour_plan import TourPlan
@@ -35,7 +36,7 @@ from sim.io.errors import InputError
 from sim.io.units import format_length
 
 MOST_ROBOTS = 12
-MOST_ORDERS = 24
+MOST_TIMINGS = 300
 _STEPS = 800  # of the longest motion
 _LEAST_STEP = 0.5  # time units
 _PLACES = 20  # of waiting circles on a path
@@ -79,7 +80,7 @@ def fleet(
     """Time plans so that the bodies of the robots keep apart.
 
     Args:
-        members: the robots with their plans, in order of priority.
+        members: the robots with their plans; where possible, later ones give way to earlier ones.
         apart: least distance between bodies [m].
         feedback: poses will be measured every 20 flips, so the errors in place are those with feedback.
         progress: called now and then with the share of what is done.
@@ -91,21 +92,11 @@ def fleet(
     _check(members, apart)
     planner = _Fleet(members, apart, feedback)
     planner.check_rest()
-    orders = list(islice(permutations(range(len(members))), MOST_ORDERS))
-    refusals: list[_HinderedError] = []
-    for tried, order in enumerate(orders):
-        if any(refusal.applies(order) for refusal in refusals):
-            continue
-        if progress is not None:
-            progress(tried / len(orders))
-        try:
-            scheduled = planner.in_order(order)
-        except _HinderedError as hindered:
-            refusals.append(hindered)
-            continue
-        motions = tuple(scheduled[k] for k in range(len(members)))
-        return FleetPlan(tuple(each.name for each in members), motions, order, apart, feedback)
-    raise NoTimingError(planner.refusal(refusals, len(orders)))
+    search = Priorities(planner.alone, planner.timed, planner.meet, MOST_TIMINGS, progress)
+    resolved = search.resolve()
+    if resolved is None:
+        raise NoTimingError(planner.refusal(search))
+    return FleetPlan(tuple(each.name for each in members), *resolved, apart, feedback)
 
 
 def _check(members: Sequence[Member], apart: float) -> None:
@@ -119,49 +110,34 @@ def _check(members: Sequence[Member], apart: float) -> None:
             raise InputError(f"{member.name}: start delay {member.earliest:g} s; give seconds, 0 or more")
 
 
-class _HinderedError(Exception):
-    """A robot finds no timing among others."""
-
-    def __init__(self, who: int, others: tuple[int, ...]):
-        super().__init__()
-        self.who, self.others = who, others
-
-    def applies(self, order: tuple[int, ...]) -> bool:
-        """Tell whether an order gives the same robot the same robots before it, in the same order."""
-        return order[: len(self.others) + 1] == (*self.others, self.who)
-
-
 class _Fleet:
     """The robots, and what is known of them."""
 
     def __init__(self, members: Sequence[Member], apart: float, feedback: bool):
         self.members, self.apart, self.feedback = members, apart, feedback
         self.motions = [TimedMotion(member.plan, feedback) for member in members]
-        longest = max(motion.duration for motion in self.motions)
-        unit = min(member.plan.robot.time_scale for member in members)
-        self.step = max(longest / _STEPS, _LEAST_STEP * unit)
-        self._turns: dict[int, list[Turn]] = {}
+        self.alone = tuple(map(Scheduled, self.motions, (member.earliest for member in members)))
+        self.timed, self.meet, self._turns = cache(self._timed), cache(self._meet), cache(self._turns_of)
 
-    def in_order(self, order: tuple[int, ...]) -> dict[int, Scheduled]:
-        """Time the motions, each among those before it.
+    def _meet(self, first: Scheduled, second: Scheduled) -> float:
+        """Find when two robots come too near to each other first."""
+        times, _, sure = approach(first, second)
+        near = sure < self.apart
+        return float(times[near.argmax()]) if near.any() else math.inf
 
-        Raises:
-            _HinderedError: a robot finds no timing.
-        """
-        scheduled: dict[int, Scheduled] = {}
-        for place, k in enumerate(order):
-            timed = self._timed(k, list(scheduled.values()))
-            if timed is None:
-                raise _HinderedError(k, order[:place])
-            scheduled[k] = timed
-        return scheduled
+    def _step(self, k: int, others: Sequence[Scheduled]) -> float:
+        """Choose the step of time of a table."""
+        motions = (self.motions[k], *(other.motion for other in others))
+        unit = min(motion.plan.robot.time_scale for motion in motions)
+        return max(max(motion.duration for motion in motions) / _STEPS, _LEAST_STEP * unit)
 
-    def _timed(self, k: int, others: list[Scheduled]) -> Scheduled | None:
+    def _timed(self, k: int, others: tuple[Scheduled, ...]) -> Scheduled | None:
         """Find when a robot begins and where it circles. The margin grows until the exact distances suffice."""
         member, base = self.members[k], self.motions[k]
-        margin = 0.0
+        margin, step = 0.0, self._step(k, others)
         for _ in range(_TRIES):
-            timing = self._find(k, base, others, margin)
+            table = Timetable(base, others, self.apart + margin, step, member.earliest)
+            timing = table.find() or table.find(self._turns(k, step))
             if timing is None:
                 return None
             motion = base
@@ -170,28 +146,21 @@ class _Fleet:
                     motion = TimedMotion(self._circling(member, timing.circles), self.feedback)
                 except InputError:  # no room for a circle
                     return None
-                again = Timetable(motion, others, self.apart, self.step, member.earliest).find()
+                again = Timetable(motion, others, self.apart, step, member.earliest).find()
                 if again is None:
                     ends = [each.error(np.array([each.duration]))[0] for each in (base, motion)]
                     margin += max(float(ends[1] - ends[0]) - margin, _MORE * base.body.reach)
                     continue
                 timing = Timing(again.begin, timing.circles)
             candidate = Scheduled(motion, timing.begin, timing.circles)
-            lacking = self.apart - self._least(candidate, others)
+            lacking = self.apart - min(float(approach(candidate, other).sure.min()) for other in others)
             if lacking <= 0:
                 return candidate
             margin += max(1.1 * lacking, _MORE * base.body.reach)
         return None
 
-    def _find(self, k: int, motion: TimedMotion, others: list[Scheduled], margin: float) -> Timing | None:
-        """Find a timing, without circles if there is one."""
-        table = Timetable(motion, others, self.apart + margin, self.step, self.members[k].earliest)
-        timing = table.find()
-        if timing is not None or not others:
-            return timing
-        if k not in self._turns:
-            self._turns[k] = _turns(self.members[k], motion, self.step)
-        return table.find(self._turns[k])
+    def _turns_of(self, k: int, step: float) -> list[Turn]:
+        return _turns(self.members[k], self.motions[k], step)
 
     def _circling(self, member: Member, circles: Sequence[WaitingCircle]) -> Plan:
         """Plan again with waiting circles, clear of obstacles.
@@ -213,15 +182,6 @@ class _Fleet:
         return replace(
             plan, kept_clear=KeptClear(kept.free_space, max(kept.margin, needed), clearance, kept.detours)
         )
-
-    def _least(self, candidate: Scheduled, others: list[Scheduled]) -> float:
-        """Compute the least distance from others, less the errors in place of both."""
-        times = instants([candidate, *others])
-        own, least = candidate.places(times), math.inf
-        for other in others:
-            places = other.places(times)
-            least = min(least, float((distances(own, places) - own.error - places.error).min()))
-        return least
 
     def check_rest(self) -> None:
         """Refuse robots that start or end too near to each other.
@@ -250,33 +210,29 @@ class _Fleet:
         times = np.array([when * motion.duration])
         return Places(motion.body, motion.poses(times), motion.error(times))
 
-    def refusal(self, refusals: list[_HinderedError], orders: int) -> str:
+    def refusal(self, search: Priorities[Scheduled]) -> str:
         """Say which robots cannot keep apart, and why."""
-        for first, second in combinations(range(len(self.members)), 2):
-            ways = ((first, second), (second, first))
-            if any(self._timed(after, [self._alone(before)]) is not None for before, after in ways):
-                continue
-            one, two = self.members[first].name, self.members[second].name
-            reasons = [reason for before, after in ways for reason in self._in_the_way(before, after)]
-            why = " and ".join(reasons) or "they meet where neither of them has room to wait"
-            return (
-                f"{one} and {two} cannot keep {format_length(self.apart)} apart, whichever of them waits: {why}; "
-                "move their paths apart, or ask for less"
-            )
-        worst = max(refusals, key=lambda refusal: len(refusal.others))
-        others = ", ".join(self.members[k].name for k in worst.others)
+        if search.impossible is not None:
+            robots, tried = tuple(sorted(search.impossible)), "whichever of them waits"
+        else:
+            who, above = min(search.refused, key=lambda refused: len(refused[1]))
+            for each in tuple(above):  # leave out those that do not matter
+                fewer = {other: motion for other, motion in above.items() if other != each}
+                if fewer and self.timed(who, tuple(fewer.values())) is None:
+                    above = fewer
+            robots, tried = (who, *above), f"in {search.tried} timings with others before or after them"
+        pairs = [pair for k in robots[1:] for pair in ((k, robots[0]), (robots[0], k))]
+        reasons = dict.fromkeys(reason for pair in pairs for reason in self._in_the_way(*pair))
+        why = " and ".join(reasons) or "they meet where neither of them has room to wait"
         return (
-            f"{self.members[worst.who].name} cannot keep {format_length(self.apart)} apart from {others} by "
-            f"waiting, in none of {orders} orders of priority; move paths apart, or ask for less"
+            f"{' and '.join(self.members[k].name for k in robots)} cannot keep {format_length(self.apart)} apart, "
+            f"{tried}: {why}; move their paths apart, or ask for less"
         )
-
-    def _alone(self, k: int) -> Scheduled:
-        return Scheduled(self.motions[k], self.members[k].earliest)
 
     def _in_the_way(self, resting: int, moving: int) -> list[str]:
         """Say whether a robot starts or ends on the way of another one."""
         motion = self.motions[moving]
-        times = np.arange(0.0, motion.duration, self.step)
+        times = np.arange(0.0, motion.duration, self._step(moving, ()))
         along = Places(motion.body, motion.poses(times), motion.error(times))
         names = self.members[resting].name, self.members[moving].name
         return [

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from planner.jobs.separation import Scheduled, distances, instants
+from planner.jobs.separation import Approach, Scheduled, approach, instants
 from planner.planning.planned import Plan
 from sim.arrays import Floats
 from sim.io.notebook import as_html
@@ -49,7 +49,7 @@ class FleetPlan:
 
     names: tuple[str, ...]  # of the robots
     scheduled: tuple[Scheduled, ...]  # their motions in time
-    order: tuple[int, ...]  # indices of the robots: each one gives way to those before it
+    order: tuple[int, ...]  # indices of the robots: each gives way only to some of those before it
     apart_m: float  # as asked for
     feedback: bool  # poses are measured every 20 flips
 
@@ -77,28 +77,28 @@ class FleetPlan:
     def distances(self) -> tuple[Floats, dict[tuple[int, int], tuple[Floats, Floats]]]:
         """Instants (K,), and of each pair the predicted distances (K,) and those less both errors in place."""
         times = instants(self.scheduled)
-        places = [each.places(times) for each in self.scheduled]
         table = {}
-        for first, second in combinations(range(len(places)), 2):
-            predicted = distances(places[first], places[second])
-            table[first, second] = predicted, predicted - places[first].error - places[second].error
+        for pair, known in self._approaches.items():
+            predicted, sure = (np.interp(times, known.times, column) for column in known[1:])
+            table[pair] = predicted, sure
         return times, table
+
+    @cached_property
+    def _approaches(self) -> dict[tuple[int, int], Approach]:
+        pairs = combinations(range(len(self.scheduled)), 2)
+        return {(i, j): approach(self.scheduled[i], self.scheduled[j]) for i, j in pairs}
 
     @property
     def nearest(self) -> Nearest:
         """The least predicted distance between two bodies, when it is, and between which robots."""
-        return self._nearest(0)
+        pair, known = min(self._approaches.items(), key=lambda item: float(item[1].predicted.min()))
+        k = int(known.predicted.argmin())
+        return Nearest(float(known.predicted[k]), float(known.times[k]), pair)
 
     @property
     def sure_m(self) -> float:
         """The least distance that is left when both robots are off by their errors in place."""
-        return self._nearest(1).distance_m
-
-    def _nearest(self, column: int) -> Nearest:
-        times, table = self.distances
-        pair = min(table, key=lambda pair: float(table[pair][column].min()))
-        k = int(table[pair][column].argmin())
-        return Nearest(float(table[pair][column][k]), float(times[k]), pair)
+        return min(float(known.sure.min()) for known in self._approaches.values())
 
     @property
     def warnings(self) -> tuple[str, ...]:

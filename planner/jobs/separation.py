@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ _MOST = 40_000  # instants
 Truth = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scheduled:
     """A motion that begins at a time; before, the robot rests at its start, and afterwards at its end."""
 
@@ -70,6 +71,22 @@ def distances(first: Places, second: Places) -> Floats:
     return np.asarray(lines - first.body.radius - second.body.radius)
 
 
+class Approach(NamedTuple):
+    """How near two robots come to each other at K instants [s, m]."""
+
+    times: Floats  # (K,)
+    predicted: Floats  # (K,), distances between bodies
+    sure: Floats  # (K,), less the errors in place of both
+
+
+def approach(first: Scheduled, second: Scheduled) -> Approach:
+    """Compute the distances of two robots from the beginning until both have ended."""
+    times = instants([first, second])
+    one, other = first.places(times), second.places(times)
+    predicted = distances(one, other)
+    return Approach(times, predicted, predicted - one.error - other.error)
+
+
 def too_near(first: Places, second: Places, apart: float) -> Truth:
     """Tell for all pairs of poses (I, J) whether bodies may be nearer than `apart`."""
     ends, other_ends = first.body.ends(first.poses), second.body.ends(second.poses)
@@ -77,6 +94,9 @@ def too_near(first: Places, second: Places, apart: float) -> Truth:
     widths = first.body.radius + second.body.radius + apart
     halves = (first.body.front - first.body.back + second.body.front - second.body.back) / 2
     near = np.zeros((len(middles), len(others)), dtype=bool)
+    gap = np.maximum(middles.min(0) - others.max(0), others.min(0) - middles.max(0)).max()
+    if gap > widths + halves + first.error.max() + second.error.max():
+        return near
     for begin in range(0, len(middles), _ROWS):
         rows = slice(begin, begin + _ROWS)
         needed = widths + first.error[rows, None] + second.error

@@ -187,11 +187,12 @@ def fleet(
 ) -> FleetPlan:
     """Time plans of several robots in one tank so that their bodies keep apart, open loop or with feedback.
 
-    Each robot keeps its path. Robots give way to those before them: they begin later, or make waiting circles. If
-    that leads nowhere, other orders are tried. Robots that rest at their start or end count, too.
+    Each robot keeps its path. Of two robots that would come too near to each other the later one of the list gives
+    way: it begins later, or makes waiting circles. If that leads nowhere, the other one does. Robots that rest at
+    their start or end count, too.
 
     Args:
-        plans: of two or more robots, in one frame of the tank; the first ones have priority.
+        plans: of two or more robots, in one frame of the tank; where possible, the first ones have priority.
         apart: least distance between bodies, as "10cm"; a number is in tail lengths, if all robots have the same.
             It is kept although both robots are off by their errors in place.
         names: of the robots; default: robot-1, robot-2 and so on.

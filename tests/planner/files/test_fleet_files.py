@@ -15,12 +15,11 @@ from sim.model.presets import PRESETS
 
 TWO = """
 apart = "3cm"
-[[robot]]
+robot = "paper-control"
+[[member]]
 name = "right"
-robot = "paper-control"
 path = "right.csv"
-[[robot]]
-robot = "paper-control"
+[[member]]
 goal = [11, 24, 90]
 start = [11, -21, 90]
 unit = "cm"
@@ -75,7 +74,8 @@ def test_the_command_plans_for_all_robots(tmp_path: Path, capsys: pytest.Capture
         ('path = "right.csv"', 'path = "right.csv"\ngoal = [1, 1, 1]', "one of path, goal, places, region"),
         ('path = "right.csv"', 'path = "wrong.csv"', "wrong.csv"),
         ('path = "right.csv"', 'path = "right.csv"\nspeed = 3', "--speed"),
-        ('robot = "paper-control"\npath', 'robot = "no-such"\npath', "no robot 'no-such'"),
+        ('robot = "paper-control"', 'robot = "no-such"', "no robot 'no-such'"),
+        ('robot = "paper-control"', "", "give robot, and one of"),
         ('apart = "3cm"', 'apart = "3cm"\nfeedback = 1', "write true or false"),
     ],
 )
@@ -92,7 +92,7 @@ def test_it_refuses_in_one_line_and_writes_nothing(
 
 
 def test_options_for_all_robots_and_places(tmp_path: Path) -> None:
-    path = write_files(tmp_path, 'unit = "cm"\n[[robot]]\nrobot = "paper-control"\nplaces = [[0, 0], [-30, 5]]\n'
+    path = write_files(tmp_path, 'unit = "cm"\n[[member]]\nrobot = "paper-control"\nplaces = [[0, 0], [-30, 5]]\n'
                                  'return = true\nkeep_out = ["circle:1,2,3", "circle:4,5,6"]\n')  # fmt: skip
     (robot,) = read_fleet(path).robots
     assert robot.command == "tour"
@@ -100,6 +100,13 @@ def test_options_for_all_robots_and_places(tmp_path: Path) -> None:
         "--robot", "paper-control", "--unit", "cm", "--return", "--keep-out", "circle:1,2,3", "--keep-out",
         "circle:4,5,6", "--", "0,0", "-30,5",
     )  # fmt: skip
+
+
+def test_the_old_name_of_the_array_is_read(tmp_path: Path) -> None:
+    new, old = 'path = "right.csv"\n', TWO.replace('robot = "paper-control"\n', "", 1)
+    old = old.replace("[[member]]", '[[robot]]\nrobot = "paper-control"')
+    assert new in old
+    assert read_fleet(write_files(tmp_path, old)) == read_fleet(write_files(tmp_path, TWO))
 
 
 def test_distances_have_units() -> None:

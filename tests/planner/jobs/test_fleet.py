@@ -100,6 +100,23 @@ def test_other_orders_of_priority_are_tried() -> None:
     assert result.sure_m >= APART
 
 
+FAR = [((20 + 4 * k, 20), (21 + 4 * k, 20)) for k in range(4)]
+
+
+def test_of_five_robots_three_that_end_on_the_way_of_the_fourth_give_way() -> None:
+    ends_on_the_way = [straight((2 * k, 1.5), (2 * k, 0.1)) for k in range(3)]
+    passes, far = straight((-2, 0), (7, 0)), straight(*FAR[0])
+    result = keep_apart([*ends_on_the_way, passes, far])
+    assert result.begin_s[3:] == (0, 0)
+    assert min(result.begin_s[:3]) > 0
+    assert result.sure_m >= APART
+
+
+def test_robots_far_away_change_nothing(two: FleetPlan) -> None:
+    far = keep_apart([*crossing(), *(straight(*way) for way in FAR)])
+    assert far.begin_s == (*two.begin_s, 0, 0, 0, 0)
+
+
 def test_delays_are_kept() -> None:
     plans = crossing()
     members = [Member.of("a", plans[0], 30.0), Member.of("b", plans[1], 45.0)]
@@ -128,6 +145,7 @@ def test_waiting_circles_keep_clear_of_walls() -> None:
         ([((0, 0), (3, 0)), ((0, 3), (3.5, 0.3))], "a and b end"),
         ([((-3, 0), (3, 0)), ((4, 0), (-1, 0))], "b ends on the way of a"),
         ([((0, 0), (5, 0)), ((5.5, 0.1), (-1.5, 0.1))], "whichever of them waits"),
+        ([FAR[0], ((-3, 0), (3, 0)), *FAR[1:], ((4, 0), (-1, 0))], "^b and f cannot keep 3.3 cm apart, whichever"),
     ],
 )
 def test_it_says_which_two_cannot_keep_apart(paths: list[Any], expected: str) -> None:
