@@ -1,4 +1,4 @@
-"""Command line of the planner: plan a path, go to a goal, track a robot, check a track."""
+"""Command line of the planner: plan a path, go to a goal, track a robot, replay a plan, check a track."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from planner.fleet_command import FLEET, fleet_command
 from planner.job_commands import JOBS, planned_cover, planned_tour
 from planner.page_command import PAGE
 from planner.paths.units import describe, in_lab, read_length, read_pose
+from planner.replay_command import REPLAY
 from planner.tracking_commands import POSES, REPLAN, START, track, without_robot
 from sim.io.commands import ROBOT, UNIT, Program, argument, out
 from sim.io.errors import InputError, naming
@@ -244,7 +245,7 @@ def _fleet(arguments: Namespace) -> None:
     fleet_command(arguments, program.commands, planned)
 
 
-for job in (*JOBS, PAGE, REPLAN):
+for job in (*JOBS, PAGE, REPLAN, REPLAY):
     program.command(job.name, job.help, *job.arguments)(job.run)
 
 

@@ -1,11 +1,10 @@
-"""Command line of the simulator: `steady`, `branches`, `replay`, `film`, `robot`, `check`, `compile`."""
+"""Command line of the simulator: `steady`, `branches`, `film`, `robot`, `check`, `compile`."""
 
 from __future__ import annotations
 
 import sys
 from argparse import Namespace
 from pathlib import Path
-from typing import Any
 
 from sim.io.commands import JOBS, Program, argument, out
 from sim.io.errors import InputError, naming
@@ -13,7 +12,6 @@ from sim.model.sweepable import SWEEPABLE, read_range
 
 program = Program("sim", "Simulate swimming robots.")
 main = program.main
-BAR_AFTER = 1.0  # s
 
 
 @program.command(
@@ -141,42 +139,6 @@ def _effects(arguments: Namespace) -> None:
     for name in catalogue():
         sentence = str(import_module(f"sim.effects.{name}").__doc__).splitlines()[0]
         print(f"{name:22} {sentence}")
-
-
-@program.command(
-    "replay",
-    "simulate a planned schedule",
-    argument("plan", help="plan.json"),
-    out("CSV with the track"),
-    argument("--no-error", action="store_true",
-             help="do not estimate the error of the track, which takes more than half as long again"),
-)  # fmt: skip
-def _replay(arguments: Namespace) -> None:
-    from tqdm import tqdm
-
-    from sim.io.files import write_csv
-    from sim.io.units import format_length, format_time
-    from sim.model.schedule import load_schedule
-    from sim.motion.replay import replay, replay_error
-
-    schedule = load_schedule(arguments.plan)
-    shown: Any = {"unit": "dwell", "delay": BAR_AFTER, "disable": None}  # None: shown on a terminal alone
-    with tqdm(total=len(schedule.dwells), desc="replay", **shown) as bar:
-        track = replay([schedule], progress=bar.update)[0]
-    write_csv(track, arguments.out)
-    error = ""
-    if not arguments.no_error:
-        with tqdm(total=len(schedule.dwells), desc="on a coarser mesh", **shown) as bar:
-            size = replay_error(schedule, track, progress=bar.update)
-        length = schedule.tail_length
-        in_lab = f"{size:.2g} l" if length is None else f"{format_length(size * length)} ({size:.2g} l)"
-        error = f", the simulator's own error is {in_lab} at most"
-    end = track.iloc[-1]
-    place = f"({end.x_over_l:.3f}, {end.y_over_l:.3f}) l"
-    if "x_cm" in track:
-        place = f"({end.x_cm:.2f}, {end.y_cm:.2f}) cm = {place}"
-    time = format_time(end.time_s)
-    print(f"{len(schedule.dwells)} dwells, {time}, ends at {place}{error} -> {arguments.out}")
 
 
 @program.command(

@@ -18,7 +18,9 @@ from planner.paths.path import circle as circle
 from planner.paths.path import polygon as polygon
 from planner.paths.path_files import Drawing as Drawing
 from planner.paths.path_files import read_path as read_path
+from planner.planning.camera import Camera as Camera
 from planner.planning.planned import Plan as Plan
+from planner.tracking.swim import Swim as Swim
 from planner.tracking.tracker import Command as Command
 from planner.tracking.tracker import Tracker as Tracker
 from planner.vehicle.calibration_table import CalibrationKnowledge as CalibrationKnowledge
@@ -51,6 +53,7 @@ from softflagella.api.simulate import replay as replay
 from softflagella.api.simulate import response as response
 from softflagella.api.simulate import sensitivities as sensitivities
 from softflagella.api.simulate import steady as steady
+from softflagella.api.simulate import swim as swim
 from softflagella.api.sweep import read_sweep as read_sweep
 from softflagella.api.sweep import sweep as sweep
 from surrogate.interface import LookupTable as LookupTable

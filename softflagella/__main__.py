@@ -28,17 +28,17 @@ WORDS = {  # the most important commands -> package and command
     "train": ("surrogate", "train"),
     "tracks": ("calibration", "tracks"),
     "calibrate": ("calibration", "calibrate"),
-    "replay": ("sim", "replay"),
+    "replay": ("planner", "replay"),
     "check": ("planner", "check"),
     "film": ("sim", "film"),
     "query": ("surrogate", "query"),
     "demo": ("softflagella", "demo"),
 }
 PACKAGES = {
-    "sim": "simulate robots: steady motion, replays of schedules, presets",
+    "sim": "simulate robots: steady motion, branches, films, presets",
     "dataset": "simulate sweeps into data sets, report and verify them",
     "surrogate": "train look-up tables and query them",
-    "planner": "plan switching schedules for paths, check tracks",
+    "planner": "plan switching schedules for paths, replay them, check tracks",
     "calibration": "find from measured runs what the model lacks",
 }
 program = Program("softflagella", "Soft flagellated robots near a surface.")

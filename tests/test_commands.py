@@ -46,7 +46,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         folder / "points.csv", index=False
     )
     done("planner", "plan", "circle:1.5l", "--robot", folder / "robot.toml", "--out", folder / "plan")
-    done("sim", "replay", folder / "plan" / "plan.json", "--out", folder / "track.csv")
+    done("planner", "replay", folder / "plan" / "plan.json", "--out", folder / "track.csv")
     (folder / "sweep.toml").write_text(SMALL)
     done("dataset", "build", "--config", folder / "sweep.toml", "--out", folder / "sweep", "--jobs", 1)
     return folder
@@ -64,7 +64,7 @@ def replay(made: Path, out: Path) -> str:
     plan = json.loads((made / "plan" / "plan.json").read_text())
     short = {**plan, "dwell_bar": plan["dwell_bar"][:2]}
     (out / "short.json").write_text(json.dumps(short))
-    done("sim", "replay", out / "short.json", "--out", out / "track.csv")
+    done("planner", "replay", out / "short.json", "--out", out / "track.csv")
     track = pd.read_csv(out / "track.csv")
     assert track["time_bar"].iloc[-1] == pytest.approx(sum(short["dwell_bar"]), rel=1e-6)
     assert sorted(set(track["direction"])) == [-1, 1]
@@ -339,7 +339,8 @@ def adopt(made: Path, out: Path) -> str:
 
 
 RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
-    ("sim", "steady"): steady, ("sim", "replay"): replay, ("sim", "robot"): robot, ("sim", "check"): check_paper,
+    ("sim", "steady"): steady, ("planner", "replay"): replay,
+    ("sim", "robot"): robot, ("sim", "check"): check_paper,
     ("sim", "effects"): effects,
     ("sim", "film"): film, ("sim", "branches"): branches, ("planner", "page"): page,
     ("sim", "compile"): compiled, ("surrogate", "compile"): compiled_queries,

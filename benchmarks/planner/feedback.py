@@ -19,13 +19,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.parallel import in_parallel
-from benchmarks.planner.simulated_swim import Blind, Camera, Swum, swim
 from benchmarks.proportions import wilson
 from planner.paths.path import Path2D, circle
+from planner.planning.camera import Camera
 from planner.planning.picture import DECLARED, REPLAYED
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
-from planner.tracking.tracker import FALSE_ALARM, WINDOW, Tracker
+from planner.tracking.clock import SLACK
+from planner.tracking.swim import Swim, swim
+from planner.tracking.tracker import FALSE_ALARM, WINDOW, Command, Tracker
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 
@@ -59,13 +61,31 @@ def eight(length: float) -> Path2D:
     return path.scaled(length / path.length)
 
 
-def both(case: Case, planned: Plan) -> tuple[Swum, Swum]:
+class Blind:
+    """The schedule as planned, whatever the camera sees."""
+
+    def __init__(self, plan: Plan):
+        self._plan = plan
+        self._flips = np.cumsum(plan.dwells).tolist()
+        self._done = 0
+
+    def update(self, now: float, *_: object) -> Command:
+        """Tell what the schedule orders."""
+        if self._done < len(self._flips) and now >= self._flips[self._done] - SLACK:
+            self._done += 1
+        finished = self._done == len(self._flips)
+        direction = 0 if finished else self._plan.first_direction * (-1) ** self._done
+        flip_at = self._flips[min(self._done, len(self._flips) - 1)]
+        return Command(direction, flip_at, finished, False, self._plan.stated_error)
+
+
+def both(case: Case, planned: Plan) -> tuple[Swim, Swim]:
     """Open loop and with the tracker."""
     blind = swim(Blind(planned), planned, case.robot, Camera(), later=case.later)
     return blind, swim(Tracker(planned), planned, case.robot, Camera(), later=case.later)
 
 
-def draw(planned: Plan, swims: list[tuple[Swum, Swum]]) -> Figure:
+def draw(planned: Plan, swims: list[tuple[Swim, Swim]]) -> Figure:
     """Draw the tracks of the hardest case, and distances from the path over the way in all cases."""
     figure = Figure(figsize=(10, 6.6), layout="constrained")
     upper, lower = np.asarray(figure.subfigures(2, 1, height_ratios=(1.15, 1)), dtype=object)
@@ -73,9 +93,9 @@ def draw(planned: Plan, swims: list[tuple[Swum, Swum]]) -> Figure:
     for i, (swum, colour, name) in enumerate(ways):
         axes = upper.add_subplot(1, 2, 1 + i)
         axes.plot(*planned.reference.T, color=DECLARED, lw=1.2)
-        axes.plot(*swum.track.T, color=colour, lw=0.8)
-        half = int(np.searchsorted(swum.time, planned.duration / 2))
-        axes.plot(*swum.track[half], "o", color=colour, ms=5)
+        axes.plot(*swum.poses[:, :2].T, color=colour, lw=0.8)
+        half = int(np.searchsorted(swum.times, planned.duration / 2))
+        axes.plot(*swum.poses[half, :2], "o", color=colour, ms=5)
         axes.set_aspect("equal")
         axes.set_title(f"{CASES[-1].name}, {name}: {swum.rms():.2g} l rms", fontsize=10)
         axes.set_xlabel("x / l")
@@ -83,7 +103,7 @@ def draw(planned: Plan, swims: list[tuple[Swum, Swum]]) -> Figure:
     for i, case in enumerate(CASES):
         axes = lower.add_subplot(1, len(CASES), 1 + i)
         for swum, colour in zip(swims[i], (REPLAYED, FEEDBACK), strict=True):
-            axes.semilogy(LENGTH * swum.time / swum.time[-1], smooth(swum), color=colour, lw=1.0)
+            axes.semilogy(LENGTH * swum.times / swum.times[-1], smooth(swum), color=colour, lw=1.0)
         axes.set_ylim(3e-3, 10)
         axes.set_title(case.name, fontsize=9)
         axes.set_xlabel("way / l", fontsize=8)
@@ -94,9 +114,9 @@ def draw(planned: Plan, swims: list[tuple[Swum, Swum]]) -> Figure:
     return figure
 
 
-def smooth(swum: Swum) -> np.ndarray:
+def smooth(swum: Swim) -> np.ndarray:
     """Compute the root mean square distance over 1 l of the way."""
-    width = max(1, round(len(swum.time) / LENGTH))
+    width = max(1, round(len(swum.times) / LENGTH))
     padded = np.pad(swum.distance**2, (width // 2, width - 1 - width // 2), mode="edge")
     return np.asarray(np.sqrt(np.convolve(padded, np.ones(width) / width, mode="valid")))
 
@@ -106,15 +126,15 @@ def alarms(planned: Plan, seed: int) -> tuple[int, int]:
     rng = np.random.default_rng(seed)
     C_t, C_r, C_yr = (np.array([ROBOT.C_t, ROBOT.C_r, ROBOT.C_yr]) * np.exp(0.01 * rng.normal(size=3))).tolist()
     robot = replace(ROBOT, C_t=C_t, C_r=C_r, C_yr=C_yr)
-    swum = swim(Tracker(planned), planned, robot, Camera(every=0.5, rng=rng))
+    swum = swim(Tracker(planned), planned, robot, Camera(every_s=0.5, seed=rng))
     return swum.fed // WINDOW, len(swum.alarms)
 
 
-def lines(swims: list[tuple[Swum, Swum]]) -> Iterator[str]:
+def lines(swims: list[tuple[Swim, Swim]]) -> Iterator[str]:
     for case, pair in zip(CASES, swims, strict=True):
         for name, swum in zip(("open loop", "tracker"), pair, strict=True):
             quarters = "".join(f"{swum.rms(q / 4, (q + 1) / 4):8.4f}" for q in range(4))
-            rang = f"{swum.alarms[0] / swum.time[-1]:.2f}" if swum.alarms else "-"
+            rang = f"{swum.alarms[0] / swum.times[-1]:.2f}" if swum.alarms else "-"
             yield f"{case.name:28}{name:11}{swum.rms():8.4f}{swum.distance.max():8.3f}{quarters}{rang:>8}"
 
 

@@ -22,12 +22,13 @@ import numpy as np
 from benchmarks.parallel import in_parallel
 from benchmarks.planner.feedback import eight
 from planner.paths.path import Path2D, circle, polygon
+from planner.planning.camera import Camera
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
+from planner.tracking.swim import swim
 from planner.vehicle.dwell_choice import Objective
 from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker
-from tests.planner.swimming import Camera, rms, swum
 
 CURRENTS = (0.0, 0.06, 0.12)  # of the net speed
 
@@ -71,10 +72,8 @@ def covered(planned: Plan, seeds: int, current: float) -> list[tuple[float, floa
             flow = current * planned.straight.net_speed * np.array([math.cos(angle), math.sin(angle)])
             truth = replace(car, twist=twist, lag=lag, current=flow)
             every, delay = float(rng.choice([0.5, 1.0, 3.0])), float(rng.choice([0.0, 1.0, 2.0]))
-            result = swum(tracker, planned, truth, Camera(rng=rng, every=every, delay=delay, gaps=0.1))
-            time = np.gradient(result.times)
-            within = float((time * (result.distance <= result.errors)).sum() / time.sum())
-            results.append((within, float(result.errors.mean()), rms(result.distance)))
+            result = swim(tracker, planned, truth, Camera(seed=rng, every_s=every, delay_s=delay, lost=0.1))
+            results.append((result.within(result.errors), float(result.errors.mean()), result.rms()))
     return results
 
 

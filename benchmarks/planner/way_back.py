@@ -20,12 +20,13 @@ import numpy as np
 from benchmarks.parallel import in_parallel
 from benchmarks.planner.feedback import eight
 from planner.goal.dubins import shortest_paths
+from planner.planning.camera import Camera
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
+from planner.tracking.swim import swim
 from sim.arrays import Floats
 from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker
-from tests.planner.swimming import Camera, swum
 
 ON_PATH = 0.08  # l
 _AT_ONCE = 25  # starts of one task
@@ -56,7 +57,8 @@ def times_back(planned: Plan, seeds: list[int], single: bool) -> list[tuple[floa
         for seed in seeds:
             tracker.restart()
             start, rng = random_start(planned, seed)
-            result = swum(tracker, planned, planned.tracked.vehicle, Camera(rng=rng), start=start, most=2000)
+            camera = Camera(seed=rng, delay_s=0, lost=0)
+            result = swim(tracker, planned, planned.tracked.vehicle, camera, start=start, longest=10)
             off = np.flatnonzero(result.distance > ON_PATH)
             arrived = result.finished and (not len(off) or off[-1] + 1 < len(result.times))
             spent = float(result.times[off[-1] + 1]) if arrived and len(off) else 0.0 if arrived else math.nan

@@ -93,8 +93,10 @@ static int tracker_seen_from(const tracker *t, double when, tracker_real pose[3]
     D[0][11] -= s;
     D[1][10] += s;
     D[1][11] += c;
+    D[2][12] += 1;
     pose[0] += marker_x;
     pose[1] += marker_y;
+    pose[2] += t->state[12];
     return 1;
 }
 
@@ -105,13 +107,13 @@ static void tracker_difference(const tracker_real pose[3], const tracker_real ex
     left[2] -= 2 * TRACKER_PI * TRACKER_FLOOR((left[2] + TRACKER_PI) / (2 * TRACKER_PI));
 }
 
-/* Puts the robot at another pose, known like a measured one; what was learned stays. */
+/* Puts the robot at another pose, known like one of the marker; what was learned stays. */
 static void tracker_relocate(tracker *t, const tracker_real pose[3])
 {
     for (int i = 0; i < 3; i++) {
         t->state[i] = pose[i];
         for (int j = 0; j < TRACKER_STATES; j++) t->covariance[i][j] = t->covariance[j][i] = 0;
-        t->covariance[i][i] = t->noise[i];
+        t->covariance[i][i] = t->noise[i] + t->covariance[10 + i][10 + i];
     }
 }
 

@@ -48,7 +48,7 @@ typedef struct { /* the second pose: where the robot is if it has been moved */
 } tracker_moved_robot;
 
 typedef struct {
-    /* pose at the last flip; yaw rates, surge, sway, lag angle, current, place of the marker */
+    /* pose at the last flip; yaw rates, surge, sway, lag angle, current, place and angle of the marker */
     tracker_real state[TRACKER_STATES];
     tracker_real covariance[TRACKER_STATES][TRACKER_STATES];
     tracker_real noise[3], score;

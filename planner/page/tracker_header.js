@@ -11,13 +11,14 @@ import { zigzagSpeed } from "./zigzag.js";
 
 const A_LINE = 12; // numbers of a table
 const LARGEST = 32_767;
-const STATES = 12;
+const STATES = 13;
 const START = [0.02, 0.02, 0.03]; // standard deviations of the first pose [l, rad]
 const PRIOR = [0.03, 0.03, 0.03, 0.03]; // of yaw rates, surge and sway, beside the plan's own
-const MARKER = [0.05, 0.05]; // of the marker's place [l]
+const MARKER = [0.05, 0.05, 0.2]; // of the marker's place [l] and angle [rad]
 const MOST = [0.5, 0.5, 0.5, 0.5, 0.3]; // bounds of the learned yaw rates, surge, sway, lag angle
+const CURRENT = 0.07; // standard deviation of a current beside the plan's, in net speeds
 const MOST_CURRENT = 0.5; // of the net speed
-const MOST_MARKER = 0.5; // l
+const MOST_MARKER = [0.5, 0.5, 1]; // l, rad
 const NEAR = 0.5; // of the pivot's turn radius: the distance within which the guidance steers back
 const ERRORS = 4; // or of the largest predicted error
 const STRIDE = 0.5; // between two targets of a way back, in radii
@@ -77,7 +78,7 @@ function tables(plan) {
     start: row(switches.poses[0]),
     twist: `{${vehicle.twist.map(row).join(", ")}}`,
     current: row(vehicle.current),
-    most: row([...MOST, current, current, MOST_MARKER, MOST_MARKER]),
+    most: row([...MOST, current, current, ...MOST_MARKER]),
     lag_unit: row(unit),
     prior: table(prior(plan).flat(), repr),
     path_x: table(q.map(([x]) => x), nine),
@@ -102,7 +103,7 @@ function inUnits(lags, unit) {
 }
 
 /* The covariance before the first pose, from what is uncertain of the start and the plan. prior */
-function prior({ tracked: { vehicle }, guidance: { dwell } }) {
+function prior({ tracked: { vehicle }, straight, guidance: { dwell } }) {
   const squares = (sigmas) => sigmas.map((sigma) => sigma * sigma), { twist } = vehicle;
   const variances = [...squares(START), ...squares(PRIOR), 1e-6, 1e-12, 1e-12, ...squares(MARKER)];
   const covariance = variances.map((variance, i) => variances.map((_, j) => (i === j ? variance : 0)));
@@ -120,7 +121,7 @@ function prior({ tracked: { vehicle }, guidance: { dwell } }) {
       for (let j = 0; j < STATES; j++) covariance[i][j] += direction[i] * direction[j];
     }
   }
-  for (const i of [8, 9]) covariance[i][i] += (0.05 * speed) ** 2 / 4;
+  for (const i of [8, 9]) covariance[i][i] += (CURRENT * zigzagSpeed(straight)) ** 2;
   return covariance;
 }
 

@@ -203,18 +203,16 @@ class Plan:
         """
         if laps != 1 and (self.lap is None or laps < 1):
             raise InputError(f"{laps} laps of a schedule that is carried out once; plan it with --loop, loop=True")
-        swims = robot or self.robot
-        time, length = self.robot.time_scale / swims.time_scale, self.robot.tail_length / swims.tail_length
-        x, y, heading = self.start
-        start = (x * length, y * length, heading)
-        return Schedule(
-            swims.group_values(),
+        planned = self.robot
+        schedule = Schedule(
+            planned.group_values(),
             self.first_direction,
-            np.tile(self.dwells, laps) * time,
-            start,
-            swims.time_scale,
-            swims.tail_length,
+            np.tile(self.dwells, laps),
+            self.start,
+            planned.time_scale,
+            planned.tail_length,
         )
+        return schedule if robot is None else schedule.swum_by(robot)
 
     def __repr__(self) -> str:
         robot, (x, y, heading) = self.robot, self.start

@@ -1,4 +1,4 @@
-"""Kalman filter of the tracker: twelve numbers of the robot and their covariance, estimated from poses.
+"""Kalman filter of the tracker: thirteen numbers of the robot and their covariance, estimated from poses.
 
     x, y, heading    of the head's centre at the last flip
     yaw rates        relative errors of the plan's, left and right
@@ -6,6 +6,7 @@
     lag angle        error of the angle that a flip adds to the heading
     current x, y     beside the plan's
     marker x, y      its place in the robot, forward and left of the head's centre: poses are those of the marker
+    marker angle     by which it is turned on the robot, to the left: headings are those of the marker
 
 A dwell moves the pose by lag and arc of the robot as estimated so far. The estimates follow a random walk, a small
 step in each dwell, so that changes are tracked. All derivatives are exact, and only arithmetic, sin, cos and sqrt
@@ -29,15 +30,16 @@ from planner.vehicle.vehicle import interpolated
 POSE = tuple[float, float, float]
 ROWS = list[list[float]]
 NAMES = ("x", "y", "heading", "yaw rate, left", "yaw rate, right", "surge", "sway", "lag angle",
-         "current x", "current y", "marker, forward", "marker, left")  # fmt: skip
+         "current x", "current y", "marker, forward", "marker, left", "marker, angle")  # fmt: skip
 STATES = len(NAMES)
 PRIOR = (0.03, 0.03, 0.03, 0.03)  # standard deviations beside the plan's own: yaw rates, surge, sway
 CHANGES = (1.5e-3, 1.5e-3, 5e-4, 5e-4)  # their process noise, standard deviation per dwell
 WALK = 3e-4  # process noise of the pose per dwell [l, rad]
 MOST = (0.5, 0.5, 0.5, 0.5, 0.3)  # bounds of the estimated yaw rates, surge, sway, lag angle
+CURRENT = 0.07  # standard deviation of a current beside the plan's, in net speeds
 MOST_CURRENT = 0.5  # of the net speed
-MARKER = (0.05, 0.05)  # standard deviations of the marker's place before the first pose [l]
-MOST_MARKER = 0.5  # l
+MARKER = (0.05, 0.05, 0.2)  # standard deviations of the marker's place [l] and angle [rad] before the first pose
+MOST_MARKER = (0.5, 0.5, 1.0)
 
 
 class Dwell(NamedTuple):
@@ -50,7 +52,7 @@ class Dwell(NamedTuple):
 
 
 class Estimate:
-    """State (12,) and covariance (12, 12) at the last flip.
+    """State (13,) and covariance (13, 13) at the last flip.
 
     Args:
         plan: gives the robot and where it starts.
@@ -92,7 +94,7 @@ class Estimate:
             self.state[i] += change.move[i]
 
     def seen_from(self, when: float, now: Dwell, past: Sequence[Dwell]) -> tuple[POSE, ROWS] | None:
-        """Predict what is seen at `when`, and its derivatives (3, 12) in the state; None if it is too long ago.
+        """Predict what is seen at `when`, and its derivatives (3, 13) in the state; None if it is too long ago.
 
         Args: as for `pose_at`.
         """
@@ -100,16 +102,17 @@ class Estimate:
         if prediction is None:
             return None
         (x, y, heading), D = prediction
-        c, s, (forward, left) = math.cos(heading), math.sin(heading), self.state[10:]
+        c, s, (forward, left, angle) = math.cos(heading), math.sin(heading), self.state[10:]
         marker_x, marker_y = c * forward - s * left, s * forward + c * left
         for k in range(STATES):
             D[0][k], D[1][k] = D[0][k] - marker_y * D[2][k], D[1][k] + marker_x * D[2][k]
         D[0][10], D[0][11] = D[0][10] + c, D[0][11] - s
         D[1][10], D[1][11] = D[1][10] + s, D[1][11] + c
-        return (x + marker_x, y + marker_y, heading), D
+        D[2][12] += 1
+        return (x + marker_x, y + marker_y, heading + angle), D
 
     def pose_at(self, when: float, now: Dwell, past: Sequence[Dwell]) -> tuple[POSE, ROWS] | None:
-        """Predict the pose at `when`, and its derivatives (3, 12) in the state; None if it is too long ago.
+        """Predict the pose at `when`, and its derivatives (3, 13) in the state; None if it is too long ago.
 
         Args:
             when: the time.
@@ -151,7 +154,7 @@ class Estimate:
         """Compute the standard deviation of a point in a direction.
 
         Args:
-            D: derivatives (3, 12) of the pose.
+            D: derivatives (3, 13) of the pose.
             direction: in the lab [rad].
             lever: what a turn of the robot by one rad moves the point in this direction.
         """
@@ -165,19 +168,19 @@ class Estimate:
         return pose[0] + x, pose[1] + y, pose[2] + turned
 
     def relocate(self, pose: POSE) -> None:
-        """Put the robot at another pose, known like a measured one; what was learned stays."""
+        """Put the robot at another pose, known like one of the marker; what was learned stays."""
         self.state[:3] = pose
         for i in range(3):
             for j in range(STATES):
                 self.covariance[i][j] = self.covariance[j][i] = 0.0
-            self.covariance[i][i] = self.noise[i]
+            self.covariance[i][i] = self.noise[i] + self.covariance[10 + i][10 + i]
 
     def update(self, residual: POSE, H: ROWS, largest: float) -> float:
         """Update the state with a measured pose, unless its squared residual exceeds `largest`.
 
         Args:
             residual: measured pose less the expected one.
-            H: derivatives (3, 12) of the expected pose.
+            H: derivatives (3, 13) of the expected pose.
             largest: squared size above which the pose is rejected.
 
         Returns:
@@ -245,7 +248,7 @@ class Estimate:
 
 
 class _Change(NamedTuple):
-    """What is added to a pose; its derivatives in the heading before (x, y), and in the state (3, 12)."""
+    """What is added to a pose; its derivatives in the heading before (x, y), and in the state (3, 13)."""
 
     move: POSE
     lever: tuple[float, float]
@@ -253,7 +256,7 @@ class _Change(NamedTuple):
 
 
 def prior(plan: Plan) -> ROWS:
-    """Compute the covariance (12, 12) before the first pose, from what is uncertain of the start and the plan."""
+    """Compute the covariance (13, 13) before the first pose, from what is uncertain of the start and the plan."""
     vehicle = plan.tracked.vehicle
     P = np.diag([0.02**2, 0.02**2, 0.03**2, *(s**2 for s in PRIOR), 1e-6, 1e-12, 1e-12,
                  *(s**2 for s in MARKER)])  # fmt: skip
@@ -269,15 +272,15 @@ def prior(plan: Plan) -> ROWS:
             direction[7] = interpolated(mode.lag[0], dwell, dwell)[2]
         direction[8:10] = mode.current
         P += np.outer(direction, direction)
-    P[8, 8] += (0.05 * speed) ** 2 / 4
-    P[9, 9] += (0.05 * speed) ** 2 / 4
+    P[8, 8] += (CURRENT * plan.straight.net_speed) ** 2
+    P[9, 9] += (CURRENT * plan.straight.net_speed) ** 2
     return [[float(value) for value in row] for row in P]
 
 
 def most(plan: Plan) -> tuple[float, ...]:
-    """Return the largest absolute values (9,) of the learned numbers."""
+    """Return the largest absolute values (10,) of the learned numbers."""
     current = MOST_CURRENT * plan.straight.net_speed
-    return *MOST, current, current, MOST_MARKER, MOST_MARKER
+    return *MOST, current, current, *MOST_MARKER
 
 
 def difference(pose: POSE, expected: POSE) -> POSE:

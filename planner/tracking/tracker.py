@@ -6,7 +6,7 @@
 
 Every call returns the direction of the motor and the time of the next flip. At most one flip can have happened
 since the last call: the one that was announced. A call at its time or later, also one with a pose, counts as this
-flip, so the motor must turn in the returned direction. The tracker estimates twelve numbers of the robot
+flip, so the motor must turn in the returned direction. The tracker estimates thirteen numbers of the robot
 (`planner.tracking.kalman_filter`). A pose may be late: it is compared with the predicted pose at its own time.
 Implausible poses, values that are not finite, and times that cannot be (`planner.tracking.clock`) are ignored.
 Long gaps between poses only increase the error. Implausible poses that agree with each other are those of a robot
@@ -99,6 +99,7 @@ class Tracker:
         start: POSE | None = None,
     ):
         self.shortest = plan.minimum_dwell
+        self.start = plan.start if start is None else start
         self._plan = plan
         self._law = TrackerGuidance(plan)
         self._estimate = Estimate(plan, self._law, noise, start)
@@ -165,11 +166,14 @@ class Tracker:
             motor = f"motor {command.direction:+d} until {flip} ({command.flip_at:.4g} time units)"
         x, y, heading = self.pose
         cm = 100 * robot.tail_length
+        forward, left, angle = self._estimate.state[10:]
         return "\n".join(
             [
                 f"Tracker of {robot.name!r} at {when} ({self._now:.4g} time units): {motor}",
                 f"  estimated pose: x = {x * cm:.4g} cm, y = {y * cm:.4g} cm, heading "
                 f"{heading_in_degrees(heading)}; within {in_lab(command.error, robot)} of the path (95 %)",
+                f"  estimated marker: {forward * cm:.2g} cm forward and {left * cm:.2g} cm left of the "
+                f"head's centre, turned by {math.degrees(angle):.2g} degrees",
                 f"  alarm: {'calibrate again, the robot is not as the model says' if command.alarm else 'none'}",
             ]
         )
@@ -190,6 +194,11 @@ class Tracker:
         ax.plot(cm * x, cm * y, "^", color="black", label="estimated")
         ax.plot([cm * x, cm * ahead[0]], [cm * y, cm * ahead[1]], color="black", lw=1)
         return ax
+
+    @property
+    def plan(self) -> Plan:
+        """The plan that is followed."""
+        return self._plan
 
     @property
     def pose(self) -> POSE:

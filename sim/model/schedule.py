@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,11 @@ from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.model.plan_file import read_plan_file
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sim.model.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -57,6 +63,34 @@ class Schedule:
             raise InputError(f"time_scale_s = {self.time_scale}; it must be a finite number above 0")
         if self.tail_length is not None and not (np.isfinite(self.tail_length) and self.tail_length > 0):
             raise InputError(f"tail_length_m = {self.tail_length}; it must be a finite number above 0")
+
+    def swum_by(self, robot: Robot) -> Schedule:
+        """Return the schedule as another robot carries it out, in its units: seconds and metres stay.
+
+        Raises:
+            InputError: the schedule has no tail length.
+        """
+        if self.tail_length is None:
+            raise InputError("the schedule has no tail length that another robot could use; plan it again")
+        time, length = self.time_scale / robot.time_scale, self.tail_length / robot.tail_length
+        x, y, heading = self.start
+        return Schedule(
+            robot.group_values(),
+            self.first_direction,
+            self.dwells * time,
+            (x * length, y * length, heading),
+            robot.time_scale,
+            robot.tail_length,
+        )
+
+    def in_own_units(self, track: pd.DataFrame) -> pd.DataFrame:
+        """Return the track of a robot that has carried it out with times and lengths in this schedule's units."""
+        if self.tail_length is None:
+            return track
+        cm = 100 * self.tail_length
+        return track.assign(
+            time_bar=track["time_s"] / self.time_scale, x_over_l=track["x_cm"] / cm, y_over_l=track["y_cm"] / cm
+        )
 
 
 @checks_keywords()

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from planner.planning.camera import Camera
 from planner.planning.line_of_sight import Guidance
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle
 from sim.arrays import Floats
 from sim.mechanics import planar
 
+PROMPT = Camera(delay_s=0.0, lost=0.0)
+FINE = replace(PROMPT, noise=(0.005, 0.005))
 ERRORS = (0.001, 0.003, 0.003)  # relative, of v_z, v_x and ω_yr
 
 
@@ -55,3 +60,7 @@ def _modes(twist: Floats, errors: float) -> tuple[Mode, ...]:
         size[:, i] = errors * share * twist[:, i]
         modes.append(Mode(str(i), size))
     return tuple(modes)
+
+
+def root_mean_square(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -21,13 +21,14 @@ from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
+from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.tracked_point import tracked_vehicle
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker
-from tests.planner.swimming import Camera, rms, swim
+from tests.planner.vehicles import PROMPT
 
 ROBOT = PRESETS["paper-control"]
 CORNER = [[0.0, 0.0], [3.0, 0.0], [3.0, 3.0]]
@@ -112,7 +113,7 @@ def test_a_file_from_before_is_computed_again(name: str) -> None:
     result, same = made(name), restore_plan(old)
     heading = same.declared.reference.heading
     assert heading == pytest.approx(result.declared.reference.heading, abs=1e-3)
-    far, near = (rms(swim(Tracker(each), result, result.tracked.vehicle, Camera())[0]) for each in (same, result))
+    far, near = (swim(Tracker(each), result, result.tracked.vehicle, PROMPT).rms() for each in (same, result))
     assert far < 1.1 * near + 0.002
 
 

@@ -18,12 +18,13 @@ from planner.paths.path import Path2D, circle
 from planner.planning.plan import make_plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
+from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from sim.io.errors import InputError, run_command
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay
-from tests.planner.swimming import Camera, swum
+from tests.planner.vehicles import FINE
 
 CONTROL = PRESETS["paper-control"]
 BENT = Path2D.of([[0.0, 0.0], [2.0, 0.0], [3.5, 1.5]])
@@ -105,7 +106,7 @@ def test_the_simulator_follows_swings(waiting: Plan) -> None:
 
 def test_a_tracked_robot_swims_the_circles_and_arrives(waiting: Plan, tracked: TrackedVehicle) -> None:
     car = replace(tracked.vehicle, twist=tracked.vehicle.twist * np.array([1.02, 1.0, 1.02]))
-    result = swum(Tracker(waiting), waiting, car, Camera((0.005, 0.005)))
+    result = swim(Tracker(waiting), waiting, car, FINE)
     assert result.finished
     assert result.distance.max() < 0.2
     assert result.times[-1] == pytest.approx(waiting.duration, rel=0.03)  # a robot that is 2 % faster

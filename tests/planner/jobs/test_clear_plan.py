@@ -18,12 +18,13 @@ from planner.planning.declared_path import TIGHTEST
 from planner.planning.plan import make_plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
+from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from sim.io.errors import InputError, run_command
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay
-from tests.planner.swimming import Camera, swim
+from tests.planner.vehicles import FINE
 
 CONTROL = PRESETS["paper-control"]
 LINE = Path2D.of([[0, 0], [8, 0]])
@@ -99,7 +100,7 @@ def test_a_tracked_robot_with_wrong_coefficients_stays_clear(tracked: TrackedVeh
     result = plan_clear(LINE, tracked, PlanRequest(), FreeSpace.of([Circle(4, 0.2, 0.5)]))
     assert result.kept_clear is not None
     twist = tracked.vehicle.twist * np.array([1.02, 1.0, 1.02])
-    distances, _ = swim(Tracker(result), result, replace(tracked.vehicle, twist=twist), Camera((0.005, 0.005)))
+    distances = swim(Tracker(result), result, replace(tracked.vehicle, twist=twist), FINE).distance
     assert distances.max() < result.kept_clear.margin
 
 

@@ -14,12 +14,13 @@ from planner.jobs.region import Field, share_covered
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.planning.declared_path import TIGHTEST
 from planner.planning.request import PlanRequest
+from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from sim.io.errors import InputError, run_command
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay
-from tests.planner.swimming import Camera, swim
+from tests.planner.vehicles import FINE
 
 CONTROL = PRESETS["paper-control"]
 FIELD = Field(Polygon.of([[0, 0], [3, 0], [3, 1.5], [0, 1.5]]))
@@ -82,7 +83,7 @@ def test_the_simulator_covers_the_same(tracked: TrackedVehicle) -> None:
 def test_a_tracked_robot_with_wrong_coefficients_stays_on_its_lanes(tracked: TrackedVehicle) -> None:
     swept = cover(Field(Polygon.of([[0, 0], [2, 0], [2, 0.8], [0, 0.8]])), 0.5, tracked, PlanRequest())
     car = replace(tracked.vehicle, twist=tracked.vehicle.twist * np.array([1.02, 1.0, 1.02]))
-    distances, _ = swim(Tracker(swept.plan), swept.plan, car, Camera((0.005, 0.005)))
+    distances = swim(Tracker(swept.plan), swept.plan, car, FINE).distance
     assert distances.max() < 0.08
 
 

@@ -17,6 +17,7 @@ from planner.paths.path import Path2D
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
+from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.rollout import Switches, poses_at_flips
 from planner.vehicle.tracked_point import tracked_vehicle
@@ -24,7 +25,7 @@ from planner.vehicle.vehicle import Vehicle
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay
-from tests.planner.swimming import Camera, swum
+from tests.planner.vehicles import FINE
 
 CONTROL = PRESETS["paper-control"]
 TAIL = CONTROL.tail_length
@@ -211,8 +212,8 @@ def test_robots_under_trackers_keep_apart() -> None:
             vehicle = made.tracked.vehicle
             robot = drawn(vehicle, 0.7 * rng.normal(size=len(vehicle.modes)))
             robot = replace(robot, current=np.array([2e-5, -2e-5]))
-            camera = Camera((0.005, 0.005), rng=rng)
-            tracks.append(swum(Tracker(made, noise=(0.005, 0.005)), made, robot, camera))
+            camera = replace(FINE, seed=rng)
+            tracks.append(swim(Tracker(made, noise=(0.005, 0.005)), made, robot, camera))
         scale = CONTROL.time_scale
         times = np.arange(0.0, result.duration_s, 1.0)
         poses = [

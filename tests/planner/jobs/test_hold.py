@@ -14,6 +14,7 @@ from planner.jobs.hold import hold
 from planner.jobs.hold_plan import HoldPlan
 from planner.paths.obstacles import Circle, FreeSpace
 from planner.planning.request import PlanRequest
+from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Vehicle
@@ -24,7 +25,7 @@ from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
 from tests.planner.jobs.test_laps import UntilTold
-from tests.planner.swimming import Camera, swum
+from tests.planner.vehicles import FINE
 
 CONTROL = PRESETS["paper-control"]
 PLACE = (2.0, 1.0)
@@ -93,7 +94,7 @@ def test_a_tracked_robot_stays(held: HoldPlan, tracked: TrackedVehicle, current:
         current=np.array([current, 0.0]),
     )
     plan = held.plan
-    result = swum(UntilTold(Tracker(plan), 5.5 * plan.duration), plan, car, Camera((0.005, 0.005)))
+    result = swim(UntilTold(Tracker(plan), 5.5 * plan.duration), plan, car, FINE, longest=8)
     settled = result.times > plan.duration
     away = np.hypot(*(result.poses[settled, :2] - PLACE).T)
     assert result.finished

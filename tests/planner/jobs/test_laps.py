@@ -18,6 +18,7 @@ from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.guidance import TrackerGuidance
 from planner.tracking.pipe import answers
+from planner.tracking.swim import swim
 from planner.tracking.tracker import POSE, Command, Tracker
 from planner.vehicle.rollout import Switches, poses_at_flips
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
@@ -25,7 +26,7 @@ from sim.io.errors import InputError, run_command
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay
 from tests.planner.compiled import CompiledTracker
-from tests.planner.swimming import Camera, swum
+from tests.planner.vehicles import FINE
 
 CONTROL = PRESETS["paper-control"]
 FEW = PlanRequest(dwell=2.03)  # no flip is at the time of a picture
@@ -115,7 +116,7 @@ def test_a_tracked_robot_goes_around_until_it_is_told(laps: Plan, tracked: Track
         current=np.array([current, 0.0]),
     )
     tracker = UntilTold(Tracker(laps), 3.4 * laps.duration)
-    result = swum(tracker, laps, car, Camera((0.005, 0.005)))
+    result = swim(tracker, laps, car, FINE, longest=8)
     assert result.finished
     assert 3.8 < result.times[-1] / laps.duration < 4.2
     assert result.distance.max() < 0.15
@@ -127,7 +128,7 @@ def test_a_tracked_robot_goes_around_until_it_is_told(laps: Plan, tracked: Track
 def test_a_robot_that_was_moved_comes_back_in_any_lap(laps: Plan) -> None:
     start = (0.5, -2.0, 2.0)
     tracker = UntilTold(Tracker(laps, start=start), 2.5 * laps.duration)
-    result = swum(tracker, laps, laps.tracked.vehicle, Camera((0.005, 0.005)), start=start)
+    result = swim(tracker, laps, laps.tracked.vehicle, FINE, start=start, longest=8)
     assert result.finished
     assert result.distance[result.times > laps.duration].max() < 2 * laps.predicted_max
 

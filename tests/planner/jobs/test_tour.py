@@ -16,6 +16,7 @@ from planner.paths.distance import distance_to
 from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.tractrix import STILL
 from planner.planning.request import PlanRequest
+from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.dwell_choice import dwells_for
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
@@ -23,7 +24,7 @@ from planner.vehicle.zigzag import zigzag
 from sim.io.errors import InputError, run_command
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay
-from tests.planner.swimming import Camera, swim
+from tests.planner.vehicles import FINE
 
 CONTROL = PRESETS["paper-control"]
 PLACES = [(0.0, 0.0), (4.0, 0.0), (2.0, 1.0), (3.0, 3.0), (-1.0, 2.0)]
@@ -107,7 +108,7 @@ def test_a_tracked_robot_with_wrong_coefficients_visits_all(tracked: TrackedVehi
     result = tour(PLACES[:3], tracked, PlanRequest())
     twist = tracked.vehicle.twist * np.array([1.02, 1.0, 1.02])
     car = replace(tracked.vehicle, twist=twist)
-    distances, _ = swim(Tracker(result.plan), result.plan, car, Camera((0.005, 0.005)))
+    distances = swim(Tracker(result.plan), result.plan, car, FINE).distance
     assert distances.max() < 0.08
 
 

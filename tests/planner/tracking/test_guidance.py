@@ -14,13 +14,14 @@ from planner.paths.path import Path2D
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from planner.tracking.guidance import LearnedDrift, TrackerGuidance
+from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.dwell_choice import Objective
 from planner.vehicle.vehicle import Vehicle
 from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker
-from tests.planner.swimming import Camera, rms, swim, swum
+from tests.planner.vehicles import PROMPT, root_mean_square
 
 ROBOT = PRESETS["paper-control"]
 CURRENT = (0.0, 0.0015)  # l per time unit, a tenth of the net speed
@@ -37,12 +38,12 @@ def eight(current: tuple[float, float] = (0.0, 0.0)) -> Plan:
 def test_a_learned_current_is_used() -> None:
     """It was learned to 1 %, yet the error stayed at three times that of a plan that knows it."""
     truth = replace(eight().tracked.vehicle, current=np.array(CURRENT))
-    learning, _ = swim(Tracker(eight()), eight(), truth, Camera())
-    knowing, _ = swim(Tracker(eight(CURRENT)), eight(CURRENT), truth, Camera())
+    learning = swim(Tracker(eight()), eight(), truth, PROMPT).distance
+    knowing = swim(Tracker(eight(CURRENT)), eight(CURRENT), truth, PROMPT).distance
     half = len(learning) // 2
-    assert rms(knowing) < 0.015
-    assert rms(learning[half:]) < 1.2 * rms(knowing)
-    assert rms(learning) < 1.5 * rms(knowing)
+    assert root_mean_square(knowing) < 0.015
+    assert root_mean_square(learning[half:]) < 1.2 * root_mean_square(knowing)
+    assert root_mean_square(learning) < 1.5 * root_mean_square(knowing)
 
 
 def test_a_drift_that_the_plan_knows_does_not_turn_the_reference() -> None:
@@ -80,8 +81,8 @@ def test_the_robot_is_as_near_to_its_path_as_the_tracker_says(current: float) ->
     """It was in 73 % of the time; in a current of a tenth of the net speed in half of it."""
     rng, within = np.random.default_rng(3), []
     for seed in range(3):
-        camera = Camera(rng=np.random.default_rng(seed))
-        result = swum(Tracker(eight()), eight(), drawn(eight(), rng, current), camera)
+        camera = replace(PROMPT, seed=seed)
+        result = swim(Tracker(eight()), eight(), drawn(eight(), rng, current), camera)
         within.append(result.distance <= result.errors)
     assert 0.9 < np.concatenate(within).mean() < 0.98
 
@@ -95,6 +96,6 @@ def test_the_same_where_the_swings_are_large(robot: str, objective: Objective, t
     tracker = CompiledTracker(planned, tmp_path)
     for current in (0.0, 0.001) * 4:
         tracker.restart()
-        result = swum(tracker, planned, drawn(planned, rng, current), Camera(rng=rng))
+        result = swim(tracker, planned, drawn(planned, rng, current), replace(PROMPT, seed=rng))
         within.append(result.distance <= result.errors)
     assert 0.9 < np.concatenate(within).mean() < 0.98

@@ -15,7 +15,7 @@ from planner.tracking.kalman_filter import MOST, STATES, Dwell, Estimate
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
 
-STATE = [0.3, -0.2, 1.1, 0.03, -0.02, 0.04, -0.05, 0.003, 2e-4, -1e-4, 0.02, -0.03]
+STATE = [0.3, -0.2, 1.1, 0.03, -0.02, 0.04, -0.05, 0.003, 2e-4, -1e-4, 0.02, -0.03, 0.2]
 PAST = [Dwell(0.0, 1, None, 0.9), Dwell(0.9, -1, 0.9, 0.8), Dwell(1.7, 1, 0.8, 1.1)]
 NOW = Dwell(2.8, -1, 1.1, 0.0)
 
@@ -74,7 +74,7 @@ def test_counting_back_and_going_forward_end_at_the_same_pose(estimate: Estimate
     def drift(time: float) -> np.ndarray:
         return np.append(state[8:10] * time, 0.0)  # the current moves the robot in the lab
 
-    marker = planar.inverse(np.append(state[10:], 0.0))  # from the marker to the head's centre
+    marker = planar.inverse(state[10:])  # from the marker to the head's centre
     pose = planar.compose(
         planar.compose(np.array(expected[0]), marker) - drift(0.2), planar.inverse(change(PAST[0], 0.2))
     )

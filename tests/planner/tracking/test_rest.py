@@ -15,13 +15,14 @@ from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.rest import Rest, rest_of
+from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.rollout import predicted_poses
 from planner.vehicle.tracked_point import tracked_vehicle
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay
-from tests.planner.swimming import Camera, rms, swim
+from tests.planner.vehicles import PROMPT, root_mean_square
 
 ROBOT = PRESETS["paper-control"]
 ROCK = FreeSpace((Circle(3.0, 0.2, 0.5),))
@@ -91,8 +92,8 @@ def test_the_rest_in_the_simulator_ends_where_the_path_ends() -> None:
 
 def test_the_rest_is_tracked_like_any_plan() -> None:
     after = rest("square", 0.5, -2.0, 1.0, 3.0).plan
-    distance, _ = swim(Tracker(after), after, after.tracked.vehicle, Camera())
-    assert rms(distance) < 0.03
+    distance = swim(Tracker(after), after, after.tracked.vehicle, PROMPT).distance
+    assert root_mean_square(distance) < 0.03
 
 
 @pytest.mark.parametrize("moved", [(), (-0.3, 0.6, 0.5)])

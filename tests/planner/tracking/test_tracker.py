@@ -14,13 +14,15 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from planner.paths.path import circle, polygon
+from planner.planning.camera import POSE, Camera
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from planner.tracking import tracker
+from planner.tracking.swim import swim
 from planner.tracking.tracker import Command, Tracker
 from planner.vehicle.vehicle import Vehicle
 from sim.model.presets import PRESETS
-from tests.planner.swimming import Camera, rms, swim
+from tests.planner.vehicles import PROMPT, root_mean_square
 
 
 @cache
@@ -48,51 +50,65 @@ FURTHER = ("5 % faster turns", "3 % asymmetry")
     "name", [pytest.param(name, marks=pytest.mark.long) if name in FURTHER else name for name in ROBOTS]
 )
 def test_robots_that_differ_stay_on_the_path(name: str) -> None:
-    cameras = [Camera(rng=np.random.default_rng(seed)) for seed in range(3)]
+    cameras = [replace(PROMPT, seed=seed) for seed in range(3)]
     swims = [swim(Tracker(planned()), planned(), ROBOTS[name], camera) for camera in cameras]
-    assert np.mean([rms(distance) for distance, _ in swims]) < 0.026
-    for _, dwells in swims:
-        assert min(dwells[:-1]) >= planned().minimum_dwell * (1 - 1e-9)
+    assert np.mean([each.rms() for each in swims]) < 0.026
+    for each in swims:
+        assert min(each.dwells[:-1]) >= planned().minimum_dwell * (1 - 1e-9)
 
 
 @pytest.mark.parametrize(
     "camera",
-    [Camera(delay=2.0), Camera(gaps=0.2), Camera(wrong=0.1), Camera(every=0.3, delay=1.0, gaps=0.5, wrong=0.05)],
+    [
+        replace(PROMPT, delay_s=2.0),
+        replace(PROMPT, lost=0.2),
+        replace(PROMPT, wrong=0.1),
+        replace(PROMPT, every_s=0.3, delay_s=1.0, lost=0.5, wrong=0.05),
+    ],
     ids=["late", "gaps", "wrong", "all"],
 )
 def test_bad_cameras_do_little_harm(camera: Camera) -> None:
-    distance, _ = swim(Tracker(planned()), planned(), ROBOTS["3 % asymmetry"], camera)
-    assert rms(distance) < 0.03
+    distance = swim(Tracker(planned()), planned(), ROBOTS["3 % asymmetry"], camera).distance
+    assert root_mean_square(distance) < 0.03
 
 
 def test_without_the_tracker_the_same_robot_is_lost() -> None:
     """The independent side of the tests above: what feedback is worth."""
-    distance, _ = swim(Tracker(planned()), planned(), ROBOTS["3 % asymmetry"], Camera(gaps=1.0))
-    assert rms(distance) > 0.2
+    distance = swim(Tracker(planned()), planned(), ROBOTS["3 % asymmetry"], replace(PROMPT, lost=1.0)).distance
+    assert root_mean_square(distance) > 0.2
 
 
 def test_an_effect_that_starts_halfway_is_learned() -> None:
     tracker = Tracker(planned())
-    distance, _ = swim(tracker, planned(), changed(), Camera(), changes_to=changed(left=1.06, right=0.94))
-    assert rms(distance) < 0.05
+    distance = swim(tracker, planned(), changed(), PROMPT, later=changed(left=1.06, right=0.94)).distance
+    assert root_mean_square(distance) < 0.05
     assert tracker.learned["yaw rate, left"] - tracker.learned["yaw rate, right"] > 0.03
 
 
 def test_it_learns_the_robot() -> None:
     tracker = Tracker(planned())
-    swim(tracker, planned(), changed(left=1.04, right=0.99, speed=0.97), Camera())
+    swim(tracker, planned(), changed(left=1.04, right=0.99, speed=0.97), PROMPT)
     # On a circle of many small swings the difference of the turns shows at once; their mean hardly does.
     assert tracker.learned["yaw rate, left"] - tracker.learned["yaw rate, right"] == pytest.approx(0.05, abs=0.02)
     assert tracker.learned["surge"] == pytest.approx(-0.03, abs=0.02)
 
 
-@pytest.mark.parametrize("marker", [(0.1, 0.0), (0.0, 0.1)], ids=["forward", "left"])
-def test_a_marker_off_centre_is_found(marker: tuple[float, float]) -> None:
-    """It doubled the error without an alarm."""
+MARKERS = {
+    "forward": (0.1, 0.0, 0.0),
+    "left": (0.0, 0.1, 0.0),
+    "askew": (0.0, 0.0, 0.35),
+    "all": (0.05, -0.05, -0.2),
+}
+
+
+@pytest.mark.parametrize("marker", MARKERS.values(), ids=MARKERS)
+def test_a_marker_off_centre_or_askew_is_found(marker: POSE) -> None:
+    """A place doubled the error without an alarm; an angle of 5 degrees tripled it, with 20 the robot was lost."""
     tracker = Tracker(planned())
-    distance, _ = swim(tracker, planned(), changed(), Camera(marker=marker))
-    assert rms(distance) < 0.02
-    found = tracker.learned["marker, forward"], tracker.learned["marker, left"]
+    result = swim(tracker, planned(), changed(), replace(PROMPT, marker=marker))
+    assert result.rms() < 0.025
+    assert not result.alarms
+    found = [tracker.learned[f"marker, {name}"] for name in ("forward", "left", "angle")]
     assert found == pytest.approx(marker, abs=0.025)
 
 
@@ -113,15 +129,15 @@ def alarmed(car: Vehicle, camera: Camera) -> bool:
 
 
 def test_alarms_are_rare_for_a_robot_of_the_model_and_come_for_another() -> None:
-    cameras = [Camera(rng=np.random.default_rng(seed)) for seed in range(4)]
+    cameras = [replace(PROMPT, seed=seed) for seed in range(4)]
     assert sum(alarmed(changed(left=1.02), camera) for camera in cameras) == 0
     jerky = replace(changed(), lag=changed().lag + np.array([0.03, 0.0, 0.0]), twist=1.3 * changed().twist)
-    assert alarmed(jerky, Camera())
+    assert alarmed(jerky, PROMPT)
 
 
 def test_wrong_poses_are_no_alarm() -> None:
     """A camera that is wrong now and then says nothing of the robot. Two poses in 40 were enough for an alarm."""
-    assert not alarmed(changed(), Camera(wrong=0.1))
+    assert not alarmed(changed(), replace(PROMPT, wrong=0.1))
 
 
 def test_a_pose_at_the_time_of_a_flip_announces_the_next_flip() -> None:
@@ -132,8 +148,8 @@ def test_a_pose_at_the_time_of_a_flip_announces_the_next_flip() -> None:
     share = np.linspace(0, 1, 100)
     line = plan(np.stack([3 * share, 0 * share], 1), PRESETS["paper-control"], objective="flips")
     for seed in range(3):
-        camera = Camera(rng=np.random.default_rng(seed))
-        distance, _ = swim(Tracker(line), line, line.tracked.vehicle, camera)
+        camera = replace(PROMPT, seed=seed)
+        distance = swim(Tracker(line), line, line.tracked.vehicle, camera).distance
         assert distance.max() < line.predicted_max + 0.04
     tracker = Tracker(line)
     first = tracker.command

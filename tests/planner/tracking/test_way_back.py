@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -11,12 +12,14 @@ import pytest
 
 from planner.goal.dubins import shortest_paths
 from planner.paths.path import Path2D
+from planner.planning.camera import POSE, Camera
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
+from planner.tracking.swim import Swim, swim
 from planner.tracking.tracker import Tracker
 from planner.tracking.way_back import Segment, shortest_way
 from sim.model.presets import PRESETS
-from tests.planner.swimming import Camera, Swum, swum
+from tests.planner.vehicles import PROMPT
 
 ON_PATH = 0.08  # l
 
@@ -28,12 +31,12 @@ def eight() -> Plan:
     return plan(path, PRESETS["paper-control"], minimum_dwell=0.7)
 
 
-def swim_from(start: Any, camera: Camera, *, told: bool = False) -> Swum:
+def swim_from(start: Any, camera: Camera, *, told: bool = False) -> Swim:
     tracker = Tracker(eight(), start=start if told else None)
-    return swum(tracker, eight(), eight().tracked.vehicle, camera, start=start, most=2000)
+    return swim(tracker, eight(), eight().tracked.vehicle, camera, start=start, longest=10)
 
 
-def time_back(result: Swum) -> float:
+def time_back(result: Swim) -> float:
     """Return when the robot was on the path for good."""
     return float(result.times[np.flatnonzero(result.distance > ON_PATH)[-1] + 1])
 
@@ -55,7 +58,7 @@ def test_a_robot_beside_the_start_arrives(side: int) -> None:
     """From one side it never did."""
     x, y, heading = eight().start
     start = x - side * math.sin(heading), y + side * math.cos(heading), heading
-    result = swim_from(start, Camera(wrong=0.1))
+    result = swim_from(start, replace(PROMPT, wrong=0.1))
     assert result.finished
     assert result.distance[len(result.distance) // 2 :].max() < ON_PATH
 
@@ -66,7 +69,7 @@ def test_from_anywhere_it_is_back_in_little_more_than_the_least_time() -> None:
         r, angle = 5 * math.sqrt(rng.random()), rng.uniform(0, 2 * math.pi)
         x, y, _ = eight().start
         start = x + r * math.cos(angle), y + r * math.sin(angle), rng.uniform(-math.pi, math.pi)
-        result = swim_from(start, Camera(rng=np.random.default_rng(seed)), told=seed % 2 == 0)
+        result = swim_from(start, replace(PROMPT, seed=seed), told=seed % 2 == 0)
         assert result.finished
         assert result.distance[-1] < ON_PATH
         ratios.append(time_back(result) / best_time(start))
@@ -95,24 +98,29 @@ def test_the_way_leads_to_the_target_and_is_short() -> None:
     assert sum(segment.length for segment in way.segments) < 1.5 + math.pi * 0.4 + 0.5
 
 
-@cache
-def _other() -> Any:
-    """Poses of another robot on the same path, forty flips behind."""
-    times = np.concatenate([[0.0], np.cumsum(eight().dwells)])
-    return lambda time: eight().poses[max(int(np.searchsorted(times, time)) - 41, 0)]
+@dataclass(frozen=True)
+class Mistaken(Camera):
+    """It takes another robot, on the same path forty flips behind, for this one, at random or from a time on."""
+
+    share: float = 0.0
+    after: float = math.inf
+
+    def sees(self, pose: POSE, time: float, rng: np.random.Generator) -> POSE | None:
+        if rng.random() < self.share or time > self.after:
+            times = np.concatenate([[0.0], np.cumsum(eight().dwells)])
+            pose = tuple(eight().poses[max(int(np.searchsorted(times, time)) - 41, 0)].tolist())
+        return super().sees(pose, time, rng)
 
 
 def test_now_and_then_another_robot_does_no_harm() -> None:
-    rng = np.random.default_rng(5)
-    camera = Camera(other=_other(), swapped=lambda time: rng.random() < 0.1)
-    result = swim_from(eight().start, camera)
+    result = swim_from(eight().start, Mistaken(delay_s=0.0, lost=0.0, share=0.1, seed=5))
     assert result.finished
     assert result.distance.max() < ON_PATH
 
 
 def test_the_poses_of_another_robot_are_an_alarm_and_no_path() -> None:
     """The motor flips by the plan, and does not steer the other robot."""
-    result = swim_from(eight().start, Camera(other=_other(), swapped=lambda time: time > 200))
+    result = swim_from(eight().start, Mistaken(delay_s=0.0, lost=0.0, after=200.0))
     assert 200 < result.alarms[0] < 215
     straight = result.times < 230
     assert result.distance[straight].max() < ON_PATH

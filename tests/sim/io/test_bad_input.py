@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 from pathlib import Path
@@ -68,55 +67,6 @@ def test_the_command_itself_exits_with_2(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "none.csv" in done.stderr
     assert len(done.stderr.splitlines()) == 1
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("", "not a plan.json"),
-        ("{}", "no format"),
-        (
-            '{"format": 2, "robot": {"groups": {"omega_bar": 10}, "time_scale_s": 1}, "first_direction": 1}',
-            "no entry",
-        ),
-        ("not json", "not a plan.json"),
-    ],
-)
-def test_replay_refuses(text: str, expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from sim.__main__ import main
-
-    plan = tmp_path / "plan.json"
-    plan.write_text(text)
-    assert run_command(main, ["replay", str(plan), "--out", str(tmp_path / "t.csv")]) == 2
-    error = capsys.readouterr().err
-    assert expected in error
-    assert len(error.splitlines()) == 1
-    assert [p.name for p in tmp_path.iterdir()] == ["plan.json"]
-
-
-def test_replay_of_a_folder_is_told_the_file_in_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from sim.__main__ import main
-
-    (tmp_path / "plan.json").write_text("{}")
-    assert run_command(main, ["replay", str(tmp_path), "--out", str(tmp_path / "t.csv")]) == 2
-    (error,) = capsys.readouterr().err.splitlines()
-    assert error.endswith(f"is the folder of a plan; give {tmp_path / 'plan.json'}")
-
-
-def test_replay_shows_no_bar_without_a_terminal(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A replay of 700 dwells used to write 1,400 bars into a log."""
-    from sim.__main__ import main
-
-    robot = {"groups": PRESETS["paper-control"].group_values(), "time_scale_s": 2.0, "tail_length_m": 0.11}
-    start = {"x_over_l": 0.0, "y_over_l": 0.0, "heading_rad": 0.0}
-    content = {"format": 2, "robot": robot, "start": start, "first_direction": 1, "dwell_bar": [0.3, 0.3]}
-    (tmp_path / "plan.json").write_text(json.dumps(content))
-    monkeypatch.setattr("sim.__main__.BAR_AFTER", 0.0)
-    words = ["replay", str(tmp_path / "plan.json"), "--out", str(tmp_path / "t.csv"), "--no-error"]
-    assert run_command(main, words) == 0
-    assert "replay:" not in capsys.readouterr().err
 
 
 def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path) -> None:

@@ -1,0 +1,67 @@
+"""The camera whose poses a tracker gets. Lengths in l, angles in rad."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.io.errors import InputError
+from sim.mechanics import planar
+
+POSE = tuple[float, float, float]
+_ANYWHERE = (5.0, 5.0, 2.0)  # standard deviations of wrong poses
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera that measures the pose of a robot's marker at equal times.
+
+    Args:
+        noise: standard deviations of a pose: of x and y [l], of the heading [rad].
+        every_s: time between two poses [s].
+        delay_s: age of a pose when it comes in [s].
+        lost: share of the poses that never come in.
+        wrong: share of the others that lie anywhere.
+        marker: its place on the robot, forward and left of the head's centre [l], and its angle [rad].
+        seed: of the random numbers, or their generator.
+
+    Raises:
+        InputError: a number is not possible.
+
+    Example:
+        >>> from softflagella import Camera
+        >>> Camera(every_s=0.5, lost=0).noise
+        (0.01, 0.01)
+    """
+
+    noise: tuple[float, float] = (0.01, 0.01)
+    every_s: float = 1.0
+    delay_s: float = 2.0
+    lost: float = 0.2
+    wrong: float = 0.0
+    marker: POSE = (0.0, 0.0, 0.0)
+    seed: int | np.random.Generator = 0
+
+    def __post_init__(self) -> None:
+        for name, values, low, high, allowed in (
+            ("noise", self.noise, 0.0, math.inf, "numbers above 0"),
+            ("every_s", (self.every_s,), 0.0, math.inf, "a number above 0"),
+            ("delay_s", (self.delay_s,), -1e-300, math.inf, "0 or more"),
+            ("lost", (self.lost,), -1e-300, 1 + 1e-12, "0 to 1"),
+            ("wrong", (self.wrong,), -1e-300, 1 + 1e-12, "0 to 1"),
+        ):
+            if not all(low < value < high for value in values):
+                raise InputError(f"camera: {name} is {getattr(self, name)}; give {allowed}")
+
+    def sees(self, pose: POSE, time: float, rng: np.random.Generator) -> POSE | None:
+        """Return what is measured of a robot at `pose` at a time; None where the pose gets lost."""
+        if rng.random() < self.lost:
+            return None
+        if rng.random() < self.wrong:
+            x, y, heading = (rng.normal(size=3) * _ANYWHERE).tolist()
+        else:
+            noise = rng.normal(size=3) * [self.noise[0], self.noise[0], self.noise[1]]
+            x, y, heading = (planar.compose(np.array(pose), np.array(self.marker)) + noise).tolist()
+        return x, y, math.remainder(heading, 2 * math.pi)

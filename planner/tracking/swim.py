@@ -1,0 +1,240 @@
+"""A closed loop in simulation: a robot under a tracker's orders, and a camera that sees it.
+
+The robot is simulated in time steps, or moves as the planner's vehicle does, which takes a thousandth of the time.
+The camera looks at equal times (`planner.planning.camera`). Times in μ0 l⁴/EI and lengths in l are those of the
+plan's robot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from planner.paths.distance import distance_to
+from planner.planning.camera import POSE, Camera
+from planner.planning.planned import Plan
+from planner.tracking.tracker import Command
+from planner.vehicle.vehicle import Vehicle
+from sim.arrays import Floats
+from sim.io.errors import InputError
+from sim.io.units import column_units, format_length
+from sim.mechanics import planar
+from sim.model.robot import Robot
+from sim.motion.replay import run_at_rest
+from sim.motion.run import Run
+from sim.solve.march import YAW, X, Y
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SAME = 1e-5  # time units; a flip so soon after another event comes with it
+_STRIDE = 4  # time steps between two kept instants
+_SHARES = np.array([0.25, 0.5, 0.75, 1.0])  # of the time between two events: the kept instants of a vehicle
+
+
+class Pilot(Protocol):
+    """A `Tracker`, or what is fed like one."""
+
+    def update(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Command: ...
+
+
+@dataclass(frozen=True)
+class Swim:
+    """What a robot did under a tracker. K instants, M dwells.
+
+    Example:
+        >>> from softflagella import check, circle, plan, swim
+        >>> result = plan(circle(1.2), "paper-control", objective="flips")
+        >>> swum = swim(result)
+        >>> swum.finished, check(result, swum.to_frame()).rms < 0.1
+        (True, True)
+    """
+
+    plan: Plan
+    times: Floats  # (K,)
+    poses: Floats  # (K, 3) of the head's centre
+    direction: Floats  # (K,) of the motor
+    distance: Floats  # (K,) of the tracked point from the declared path
+    errors: Floats  # (K,) the bound on it that the tracker gave before
+    dwells: Floats  # (M,) as ordered
+    alarms: tuple[float, ...]  # when an alarm began
+    fed: int  # poses that came in
+    finished: bool
+
+    def weights(self, begin: float = 0.0, end: float = 1.0) -> Floats:
+        """Return the share (K,) of the time that each instant stands for, in a part of the whole time."""
+        share = self.times / self.times[-1]
+        weight = np.gradient(self.times) * ((share >= begin) & (share <= end))
+        return np.asarray(weight / weight.sum())
+
+    def rms(self, begin: float = 0.0, end: float = 1.0) -> float:
+        """Compute the root mean square distance over a part of the time."""
+        return float(np.sqrt((self.weights(begin, end) * self.distance**2).sum()))
+
+    def within(self, error: float | Floats) -> float:
+        """Compute the share of the time within a distance of the path, or within distances (K,)."""
+        return float(self.weights() @ (self.distance <= error))
+
+    def to_frame(self) -> pd.DataFrame:
+        """Tabulate the track of the head's centre as `softflagella.replay` does; K rows."""
+        import pandas as pd
+
+        robot, (x, y, heading) = self.plan.robot, self.poses.T
+        cm = 100 * robot.tail_length
+        columns = {
+            "time_s": self.times * robot.time_scale, "x_cm": x * cm, "y_cm": y * cm,
+            "heading_deg": np.degrees(heading), "time_bar": self.times, "x_over_l": x, "y_over_l": y,
+            "heading_rad": heading, "direction": self.direction.astype(int), "error_over_l": self.errors,
+        }  # fmt: skip
+        frame = pd.DataFrame(columns)
+        frame.attrs["units"] = column_units(frame)
+        return frame
+
+    def __repr__(self) -> str:
+        length = self.plan.robot.tail_length
+        rms, largest = format_length(self.rms() * length), format_length(float(self.distance.max()) * length)
+        feedback = self.plan.feedback_error
+        return (
+            f"Swim of {self.plan.robot.name!r} under a tracker: {len(self.dwells)} dwells, {rms} rms and "
+            f"{largest} at most from the declared path, {100 * self.within(feedback):.0f} % of the time within "
+            f"{format_length(feedback * length)}; {'finished' if self.finished else 'not finished'}, "
+            f"{len(self.alarms)} alarms"
+        )
+
+
+class _Swimmer:
+    """A robot in time steps, or a vehicle, from rest; it advances at constant motor speed, and flips."""
+
+    def __init__(
+        self, truth: Robot | Vehicle, plan: Plan, direction: int, start: Floats, current: tuple[float, float]
+    ):
+        self._plan, self._direction, self._start = plan, direction, start
+        self._current, self._now = np.array([*current, 0.0]), 0.0
+        self._pose, self._elapsed = np.zeros(3), 0.0  # of a vehicle: pose at the last flip, time since then
+        self._before: float | None = None  # length of its last dwell
+        self._run: Run | None = None
+        self.become(truth)
+
+    def become(self, truth: Robot | Vehicle) -> None:
+        """Change into a robot, as it swims."""
+        if isinstance(truth, Vehicle):
+            self._vehicle = truth
+            return
+        run = run_at_rest(replace(self._plan.schedule(truth), first_direction=self._direction))
+        if self._run is None:
+            self._run = run
+        else:
+            self._run.body, self._run.reverse = run.body, run.reverse
+        self._time = truth.time_scale / self._plan.robot.time_scale
+        self._length = truth.tail_length / self._plan.robot.tail_length
+
+    def go(self, duration: float) -> tuple[Floats, Floats]:
+        """Advance: return times from now (K,) and poses (K, 3)."""
+        if self._run is None:
+            times, current = _SHARES * duration, np.append(self._vehicle.current, 0.0)
+            poses = planar.compose(self._pose, self._moved(self._elapsed + times))
+            self._elapsed += duration
+        else:
+            times, poses = self._run.go(duration / self._time)
+            if self._run.failed:
+                raise InputError(f"the simulation of the robot failed: {self._run.failed}")
+            kept = slice((len(times) - 1) % _STRIDE, None, _STRIDE)
+            times, current = times[kept] * self._time, np.zeros(3)
+            poses = poses[kept][:, [X, Y, YAW]] * [self._length, self._length, 1.0]
+        drift = (self._now + times)[:, None] * (self._current + current)
+        self._now += duration
+        return times, planar.compose(self._start, poses) + drift
+
+    def flip(self) -> None:
+        if self._run is not None:
+            self._run.flip()
+        else:
+            self._pose = planar.compose(self._pose, self._moved(self._elapsed))
+            self._before, self._elapsed = self._elapsed, 0.0
+        self._direction = -self._direction
+
+    def _moved(self, time: float | Floats) -> Floats:
+        return self._vehicle.motion(self._direction, self._before, time)
+
+
+def swim(
+    pilot: Pilot,
+    plan: Plan,
+    truth: Robot | Vehicle,
+    camera: Camera,
+    *,
+    start: POSE | None = None,
+    current: tuple[float, float] = (0.0, 0.0),
+    later: Robot | Vehicle | None = None,
+    longest: float = 3.0,
+) -> Swim:
+    """Let a robot swim until the pilot says that the path ends.
+
+    Args:
+        pilot: gives the orders.
+        plan: gives the path and the units.
+        truth: what swims: a robot that is simulated, or a vehicle.
+        camera: what sees it.
+        start: pose of the head's centre at rest; default: the plan's.
+        current: of the fluid, in x and y [l per time unit]; a vehicle has its own besides.
+        later: what it is from half of the planned time on.
+        longest: times the planned duration after which the swim ends in any case.
+
+    Raises:
+        InputError: the robot cannot be simulated.
+    """
+    scale, rng = plan.robot.time_scale, np.random.default_rng(camera.seed)
+    every, delay = camera.every_s / scale, camera.delay_s / scale
+    begin, limit = np.array(plan.start if start is None else start), longest * plan.duration
+    command = pilot.update(0.0)
+    swimmer = _Swimmer(truth, plan, command.direction, begin, current)
+    now, look, change = 0.0, every, plan.duration / 2 if later else np.inf
+    waiting: list[tuple[float, POSE, float]] = []
+    rows = [(np.zeros(1), begin[None], command)]
+    dwells: list[float] = []
+    alarms: list[float] = []
+    flipped, fed = 0.0, 0
+    while not command.finished and now < limit:
+        until = min(look, change, waiting[0][0] if waiting else np.inf)
+        until = command.flip_at if command.flip_at <= until + SAME else until
+        if until > now:
+            times, poses = swimmer.go(until - now)
+            rows.append((now + times, poses, command))
+            now = until
+        last = command
+        if until == command.flip_at:
+            command = pilot.update(now)
+        elif until == change and later is not None:
+            swimmer.become(later)
+            change = np.inf
+        elif until == look:
+            x, y, heading = rows[-1][1][-1].tolist()
+            seen = camera.sees((x, y, heading), now, rng)
+            if seen is not None:
+                waiting.append((now + delay, seen, now))
+            look += every
+        else:
+            command = pilot.update(now, *waiting.pop(0)[1:])
+            fed += 1
+        if command.direction != last.direction:
+            dwells.append(now - flipped)
+            flipped = now
+            swimmer.flip()
+        alarms += [now] if command.alarm and not last.alarm else []
+    counts = [len(times) for times, _, _ in rows]
+    poses = np.concatenate([poses for _, poses, _ in rows])
+    followed = planar.compose(poses, np.array([plan.tracked.offset, 0.0, 0.0]))[:, :2]
+    return Swim(
+        plan,
+        np.concatenate([times for times, _, _ in rows]),
+        poses,
+        np.repeat([float(each.direction) for _, _, each in rows], counts),
+        distance_to(plan.reference, followed),
+        np.repeat([each.error for _, _, each in rows], counts),
+        np.array(dwells),
+        tuple(alarms),
+        fed,
+        command.finished,
+    )
