@@ -11,6 +11,8 @@ const OBJECTIVES = ["error", "time", "flips"];
 const QUICK = 0.3; // below this, the last two dwells matter, not only the last one
 const LONGEST = 4;
 const KEPT = { error: 0.9, time: 1, flips: 0.95 }; // share of the best net speed that is kept
+const NEARLY = 0.97; // share of the best net speed with which a path may be followed in less time
+const COMPARED = 10; // such dwells
 const WIDEST = 0.6; // rad that the heading swings to a side
 const GRID = 100; // dwells that are compared
 const LONGER = 1.3; // from one longer dwell to the next
@@ -31,6 +33,15 @@ function dwellsFor(vehicle, objective, least) {
   if (first === 0) return [shortest];
   const count = Math.max(2, Math.ceil(8 * Math.log2(grid[first] / shortest)) + 1);
   return Array.from(geomspace(shortest, grid[first], count)).reverse();
+}
+
+/* Dwells with which straight motion is nearly as fast as with the fastest, longest first.
+ * nearly_fastest */
+function nearlyFastest(vehicle, least) {
+  const shortest = checkLeast(least), grid = geomspace(shortest, longestDwell(vehicle, shortest), GRID);
+  const speeds = netSpeeds(vehicle, grid), enough = NEARLY * largest(speeds);
+  const good = grid.filter((_, i) => speeds[i] >= enough);
+  return Array.from(geomspace(good[good.length - 1], good[0], COMPARED));
 }
 
 /* Longer dwells, up to the longest that is considered. longer_dwells */
@@ -67,4 +78,4 @@ function checkLeast(least) {
   );
 }
 
-export { QUICK, dwellsFor, longerDwells, longestDwell, netSpeeds, checkLeast };
+export { QUICK, dwellsFor, nearlyFastest, longerDwells, longestDwell, netSpeeds, checkLeast };

@@ -2,8 +2,9 @@
  *
  * Mirrors planner/planning/plan.py, which has the steps. A plan is {tracked, objective, drawn, declared, straight,
  * guidance, switches, errors}. Lengths in l, times in μ0 l⁴/EI, unless a name says its unit. */
+import { sum } from "./arrays.js";
 import { declare } from "./declared_path.js";
-import { checkLeast, dwellsFor, longerDwells } from "./dwell_choice.js";
+import { checkLeast, dwellsFor, longerDwells, nearlyFastest } from "./dwell_choice.js";
 import { planErrors } from "./errors.js";
 import { InputError } from "./input_error.js";
 import { leastDwell, planRequest } from "./request.js";
@@ -15,6 +16,7 @@ import { turnRadius } from "./vehicle.js";
 import { zigzag, zigzagHysteresis } from "./zigzag.js";
 
 const WORTH = 0.8; // of the stated error: a longer dwell, which swings further, must leave at most this
+const SAVED = 3; // dwells that corners and the end of a path may save
 const LENGTHENED_FROM = 1.2; // stated error over predicted error, below which fewer flips gain nothing
 const OWN_TABLE = "softflagella surrogate robot"; // makes the table of one robot
 
@@ -32,7 +34,7 @@ function makePlan(drawn, tracked, request, progress = null) {
   checkSize(drawn, robot, turnRadius(vehicle));
   const { dwell: given, objective, corner, timeWeight, tolerance, seed } = request;
   const least = leastDwell(request, robot);
-  const dwells = given === null ? dwellsFor(vehicle, objective, least) : [checkLeast(given)];
+  let dwells = given === null ? dwellsFor(vehicle, objective, least) : [checkLeast(given)];
   const declaredPath = (drift) => {
     const key = JSON.stringify(drift);
     if (!declaredPaths.has(key)) {
@@ -50,12 +52,34 @@ function makePlan(drawn, tracked, request, progress = null) {
     const errors = planErrors(tracked, drawn, declared, switches, bound, seed);
     return { tracked, objective, drawn, declared, straight, guidance, switches, errors };
   };
+  if (given === null && objective === "time") {
+    const drift = driftOf(tracked, zigzag(vehicle, dwells[0], tracked.offset), dwells[0]);
+    const best = quickest(tracked, declaredPath(drift), dwells[0], least);
+    dwells = [best, ...dwells.filter((dwell) => dwell < best)];
+  }
   let first = withDwell(dwells[0]);
   if (given === null && objective === "error") {
     first = leastStated(first, longerDwells(vehicle, first.guidance.dwell), withDwell);
   }
   if (tolerance === null || first.errors.stated <= tolerance) return first;
   return shortened(first, dwells, withDwell, tolerance);
+}
+
+/* The dwell with which a declared path takes the least time; straight motion is the fastest with `fastest`.
+ * _quickest */
+function quickest({ vehicle, offset }, declared, fastest, least) {
+  let best = fastest, time = Infinity;
+  for (const dwell of nearlyFastest(vehicle, least)) {
+    const guidance = chooseGuidance(vehicle, declared, zigzag(vehicle, dwell, offset), dwell);
+    try {
+      const taken = sum(follow(declared.reference, vehicle, guidance, offset).dwells);
+      if (taken < time) [best, time] = [dwell, taken];
+      if (taken > time + SAVED * fastest) break;
+    } catch (refusal) { // too long for this path
+      if (!(refusal instanceof InputError)) throw refusal;
+    }
+  }
+  return best;
 }
 
 /* Lengthen the dwells where this makes the stated error smaller by a fifth or more. _least_stated */

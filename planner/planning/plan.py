@@ -2,7 +2,8 @@
 
 1. The look-up table gives the vehicle: both directions, and the memory of the last dwell
    (`planner.vehicle.from_table`).
-2. The objective chooses the shortest dwell (`planner.vehicle.dwell_choice`).
+2. The objective chooses the shortest dwell (`planner.vehicle.dwell_choice`). For the shortest time, the path is
+   followed with several.
 3. The path that the robot can follow and that is nearest to the drawn one is declared
    (`planner.planning.declared_path`). Its tractrix is the pivot's reference (`planner.paths.tractrix`).
 4. Line-of-sight guidance with hysteresis gives the dwells (`planner.planning.schedule`).
@@ -16,6 +17,7 @@ path is reported from both sides.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache, partial
 from typing import Unpack
 
@@ -35,7 +37,7 @@ from planner.planning.schedule import follow
 from planner.planning.stated_error import guaranteed, look_ahead
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.coefficient_modes import OWN_TABLE
-from planner.vehicle.dwell_choice import check_least, dwells_for, longer_dwells
+from planner.vehicle.dwell_choice import check_least, dwells_for, longer_dwells, nearly_fastest
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
@@ -45,6 +47,7 @@ from surrogate.interface import LookupTable
 
 _WORTH = 0.8  # of the stated error: a longer dwell, which swings further, must leave at most this
 _LENGTHENED_FROM = 1.2  # stated error over predicted error, below which fewer flips gain nothing
+_SAVED = 3.0  # dwells that corners and the end of a path may save
 # Plans from what declares the path, the drift, and what follows a declared path.
 Redirect = Callable[[Callable[[], Declared], Drift, Callable[[Declared], Plan]], Plan]
 
@@ -127,12 +130,39 @@ def make_plan(
             return redirect(partial(declared_path, drift), drift, follow_declared)
         return follow_declared(declared_path(drift))
 
+    if request.dwell is None and request.objective == "time" and redirect is None:
+        drift = zigzag_drift(tracked, zigzag(vehicle, dwells[0], tracked.offset), dwells[0])
+        best = _quickest(tracked, declared_path(drift), dwells[0], least)
+        dwells = [best, *(dwell for dwell in dwells if dwell < best)]
     first = with_dwell(dwells[0])
     if request.dwell is None and request.objective == "error":
         first = _least_stated(first, longer_dwells(vehicle, first.minimum_dwell), with_dwell)
     if request.tolerance is None or first.stated_error <= request.tolerance:
         return first
     return _shortened(first, dwells, with_dwell, request.tolerance)
+
+
+def _quickest(tracked: TrackedVehicle, declared: Declared, fastest: float, least: float | None) -> float:
+    """Choose the dwell with which a declared path takes the least time.
+
+    Shorter dwells are tried until they cost more time than corners and the end may save.
+
+    Args:
+        tracked: the vehicle and its tracked point.
+        declared: with the dwell `fastest`.
+        fastest: with which straight motion is the fastest.
+        least: the shortest dwell that the motor allows.
+    """
+    vehicle, offset = tracked.vehicle, tracked.offset
+
+    times: dict[float, float] = {}
+    for dwell in nearly_fastest(vehicle, least):
+        guidance = choose_guidance(vehicle, declared, zigzag(vehicle, dwell, offset), dwell)
+        with suppress(InputError):  # too long for this path
+            times[dwell] = float(follow(declared.reference, vehicle, guidance, offset).dwells.sum())
+            if times[dwell] > min(times.values()) + _SAVED * fastest:
+                break
+    return min(times, key=lambda dwell: times[dwell], default=fastest)
 
 
 def _least_stated(first: Plan, longer: list[float], with_dwell: Callable[[float], Plan]) -> Plan:

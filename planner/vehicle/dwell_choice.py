@@ -2,7 +2,8 @@
 
 A longer dwell loses less speed to the turn-over of the tails, and swings further. So one number decides between
 speed and error. All figures here are of straight motion; the plan's own errors are checked
-against the tolerance afterwards. Times in μ0 l⁴/EI.
+against the tolerance afterwards, and for "time" the path itself is followed with several dwells
+(`planner.planning.plan`). Times in μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ Objective = Literal["error", "time", "flips"]
 QUICK = 0.3  # below this, the last two dwells matter, not only the last one
 LONGEST = 4.0
 KEPT = {"error": 0.90, "flips": 0.95}  # share of the best net speed that is kept
+_NEARLY = 0.97  # share of the best net speed with which a path may be followed in less time
+_COMPARED = 10  # such dwells
 _WIDEST = 0.6  # rad that the heading swings to a side
 _COUNT = 100
 _LONGER = 1.3  # from one longer dwell to the next
@@ -51,6 +54,18 @@ def dwells_for(vehicle: Vehicle, objective: Objective, least: float | None) -> l
     first = int(good[-1 if objective == "flips" else 0])
     shorter = np.geomspace(least, grid[first], max(2, math.ceil(8 * math.log2(grid[first] / least)) + 1))
     return shorter[::-1].tolist() if first else [least]
+
+
+def nearly_fastest(vehicle: Vehicle, least: float | None) -> list[float]:
+    """List dwells with which straight motion is nearly as fast as with the fastest, longest first.
+
+    On a path another one may be the fastest: corners and the end take whole dwells.
+    """
+    least = check_least(least)
+    grid = np.geomspace(least, longest_dwell(vehicle, least), _COUNT)
+    speed = net_speeds(vehicle, grid)
+    good = grid[speed >= _NEARLY * speed.max()]
+    return np.geomspace(good[-1], good[0], _COMPARED).tolist()
 
 
 def longer_dwells(vehicle: Vehicle, dwell: float) -> list[float]:

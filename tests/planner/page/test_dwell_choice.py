@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.vehicle.dwell_choice import check_least, dwells_for, longer_dwells, net_speeds
+from planner.vehicle.dwell_choice import check_least, dwells_for, longer_dwells, nearly_fastest, net_speeds
 from tests.planner.page.page_core import answer, answers, check_near, refusal_of
 from tests.planner.page.robots import random_robots, vehicle_of, vehicle_to_page
 
@@ -24,6 +24,9 @@ def test_dwells() -> None:
             answers([("dwell_choice.js", "dwellsFor", page, *case) for case in cases]), cases, strict=True
         ):
             check_near(found, dwells_for(vehicle, *case), 1e-13)  # type: ignore[arg-type]
+        for least in (None, 0.2, 1.5, 50.0):
+            found = answer("dwell_choice.js", "nearlyFastest", page, least)
+            check_near(found, nearly_fastest(vehicle, least), 1e-13)
         longer, speeds = answers(
             [("dwell_choice.js", "longerDwells", page, 0.5), ("dwell_choice.js", "netSpeeds", page, grid)]
         )
