@@ -28,8 +28,9 @@ from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge, kno
 from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.io.errors import InputError
+from sim.io.units import from_si, to_si
 from sim.model.robot import Robot
-from sim.model.robot_toml import robot_toml
+from sim.model.robot_toml import ENTRIES, robot_toml
 from surrogate.input_ranges import COEFFICIENTS
 
 _CERTAIN = 1e-12  # least variance of a logarithm, and of a correlated combination of them
@@ -118,16 +119,22 @@ def significant(robot: Robot, known: CalibrationKnowledge) -> Robot:
     correlation = known.covariance / np.outer(scale, scale)
     precision = np.diag(np.linalg.inv(correlation + _CERTAIN * np.eye(len(scale))))
     sigmas = dict(zip(known.names, (scale / np.sqrt(precision)).tolist(), strict=True))
+    units = {entry.field: entry.unit for entry in ENTRIES}
     numbers = {name: getattr(robot, name) for name in (*COEFFICIENTS, *NUMBERS) if name in sigmas}
     return replace(
         robot,
-        **{name: _rounded(value, value * sigmas[name]) for name, value in numbers.items() if value},
+        **{name: _rounded(value, value * sigmas[name], units[name]) for name, value in numbers.items() if value},
         effects={name: _rounded(size, sigmas.get(name, 0.0)) for name, size in robot.effects.items()},
     )
 
 
-def _rounded(value: float, sigma: float) -> float:
-    return round(value, 1 - math.floor(math.log10(abs(sigma)))) if sigma else value
+def _rounded(value: float, sigma: float, unit: str = "") -> float:
+    """Round a number in the unit in which it is written."""
+    if not sigma:
+        return value
+    number, error = (from_si(size, unit) if unit else size for size in (value, abs(sigma)))
+    rounded = round(number, 1 - math.floor(math.log10(error)))
+    return to_si(rounded, unit) if unit else rounded
 
 
 def _with_correction(known: CalibrationKnowledge, learnt: HeadCorrection, robot: Robot) -> CalibrationKnowledge:

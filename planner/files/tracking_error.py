@@ -130,4 +130,4 @@ def draw_overlay(axes: Axes, plan: dict[str, Any], error: TrackingError, title: 
     draw_tracks(axes, np.array(plan["raw_path"]), np.array(plan["reference"]), error.stated, length)
     axes.plot(*(100 * length * error.track.T), color=REPLAYED, lw=0.8, label="track")
     rms, largest = format_length(error.rms * length), format_length(error.largest * length)
-    axes.set_title(f"{title}\n{rms} rms, {largest} at most from the declared path", fontsize=10, parse_math=False)
+    axes.set_title(f"{title}\n{rms} rms, {largest} at most\nfrom the declared path", fontsize=10, parse_math=False)
