@@ -37,7 +37,7 @@ _JOBS = {"path": "plan", "goal": "goal", "places": "tour", "region": "cover"}  #
 _OWN = ("robot", "name", "delay_s")
 _OF_ALL = ("apart", "feedback")
 _MEMBERS = ("member", "robot")  # what the array of robots is called, and what it was called before
-_FILES = ("robot", "path", "region", "lookup", "model", "walls", "keep_out", "hole")  # keys whose values may be files
+_FILES = ("robot", "path", "region", "lookup", "model", "walls", "keep_out", "hole")  # may be files
 _NAME = re.compile(r"\w[\w-]*")
 _WRITTEN = ("fleet.json", "fleet.svg")
 

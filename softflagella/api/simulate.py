@@ -246,6 +246,7 @@ def replay(schedule: Schedule | Plan | str | Path, robot: OneRobot | None = None
     return with_units(track if robot is None else schedule.in_own_units(track))
 
 
+@checks_keywords()
 def swim(
     pilot: Plan | Tracker,
     truth: OneRobot | None = None,
