@@ -114,7 +114,11 @@ def cover(
     ordered = _ordered(cut, travel, tracked, drift)
     track = partial(_track, ordered.ends, travel, tracked)
     plan = plan_track(tracked, request, space, track, drift, feedback=feedback, progress=progress)
-    stated = plan.feedback_error if feedback else plan.stated_error
+
+    def sure(error: float) -> float:
+        return share_covered(field, plan.reference, width - 2 * error) if width > 2 * error else 0.0
+
+    tracked_sure = sure(plan.feedback_error)
     points, cell = field.raster(width / 20)
     return CoveragePlan(
         plan=plan,
@@ -122,7 +126,8 @@ def cover(
         width=width,
         lanes=ordered.ends,
         share=share_covered(field, plan.track, width),
-        sure=share_covered(field, plan.reference, width - 2 * stated) if width > 2 * stated else 0.0,
+        sure=tracked_sure if feedback else sure(plan.stated_error),
+        sure_tracked=tracked_sure,
         bound=len(points) * cell / (width * straight.net_speed),
         exact=len(cut) <= EXACT and space.empty,
         gap=ordered.order.gap,

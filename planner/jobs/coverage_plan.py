@@ -36,6 +36,7 @@ class CoveragePlan:
     lanes: Floats  # (k, 2, 2), start and end of each lane, in the order in which they are swum
     share: float  # of the area that the predicted track covers
     sure: float  # of the area that is covered as long as the robot stays within the stated error
+    sure_tracked: float  # the same with feedback, if the margin around obstacles stays as it is
     bound: float  # area by width and net speed on straight lines: lanes take longer, by turns and overlap
     exact: bool  # no order of the lanes is quicker
     gap: float  # how much longer than with the quickest order the ways between lanes may take, as a share
@@ -50,10 +51,14 @@ class CoveragePlan:
             proven = "no order of them is quicker"
         else:
             proven = f"another order takes at most {100 * self.gap / (1 + self.gap):.0f} % less"
-        share, sure = 100 * self.share, 100 * self.sure
+        share, sure, tracked = (100 * each for each in (self.share, self.sure, self.sure_tracked))
+        remedy = f", {tracked:.1f} % if a camera measures where it is (--feedback)" if tracked > sure else ""
+        if tracked == 0:
+            remedy = f"; with a camera (--feedback), give more than {in_lab(2 * self.plan.feedback_error, robot)}"
         return [
             f"{len(self.lanes)} lanes for a width of {in_lab(self.width, robot)}; {proven}",
-            f"covers {share:.1f} % as predicted, {sure:.1f} % wherever the robot is within the stated error",
+            f"covers {share:.1f} % as predicted, {sure:.1f} % wherever the robot is within the stated error"
+            f"{remedy}",
             f"{format_time(duration * scale)}; area by width and net speed, the bound for lanes without turns, is "
             f"{format_time(self.bound * scale)}",
         ]

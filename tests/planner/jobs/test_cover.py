@@ -42,6 +42,19 @@ def test_it_covers_the_region_by_turns_that_the_robot_can_make(tracked: TrackedV
     assert len(swept.lanes) == 4
 
 
+@pytest.mark.parametrize(("share", "proposed"), [(0.8, "80.0 % if a camera"), (0.0, "give more than")])
+def test_what_is_not_certain_without_a_camera_proposes_one(
+    tracked: TrackedVehicle, share: float, proposed: str
+) -> None:
+    swept = cover(Field(Polygon.of([[0, 0], [1, 0], [1, 0.5], [0, 0.5]])), 0.5, tracked, PlanRequest())
+    assert swept.sure <= swept.sure_tracked <= swept.share
+    said = replace(swept, sure=0.0, sure_tracked=share).lines()[1]
+    assert "0.0 % wherever the robot is within the stated error" in said
+    assert proposed in said
+    assert "--feedback" in said
+    assert "--feedback" not in replace(swept, sure=0.9, sure_tracked=0.9).lines()[1]
+
+
 def test_the_bound_is_area_by_width_and_speed(tracked: TrackedVehicle) -> None:
     swept = cover(FIELD, 0.5, tracked, QUICK)
     assert swept.bound == pytest.approx(4.5 / (0.5 * swept.plan.straight.net_speed), rel=0.01)
