@@ -84,7 +84,7 @@ class Page {
   }
 
   ofShape({ name, points, closed, size }) {
-    return points ? { points: onGrid(points), closed, name } : { shape: name, size };
+    return points ? { points, closed, name } : { shape: name, size };
   }
 
   get state() {
@@ -268,8 +268,8 @@ class Page {
     );
   }
 
-  setPoints(points, closed, name = "my path") {
-    const grid = onGrid(points);
+  /* Take points; those drawn here are put on the grid, those of a file are not. */
+  setPoints(points, closed, name = "my path", grid = onGrid(points)) {
     const refusal = pointsRefusal(grid);
     say(byId("path-problem"), refusal, true);
     if (refusal) return;
@@ -343,7 +343,7 @@ class Page {
       const path = await askUnit(content, this.plan?.tailLength ?? 10);
       if (path) {
         this.view.moved = false;
-        this.setPoints(path.points, path.closed, path.name);
+        this.setPoints(path.points, path.closed, path.name, path.points);
       }
     } else if (content.kind === "track") {
       await this.compare("none", { name, ...content });

@@ -2,7 +2,8 @@
  *
  * A state is a plain object and is never changed: each change makes a new one.
  *   robot    {name, values}: the values of FIELDS in laboratory units
- *   path     {shape, size}, with the size in cm; or {points, closed, name}, whole thousandths of a centimetre
+ *   path     {shape, size}, with the size in cm; or {points, closed, name}, with points in cm: those drawn in the
+ *            page are in whole thousandths, those of a file are as in the file
  *   options  those of OPTIONS
  * The address holds, after #, a version and what differs from the page's own first state. */
 
@@ -64,13 +65,13 @@ function siValues(values, given = {}) {
   return Object.fromEntries(pairs);
 }
 
-/* Put points [cm] on the grid of thousandths, as whole numbers, without repeating one. */
+/* Put points on the grid of thousandths, without repeating one. */
 function onGrid(points) {
-  const rows = points.map(([x, y]) => [Math.round(x * THOUSANDTHS), Math.round(y * THOUSANDTHS)]);
+  const rows = points.map((point) => point.map((value) => Math.round(value * THOUSANDTHS) / THOUSANDTHS));
   return rows.filter(([x, y], i) => i === 0 || x !== rows[i - 1][0] || y !== rows[i - 1][1]);
 }
 
-/* Say why points on the grid are no path of the page; empty: they are. */
+/* Say why points are no path of the page; empty: they are. */
 function pointsRefusal({ length }) {
   if (length < 2) return "The path needs two or more corners that differ.";
   if (length <= MOST_POINTS) return "";
@@ -80,13 +81,8 @@ function pointsRefusal({ length }) {
 /* A state as the planner takes it; `given` has exact SI values of fields of the robot. */
 function wishOf({ robot, path, options }, given) {
   const { points, closed, name, shape, size } = path;
-  const drawing = points ? { points: inCentimetres(points), closed, name } : { words: `${shape}:${size}` };
+  const drawing = points ? { points, closed, name } : { words: `${shape}:${size}` };
   return { robot: { ...given, name: robot.name, ...siValues(robot.values, given) }, path: drawing, options };
-}
-
-/* Points in cm from whole thousandths. */
-function inCentimetres(points) {
-  return points.map(([x, y]) => [x / THOUSANDTHS, y / THOUSANDTHS]);
 }
 
 /* Write a state as the part of an address behind #, without what is as in `initial`. */
@@ -99,7 +95,7 @@ function addressOf(state, initial) {
   }
   const { shape, size, points, closed, name } = state.path;
   if (points) {
-    parts.push(`points=${packed(points)}`);
+    parts.push(isOnGrid(points) ? `points=${packed(points)}` : `places=${points.map(String).join("~")}`);
     if (closed) parts.push("closed=1");
     if (name) parts.push(`name=${encodeURIComponent(name)}`);
   } else if (shape !== initial.path.shape || size !== initial.path.size) {
@@ -153,10 +149,12 @@ function readRobot(parts, robot) {
 
 function readPath(parts, path, shapes) {
   const points = taken(parts, "points");
+  const places = taken(parts, "places");
   const closed = taken(parts, "closed") === "1";
   const name = decoded(taken(parts, "name") ?? "");
   const words = taken(parts, "path");
   if (points !== undefined) return { points: unpacked(points), closed, name };
+  if (places !== undefined) return { points: listed(places), closed, name };
   if (words === undefined) return path;
   const at = decoded(words).lastIndexOf(":");
   const [shape, size] = [decoded(words).slice(0, at), number("path", decoded(words).slice(at + 1))];
@@ -192,13 +190,17 @@ function number(key, text) {
   return value;
 }
 
-/* Write whole numbers as differences in base 36: "a.-3~1.0" has the points (10, -3) and (11, -3). */
+function isOnGrid(points) {
+  return points.every((point) => point.every((value) => value === Math.round(value * THOUSANDTHS) / THOUSANDTHS));
+}
+
+/* Write thousandths as differences in base 36: "a.-3~1.0" has the points (10, -3) and (11, -3) thousandths. */
 function packed(points) {
   let [x, y] = [0, 0];
   return points
     .map((point) => {
-      const step = [point[0] - x, point[1] - y];
-      [x, y] = point;
+      const [right, up] = point.map((value) => Math.round(value * THOUSANDTHS)), step = [right - x, up - y];
+      [x, y] = [right, up];
       return step.map((value) => value.toString(36)).join(".");
     })
     .join("~");
@@ -211,9 +213,16 @@ function unpacked(text) {
     const [right, up] = pair.split(".").map((digits) => parseInt(digits, 36));
     x += right;
     y += up;
-    return [x, y];
+    return [x / THOUSANDTHS, y / THOUSANDTHS];
   });
   if (points.length < 2) throw new Error("its path has one point");
+  return points;
+}
+
+/* Read points as they are: "1.0625,2~3,4". */
+function listed(text) {
+  const points = text.split("~").map((pair) => pair.split(",").map((value) => number("path", value)));
+  if (points.length < 2 || points.some(({ length }) => length !== 2)) throw new Error("it is cut off or damaged");
   return points;
 }
 
@@ -258,4 +267,4 @@ class History {
   }
 }
 
-export { FIELDS, History, addressOf, fromAddress, inCentimetres, labValues, onGrid, pointsRefusal, siValues, wishOf };
+export { FIELDS, History, addressOf, fromAddress, labValues, onGrid, pointsRefusal, siValues, wishOf };

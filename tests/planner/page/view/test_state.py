@@ -42,12 +42,14 @@ def test_laboratory_units_are_round_numbers_and_lead_back_to_the_last_bit() -> N
 def test_an_address_holds_what_differs_and_leads_back_to_the_same_state() -> None:
     initial = first()
     rng = np.random.default_rng(1)
-    drawn = np.cumsum(rng.integers(-400, 400, (300, 2)), 0).tolist()
+    drawn = (np.cumsum(rng.integers(-400, 400, (300, 2)), 0) / 1000).tolist()
+    opened = [*rng.normal(size=(20, 2)).tolist(), [1e-9, -1e21]]
     values = {**initial["robot"]["values"], "viscosity": 0.97, "discOffset": 12.5}
     states = [
         initial,
         {**initial, "path": {"shape": "square", "size": 12.5}},
         {**initial, "path": {"points": drawn, "closed": True, "name": "a & b = ü#"}},
+        {**initial, "path": {"points": opened, "closed": False, "name": "file"}},
         {**initial, "robot": {"name": "mine", "values": values}},
         {**initial, "options": {**OPTIONS, "objective": "flips", "tolerance": 0.4, "smooth": 1.5}},
     ]
@@ -60,7 +62,7 @@ def test_an_address_holds_what_differs_and_leads_back_to_the_same_state() -> Non
 
 def test_an_unknown_or_broken_address_gives_the_first_state_and_says_so() -> None:
     initial = first()
-    broken = ["v=2", "rubbish", "v=1&points=1.", "v=1&points=2.3", "v=1&path=heptagon%3A3", "v=1&C_t=x",
+    broken = ["v=2", "rubbish", "v=1&points=1.", "v=1&points=2.3", "v=1&places=2,3", "v=1&places=2,3~4", "v=1&places=2,3~4,x", "v=1&path=heptagon%3A3", "v=1&C_t=x",
               "v=1&name=%E0%A4%A", "v=1&path=circle%3A", "v=1&unknown=3", "v=1&C_t=none", "=",
               "v=1&&"]  # fmt: skip
     read = answers([("view/state.js", "fromAddress", address, initial, SHAPES) for address in broken])
@@ -76,7 +78,6 @@ def test_a_misspelt_shape_in_an_address_is_told_the_nearest_one() -> None:
 
 def test_points_lie_on_the_grid_once() -> None:
     assert answer("view/state.js", "onGrid", [[0.1234, 2], [0.12341, 2.0001], [-1, 0]]) == [
-        [123, 2000],
-        [-1000, 0],
+        [0.123, 2],
+        [-1, 0],
     ]
-    assert answer("view/state.js", "inCentimetres", [[123, 2000]]) == [[0.123, 2]]
