@@ -3,6 +3,7 @@
  * An opened path is {kind: "path", paths: [{points, closed, name}], unit}: unit is the size of its unit in cm,
  * null: the numbers have no unit. A track is {kind: "track", table}, a table of runs {kind: "runs", table}, a
  * robot {kind: "robot", fields}. */
+import { refuseOtherKinds } from "./file_kinds.js";
 import { InputError } from "./input_error.js";
 import { areOfRuns } from "./measured_table.js";
 import { readTablePath } from "./path_files.js";
@@ -23,6 +24,7 @@ function openFile({ name, bytes }) {
   const content = new Uint8Array(bytes);
   if (TOML.test(name)) return { kind: "robot", fields: readRobot(textOf(content, name), name) };
   if (SVG.test(name)) return pathsOfDrawing(textOf(content, name), name);
+  refuseOtherKinds(name, content);
   if (JSON_FILE.test(name)) return pathOfPlan(textOf(content, name), name);
   const { names, words, comma } = parseWords(content, name, false), columns = names.map(String);
   const quantities = columns.map((column) => splitName(column).quantity.toLowerCase());

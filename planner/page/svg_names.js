@@ -1,6 +1,6 @@
 /* Names that readers of drawings know: of elements, of attributes and properties, of transforms and units.
  *
- * planner/paths/svg_shapes.py reads this file, too, so what stands between the first braces is JSON. `unread` are
+ * planner/paths/svg_shapes.py reads this file, too, so its value is JSON. `unread` are
  * attributes and properties that move, scale or hide, with the values that do nothing. `lengths` belong to a view's
  * width (0), height (1) or diagonal (2). `transforms` take numbers (1), lengths (x) and angles (a); `units` are those
  * of each, `pixels` the sizes of units. */

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from planner.paths.file_kinds import refuse_other_kinds
 from planner.paths.path import Path2D
 from planner.paths.shapes import SHAPES, like_a_shape, nearest_shape, shape_of
 from planner.paths.svg_drawing import read_svg
@@ -94,6 +95,7 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
     with naming(source):
         if Path(source).suffix.lower() == ".svg":
             return Drawing(*read_svg(Path(source), closed, shape))
+        refuse_other_kinds(Path(source))
         if shape is not None:
             raise InputError(f"{source} is no SVG, so it has no shape {shape!r}; leave --shape out")
         points, unit = _read_columns(source)

@@ -6,20 +6,18 @@ refused here. Names and units are in planner/page/svg_names.js, which the page r
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from svgelements import Ellipse, Matrix, Polygon, Polyline, Rect, SimpleLine
 from svgelements import Path as SvgPath
 
+from planner.paths.shared_names import shared_names
 from sim.io.errors import InputError
 
-_TEXT = Path(__file__).parents[1].joinpath("page", "svg_names.js").read_text(encoding="utf-8")
-NAMES: dict[str, Any] = json.JSONDecoder().raw_decode(_TEXT, _TEXT.index("{"))[0]
+NAMES = shared_names("svg_names.js")
 _N = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 NUMBER = re.compile(_N)
 _LENGTH = re.compile(rf"({_N})\s*([a-zA-Z]*|%)")
