@@ -8,7 +8,7 @@ const KINDS = {
   "JSON": ["json", "\\{|\\[\\s*[\\[{\\d-]"],
   "GPX": ["gpx", "<[\\s\\S]*?<gpx[\\s>]|<gpx[\\s>]"],
   "KML": ["kml kmz", "<[\\s\\S]*?<kml[\\s>]|<kml[\\s>]"],
-  "a drawing with another ending than .svg": ["svgz", "<[\\s\\S]*?<svg[\\s>]|<svg[\\s>]"],
+  "a drawing with another ending than .svg": ["svgz", "<[\\s\\S]*?<svg[\\s/>]|<svg[\\s/>]"],
   "XML": ["xml gml", "<"],
   "G-code": ["gcode gco ngc cnc tap", "(?:[%;(O][^\\n]*\\n|\\s)*(?:N\\d+\\s*)?[GM]\\d+(?:\\.\\d+)?(?:\\s|[A-Z;(]|$)"],
   "WKT": ["wkt ewkt", "(?:[^\\n]*\\n)?[^\\n(]*?(?:POINT|LINESTRING|RING|POLYGON|COLLECTION)[\\sZM]*\\(+[\\s\\d.+-]"],
