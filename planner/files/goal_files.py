@@ -12,7 +12,7 @@ from planner.goal.goal_plan import GoalPlan
 from planner.paths.obstacles import Circle, FreeSpace, Polygon, Region
 from planner.paths.path_files import Drawing, read_path
 from planner.paths.shapes import like_a_shape, shape_of
-from planner.paths.units import read_length
+from planner.paths.units import in_tails, read_length
 from sim.io.errors import InputError, naming
 from sim.io.files import files_together, write_text
 from sim.model.robot import Robot
@@ -42,7 +42,10 @@ def read_region(words: str, unit: str | None, robot: Robot) -> Region:
         raise InputError(f"{words!r}; write {_SHAPES[shape]}")
     drawing = read_outline(words)
     with naming(words):
-        return Polygon.of(drawing.in_tails(robot, unit if drawing.unit is None else None))
+        given = drawing.unit or unit
+        named = given if isinstance(given, str) else {1.0: "m", 0.001: "mm"}.get(given or 0.0, "cm")
+        path = drawing.in_tails(robot, unit if drawing.unit is None else None)
+        return Polygon.of(path, 1.0 / in_tails(named, robot), named)
 
 
 def read_outline(words: str) -> Drawing:

@@ -61,17 +61,29 @@ class Polygon:
     corners: Floats  # (n, 2), in order [l]
 
     @staticmethod
-    def of(points: Path2D | ArrayLike) -> Polygon:
+    def of(points: Path2D | ArrayLike, size: float = 1.0, unit: str = "l") -> Polygon:
         """Make a polygon from points (n, 2): three or more that are not on one line.
 
+        Args:
+            points: in l.
+            size: of l in the unit that a message has.
+            unit: its name.
+
         Raises:
-            InputError: the points enclose nothing.
+            InputError: the points enclose nothing, or the outline crosses, touches or repeats itself.
         """
+        from shapely import MultiPoint
+        from shapely import Polygon as Outline
+        from shapely.validation import explain_validity
+
         path = points if isinstance(points, Path2D) else Path2D.of(points)
-        x, y = path.points.T
-        area = abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2
-        if len(path.points) < 3 or area <= 1e-12 * path.length**2:
+        if MultiPoint(path.points).convex_hull.area <= 1e-12 * path.length**2:
             raise InputError("a region needs three or more points that are not on one line")
+        reason, _, place = explain_validity(Outline(path.points)).partition("[")
+        if place:
+            x, y = (format(size * float(number), ".4g") for number in place.rstrip("]").split()[:2])
+            words = "draw it so that it neither crosses, touches nor repeats itself"
+            raise InputError(f"{reason} of an outline at ({x}, {y}) {unit}; {words}")
         return Polygon(path.points)
 
     def distance(self, points: Floats) -> Floats:
