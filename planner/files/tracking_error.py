@@ -25,6 +25,7 @@ from sim.io.units import format_length
 from sim.mechanics import planar
 
 _COLUMNS = ("time_bar", "x_over_l", "y_over_l", "heading_rad")
+_ALIKE = 1e-3  # of a place and of the tail length, largest difference of the same place in cm and in l
 _LAB = ("time_s", "x_cm", "y_cm", "heading_deg")  # or in other units
 
 
@@ -103,17 +104,30 @@ def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
 
 
 def track_in_tails(track: pd.DataFrame, robot: Mapping[str, Any]) -> pd.DataFrame:
-    """Return a track with the columns of a replay."""
-    if set(_COLUMNS) <= set(track):
-        return track
+    """Return a track with the columns of a replay.
+
+    Raises:
+        InputError: a column is missing, or places in cm and in tail lengths differ: the track is of another robot.
+    """
     lab = convert_columns(track, _LAB, "the track").table
+    cm = 100 * robot["tail_length_m"]
+    if set(_COLUMNS) <= set(track):
+        for over_l, in_cm in (("x_over_l", "x_cm"), ("y_over_l", "y_cm")):
+            if in_cm not in lab:
+                continue
+            in_tails, given = numbers_of(track[over_l]) * cm, numbers_of(lab[in_cm])
+            if not (np.abs(in_tails - given) <= _ALIKE * (cm + np.abs(given))).all():
+                raise InputError(
+                    f"{over_l} and {in_cm} of the track disagree with the plan's tail length, {cm:g} cm: it is "
+                    "the track of another robot"
+                )
+        return track
     for name in _LAB:
         if name not in lab:
             raise InputError(
                 f"the track has no column {name!r}; it needs time_s, x_cm, y_cm and heading_deg, or in other units"
             )
     values = {name: numbers_of(lab[name]) for name in _LAB}
-    cm = 100 * robot["tail_length_m"]
     return pd.DataFrame(
         {
             "time_bar": values["time_s"] / robot["time_scale_s"],

@@ -12,6 +12,7 @@ import { pivotRadius, turnRadius } from "./vehicle.js";
 
 const CORNERS = ["nearest", "minimax", "fillet", "error"];
 const WARN = 0.1; // share of the extent; a declared path that is further off gets a warning
+const FAR = 0.3; // l; so does one that is further off than this
 
 /* Choose the path that the robot will follow: {reference, curvature, offDrawn, missed, warnings}.
  *
@@ -36,6 +37,11 @@ function declare(raw, feasibility, progress = null) {
     warnings.push(
       `the shape is lost in part: the declared path is up to ${inLab(distance, robot)} from the drawn one, ` +
         `which is ${inLab(size, robot)} across; draw it larger`,
+    );
+  } else if (distance > FAR) {
+    warnings.push(
+      `the declared path leaves the drawn one by up to ${inLab(distance, robot)}, where the robot cannot turn ` +
+        "so tightly; draw wider turns",
     );
   }
   return { reference: followed, curvature: largestSize(followed.curvature), offDrawn, missed, warnings };

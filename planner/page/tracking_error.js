@@ -11,6 +11,7 @@ import { convertColumns } from "./quantities.js";
 
 const LARGEST = 1e100; // of a number
 const COLUMNS = ["time_bar", "x_over_l", "y_over_l", "heading_rad"];
+const ALIKE = 1e-3; // of a place and of the tail length, largest difference of the same place in cm and in l
 const LAB = ["time_s", "x_cm", "y_cm", "heading_deg"]; // or in other units
 
 /* Compare a track with its plan: {rms, largest, rawRms, rawLargest, missed, stated, track, time, distance,
@@ -65,19 +66,29 @@ function trackingLine(error) {
   );
 }
 
-/* Time, x, y and heading in the units of a replay. */
+/* Time, x, y and heading in the units of a replay. track_in_tails */
 function columnsInTails(table, robot) {
+  const lab = convertColumns(table, LAB, "the track").table, cm = 100 * robot.tail_length_m;
   if (COLUMNS.every((name) => table.names.includes(name))) {
+    for (const axis of ["x", "y"]) {
+      const given = lab.columns[lab.names.indexOf(`${axis}_cm`)];
+      const inTails = table.columns[table.names.indexOf(`${axis}_over_l`)];
+      if (given && !inTails.every((value, i) => Math.abs(value * cm - given[i]) <= ALIKE * (cm + Math.abs(given[i])))) {
+        throw new InputError(
+          `${axis}_over_l and ${axis}_cm of the track disagree with the plan's tail length, ${general(cm)} cm: it is ` +
+            "the track of another robot",
+        );
+      }
+    }
     return COLUMNS.map((name) => table.columns[table.names.indexOf(name)]);
   }
-  const lab = convertColumns(table, LAB, "the track").table;
   const missing = LAB.find((name) => !lab.names.includes(name));
   if (missing) {
     throw new InputError(
       `the track has no column '${missing}'; it needs time_s, x_cm, y_cm and heading_deg, or in other units`,
     );
   }
-  const cm = 100 * robot.tail_length_m, scales = [robot.time_scale_s, cm, cm, 180 / Math.PI];
+  const scales = [robot.time_scale_s, cm, cm, 180 / Math.PI];
   return LAB.map((name, i) => lab.columns[lab.names.indexOf(name)].map((value) => value / scales[i]));
 }
 

@@ -25,6 +25,7 @@ from planner.planning.request import Corner
 from sim.io.errors import InputError
 
 WARN = 0.1  # share of the extent; a declared path that is further off gets a warning
+FAR = 0.3  # l; so does one that is further off than this
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,11 @@ def declare(raw: Path2D, feasibility: Feasibility, progress: Progress | None = N
         warnings.append(
             f"the shape is lost in part: the declared path is up to {in_lab(distance, robot)} from the drawn one, "
             f"which is {in_lab(max(extent(raw)), robot)} across; draw it larger"
+        )
+    elif distance > FAR:
+        warnings.append(
+            f"the declared path leaves the drawn one by up to {in_lab(distance, robot)}, where the robot cannot "
+            "turn so tightly; draw wider turns"
         )
     return Declared(followed, float(np.abs(followed.curvature).max()), off_drawn, missed, tuple(warnings))
 

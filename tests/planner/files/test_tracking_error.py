@@ -47,6 +47,20 @@ def test_a_track_of_a_camera_has_the_error_of_the_same_track_in_tail_lengths(
     assert f"{1000 * error.rms * CONTROL.tail_length:.3g} mm ({error.rms:.3g} l) rms" in error.line
 
 
+def test_the_track_of_another_robot_is_refused(planned: tuple[dict[str, object], pd.DataFrame]) -> None:
+    """A replay has places in cm and in l; those in cm were not read, and a larger square passed."""
+    record, track = planned
+    cm = 100 * CONTROL.tail_length
+    own, other = (
+        track.assign(x_cm=size * track["x_over_l"], y_cm=size * track["y_over_l"]) for size in (cm, 15.0)
+    )
+    assert tracking_error(record, own).rms == tracking_error(record, track).rms
+    with pytest.raises(
+        InputError, match="x_over_l and x_cm of the track disagree with the plan's tail length, 11 cm"
+    ):
+        tracking_error(record, other)
+
+
 def test_a_track_without_a_column_is_refused(planned: tuple[dict[str, object], pd.DataFrame]) -> None:
     record, track = planned
     with pytest.raises(InputError, match="no column 'time_s'; it needs time_s, x_cm, y_cm and heading_deg"):

@@ -54,7 +54,7 @@ def test_errors_and_their_sentence(name: str, point: str, noise: float) -> None:
         assert answer("tracking_error.js", "trackingLine", found) == wanted.line
 
 
-@pytest.mark.parametrize("change", ["missing", "still", "back", "nan", "bare"])
+@pytest.mark.parametrize("change", ["missing", "still", "back", "nan", "another robot", "bare"])
 def test_bad_tracks_are_refused_in_the_same_words(change: str) -> None:
     result = planned("circle", objective="flips", point="head_centre")
     frame = track(result, 0.0)
@@ -66,6 +66,8 @@ def test_bad_tracks_are_refused_in_the_same_words(change: str) -> None:
         frame = frame.iloc[[0, 2, 1, 3]]
     elif change == "nan":
         frame["x_over_l"] = 1e101
+    elif change == "another robot":  # of tails of 15 cm
+        frame["x_cm"], frame["y_cm"] = 15 * frame["x_over_l"], 15 * frame["y_over_l"]
     else:
         frame = frame.set_axis(["time", "x_cm", "y_cm", "heading_deg"], axis=1)
     with pytest.raises(InputError) as wanted:

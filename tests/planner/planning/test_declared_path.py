@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import softflagella as sf
-from planner.paths.path import Path2D, circle, smoothed
+from planner.paths.path import Path2D, circle, polygon, smoothed
 from planner.planning.plan import plan
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
@@ -43,6 +43,13 @@ def test_the_smoothing_that_a_very_noisy_path_is_told_works(noise: float) -> Non
         plan(noisy, CONTROL)
     smooth, _ = smoothed(noisy, float(str(caught.value).rsplit(" ", 1)[1].removesuffix("l")))
     assert plan(smooth, CONTROL).predicted_rms < 0.1
+
+
+def test_a_declared_path_far_from_the_drawn_one_says_so_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It used to be said only where a tenth of the path's extent is lost: 0.9 l of a race track were not."""
+    monkeypatch.setattr("planner.planning.declared_path.FAR", 0.02)
+    triangle = plan(polygon(3, 4.0), CONTROL, objective="flips")
+    assert triangle.warnings[0].startswith("the declared path leaves the drawn one by up to")
 
 
 def test_a_small_path_is_not_noisy() -> None:
