@@ -18,6 +18,7 @@ from dataset.rows.design import load_design
 from planner.files.plan_json import load_plan
 from sim.inputs import load_robot
 from sim.io.errors import run_command
+from sim.model.plan_file import plan_id
 from sim.model.presets import PRESETS
 from softflagella.__main__ import PACKAGES, main
 from surrogate.table.model_file import SHIPPED, load
@@ -63,6 +64,7 @@ def steady(made: Path, out: Path) -> str:
 def replay(made: Path, out: Path) -> str:
     plan = json.loads((made / "plan" / "plan.json").read_text())
     short = {**plan, "dwell_bar": plan["dwell_bar"][:2]}
+    short["id"] = plan_id(short)
     (out / "short.json").write_text(json.dumps(short))
     done("planner", "replay", out / "short.json", "--out", out / "track.csv")
     track = pd.read_csv(out / "track.csv")

@@ -28,6 +28,7 @@ from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge, kno
 from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.io.errors import InputError
+from sim.io.seals import sealed
 from sim.io.units import from_si, to_si
 from sim.model.robot import Robot
 from sim.model.robot_toml import ENTRIES, robot_toml
@@ -97,8 +98,8 @@ def corrected_toml(robot: Robot, final: FinalRefit, learnt: LearntCorrection | N
 
 
 def as_toml(robot: Robot, known: CalibrationKnowledge) -> str:
-    """Write a robot and what a calibration knows about it."""
-    return robot_toml(robot) + "\n" + knowledge_toml(known)
+    """Write a robot and what a calibration knows about it, with a digest."""
+    return sealed(robot_toml(robot) + "\n" + knowledge_toml(known))
 
 
 def handed_on(

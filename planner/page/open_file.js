@@ -8,6 +8,7 @@ import { InputError } from "./input_error.js";
 import { areOfRuns } from "./measured_table.js";
 import { readTablePath } from "./path_files.js";
 import { readRobot } from "./robot_toml.js";
+import { checkPlanId } from "./seals.js";
 import { splitName } from "./si_units.js";
 import { pathNames, readSvg } from "./svg_drawing.js";
 import { numbersOf, parseWords, textsOf } from "./text_tables.js";
@@ -66,6 +67,7 @@ function pathOfPlan(text, name) {
     throw new InputError(`${name} is not a plan.json of the planner (it has no format); plan again`);
   if (plan.format !== FORMAT)
     throw new InputError(`${name} has format ${plan.format}, this version reads ${FORMAT}: plan again`);
+  checkPlanId(plan.id, text, name);
   checkPlan(plan, name);
   const cm = 100 * plan.robot.tail_length_m,
     points = plan.closed ? plan.raw_path.slice(0, -1) : plan.raw_path;

@@ -7,6 +7,7 @@ import { general, pythonNumber, pythonText, repr } from "./format.js";
 import { InputError } from "./input_error.js";
 import { makeRobot } from "./robot.js";
 import { UNITS, fromSi, splitName, toSi, unitsOfKind } from "./si_units.js";
+import { isWhole } from "./seals.js";
 import { readToml } from "./toml.js";
 
 const ENTRIES = [
@@ -52,6 +53,7 @@ function readRobot(text, where) {
         `page --robot ${where} --out page.html`,
     );
   }
+  if (!isWhole(text)) throw new InputError(`${where} was edited, damaged or cut short after it was written`);
   const fields = readFields(tables, where);
   try {
     return makeRobot({ name: typeof name === "string" ? name : shown(name), ...fields });

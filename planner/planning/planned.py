@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import math
 import textwrap
 from dataclasses import dataclass
 from functools import cached_property
-from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,7 +28,7 @@ from sim.io.deprecated import old_attributes
 from sim.io.errors import InputError
 from sim.io.notebook import as_html, given_axes
 from sim.io.units import column_units, format_time
-from sim.model.plan_file import FORMAT
+from sim.model.plan_file import FORMAT, plan_id
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule
 
@@ -300,8 +298,7 @@ class Plan:
         `id` is a digest of all the rest. The other files of the plan have it, too.
         """
         content = self._content()
-        digest = sha256(json.dumps(content).encode()).hexdigest()
-        return {"id": f"p{digest[:11]}", **content}  # a letter first: no reader of plan.csv takes it for a number
+        return {"id": plan_id(content), **content}
 
     def _content(self) -> dict[str, Any]:
         robot, schedule = self.robot, self.schedule()

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from sim.io.errors import InputError
+from sim.io.seals import check_seal
 
 MOST_SETTINGS = 2**20  # bytes of a robot or a sweep
 MOST_TEXT = 16 * 2**20  # bytes of a drawing
@@ -73,12 +74,13 @@ def decode(data: bytes) -> str:
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """Read a TOML file.
+    """Read a TOML file; where it carries a digest (`sim.io.seals`), the digest is checked.
 
     Raises:
-        InputError: the file cannot be read, or is not TOML.
+        InputError: the file cannot be read, was cut short, or is not TOML.
     """
     text = read_text(path, MOST_SETTINGS)
+    check_seal(text, path)
     if _LONG_KEY.search(text):
         raise InputError(f"{path} is not TOML that is read here: a key has more than {_MOST_PARTS} parts")
     try:

@@ -13,9 +13,11 @@ from planner.files.plan_json import load_plan
 from planner.paths.path import circle
 from planner.planning.plan import plan
 from sim.io.errors import InputError
-from sim.model.plan_file import FORMAT
+from sim.model.plan_file import FORMAT, plan_id
 from sim.model.presets import PRESETS
 from sim.model.schedule import load_schedule
+
+READERS = [load_plan, load_schedule]  # of the planner and of the simulator
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +33,20 @@ def written(record: dict[str, Any], folder: Path, **changes: Any) -> Path:
 
 def test_it_reads_back(record: dict[str, Any], tmp_path: Path) -> None:
     assert load_plan(written(record, tmp_path)) == record
+    assert load_plan(written(record, tmp_path, code_version="0")) == {**record, "code_version": "0"}
+
+
+def test_a_changed_number_is_noticed(record: dict[str, Any], tmp_path: Path) -> None:
+    """One flipped bit used to change a dwell in silence."""
+    changed = {"dwell_bar": [record["dwell_bar"][0] * 1.01, *record["dwell_bar"][1:]]}
+    for reader in READERS:
+        with pytest.raises(
+            InputError, match=r"was edited or damaged after it was written: .*; plan again, or delete"
+        ):
+            reader(written(record, tmp_path, **changed))
+    edited = {name: value for name, value in {**record, **changed}.items() if name != "id"}
+    assert load_plan(written(edited, tmp_path)) == {**edited, "id": plan_id(edited)}
+    assert load_plan(written(record, tmp_path, **changed, id="0123456789ab"))["id"] == "0123456789ab"
 
 
 @pytest.mark.parametrize(
@@ -49,11 +65,8 @@ def test_edited_files_are_refused(
     record: dict[str, Any], tmp_path: Path, changes: dict[str, Any], expected: str
 ) -> None:
     with pytest.raises(InputError, match=expected) as caught:
-        load_plan(written(record, tmp_path, **changes))
+        load_plan(written(record, tmp_path, **changes, id=plan_id({**record, **changes})))
     assert "\n" not in str(caught.value)
-
-
-READERS = [load_plan, load_schedule]  # of the planner and of the simulator
 
 
 @pytest.mark.parametrize("reader", READERS)

@@ -26,6 +26,7 @@ from planner.tracking.tracker import Tracker
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.tracked_point import tracked_vehicle
 from sim.io.errors import InputError
+from sim.model.plan_file import plan_id
 from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker
 from tests.planner.vehicles import PROMPT
@@ -153,6 +154,7 @@ def test_paths_are_no_plans(tmp_path: Path) -> None:
 )
 def test_edited_plans_are_refused(changes: dict[str, Any], expected: str, tmp_path: Path) -> None:
     content = {**saved("circle"), **changes}
+    content["id"] = plan_id(content)
     path = tmp_path / "plan.json"
     path.write_text(json.dumps(content))
     for source in (content, path):

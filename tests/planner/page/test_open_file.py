@@ -11,6 +11,7 @@ import softflagella as sf
 from planner.paths.path import circle
 from planner.planning.plan import plan
 from sim.io.errors import InputError
+from sim.io.seals import sealed
 from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
 from tests.planner.page.page_core import answer, check_near
@@ -50,6 +51,17 @@ def test_plans_with_walls_an_arrival_or_laps_give_their_paths() -> None:
         assert found["paths"][0]["closed"] is content["closed"]  # type: ignore[index]
         raw = content["raw_path"][:-1] if content["closed"] else content["raw_path"]
         check_near(found["paths"][0]["points"], raw)  # type: ignore[index]
+
+
+def test_an_edited_plan_and_a_robot_that_was_cut_are_refused() -> None:
+    content = {**plan(circle(1.5), ROBOT, objective="flips").to_dict(), "code_version": "0"}
+    assert opened("plan.json", json.dumps(content, indent=1))["kind"] == "path"  # type: ignore[index]
+    content["raw_path"][1][0] += 0.1
+    assert "plan.json was edited or damaged after it was written" in str(opened("plan.json", json.dumps(content)))
+    whole = sealed(robot_toml(ROBOT))
+    assert opened("robot.toml", whole)["kind"] == "robot"  # type: ignore[index]
+    for text in (whole[:-30], whole.replace("C_t = 3.", "C_t = 4.")):
+        assert "robot.toml was edited, damaged or cut short" in str(opened("robot.toml", text))
 
 
 def test_a_drawing_with_several_paths_has_all_of_them() -> None:
