@@ -109,9 +109,10 @@ def track_in_tails(track: pd.DataFrame, robot: Mapping[str, Any]) -> pd.DataFram
     Raises:
         InputError: a column is missing, or places in cm and in tail lengths differ: the track is of another robot.
     """
-    lab = convert_columns(track, _LAB, "the track").table
+    replayed = set(_COLUMNS) <= set(track)
+    lab = convert_columns(track.drop(columns=[*_COLUMNS]) if replayed else track, _LAB, "the track").table
     cm = 100 * robot["tail_length_m"]
-    if set(_COLUMNS) <= set(track):
+    if replayed:
         for over_l, in_cm in (("x_over_l", "x_cm"), ("y_over_l", "y_cm")):
             if in_cm not in lab:
                 continue

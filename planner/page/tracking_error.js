@@ -68,15 +68,19 @@ function trackingLine(error) {
 
 /* Time, x, y and heading in the units of a replay. track_in_tails */
 function columnsInTails(table, robot) {
-  const lab = convertColumns(table, LAB, "the track").table, cm = 100 * robot.tail_length_m;
-  if (COLUMNS.every((name) => table.names.includes(name))) {
+  const replayed = COLUMNS.every((name) => table.names.includes(name)), cm = 100 * robot.tail_length_m;
+  const own = table.names.map((name, i) => [name, table.columns[i]]).filter(([name]) => !COLUMNS.includes(name));
+  const given = replayed ? { names: own.map(([name]) => name), columns: own.map(([, values]) => values) } : table;
+  const lab = convertColumns(given, LAB, "the track").table;
+  if (replayed) {
     for (const axis of ["x", "y"]) {
-      const given = lab.columns[lab.names.indexOf(`${axis}_cm`)];
+      const inCm = lab.columns[lab.names.indexOf(`${axis}_cm`)];
       const inTails = table.columns[table.names.indexOf(`${axis}_over_l`)];
-      if (given && !inTails.every((value, i) => Math.abs(value * cm - given[i]) <= ALIKE * (cm + Math.abs(given[i])))) {
+      const alike = (value, i) => Math.abs(value * cm - inCm[i]) <= ALIKE * (cm + Math.abs(inCm[i]));
+      if (inCm && !inTails.every(alike)) {
         throw new InputError(
-          `${axis}_over_l and ${axis}_cm of the track disagree with the plan's tail length, ${general(cm)} cm: it is ` +
-            "the track of another robot",
+          `${axis}_over_l and ${axis}_cm of the track disagree with the plan's tail length, ${general(cm)} cm: ` +
+            "it is the track of another robot",
         );
       }
     }

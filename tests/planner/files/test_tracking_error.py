@@ -52,7 +52,8 @@ def test_the_track_of_another_robot_is_refused(planned: tuple[dict[str, object],
     record, track = planned
     cm = 100 * CONTROL.tail_length
     own, other = (
-        track.assign(x_cm=size * track["x_over_l"], y_cm=size * track["y_over_l"]) for size in (cm, 15.0)
+        track.assign(x_cm=size * track["x_over_l"], y_cm=size * track["y_over_l"], heading_deg=0.0)
+        for size in (cm, 15.0)
     )
     assert tracking_error(record, own).rms == tracking_error(record, track).rms
     with pytest.raises(

@@ -68,6 +68,7 @@ def test_bad_tracks_are_refused_in_the_same_words(change: str) -> None:
         frame["x_over_l"] = 1e101
     elif change == "another robot":  # of tails of 15 cm
         frame["x_cm"], frame["y_cm"] = 15 * frame["x_over_l"], 15 * frame["y_over_l"]
+        frame["heading_deg"] = np.degrees(frame["heading_rad"])
     else:
         frame = frame.set_axis(["time", "x_cm", "y_cm", "heading_deg"], axis=1)
     with pytest.raises(InputError) as wanted:
