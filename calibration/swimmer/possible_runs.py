@@ -25,9 +25,10 @@ from sim.model.groups import MOST_TAILS
 from sim.model.robot import Robot
 
 SHORTEST, LONGEST, FASTEST = 0.5, 50, 1000  # tails in head radii, ω̄
-OFF, SLIPS = 20.0, 3.0  # factors: of an output, of the spins' sum
+SLIPS = 3.0  # factor of the spins' sum
 _SPINS = 4.0  # factor of the yaw rate beyond which all other spins may be in another unit
 _NEAR = 1.6  # factor between an output in another unit and what the robot does
+OFF = 10 / _NEAR  # factor of an output: of what is ten times too large or too small
 _USUAL = ("rpm", "rad_s", "deg_s", "rps", "mm", "cm", "m", "deg", "rad", "mm_s", "cm_s", "m_s", "cm_min")
 
 

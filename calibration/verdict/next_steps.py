@@ -1,6 +1,7 @@
 """What a lab does next, by the verdict of a table, in words.
 
-A verdict that the held-out runs contradict comes before all others: more runs, and no use of it until then.
+A verdict that the held-out runs contradict comes before all others: more runs, and no use of it until then. A
+corrected robot that does not lower their error is not advised.
 """
 
 from __future__ import annotations
@@ -20,7 +21,15 @@ def next_steps(result: Verdict) -> list[str]:
         "ambiguous": _after_ambiguous,
         "unexplained": _after_unexplained,
     }
-    return [*_contradicted(result), *by_verdict[result.verdict](result)]
+    steps = [*_contradicted(result), *by_verdict[result.verdict](result)]
+    if result.error_corrected < result.error_uncalibrated:
+        return steps
+    return [
+        "Plan with the robot as given: the corrected one does not lower the error on the held-out runs "
+        f"({100 * result.error_uncalibrated:.2f} % as given, {100 * result.error_corrected:.2f} % corrected). "
+        "Check the units of the table, or make more runs.",
+        *(step for step in steps if "corrected.toml" not in step),
+    ]
 
 
 def _contradicted(result: Verdict) -> list[str]:

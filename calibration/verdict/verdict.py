@@ -124,6 +124,13 @@ class Verdict:
         return self.errors.rms.get("predictive")
 
     @property
+    def error_corrected(self) -> float:
+        """Relative error of the corrected robot on the held-out runs."""
+        if self.described:
+            return self.errors.rms["law"]
+        return self.error_after if self.error_predictive is None else self.error_predictive
+
+    @property
     def noise_ceiling(self) -> float:
         """Relative error that noise alone makes."""
         return self.errors.noise

@@ -107,6 +107,19 @@ def test_the_units_of_the_table_do_not_change_the_numbers(number: tuple[Verdict,
     assert record["next_steps"] == next_steps(number[0])
 
 
+@pytest.mark.xdist_group("report")
+def test_a_corrected_robot_that_does_not_lower_the_error_is_not_advised(
+    number: tuple[Verdict, Measurements],
+) -> None:
+    given = number[0].error_uncalibrated
+    for result in (with_errors(number[0], before=given, after=given), replace(number[0], verdict="none")):
+        worse = with_errors(result, before=given, after=1.1 * given)
+        first, *others = next_steps(worse)
+        assert first.startswith("Plan with the robot as given: the corrected one does not lower the error")
+        assert not [step for step in others if "corrected" in step]
+        assert "corrected.toml" in " ".join(next_steps(with_errors(result, before=given, after=0.9 * given)))
+
+
 @shares_verdicts
 def test_a_claim_that_does_not_lower_the_error_says_so_first(tmp_path: Path) -> None:
     """In the verdict's first sentence, which verdict.json and the report have, too, and in what to do next."""

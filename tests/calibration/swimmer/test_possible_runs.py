@@ -88,6 +88,15 @@ def test_an_output_in_another_unit_is_refused_with_that_unit(name: str, unit: st
 
 
 @pytest.mark.usefixtures("toy_model")
+@pytest.mark.parametrize("column", ["omega_yr_rad_s", "R_yr_cm", "theta_deg"])
+def test_an_output_ten_times_too_small_is_refused(column: str) -> None:
+    """R_yr_cm / 10 used to be fitted for minutes, and the corrected robot was advised with an error of 64 %."""
+    table = toy_table(4)
+    with pytest.raises(InputError, match=f"{column} is 0.* times what the robot as given does"):
+        calibrated(table.assign(**{column: table[column] / 10}))
+
+
+@pytest.mark.usefixtures("toy_model")
 @pytest.mark.parametrize(
     ("factor", "meant", "stated"), [(math.pi / 30, "rad/s", "rpm"), (30 / math.pi, "rpm", "rad/s")]
 )
