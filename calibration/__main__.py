@@ -12,6 +12,14 @@ program = Program("calibration", "Find from measured runs what the model of a ro
 main = program.main
 
 
+def _refuse_early(*tables: str) -> None:
+    """Refuse what is no table before anything that takes seconds to load."""
+    from sim.io.tables import read_table
+
+    for table in tables:
+        read_table(table)
+
+
 @program.command(
     "calibrate",
     "fit a table, find what the model lacks, correct the robot",
@@ -46,6 +54,7 @@ main = program.main
     aliases=("close",),
 )
 def _calibrate(arguments: Namespace) -> None:
+    _refuse_early(arguments.table)
     from calibration.report.path_error import DEFAULT_PATHS
     from calibration.report.robot_verdict import calibrate_robot
     from calibration.swimmer.possible_runs import owned
@@ -95,6 +104,7 @@ def _calibrate(arguments: Namespace) -> None:
     JOBS,
 )
 def _decide(arguments: Namespace) -> None:
+    _refuse_early(arguments.table)
     from calibration.laws.law_model import with_law
     from calibration.swimmer.measured_table import read_measurements
     from calibration.swimmer.swimmer import SwimmerModel
@@ -121,6 +131,7 @@ def _decide(arguments: Namespace) -> None:
     JOBS,
 )
 def _laws(arguments: Namespace) -> None:
+    _refuse_early(arguments.table)
     from calibration.report.robot_laws import find_robot_laws
     from sim.inputs import load_robot
 
@@ -206,6 +217,7 @@ def _simulate(arguments: Namespace) -> None:
     out("CSV"),
 )
 def _tracks(arguments: Namespace) -> None:
+    _refuse_early(arguments.tracks, arguments.runs)
     from calibration.report.track_pictures import draw_tracks
     from calibration.swimmer.camera_tracks import measure_tracks
     from sim.inputs import load_robot

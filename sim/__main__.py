@@ -6,7 +6,7 @@ import sys
 from argparse import Namespace
 from pathlib import Path
 
-from sim.io.commands import JOBS, Program, argument, out
+from sim.io.commands import JOBS, RUNS_OF, Program, argument, out, refuse_runs_of
 from sim.io.errors import InputError, naming
 from sim.model.sweepable import SWEEPABLE, read_range
 
@@ -18,7 +18,8 @@ main = program.main
     "steady",
     "mean motion of a robot, or of many, at constant motor speed",
     argument("robot", metavar="ROBOT", help="robot.toml, the name of a preset, or a table of points: CSV with "
-             "C_t,C_r,C_yr,l_over_R,L_over_R,l_over_r0,omega_bar,N,…"),
+             "C_t,C_r,C_yr,l_over_R,L_over_R,l_over_r0,omega_bar,N,…, or, with --robot, runs: N,l_cm,omega_rpm"),
+    RUNS_OF,
     out("CSV with the same rows and their motion; needed for a table of points", default=None),
     argument("--no-stability", action="store_true",
              help="do not compute whether small perturbations decay, which adds a quarter to the time"),
@@ -28,6 +29,7 @@ def _steady(arguments: Namespace) -> None:
     from sim.inputs import names_robot
 
     if names_robot(arguments.robot):
+        refuse_runs_of(arguments)
         _steady_robot(arguments)
     elif arguments.out is None:
         from sim.io.tables import read_table
@@ -67,25 +69,29 @@ def _steady_points(arguments: Namespace) -> None:
 
     from sim.effects.tail_contact import EFFECT as CONTACT
     from sim.effects.tail_contact import least_gap
+    from sim.inputs import point_columns
     from sim.io.files import write_csv
     from sim.io.tables import read_table
     from sim.motion.batches import steady_columns
+    from sim.motion.lab_units import LAB_COLUMNS, lab_motion
     from sim.motion.steady_motion import QUALITY_COLUMNS, STEADY_COLUMNS
 
     points = read_table(arguments.robot)
-    replaced = [name for name in (*STEADY_COLUMNS, *QUALITY_COLUMNS) if name in points]
+    lab = () if arguments.runs_of is None else LAB_COLUMNS
+    replaced = [name for name in (*lab, *STEADY_COLUMNS, *QUALITY_COLUMNS) if name in points]
     if replaced:
         print(
             f"note: these columns of the input are replaced by new results: {', '.join(replaced)}", file=sys.stderr
         )
         points = points.drop(columns=replaced)
     with naming(arguments.robot):
-        columns = {str(c): points[c].to_numpy() for c in points}
-        result = steady_columns(columns, stability=not arguments.no_stability, jobs=arguments.jobs)
-    table = pd.concat([points, pd.DataFrame(result)], axis=1)
+        robots, columns = point_columns(points, arguments.runs_of, arguments.robot)
+        motion = steady_columns(columns, stability=not arguments.no_stability, jobs=arguments.jobs)
+    result = {**lab_motion(robots, motion), **motion} if robots else motion
+    table = pd.concat([points.reset_index(drop=True), pd.DataFrame(result)], axis=1)
     write_csv(table, arguments.out)
     ended = table["converged"].to_numpy()
-    touching = int(np.count_nonzero(table["tail_gap"] < least_gap(table.get(CONTACT.name, 0.0))))
+    touching = int(np.count_nonzero(table["tail_gap"] < least_gap(columns.get(CONTACT.name, 0.0))))
     direct = int(np.count_nonzero(table["method"] == "direct"))
     print(
         f"{len(table)} rows, {int(ended.sum())} converged ({direct} solved directly), "

@@ -6,8 +6,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,12 +18,22 @@ from sim.io.errors import InputError, naming
 from sim.io.files import write_text
 from sim.io.keywords import checks_keywords
 from sim.io.reading import read_toml
+from sim.io.units import to_si
 from sim.model.correction import read_correction
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, checked_values
 from sim.model.learnt_range import read_learnt_range
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import read_robot, robot_toml
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+RUN = ("N", "l_cm", "omega_rpm")  # what differs between the runs of a robot
+RUN_SYNONYMS = {
+    "rpm": "omega", "motor": "omega", "motor_speed": "omega", "length": "l", "tail_length": "l", "tails": "N",
+    "heading": "course",
+}  # fmt: skip
 
 
 def check_columns(columns: Mapping[str, Any]) -> dict[str, Floats]:
@@ -53,6 +64,47 @@ def group_columns(robots: Sequence[Robot]) -> dict[str, Floats]:
     names = dict.fromkeys(name for row in rows for name in row)
     nulls = {name: catalogue()[name].null if name in catalogue() else None for name in names}
     return {name: np.array([row.get(name, nulls[name]) for row in rows]) for name in names}
+
+
+def run_columns(table: pd.DataFrame, robot: Robot, where: str) -> tuple[list[Robot], dict[str, Floats]]:
+    """Return the robot in each of M runs, and the dimensionless columns, (M,) each, of its runs.
+
+    Args:
+        table: columns of RUN, or these in other units; for what is missing the robot has one value. Other columns
+            are not read.
+        robot: the robot of the runs. The sign of a run's omega_rpm is the direction of the motor.
+        where: name of the table, for messages.
+
+    Raises:
+        InputError: there is no column of a run, or a run is not possible.
+    """
+    from sim.io.quantities import convert_columns, numbers_of  # these load pandas
+    from sim.io.text_tables import row_name
+
+    given = convert_columns(table, RUN, where, RUN_SYNONYMS).table
+    if not set(RUN) & set(given):
+        raise InputError(f"{where}: no column {', '.join(RUN)}; give at least one of them for the runs of a robot")
+    robots, directions = [], []
+    values = {name: numbers_of(given[name]).to_list() for name in RUN if name in given}
+    for row in range(len(table)):
+        run = {name: column[row] for name, column in values.items()}
+        speed = to_si(run["omega_rpm"], "rpm") if "omega_rpm" in run else robot.motor_speed
+        length = to_si(run["l_cm"], "cm") if "l_cm" in run else robot.tail_length
+        with naming(f"{where}, {row_name(table, row)}"):
+            tails = run.get("N", robot.tails)
+            if tails % 1 != 0:
+                raise InputError(f"N = {tails:g}; give a whole number of tails")
+            robots.append(replace(robot, tails=int(tails), tail_length=length, motor_speed=abs(speed)))
+        directions.append(-1.0 if speed < 0 else 1.0)
+    columns = group_columns(robots)
+    return robots, {**columns, "omega_bar": columns["omega_bar"] * np.array(directions)}
+
+
+def point_columns(points: pd.DataFrame, robot: str | None, where: str) -> tuple[list[Robot], dict[str, Any]]:
+    """Return the robots where a table has the runs of one, otherwise none, and the columns of the points, (M,)."""
+    if robot is not None:
+        return run_columns(points, load_robot(robot), where)
+    return [], {str(name): points[name].to_numpy() for name in points}
 
 
 def names_robot(source: str | Path) -> bool:

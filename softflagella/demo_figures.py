@@ -28,7 +28,7 @@ _TAILS = {1: SOFT, 2: BLUE, 3: ORANGE, 4: GREEN, 5: VIOLET}
 _LEFT, _RIGHT = BLUE, ORANGE  # of the directions of the motor, and of the turns that they make
 _MAGNIFIED = 40.0  # s of the schedule that are magnified
 _QUANTITIES = {  # column of a motion in lab units -> what it is called, its unit, factor to it
-    "omega_yr_rad_s": ("yaw rate", "°/s", 180 / math.pi),
+    "omega_yr_rad_s": ("yaw rate", "rad/s", 1.0),
     "R_yr_cm": ("turn radius", "cm", 1.0),
     "theta_deg": ("slip angle", "°", 1.0),
 }

@@ -6,7 +6,6 @@ a checkout of the repository.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -163,7 +162,7 @@ def _motion_in_words(robot: Robot, motion: Mapping[str, Any]) -> list[tuple[str,
         (f"spin of the head, {_sense(lab['omega_h_rpm'])} from behind", f"{abs(lab['omega_h_rpm']):.3g} rpm"),
         (
             f"yaw rate, to the {'left' if lab['omega_yr_rad_s'] > 0 else 'right'}",
-            f"{math.degrees(abs(lab['omega_yr_rad_s'])):.3g} °/s",
+            f"{abs(lab['omega_yr_rad_s']):.3g} rad/s",
         ),
         ("turn radius", f"{lab['R_yr_cm']:.3g} cm"),
         ("slip angle, between axis and path", f"{lab['theta_deg']:.3g}°"),

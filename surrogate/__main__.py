@@ -6,7 +6,7 @@ import sys
 from argparse import Namespace
 from pathlib import Path
 
-from sim.io.commands import LOOKUP, Program, argument, out
+from sim.io.commands import LOOKUP, RUNS_OF, Program, argument, out, refuse_runs_of
 from sim.io.errors import InputError, naming
 
 program = Program("surrogate", "Train look-up tables and query them.")
@@ -64,8 +64,9 @@ def _train(arguments: Namespace) -> None:
 @program.command(
     "query",
     "predict the motion of a robot, or of many, with intervals, without simulating",
-    argument("robot", metavar="ROBOT", help="robot.toml, the name of a preset, or a table of points like that of "
-             "softflagella steady, dwell_bar optional"),
+    argument("robot", metavar="ROBOT", help="robot.toml, the name of a preset, or a table of points or runs "
+             "like that of softflagella steady, dwell_bar optional"),
+    RUNS_OF,
     out("CSV; needed for a table of points", default=None),
     LOOKUP,
     argument(
@@ -77,6 +78,7 @@ def _query(arguments: Namespace) -> None:
     from sim.inputs import names_robot
 
     if names_robot(arguments.robot):
+        refuse_runs_of(arguments)
         _query_robot(arguments)
     elif arguments.out is None:
         from sim.io.tables import read_table
@@ -117,20 +119,25 @@ def _query_points(arguments: Namespace) -> None:
     """Answer for every row of a table."""
     import pandas as pd
 
+    from sim.inputs import point_columns
     from sim.io.files import write_csv
     from sim.io.tables import read_table
+    from sim.motion.lab_units import lab_motion
     from surrogate.table.lookup import NeuralTable
     from surrogate.table.model_file import load_table
 
     points = read_table(arguments.robot)
     table = load_table(arguments.lookup)
-    columns = {str(c): points[c].to_numpy() for c in points}
     with naming(arguments.robot):
+        robots, columns = point_columns(points, arguments.runs_of, arguments.robot)
         if isinstance(table, NeuralTable):
             result = table.query(columns, intervals=True, flag=arguments.flag, certify=arguments.certify)
         else:
             result = table.query(columns)
-    answers = pd.concat([points, pd.DataFrame(result)], axis=1)
+    if robots:
+        result = {**lab_motion(robots, result), **result}
+    kept = points.drop(columns=[name for name in result if name in points]).reset_index(drop=True)
+    answers = pd.concat([kept, pd.DataFrame(result)], axis=1)
     write_csv(answers, arguments.out)
     print(f"{len(answers)} rows -> {arguments.out}")
 

@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 
 MANY = 0.2  # share of the rows; if more are excluded, the rest may not be a fair sample
-_ROW = re.compile(r"row (\d+): (.*)", re.DOTALL)
+_ROW = re.compile(r"row (\d+)(?: \(line \d+\))?: (.*)", re.DOTALL)
 # A value (" = 3"), the row that was copied, the size of a deviation.
 _PARTICULAR = re.compile(r" = .*?(?= is | has )| \(row \d+\)$|(?<= is )\d+ (?=standard deviations )", re.DOTALL)
 _LISTED = 3  # rows of a reason

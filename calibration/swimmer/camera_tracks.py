@@ -10,22 +10,23 @@ other units than COLUMNS are converted. Angles are counter-clockwise, seen from 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, replace
+from collections.abc import Collection
+from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from calibration.swimmer.measured_table import INPUTS, OUTPUTS, SYNONYMS
+from calibration.swimmer.measured_table import OUTPUTS
 from calibration.swimmer.possible_runs import check_factor
 from calibration.swimmer.track_fit import TrackedRun, TrackFit, fit_track
 from sim.arrays import Floats
-from sim.inputs import group_columns
+from sim.inputs import RUN, RUN_SYNONYMS, run_columns
 from sim.io.errors import InputError, naming
 from sim.io.quantities import convert_columns, numbers_of
 from sim.io.tables import read_table
-from sim.io.units import to_si
+from sim.io.text_tables import row_name
 from sim.model.robot import Robot
 from sim.motion.batches import steady_columns
 from sim.motion.lab_units import lab_motion
@@ -34,6 +35,7 @@ COLUMNS = ("run", "time_s", "x_cm", "y_cm", "heading_deg")
 _SYNONYMS = {"t": "time"}
 _LARGEST = 1e9  # of a sample
 _FEWEST = 12  # samples that a run needs
+_LISTED = 8  # names of runs in a message
 _ALIKE = 1.3  # ratio of the angles by which path and heading turn
 
 
@@ -82,7 +84,7 @@ def measure_tracks(
     )
     table, place = (runs, "the runs") if isinstance(runs, pd.DataFrame) else (read_table(runs), str(runs))
     samples, converted = convert_columns(samples, COLUMNS, where, _SYNONYMS)
-    table, renamed = convert_columns(table, INPUTS, place, SYNONYMS)
+    table, renamed = convert_columns(table, RUN, place, RUN_SYNONYMS)
     with naming(runs):
         _check_runs(table)
     with naming(tracks):
@@ -94,7 +96,8 @@ def _check_runs(table: pd.DataFrame) -> None:
     """Refuse runs that have no names, or that are there twice."""
     if "run" not in table:
         raise InputError("the runs have no column 'run' that says which track is theirs")
-    twice = table["run"][table["run"].duplicated()]
+    names = _names(table["run"])
+    twice = names[names.duplicated()]
     if len(twice):
         raise InputError(f"run {str(twice.iloc[0])[:40]} is there twice; give one row for each run")
 
@@ -103,21 +106,30 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
     for name in COLUMNS:
         if name not in samples:
             raise InputError(f"the tracks have no column {name!r}; they need {', '.join(COLUMNS)}")
-    values = pd.DataFrame({name: numbers_of(samples[name]) for name in COLUMNS[1:]})
+    values = pd.DataFrame({name: numbers_of(samples[name]) for name in COLUMNS[1:]}).reset_index(drop=True)
     values[~(values.abs() < _LARGEST)] = np.nan
-    of_run = dict(list(values.groupby(samples["run"], sort=False)))
+    of_run = {str(name): track for name, track in values.groupby(_names(samples["run"]).to_numpy(), sort=False)}
     nothing = values.iloc[:0]
-    aside: list[str] = []
+    runs = list(_names(table["run"]))
+    if not set(runs) & set(of_run):
+        raise InputError(f"no run has a track: the runs are {_listed(runs)}; the tracks are {_listed(of_run)}")
+    aside = [f"run {name}: a track, but no row among the runs" for name in of_run if name not in runs]
     tracked: list[TrackedRun] = []
     fitted: list[Track] = []
-    for run in table["run"]:
+    for run in runs:
         track = of_run.get(run, nothing)
         known_samples = track.notna().all(axis=1)
         if not known_samples.all():
             aside.append(f"run {run}: {int((~known_samples).sum())} samples with a value that is not a number")
-        track = track[known_samples].sort_values("time_s")
-        if len(track) < _FEWEST:
-            aside.append(f"run {run}: {len(track)} samples; a track needs at least {_FEWEST}")
+        track = track[known_samples]
+        back = track.index[1:][np.diff(track["time_s"]) < 0]
+        if len(back) or len(track) < _FEWEST:
+            aside.append(
+                f"run {run}: its time goes back at {row_name(samples, back[0])}; give its samples in order, with "
+                "a clock that runs on"
+                if len(back)
+                else f"run {run}: {len(track)} samples; a track needs at least {_FEWEST}"
+            )
             tracked.append(TrackedRun())
             continue
         time, x, y, heading = (track[c].to_numpy(dtype=float) for c in COLUMNS[1:])
@@ -137,6 +149,16 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
     if robot is not None:
         _check_motion(robot, table, columns)
     return MeasuredTracks(pd.concat([table, columns[known]], axis=1), aside, fitted, ())
+
+
+def _names(column: pd.Series) -> pd.Series:
+    """Write the names of runs as text without blanks around it; a whole number has one spelling."""
+    return column.astype(str).str.strip().str.replace(r"^0*([0-9]+)(?:\.0*)?$", r"\1", regex=True)
+
+
+def _listed(names: Collection[str]) -> str:
+    more = f", … ({len(names)})" if len(names) > _LISTED else ""
+    return ", ".join(list(names)[:_LISTED]) + more
 
 
 def _fitted(time: Floats, x: Floats, y: Floats, heading_deg: Floats) -> TrackFit | None:
@@ -192,18 +214,15 @@ def _check_motion(robot: Robot, runs: pd.DataFrame, measured: pd.DataFrame) -> N
     Raises:
         InputError: the runs lack a setting, or an output is far from the simulated one in all runs together.
     """
-    missing = [name for name in INPUTS if name not in runs]
+    missing = [name for name in RUN if name not in runs]
     if missing:
         raise InputError(f"the runs have no column {missing[0]!r}; the comparison with a robot needs it")
-    settings = runs[list(INPUTS)].apply(numbers_of)
+    settings = runs[list(RUN)].apply(numbers_of)
     usable = (settings["N"] >= 1) & (settings["l_cm"] > 0) & (settings["omega_rpm"].abs() > 0)
-    swimmers = [
-        replace(robot, tails=int(tails), tail_length=cm / 100, motor_speed=to_si(abs(rpm), "rpm"))
-        for tails, cm, rpm in settings[usable].itertuples(index=False)
-    ]
-    if not swimmers:
+    if not usable.any():
         return
-    simulated = lab_motion(swimmers, steady_columns(group_columns(swimmers), stability=False))
+    swimmers, columns = run_columns(settings[usable], robot, "the runs")
+    simulated = lab_motion(swimmers, steady_columns(columns, stability=False))
     for output in ("omega_yr", "R_yr", "theta", "v"):
         column = OUTPUTS[output][0]
         factors = np.abs(measured[column][usable].to_numpy(dtype=float) / simulated[column])

@@ -10,8 +10,9 @@ Some conditions must be repeated, because the noise is estimated from repeats. `
 that were made together. Without it, all runs of one N are one session. Some effects need elapsed_min,
 temperature_C, tank_diameter_cm or course_deg (direction of the path in the lab, where a run is a part of a
 circle). Rows that cannot be used are excluded with number and reason, and so are copies of rows
-(`calibration.swimmer.copied_rows`). Columns without any value are left out, and columns of other names, unless the
-name looks like a misspelt one.
+(`calibration.swimmer.copied_rows`), and rows that lack a note which nearly all others have. Columns without any
+value are left out, notes that many rows lack, and columns of other names, unless the name looks like a misspelt
+one.
 
 Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians. A
 row with a wrong sign is a bad row, because the direction of the motor determines all signs
@@ -33,9 +34,12 @@ from calibration.statistics.statistical_model import Runs, repeat_covariance
 from calibration.swimmer.copied_rows import find_copies
 from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, TACHOMETER
 from sim.arrays import Floats, Integers
+from sim.inputs import RUN as INPUTS
+from sim.inputs import RUN_SYNONYMS as SYNONYMS
 from sim.io.errors import InputError, naming
 from sim.io.quantities import convert_columns, numbers_of
 from sim.io.tables import read_table
+from sim.io.text_tables import row_name
 from sim.io.units import to_si
 
 # Output -> (column, factor to SI, sign relative to the motor's; 0: a magnitude)
@@ -63,11 +67,6 @@ _SIGMAS = {  # column -> nuisance parameter, factor
     "heading_zero_sigma_deg": (HEADING, math.pi / 180),
     "tachometer_sigma_percent": (TACHOMETER, 0.01),
 }
-INPUTS = ("N", "l_cm", "omega_rpm")
-SYNONYMS = {
-    "rpm": "omega", "motor": "omega", "motor_speed": "omega", "length": "l", "tail_length": "l", "tails": "N",
-    "heading": "course",
-}  # fmt: skip
 _NOTED = ("elapsed_min", "temperature_C", "tank_diameter_cm", "course_deg")
 KNOWN_COLUMNS = {
     *INPUTS,
@@ -82,6 +81,7 @@ KNOWN_COLUMNS = {
 _LARGEST = 1e9  # of a value
 _FEWEST_RUNS, _FEWEST_REPEATS = 24, 8
 _COPY = "a copy of an earlier row, equal in all inputs and outputs"
+_GAPS = 0.1  # share of the usable rows that may lack a note
 _OWN = 1e-3  # share of an output's scatter that must be independent of the other outputs
 
 
@@ -133,10 +133,11 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         )
     numbers = table.drop(columns="session", errors="ignore").apply(numbers_of)
     reasons = _reasons(table, numbers, outputs)
+    sparse = _mark_gaps(reasons, table, numbers)
     _mark_copies(reasons, numbers, outputs)
     keep = np.array([not r for r in reasons])
-    aside = tuple(f"row {i + 1}: {r}" for i, r in enumerate(reasons) if r)
-    good = numbers[keep]
+    aside = tuple(f"{row_name(table, i)}: {r}" for i, r in enumerate(reasons) if r)
+    good = numbers[keep].drop(columns=sparse)
     if len(good) < _FEWEST_RUNS:
         first = f" ({aside[0]})" if aside else ""
         raise InputError(f"{len(good)} usable runs{first}; a calibration needs at least {_FEWEST_RUNS}")
@@ -177,6 +178,10 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
             *aside,
             *follows,
             *(f"column {name}: without any value, left out" for name in empty),
+            *(
+                f"column {name}: without a value in more than {100 * _GAPS:.0f} % of the rows, left out"
+                for name in sparse
+            ),
             *(f"column {name}: not known, left out" for name in unknown),
         ),
         caveats=_caveats(tails, length, omega),
@@ -193,6 +198,20 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
 def _is_empty(column: pd.Series) -> bool:
     """Tell whether a column has nothing but missing values and blanks."""
     return bool((column.isna() | (column.astype(str).str.strip() == "")).all())
+
+
+def _mark_gaps(reasons: list[str], table: pd.DataFrame, numbers: pd.DataFrame) -> list[str]:
+    """Give a reason to every usable row that lacks a note, and return the notes that many rows lack."""
+    sparse = []
+    usable = np.array([not reason for reason in reasons])
+    for column in (name for name in _NOTED if name in numbers):
+        gaps = np.flatnonzero(usable & ~np.isfinite(numbers[column].to_numpy()))
+        if len(gaps) > _GAPS * usable.sum():
+            sparse.append(column)
+            continue
+        for i in gaps:
+            reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} is not a finite number"
+    return sparse
 
 
 def _mark_copies(reasons: list[str], numbers: pd.DataFrame, outputs: tuple[str, ...]) -> None:
@@ -260,7 +279,7 @@ def _caveats(tails: Floats, length: Floats, omega: Floats) -> tuple[str, ...]:
 
 
 def _noted(good: pd.DataFrame) -> dict[str, Floats]:
-    """Read notes that every run has and that differ between runs."""
+    """Read notes that differ between runs."""
     notes = {}
     for column, (name, scale) in {
         "elapsed_min": ("elapsed_h", 1 / 60),
@@ -269,11 +288,11 @@ def _noted(good: pd.DataFrame) -> dict[str, Floats]:
     }.items():
         if column in good:
             value = good[column].to_numpy(dtype=float) * scale
-            if np.isfinite(value).all() and np.ptp(value) > 0:
+            if np.ptp(value) > 0:
                 notes[name] = value - value.mean() if name == "temperature_K" else value
     if "course_deg" in good:
         value = np.radians(good["course_deg"].to_numpy(dtype=float))
-        if np.isfinite(value).all() and np.ptp(value) > 0:
+        if np.ptp(value) > 0:
             notes["course_x"], notes["course_y"] = np.cos(value), np.sin(value)
     return notes
 

@@ -55,8 +55,9 @@ function pythonText(text) {
   const quote = text.includes("'") && !text.includes('"') ? '"' : "'";
   const escapes = { "\\": "\\\\", "\n": "\\n", "\r": "\\r", "\t": "\\t", [quote]: `\\${quote}` };
   const shown = (sign) => {
-    const hidden = /[\x00-\x1f\x7f-\xa0\xad]/.test(sign);
-    return hidden ? `\\x${sign.codePointAt(0).toString(16).padStart(2, "0")}` : sign;
+    const code = sign.codePointAt(0), [letter, width] = code < 0x100 ? ["x", 2] : code < 0x10000 ? ["u", 4] : ["U", 8];
+    const hidden = sign !== " " && /[\p{C}\p{Z}]/u.test(sign);
+    return hidden ? `\\${letter}${code.toString(16).padStart(width, "0")}` : sign;
   };
   return quote + Array.from(text, (sign) => escapes[sign] ?? shown(sign)).join("") + quote;
 }

@@ -42,6 +42,7 @@ const KNOWN = [
   ...ERRORS, ...Object.keys(SIGMAS),
 ];
 const LARGEST = 1e9; // of a value
+const GAPS = 0.1; // share of the usable rows that may lack a note
 const OWN = 1e-3; // share of an output's scatter that must be independent of the other outputs
 const LARGEST_SIGMA = 0.5;
 const FEWEST_RUNS = 24;
@@ -86,10 +87,11 @@ function measurementsOf(given, where) {
   const used = [...INPUTS, ...outputs.map((name) => OUTPUTS[name].column)];
   const columns = Object.fromEntries(used.map((name) => [name, column(name)]));
   const reasons = reasonsOf(table, columns, outputs);
+  const sparse = markGaps(reasons, table);
   markCopies(reasons, columns);
   const usable = reasons.flatMap((reason, row) => (reason ? [] : [row]));
   if (!usable.length) {
-    throw new InputError(`0 usable runs (row 1: ${reasons[0]}); a calibration needs at least ${FEWEST_RUNS}`);
+    throw new InputError(`0 usable runs (${rowName(table, 0)}: ${reasons[0]}); a calibration needs at least ${FEWEST_RUNS}`);
   }
   const names = usable.map((row) =>
     table.names.includes("session")
@@ -101,7 +103,7 @@ function measurementsOf(given, where) {
   const runs = {
     outputs, columns, usable, repeats, names: table.names, sessions: [...new Set(names)].sort(),
     converted: [...first.notes, ...notes],
-    excluded: reasons.flatMap((reason, row) => (reason ? [`row ${row + 1}: ${reason}`] : [])),
+    excluded: reasons.flatMap((reason, row) => (reason ? [`${rowName(table, row)}: ${reason}`] : [])),
     refusal: null,
   };
   if (usable.length >= FEWEST_RUNS && repeats >= FEWEST_REPEATS) {
@@ -110,6 +112,8 @@ function measurementsOf(given, where) {
     runs.refusal = refusal ?? sigmaRefusal(table, usable);
   }
   runs.excluded.push(...empty.map((name) => `column ${name}: without any value, left out`));
+  const many = `without a value in more than ${100 * GAPS} % of the rows, left out`;
+  runs.excluded.push(...sparse.map((name) => `column ${name}: ${many}`));
   runs.excluded.push(...unknown.map((name) => `column ${name}: not known, left out`));
   return runs;
 }
@@ -119,11 +123,27 @@ function emptyColumns({ names, texts }) {
   return names.filter((_, i) => texts[i].every((text) => text.trim() === "" || text === "nan"));
 }
 
-function without({ names, columns, texts }, left) {
+function without({ names, columns, texts, lines }, left) {
   const kept = names.flatMap((name, i) => (left.includes(name) ? [] : [i]));
   return {
-    names: kept.map((i) => names[i]), columns: kept.map((i) => columns[i]), texts: kept.map((i) => texts[i]),
+    names: kept.map((i) => names[i]), columns: kept.map((i) => columns[i]), texts: kept.map((i) => texts[i]), lines,
   };
+}
+
+/* Name a row by its number and by its line in the file. row_name */
+function rowName({ lines }, row) {
+  return `row ${row + 1} (line ${lines[row]})`;
+}
+
+/* Give a reason to every usable row that lacks a note, and return the notes that many rows lack. _mark_gaps */
+function markGaps(reasons, table) {
+  const usable = reasons.flatMap((reason, row) => (reason ? [] : [row]));
+  return NOTED.filter((name) => {
+    const at = table.names.indexOf(name), gaps = usable.filter((row) => !Number.isFinite(table.columns[at]?.[row]));
+    if (at < 0 || gaps.length > GAPS * usable.length) return at >= 0;
+    for (const row of gaps) reasons[row] ||= `${name} = ${table.texts[at][row]} is not a finite number`;
+    return false;
+  });
 }
 
 /* Give a reason to every usable row that is a copy of an earlier one. _mark_copies */

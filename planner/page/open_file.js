@@ -6,12 +6,13 @@
 import { refuseOtherKinds } from "./file_kinds.js";
 import { InputError } from "./input_error.js";
 import { areOfRuns } from "./measured_table.js";
+import { numbersOf, textsOf } from "./number_words.js";
 import { readTablePath } from "./path_files.js";
 import { readRobot } from "./robot_toml.js";
 import { checkPlanId } from "./seals.js";
 import { splitName } from "./si_units.js";
 import { pathNames, readSvg } from "./svg_drawing.js";
-import { numbersOf, parseWords, textsOf } from "./text_tables.js";
+import { parseWords } from "./text_tables.js";
 
 const FORMAT = 2; // of plan.json
 const TRACK = ["heading", "time"]; // what a path does not have
@@ -27,13 +28,13 @@ function openFile({ name, bytes }) {
   if (SVG.test(name)) return pathsOfDrawing(textOf(content, name), name);
   refuseOtherKinds(name, content);
   if (JSON_FILE.test(name)) return pathOfPlan(textOf(content, name), name);
-  const { names, words, comma } = parseWords(content, name, false), columns = names.map(String);
+  const { names, words, lines } = parseWords(content, name, false), columns = names.map(String);
   const quantities = columns.map((column) => splitName(column).quantity.toLowerCase());
-  const table = () => ({ names, columns: words.map((column) => numbersOf(column, comma)) });
+  const table = () => ({ names, columns: words.map((column, i) => numbersOf(column, names[i])) });
   if (TRACK.every((quantity) => quantities.some((each) => each.startsWith(quantity))))
     return { kind: "track", table: table() };
   if (!PATH.every((quantity) => quantities.includes(quantity)) && areOfRuns(columns)) {
-    return { kind: "runs", table: { ...table(), texts: words.map((column) => textsOf(column, comma)) } };
+    return { kind: "runs", table: { ...table(), texts: words.map(textsOf), lines } };
   }
   const { path, unit } = readTablePath(content, name);
   return { kind: "path", unit: unit === null ? null : 100 * unit, paths: [{ ...path, name: stem(name) }] };

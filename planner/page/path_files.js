@@ -21,7 +21,9 @@ function readTablePath(bytes, where, closed = null) {
   const [x, y] = names.map((name) => table.columns[table.names.indexOf(name)]);
   const broken = x.findIndex((value, i) => !(Number.isFinite(value) && Number.isFinite(y[i])));
   if (broken >= 0) {
-    throw new InputError(`${where}: x or y of point ${broken + 1} is no number; correct the file`);
+    throw new InputError(
+      `${where}: x or y of point ${broken + 1} (line ${table.lines[broken]}) is no number; correct the file`,
+    );
   }
   const [size, other] = units.length ? units.map((unit) => toSi(1, unit.suffix)) : [1, 1];
   const points = Array.from(x, (value, i) => [value, y[i] * (other / size)]);

@@ -33,7 +33,7 @@ function convertColumns(table, wanted, where, synonyms = new Map()) {
     }
     names[at] = name;
   }
-  return { table: texts ? { names, columns, texts } : { names, columns }, notes };
+  return { table: { ...table, names, columns, ...(texts && { texts }) }, notes };
 }
 
 /* Whether a column of another name holds a quantity, in any unit of its kind. */

@@ -1,62 +1,97 @@
-/* Tables as text: comma, semicolon, tab or blanks between columns; decimal point or comma; comment lines.
+/* Tables as text: comma, semicolon, tab or blanks between columns; comment lines; quotes as in CSV.
  *
- * Mirrors sim/io/text_tables.py, which explains how the first lines show the form, and what pandas does with it.
- * */
+ * Mirrors sim/io/text_tables.py, which explains how the first lines show the form. */
+import { pythonText } from "./format.js";
 import { InputError } from "./input_error.js";
-import { pythonText, repr } from "./format.js";
+import { checkMarks, isMissing, isNumber, numbersOf, plainText, plainWords } from "./number_words.js";
 import { findUnit } from "./si_units.js";
 
+const COMMENT = /^\s*[#%]/;
+const MARKED_NUMBER = /^\s*[#%]+\s*[+-]?[.,]?[0-9]/;
+const BLANKS = /("(?:[^"]|"")*")|\s+/g;
 const SEPARATORS = [";", "\t", ","];
-const DECIMAL_COMMA = /^[+-]?\d*,\d+(?:[eE][+-]?\d+)?$/;
-const DECIMAL_POINT = /^[+-]?\d*\.\d+(?:[eE][+-]?\d+)?$/;
-const THOUSANDS = /^(?:[+-]?\d{1,3}(?:\.\d{3})+,\d+|[+-]?\d{1,3}(?:,\d{3})+\.\d+)$/;
-const NUMBER = /^[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?$/i;
-const INFINITE = /^([+-]?)inf(?:inity)?$/i;
 const MOST_COLUMNS = 10_000;
-const NOTHING = new Set([
-  "", "#N/A", "#N/A N/A", "#NA", "-1.#IND", "-1.#QNAN", "-NaN", "-nan", "1.#IND", "1.#QNAN", "<NA>", "N/A", "NA",
-  "NULL", "NaN", "None", "n/a", "nan", "null",
-]); // words that pandas reads as no value
-const SAMPLE = 2 ** 18; // characters from which the form of the text is found out
 const MOST_TEXT = 128 * 2 ** 20; // bytes
 
-/* Parse a table: {names, columns}, with a column of numbers for each name, NaN for what is none.
+/* Parse a table: {names, columns, lines}, with a column of numbers for each name, NaN for what is none, and the line
+ * of each row.
  *
  * bytes: content of the file. where: its name, for messages. named: the columns must have names; without, a table
  * of numbers alone has the names 0, 1, … */
 function parseTable(bytes, where, named = true) {
-  const { names, words, comma } = parseWords(bytes, where, named);
-  return { names, columns: words.map((column) => numbersOf(column, comma)) };
+  const { names, words, lines } = parseWords(bytes, where, named);
+  return { names, columns: words.map((column, i) => numbersOf(column, names[i])), lines };
 }
 
-/* Parse a table as its words: {names, words, comma}, with a column of words for each name. comma: numbers have
- * decimal commas. */
+/* Parse a table as its plain words: {names, words, lines}, with a column of words for each name. parse_lines */
 function parseWords(bytes, where, named = true) {
   if (bytes.length > MOST_TEXT) throw new InputError(`${where} has more than 128 MiB; such a file is not read`);
-  let text = decoded(Uint8Array.from(bytes), where).replaceAll("\r\n", "\n").replaceAll("\r", "\n");
-  const comment = /^[ \t]*[#%].*(?:\n|(?![\s\S]))/gm, comments = text.slice(0, SAMPLE).match(comment) ?? [];
-  if (comments.length) text = text.replace(comment, "");
-  text = text.replace(/^(?:[ \t]*\n)+/, "");
-  const lines = text.slice(0, SAMPLE).split("\n"), [first] = lines;
-  if (!first.trim()) throw new InputError(`${where} is empty; give a table with one row per line`);
-  const separator = separatorOf(first), words = wordsOf(first, separator);
-  if (words.length > MOST_COLUMNS) {
-    throw new InputError(`${where} has more than ${MOST_COLUMNS} columns; give a table with one row per line`);
-  }
-  const header = !words.every((word) => !word || isNumber(word));
-  let names = header ? words : commentedNames(comments, words.length, separator), skipped = header ? 1 : 0;
+  const lines = decoded(Uint8Array.from(bytes), where).replaceAll("\r\n", "\n").replaceAll("\r", "\n").split("\n");
+  const top = lines.findIndex((line) => line.trim() && !COMMENT.test(line));
+  if (top < 0) throw new InputError(`${where} is empty; give a table with one row per line`);
+  const separator = separatorOf(lines.slice(top), where);
+  const { names, rows } = header(lines, top, separator, where);
   if (names === null && named) {
     throw new InputError(`${where} has no names of columns; write them into its first line`);
   }
-  checkNames(names ?? [], where);
-  const units = header && lines.length > 1 ? wordsOf(lines[1], separator) : [];
-  if (names && units.length === names.length && areUnits(units)) {
-    names = names.map((name, i) => withUnit(name, units[i]));
-    skipped = 2;
+  if (!rows.length) throw new InputError(`${where} has no rows; give at least one below the header`);
+  const width = names === null ? rows[0].words.length : names.length;
+  const long = rows.find(({ words }) => words.slice(width).some((word) => word));
+  if (long) {
+    throw new InputError(
+      `${where}: line ${long.line} has more values than columns; if numbers have decimal commas, separate columns ` +
+        "by semicolons",
+    );
   }
-  const comma = hasDecimalCommas(text.slice(0, SAMPLE), where, separator);
-  const columnNames = (names ?? words.map((_, i) => i)).map((name, i) => (name === "" ? `column ${i + 1}` : name));
-  return { names: columnNames, words: wordColumns(text, where, separator, columnNames.length, skipped), comma };
+  const last = (names ?? []).reduce((most, name, i) => (name ? i + 1 : most), 0);
+  const longest = rows.reduce((most, { words }) => Math.max(most, words.length), 0);
+  if (longest < last) {
+    throw new InputError(
+      `${where}: all rows have fewer values (${longest}) than there are columns (${last}); correct the names`,
+    );
+  }
+  const cells = Array.from({ length: width }, (_, i) => rows.map(({ words }) => words[i] ?? ""));
+  checkMarks(cells, where, separator);
+  const kept = cells.flatMap((words, i) => (names === null || names[i] || words.some((word) => word) ? [i] : []));
+  return {
+    names: kept.map((i) => (names === null ? i : names[i] || `column ${i + 1}`)),
+    words: kept.map((i) => plainWords(cells[i])),
+    lines: rows.map(({ line }) => line),
+  };
+}
+
+/* The names of the columns, or null, and the rows below them. _header */
+function header(lines, top, separator, where) {
+  const rows = rowsOf(lines, top, separator, where), { words } = rows[0];
+  if (words.length > MOST_COLUMNS) {
+    throw new InputError(`${where} has more than ${MOST_COLUMNS} columns; give a table with one row per line`);
+  }
+  const above = lines.slice(0, top), commented = commentedNames(above, words.length, separator);
+  if (words.every((word) => isNumber(word) || isMissing(word)) || (commented && words.some(isNumber))) {
+    if (commented === null) { // what looked like comments may be rows
+      const start = above.findIndex((line) => !isComment(lineWords(line, separator)));
+      return { names: null, rows: start < 0 ? rows : rowsOf(lines, start, separator, where) };
+    }
+    checkNames(commented, where);
+    return { names: commented, rows };
+  }
+  checkNames(words, where);
+  const next = (from) => {
+    const found = rows.findIndex((row, i) => i >= from && !isComment(row.words));
+    return found < 0 ? rows.length : found;
+  };
+  let second = next(1), names = words;
+  const units = rows[second]?.words ?? [];
+  if (units.length === words.length && areUnits(units)) {
+    names = words.map((name, i) => withUnit(name, units[i]));
+    second = next(second + 1);
+  }
+  return { names: names.map(plainText), rows: rows.slice(second) };
+}
+
+function isComment(words) {
+  if (!words.length) return true;
+  return COMMENT.test(words[0]) && !MARKED_NUMBER.test(words.join(" ")) && !isMissing(words[0]);
 }
 
 /* Decode UTF-8, UTF-16 with a byte order mark, or Windows-1252. */
@@ -78,21 +113,31 @@ function decoded(bytes, where) {
   return text;
 }
 
-/* The separator that a line has most often; null: blanks. */
-function separatorOf(line) {
-  const counts = SEPARATORS.map((mark) => line.split(mark).length - 1), most = Math.max(...counts);
-  return most ? SEPARATORS[counts.indexOf(most)] : null;
+/* What separates the columns. _separator */
+function separatorOf(lines, where) {
+  const counts = new Map();
+  for (const mark of SEPARATORS) {
+    let rows;
+    try {
+      rows = rowsOf(lines, 0, mark, where, 2);
+    } catch {
+      continue; // quotes that end within a cell: another separator
+    }
+    const [first, second] = rows.map(({ words }) => words.length);
+    if (first > 1 && first === second) return mark;
+    counts.set(mark, first);
+  }
+  const most = Math.max(...counts.values());
+  return most > 1 ? [...counts.keys()].find((mark) => counts.get(mark) === most) : " ";
 }
 
-function wordsOf(line, separator) {
-  const parts = separator === null ? line.split(/\s+/).filter((word) => word) : line.split(separator);
-  return parts.map((word) => word.trim().replace(/^"+|"+$/g, "").trim());
-}
-
-/* Say whether a word is a number, with a decimal point or comma. */
-function isNumber(word) {
-  const text = word.replaceAll(",", ".").trim();
-  return NUMBER.test(text) || /^[+-]?(?:inf|infinity|nan)$/i.test(text);
+/* The words of one line; none if its quotes do not pair. */
+function lineWords(line, separator) {
+  try {
+    return rowsOf([line], 0, separator, "")[0]?.words ?? [];
+  } catch {
+    return [];
+  }
 }
 
 /* Say whether words are units, apart from empty ones. */
@@ -107,32 +152,13 @@ function withUnit(name, unit) {
 }
 
 /* Take names from the last comment, if it has one for each column and no number. */
-function commentedNames(comments, count, separator) {
-  if (!comments.length) return null;
-  const line = comments[comments.length - 1].trim().replace(/^[#%]+/, "").trim();
-  for (const mark of [separator, ...SEPARATORS, null]) {
-    const words = wordsOf(line, mark);
+function commentedNames(lines, count, separator) {
+  const comment = lines.findLast((line) => line.trim()) ?? "", line = comment.trim().replace(/^[#%]+/, "").trim();
+  for (const mark of [separator, ...SEPARATORS, " "]) {
+    const words = lineWords(line, mark);
     if (words.length === count && !words.some(isNumber)) return words;
   }
   return null;
-}
-
-/* Find out whether numbers have decimal commas. */
-function hasDecimalCommas(text, where, separator) {
-  if (separator === "," || !text.includes(",")) return false;
-  const words = text.split("\n").flatMap((line) => wordsOf(line, separator));
-  const thousands = words.find((word) => THOUSANDS.test(word));
-  if (thousands) {
-    const number = pythonText(thousands);
-    throw new InputError(`${where} has the number ${number}; write numbers without separators of thousands`);
-  }
-  const [comma, point] = [DECIMAL_COMMA, DECIMAL_POINT].map((form) => words.find((word) => form.test(word)));
-  if (comma && point) {
-    throw new InputError(
-      `${where} has numbers with a decimal comma (${comma}) and with a decimal point (${point}); use one of them`,
-    );
-  }
-  return comma !== undefined;
 }
 
 /* Refuse a name that stands above two columns. */
@@ -141,68 +167,44 @@ function checkNames(names, where) {
   if (twice) throw new InputError(`${where} has two columns ${pythonText(twice)}; rename or drop one`);
 }
 
-/* Read columns of words below the header. */
-function wordColumns(text, where, separator, count, skipped) {
-  const rows = rowsOf(text, separator).slice(skipped).filter((row) => row.length > 1 || row[0] !== "");
-  if (!rows.length) throw new InputError(`${where} has no rows; give at least one below the header`);
-  const most = Math.max(count, rows[0].length), long = rows.findIndex((row) => row.length > most);
-  if (long >= 0) {
-    throw new InputError(
-      `${where} is no CSV table (Error tokenizing data. C error: Expected ${most} fields in line ` +
-        `${long + skipped + 1}, saw ${rows[long].length}); give a header and one row per line`,
-    );
+/* Split lines, from one of them on, into rows {line, words} without those that are empty; at most so many.
+ *
+ * Quotes hold separators and ends of lines together, as the module csv of Python has it. */
+function rowsOf(lines, start, separator, where, most = Infinity) {
+  const rows = [], mark = separator === " " ? "\t" : separator;
+  let words = [], word = "", state = "start"; // of a cell; "plain", "quoted" or "closed" within it
+  for (let i = start; i < lines.length && rows.length < most; i++) {
+    const line = separator === " " ? lines[i].trim().replace(BLANKS, (_, held) => held ?? "\t") : lines[i];
+    const broken = (reason) =>
+      new InputError(
+        `${where} is no CSV table (line ${i + 1}: ${reason}); give a header and one row per line`,
+      );
+    for (const sign of line) {
+      if (state === "quoted") {
+        if (sign === '"') state = "closed";
+        else word += sign;
+      } else if (sign === mark) {
+        words.push(word.trim());
+        [word, state] = ["", "start"];
+      } else if (sign === '"' && state === "closed") {
+        word += sign;
+        state = "quoted";
+      } else if (state === "closed") throw broken(`'${mark}' expected after '"'`);
+      else if (state === "start" && sign === '"') state = "quoted";
+      else if (state !== "start" || sign !== " ") {
+        word += sign;
+        state = "plain";
+      }
+    }
+    if (state === "quoted") {
+      if (i + 1 < lines.length) continue;
+      throw broken("unexpected end of data");
+    }
+    words.push(word.trim());
+    if (words.some((each) => each)) rows.push({ line: i + 1, words });
+    [words, word, state] = [[], "", "start"];
   }
-  if (most > count + 1 || (most > count && rows.some((row) => row[count]))) {
-    throw new InputError(
-      `${where} has a row with more values than columns; if numbers have decimal commas, separate columns by ` +
-        "semicolons",
-    );
-  }
-  return Array.from({ length: count }, (_, i) => rows.map((row) => row[i] ?? ""));
-}
-
-/* Split a text into rows of words; quotes hold separators and ends of lines together. */
-function rowsOf(text, separator) {
-  const rows = [], end = separator === null ? " " : separator;
-  let row = [], word = "", quoted = false;
-  const take = (last) => {
-    if (separator !== null || word) row.push(word.trim());
-    word = "";
-    if (!last) return;
-    rows.push(row.length ? row : [""]);
-    row = [];
-  };
-  for (const sign of text) {
-    if (sign === '"') quoted = !quoted;
-    else if (quoted) word += sign;
-    else if (sign === "\n") take(true);
-    else if (sign === end || (separator === null && sign === "\t")) take(false);
-    else word += sign;
-  }
-  if (word || row.length) take(true);
   return rows;
 }
 
-/* Convert words to numbers, with NaN for what is none; decimal commas count where all words have the form. */
-function numbersOf(words, comma) {
-  const plain = comma && areNumbers(words, comma) ? words.map((word) => word.replace(",", ".")) : words;
-  return Float64Array.from(plain, (word) => {
-    if (NUMBER.test(word)) return Number(word);
-    const infinite = INFINITE.exec(word);
-    return infinite ? (infinite[1] === "-" ? -Infinity : Infinity) : NaN;
-  });
-}
-
-/* The values of a column as Python shows what pandas reads: numbers if all words are, otherwise the words. */
-function textsOf(words, comma) {
-  if (!areNumbers(words, comma)) return words.map((word) => (NOTHING.has(word) ? "nan" : word));
-  const values = numbersOf(words, comma), whole = words.every((word) => /^[+-]?\d+$/.test(word));
-  return Array.from(values, (value) => (whole ? String(value) : repr(value)));
-}
-
-function areNumbers(words, comma) {
-  const isOne = (word) => NUMBER.test(comma ? word.replace(",", ".") : word) && !(comma && word.includes("."));
-  return words.every((word) => NOTHING.has(word) || INFINITE.test(word) || isOne(word));
-}
-
-export { numbersOf, parseTable, parseWords, textsOf };
+export { parseTable, parseWords };

@@ -122,7 +122,8 @@ def _read_columns(source: str | Path) -> tuple[Floats, float | None]:
     points = table[names].apply(numbers_of).to_numpy(dtype=float)
     broken = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(broken):
-        raise InputError(f"{source}: x or y of point {broken[0] + 1} is no number; correct the file")
+        line = f" (line {table.index[broken[0]]})" if table.index.name else ""
+        raise InputError(f"{source}: x or y of point {broken[0] + 1}{line} is no number; correct the file")
     if not units:
         return points, None
     factors = np.array([to_si(1.0, unit.suffix) for unit in units])

@@ -41,11 +41,22 @@ def out(what: str, **options: Any) -> Argument:
 
 
 ROBOT = argument("--robot", required=True, help="robot.toml or the name of a preset")
+RUNS_OF = argument(
+    "--robot", dest="runs_of", help="robot.toml or the name of a preset, for a table of its runs: N,l_cm,omega_rpm"
+)
 JOBS = argument("--jobs", type=int, help="processes or threads (default: all processors)")
 UNIT = argument("--unit", choices=LENGTHS, metavar="UNIT",
                 help="of all lengths that are given without one: m, cm, mm, or l for tail lengths. 24cm and 3l, "
                 "columns x_cm and y_cm, and drawings with a size have their own")  # fmt: skip
 LOOKUP = argument("--lookup", old="--model", help="look-up table (default: the one that comes with the package)")
+
+
+def refuse_runs_of(arguments: Namespace) -> None:
+    """Refuse RUNS_OF beside a robot."""
+    if arguments.runs_of is not None:
+        raise InputError(
+            f"--robot goes with a table of runs, and {arguments.robot} is a robot; leave one of them out"
+        )
 
 
 class Parser(ArgumentParser):

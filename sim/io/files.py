@@ -120,9 +120,12 @@ def make_folder(folder: str | Path) -> None:
 
 
 def write_csv(table: DataFrame, path: str | Path, *, digits: int = 8) -> None:
-    """Write a table as CSV with so many digits, completely or not at all."""
+    """Write a table as CSV with so many digits, completely or not at all; no text becomes a formula."""
+    from sim.io.number_words import safe_text
+
+    texts = {str(name): table[name].map(safe_text) for name in table.select_dtypes(exclude="number")}
     with whole_file(path) as part:
-        table.to_csv(part, index=False, float_format=f"%.{digits}g")
+        table.assign(**texts).rename(columns=safe_text).to_csv(part, index=False, float_format=f"%.{digits}g")
 
 
 def write_numbers(columns: Mapping[str, Any], path: str | Path, *, digits: int = 8) -> None:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from sim.io.errors import InputError
+from sim.io.times import times_of
 from sim.io.units import Unit, convert, find_unit, of_kind, split
 
 _NONE: Mapping[str, str] = {}
@@ -62,7 +63,12 @@ def convert_columns(
 
 
 def numbers_of(column: pd.Series) -> pd.Series:
-    """Convert a column to float64, with NaN for what is no number."""
+    """Convert a column to float64, with NaN for what is no number; `sim.io.times` reads columns of times."""
+    unit = split(str(column.name)).unit
+    if unit is not None and unit.kind == "time":
+        return pd.Series(times_of(column, unit.suffix), index=column.index, name=column.name)
+    if column.dtype.kind in "mM":  # a duration or a date where no time belongs
+        return pd.Series(math.nan, index=column.index, name=column.name)
     try:
         return pd.to_numeric(column, errors="coerce").astype(float)
     except (TypeError, ValueError, OverflowError):  # dates, lists, whole numbers of hundreds of digits

@@ -18,7 +18,6 @@ from sim.io.pages import Page
 from sim.io.provenance import code_version
 from sim.motion.branches import Branch, Branches, Motion
 from sim.motion.exponents import DOUBLING, FOLD, HOPF
-from sim.motion.lab_units import RPM
 from sim.motion.slow_sweep import Settled
 
 UP, DOWN = "time steps, up", "time steps, down"
@@ -65,13 +64,13 @@ def _means(result: Branches, s: float, means: Floats) -> dict[str, Any]:
         **dict(zip(_NAMES, map(float, means), strict=True)),
         "R_yr_over_l": speed / abs(float(means[2])) if means[2] else np.inf,
         "theta_deg": float(np.degrees(np.arctan2(abs(means[3]), means[4]))),
-        "omega_yr_rpm": _yaw_rpm(result, s, means),
+        "omega_yr_rad_s": _yaw_rate(result, s, means),
     }
 
 
-def _yaw_rpm(result: Branches, s: float, means: Floats) -> float:
-    """Convert the yaw rate to rpm, with the robot's unit of time."""
-    return float(means[2]) / result.swept.robot.time_scale / RPM
+def _yaw_rate(result: Branches, s: float, means: Floats) -> float:
+    """Convert the yaw rate to rad/s, with the robot's unit of time."""
+    return float(means[2]) / result.swept.robot.time_scale
 
 
 def special_rows(result: Branches) -> list[list[str]]:
@@ -81,7 +80,7 @@ def special_rows(result: Branches) -> list[list[str]]:
             str(number),
             motion.kind,
             f"{result.swept.value(motion.s):.4g}",
-            f"{_yaw_rpm(result, motion.s, motion.means):.4g} rpm",
+            f"{_yaw_rate(result, motion.s, motion.means):.4g} rad/s",
             f"{motion.leading.growth:.2g}",
         ]
         for number, branch in enumerate(result.branches, 1)
@@ -121,20 +120,20 @@ def draw_branches(result: Branches) -> Figure:
             inputs = [result.swept.value(motion.s) for motion in part]
             style = {"color": colour, "lw": 1.8 if stable else 1.1, "ls": "-" if stable else (0, (4, 2))}
             label = once(f"{who}, {'stable' if stable else 'unstable'}")
-            upper.plot(inputs, [_yaw_rpm(result, m.s, m.means) for m in part], label=label, **style)
+            upper.plot(inputs, [_yaw_rate(result, m.s, m.means) for m in part], label=label, **style)
             lower.plot(inputs, [m.leading.growth for m in part], **style)
         for motion in branch.special:
             mark, edge = _MARKS[motion.kind]
             options = {"marker": mark, "ms": 6, "mfc": "white", "mec": edge, "mew": 1.5, "ls": "", "zorder": 5}
             at = result.swept.value(motion.s)
-            upper.plot(at, _yaw_rpm(result, motion.s, motion.means), label=once(motion.kind), **options)
+            upper.plot(at, _yaw_rate(result, motion.s, motion.means), label=once(motion.kind), **options)
             lower.plot(at, motion.leading.growth, **options)
     for label, sweep, mark in ((UP, result.up, "^"), (DOWN, result.down, "v")):
         _draw_sweep(upper, result, sweep, label, mark)
     lower.axhline(0.0, color=SOFT, lw=0.8)
     lower.set_yscale("symlog", linthresh=_LINEAR)
     lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    upper.set_ylabel("yaw rate [rpm]")
+    upper.set_ylabel("yaw rate [rad/s]")
     lower.set_ylabel("growth in a motor revolution")
     lower.set_xlabel(result.swept.label)
     for axes in (upper, lower):
@@ -152,7 +151,7 @@ def _draw_sweep(axes: Any, result: Branches, sweep: list[Settled], label: str, m
         if points:
             axes.plot(
                 [result.swept.value(m.s) for m in points],
-                [_yaw_rpm(result, m.s, m.means) for m in points],
+                [_yaw_rate(result, m.s, m.means) for m in points],
                 ls="", marker=mark, ms=4.5, mfc="none", mec=INK, alpha=0.85 if settled else 0.3,
                 label=label if settled else f"{label}, unsettled", zorder=4,
             )  # fmt: skip

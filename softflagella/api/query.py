@@ -12,7 +12,7 @@ import pandas as pd
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.motion.lab_units import lab_motion
-from softflagella.api.robots import Robots, robot_rows, with_units
+from softflagella.api.robots import OneRobot, Robots, robot_rows, with_units
 from surrogate.export.small_copy_files import save_small_copy
 from surrogate.interface import LookupTable
 from surrogate.table.answers import answer_with_error
@@ -24,12 +24,17 @@ from surrogate.table.refusals import refusing_robots
 
 @checks_keywords(table="lookup")
 def query(
-    robots: Robots, *, lookup: LookupTable | str | Path | None = None, flag: bool = False, certify: bool = False
+    robots: Robots,
+    *,
+    robot: OneRobot | None = None,
+    lookup: LookupTable | str | Path | None = None,
+    flag: bool = False,
+    certify: bool = False,
 ) -> pd.DataFrame:
     """Ask a look-up table for the mean motion at constant motor speed, without simulating.
 
     Args:
-        robots: as for `steady`.
+        robots, robot: as for `steady`.
         lookup: the table, or its file; default: the one that comes with the package.
         flag: answer for robots outside the domain as well; the column `outside` says which.
         certify: simulate each robot as well; the column `certified_error` is the actual error of its answer.
@@ -48,7 +53,7 @@ def query(
         >>> motion[["robot", "R_yr_cm", "v_cm_s"]].round(2).values.tolist()
         [['paper-control', 10.36, 0.23], ['paper-triangle', 10.11, 0.36]]
     """
-    rows, table = robot_rows(robots), _table(lookup)
+    rows, table = robot_rows(robots, robot), _table(lookup)
     with refusing_robots(rows.robots, table) if rows.robots else nullcontext():
         answer = answer_with_error(table, rows.columns, flag=flag, certify=certify)
     return rows.frame(lab_motion(rows.robots, answer) if rows.robots else {}, answer)

@@ -2,10 +2,12 @@
 
 Robots are a `Robot`, the path of a robot.toml, the name of a preset, or a list of these. Or they are
 dimensionless: a mapping or a pandas table with the columns `C_t`, `C_r`, `C_yr`, `l_over_R`, `L_over_R`,
-`l_over_r0`, `omega_bar`, `N`, and optionally `a_over_R` and sizes of effects, one row for each robot.
+`l_over_r0`, `omega_bar`, `N`, and optionally `a_over_R` and sizes of effects, one row for each robot. Or they are
+the runs of one robot: a table with `N`, `l_cm`, `omega_rpm`, or these in other units, as for `calibrate`.
 
-A table of results begins with the robots' names and the columns in lab units. Dimensionless columns follow. Robots
-that are dimensionless have no lab units. `frame.attrs["units"]` has the unit of every column that has one.
+A table of results begins with the robots' names, or with the columns of the table that was given, without those
+that have new results. The columns in lab units and the dimensionless ones follow. Robots that are dimensionless
+have no lab units. `frame.attrs["units"]` has the unit of every column that has one.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ import pandas as pd
 
 from dataset.rows.schema import INPUTS, OUTPUTS
 from sim.arrays import Floats
-from sim.inputs import check_columns, group_columns, load_robot
+from sim.inputs import check_columns, group_columns, load_robot, run_columns
 from sim.io.errors import InputError
 from sim.io.units import column_units
 from sim.model.robot import Robot
@@ -37,21 +39,30 @@ class RobotRows:
 
     columns: dict[str, Floats]
     robots: tuple[Robot, ...] = ()  # none: the rows are dimensionless
+    given: Mapping[str, Any] | None = None  # columns of the table that was given, (M,) each; None: none was
 
     def frame(self, lab: Mapping[str, Any], values: Mapping[str, Any]) -> pd.DataFrame:
-        """Make a table of M rows: names, columns in lab units, dimensionless columns."""
-        names = {NAME: [robot.name for robot in self.robots]} if self.robots else {}
-        return with_units(pd.DataFrame({**names, **lab, **{k: v for k, v in values.items() if k not in lab}}))
+        """Make a table of M rows: names or given columns, columns in lab units, dimensionless columns."""
+        results = {**lab, **{k: v for k, v in values.items() if k not in lab}}
+        names = {NAME: [robot.name for robot in self.robots]}
+        first: Mapping[str, Any] = names if self.given is None else self.given
+        return with_units(pd.DataFrame({**{k: v for k, v in first.items() if k not in results}, **results}))
 
 
-def robot_rows(robots: Robots) -> RobotRows:
-    """Check robots, and convert them to columns.
+def robot_rows(robots: Robots, robot: OneRobot | None = None) -> RobotRows:
+    """Check robots, and convert them to columns; with `robot`, a table has its runs.
 
     Raises:
         InputError: a robot cannot be simulated, or columns differ in length.
     """
     if isinstance(robots, Mapping | pd.DataFrame):
-        return RobotRows(_checked(robots))
+        table = _broadcast(robots)
+        if robot is None:
+            return RobotRows(check_columns(table), given=table)
+        runs, columns = run_columns(pd.DataFrame(table), one_robot(robot), "the table")
+        return RobotRows(check_columns(columns), tuple(runs), table)
+    if robot is not None:
+        raise InputError("robot goes with a table of runs; give a table with N, l_cm, omega_rpm, or leave it out")
     given = [robots] if isinstance(robots, Robot | str | Path) else list(robots)
     if not given:
         raise InputError("no robots; give at least one")
@@ -64,7 +75,7 @@ def one_robot(robot: OneRobot) -> Robot:
     return robot if isinstance(robot, Robot) else load_robot(robot)
 
 
-def _checked(robots: Mapping[str, Any] | pd.DataFrame) -> dict[str, Floats]:
+def _broadcast(robots: Mapping[str, Any] | pd.DataFrame) -> dict[str, Any]:
     columns = {str(name): np.atleast_1d(np.asarray(values)) for name, values in robots.items()}
     try:
         rows = np.broadcast_shapes(*(column.shape for column in columns.values()))
@@ -73,7 +84,7 @@ def _checked(robots: Mapping[str, Any] | pd.DataFrame) -> dict[str, Floats]:
         raise InputError(
             f"columns differ in length ({sizes}); give one value for each robot, or one for all"
         ) from None
-    return check_columns({name: np.broadcast_to(column, rows) for name, column in columns.items()})
+    return {name: np.broadcast_to(column, rows) for name, column in columns.items()}
 
 
 def with_units(frame: pd.DataFrame) -> pd.DataFrame:

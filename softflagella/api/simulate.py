@@ -32,19 +32,24 @@ from softflagella.api.robots import NAME, OneRobot, RobotRows, Robots, one_robot
 
 
 @checks_keywords()
-def steady(robots: Robots, *, stability: bool = True, jobs: int | None = None) -> pd.DataFrame:
+def steady(
+    robots: Robots, *, robot: OneRobot | None = None, stability: bool = True, jobs: int | None = None
+) -> pd.DataFrame:
     """Simulate the mean motion at constant motor speed, as reached from rest.
 
     Args:
         robots: a `Robot`, the path of a robot.toml, the name of a preset, or a list of these; or dimensionless
-            robots, a table with M rows (single values stand for all rows).
+            robots, a table with M rows (single values stand for all rows); or, with `robot`, a table of its runs:
+            `N`, `l_cm`, `omega_rpm`, or these in other units.
+        robot: the robot of a table of runs.
         stability: whether to compute `stable` and `growth`, which adds a quarter to the time, and about as much as
             the rest for robots with non-local effects (flow, contact, natural shape, thinning).
         jobs: threads; default all processors.
 
     Returns:
-        A table with M rows. For robots in SI units it begins with their names (`robot`) and with `omega_h_rpm`,
-        `omega_t_rpm`, `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s` and `circle_s`, the time of a circle.
+        A table with M rows. It begins with the columns of a table that was given. For robots in SI units it has
+        their names (`robot`), `omega_h_rpm`, `omega_t_rpm`, `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s` and
+        `circle_s`, the time of a circle.
         The dimensionless columns are `omega_t_bar`, `omega_h_bar`, `omega_yr_bar` (spins of tails and head and
         yaw rate [EI/(μ0 l⁴)]), `v_x`, `v_z` (sway and surge of the head's centre [EI/(μ0 l³)]), `R_yr_over_l`,
         `theta_deg`, `converged`, `tail_gap` ([2 r0], below 1 if tails touch), `stable` (whether small
@@ -68,8 +73,11 @@ def steady(robots: Robots, *, stability: bool = True, jobs: int | None = None) -
         >>> faster = {**sf.load_robot("paper-control").group_values(), "omega_bar": [10.0, 20.0, 40.0]}
         >>> sf.steady(faster)["omega_yr_bar"].round(2).tolist()
         [0.05, 0.08, 0.16]
+        >>> runs = {"N": 2, "l_cm": [9.0, 11.0], "omega_rpm": [60.0, -60.0]}
+        >>> sf.steady(runs, robot="paper-control")[["l_cm", "omega_rpm", "R_yr_cm"]].round(2).values.tolist()
+        [[9.0, 60.0, 9.17], [11.0, -60.0, 9.92]]
     """
-    rows = robot_rows(robots)
+    rows = robot_rows(robots, robot)
     motion = steady_columns(rows.columns, stability=stability, jobs=jobs, title="")
     return rows.frame(lab_motion(rows.robots, motion) if rows.robots else {}, motion)
 

@@ -80,7 +80,7 @@ function showMotion(answer) {
   const { turnRadius, slip, yawRate, speed, tailGap, omegaBar } = answer.answer;
   describe(byId("motion"), [
     ["Turn radius", length(turnRadius)],
-    ["Yaw rate", `${degrees(yawRate)} degrees/s`],
+    ["Yaw rate", `${digits(yawRate)} rad/s`],
     ["Speed round the circle", `${digits(60 * speed)} cm/min`],
     ["Slip angle", `${degrees(slip)} degrees`],
     ["Gap of the tails", `${digits(tailGap)} tail diameters`],

@@ -122,3 +122,45 @@ def test_the_picture_has_a_panel_for_each_run_with_track_and_fit() -> None:
     drawn, fitted = (np.array(line.get_xydata()) for line in first.get_lines()[:2])
     assert drawn == pytest.approx(track(0)[["x_cm", "y_cm"]].to_numpy())
     assert np.linalg.norm(fitted - [3, -2], axis=1) == pytest.approx(np.full(len(fitted), RADIUS), rel=0.01)
+
+
+@pytest.mark.parametrize("change", [0.0, 8.0, None], ids=["zeros", "restart", "wrap"])
+def test_a_clock_that_goes_back_excludes_its_run(change: float | None) -> None:
+    """The samples used to be sorted by time, and gave radii of 8.2 and 6.6 cm instead of 9."""
+    samples = pd.concat([track(0), track(1).assign(run=2)], ignore_index=True)
+    late = (samples["run"] == 1) & (samples["time_s"] > 30)
+    samples.loc[late, "time_s"] = samples["time_s"] % 20 if change is None else samples["time_s"] - 30 + change
+    if change == 0.0:
+        samples.loc[late, "time_s"] = 0.0
+    runs = pd.DataFrame({"run": [1, 2], "N": 2, "l_cm": 11.0, "omega_rpm": -150.0})
+    measured = measure_tracks(samples, runs)
+    assert measured.excluded == [
+        "run 1: its time goes back at row 152; give its samples in order, with a clock that runs on"
+    ]
+    assert measured.table["R_yr_cm"].isna().tolist() == [True, False]
+
+
+@pytest.mark.parametrize("start", [1.7e9, "2026-05-01 12:00:00"])
+def test_a_track_may_begin_at_any_time(start: float | str) -> None:
+    given = track(0)
+    seconds = given["time_s"]
+    date = (
+        start + seconds if isinstance(start, float) else pd.Timestamp(start) + pd.to_timedelta(seconds, unit="s")
+    )
+    seen, expected = measure_tracks(given.assign(time_s=date), RUNS).table, measure_tracks(given, RUNS).table
+    pd.testing.assert_frame_equal(seen, expected, rtol=1e-4)
+
+
+@pytest.mark.parametrize("name", [1, 1.0, "1", " 1 ", "1.0", "01"], ids=repr)
+def test_names_of_runs_are_compared_as_text(name: object) -> None:
+    named = track(0).assign(run=[str(name)] * 299 + ["checkerboard"])
+    measured = measure_tracks(named, RUNS.assign(run=1))
+    assert measured.excluded == ["run checkerboard: a track, but no row among the runs"]
+    assert measured.table["R_yr_cm"].notna().all()
+
+
+def test_names_that_do_not_agree_are_shown() -> None:
+    with pytest.raises(InputError, match="no run has a track: the runs are run 1; the tracks are 1"):
+        measure_tracks(track(0), RUNS.assign(run="run 1"))
+    with pytest.raises(InputError, match="run 1 is there twice"):
+        measure_tracks(track(0), pd.concat([RUNS, RUNS.assign(run="1.0")]))

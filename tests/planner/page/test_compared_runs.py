@@ -19,7 +19,7 @@ from tests.planner.page.runs import ROBOT, look_up, table_of_runs
 def compared(table: pd.DataFrame, lookup: str | None = TABLE) -> Any:
     texts = [[str(value) for value in table[name]] for name in table]
     numbers = [pd.to_numeric(table[name], errors="coerce").fillna(0).tolist() for name in table]
-    content = {"names": list(table), "columns": numbers, "texts": texts}
+    content = {"names": list(table), "columns": numbers, "texts": texts, "lines": list(range(2, len(table) + 2))}
     robot = robot_to_page(ROBOT)
     return answers([("compared_runs.js", "comparedRuns", content, "table.csv", robot, lookup)], shipped_data())[0]
 

@@ -54,5 +54,14 @@ def test_numbers_are_read_as_python_reads_them() -> None:
 
 
 def test_texts_in_quotes() -> None:
-    texts = ["plain", "it's", '"both" it\'s', "a\\b\n\t\r", "\x00\x1f\x7f\xa0", "ümlaut ∞", ""]
+    texts = [
+        "plain",
+        "it's",
+        '"both" it\'s',
+        "a\\b\n\t\r",
+        "\x00\x1f\x7f\xa0",
+        "ümlaut ∞",
+        "1\u202f2\u2009\ufeff",
+        "",
+    ]
     assert answers([("format.js", "pythonText", text) for text in texts]) == list(map(repr, texts))

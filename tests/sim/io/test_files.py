@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import os
 import stat
@@ -16,6 +17,7 @@ import pytest
 
 from sim.io.errors import CLOSED_PIPE, INTERRUPTED, InputError, run_command
 from sim.io.files import files_together, whole_file, write_csv, write_numbers, write_text
+from sim.io.tables import read_table
 from tests.processes import LIMIT
 
 ROOT = Path(__file__).parents[3]
@@ -208,3 +210,24 @@ def test_numbers_are_written_as_a_table_is(tmp_path: Path) -> None:
     write_csv(pd.DataFrame(columns), tmp_path / "table.csv")
     write_numbers(columns, tmp_path / "numbers.csv")
     assert (tmp_path / "numbers.csv").read_bytes() == (tmp_path / "table.csv").read_bytes()
+
+
+def test_no_text_is_a_formula_and_every_text_is_read_back(tmp_path: Path) -> None:
+    words = [
+        "=1+1",
+        "+a",
+        "-b c",
+        "@SUM(A1)",
+        "'=x",
+        "''-y",
+        "'quoted'",
+        "plain",
+        '=HYPERLINK("http://a";"b")',
+        "=a,b",
+    ]
+    table = pd.DataFrame({"session": words, "=x": np.arange(len(words)) - 3.5})
+    write_csv(table, tmp_path / "table.csv")
+    with open(tmp_path / "table.csv", newline="") as file:
+        cells = [cell for row in csv.reader(file) for cell in row]
+    assert not [cell for cell in cells if cell[0] in "=+-@" and not cell[1:].replace(".", "").isdigit()]
+    assert read_table(tmp_path / "table.csv").to_dict("list") == table.to_dict("list")

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import io
+import math
+from datetime import datetime, timedelta
 from pathlib import Path
 
+import openpyxl
 import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.io.errors import InputError
+from sim.io.quantities import numbers_of
 from sim.io.tables import read_table
-from sim.io.text_tables import parse_table
+from sim.io.text_tables import parse_table, row_name
 
 TABLE = pd.DataFrame({"run": ["a", "b c"], "x [mm]": [0.5, -3.25], "y [mm]": [1.0, 1250.0]})
 TEXTS = {
@@ -36,7 +40,7 @@ TEXTS = {
 
 
 def in_millimetres(table: pd.DataFrame) -> pd.DataFrame:
-    return table.rename(columns={"x_mm": "x [mm]", "y_mm": "y [mm]"})
+    return table.rename(columns={"x_mm": "x [mm]", "y_mm": "y [mm]"}).reset_index(drop=True)
 
 
 @pytest.mark.parametrize("dialect", TEXTS)
@@ -60,7 +64,7 @@ def test_spreadsheets_and_parquet_are_the_same_table(units: bool, tmp_path: Path
     rows.to_excel(tmp_path / "table.xlsx", index=False)
     TABLE.to_parquet(tmp_path / "table.parquet")
     for name in ("table.xlsx", "table.parquet"):
-        pd.testing.assert_frame_equal(read_table(tmp_path / name), TABLE, check_dtype=False)
+        pd.testing.assert_frame_equal(in_millimetres(read_table(tmp_path / name)), TABLE, check_dtype=False)
 
 
 def test_names_in_a_comment_belong_to_the_columns(tmp_path: Path) -> None:
@@ -87,6 +91,15 @@ def test_a_table_without_names_has_numbered_columns_where_that_is_allowed(tmp_pa
         ("x,y\n", "no rows"),
         ("x,y\nmm,mm\n", "no rows"),
         ("x,y\n1,2\0\n", "is no text"),
+        ("a,b,c\n1,2\n3,4\n", r"all rows have fewer values \(2\) than there are columns \(3\)"),
+        ("x,y\n\n1,2\n# 3\n1,2,3\n", "line 5 has more values than columns"),
+        ('x,y\n1,2\n"3,4\n', "line 4: unexpected end of data"),
+        ("x;y\n1,200;300\n", "'1,200', which may be 1200 or 1.2"),
+        ("x;y\n1,200;0,5\n300;0,5\n", "'1,200', which may be 1200 or 1.2"),
+        ("x;y\n1.200;1\n300;2\n", "'1.200', which may be 1200 or 1.2"),
+        ('x,y\n"1,200",300\n', "'1,200', which may be 1200 or 1.2"),
+        ("x;y\n1.200.300;1\n", "'1.200.300'; write numbers without"),
+        ("x\ty\n1\u202f200\t1\n", r"'1\\u202f200'; write numbers without"),
     ],
 )
 def test_what_is_no_table_or_could_be_two_is_refused(text: str, words: str, tmp_path: Path) -> None:
@@ -95,6 +108,71 @@ def test_what_is_no_table_or_could_be_two_is_refused(text: str, words: str, tmp_
         read_table(tmp_path / "a.csv")
     assert str(tmp_path / "a.csv") in str(refusal.value)
     assert "\n" not in str(refusal.value)
+
+
+NAN = float("nan")
+READ = {
+    "a separator within quotes": ('"marker, note",x\n"a, b",0\n', {"marker, note": ["a, b"], "x": [0]}),
+    "a comma before the unit": ("time, s;x, cm\n0,5;1\n", {"time, s": [0.5], "x, cm": [1]}),
+    "the error of a formula": ("x,y\n#N/A,1\n#DIV/0!,2\n", {"x": [NAN, NAN], "y": [1, 2]}),
+    "a number behind a mark": ("x,y\n%30,1\n2,3\n", {"x": ["%30", "2"], "y": [1, 3]}),
+    "a mark within the data": ("x,y\n1,2\n# late,3\n", {"x": ["1", "# late"], "y": [2, 3]}),
+    "a comment with names of all kinds": ("# 25 fps\n# x y w\n1 2 a\n", {"x": [1], "y": [2], "w": ["a"]}),
+    "a word among decimal commas": ("x;y\n0,5;1\n#WERT!;2\nwet;3\n", {"x": ["0.5", NAN, "wet"], "y": [1, 2, 3]}),
+    "decimal commas between commas": ('x,y\n"1,5",2\n', {"x": [1.5], "y": [2]}),
+    "three decimals beside others": ("x;y\n1,234;0,250\n2,000;0,125\n", {"x": [1.234, 2.0], "y": [0.25, 0.125]}),
+    "values that are missing": ("x;y\n-;n/a\n#####;Err:502\n1,5;2\n", {"x": [NAN, NAN, 1.5], "y": [NAN, NAN, 2]}),
+    "a column without a name and a value": ("x,,y,\n1,,2\n3,,4,\n", {"x": [1, 3], "y": [2, 4]}),
+}
+
+
+@pytest.mark.parametrize("case", READ)
+def test_a_table_is_read_as_it_is_meant(case: str) -> None:
+    text, expected = READ[case]
+    table = parse_table(text.encode(), "table")
+    assert list(table) == list(expected)
+    for name, values in expected.items():
+        pd.testing.assert_series_equal(
+            table[name].reset_index(drop=True), pd.Series(values, name=name), check_dtype=False
+        )
+
+
+def test_rows_have_the_numbers_of_their_lines() -> None:
+    table = parse_table(b"# tank 3\n\nx,y\nmm,mm\n1,2\n\n3,4\n", "table")
+    assert [row_name(table, row) for row in (0, 1)] == ["row 1 (line 5)", "row 2 (line 7)"]
+
+
+def sheet(path: Path, rows: list[list[object]], formats: dict[str, str] | None = None) -> None:
+    book = openpyxl.Workbook()
+    assert book.active is not None
+    for row in rows:
+        book.active.append(row)
+    for cell, form in (formats or {}).items():
+        book.active[cell].number_format = form
+    book.save(path)
+
+
+def test_cells_of_a_sheet_are_read_as_their_text(tmp_path: Path) -> None:
+    row = [1, 0.05, timedelta(seconds=90.5), datetime(2026, 5, 1, 12), "#N/A"]
+    sheet(tmp_path / "a.xlsx", [["n", "share", "t_s", "when_h", "k"], row], {"B2": "0.0%"})
+    table = read_table(tmp_path / "a.xlsx")
+    assert table.iloc[0, :4].tolist() == [1, "5%", "0:01:30.500000", "2026-05-01 12:00:00"]
+    assert math.isnan(table["k"].iloc[0])
+    assert (numbers_of(table["t_s"]).tolist(), numbers_of(table["when_h"]).tolist()) == ([90.5], [0.0])
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ([["x", "y", "x"], [1, 2, 3]], "two columns 'x'"),
+        ([["x", "R_yr_cm"], [1, 2], [3, "=B2*2"]], "column R_yr_cm has no values: its formulas .* .cell B3"),
+        ([["x", "y"], ["1,200", 300]], "'1,200', which may be"),
+    ],
+)  # fmt: skip
+def test_sheets_are_refused_as_texts_are(rows: list[list[object]], words: str, tmp_path: Path) -> None:
+    sheet(tmp_path / "a.xlsx", rows)
+    with pytest.raises(InputError, match=words):
+        read_table(tmp_path / "a.xlsx")
 
 
 @pytest.mark.parametrize("name", ["a.xlsx", "a.parquet"])

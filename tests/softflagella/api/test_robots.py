@@ -10,6 +10,8 @@ import pandas as pd
 import pytest
 
 import softflagella as sf
+import surrogate.__main__
+from sim.io.tables import read_table
 from sim.motion.lab_units import LAB_COLUMNS
 from softflagella.api.robots import robot_rows, with_units
 
@@ -62,6 +64,43 @@ def test_dimensionless_robots_have_no_lab_units() -> None:
     assert len(motion) == 2
     assert not {"robot", *LAB_COLUMNS} - {"theta_deg"} & set(motion)
     assert motion["omega_yr_bar"].iloc[1] == sf.steady(ROBOT)["omega_yr_bar"].item()
+
+
+RUNS = pd.DataFrame({"Tails": [2, 3], "l_mm": [90.0, 110.0], "rpm": [60.0, -40.0], "R_yr_cm": 1.0, "day": "=a"})
+
+
+def test_runs_of_a_robot_come_back_with_their_inputs(tmp_path: Path) -> None:
+    """The columns of `calibrate` were unknown to `steady` and `query`."""
+    alone = [
+        replace(ROBOT, tails=n, tail_length=length, motor_speed=rpm * np.pi / 30)
+        for n, length, rpm in ((2, 0.09, 60.0), (3, 0.11, 40.0))
+    ]
+    motion, expected = sf.query(RUNS, robot=ROBOT), sf.query(alone)
+    assert list(motion)[:5] == ["Tails", "l_mm", "rpm", "day", "omega_h_rpm"]
+    assert motion["omega_yr_rad_s"].to_numpy() == pytest.approx(expected["omega_yr_rad_s"].to_numpy() * [1, -1])
+    assert motion["R_yr_cm"].to_numpy() == pytest.approx(expected["R_yr_cm"].to_numpy())
+    RUNS.to_csv(tmp_path / "runs.csv", index=False)
+    command = ["query", str(tmp_path / "runs.csv"), "--robot", "paper-control", "--out", str(tmp_path / "o.csv")]
+    surrogate.__main__.main(command)
+    written = read_table(tmp_path / "o.csv")
+    assert written["R_yr_cm"].to_numpy() == pytest.approx(expected["R_yr_cm"].to_numpy(), rel=1e-6)
+    assert written["day"].tolist() == ["=a", "=a"]
+    columns = {**ROBOT.group_values(), "omega_bar": [5.0, 10.0]}
+    assert list(sf.query(columns))[: len(columns)] == list(columns)
+
+
+@pytest.mark.parametrize(
+    ("runs", "words"),
+    [
+        (RUNS.assign(Tails=[2.5, 3]), "the table, row 1: N = 2.5; give a whole number"),
+        (RUNS.assign(l_mm=["long", 3]), "the table, row 1: tail_length"),
+        (RUNS[["day"]], "the table: no column N, l_cm, omega_rpm"),
+        ([ROBOT], "robot goes with a table of runs"),
+    ],
+)
+def test_runs_that_cannot_be_are_refused(runs: pd.DataFrame, words: str) -> None:
+    with pytest.raises(sf.InputError, match=words):
+        robot_rows(runs, ROBOT)
 
 
 def test_a_response_in_lab_units(file: Path) -> None:
