@@ -4,8 +4,10 @@
 import { general } from "./format.js";
 import { InputError } from "./input_error.js";
 import { LineOfSight, hysteresis } from "./line_of_sight.js";
+import { compose, inversePose } from "./planar.js";
 import { FOLLOWING, tell } from "./progress.js";
-import { pivotDistance, speedOf, turnRadius } from "./vehicle.js";
+import { motionAfter, pivotDistance, sideOf, speedOf, turnRadius } from "./vehicle.js";
+import { zigzag } from "./zigzag.js";
 
 const MOST_SWITCHES = 2_000_000;
 const PATIENCE = 30.0; // lengths of the robot's motion that may pass without progress along the path
@@ -16,7 +18,7 @@ const EVERY = 2_000; // switches between two calls of `progress`
  * offset: from the head's centre forward to the tracked point. start: {pose, sense}; default: at rest at the
  * beginning of the reference, with its heading. */
 function follow(reference, vehicle, guidance, offset = 0, options = {}) {
-  const start = options.start ?? startAtRest(reference, vehicle, offset, guidance.swing);
+  const start = options.start ?? startAtRest(reference, vehicle, guidance, offset);
   const law = new LineOfSight(reference, vehicle, guidance, offset), dwells = [], poses = [start.pose];
   const around = guidance.ahead + pivotDistance(vehicle) + offset + turnRadius(vehicle);
   const patience = (PATIENCE * around) / Math.max(speedOf(vehicle), 1e-300);
@@ -47,17 +49,21 @@ function follow(reference, vehicle, guidance, offset = 0, options = {}) {
   }
 }
 
-/* Start at rest where the reference begins: {pose, sense}.
- *
- * The robot turns first to the side to which the reference turns first, so its initial heading points to the other
- * side of the reference by half a swing of the zigzag. */
-function startAtRest(reference, vehicle, offset, swing) {
+/* Start at rest near the beginning of the reference, so that the first dwell ends as one of the zigzag does:
+ * {pose, sense}. start_at_rest */
+function startAtRest(reference, vehicle, guidance, offset) {
   const [first] = reference.heading;
   const turning = Array.from(reference.heading).find((heading) => Math.abs(heading - first) > 1e-6);
-  const sense = turning === undefined || turning > first ? 1 : -1;
-  const heading = first - sense * hysteresis(reference, vehicle, swing)[0];
+  const sense = turning === undefined || turning > first ? 1 : -1, straight = zigzag(vehicle, guidance.dwell, offset);
+  const heading = first - sense * straight.swing * hysteresis(reference, vehicle, 1)[0];
   const [[px, py], [qx, qy]] = [reference.p[0], reference.q[0]], toHead = Math.hypot(px - qx, py - qy) - offset;
-  return { pose: [qx + toHead * Math.cos(heading), qy + toHead * Math.sin(heading), heading], sense };
+  const sway = sense * straight.sway, c = Math.cos(heading), s = Math.sin(heading);
+  const bent = [qx + sway * s + toHead * c, qy - sway * c + toHead * s, heading];
+  const law = new LineOfSight(reference, vehicle, guidance, offset), before = straight.dwells[sideOf(-sense)];
+  const [x, y, turned] = law.poseAfter(bent, sense, before, law.nextDwell(bent, sense, before).time);
+  const [dx, dy] = vehicle.current.map((speed) => speed * guidance.dwell);
+  const moved = motionAfter(vehicle, sense, null, guidance.dwell);
+  return { pose: compose([x - dx, y - dy, turned], inversePose(moved)), sense };
 }
 
 export { follow, startAtRest };

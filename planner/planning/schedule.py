@@ -30,7 +30,9 @@ from planner.planning.line_of_sight import Guidance, LineOfSight, hysteresis
 from planner.planning.progress import FOLLOWING, Progress, tell
 from planner.vehicle.rollout import Switches
 from planner.vehicle.vehicle import Vehicle
+from planner.vehicle.zigzag import zigzag
 from sim.io.errors import InputError
+from sim.mechanics import planar
 
 MOST_SWITCHES = 2_000_000
 _PATIENCE = 30.0  # lengths of the robot's motion that may pass without progress along the path
@@ -67,7 +69,7 @@ def follow(
     Raises:
         InputError: the path needs too many switches, or the robot turns in circles.
     """
-    start = start or start_at_rest(reference, vehicle, offset, guidance.swing)
+    start = start or start_at_rest(reference, vehicle, guidance, offset)
     law = LineOfSight(reference, vehicle, guidance, offset)
     pose, sense = start.pose, start.sense
     before: float | None = None  # at rest
@@ -100,17 +102,26 @@ def follow(
             tell(progress, FOLLOWING, law.place / len(reference.q))
 
 
-def start_at_rest(reference: Reference, vehicle: Vehicle, offset: float, swing: float) -> Start:
-    """Start at rest where the reference begins.
+def start_at_rest(reference: Reference, vehicle: Vehicle, guidance: Guidance, offset: float) -> Start:
+    """Start at rest near the beginning of the reference, so that the first dwell ends as one of the zigzag does.
 
-    The robot turns first to the side to which the reference turns first, so its initial heading points to the
-    other side of the reference by half a swing of the zigzag.
+    The robot turns first to the side to which the reference turns first. A dwell of the zigzag to that side begins
+    outside the reference by half a swing of the heading, with bent tails. From rest they are straight, and the
+    robot moves further. So the start is where the shortest dwell from rest leads to the end of that dwell.
     """
     turn = reference.heading - reference.heading[0]
     turning = np.flatnonzero(np.abs(turn) > 1e-6)
     sense = 1 if not len(turning) or turn[turning[0]] > 0 else -1
-    heading = float(reference.heading[0]) - sense * float(hysteresis(reference, vehicle, swing)[0])
-    to_tracked = reference.p[0] - reference.q[0]
-    to_head = math.hypot(*to_tracked.tolist()) - offset
-    x, y = (reference.q[0] + to_head * np.array([math.cos(heading), math.sin(heading)])).tolist()
+    straight = zigzag(vehicle, guidance.dwell, offset)
+    bend = hysteresis(reference, vehicle, 1.0)[0]  # over the swing
+    heading = float(reference.heading[0]) - sense * straight.swing * bend
+    to_head = math.hypot(*(reference.p[0] - reference.q[0]).tolist()) - offset
+    outside = sense * straight.sway * np.array([math.sin(heading), -math.cos(heading)])
+    x, y = (reference.q[0] + outside + to_head * np.array([math.cos(heading), math.sin(heading)])).tolist()
+    law = LineOfSight(reference, vehicle, guidance, offset)
+    before = straight.dwells[0 if sense < 0 else 1]
+    time, _ = law.next_dwell((x, y, heading), sense, before)
+    at_flip = np.array(law.pose_after((x, y, heading), sense, before, time))
+    at_flip[:2] -= vehicle.current * guidance.dwell
+    x, y, heading = planar.compose(at_flip, planar.inverse(vehicle.motion(sense, None, guidance.dwell))).tolist()
     return Start((x, y, heading), sense)

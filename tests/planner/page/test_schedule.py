@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from planner.paths.path import Path2D
@@ -19,9 +22,11 @@ PAGE = vehicle_to_page(CAR)
 
 def test_starts() -> None:
     followed = [reference(path, CAR.pivot_distance + 0.1, 0.02) for path in PATHS.values()]
-    found = answers([("schedule.js", "startAtRest", reference_to_page(r), PAGE, 0.1, 0.08) for r in followed])
-    for start, wanted in zip(found, [start_at_rest(r, CAR, 0.1, 0.08) for r in followed], strict=True):
-        check_near(start["pose"], wanted.pose, 1e-12)
+    car, guidance = replace(CAR, current=np.array([1e-3, -5e-4])), Guidance(0.8, 0.9, 0.04)
+    page = (vehicle_to_page(car), guidance._asdict(), 0.1)
+    found = answers([("schedule.js", "startAtRest", reference_to_page(r), *page) for r in followed])
+    for start, wanted in zip(found, [start_at_rest(r, car, guidance, 0.1) for r in followed], strict=True):
+        check_near(start["pose"], wanted.pose, 1e-9)
         assert start["sense"] == wanted.sense
 
 

@@ -10,10 +10,13 @@ import pytest
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Drift, reference
+from planner.planning.plan import plan
 from planner.planning.schedule import follow
 from planner.planning.stated_error import guaranteed, look_ahead
 from planner.vehicle.rollout import poses_at_flips, trace
 from sim.mechanics import planar
+from sim.model.presets import PRESETS
+from sim.model.robot import Robot
 from tests.planner.vehicles import plain_guidance, vehicle
 
 
@@ -72,3 +75,26 @@ def test_the_schedule_predicts_what_the_vehicle_does(bias: float) -> None:
         before = dwell
     assert poses_at_flips(car, switches) == pytest.approx(switches.poses, abs=1e-8)
     assert trace(car, switches, 0.0)[::8] == pytest.approx(switches.poses[:, :2], abs=1e-8)
+
+
+SIDEWAYS = replace(
+    PRESETS["paper-control"], tails=3, tail_length=0.08097, head_radius=0.016, head_length=0.06,
+    C_t=3.7343, C_r=1.5529, C_yr=3.7597,
+).with_motor(2.2)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        Path2D.of([[0, 0], [0.7, 0.1]]),
+        Path2D.of([[0, 0], [3, 0], [3, 2], [0, 2]], closed=True),  # begins at a corner
+        circle(1.5),
+    ],
+    ids=["line", "corner", "circle"],
+)
+@pytest.mark.parametrize("robot", [SIDEWAYS, PRESETS["paper-control"]], ids=["sideways", "control"])
+def test_the_first_dwell_is_no_worse_than_those_after_it(robot: Robot, path: Path2D) -> None:
+    """From rest the tails are straight, and the first dwell moves the robot further than the others do."""
+    distance = plan(path, robot, dwell=1.5).errors.distance
+    first, later = distance[:9].max(), distance[9:-8].max()
+    assert first <= 1.12 * later
