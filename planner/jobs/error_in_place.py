@@ -31,7 +31,7 @@ from planner.paths.tractrix import reference
 from planner.planning.error_growth import error_growth
 from planner.planning.plan import zigzag_drift
 from planner.planning.planned import Plan
-from planner.planning.stated_error import LEVEL, deviations_open_loop, flips_between
+from planner.planning.stated_error import LEVEL, WOBBLE, deviations_open_loop, flips_between
 from planner.vehicle.rollout import roll_out
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Mode
@@ -39,7 +39,6 @@ from planner.vehicle.zigzag import zigzag
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
-WOBBLE = 0.002  # l; what the disc's revolutions move the body, which the vehicle averages
 MEASURED = 0.01  # l; what poses with errors of 0.01 l and 0.01 rad add to the error with feedback
 _PLACES = 300  # along the path
 _DRAWS = 400
@@ -76,7 +75,7 @@ def error_with_feedback(plan: Plan) -> tuple[Floats, Floats]:
             along = np.maximum(along, np.hypot(*(_interpolated(shifted, declared.arc, p) - here).T))
     beyond = max(0.0, max(map(abs, levers)) - tracked.rod)
     across = plan.predicted_max + plan.feedback_error + MEASURED + plan.straight.swing * beyond
-    return times_at(plan, arcs), WOBBLE + np.hypot(along, across)
+    return times_at(plan, arcs), np.hypot(WOBBLE + along, across)
 
 
 def times_at(plan: Plan, arcs: Floats) -> Floats:

@@ -12,6 +12,7 @@ import { groupValues } from "./robot.js";
 import { lagTable, resampled } from "./vehicle.js";
 
 const ODD = 0.2; // share of a table's error that has opposite signs in the two directions
+const TIME_STEPS = 2.5e-4; // of the yaw rate, one standard deviation: error of time steps
 const SIDES = [[1, 1, 1], MIRROR];
 
 /* Ask a table for the vehicle of a robot. table_vehicle */
@@ -59,7 +60,7 @@ function vehicleOfParts({ twist, curves, before, phaseRate, errors, modes, curre
 }
 
 /* Turn the errors of the table into modes. The two directions of a mirror-symmetric robot have the same errors;
- * those of other robots also have a part of opposite signs. */
+ * those of other robots also have a part of opposite signs. The simulator turns a little less in time steps. */
 function tableModes(twist, errors) {
   const alike = twist[1].every((value, i) => {
     const image = twist[0][i] * MIRROR[i];
@@ -67,7 +68,9 @@ function tableModes(twist, errors) {
   });
   const signs = alike ? [[1, 1]] : [[1, 1], [ODD, -ODD]];
   const tables = errors.map(({ lag, memory }) => lag && lagTable(lag, memory));
-  return signs.flatMap((sign) => errors.map((error, i) => {
+  const turned = twist.map(([, , rate]) => [0, 0, TIME_STEPS * rate]);
+  const ofSteps = { name: "table: time steps", twist: turned, lag: null, current: [0, 0] };
+  return [ofSteps, ...signs.flatMap((sign) => errors.map((error, i) => {
     const sides = SIDES.map((side, s) => side.map((value) => sign[s] * value));
     return {
       name: `table: ${i + 1}`,
@@ -75,7 +78,7 @@ function tableModes(twist, errors) {
       lag: tables[i] && sides.map((side) => mirrored(tables[i], side)),
       current: [0, 0],
     };
-  }));
+  }))];
 }
 
 function mirrored(table, side) {

@@ -18,6 +18,7 @@ from sim.model.robot import Robot
 from surrogate.interface import ErrorModes, LookupTable
 from surrogate.table.refusals import refusing_robots
 
+_TIME_STEPS = 2.5e-4  # of the yaw rate, one standard deviation: error of time steps (`sim.motion.resolution`)
 _ODD = 0.2  # share of a table's error that has opposite signs in the two directions
 
 
@@ -94,13 +95,13 @@ def _table_modes(twist: Floats, errors: ErrorModes) -> list[Mode]:
     """Turn the errors of the table into modes.
 
     The two directions of a mirror-symmetric robot have the same errors. Those of other robots also have a part of
-    opposite signs.
+    opposite signs. The simulator, whose motion the table has learned, turns a little less in time steps.
     """
     symmetric = np.allclose(twist[1], twist[0] * planar.MIRROR, rtol=1e-9, atol=0)
     mirror = np.stack([np.ones(3), planar.MIRROR])
     signs = [np.ones(2)] if symmetric else [np.ones(2), _ODD * np.array([1.0, -1.0])]
     lags = lag_table(errors.lag, errors.memory)
-    modes = []
+    modes = [Mode("table: time steps", twist * [0.0, 0.0, _TIME_STEPS])]
     for sign in signs:
         sides = sign[:, None] * mirror
         for i, move in enumerate(errors.twist):

@@ -16,6 +16,7 @@ from planner.planning.error_growth import error_growth
 from planner.planning.plan import plan
 from planner.planning.schedule import follow
 from planner.planning.stated_error import (
+    WOBBLE,
     Predicted,
     flips_between,
     look_ahead,
@@ -64,7 +65,7 @@ def test_it_is_the_quantile_over_drawn_vehicles(path: Path2D, errors: float) -> 
         twist = car.twist + sum(rng.normal() * mode.twist for mode in car.modes)
         drawn = trace(replace(car, twist=twist), switches, 0.0)
         worst.append(distance_to(ref.p, drawn).max())
-    assert np.mean(np.array(worst) <= stated) == pytest.approx(0.95, abs=0.035)
+    assert np.mean(np.array(worst) + WOBBLE <= stated) == pytest.approx(0.95, abs=0.035)
 
 
 def test_errors_of_the_response_add_up_on_curves() -> None:
@@ -78,7 +79,7 @@ def test_errors_of_the_response_add_up_on_curves() -> None:
     for _ in range(300):
         lag = car.lag + sum(rng.normal() * mode.lag for mode in car.modes if mode.lag is not None)
         worst.append(distance_to(ref.p, trace(replace(car, lag=lag), switches, 0.0)).max())
-    assert np.mean(np.array(worst) <= stated) == pytest.approx(0.95, abs=0.035)
+    assert np.mean(np.array(worst) + WOBBLE <= stated) == pytest.approx(0.95, abs=0.035)
     assert stated > 2 * error.largest
 
 
@@ -94,11 +95,11 @@ def _wavy_modes() -> list[Mode]:
     return modes
 
 
-def test_without_uncertainty_it_is_the_predicted_error() -> None:
+def test_without_uncertainty_it_is_the_predicted_error_and_the_motion_within_a_revolution() -> None:
     car = replace(vehicle(), modes=())
     switches, ref, rollout = planned(car, circle(2.0))
     error = predicted_error(ref.p, rollout.track, closed=True)
-    assert stated_for(car, switches, rollout, error) == pytest.approx(error.largest)
+    assert stated_for(car, switches, rollout, error) == pytest.approx(error.largest + WOBBLE)
 
 
 JITTER = np.tile([0.0, 0.0, 1e-3], (2, len(TIMES), 1))  # of the lag, over the disc's phase
