@@ -38,7 +38,7 @@ def test_paper_cases_are_planned_within_their_bound(name: str) -> None:
     robot = PRESETS["paper-triangle"] if name == "triangle" else CONTROL
     result = plan(path, robot)
     assert result.predicted_rms < 1.3 * result.straight.rms
-    assert result.errors.drawn_rms < {"circle": 0.012, "square": 0.020, "triangle": 0.042}[name]
+    assert result.errors.drawn_rms < {"circle": 0.012, "square": 0.020, "triangle": 0.044}[name]
     assert result.errors.guaranteed is not None
     assert result.predicted_max <= min(result.errors.guaranteed, result.stated_error)
     assert result.errors.closure is not None
