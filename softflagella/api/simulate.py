@@ -75,7 +75,7 @@ def steady(
         [0.05, 0.08, 0.16]
         >>> runs = {"N": 2, "l_cm": [9.0, 11.0], "omega_rpm": [60.0, -60.0]}
         >>> sf.steady(runs, robot="paper-control")[["l_cm", "omega_rpm", "R_yr_cm"]].round(2).values.tolist()
-        [[9.0, 60.0, 9.17], [11.0, -60.0, 9.92]]
+        [[9.0, 60.0, 9.19], [11.0, -60.0, 10.24]]
     """
     rows = robot_rows(robots, robot)
     motion = steady_columns(rows.columns, stability=stability, jobs=jobs, title="")
