@@ -20,11 +20,10 @@ import numpy as np
 from benchmarks.parallel import in_parallel
 from benchmarks.planner.feedback import eight
 from planner.goal.dubins import shortest_paths
-from planner.planning.camera import Camera
+from planner.planning.camera import POSE, Camera
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from planner.tracking.swim import swim
-from sim.arrays import Floats
 from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker
 
@@ -32,14 +31,14 @@ ON_PATH = 0.08  # l
 _AT_ONCE = 25  # starts of one task
 
 
-def random_start(planned: Plan, seed: int) -> tuple[Floats, np.random.Generator]:
+def random_start(planned: Plan, seed: int) -> tuple[POSE, np.random.Generator]:
     """Draw a pose of the head's centre, and return what else is drawn from."""
     rng, (x, y, _) = np.random.default_rng(seed), planned.start
     r, angle = 5 * math.sqrt(rng.random()), rng.uniform(0, 2 * math.pi)
-    return np.array([x + r * math.cos(angle), y + r * math.sin(angle), rng.uniform(-math.pi, math.pi)]), rng
+    return (x + r * math.cos(angle), y + r * math.sin(angle), rng.uniform(-math.pi, math.pi)), rng
 
 
-def best_time(planned: Plan, start: Floats) -> float:
+def best_time(planned: Plan, start: POSE) -> float:
     """Compute the time of the fastest of the shortest Dubins tracks to all poses of the path."""
     reference, car = planned.declared.reference, planned.tracked.vehicle
     goals, a = np.column_stack([reference.q, reference.heading]), car.pivot_distance
