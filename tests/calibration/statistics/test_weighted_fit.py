@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from calibration.statistics.fit import fit
-from calibration.statistics.held_out import errors
+from calibration.statistics.held_out import error_interval, errors
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import Parameter, Parameters, Runs, start_values
 from calibration.statistics.study import Study, middle_session
@@ -126,3 +127,17 @@ def test_runs_of_little_weight_are_named() -> None:
     (many,) = caveat_of_weights(tuple(range(1, 15)), 96)
     assert many.startswith("14 of 96 runs have a weight below one half (rows 1, 2, ")
     assert "10 and 4 more" in many
+
+
+@pytest.mark.parametrize(("count", "most"), [(3, 3), (8, 7)])
+def test_the_interval_of_the_held_out_error_holds_95_percent_of_the_draws(count: int, most: int) -> None:
+    """Few conditions, one of 3 or 4 of 8 in error by 1: the number of those drawn is binomial."""
+    data = line(0)[0].runs.subset(np.arange(count))
+    data = replace(data, condition=np.arange(count))
+    wrong = np.arange(count) < (1 if count == 3 else 4)
+    prediction = data.y + wrong[:, None]
+    share = float(wrong.mean())
+    least, largest = binom.ppf([0.025, 0.975], count, share)
+    assert largest == most
+    low, high = error_interval(data, prediction, np.ones(count, bool), seed=0)
+    assert (low, high) == pytest.approx((np.sqrt(least / count), np.sqrt(largest / count)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -103,6 +104,22 @@ def test_the_true_explanation_is_seldom_given_up() -> None:
     lost_column = [replace(both[0], parameters={"viscosity_with_time": 0.1})]
     with pytest.raises(InputError, match="A: these runs cannot test viscosity_with_time"):
         standings(model(np.zeros((n, k))), lost_column, np.ones(n, bool))
+
+
+@pytest.mark.parametrize(("ratio", "given_up"), [(24.0, False), (26.0, True)])
+def test_an_explanation_is_given_up_where_another_is_25_times_as_likely(ratio: float, given_up: bool) -> None:
+    """One run with an error of variance 1 where the first predicts 0, and is there: e^(d²/2) to one."""
+    known = tuple(SimpleNamespace(name=name, start=0.0) for name in "AB")
+    predictions = {"A": 0.0, "B": math.sqrt(2 * math.log(ratio))}
+    model: Any = SimpleNamespace(
+        runs=SimpleNamespace(y=np.zeros((1, 1)), session=np.zeros(1, int), outputs=("y",)),
+        coefficients=known, nuisances=(), effects=(),
+        derivatives=lambda _, names: (np.array([[predictions[names[0]]]]), np.zeros((1, 1, 1))),
+    )  # fmt: skip
+    both = [Explanation(t, {t: 1.0}, np.eye(1), Noise(np.eye(1), 0.0), ("y",)) for t in predictions]
+    first, second = standings(model, both, np.ones(1, bool))
+    assert (first.title, first.given_up, second.given_up) == ("A", False, given_up)
+    assert second.behind == pytest.approx(2 * math.log(ratio))
 
 
 def test_a_verdict_without_rivals_is_refused(tmp_path: Path) -> None:

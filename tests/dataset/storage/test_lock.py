@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import socket
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -56,3 +58,26 @@ def test_a_shard_is_not_written_through_a_link(tmp_path: Path) -> None:
     LocalStorage(str(tmp_path)).write("a.txt", "new")
     assert (tmp_path / "precious").read_text() == "content"
     assert (tmp_path / "a.txt").read_text() == "new"
+
+
+@pytest.mark.parametrize("left", [None, "of a killed process"], ids=["removed", "replaced"])
+def test_a_lock_that_is_removed_before_it_is_locked_is_made_again(
+    left: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its owner ends between our opening and our locking: what we then hold is no longer the file of that name."""
+    storage, lock, flock = LocalStorage(str(tmp_path)), tmp_path / LOCK, fcntl.flock
+
+    def flock_late(*words: Any) -> None:
+        monkeypatch.setattr(fcntl, "flock", flock)
+        lock.unlink()
+        if left is not None:
+            lock.write_text(left)
+        flock(*words)
+
+    monkeypatch.setattr(fcntl, "flock", flock_late)
+    with (
+        locked(storage),
+        pytest.raises(InputError, match=f"being written by process {os.getpid()} on"),
+        locked(storage),
+    ):
+        pytest.fail("the lock must not be taken twice")

@@ -77,6 +77,7 @@ def test_the_header_compiles(tmp_path: Path) -> None:
 def test_milliseconds_carry_rounding_and_split_long_dwells() -> None:
     assert sum(milliseconds(np.full(1000, 0.0104))) == 10400
     assert milliseconds(np.array([1.0, 140.0])) == [1000, 65535, 0, 65535, 0, 8930]
+    assert milliseconds(np.array([65.535, 65.536])) == [65535, 65535, 0, 1]
     with pytest.raises(InputError, match="longer minimum dwell"):
         milliseconds(np.array([1.0, 0.0001]))
 

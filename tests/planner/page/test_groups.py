@@ -14,8 +14,8 @@ from tests.planner.page.robots import random_groups
 
 @pytest.mark.parametrize(
     "change",
-    [{"C_t": np.inf}, {"C_yr": np.nan}, {"L_over_R": 0.0}, {"N": 2.5}, {"N": 1e9}, {"l_over_r0": 5.0},
-     {"omega_bar": 0.0}],
+    [{"C_t": np.inf}, {"C_yr": np.nan}, {"L_over_R": 0.0}, {"a_over_R": 0.0}, {"a_over_R": -1.0}, {"N": 2.5},
+     {"N": 1e9}, {"l_over_r0": 5.0}, {"omega_bar": 0.0}],
     ids=str,
 )  # fmt: skip
 def test_refusals(change: dict[str, Any]) -> None:

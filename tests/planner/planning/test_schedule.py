@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Drift, reference
+from planner.planning.line_of_sight import hysteresis
 from planner.planning.plan import plan
 from planner.planning.schedule import follow
 from planner.planning.stated_error import guaranteed, look_ahead
@@ -98,3 +101,11 @@ def test_the_first_dwell_is_no_worse_than_those_after_it(robot: Robot, path: Pat
     distance = plan(path, robot, dwell=1.5).errors.distance
     first, later = distance[:9].max(), distance[9:-8].max()
     assert first <= 1.12 * later
+
+
+def test_the_hysteresis_is_half_the_swing_and_grows_with_the_bend() -> None:
+    """h = β/2 (1 + R′ |κ|), and β where the robot can only turn: it then swings to one side of the path."""
+    car = vehicle()
+    for curvature, part in ((0.0, 0.5), (0.5, 0.5 * (1 + 0.5 * car.pivot_radius)), (-9.0, 1.0)):
+        ref: Any = SimpleNamespace(curvature=np.array([curvature]))
+        assert hysteresis(ref, car, 0.08) == pytest.approx([0.08 * part])

@@ -12,7 +12,7 @@ import pytest
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Reference, reference
-from planner.planning.error_growth import error_growth
+from planner.planning.error_growth import ErrorGrowth, error_growth
 from planner.planning.plan import plan
 from planner.planning.schedule import follow
 from planner.planning.stated_error import (
@@ -100,6 +100,16 @@ def test_without_uncertainty_it_is_the_predicted_error_and_the_motion_within_a_r
     switches, ref, rollout = planned(car, circle(2.0))
     error = predicted_error(ref.p, rollout.track, closed=True)
     assert stated_for(car, switches, rollout, error) == pytest.approx(error.largest + WOBBLE)
+
+
+@pytest.mark.parametrize(("closed", "expected"), [(False, 1.645), (True, 0.0)])
+def test_a_robot_that_swims_past_an_open_end_is_off_its_path(closed: bool, expected: float) -> None:
+    """One mode, a way along the path that is too long or too short: half of the robots stop before the end."""
+    x = np.arange(3.0)
+    line, along = np.stack([x, 0 * x], 1), np.stack([0.1 * x, 0 * x], 1)[:, None]
+    growth = ErrorGrowth(np.arange(3), line, along, np.zeros((3, 1)))
+    predicted = Predicted(np.zeros(3), np.zeros(3), np.tile([0.0, 1.0], (3, 1)), closed)
+    assert stated_error(growth, predicted) == pytest.approx(expected * 0.2, rel=0.15, abs=0.01)
 
 
 JITTER = np.tile([0.0, 0.0, 1e-3], (2, len(TIMES), 1))  # of the lag, over the disc's phase

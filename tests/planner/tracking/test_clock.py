@@ -9,7 +9,7 @@ import pytest
 
 from planner.paths.path import circle
 from planner.planning.plan import plan
-from planner.tracking.clock import CONFIRMED, LATE, Clock
+from planner.tracking.clock import CONFIRMED, EARLY, LATE, Clock
 from planner.tracking.tracker import Tracker
 from sim.model.presets import PRESETS
 
@@ -29,6 +29,16 @@ def test_times_that_cannot_be_are_taken_for_the_last_one(now: float) -> None:
     clock = Clock(1.0)
     assert clock.tell(now, 2.0) == 0.0
     assert clock.now == 1.0
+
+
+def test_late_messages_are_taken_for_the_last_time() -> None:
+    """They overtook each other on the way; however many there are, they do not set the clock back."""
+    clock = Clock(5.0)
+    for k in range(2 * CONFIRMED):
+        assert clock.tell(5.0 - EARLY + 0.1 * k, 6.0) == 0.0
+        assert (clock.now, clock.believed) == (5.0, True)
+    clock.tell(4.9 - EARLY, 6.0)
+    assert not clock.believed
 
 
 @pytest.mark.parametrize("jump", [140.0, -140.0], ids=["forward", "back"])

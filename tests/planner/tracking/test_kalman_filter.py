@@ -102,6 +102,18 @@ def test_an_update_is_that_of_the_textbook(estimate: Estimate) -> None:
     assert np.array(estimate.covariance) == pytest.approx(P - gain @ H @ P, abs=1e-12)
 
 
+def test_the_guidance_swims_with_the_learned_robot(estimate: Estimate) -> None:
+    """The current among it, with its sign: guidance and filter expect one pose at the end of a dwell."""
+    learned = estimate._law
+    estimate.apply()
+    for dwell in PAST:
+        expected = estimate.moved(estimate.pose, dwell)
+        found = learned.pose_after(estimate.pose, dwell.sense, dwell.before, dwell.length)
+        assert found == pytest.approx(expected, abs=1e-12)
+    speed = estimate._speed * (1 + STATE[5])
+    assert learned._drift[1:] == pytest.approx((STATE[8] / speed, STATE[9] / speed))
+
+
 def test_numbers_stay_within_bounds(estimate: Estimate) -> None:
     H = [[0.0] * STATES for _ in range(3)]
     H[0][3] = H[1][4] = H[2][5] = 1.0

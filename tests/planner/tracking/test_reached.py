@@ -61,3 +61,11 @@ def test_a_gap_of_the_camera_is_bridged() -> None:
     kept = np.r_[:40, 160:200]
     place = reached(along, times[kept], poses[kept], SPEED)
     assert place == pytest.approx(len(along.q) // 2, abs=5)
+
+
+def test_a_robot_that_is_faster_than_its_model_is_followed() -> None:
+    along = reference(LANES, 0.0, 0.02)
+    end = round(0.9 * len(along.q))
+    times, poses = followed(along, 0, end, 50)
+    place = reached(along, times / 2.8, poses, SPEED)  # at 1.4 of its speed
+    assert place == pytest.approx(end, abs=5)

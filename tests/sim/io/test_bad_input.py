@@ -29,6 +29,8 @@ def table(**changes: object) -> str:
 
 BAD_TABLES = {
     "negative length": (table(l_over_R=-3), "l_over_R = -3"),
+    "disc without radius": (table(a_over_R=0), "a_over_R = 0 in row 1; it must be above 0"),
+    "disc of negative radius": (table(a_over_R=-1), "a_over_R = -1"),
     "no tails": (table(N=0), "N = 0"),
     "half a tail": (table(N=2.5), "N = 2.5"),
     "nan": (table(C_t="nan"), "C_t = nan"),
