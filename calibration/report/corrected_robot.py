@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -122,9 +123,12 @@ def significant(robot: Robot, known: CalibrationKnowledge) -> Robot:
     sigmas = dict(zip(known.names, (scale / np.sqrt(precision)).tolist(), strict=True))
     units = {entry.field: entry.unit for entry in ENTRIES}
     numbers = {name: getattr(robot, name) for name in (*COEFFICIENTS, *NUMBERS) if name in sigmas}
+    rounded: dict[str, Any] = {
+        name: _rounded(value, value * sigmas[name], units[name]) for name, value in numbers.items() if value
+    }
     return replace(
         robot,
-        **{name: _rounded(value, value * sigmas[name], units[name]) for name, value in numbers.items() if value},
+        **rounded,
         effects={name: _rounded(size, sigmas.get(name, 0.0)) for name, size in robot.effects.items()},
     )
 

@@ -39,8 +39,8 @@ def draw_motions(axes: Axes, names: Sequence[str], scheduled: Sequence[Scheduled
         labels += [(place, f"{minute:g}", colour) for minute, place in zip(shown.tolist(), places, strict=True)]
     axes.set_aspect("equal")
     if labels:
-        places, words, colours = zip(*labels, strict=True)
-        label_points(axes, np.array(places), words, colours, 7)
+        points, words, colours = zip(*labels, strict=True)
+        label_points(axes, np.array(points), words, colours, 7)
     axes.set_xlabel("x [cm]")
     axes.set_ylabel("y [cm]")
     return axes
