@@ -73,8 +73,14 @@ def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
             time_bar, x_over_l, y_over_l, heading_rad.
 
     Raises:
-        InputError: a column is missing, a value is no finite number, or time goes back.
+        InputError: a column is missing, a value is no finite number, time goes back, or it is the track of
+            another plan.
     """
+    others = set(track["plan_id"].dropna().astype(str)) - {plan["id"]} if "plan_id" in track else set()
+    if others:
+        raise InputError(
+            f"the track is of plan {min(others)}, not of {plan['id']}; compare it with its own plan.json"
+        )
     track = track_in_tails(track, plan["robot"])
     values = {name: numbers_of(track[name]).to_numpy() for name in _COLUMNS}
     pose = np.stack([values["x_over_l"], values["y_over_l"], values["heading_rad"]], 1)

@@ -13,11 +13,11 @@ const HOW = {
 
 /* Compare a track with a plan, as measured ("none"), from time 0 ("time"), or laid on the plan's start ("rigid").
  *
- * plan: content of plan.json. table: {names, columns} of the file. */
+ * plan: content of plan.json. table: {names, columns} of the file, and `plans`, the ids in it. */
 function comparedTrack(plan, table, how) {
   const measured = columnsInTails(table, plan.robot),
     moved = how === "none" ? measured : movedTrack(measured, plan, how);
-  const error = trackingError(plan, { names: COLUMNS, columns: moved });
+  const error = trackingError(plan, { names: COLUMNS, columns: moved, plans: table.plans });
   const cm = 100 * plan.robot.tail_length_m,
     second = plan.robot.time_scale_s;
   const worst = error.distance.indexOf(largest(error.distance)),

@@ -32,12 +32,17 @@ function openFile({ name, bytes }) {
   const quantities = columns.map((column) => splitName(column).quantity.toLowerCase());
   const table = () => ({ names, columns: words.map((column, i) => numbersOf(column, names[i])) });
   if (TRACK.every((quantity) => quantities.some((each) => each.startsWith(quantity))))
-    return { kind: "track", table: table() };
+    return { kind: "track", table: { ...table(), plans: plansOf(names, words) } };
   if (!PATH.every((quantity) => quantities.includes(quantity)) && areOfRuns(columns)) {
     return { kind: "runs", table: { ...table(), texts: words.map(textsOf), lines } };
   }
   const { path, unit } = readTablePath(content, name);
   return { kind: "path", unit: unit === null ? null : 100 * unit, paths: [{ ...path, name: stem(name) }] };
+}
+
+/* The ids of the plans that a track is of. */
+function plansOf(names, words) {
+  return [...new Set(words[names.indexOf("plan_id")])].filter(Boolean);
 }
 
 /* The paths of an SVG, those that can be read; where there is none, the refusal of the first. */

@@ -17,8 +17,11 @@ const LAB = ["time_s", "x_cm", "y_cm", "heading_deg"]; // or in other units
 /* Compare a track with its plan: {rms, largest, rawRms, rawLargest, missed, stated, track, time, distance,
  * tailLength}; those called raw from the path as given.
  *
- * plan: content of plan.json. table: {names, columns} of the head's centre, as replays or labs have them. */
+ * plan: content of plan.json. table: {names, columns} of the head's centre, as replays or labs have them; it may
+ * have `plans`, the ids of the plans that it is of. */
 function trackingError(plan, table) {
+  const [other] = (table.plans ?? []).filter((id) => id !== plan.id).sort();
+  if (other) throw new InputError(`the track is of plan ${other}, not of ${plan.id}; compare it with its own plan.json`);
   const [time, x, y, heading] = columnsInTails(table, plan.robot);
   if (![time, x, y, heading].every((values) => values.every((value) => Math.abs(value) < LARGEST))) {
     throw new InputError("the track has a value that is not a finite number; correct the file");

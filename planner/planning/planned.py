@@ -209,6 +209,7 @@ class Plan:
             self.start,
             planned.time_scale,
             planned.tail_length,
+            self.identity,
         )
         return schedule if robot is None else schedule.swum_by(robot)
 
@@ -295,19 +296,22 @@ class Plan:
     def to_dict(self) -> dict[str, Any]:
         """Return the content of plan.json, which `softflagella.load_plan` reads.
 
-        `id` is a digest of all the rest. The other files of the plan have it, too.
+        `id` is `identity`.
         """
-        content = self._content()
-        return {"id": plan_id(content), **content}
+        return {"id": self.identity, **self._content()}
+
+    @cached_property
+    def identity(self) -> str:
+        """The `id` of plan.json, a digest of all the rest. The other files of the plan have it, and its tracks."""
+        return plan_id(self._content())
 
     def _content(self) -> dict[str, Any]:
-        robot, schedule = self.robot, self.schedule()
-        x, y, heading = schedule.start
+        robot, (x, y, heading) = self.robot, self.start
         return {
             "format": FORMAT,
             "robot": {
                 "name": robot.name,
-                "groups": schedule.robot,
+                "groups": robot.group_values(),
                 "tail_length_m": robot.tail_length,
                 "motor_speed_rad_s": robot.motor_speed,
                 "time_scale_s": robot.time_scale,

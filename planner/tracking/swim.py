@@ -87,6 +87,7 @@ class Swim:
             "time_s": self.times * robot.time_scale, "x_cm": x * cm, "y_cm": y * cm,
             "heading_deg": np.degrees(heading), "time_bar": self.times, "x_over_l": x, "y_over_l": y,
             "heading_rad": heading, "direction": self.direction.astype(int), "error_over_l": self.errors,
+            "plan_id": self.plan.identity,
         }  # fmt: skip
         frame = pd.DataFrame(columns)
         frame.attrs["units"] = column_units(frame)

@@ -49,6 +49,7 @@ class Schedule:
     start: tuple[float, float, float]  # x, y [l] and heading [rad] of the head's centre
     time_scale: float  # μ0 l⁴/EI [s]
     tail_length: float | None = None  # l [m]; without it tracks are in l alone
+    plan_id: str | None = None  # of the plan that it is of, for its tracks
 
     def __post_init__(self) -> None:
         if self.first_direction not in (-1, 1):
@@ -81,6 +82,7 @@ class Schedule:
             (x * length, y * length, heading),
             robot.time_scale,
             robot.tail_length,
+            self.plan_id,
         )
 
     def in_own_units(self, track: pd.DataFrame) -> pd.DataFrame:
@@ -118,6 +120,7 @@ def load_schedule(path: str | Path) -> Schedule:
             start=tuple(float(content["start"][k]) for k in ("x_over_l", "y_over_l", "heading_rad")),  # type: ignore[arg-type]
             time_scale=float(content["robot"]["time_scale_s"]),
             tail_length=None if (length := content["robot"].get("tail_length_m")) is None else float(length),
+            plan_id=str(content["id"]),
         )
     except KeyError as missing:
         raise InputError(f"{path} has no entry {missing}; give a plan.json of the planner") from None

@@ -44,7 +44,7 @@ def replay(
     Returns:
         A track for each schedule: time_s, x_cm and y_cm (if the schedule has a tail length), heading_deg,
         time_bar, x_over_l, y_over_l, heading_rad, direction, dwell (index of the dwell that ends at or after the
-        sample).
+        sample), plan_id (if the schedule is that of a plan).
     """
     return [_replay(schedule, resolution, progress) for schedule in schedules]
 
@@ -139,5 +139,6 @@ def _track(schedule: Schedule, rows: list[tuple[float, ...]]) -> pd.DataFrame:
             "heading_rad": pose[:, 2],
             "direction": table[:, 4].astype(int),
             "dwell": table[:, 5].astype(int),
+            **({} if schedule.plan_id is None else {"plan_id": schedule.plan_id}),
         }
     )

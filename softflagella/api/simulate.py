@@ -232,7 +232,7 @@ def replay(schedule: Schedule | Plan | str | Path, robot: OneRobot | None = None
 
     Returns:
         The track of the head's centre, with the columns `time_bar` [μ0 l⁴/EI], `time_s`, `x_over_l`, `y_over_l`,
-        `heading_rad`, `direction` of the motor, `dwell` (index).
+        `heading_rad`, `direction` of the motor, `dwell` (index), and `plan_id` where it is that of a plan.
 
     Raises:
         InputError: the schedule cannot be simulated, or it needs too many time steps.

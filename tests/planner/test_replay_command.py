@@ -78,3 +78,6 @@ def test_another_robot_carries_out_a_plan_and_its_tracking_error_is_told(
     track = replay([result.schedule(other)])[0][["time_s", "x_cm", "y_cm", "heading_deg"]]
     assert tracking_error(result.to_dict(), track).line == told
     assert "ABOVE the stated error" in told
+    twin = write_plan(plan(circle(1.0), other, objective="flips"), tmp_path / "twin")[0]
+    assert run_command(main, ["check", str(twin), words[2]]) == 2
+    assert f"is of plan {result.identity}, not of" in capsys.readouterr().err

@@ -62,6 +62,16 @@ def test_the_track_of_another_robot_is_refused(planned: tuple[dict[str, object],
         tracking_error(record, other)
 
 
+def test_the_track_of_another_plan_is_refused(planned: tuple[dict[str, object], pd.DataFrame]) -> None:
+    """The track of a square of the same robot passed; one that has no id is taken as it is."""
+    record, track = planned
+    own = track.assign(plan_id=record["id"]).astype({"plan_id": object})
+    own.loc[3, "plan_id"] = None
+    assert tracking_error(record, own).rms == tracking_error(record, track).rms
+    with pytest.raises(InputError, match=f"the track is of plan p0123456789a, not of {record['id']}"):
+        tracking_error(record, track.assign(plan_id="p0123456789a"))
+
+
 def test_a_track_without_a_column_is_refused(planned: tuple[dict[str, object], pd.DataFrame]) -> None:
     record, track = planned
     with pytest.raises(InputError, match="no column 'time_s'; it needs time_s, x_cm, y_cm and heading_deg"):

@@ -29,7 +29,8 @@ def test_paths_tracks_robots_and_plans_are_told_apart() -> None:
     assert (path["kind"], path["unit"]) == ("path", pytest.approx(0.1))  # type: ignore[index]
     check_near(path["paths"][0]["points"], [[0, 0], [300.5, 0]])  # type: ignore[index]
     assert opened("b.csv", "x,y\n0,0\n3,0\n")["unit"] is None  # type: ignore[index]
-    assert opened("t.csv", "time_s,x_cm,y_cm,heading_deg\n0,0,0,0\n1,0,0,0\n")["kind"] == "track"  # type: ignore[index]
+    track = opened("t.csv", "time_s,x_cm,y_cm,heading_deg,plan_id\n0,0,0,0,p1\n1,0,0,0,\n2,0,0,0,p1\n")
+    assert (track["kind"], track["table"]["plans"]) == ("track", ["p1"])  # type: ignore[index]
     runs = ("N,l_cm,omega_rpm,theta_deg\n3,9,100,20\n", "tails;rpm\n3;100\n", "theta_deg,R_yr_mm\n3,4\n")
     assert [opened("runs.csv", text)["kind"] for text in runs] == ["runs"] * 3  # type: ignore[index]
     robot = opened("robot.toml", robot_toml(ROBOT))

@@ -28,7 +28,9 @@ def track(result: Plan, noise: float) -> pd.DataFrame:
 
 
 def to_page(frame: pd.DataFrame) -> dict[str, Any]:
-    return {"names": list(frame), "columns": [frame[name].to_list() for name in frame]}
+    plans = frame.get("plan_id", pd.Series(dtype=str)).unique().tolist()
+    numbers = frame.drop(columns="plan_id", errors="ignore")
+    return {"names": list(numbers), "columns": [numbers[name].to_list() for name in numbers], "plans": plans}
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.05, 2.0])
@@ -54,7 +56,7 @@ def test_errors_and_their_sentence(name: str, point: str, noise: float) -> None:
         assert answer("tracking_error.js", "trackingLine", found) == wanted.line
 
 
-@pytest.mark.parametrize("change", ["missing", "still", "back", "nan", "another robot", "bare"])
+@pytest.mark.parametrize("change", ["missing", "still", "back", "nan", "another robot", "another plan", "bare"])
 def test_bad_tracks_are_refused_in_the_same_words(change: str) -> None:
     result = planned("circle", objective="flips", point="head_centre")
     frame = track(result, 0.0)
@@ -69,6 +71,8 @@ def test_bad_tracks_are_refused_in_the_same_words(change: str) -> None:
     elif change == "another robot":  # of tails of 15 cm
         frame["x_cm"], frame["y_cm"] = 15 * frame["x_over_l"], 15 * frame["y_over_l"]
         frame["heading_deg"] = np.degrees(frame["heading_rad"])
+    elif change == "another plan":
+        frame["plan_id"] = "p0123456789a"
     else:
         frame = frame.set_axis(["time", "x_cm", "y_cm", "heading_deg"], axis=1)
     with pytest.raises(InputError) as wanted:
