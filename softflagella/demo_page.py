@@ -332,8 +332,8 @@ def _add_own_robot(page: Page, folder: Path) -> None:
     page.section("With your own robot: three commands")
     page.commands(
         [
-            "softflagella sim robot paper-control --out robot.toml",
-            "softflagella plan square:30l --unit cm --robot robot.toml --out plan",
+            "softflagella robot paper-control --out robot.toml",
+            "softflagella plan square:30cm --robot robot.toml --out plan",
             "softflagella replay plan/plan.json --out track.csv",
         ]
     )

@@ -247,7 +247,7 @@ def hold(made: Path, out: Path) -> str:
 
 
 def fleet(made: Path, out: Path) -> str:
-    robot = f'[[robot]]\nrobot = "{made / "robot.toml"}"\n'
+    robot = f'[[member]]\nrobot = "{made / "robot.toml"}"\nunit = "l"\n'
     goals = [f"goal = [2, {y}, 0]\nstart = [0, {y}, 0]\n" for y in (0, 2)]
     (out / "fleet.toml").write_text("".join(robot + goal for goal in goals))
     done("planner", "fleet", out / "fleet.toml", "--apart", "5cm", "--out", out / "fleet")

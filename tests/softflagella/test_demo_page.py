@@ -161,9 +161,9 @@ def test_the_three_commands_are_commands(folder: Path, tmp_path: Path, monkeypat
     """As they stand on the page; the last one, a replay, takes long and is only read."""
     text = "".join(PageText(folder / "demo.html").words)
     commands = [line.split()[1:] for line in text.splitlines() if line.startswith("softflagella ")]
-    assert [words[0] for words in commands] == ["sim", "plan", "replay"]
+    assert [words[0] for words in commands] == ["robot", "plan", "replay"]
     monkeypatch.chdir(tmp_path)
-    assert run_command(sim, commands[0][1:]) == 0
+    assert run_command(sim, commands[0]) == 0
     assert run_command(planner, commands[1]) == 0
     assert (tmp_path / commands[2][1]).exists()
     assert sf.load_robot("robot.toml") == ROBOT

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
-from calibration.report.corrected_robot import corrected_robot
+from calibration.report.corrected_robot import handed_on
 from calibration.report.robot_verdict import FILES, RobotVerdict
 from calibration.swimmer.measured_table import read_measurements
 from planner.vehicle.calibration_table import read_knowledge
@@ -48,7 +48,7 @@ def test_a_verdict_says_what_it_found_in_a_few_lines(seed: int, effects: dict[st
 @shares_verdicts
 def test_a_verdict_has_the_corrected_robot_and_writes_its_files(tmp_path: Path) -> None:
     verdict = verdict_of(5, end_over_end_drag=5.0)
-    assert verdict.corrected == corrected_robot(START, verdict.fits.final_refit.parameters)
+    assert verdict.corrected == handed_on(START, verdict.fits.final_refit)[0]
     assert verdict.corrected.effects["end_over_end_drag"] == pytest.approx(5.0, rel=0.3)
     paths = verdict.save(tmp_path / "calibrated")
     assert [path.name for path in paths] == list(FILES)

@@ -47,7 +47,7 @@ def test_damaged_tables_of_one_robot_are_refused(single: RobotTable, tmp_path: P
         else:
             same += 1
             assert loaded == single
-    assert same < 4
+    assert same < 10
     for size in [0, 1, len(contents) // 2, len(contents) - 3]:
         path.write_bytes(contents[:size])
         refusal(path, load_robot_table)
