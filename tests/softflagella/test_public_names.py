@@ -74,8 +74,8 @@ def test_every_name_has_an_example_that_runs(name: str) -> None:
 
 
 def test_a_name_that_is_not_there() -> None:
-    with pytest.raises(AttributeError, match="no attribute 'swim'"):
-        sf.swim  # noqa: B018
+    with pytest.raises(AttributeError, match="no attribute 'swims'"):
+        sf.swims  # noqa: B018
 
 
 def test_importing_the_package_loads_nothing_heavy() -> None:

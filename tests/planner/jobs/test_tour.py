@@ -64,7 +64,7 @@ def test_no_other_order_of_the_places_takes_less_time(
     places = size * np.array([(0, 0), (4, 0), (2, 1), (3, 3), (-1, 2)])
     best = tour(places.tolist(), tracked, QUICK, back=back, any_start=any_start)
     assert best.exact
-    assert best.estimate == pytest.approx(best.plan.duration, rel=0.1)
+    assert 0.7 * best.estimate < best.plan.duration < 1.1 * best.estimate  # longer dwells may be faster
     assert best.order[0] == (best.order[-1] if back else best.order[0] if any_start else 0)
     assert sorted(set(best.order)) == [0, 1, 2, 3, 4]
     times = legs(tracked, places)
