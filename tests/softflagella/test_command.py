@@ -103,7 +103,7 @@ PYTHON = {"plan": sf.plan, "goal": sf.to_goal, "tour": sf.tour, "cover": sf.cove
           "calibrate": sf.calibrate, "tracks": sf.tracks}  # fmt: skip
 OF_COMMANDS = {  # files, units and words of the command line
     "out", "unit", "scale", "shape", "closed", "trade_off", "smooth", "path", "no_path", "hole", "check", "arrive",
-    "back", "no_laws", "no_stability",
+    "back", "no_laws", "no_stability", "runs_of",  # --robot of a table of runs: `robot=` in Python
 }  # fmt: skip
 
 

@@ -159,7 +159,7 @@ def test_a_table_says_its_unit(text: str, unit: float, tmp_path: Path) -> None:
         ("x_mm,x_cm,y_mm\n1,2,3\n4,5,6\n", "x_mm and x_cm are the same coordinate"),
         ("x_mm,y_s\n1,2\n3,4\n", "has columns x_mm, y_s; give x and y"),
         ("1\n2\n", "give x and y"),
-        ("x,y\n1,2\n3,?\n", "x or y of point 2 is no number"),
+        ("x,y\n1,2\n3,?\n", r"x or y of point 2 \(line 3\) is no number"),
     ],
 )
 def test_a_table_whose_coordinates_are_not_clear_is_refused(text: str, words: str, tmp_path: Path) -> None:
