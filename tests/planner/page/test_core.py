@@ -71,3 +71,5 @@ def test_a_file_names_what_it_mirrors(file: Path) -> None:
     sources = re.findall(r"\b(?:planner|sim|surrogate|calibration)/[\w/]+\.py\b", comment)
     assert sources or file.name in OWN | PAGE
     assert all((ROOT / source).exists() for source in sources)
+    tested = (FOLDER.parents[1] / "tests" / "planner" / "page" / f"test_{file.stem}.py").exists()
+    assert tested or file.name in IN_JOURNEYS
