@@ -41,6 +41,7 @@ def exports_of(file: Path) -> set[str]:
 def test_imports_and_exports_stand_on_lines_of_their_own(file: Path) -> None:
     lines = file.read_text().splitlines()
     assert len(lines) <= 400
+    assert not [line for line in lines if len(line) > 115]
     imports = [line for line in lines if re.search(r"\bimport\b(?!ant|s)", line.split("/*")[0].split(" * ")[0])]
     for line in imports:
         match = IMPORT.fullmatch(line)
