@@ -14,7 +14,7 @@ const ADVICE = [ // what a message of the planner says, and what the page says i
   [/, or make a table of this robot with .*/, ' under "Largest stated error"'],
 ];
 
-/* A message of the planner with its advice in the page's words; lengths over which a path is smoothed become cm. */
+/* A message of the planner with its advice in the page's words; the lengths of smoothing become cm. */
 function inPage(message, robot) {
   const cm = message.replace(/(?<=--smooth )(\S+)l/, (_, tails) => general(100 * robot.tailLength * tails, 3));
   return ADVICE.reduce((words, [from, to]) => words.replace(from, to), cm);

@@ -68,7 +68,8 @@ function answerTo([tails, length, speed], fields, lookup) {
     return { answer: labColumns(motion, length, robot.timeScale), outside: "" };
   } catch (refusal) {
     if (!(refusal instanceof InputError)) throw refusal;
-    return { answer: null, outside: refusal instanceof OutsideError ? refusal.reason : inPage(refusal.message, fields) };
+    const outside = refusal instanceof OutsideError ? refusal.reason : inPage(refusal.message, fields);
+    return { answer: null, outside };
   }
 }
 

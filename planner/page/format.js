@@ -55,7 +55,8 @@ function pythonText(text) {
   const quote = text.includes("'") && !text.includes('"') ? '"' : "'";
   const escapes = { "\\": "\\\\", "\n": "\\n", "\r": "\\r", "\t": "\\t", [quote]: `\\${quote}` };
   const shown = (sign) => {
-    const code = sign.codePointAt(0), [letter, width] = code < 0x100 ? ["x", 2] : code < 0x10000 ? ["u", 4] : ["U", 8];
+    const code = sign.codePointAt(0);
+    const [letter, width] = code < 0x100 ? ["x", 2] : code < 0x10000 ? ["u", 4] : ["U", 8];
     const hidden = sign !== " " && /[\p{C}\p{Z}]/u.test(sign);
     return hidden ? `\\${letter}${code.toString(16).padStart(width, "0")}` : sign;
   };

@@ -91,7 +91,8 @@ function measurementsOf(given, where) {
   markCopies(reasons, columns);
   const usable = reasons.flatMap((reason, row) => (reason ? [] : [row]));
   if (!usable.length) {
-    throw new InputError(`0 usable runs (${rowName(table, 0)}: ${reasons[0]}); a calibration needs at least ${FEWEST_RUNS}`);
+    const first = `${rowName(table, 0)}: ${reasons[0]}`;
+    throw new InputError(`0 usable runs (${first}); a calibration needs at least ${FEWEST_RUNS}`);
   }
   const names = usable.map((row) =>
     table.names.includes("session")
@@ -126,7 +127,10 @@ function emptyColumns({ names, texts }) {
 function without({ names, columns, texts, lines }, left) {
   const kept = names.flatMap((name, i) => (left.includes(name) ? [] : [i]));
   return {
-    names: kept.map((i) => names[i]), columns: kept.map((i) => columns[i]), texts: kept.map((i) => texts[i]), lines,
+    names: kept.map((i) => names[i]),
+    columns: kept.map((i) => columns[i]),
+    texts: kept.map((i) => texts[i]),
+    lines,
   };
 }
 
@@ -139,7 +143,8 @@ function rowName({ lines }, row) {
 function markGaps(reasons, table) {
   const usable = reasons.flatMap((reason, row) => (reason ? [] : [row]));
   return NOTED.filter((name) => {
-    const at = table.names.indexOf(name), gaps = usable.filter((row) => !Number.isFinite(table.columns[at]?.[row]));
+    const at = table.names.indexOf(name);
+    const gaps = usable.filter((row) => !Number.isFinite(table.columns[at]?.[row]));
     if (at < 0 || gaps.length > GAPS * usable.length) return at >= 0;
     for (const row of gaps) reasons[row] ||= `${name} = ${table.texts[at][row]} is not a finite number`;
     return false;

@@ -55,7 +55,8 @@ function checkMarks(columns, where, separator) {
       if (!three || OTHER(mark).test(text) || !(alone || WHOLE_LINE.test(text))) continue;
       const [word] = three, small = word.replace(mark, ".").replace(/0+$/, "");
       throw new InputError(
-        `${where} has the number ${pythonText(word)}, which may be ${word.replace(mark, "")} or ${small}; write it ` +
+        `${where} has the number ${pythonText(word)}, which may be ${word.replace(mark, "")} or ${small}; ` +
+        `write it ` +
           "without separators of thousands, or with another number of decimals",
       );
     }

@@ -54,7 +54,8 @@ function follow(reference, vehicle, guidance, offset = 0, options = {}) {
 function startAtRest(reference, vehicle, guidance, offset) {
   const [first] = reference.heading;
   const turning = Array.from(reference.heading).find((heading) => Math.abs(heading - first) > 1e-6);
-  const sense = turning === undefined || turning > first ? 1 : -1, straight = zigzag(vehicle, guidance.dwell, offset);
+  const sense = turning === undefined || turning > first ? 1 : -1;
+  const straight = zigzag(vehicle, guidance.dwell, offset);
   const heading = first - sense * straight.swing * hysteresis(reference, vehicle, 1)[0];
   const [[px, py], [qx, qy]] = [reference.p[0], reference.q[0]], toHead = Math.hypot(px - qx, py - qy) - offset;
   const sway = sense * straight.sway, c = Math.cos(heading), s = Math.sin(heading);

@@ -23,7 +23,8 @@ function readStyleSheet(text, known) {
       const found = SELECTOR.exec(selector);
       if (!found || IMPORTANT.test(body.trim().replace(/;+$/, ""))) {
         throw new InputError(
-          `<style> sets ${Object.keys(given).join(", ")} of ${pythonText(selector)}; read are kinds, classes and ids, ` +
+          `<style> sets ${Object.keys(given).join(", ")} of ${pythonText(selector)}; read are kinds, classes ` +
+          `and ids, ` +
             "without !important; write attributes instead",
         );
       }

@@ -41,7 +41,7 @@ function pathNames(text, where) {
   return [...drawingPaths(text, where).paths.keys()];
 }
 
-/* The paths of a drawing by name, {points, ends}: whether the path is closed; and whether its pixels have a size. */
+/* The paths of a drawing by name, {points, ends}: whether a path is closed; and whether pixels have a size. */
 function drawingPaths(text, where) {
   if (text.length > MOST_TEXT) throw new InputError(`${where} has more than 16 MiB; such a file is not read`);
   if (text.includes("<?xml-stylesheet")) {
@@ -65,7 +65,8 @@ function namedPaths(shapes) {
     const count = counts[kind], name = id || `${kind}${count}`;
     const parts = subpaths(segments).map(sampled).filter(({ points }) => points.length > 1);
     parts.forEach((part, i) => {
-      const own = parts.length === 1 ? name : `${name}/${i + 1}`, clip = clips.find((each) => hides(each, part.points));
+      const own = parts.length === 1 ? name : `${name}/${i + 1}`;
+      const clip = clips.find((each) => hides(each, part.points));
       if (clip) {
         const words = `cut it off in the drawing, or remove ${clip.name}`;
         throw new InputError(`${clip.name} hides a part of ${own}; ${words}`);

@@ -58,7 +58,8 @@ function numbersIn(own, name) {
 function shapeSegments(kind, own, lengths, view) {
   if (kind === "path") return pathSegments(own.d ?? "");
   if (kind === "polyline" || kind === "polygon") return polySegments(kind, numbersIn(own, "points"));
-  const given = Object.fromEntries(Object.keys(NAMES.lengths).map((name) => [name, lengths.read(own, name, view)]));
+  const names = Object.keys(NAMES.lengths);
+  const given = Object.fromEntries(names.map((name) => [name, lengths.read(own, name, view)]));
   const { x, y, width, height, cx, cy, r, x1, y1, x2, y2 } = given, rx = given.rx ?? given.ry, ry = given.ry ?? rx;
   if (kind === "line") {
     return [{ kind: "move", points: [[x1 ?? 0, y1 ?? 0]] }, { kind: "line", points: [[x2 ?? 0, y2 ?? 0]] }];
@@ -118,7 +119,8 @@ function roundSegments(x, y, a, b) {
 function transformOf(text) {
   let matrix = [1, 0, 0, 1, 0, 0];
   if (text.toLowerCase() === "none") return matrix;
-  const functions = Array.from(text.matchAll(FUNCTION), ([, name, inside]) => oneTransform(name.toLowerCase(), inside));
+  const found = Array.from(text.matchAll(FUNCTION));
+  const functions = found.map(([, name, inside]) => oneTransform(name.toLowerCase(), inside));
   if (functions.includes(null) || /[^,\s]/.test(text.replace(FUNCTION, ""))) {
     const words = "give matrix, translate, scale, rotate or skew, in px and deg";
     throw new InputError(`transform=${pythonText(text.slice(0, 40))} is not read; ${words}`);
@@ -131,7 +133,8 @@ function transformOf(text) {
 function oneTransform(name, inside) {
   const given = inside.trim().split(/[\s,]+/).map((word) => LENGTH.exec(word));
   const kinds = (NAMES.transforms[name] ?? []).find(({ length }) => length === given.length);
-  const values = given.map((word, i) => word && kinds && Number(word[1]) * NAMES.units[kinds[i]][word[2].toLowerCase()]);
+  const unit = (word, i) => NAMES.units[kinds[i]][word[2].toLowerCase()];
+  const values = given.map((word, i) => word && kinds && Number(word[1]) * unit(word, i));
   if (!kinds || !values.every((value) => typeof value === "number" && !Number.isNaN(value))) return null;
   const [p, q, r] = values, [tan, tan2] = [p, q ?? 0].map((degrees) => Math.tan((degrees * TAU) / 360));
   if (name === "matrix") return values;

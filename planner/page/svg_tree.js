@@ -81,7 +81,8 @@ class TreeReader {
     for (const key of ["d", "points"]) this.count += element.attributes[key]?.match(NUMBER)?.length ?? 0;
     if (this.count > MOST_NUMBERS || this.open.length > DEEPEST) {
       throw new InputError(
-        `the drawing has more than ${MOST_NUMBERS} shapes and coordinates, or groups in more than ${DEEPEST} levels; ` +
+        `the drawing has more than ${MOST_NUMBERS} shapes and coordinates, or groups in more than ` +
+        `${DEEPEST} levels; ` +
           "simplify it",
       );
     }
@@ -97,7 +98,8 @@ class TreeReader {
   /* What a <use> shows. */
   shown(own) {
     const link = own.href ?? own[XLINK] ?? "", element = this.named.get(link);
-    if (!element) throw new InputError(`a <use> shows ${pythonText(link)}, which is not in the drawing; remove it`);
+    if (!element)
+      throw new InputError(`a <use> shows ${pythonText(link)}, which is not in the drawing; remove it`);
     return element;
   }
 
@@ -132,7 +134,8 @@ class TreeReader {
     const upright = corners.every(([x, y], i) => !i || x === corners[i - 1][0] || y === corners[i - 1][1]);
     const straight = segments.every(({ kind }) => ["move", "line", "close"].includes(kind));
     const axes = [0, 1].map((axis) => [...new Set(corners.map((point) => point[axis]))].sort((a, b) => a - b));
-    if (new Set(corners.map(String)).size !== 4 || axes.some(({ length }) => length !== 2) || !upright || !straight) {
+    const four = new Set(corners.map(String)).size === 4;
+    if (!four || axes.some(({ length }) => length !== 2) || !upright || !straight) {
       return null;
     }
     const [low, high] = [0, 1].map((i) => axes.map((axis) => axis[i]));
@@ -141,7 +144,8 @@ class TreeReader {
 
   /* Enter an <svg> or a <symbol>: its place, its size, its viewBox. */
   inView(own, around) {
-    const numbers = numbersIn(own, "viewBox"), box = numbers.length ? numbers : null, outer = this.open.length === 1;
+    const numbers = numbersIn(own, "viewBox"), box = numbers.length ? numbers : null;
+    const outer = this.open.length === 1;
     if (box && (box.length !== 4 || Math.min(box[2], box[3]) < 0)) {
       throw new InputError(`viewBox=${pythonText(own.viewBox)} is not read; give left, top, width and height`);
     }
@@ -162,13 +166,15 @@ class TreeReader {
       clips.push({ name: "<svg>", matrix: around.matrix, low: place, high });
     }
     const view = !box ? size : size.includes(0) ? [0, 0] : box.slice(2);
-    const fits = box && !view.includes(0), inner = fits ? fitted(own.preserveAspectRatio, place, size, box) : shift;
+    const fits = box && !view.includes(0);
+    const inner = fits ? fitted(own.preserveAspectRatio, place, size, box) : shift;
     return { ...around, matrix: product(around.matrix, inner), view, clips };
   }
 
   /* Width and height of the drawing; what is missing, or in per cent, follows from the viewBox. */
   outerSize(own, box) {
-    const size = SIZE.map((name) => (own[name]?.endsWith("%") ? null : this.lengths.read(own, name, [null, null])));
+    const read = (name) => this.lengths.read(own, name, [null, null]);
+    const size = SIZE.map((name) => (own[name]?.endsWith("%") ? null : read(name)));
     if (!box) return size;
     this.lengths.sized = size.some((length) => length !== null);
     const scales = size.map((length, i) => length && box[2 + i] && length / box[2 + i]);

@@ -39,7 +39,8 @@ function parseWords(bytes, where, named = true) {
   const long = rows.find(({ words }) => words.slice(width).some((word) => word));
   if (long) {
     throw new InputError(
-      `${where}: line ${long.line} has more values than columns; if numbers have decimal commas, separate columns ` +
+      `${where}: line ${long.line} has more values than columns; if numbers have decimal commas, ` +
+      `separate columns ` +
         "by semicolons",
     );
   }

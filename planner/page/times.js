@@ -8,7 +8,7 @@ const DATE = new RegExp(
 );
 const EPOCH = 3e8, LATEST = 1e11; // s: what is longer is a date; beyond it no date, but another unit
 
-/* Convert a column of times, as words and as numbers where they are, to numbers in a unit; NaN for what is none. */
+/* Convert a column of times, words and the numbers where they are, to numbers in a unit; NaN for what is none. */
 function timesOf(words, numbers, unit) {
   if (numbers.some(Number.isNaN)) {
     for (const kind of [dateOf, clockOf]) {
@@ -44,7 +44,8 @@ function dateOf(word) {
   const read = [date.getUTCFullYear(), date.getUTCMonth() + 1, date.getUTCDate(), date.getUTCHours()];
   if (parts[4] > 59 || parts[0] < 1 || read.some((part, i) => part !== parts[i])) return NaN;
   const offset = zone.slice(1).replace(":", "");
-  const shift = offset ? (60 * Number(offset.slice(0, 2)) + Number(offset.slice(2))) * (zone[0] === "+" ? -60 : 60) : 0;
+  const minutes = offset ? 60 * Number(offset.slice(0, 2)) + Number(offset.slice(2)) : 0;
+  const shift = minutes * (offset && zone[0] === "+" ? -60 : 60);
   return date.getTime() / 1000 + shift + Number(seconds.replace(",", "."));
 }
 

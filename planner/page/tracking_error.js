@@ -21,7 +21,8 @@ const LAB = ["time_s", "x_cm", "y_cm", "heading_deg"]; // or in other units
  * have `plans`, the ids of the plans that it is of. */
 function trackingError(plan, table) {
   const [other] = (table.plans ?? []).filter((id) => id !== plan.id).sort();
-  if (other) throw new InputError(`the track is of plan ${other}, not of ${plan.id}; compare it with its own plan.json`);
+  if (other)
+    throw new InputError(`the track is of plan ${other}, not of ${plan.id}; compare it with its own plan.json`);
   const [time, x, y, heading] = columnsInTails(table, plan.robot);
   if (![time, x, y, heading].every((values) => values.every((value) => Math.abs(value) < LARGEST))) {
     throw new InputError("the track has a value that is not a finite number; correct the file");
