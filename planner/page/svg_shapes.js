@@ -119,8 +119,8 @@ function roundSegments(x, y, a, b) {
 function transformOf(text) {
   let matrix = [1, 0, 0, 1, 0, 0];
   if (text.toLowerCase() === "none") return matrix;
-  const found = Array.from(text.matchAll(FUNCTION));
-  const functions = found.map(([, name, inside]) => oneTransform(name.toLowerCase(), inside));
+  const calls = Array.from(text.matchAll(FUNCTION));
+  const functions = calls.map(([, name, inside]) => oneTransform(name.toLowerCase(), inside));
   if (functions.includes(null) || /[^,\s]/.test(text.replace(FUNCTION, ""))) {
     const words = "give matrix, translate, scale, rotate or skew, in px and deg";
     throw new InputError(`transform=${pythonText(text.slice(0, 40))} is not read; ${words}`);

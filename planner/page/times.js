@@ -44,8 +44,8 @@ function dateOf(word) {
   const read = [date.getUTCFullYear(), date.getUTCMonth() + 1, date.getUTCDate(), date.getUTCHours()];
   if (parts[4] > 59 || parts[0] < 1 || read.some((part, i) => part !== parts[i])) return NaN;
   const offset = zone.slice(1).replace(":", "");
-  const minutes = offset ? 60 * Number(offset.slice(0, 2)) + Number(offset.slice(2)) : 0;
-  const shift = minutes * (offset && zone[0] === "+" ? -60 : 60);
+  const ahead = offset ? 60 * Number(offset.slice(0, 2)) + Number(offset.slice(2)) : 0;
+  const shift = ahead * (offset && zone[0] === "+" ? -60 : 60);
   return date.getTime() / 1000 + shift + Number(seconds.replace(",", "."));
 }
 
