@@ -4,14 +4,17 @@
 import { InputError } from "./input_error.js";
 
 const KINDS = {
-  "GeoJSON": ["geojson topojson", "\\{[\\s\\S]*?\"type\"\\s*:\\s*\"(?:Feature|Topology|Geometry|(?:Multi)?(?:Point|Line|Poly))"],
+  "GeoJSON": ["geojson topojson",
+    "\\{[\\s\\S]*?\"type\"\\s*:\\s*\"(?:Feature|Topology|Geometry|(?:Multi)?(?:Point|Line|Poly))"],
   "JSON": ["json", "\\{|\\[\\s*[\\[{\\d-]"],
   "GPX": ["gpx", "<[\\s\\S]*?<gpx[\\s>]|<gpx[\\s>]"],
   "KML": ["kml kmz", "<[\\s\\S]*?<kml[\\s>]|<kml[\\s>]"],
   "a drawing with another ending than .svg": ["svgz", "<[\\s\\S]*?<svg[\\s/>]|<svg[\\s/>]"],
   "XML": ["xml gml", "<"],
-  "G-code": ["gcode gco ngc cnc tap", "(?:[%;(O][^\\n]*\\n|\\s)*(?:N\\d+\\s*)?[GM]\\d+(?:\\.\\d+)?(?:\\s|[A-Z;(]|$)"],
-  "WKT": ["wkt ewkt", "(?:[^\\n]*\\n)?[^\\n(]*?(?:POINT|LINESTRING|RING|POLYGON|COLLECTION)[\\sZM]*\\(+[\\s\\d.+-]"],
+  "G-code": ["gcode gco ngc cnc tap",
+    "(?:[%;(O][^\\n]*\\n|\\s)*(?:N\\d+\\s*)?[GM]\\d+(?:\\.\\d+)?(?:\\s|[A-Z;(]|$)"],
+  "WKT": ["wkt ewkt",
+    "(?:[^\\n]*\\n)?[^\\n(]*?(?:POINT|LINESTRING|RING|POLYGON|COLLECTION)[\\sZM]*\\(+[\\s\\d.+-]"],
   "DXF": ["dxf", "(?:999\\s*\\n[^\\n]*\\n\\s*)*0\\s*\\n\\s*SECTION"],
   "a shapefile": ["shp shx dbf", "\\x00\\x00\\x27\\x0a"],
   "a vector format": ["dwg plt hpgl eps ps ai step stp stl obj", "%!PS|AC10\\d\\d"],

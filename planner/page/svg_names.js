@@ -1,17 +1,17 @@
 /* Names that readers of drawings know: of elements, of attributes and properties, of transforms and units.
  *
- * planner/paths/svg_shapes.py reads this file, too, so its value is JSON. `unread` are
- * attributes and properties that move, scale or hide, with the values that do nothing. `lengths` belong to a view's
- * width (0), height (1) or diagonal (2). `transforms` take numbers (1), lengths (x) and angles (a); `units` are those
- * of each, `pixels` the sizes of units. */
+ * planner/paths/svg_shapes.py reads this file, too, so its value is JSON. `unread` are attributes and properties
+ * that move, scale or hide, with the values that do nothing. `lengths` belong to a view's width (0), height (1) or
+ * diagonal (2). `transforms` take numbers (1), lengths (x) and angles (a); `units` are those of each, `pixels` the
+ * sizes of units. */
 const NAMES = {
   "shapes": ["path", "line", "polyline", "polygon", "rect", "circle", "ellipse"],
   "groups": ["svg", "g", "a", "switch", "use", "symbol"],
   "undrawn": ["defs", "clipPath", "mask", "marker", "pattern", "linearGradient", "radialGradient", "meshgradient",
     "hatch", "solidcolor", "solidColor", "filter", "text", "image", "foreignObject", "style", "script", "metadata",
     "title", "desc", "view", "cursor", "color-profile", "font", "font-face", "flowRoot"],
-  "lengths": {"x": 0, "y": 1, "width": 0, "height": 1, "cx": 0, "cy": 1, "r": 2, "rx": 0, "ry": 1, "x1": 0, "y1": 1,
-    "x2": 0, "y2": 1},
+  "lengths": {"x": 0, "y": 1, "width": 0, "height": 1, "cx": 0, "cy": 1, "r": 2, "rx": 0, "ry": 1, "x1": 0,
+    "y1": 1, "x2": 0, "y2": 1},
   "read": ["display", "visibility", "opacity", "overflow", "transform", "clip-path", "d"],
   "unread": {
     "transform-origin": ["0", "0 0", "0px 0px", "left top", "top left"], "transform-box": ["view-box"],

@@ -1,7 +1,7 @@
 /* The shapes that an SVG drawing shows, each where it is seen.
  *
- * Mirrors planner/paths/svg_tree.py. What the elements around an element do to it is {matrix, view, visible, unread,
- * clips}; a clip is {name, matrix, low, high}; a shape is {kind, id, segments, clips}. */
+ * Mirrors planner/paths/svg_tree.py. What the elements around an element do to it is {matrix, view, visible,
+ * unread, clips}; a clip is {name, matrix, low, high}; a shape is {kind, id, segments, clips}. */
 import { pythonText } from "./format.js";
 import { InputError } from "./input_error.js";
 import { declarations, declared, readStyleSheet } from "./style_sheet.js";

@@ -13,8 +13,8 @@ const SEPARATORS = [";", "\t", ","];
 const MOST_COLUMNS = 10_000;
 const MOST_TEXT = 128 * 2 ** 20; // bytes
 
-/* Parse a table: {names, columns, lines}, with a column of numbers for each name, NaN for what is none, and the line
- * of each row.
+/* Parse a table: {names, columns, lines}, with a column of numbers for each name, NaN for what is none, and the
+ * line of each row.
  *
  * bytes: content of the file. where: its name, for messages. named: the columns must have names; without, a table
  * of numbers alone has the names 0, 1, … */
