@@ -42,7 +42,7 @@ def unexplained(
     *, error: float, interval: tuple[float, float], p_value: float = 0.4, verdict: str = "unexplained"
 ) -> Verdict:
     """A verdict with nothing but its errors; noise 2.36 %."""
-    rms = {"before": error, "after": error}
+    rms = {"uncalibrated": 0.2, "before": error, "after": error}
     found = Evidence(SimpleNamespace(p_value=0.004), 1000, (), (), (), {})  # type: ignore[arg-type]
     fits: Any = SimpleNamespace(pulls=(), base=None, final=None)
     conditions: Any = SimpleNamespace(split=SimpleNamespace(names="N=4"))

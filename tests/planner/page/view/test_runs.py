@@ -28,7 +28,7 @@ def test_runs_are_compared_and_the_command_is_copied(browser: Any, address: str,
         assert page.locator("#runs tbody tr").count() == 23
         seen = text_of(page, "#runs")
         assert "answers for 23 of 23 usable runs" in seen
-        assert "row 5: theta_deg = -3.0 is not above 0" in seen
+        assert "row 5 (line 6): theta_deg = -3.0 is not above 0" in seen
         assert "all have N = 3" in seen
         assert "elapsed_min: tests a drift of the viscosity" in seen
         command = "softflagella calibrate 'my table.csv' --robot robot.toml --out calibrated"
@@ -69,7 +69,7 @@ def test_a_table_that_is_no_table_of_runs_is_refused_in_one_line(
         drop(page, tmp_path / "misspelt.csv")
         waits_for(page, "unknown column 'thetta_deg': is it 'theta_deg'?")
         drop(page, tmp_path / "words.csv")
-        waits_for(page, "0 usable runs (row 1: l_cm = long is not a finite number)")
+        waits_for(page, "0 usable runs (row 1 (line 2): l_cm = long is not a finite number)")
 
 
 def test_a_page_of_one_robot_says_that_it_cannot_compare(browser: Any, tmp_path: Path) -> None:
