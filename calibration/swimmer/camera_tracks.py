@@ -97,6 +97,8 @@ def _check_runs(table: pd.DataFrame) -> None:
     if "run" not in table:
         raise InputError("the runs have no column 'run' that says which track is theirs")
     names = _names(table["run"])
+    if (names == "").any():
+        raise InputError(f"{row_name(table, names.index[names == ''][0])} of the runs has no name of a run")
     twice = names[names.duplicated()]
     if len(twice):
         raise InputError(f"run {str(twice.iloc[0])[:40]} is there twice; give one row for each run")
@@ -110,10 +112,12 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
     values[~(values.abs() < _LARGEST)] = np.nan
     of_run = {str(name): track for name, track in values.groupby(_names(samples["run"]).to_numpy(), sort=False)}
     nothing = values.iloc[:0]
+    unnamed = of_run.pop("", nothing)
     runs = list(_names(table["run"]))
     if not set(runs) & set(of_run):
         raise InputError(f"no run has a track: the runs are {_listed(runs)}; the tracks are {_listed(of_run)}")
-    aside = [f"run {name}: a track, but no row among the runs" for name in of_run if name not in runs]
+    aside = [f"{len(unnamed)} samples have no name of a run"] if len(unnamed) else []
+    aside += [f"run {name}: a track, but no row among the runs" for name in of_run if name not in runs]
     tracked: list[TrackedRun] = []
     fitted: list[Track] = []
     for run in runs:
@@ -153,7 +157,7 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
 
 def _names(column: pd.Series) -> pd.Series:
     """Write the names of runs as text without blanks around it; a whole number has one spelling."""
-    return column.astype(str).str.strip().str.replace(r"^0*([0-9]+)(?:\.0*)?$", r"\1", regex=True)
+    return column.astype(str).fillna("").str.strip().str.replace(r"^0*([0-9]+)(?:\.0*)?$", r"\1", regex=True)
 
 
 def _listed(names: Collection[str]) -> str:

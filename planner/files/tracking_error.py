@@ -8,21 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 
 from planner.files.plan_json import LARGEST
 from planner.paths.distance import distance_to, two_sided
 from planner.paths.units import length_in_lab
-from planner.planning.picture import REPLAYED, draw_tracks
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.quantities import convert_columns, numbers_of
 from sim.io.units import format_length
 from sim.mechanics import planar
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _COLUMNS = ("time_bar", "x_over_l", "y_over_l", "heading_rad")
 _ALIKE = 1e-3  # of a place and of the tail length, largest difference of the same place in cm and in l
@@ -147,6 +148,8 @@ def track_in_tails(track: pd.DataFrame, robot: Mapping[str, Any]) -> pd.DataFram
 
 def draw_overlay(axes: Axes, plan: dict[str, Any], error: TrackingError, title: str) -> None:
     """Draw a track over the declared and the raw path, on axes in cm."""
+    from planner.planning.picture import REPLAYED, draw_tracks
+
     length = error.tail_length
     draw_tracks(axes, np.array(plan["raw_path"]), np.array(plan["reference"]), error.stated, length)
     axes.plot(*(100 * length * error.track.T), color=REPLAYED, lw=0.8, label="track")

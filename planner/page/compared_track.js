@@ -13,11 +13,12 @@ const HOW = {
 
 /* Compare a track with a plan, as measured ("none"), from time 0 ("time"), or laid on the plan's start ("rigid").
  *
- * plan: content of plan.json. table: {names, columns} of the file, and `plans`, the ids in it. */
+ * plan: content of plan.json. table: {names, columns} of the file, and `plans`, the ids in it. The page plans anew,
+ * with other last digits, so the id of another plan is told, not refused. */
 function comparedTrack(plan, table, how) {
   const measured = columnsInTails(table, plan.robot),
     moved = how === "none" ? measured : movedTrack(measured, plan, how);
-  const error = trackingError(plan, { names: COLUMNS, columns: moved, plans: table.plans });
+  const error = trackingError(plan, { names: COLUMNS, columns: moved });
   const cm = 100 * plan.robot.tail_length_m,
     second = plan.robot.time_scale_s;
   const worst = error.distance.indexOf(largest(error.distance)),
@@ -25,6 +26,7 @@ function comparedTrack(plan, table, how) {
   return {
     points: error.track.map(place),
     shift: HOW[how],
+    ofPlan: (table.plans ?? []).find((id) => id !== plan.id) ?? "",
     csv: trackTable(moved, cm, second),
     error: {
       rms: error.rms * cm,

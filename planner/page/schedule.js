@@ -49,22 +49,20 @@ function follow(reference, vehicle, guidance, offset = 0, options = {}) {
   }
 }
 
-/* Start at rest near the beginning of the reference, so that the first dwell ends as one of the zigzag does:
+/* Start at rest near the beginning of the reference, so that the first dwell continues as one of the zigzag does:
  * {pose, sense}. start_at_rest */
 function startAtRest(reference, vehicle, guidance, offset) {
   const [first] = reference.heading;
   const turning = Array.from(reference.heading).find((heading) => Math.abs(heading - first) > 1e-6);
   const sense = turning === undefined || turning > first ? 1 : -1;
   const straight = zigzag(vehicle, guidance.dwell, offset);
-  const heading = first - sense * straight.swing * hysteresis(reference, vehicle, 1)[0];
+  const heading = first - sense * straight.swing * (1 - hysteresis(reference, vehicle, 1)[0]);
   const [[px, py], [qx, qy]] = [reference.p[0], reference.q[0]], toHead = Math.hypot(px - qx, py - qy) - offset;
   const sway = sense * straight.sway, c = Math.cos(heading), s = Math.sin(heading);
   const bent = [qx + sway * s + toHead * c, qy - sway * c + toHead * s, heading];
-  const law = new LineOfSight(reference, vehicle, guidance, offset), before = straight.dwells[sideOf(-sense)];
-  const [x, y, turned] = law.poseAfter(bent, sense, before, law.nextDwell(bent, sense, before).time);
-  const [dx, dy] = vehicle.current.map((speed) => speed * guidance.dwell);
-  const moved = motionAfter(vehicle, sense, null, guidance.dwell);
-  return { pose: compose([x - dx, y - dy, turned], inversePose(moved)), sense };
+  const before = straight.dwells[sideOf(-sense)];
+  const after = compose(bent, motionAfter(vehicle, sense, before, guidance.dwell));
+  return { pose: compose(after, inversePose(motionAfter(vehicle, sense, null, guidance.dwell))), sense };
 }
 
 export { follow, startAtRest };

@@ -18,15 +18,6 @@ _ANYWHERE = (5.0, 5.0, 2.0)  # standard deviations of wrong poses
 class Camera:
     """A camera that measures the pose of a robot's marker at equal times.
 
-    Args:
-        noise: standard deviations of a pose: of x and y [l], of the heading [rad].
-        every_s: time between two poses [s].
-        delay_s: age of a pose when it comes in [s].
-        lost: share of the poses that never come in.
-        wrong: share of the others that lie anywhere.
-        marker: its place on the robot, forward and left of the head's centre [l], and its angle [rad].
-        seed: of the random numbers, or their generator.
-
     Raises:
         InputError: a number is not possible.
 
@@ -36,13 +27,13 @@ class Camera:
         (0.01, 0.01)
     """
 
-    noise: tuple[float, float] = (0.01, 0.01)
-    every_s: float = 1.0
-    delay_s: float = 2.0
-    lost: float = 0.2
-    wrong: float = 0.0
-    marker: POSE = (0.0, 0.0, 0.0)
-    seed: int | np.random.Generator = 0
+    noise: tuple[float, float] = (0.01, 0.01)  # standard deviations: of x and y [l], of the heading [rad]
+    every_s: float = 1.0  # time between two poses [s]
+    delay_s: float = 2.0  # age of a pose when it comes in [s]
+    lost: float = 0.2  # share of the poses that never come in
+    wrong: float = 0.0  # share of the others that lie anywhere
+    marker: POSE = (0.0, 0.0, 0.0)  # on the robot: forward and left of the head's centre [l], its angle [rad]
+    seed: int | np.random.Generator = 0  # of the random numbers, or their generator
 
     def __post_init__(self) -> None:
         for name, values, low, high, allowed in (

@@ -103,25 +103,24 @@ def follow(
 
 
 def start_at_rest(reference: Reference, vehicle: Vehicle, guidance: Guidance, offset: float) -> Start:
-    """Start at rest near the beginning of the reference, so that the first dwell ends as one of the zigzag does.
+    """Start at rest near the reference's beginning, so that the first dwell continues as one of the zigzag does.
 
-    The robot turns first to the side to which the reference turns first. A dwell of the zigzag to that side begins
-    outside the reference by half a swing of the heading, with bent tails. From rest they are straight, and the
-    robot moves further. So the start is where the shortest dwell from rest leads to the end of that dwell.
+    The robot turns first to the side to which the reference turns first. On a straight line, a dwell of the
+    zigzag to that side begins outside the reference by half a swing of the heading; where the path bends so much
+    that the robot can only turn, it begins on the reference. Its tails are bent. From rest they are straight, and
+    the robot moves further, so the start is where the shortest dwell from rest leads to the same pose.
     """
     turn = reference.heading - reference.heading[0]
     turning = np.flatnonzero(np.abs(turn) > 1e-6)
     sense = 1 if not len(turning) or turn[turning[0]] > 0 else -1
     straight = zigzag(vehicle, guidance.dwell, offset)
-    bend = hysteresis(reference, vehicle, 1.0)[0]  # over the swing
-    heading = float(reference.heading[0]) - sense * straight.swing * bend
+    outside = straight.swing * (1 - hysteresis(reference, vehicle, 1.0)[0])
+    heading = float(reference.heading[0]) - sense * outside
     to_head = math.hypot(*(reference.p[0] - reference.q[0]).tolist()) - offset
-    outside = sense * straight.sway * np.array([math.sin(heading), -math.cos(heading)])
-    x, y = (reference.q[0] + outside + to_head * np.array([math.cos(heading), math.sin(heading)])).tolist()
-    law = LineOfSight(reference, vehicle, guidance, offset)
-    before = straight.dwells[0 if sense < 0 else 1]
-    time, _ = law.next_dwell((x, y, heading), sense, before)
-    at_flip = np.array(law.pose_after((x, y, heading), sense, before, time))
-    at_flip[:2] -= vehicle.current * guidance.dwell
-    x, y, heading = planar.compose(at_flip, planar.inverse(vehicle.motion(sense, None, guidance.dwell))).tolist()
+    aside = sense * straight.sway * np.array([math.sin(heading), -math.cos(heading)])
+    x, y = (reference.q[0] + aside + to_head * np.array([math.cos(heading), math.sin(heading)])).tolist()
+    bent = vehicle.motion(sense, straight.dwells[0 if sense < 0 else 1], guidance.dwell)
+    from_rest = vehicle.motion(sense, None, guidance.dwell)
+    after = planar.compose(np.array([x, y, heading]), bent)
+    x, y, heading = planar.compose(after, planar.inverse(from_rest)).tolist()
     return Start((x, y, heading), sense)

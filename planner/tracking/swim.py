@@ -52,7 +52,7 @@ class Swim:
         (True, True)
     """
 
-    plan: Plan
+    plan: Plan  # that the tracker follows
     times: Floats  # (K,)
     poses: Floats  # (K, 3) of the head's centre
     direction: Floats  # (K,) of the motor
@@ -61,7 +61,7 @@ class Swim:
     dwells: Floats  # (M,) as ordered
     alarms: tuple[float, ...]  # when an alarm began
     fed: int  # poses that came in
-    finished: bool
+    finished: bool  # the path has ended
 
     def weights(self, begin: float = 0.0, end: float = 1.0) -> Floats:
         """Return the share (K,) of the time that each instant stands for, in a part of the whole time."""

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.paths.path import Path2D, circle, polygon
+from planner.planning.errors import plan_errors
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from planner.planning.stated_error import WOBBLE, predicted_error
@@ -15,7 +16,6 @@ from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.rollout import trace
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
-from surrogate.interface import LookupTable
 from surrogate.one_robot.tabulate import tabulate
 from surrogate.table.lookup import NeuralTable
 
@@ -26,7 +26,7 @@ class Carried(NamedTuple):
     """A plan that the vehicle of the robot's own table carried out; lengths in l."""
 
     result: Plan
-    own: LookupTable  # the robot's own table
+    own_stated: float  # stated error of the same schedule with the robot's own table
     found: float  # largest distance from the declared path, with the motion within a revolution of the disc
 
     @property
@@ -113,6 +113,8 @@ def carried(seed: int, lookup: NeuralTable) -> Carried:
     robot = lab_robot(rng)
     result = plan(lab_path(rng), robot, lookup=lookup)
     own = tabulate(result.robot)
-    track = trace(table_vehicle(result.robot, own), result.switches, result.tracked.offset)
+    tracked = result.tracked._replace(vehicle=table_vehicle(result.robot, own))
+    errors = plan_errors(tracked, result.drawn, result.declared, result.switches, guaranteed=None, seed=0)
+    track = trace(tracked.vehicle, result.switches, tracked.offset)
     found = predicted_error(result.reference, track, closed=result.drawn.closed).largest
-    return Carried(result, own, found + WOBBLE)
+    return Carried(result, errors.stated, found + WOBBLE)

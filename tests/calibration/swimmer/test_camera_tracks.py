@@ -159,6 +159,14 @@ def test_names_of_runs_are_compared_as_text(name: object) -> None:
     assert measured.table["R_yr_cm"].notna().all()
 
 
+@pytest.mark.parametrize("blank", [None, float("nan"), "", " "])
+def test_rows_without_a_name_of_a_run_are_named(blank: object) -> None:
+    named = track(0).assign(run=pd.Series([1.0] * 299 + [blank], dtype=object))
+    assert measure_tracks(named, RUNS).excluded == ["1 samples have no name of a run"]
+    with pytest.raises(InputError, match="row 1 of the runs has no name of a run"):
+        measure_tracks(track(0), RUNS.assign(run=pd.Series([blank], dtype=object)))
+
+
 def test_names_that_do_not_agree_are_shown() -> None:
     with pytest.raises(InputError, match="no run has a track: the runs are run 1; the tracks are 1"):
         measure_tracks(track(0), RUNS.assign(run="run 1"))

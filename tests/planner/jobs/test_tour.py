@@ -80,6 +80,13 @@ def test_every_place_is_on_the_declared_path(tracked: TrackedVehicle) -> None:
     assert (np.diff(result.reached) > 0).all()
 
 
+@pytest.mark.parametrize("size", [1.0, 0.4])
+def test_a_quick_tour_begins_on_its_first_place(tracked: TrackedVehicle, size: float) -> None:
+    result = tour([(size * x, size * y) for x, y in PLACES], tracked, QUICK)
+    assert result.distance[0] < 0.03
+    assert result.plan.straight.largest > 0.08  # where a dwell of the zigzag begins
+
+
 def test_the_point_that_is_asked_for_passes(tracked: TrackedVehicle) -> None:
     by_pivot = tracked_vehicle(CONTROL, None, "pivot", None)
     result = tour(PLACES[:3], by_pivot, QUICK)

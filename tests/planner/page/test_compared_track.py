@@ -19,13 +19,13 @@ def test_a_track_is_compared_in_cm_and_can_be_laid_on_the_plan() -> None:
     x, y, heading = result.poses.T
     ends = [0.0, *result.dwells.cumsum().tolist()]
     names = ["time_bar", "x_over_l", "y_over_l", "heading_rad"]
-    table = {"names": names, "columns": [ends, x.tolist(), y.tolist(), heading.tolist()]}
+    table = {"names": names, "columns": [ends, x.tolist(), y.tolist(), heading.tolist()], "plans": ["p1"]}
     later, quarter = [time + 3 for time in ends], (heading + np.pi / 2).tolist()
     turned = {"names": names, "columns": [later, (-y).tolist(), x.tolist(), quarter]}
     measured, laid = answers(
         [("compared_track.js", "comparedTrack", content, *given) for given in ((table, "none"), (turned, "rigid"))]
     )
-    assert measured["shift"] == ""
+    assert (measured["shift"], measured["ofPlan"], laid["ofPlan"]) == ("", "p1", "")
     assert "first pose" in laid["shift"]
     assert 0 < measured["error"]["largest"] <= 11 * result.predicted_max * (1 + 1e-9)
     check_near(laid["points"], measured["points"])

@@ -211,7 +211,7 @@ def test_dwells_that_are_far_too_long_get_a_warning() -> None:
     result = plan(circle(3.0), CONTROL, minimum_seconds=100.0)
     assert result.predicted_max > 0.9
     (warning,) = result.warnings
-    for part in ("the predicted track is up to 10.3 cm", "dwells of 1.67 min", "turns by 127 degrees"):
+    for part in ("the predicted track is up to 11.2 cm", "dwells of 1.67 min", "turns by 127 degrees"):
         assert part in warning
     assert plan(circle(3.0), CONTROL, minimum_seconds=5.0).warnings == ()
 

@@ -182,7 +182,7 @@ def test_the_rms_error_is_a_mean_over_time() -> None:
 
 @pytest.mark.rates
 def test_it_holds_for_unseen_robots_and_paths() -> None:
-    """24 robots, a third of them with long schedules. With 95 % coverage, five miss in one of 200."""
+    """24 robots, most with long schedules. With 95 % coverage, five miss in one of 200."""
     lookup = load()
     plans = []
     for seed in range(7000, 7024):
@@ -190,4 +190,4 @@ def test_it_holds_for_unseen_robots_and_paths() -> None:
             plans.append(carried(seed, lookup))
     assert len(plans) >= 20
     assert sum(not one.held for one in plans) <= 4
-    assert np.median([one.result.stated_error / one.found for one in plans]) < 1.7
+    assert np.median([one.own_stated / one.found for one in plans]) < 1.5
