@@ -97,8 +97,9 @@ def _check_runs(table: pd.DataFrame) -> None:
     if "run" not in table:
         raise InputError("the runs have no column 'run' that says which track is theirs")
     names = _names(table["run"])
-    if (names == "").any():
-        raise InputError(f"{row_name(table, names.index[names == ''][0])} of the runs has no name of a run")
+    unnamed = np.flatnonzero(names == "")
+    if len(unnamed):
+        raise InputError(f"{row_name(table, int(unnamed[0]))} of the runs has no name of a run")
     twice = names[names.duplicated()]
     if len(twice):
         raise InputError(f"run {str(twice.iloc[0])[:40]} is there twice; give one row for each run")

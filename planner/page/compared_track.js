@@ -13,8 +13,8 @@ const HOW = {
 
 /* Compare a track with a plan, as measured ("none"), from time 0 ("time"), or laid on the plan's start ("rigid").
  *
- * plan: content of plan.json. table: {names, columns} of the file, and `plans`, the ids in it. The page plans anew,
- * with other last digits, so the id of another plan is told, not refused. */
+ * plan: content of plan.json. table: {names, columns} of the file, and `plans`, the ids in it. The page plans
+ * anew, with other last digits, so the id of another plan is told, not refused. */
 function comparedTrack(plan, table, how) {
   const measured = columnsInTails(table, plan.robot),
     moved = how === "none" ? measured : movedTrack(measured, plan, how);

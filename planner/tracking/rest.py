@@ -41,6 +41,7 @@ POSE = tuple[float, float, float]
 _SPACING = 0.02  # of a way
 _WORTH = 1.0  # of a length of the path: what it costs to leave it out
 _NEAR = 0.02  # l, rad: what is near in any case
+_ROUNDING = 1e-9  # the start may be the place with the largest error
 _CANDIDATES = 12  # places of the path, a turn radius apart, to which a way among obstacles may lead
 _GUESS = 0.2  # what a length along the drawn path counts beside the distance from it
 
@@ -117,7 +118,7 @@ def _way(plan: Plan, pose: POSE, place: int, drift: Drift) -> tuple[Reference | 
     law.go_to((place, 0.0, SEGMENTS, 0.0))
     distance = law.distance(pose)[0]
     turned = pose[2] - float(plan.declared.reference.heading[law.place])
-    near = max(plan.predicted_max, plan.straight.largest, _NEAR)
+    near = max(plan.predicted_max, plan.straight.largest, _NEAR) * (1 + _ROUNDING)
     if abs(distance) <= near and abs(turned) <= max(plan.straight.swing, _NEAR):
         return None, law.place
     a, (x, y, heading) = plan.tracked.vehicle.pivot_distance, pose

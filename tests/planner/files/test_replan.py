@@ -74,7 +74,7 @@ def test_a_trip_goes_on_to_its_goal_through_the_places_that_are_left(
 
 
 def test_tours_go_on_along_their_path() -> None:
-    tour = sf.tour([(0, 0), (3, 0), (2, 1.5)], ROBOT, objective="time")
+    tour = sf.tour([(0, 0), (3, 0), (2, 1.5)], ROBOT)
     rest = sf.replan(tour, track_of(tour.plan, 0.5))
     assert isinstance(rest, sf.Plan)
     assert np.hypot(*(rest.track[-1] - [3, 0])) < 0.1 or np.hypot(*(rest.track[-1] - [2, 1.5])) < 0.1
