@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from planner.paths.units import heading_in_degrees, in_lab, place_in_lab, read_length, read_time
+from planner.paths.units import heading_in_degrees, place_in_lab, read_length, read_time
 from sim.io.commands import LOOKUP, argument
 from sim.io.units import format_time
 
@@ -64,11 +64,7 @@ def say(result: Plan) -> None:
         f"{len(result.dwells)} dwells of {shortest} ({result.minimum_dwell:.2f} time units) or more, "
         f"{format_time(float(result.seconds.sum()))} in all"
     )
-    rms, largest, stated, feedback = (
-        in_lab(value, robot)
-        for value in (result.predicted_rms, result.predicted_max, result.stated_error, result.feedback_error)
-    )
-    print(f"predicted error {rms} rms, {largest} at most; stated error {stated}, with feedback {feedback}")
+    print(result.error_line)
     for line in result.job_lines():
         print(line)
 

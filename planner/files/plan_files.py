@@ -19,6 +19,7 @@ import numpy as np
 
 from planner.files.plan_picture import plan_svg
 from planner.files.tracker_header import DIRECTIONS, c_part, safe_name, tracker_header
+from planner.paths.units import in_lab
 from planner.planning.planned import Plan
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_numbers, write_text
@@ -118,6 +119,7 @@ def controller_header(result: Plan, identity: str) -> str:
  * Motor schedule for robot "{safe_name(result)}": turn in FIRST_DIRECTION for the first entry,
  * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
  * lengthens the dwell before it. {_after(result)} Look-up table {result.tracked.model}.
+{_stated(result)}
 {DIRECTIONS}
  * Put the head's centre at START_X_CM, START_Y_CM with heading START_HEADING_DEG, at rest: in cm and degrees,
  * counter-clockwise from the x axis, seen from above. START_X and START_Y are the same in tail lengths,
@@ -158,6 +160,16 @@ def _after(result: Plan) -> str:
 def _repeats(result: Plan) -> str:
     """Define a macro for a schedule that repeats."""
     return "" if result.lap is None else "\n#define SCHEDULE_REPEATS 1"
+
+
+def _stated(result: Plan) -> str:
+    """Say how far from the path the robot may get."""
+    exact = "" if result.tracked.calibrated else ", if its coefficients are exact"
+    lines = [f"Of 100 such robots 95 stay within {in_lab(result.stated_error, result.robot)} of the path{exact}."]
+    unmeasured = result.unmeasured_error
+    if unmeasured is not None:
+        lines.append(f"With the coefficients of another robot it is {in_lab(unmeasured, result.robot)}.")
+    return "\n".join(f" * {line}" for line in lines)
 
 
 def _checkpoints(result: Plan) -> list[str]:

@@ -13,15 +13,17 @@ import { lagTable, resampled } from "./vehicle.js";
 
 const ODD = 0.2; // share of a table's error that has opposite signs in the two directions
 const TIME_STEPS = 2.5e-4; // of the yaw rate, one standard deviation: error of time steps
+const STEP = 0.02; // of a coefficient, for derivatives
+const UNMEASURED = { C_t: 0.35, C_r: 0.22, C_yr: 0.48 }; // standard deviations of ln C, of another robot's
 const SIDES = [[1, 1, 1], MIRROR];
 
 /* Ask a table for the vehicle of a robot. table_vehicle */
 function tableVehicle(robot, table) {
   const groups = groupValues(robot);
-  const senses = [1, -1].map((sense) => ({ ...groups, omega_bar: groups.omega_bar * sense }));
+  const senses = bothDirections(groups);
   const motions = refusingRobot(robot, table, () => senses.map((values) => query(table, values)));
   return vehicleOfParts({
-    twist: motions.map(({ v_z, v_x, omega_yr_bar }) => [v_z, v_x, omega_yr_bar]),
+    twist: motions.map(twistOf),
     curves: senses.map((values) => response(table, values)),
     before: BEFORE,
     phaseRate: motions.map((motion) => groups.N * motion.omega_t_bar),
@@ -31,6 +33,50 @@ function tableVehicle(robot, table) {
     tailGap: Math.min(...motions.map((motion) => motion.tail_gap)),
     leastGap: 1,
   }, robot.name);
+}
+
+function bothDirections(groups) {
+  return [1, -1].map((sense) => ({ ...groups, omega_bar: groups.omega_bar * sense }));
+}
+
+function twistOf({ v_z, v_x, omega_yr_bar }) {
+  return [v_z, v_x, omega_yr_bar];
+}
+
+/* Modes of a robot whose coefficients are those of another. coefficient_modes of UNMEASURED */
+function unmeasuredModes(robot, table, vehicle) {
+  const groups = groupValues(robot);
+  return Object.entries(UNMEASURED).map(([name, sigma], k) => {
+    const ends = [1, -1].map((sign) => {
+      try {
+        const values = { ...groups, [name]: groups[name] * Math.exp(sign * STEP) };
+        return { ...motionOfOther(table, values), step: sign * STEP };
+      } catch (refusal) {
+        if (!(refusal instanceof InputError)) throw refusal;
+        return { twist: vehicle.twist, lag: vehicle.lag, step: 0 }; // at the edge of the table
+      }
+    });
+    const [above, below] = ends, scale = sigma / (above.step - below.step || Infinity);
+    const slope = (one, other) => Array.from(one, (value, i) => scale * (value - other[i]));
+    return {
+      name: `coefficients: ${k + 1}`,
+      twist: above.twist.map((twist, side) => slope(twist, below.twist[side])),
+      lag: above.lag.map((lag, side) => slope(lag, below.lag[side])),
+      current: [0, 0],
+    };
+  });
+}
+
+/* Ask a table for twists and lags of another robot. _other */
+function motionOfOther(table, values) {
+  const senses = bothDirections(values);
+  return {
+    twist: senses.map((sense) => twistOf(query(table, sense))),
+    lag: senses.map((sense, side) => {
+      const { lag, memory } = response(table, sense);
+      return mirrored(lagTable(lag, memory, BEFORE), SIDES[side]);
+    }),
+  };
 }
 
 /* Make a vehicle of a table's answers in both directions.
@@ -85,4 +131,4 @@ function mirrored(table, side) {
   return table.map((value, at) => value * side[at % 3]);
 }
 
-export { tableVehicle, vehicleOfParts };
+export { tableVehicle, unmeasuredModes, vehicleOfParts };

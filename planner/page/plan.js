@@ -61,8 +61,18 @@ function makePlan(drawn, tracked, request, progress = null) {
   if (given === null && objective === "error") {
     first = leastStated(first, longerDwells(vehicle, first.guidance.dwell), withDwell);
   }
-  if (tolerance === null || first.errors.stated <= tolerance) return first;
-  return shortened(first, dwells, withDwell, tolerance);
+  const kept = tolerance === null || first.errors.stated <= tolerance;
+  const plan = kept ? first : shortened(first, dwells, withDwell, tolerance);
+  return { ...plan, unmeasured: unmeasuredError(plan) };
+}
+
+/* The stated error if the coefficients are those of another robot; null: calibrated, or not known.
+ * Plan.unmeasured_error */
+function unmeasuredError({ tracked, drawn, declared, switches }) {
+  const { vehicle, unmeasured } = tracked;
+  if (!unmeasured.length) return null;
+  const guessed = { ...tracked, vehicle: { ...vehicle, modes: [...vehicle.modes, ...unmeasured] } };
+  return planErrors(guessed, drawn, declared, switches, null, 0).stated;
 }
 
 /* The dwell with which a declared path takes the least time; straight motion is the fastest with `fastest`.

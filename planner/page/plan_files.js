@@ -6,6 +6,7 @@ import { fixed, general, roundHalfEven } from "./format.js";
 import { InputError } from "./input_error.js";
 import { planColumns, planRecord, planSeconds } from "./planned.js";
 import { trackerHeader } from "./tracker_header.js";
+import { inLab } from "./units.js";
 
 const MOST_MS = 65_535;
 const CHECKPOINTS = 32;
@@ -61,6 +62,7 @@ function controllerHeader(plan, id, { directions, flash, schedule }) {
  * Motor schedule for robot "${safeName(robot)}": turn in FIRST_DIRECTION for the first entry,
  * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
  * lengthens the dwell before it. Stop after the last entry. Look-up table ${model}.
+${statedWithin(plan)}
 ${directions}
  * Put the head's centre at START_X_CM, START_Y_CM with heading START_HEADING_DEG, at rest: in cm and degrees,
  * counter-clockwise from the x axis, seen from above. START_X and START_Y are the same in tail lengths,
@@ -91,6 +93,14 @@ static const schedule_checkpoint SCHEDULE_TABLE(schedule_checkpoints)[SCHEDULE_C
 };
 ${schedule}#endif
 `;
+}
+
+/* Say how far from the path the robot may get. */
+function statedWithin({ tracked: { robot, calibrated }, errors, unmeasured }) {
+  const exact = calibrated ? "" : ", if its coefficients are exact";
+  const lines = [`Of 100 such robots 95 stay within ${inLab(errors.stated, robot)} of the path${exact}.`];
+  if (unmeasured !== null) lines.push(`With the coefficients of another robot it is ${inLab(unmeasured, robot)}.`);
+  return lines.map((line) => ` * ${line}`).join("\n");
 }
 
 /* Write time in ms and predicted pose of some flips and of the end, as C. */

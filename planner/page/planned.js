@@ -110,6 +110,7 @@ function planContent(plan) {
     zigzag_rms_over_l: plan.straight.rms,
     guaranteed_error_over_l: errors.guaranteed,
     stated_error_over_l: errors.stated,
+    stated_error_unmeasured_over_l: plan.unmeasured,
     table_share: errors.tableShare,
     feedback_error_over_l: errors.feedback,
     feedback_every: new Whole(FEEDBACK_EVERY),

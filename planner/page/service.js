@@ -43,7 +43,7 @@ async function service(data) {
   function vehicleOf(fields, point) {
     if (!locked) return trackedVehicle(makeRobot(fields), table, point);
     const robot = makeRobot({ ...fields, groups: locked.groups });
-    return trackedPoint(robot, locked.vehicle, point, data.table.identity, locked.ownTable);
+    return trackedPoint(robot, locked, point, data.table.identity);
   }
 
   function planOf(wish, progress = null) {
@@ -96,7 +96,7 @@ function about(subject, work) {
 }
 
 /* The vehicle of a robot that the page does not compute anew, of what Python has written. */
-function lockedVehicle({ vehicle, groups, ownTable }, name) {
+function lockedVehicle({ vehicle, groups, ownTable, calibrated }, name) {
   const flat = (part) => part?.values ?? null;
   const rows = ({ shape, values }) =>
     Array.from({ length: shape[0] }, (_, i) => {
@@ -105,12 +105,8 @@ function lockedVehicle({ vehicle, groups, ownTable }, name) {
     });
   const curves = vehicle.curves.map((curve) => mapped(curve, flat));
   const errors = vehicle.errors.map((error) => ({ lag: null, memory: null, ...mapped(error, flat) }));
-  const modes = vehicle.modes.map((mode) => ({
-    name: mode.name,
-    twist: rows(mode.twist),
-    lag: mode.lag && rows(mode.lag),
-    current: flat(mode.current),
-  }));
+  const modeOf = ({ name: ofMode, twist, lag, current }) =>
+    ({ name: ofMode, twist: rows(twist), lag: lag && rows(lag), current: flat(current) });
   const parts = {
     ...vehicle,
     twist: rows(vehicle.twist),
@@ -118,10 +114,11 @@ function lockedVehicle({ vehicle, groups, ownTable }, name) {
     before: flat(vehicle.before),
     phaseRate: Array.from(flat(vehicle.phaseRate)),
     errors: () => errors,
-    modes,
+    modes: vehicle.modes.map(modeOf),
     current: Array.from(flat(vehicle.current)),
   };
-  return { groups, ownTable, vehicle: vehicleOfParts(parts, name) };
+  const unmeasured = vehicle.unmeasured.map(modeOf);
+  return { groups, ownTable, calibrated, unmeasured, vehicle: vehicleOfParts(parts, name) };
 }
 
 function mapped(parts, change) {
@@ -181,6 +178,8 @@ function pictured(plan) {
     seconds: planDuration(plan) * robot.timeScale,
     minimumDwell: guidance.dwell * robot.timeScale,
     stated: errors.stated * cm,
+    calibrated: tracked.calibrated,
+    unmeasured: plan.unmeasured === null ? null : plan.unmeasured * cm,
     feedback: errors.feedback * cm,
     guaranteed: errors.guaranteed === null ? null : errors.guaranteed * cm,
     predictedRms: errors.predictedRms * cm,

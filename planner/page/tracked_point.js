@@ -2,25 +2,26 @@
  *
  * Mirrors planner/vehicle/tracked_point.py. Lengths in l. */
 import { fixed, pythonText } from "./format.js";
-import { tableVehicle } from "./from_table.js";
+import { tableVehicle, unmeasuredModes } from "./from_table.js";
 import { InputError } from "./input_error.js";
 import { pivotDistance } from "./vehicle.js";
 
 const POINTS = ["head_centre", "head_tip", "pivot"];
 
 /* Ask a table for the vehicle of a robot, and add the tracked point: {robot, vehicle, point, offset, model,
- * ownTable, warnings}. tracked_vehicle
+ * ownTable, calibrated, unmeasured, warnings}. tracked_vehicle
  *
  * offset: from the head's centre forward to the tracked point. model: hash of the table. ownTable: whether the
- * table is of this robot alone. */
+ * table is of this robot alone. unmeasured: modes of a robot whose coefficients are those of another. */
 function trackedVehicle(robot, table, point) {
-  return trackedPoint(robot, tableVehicle(robot, table), point, table.identity, false);
+  const vehicle = tableVehicle(robot, table), unmeasured = unmeasuredModes(robot, table, vehicle);
+  return trackedPoint(robot, { vehicle, unmeasured, calibrated: false, ownTable: false }, point, table.identity);
 }
 
 /* Add the tracked point to a vehicle; see `trackedVehicle`. */
-function trackedPoint(robot, vehicle, point, model, ownTable) {
-  const offset = pointOffset(point, robot, vehicle);
-  return { robot, vehicle, point, offset, model, ownTable, warnings: gapWarnings(vehicle) };
+function trackedPoint(robot, { vehicle, unmeasured, calibrated, ownTable }, point, model) {
+  const offset = pointOffset(point, robot, vehicle), warnings = gapWarnings(vehicle);
+  return { robot, vehicle, point, offset, model, ownTable, calibrated, unmeasured, warnings };
 }
 
 /* Distance from the pivot to the tracked point. TrackedVehicle.rod */

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from planner.files.tracker_header import DIRECTIONS, c_part, header_template
 from planner.page.first_state import NamedPath, first_options, robots_of, shapes_of, slider_ends
@@ -15,6 +18,7 @@ from planner.planning.request import PlanRequest
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.coefficient_modes import both_directions
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
+from planner.vehicle.vehicle import Mode
 from sim.io.files import write_text
 from sim.io.provenance import __version__, code_version
 from sim.model.robot import Robot
@@ -101,6 +105,15 @@ def _locked(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowledge) 
     return ""
 
 
+def _shorter(mode: Mode) -> Mode:
+    """Round the lags of a mode to three digits, which packs them to a quarter."""
+    return mode if mode.lag is None else replace(mode, lag=mode.lag.astype(np.float16).astype(float))
+
+
+def _mode_data(mode: Mode) -> dict[str, Any]:
+    return {"name": mode.name, "twist": mode.twist, "lag": mode.lag, "current": mode.current}
+
+
 def _planner_data(lookup: LookupTable, robot: Robot, tracked: TrackedVehicle, why: str) -> Any:
     """Return the look-up table's numbers, or those of the vehicle alone, for the planner in JavaScript."""
     if not why and isinstance(lookup, NeuralTable):
@@ -111,6 +124,7 @@ def _planner_data(lookup: LookupTable, robot: Robot, tracked: TrackedVehicle, wh
         "identity": lookup.identity,
         "name": robot.name,
         "ownTable": tracked.own_table,
+        "calibrated": tracked.calibrated,
         "groups": robot.group_values(),
         "vehicle": {
             "twist": vehicle.twist,
@@ -123,11 +137,8 @@ def _planner_data(lookup: LookupTable, robot: Robot, tracked: TrackedVehicle, wh
                 {"twist": twist, "lag": lag, "memory": memory} if lag.any() or memory.any() else {"twist": twist}
                 for twist, lag, memory in zip(errors.twist, errors.lag, errors.memory, strict=True)
             ],
-            "modes": [
-                {"name": mode.name, "twist": mode.twist, "lag": mode.lag, "current": mode.current}
-                for mode in vehicle.modes
-                if not mode.name.startswith("table: ")
-            ],
+            "modes": [_mode_data(mode) for mode in vehicle.modes if not mode.name.startswith("table: ")],
+            "unmeasured": [_mode_data(_shorter(mode)) for mode in tracked.unmeasured],
             "current": vehicle.current,
             "tailGap": vehicle.tail_gap,
             "leastGap": vehicle.least_gap,

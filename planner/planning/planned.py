@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from planner.paths.path import Path2D
 from planner.paths.units import heading_in_degrees, in_lab, time_in_lab
 from planner.planning.arrival import Arrival
 from planner.planning.declared_path import Declared
-from planner.planning.errors import FEEDBACK_EVERY, PlanErrors
+from planner.planning.errors import FEEDBACK_EVERY, PlanErrors, plan_errors
 from planner.planning.kept_clear import KeptClear
 from planner.planning.lap import Lap
 from planner.planning.line_of_sight import Guidance
@@ -188,6 +188,32 @@ class Plan:
             "shorter ones keep it nearer",
         )
 
+    @cached_property
+    def unmeasured_error(self) -> float | None:
+        """The stated error if the coefficients are those of another robot [l]; None: calibrated, or not known."""
+        if not self.tracked.unmeasured:
+            return None
+        vehicle = self.tracked.vehicle
+        modes = (*vehicle.modes, *self.tracked.unmeasured)
+        guessed = self.tracked._replace(vehicle=replace(vehicle, modes=modes))
+        return plan_errors(guessed, self.drawn, self.declared, self.switches, guaranteed=None, seed=0).stated
+
+    @property
+    def error_line(self) -> str:
+        """The errors in one sentence, and what holds where the coefficients are not calibrated."""
+        rms, largest, stated, feedback = (
+            in_lab(error, self.robot)
+            for error in (self.predicted_rms, self.predicted_max, self.stated_error, self.feedback_error)
+        )
+        errors = f"predicted error {rms} rms, {largest} at most; stated error {stated}, with feedback {feedback}"
+        if self.tracked.calibrated:
+            return errors
+        exact = f"if the coefficients are exact: {errors}"
+        if self.unmeasured_error is None:
+            return exact
+        unmeasured = in_lab(self.unmeasured_error, self.robot)
+        return f"{exact}\nwith the coefficients of another robot: stated error {unmeasured}"
+
     def schedule(self, robot: Robot | None = None, *, laps: int = 1) -> Schedule:
         """Return the schedule for `sim.motion.replay`.
 
@@ -216,15 +242,11 @@ class Plan:
     def __repr__(self) -> str:
         robot, (x, y, heading) = self.robot, self.start
         cm = 100 * robot.tail_length
-        rms, largest, stated, feedback = (
-            in_lab(error, robot)
-            for error in (self.predicted_rms, self.predicted_max, self.stated_error, self.feedback_error)
-        )
         path = f"{'closed path' if self.drawn.closed else 'path'} of {in_lab(self.drawn.length, robot)}"
         dwells = f"{len(self.dwells)} dwells of {self.minimum_dwell * robot.time_scale:.3g} s or more"
         lines = [
             f"Plan for {robot.name!r}: {path}, {dwells}, {format_time(float(self.seconds.sum()))}",
-            f"  predicted error {rms} rms, {largest} at most; stated error {stated}, with feedback {feedback}",
+            *(f"  {part}" for part in self.error_line.splitlines()),
             f"  start at x = {x * cm:.4g} cm, y = {y * cm:.4g} cm, heading {heading_in_degrees(heading)}, "
             f"motor {self.first_direction:+d}",
         ]
@@ -333,6 +355,7 @@ class Plan:
             "zigzag_rms_over_l": self.straight.rms,
             GUARANTEE: self.errors.guaranteed,
             "stated_error_over_l": self.errors.stated,
+            "stated_error_unmeasured_over_l": self.unmeasured_error,
             "table_share": self.errors.table_share,
             "feedback_error_over_l": self.errors.feedback,
             "feedback_every": FEEDBACK_EVERY,

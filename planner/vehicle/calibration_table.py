@@ -96,6 +96,11 @@ class CalibrationKnowledge:
             return CalibrationKnowledge(names, covariance, current, error)
 
 
+UNMEASURED = CalibrationKnowledge(COEFFICIENTS, np.diag(np.square([0.35, 0.22, 0.48])))
+"""Coefficients of another robot: rms differences of ln C between two of the eight robots whose coefficients were
+found (docs/measured-tables.md and the paper's two)."""
+
+
 def read_knowledge(path: str | Path) -> CalibrationKnowledge:
     """Read the table [calibration] of a robot.toml; nothing is known where there is no such file or table.
 

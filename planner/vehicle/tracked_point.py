@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-from planner.vehicle.calibration_table import CalibrationKnowledge
+from planner.vehicle.calibration_table import COEFFICIENTS, UNMEASURED, CalibrationKnowledge
+from planner.vehicle.coefficient_modes import Motion, coefficient_modes
 from planner.vehicle.from_table import default_table, table_vehicle
-from planner.vehicle.vehicle import Vehicle
+from planner.vehicle.vehicle import Mode, Vehicle
 from sim.io.errors import InputError
 from sim.model.robot import Robot
 from surrogate.interface import LookupTable
@@ -24,11 +25,17 @@ class TrackedVehicle(NamedTuple):
     model: str  # hash of the look-up table
     own_table: bool = True  # whether the table is of this robot alone
     knowledge: CalibrationKnowledge = CalibrationKnowledge()  # what a calibration found besides the robot
+    unmeasured: tuple[Mode, ...] = ()  # of a robot whose coefficients are those of another; calibrated: none
 
     @property
     def rod(self) -> float:
         """Distance from the pivot to the tracked point."""
         return self.vehicle.pivot_distance + self.offset
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether the coefficients of the head have a covariance."""
+        return set(COEFFICIENTS) <= set(self.knowledge.names)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -52,7 +59,15 @@ def tracked_vehicle(
     vehicle = table_vehicle(robot, lookup, knowledge)
     own = all(low == high for low, high in lookup.domain.values())
     known = knowledge or CalibrationKnowledge()
-    return TrackedVehicle(robot, vehicle, point, _offset(point, robot, vehicle), lookup.identity, own, known)
+    offset = _offset(point, robot, vehicle)
+    tracked = TrackedVehicle(robot, vehicle, point, offset, lookup.identity, own, known)
+    if tracked.calibrated:
+        return tracked
+    try:
+        modes = coefficient_modes(robot, lookup, Motion(vehicle.twist, vehicle.lag), UNMEASURED)
+    except InputError:  # the table of one robot that does not say what a coefficient changes
+        return tracked
+    return tracked._replace(unmeasured=tuple(modes))
 
 
 def _offset(point: Point, robot: Robot, vehicle: Vehicle) -> float:

@@ -6,8 +6,10 @@ import { degrees, digits, duration, length } from "./words.js";
 /* The sentence that a screen reader is told when a plan is finished. */
 function summary(plan) {
   const time = duration(plan.seconds);
-  const stated = length(plan.stated);
-  return `${time}, ${plan.dwells.length} dwells. 95 of 100 such robots stay within ${stated} of the path to follow.`;
+  const within = (size) => `95 of 100 such robots stay within ${length(size)} of the path to follow`;
+  const exact = plan.calibrated ? "" : "if the coefficients are exact, ";
+  const guessed = plan.unmeasured === null ? "" : ` With coefficients of another robot: ${length(plan.unmeasured)}.`;
+  return `${time}, ${plan.dwells.length} dwells: ${exact}${within(plan.stated)}.${guessed}`;
 }
 
 /* Show the numbers of a plan; with `tails` also in tail lengths and time units. */
@@ -21,7 +23,8 @@ function showResults(plan, tails) {
     ["Net speed along a straight path", `${digits(60 * plan.netSpeed)} cm/min`],
     ["Shortest dwell", time(plan.minimumDwell)],
     ["Predicted error", `${size(plan.predictedRms)} rms, ${size(plan.predictedMax)} at most`],
-    ["Stated error, without feedback", size(plan.stated)],
+    [`Stated error${plan.calibrated ? "" : " if the coefficients are exact"}`, size(plan.stated)],
+    ...(plan.unmeasured === null ? [] : [["With coefficients of another robot", size(plan.unmeasured)]]),
     ["With a camera every 20 flips", size(plan.feedback)],
     ["Path to follow from the drawn one", `${size(plan.offDrawn)} at most`],
     ["Drawn points from the path to follow", `${size(plan.missed)} at most`],

@@ -40,7 +40,9 @@ def plan_to_page(result: Plan) -> dict[str, Any]:
             "robot": robot_to_page(result.robot), "vehicle": vehicle_to_page(tracked.vehicle),
             "point": tracked.point, "offset": tracked.offset, "model": tracked.model,
             "ownTable": tracked.own_table, "warnings": list(tracked.warnings),
+            "calibrated": tracked.calibrated, "unmeasured": [],
         },
+        "unmeasured": result.unmeasured_error,
         "objective": result.objective,
         "drawn": _path(result.drawn),
         "declared": {

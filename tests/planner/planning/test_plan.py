@@ -6,21 +6,28 @@ import math
 import re
 import subprocess
 import sys
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, get_type_hints
 
 import numpy as np
 import pytest
 
+from planner.command_line import say
+from planner.files.plan_files import controller_header
+from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import plan
 from planner.planning.planned import _MOVED
 from planner.planning.request import PlanRequest, RequestOptions
-from planner.vehicle.calibration_table import CalibrationKnowledge
+from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
 from planner.vehicle.dwell_choice import dwells_for, longest_dwell
+from planner.vehicle.from_table import table_vehicle
+from planner.vehicle.rollout import trace
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from surrogate.one_robot.tabulate import tabulate
+from surrogate.table.model_file import load
 from tests.processes import LIMIT
 
 CONTROL = PRESETS["paper-control"]
@@ -247,3 +254,34 @@ def test_with_few_flips_a_measured_pose_does_no_harm() -> None:
     share = np.linspace(0, 1, 100)
     line = plan(np.stack([12 * share, 0 * share], 1), CONTROL, objective="flips")
     assert line.feedback_error <= line.stated_error
+
+
+def test_errors_that_are_not_calibrated_say_so(capsys: pytest.CaptureFixture[str]) -> None:
+    """First-guess coefficients had a stated error of 3 mm, and the robot missed by 10 cm."""
+    known = CalibrationKnowledge(COEFFICIENTS, 1e-4 * np.eye(3))
+    guessed, found = (plan(circle(2.0), CONTROL, knowledge=each) for each in (None, known))
+    assert guessed.error_line.startswith("if the coefficients are exact: predicted error")
+    assert "with the coefficients of another robot: stated error" in guessed.error_line
+    assert found.error_line.startswith("predicted error")
+    assert guessed.error_line.replace("\n", "\n  ") in repr(guessed)
+    say(guessed)
+    assert guessed.error_line in capsys.readouterr().out
+    assert guessed.to_dict()["stated_error_unmeasured_over_l"] == guessed.unmeasured_error
+    assert found.to_dict()["stated_error_unmeasured_over_l"] is None
+    assert "if its coefficients are exact" in controller_header(guessed, "p1")
+    assert "exact" not in controller_header(found, "p1")
+
+
+def test_robots_with_the_coefficients_of_another_stay_within_the_error_of_unmeasured_ones() -> None:
+    """The first-order statement, against 40 vehicles of robots whose coefficients are drawn as those of others."""
+    result = plan(circle(2.0), CONTROL, objective="flips")
+    rng, lookup, misses = np.random.default_rng(5), load(), []
+    for factor in np.exp(rng.normal(size=(40, 3)) * [0.35, 0.22, 0.48]):
+        other = {name: getattr(CONTROL, name) * value for name, value in zip(COEFFICIENTS, factor, strict=True)}
+        with suppress(InputError):  # outside the table
+            truth = table_vehicle(replace(CONTROL, **other), lookup)
+            misses.append(distance_to(result.reference, trace(truth, result.switches, 0.0)).max())
+    assert len(misses) > 25
+    assert result.unmeasured_error is not None
+    assert np.mean(np.array(misses) < result.unmeasured_error) > 0.8
+    assert np.median(misses) > 0.2 * result.unmeasured_error > 2 * result.stated_error

@@ -31,7 +31,7 @@ def address_of(page: Any) -> str:
 
 def test_the_page_opens_with_a_plan_and_a_saved_link_opens_with_the_same(browser: Any, address: str) -> None:
     with opened_page(browser, address) as page:
-        assert "dwells. 95 of 100 such robots stay within" in planned(page)
+        assert "dwells: if the coefficients are exact, 95 of 100 such robots stay within" in planned(page)
         page.select_option("#shape", "square")
         page.fill("#size", "31.5")
         page.select_option("#objective", "time")
@@ -307,7 +307,7 @@ def test_an_opened_path_is_smoothed(browser: Any, address: str, tmp_path: Path) 
         page.fill("#smooth", advised[1])
         page.get_by_role("button", name="Smooth this path").click()
         page.locator("#path-problem").wait_for(state="hidden")
-        assert "dwells. 95 of 100" in planned(page)
+        assert "dwells: if the coefficients are exact, 95 of 100" in planned(page)
 
 
 def test_the_page_prints_on_paper(browser: Any, address: str, tmp_path: Path) -> None:
