@@ -6,12 +6,14 @@ import logging
 import os
 import threading
 import time
+from contextlib import suppress
 from typing import Any
 
 import dask
 from distributed import Client, Future, KilledWorker, LocalCluster
 
 from dataset.workers.backend import GONE, KILLER, Lost
+from dataset.workers.processes import isolated
 from dataset.workers.tasks import Join, Outcome, Refusal, Task, run_task
 from sim.io.errors import InputError
 
@@ -33,15 +35,16 @@ class DaskCluster:
             logging.getLogger(name).setLevel(logging.CRITICAL)  # this program reports what matters
         self._cluster: Any = None
         try:
-            with dask.config.set(_SETTINGS):
+            with dask.config.set(_SETTINGS), isolated():
                 if address is None:
                     self._cluster = LocalCluster(
                         n_workers=count, threads_per_worker=1, dashboard_address=None, memory_limit=0
                     )
                 self._client = Client(self._cluster or address, timeout=_ANSWERS, set_as_default=False)
-        except (OSError, TimeoutError, ValueError) as refusal:
+        except Exception as refusal:  # whatever a connection, or a nanny, can raise
+            reason = (str(refusal) or repr(refusal)).splitlines()[0]
             raise InputError(
-                f"no dask scheduler answers at {address} ({str(refusal).splitlines()[0]}); start one with "
+                f"no dask scheduler answers at {address or 'this machine'} ({reason}); start one with "
                 "dask scheduler, or give its address as tcp://host:port"
             ) from None
         self._busy: dict[Future, int] = {}
@@ -77,10 +80,11 @@ class DaskCluster:
         """Cancel the tasks under way and disconnect."""
 
         def disconnect() -> None:
-            self._client.cancel(list(self._busy), force=True)
-            self._client.close(timeout=1)
-            if self._cluster is not None:
-                self._cluster.close(timeout=1)
+            with suppress(Exception):  # what does not close in time ends with this process
+                self._client.cancel(list(self._busy), force=True)
+                self._client.close(timeout=1)
+                if self._cluster is not None:
+                    self._cluster.close(timeout=1)
 
         closing = threading.Thread(target=disconnect, daemon=True)  # do not wait for a scheduler that is gone
         closing.start()

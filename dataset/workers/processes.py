@@ -102,7 +102,7 @@ def _submit(executor: Any, function: Callable[..., Result], *arguments: Any) -> 
     """
     for _ in range(_ATTEMPTS):
         try:
-            with _isolated():
+            with isolated():
                 executor = executor or _new_worker()
                 return executor, cast("Future[Result]", executor.submit(function, *arguments))
         except (BrokenExecutor, ConnectionError, EOFError):
@@ -121,7 +121,7 @@ def _new_worker() -> Any:
 
 
 @contextmanager
-def _isolated() -> Iterator[None]:
+def isolated() -> Iterator[None]:
     """Keep processes that start inside from running the user's script again, and from receiving Ctrl-C."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     script, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")

@@ -157,6 +157,20 @@ def test_no_scheduler_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
             build(design(9), tmp_path / "out", backend="dask", address=address, title="", simulate=invented)
 
 
+@pytest.mark.parametrize("failure", [RuntimeError("Nanny failed to start."), TimeoutError()])
+def test_a_local_cluster_that_does_not_start(
+    failure: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cluster = pytest.importorskip("dataset.workers.dask_cluster", reason="the extra dask is not installed")
+
+    def failing(**_: object) -> None:
+        raise failure
+
+    monkeypatch.setattr(cluster, "LocalCluster", failing)
+    with pytest.raises(InputError, match=r"no dask scheduler answers at this machine \((Nanny|TimeoutError)"):
+        build(design(9), tmp_path / "out", backend="dask", jobs=1, title="", simulate=invented)
+
+
 def build_apart(
     folder: Path, rows_by: str, backend: str, address: str, *, patience: float = 60
 ) -> subprocess.Popen[str]:
