@@ -64,13 +64,13 @@ ROWS = {
     "tails": (32768, 101), "single": (16384, 505), "couples": (8192, 606),
     "widths": (8192, 202), "widths_couples": (6144, 911),
     "held_out": (8192, 402), "held_out_couples": (2048, 912),
-    "locked": (4096, 20261205),
+    "locked": (4096, 20261205), "locked_couples": (2048, 20261206),
 }  # fmt: skip
 FLIPS = {"flips": (1400, 301), "locked_flips": (400, 20261202)}
 _HALF_WITH_EFFECTS = ("single", "widths", "held_out")
 _LEARNED = ("tails", "single", "couples")
 _WIDTHS, _HELD_OUT = ("widths", "widths_couples"), ("held_out", "held_out_couples")
-_COUPLES = ("couples", "widths_couples", "held_out_couples")
+_COUPLES = ("couples", "widths_couples", "held_out_couples", "locked_couples")
 # share that gets one tail
 _SINGLE = {"single": 1.0, "couples": 1.0, "widths_couples": 0.5, "held_out_couples": 0.5}
 _STEADY_ONLY = ("surface_couple", "motor_droop")  # effects that the response to a flip is not learned with
@@ -136,8 +136,8 @@ def swept(folder: str) -> tuple[SimulatedRobots, SimulatedRobots]:
     return rows.at(learned), rows.at(np.flatnonzero((part > 0) & history))
 
 
-def test(lookup: NeuralTable, rows: SimulatedRobots, flips: SimulatedRobots) -> None:
-    """Print errors and coverage on robots that were never used."""
+def test(lookup: NeuralTable, rows: SimulatedRobots, couples: SimulatedRobots, flips: SimulatedRobots) -> None:
+    """Print errors and coverage on robots that were never used; coverage on robots with couples in yaw, too."""
     began = time.process_time()
     answer = lookup.query(rows.robots, intervals=True, flag=True)
     seconds = time.process_time() - began
@@ -153,8 +153,8 @@ def test(lookup: NeuralTable, rows: SimulatedRobots, flips: SimulatedRobots) -> 
         print(words)
         for name, figures in summary({n: e[kind] for n, e in errors.items()}, apart[inside][kind]).items():
             print(f"  {name:16}" + "".join(f"  {k} {100 * v:.4f}" for k, v in figures.items()))
-    answered = {name: values[inside] for name, values in answer.items()}
-    print("coverage:", coverage(answered, {name: values[inside] for name, values in truth.items()}))
+    for words, group in (("without couples", rows), ("with couples", couples)):
+        print(f"coverage {words}:", covered(lookup, group))
     flips = flips.at(flips.robots["N"] > 1)
     response = lookup.response(flips.robots, flag=True)
     known = ~lookup.query(flips.robots, flag=True)["outside"]
@@ -163,6 +163,13 @@ def test(lookup: NeuralTable, rows: SimulatedRobots, flips: SimulatedRobots) -> 
     valid = flips.motion["tail_gap"] >= 1
     for name, figures in summary({n: e[known] for n, e in report.items()}, valid[known]).items():
         print(f"  {name:16}" + "".join(f"  {k} {100 * v:.3f}" for k, v in figures.items()))
+
+
+def covered(lookup: NeuralTable, rows: SimulatedRobots) -> dict[str, float]:
+    """Return the share of robots inside the domain whose motion is inside the intervals, by output."""
+    answer, truth = lookup.query(rows.robots, intervals=True, flag=True), with_radius(rows.motion)
+    answered, known = ({n: v[~answer["outside"]] for n, v in part.items()} for part in (answer, truth))
+    return coverage(answered, known)
 
 
 def draw(lookup: NeuralTable, rows: SimulatedRobots, path: str) -> None:
@@ -266,8 +273,8 @@ def main(*words: str) -> None:
         print(error_table(lookup.errors))
     if arguments.test:
         lookup, locked = load(arguments.test), kept(arguments.work, "locked")
-        test(lookup, locked, kept(arguments.work, "locked_flips"))
+        test(lookup, locked, *(kept(arguments.work, name) for name in ("locked_couples", "locked_flips")))
         if arguments.card:
-            write_text(arguments.card, model_card(lookup, kept(arguments.work, "held_out")))
+            write_text(arguments.card, model_card(lookup, _joined(arguments.work, _HELD_OUT)))
         if arguments.picture:
             draw(lookup, locked, arguments.picture)

@@ -16,6 +16,7 @@ function errorScale(name, answer) {
 
 /* Half of the width of the interval of an output. Intervals.half_widths
  *
+ * The page's robots have no couple in yaw, so their factors are the first ones of `factor`.
  * intervals: as a model file has them. features: 11 of them, see lookup.js. size: what errors are relative to. */
 function halfWidth(intervals, name, features, size) {
   const { shift, scale, weights, bounds, middle, factor } = intervals;

@@ -37,9 +37,10 @@ from surrogate.table.flat_table import (
     WIDTHS,
     WRENCH,
 )
+from surrogate.table.intervals import PARTS
 from surrogate.table.support import monomial_count, novelty_at, support_room
 from surrogate.wrench.balance import MATRICES, SINGLE, inputs_at, network_inputs_at, solve
-from surrogate.wrench.heads import HEAD_LENGTH, HEAD_NUMBERS, RESISTANCE, ROBOT_NUMBERS, SENSE
+from surrogate.wrench.heads import HEAD_LENGTH, HEAD_NUMBERS, RESISTANCE, ROBOT_NUMBERS, SENSE, YAW_COUPLE
 from surrogate.wrench.tails import INPUTS, SINGLE_INPUTS, inputs_of_head
 
 GROUPS = len(ROBOT)  # in the order of ROBOT
@@ -331,20 +332,20 @@ def _half_widths(table: Floats, places: Integers, robot: Floats, answer: Floats,
 
 @compiled
 def scaled_features(table: Floats, places: Integers, robot: Floats, answer: Floats, features: Floats) -> int:
-    """Write the scaled features of the intervals (WIDTH_FEATURES,); return the part of the domain."""
+    """Write the scaled features of the intervals (WIDTH_FEATURES,); return which of the factors is theirs."""
     at, number = places[FEATURES], robot[HEAD_NUMBERS + 4]
     for i in range(7):
         features[i] = _finite(answer[INPUT + i])
     features[7], features[8] = _finite(np.log(answer[NOVELTY] + 1e-12)), np.log(1e-9)
     features[9], features[10] = np.log(number), 1.0 if number == 1 else 0.0
     middle = table[at + 2 * WIDTH_FEATURES : at + 2 * WIDTH_FEATURES + 3]
-    part = 8
+    part = PARTS - 1
     if number != 1:
         part = int(features[0] > middle[0]) + 2 * int(features[3] > middle[1]) + 4 * int(features[5] > middle[2])
     for i in range(WIDTH_FEATURES):
         scaled = (features[i] - table[at + i]) / table[at + WIDTH_FEATURES + i]
         features[i] = min(max(scaled, -5.0), 5.0)
-    return part
+    return part + PARTS * int(robot[YAW_COUPLE] != 0)
 
 
 @compiled

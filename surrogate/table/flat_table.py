@@ -24,7 +24,7 @@ from sim.model.response import DWELLS
 from surrogate.networks.blocks import in_single_precision
 from surrogate.networks.ensemble import SHARED, Ensemble
 from surrogate.table.errors import OUTPUTS
-from surrogate.table.intervals import Intervals
+from surrogate.table.intervals import GROUPS, PARTS, Intervals
 from surrogate.table.response_table import ResponseTable
 from surrogate.table.support import Support, monomial_count, products_of, support_room
 from surrogate.table.wrench_table import WrenchTable
@@ -88,7 +88,8 @@ def flat_table(
         for i, name in enumerate(OUTPUTS):
             if name in intervals.factor:
                 bounds = np.array(intervals.bounds[name])
-                put(WIDTHS + i, intervals.weights[name], bounds, intervals.factor[name])
+                factor = np.resize(intervals.factor[name], GROUPS * PARTS)
+                put(WIDTHS + i, intervals.weights[name], bounds, factor)
     known = [network.packed.sizes for network in networks if network is not None]
     components = int(places[LAG + 2] + places[MEMORY + 2])
     of_support = max(support_room(len(names)) for names in (INPUTS, SINGLE_INPUTS))

@@ -6,10 +6,11 @@
 s is fitted to the logarithm of errors by least squares. Its features are the inputs of the tails and their
 squares, the robot's distance from the middle of the training data, the spread of the ensemble, and N. q makes the
 intervals cover 90 % however well s fits. There is one q for robots with one tail, and one for each octant of the
-others: low or high drag number, deflection and forward motion. So the intervals cover 90 % in each of these parts.
-s makes them cover about 90 % in smaller parts as well. s and q are fitted to different robots. Sources: Lei et
-al., J. Am. Stat. Assoc. 113, 1094 (2018), section 5.2; Vovk, Gammerman and Shafer, Algorithmic Learning in a
-Random World (2005), section 4.5, for the parts.
+others: low or high drag number, deflection and forward motion. Robots on which the tails' spin exerts a couple in
+yaw have a q of their own in each part. So the intervals cover 90 % in each of these parts, with and without
+couples. s makes them cover about 90 % in smaller parts as well. s and q are fitted to different robots. Sources:
+Lei et al., J. Am. Stat. Assoc. 113, 1094 (2018), section 5.2; Vovk, Gammerman and Shafer, Algorithmic Learning in
+a Random World (2005), section 4.5, for the parts.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim.arrays import Floats, Integers
+from sim.arrays import Flags, Floats, Integers
 
 COVERAGE = 0.90
 _TINY = 1e-9  # of the scale of an output
@@ -28,7 +29,8 @@ _RIDGE = 1e-3
 _HALVED = [0, 3, 5]  # features whose halves make the octants: drag number, deflection, forward motion
 _ONE_TAIL = -1  # the width feature that is 1 for one tail
 PARTS = 2 ** len(_HALVED) + 1
-_FEWEST = 40  # robots in a part, for a q of its own
+GROUPS = 2  # robots without and with a couple
+_FEWEST = 40  # robots in a part or group, for a q of its own
 _FIRMEST, _SOFTEST = 0.002, 0.998  # s is held between these quantiles of itself
 
 
@@ -41,16 +43,21 @@ class Intervals:
     weights: Mapping[str, Floats]  # output -> (P,)
     bounds: Mapping[str, tuple[float, float]]  # output -> smallest and largest ln s
     middle: Floats  # (3,), the halves meet here
-    factor: Mapping[str, Floats]  # output -> q of each part, (PARTS,)
+    factor: Mapping[str, Floats]  # output -> q of each part, (PARTS,) for all robots or (GROUPS PARTS,)
 
-    def half_widths(self, name: str, features: Floats, sizes: Floats | float) -> Floats:
+    def half_widths(
+        self, name: str, features: Floats, sizes: Floats | float, couples: Flags | bool = False
+    ) -> Floats:
         """Return half of the width of the interval of one output, (M,).
 
         Args:
             features: (M, F), see `surrogate.table.lookup`.
             sizes: (M,) or one number, what errors of this output are relative to.
+            couples: (M,), which robots have a couple in yaw from the spin of their tails.
         """
-        return self.factor[name][self.part(features)] * self._local(name, features) * sizes
+        factor = self.factor[name]
+        part = (self.part(features) + PARTS * np.asarray(couples)) % len(factor)
+        return factor[part] * self._local(name, features) * sizes
 
     def part(self, features: Floats) -> Integers:
         """Return which part each robot belongs to, (M,): 0 to 7 for octants, 8 for one tail."""
@@ -63,12 +70,16 @@ class Intervals:
 
     @staticmethod
     def learned(
-        features: Floats, errors: Mapping[str, Floats], more_features: Floats, more_errors: Mapping[str, Floats]
+        features: Floats,
+        errors: Mapping[str, Floats],
+        more_features: Floats,
+        more_errors: Mapping[str, Floats],
+        more_couples: Flags | bool = False,
     ) -> Intervals:
         """Learn from relative errors by output, (M,), of robots for s and of more robots, (M',), for q."""
         shift, scale = features.mean(0), np.maximum(features.std(0, ddof=1), 1e-6)
         design = _design((features - shift) / scale)
-        weights, bounds, factor = {}, {}, {}
+        weights, bounds = {}, {}
         for name, error in errors.items():
             known = np.isfinite(error)
             if not known.any():  # nothing to learn from: the interval is infinite
@@ -83,18 +94,29 @@ class Intervals:
         several = features[features[:, _ONE_TAIL] < 0.5]
         middle = np.quantile((several if len(several) else features)[:, _HALVED], 0.5, axis=0, method="lower")
         plain = Intervals(shift, scale, weights, bounds, middle, {})
-        part = plain.part(more_features)
-        for name, error in more_errors.items():
-            known = np.isfinite(error)
-            scores = np.abs(error[known]) / plain._local(name, more_features[known])
-            each = [scores[part[known] == k] for k in range(PARTS)]
-            factor[name] = np.array(
-                [
-                    _conformal_quantile(part_scores if len(part_scores) >= _FEWEST else scores)
-                    for part_scores in each
-                ]
-            )
-        return replace(plain, factor=factor)
+        return plain.calibrated(more_features, more_errors, more_couples)
+
+    def calibrated(
+        self, features: Floats, errors: Mapping[str, Floats], couples: Flags | bool = False
+    ) -> Intervals:
+        """Return the intervals with q for these robots.
+
+        Args:
+            features: (M, F) of robots that s was not learned from.
+            errors: relative errors by output, (M,); NaN where unknown.
+            couples: (M,), see `half_widths`; with too few robots of either group both have the same q.
+        """
+        part, factor = self.part(features), {}
+        couples = np.broadcast_to(couples, part.shape)
+        groups = [~couples, couples]
+        if min(map(np.count_nonzero, groups)) < _FEWEST:
+            groups = [~couples | couples]
+        for name, error in errors.items():
+            known, scores = np.isfinite(error), np.abs(error) / self._local(name, features)
+            cells = [[group & (part == k) & known, group & known, known] for group in groups for k in range(PARTS)]
+            pools = [next((c for c in cell if c.sum() >= _FEWEST), known) for cell in cells]
+            factor[name] = np.array([_conformal_quantile(scores[pool]) for pool in pools])
+        return replace(self, factor=factor)
 
 
 def _design(x: Floats) -> Floats:

@@ -281,7 +281,8 @@ class NeuralTable:
             raise InputError("this look-up table has no intervals; train it again")
         features, added = self.width_features(motions), {}
         for name in [name for name in result if name in self.intervals.factor]:
-            half = self.intervals.half_widths(name, features, error_scale(name, result))
+            size = error_scale(name, result)
+            half = self.intervals.half_widths(name, features, size, motions.heads.couples)
             half = np.where(np.isfinite(result[name]), half, 0.0)
             added[f"{name}_low"], added[f"{name}_high"] = result[name] - half, result[name] + half
         return added

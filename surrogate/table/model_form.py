@@ -15,6 +15,7 @@ from sim.model.response import BEFORE
 from surrogate.input_ranges import ROBOT
 from surrogate.networks.ensemble import state_shapes
 from surrogate.table.curve_errors import CURVE_ERRORS, SIZES
+from surrogate.table.intervals import GROUPS
 from surrogate.table.intervals import PARTS as INTERVAL_PARTS
 from surrogate.table.response_table import PARTS, SHAPES
 from surrogate.table.support import monomial_count
@@ -116,7 +117,8 @@ def _check_intervals(part: Mapping[str, Any]) -> None:
     if not set(part["factor"]) <= set(part["weights"]) & set(part["bounds"]):
         raise IncompleteError("its intervals are incomplete")
     for name, factor in part["factor"].items():
-        _check_array(factor, (INTERVAL_PARTS,))
+        groups = GROUPS if len(factor) > INTERVAL_PARTS else 1
+        _check_array(factor, (groups * INTERVAL_PARTS,))
         _check_array(part["weights"][name], (terms,))
         low, high = part["bounds"][name]
         if not low <= high:

@@ -18,6 +18,7 @@ from surrogate.table.intervals import COVERAGE
 from surrogate.table.lookup import NeuralTable
 from surrogate.training.simulated import SimulatedRobots
 from surrogate.training.train import with_radius, without_effects
+from surrogate.wrench.heads import heads_and_tails
 
 _WORST = 10
 _FEWEST = 20  # robots, for a line of a table
@@ -79,14 +80,16 @@ def model_card(lookup: NeuralTable, held_out: SimulatedRobots) -> str:
         "## Errors",
         _about_errors(int(known.sum()), int((~known).sum())),
     ]
-    plain = without_effects(held_out.robots)
+    plain, couples = without_effects(held_out.robots), heads_and_tails(held_out.robots)[0].couples
     shown = known & plain if (known & plain).any() else known
     kinds = (
         ("Two tails and more, which do not touch:", plain & (tails > 1) & apart),
         ("Two tails and more, touching or not:", plain & (tails > 1)),
         ("One tail:", plain & (tails == 1)),
-        ("Two tails and more, with effects on head and motor:", ~plain & (tails > 1) & apart),
-        ("One tail, with effects on head and motor:", ~plain & (tails == 1)),
+        ("Two tails and more, with effects on head and motor:", ~plain & ~couples & (tails > 1) & apart),
+        ("One tail, with effects on head and motor:", ~plain & ~couples & (tails == 1)),
+        ("Two tails and more, with a couple in yaw:", couples & (tails > 1) & apart),
+        ("One tail, with a couple in yaw:", couples & (tails == 1)),
     )
     for words, kind in kinds:
         rows = [_row(_TITLES[name], name, errors, inside, known & kind) for name in COMPARED]

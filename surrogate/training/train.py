@@ -275,10 +275,10 @@ def _with_intervals(lookup: NeuralTable, width_rows: SimulatedRobots, held_out: 
     The intervals are those of all rows. The errors are those of robots without effects and with two tails and
     more, as far as there are any.
     """
-    (first_features, first, _), (features, errors, inside) = (
+    (first_features, first, _, _), (features, errors, couples, inside) = (
         _errors(lookup, rows) for rows in (width_rows, held_out)
     )
-    intervals = Intervals.learned(first_features, first, features, errors)
+    intervals = Intervals.learned(first_features, first, features, errors, couples)
     apart = held_out.motion["tail_gap"][inside] >= 1
     stated = np.ones(len(apart), dtype=bool)
     for kind in (without_effects(held_out.robots)[inside], held_out.robots["N"][inside] > 1):
@@ -287,8 +287,8 @@ def _with_intervals(lookup: NeuralTable, width_rows: SimulatedRobots, held_out: 
     return replace(lookup, intervals=intervals, errors={**lookup.errors, **report})
 
 
-def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[Floats, dict[str, Floats], Flags]:
-    """Return features and relative errors of rows inside the domain, and which those are."""
+def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[Floats, dict[str, Floats], Flags, Flags]:
+    """Return features, relative errors and couples of rows inside the domain, and which those are."""
     motions = lookup.motions(rows.robots, flag=True)
     inside = np.array([not reason for reason in motions.reason])
     if inside.sum() < _FEWEST_INSIDE:  # a table of few rows has a domain that holds hardly any others: all count
@@ -298,6 +298,7 @@ def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[Floats, dict[st
     return (
         lookup.width_features(motions)[inside],
         {name: error[inside] for name, error in errors.items()},
+        motions.heads.couples[inside],
         inside,
     )
 

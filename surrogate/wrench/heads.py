@@ -31,6 +31,7 @@ Numbers = Callable[[Tails, Floats], Floats]  # tails and motion (M, 5) -> y (M, 
 
 # A robot for the compiled loops: |ω|, gain, resistance (20), L and sense of the head; then the tails, as packed.
 RESISTANCE, HEAD_LENGTH, SENSE, HEAD_NUMBERS = 2, 22, 23, 24
+YAW_COUPLE = RESISTANCE + 14  # that the tails' spin exerts
 ROBOT_NUMBERS = HEAD_NUMBERS + TAIL_NUMBERS
 
 _ON_TAILS = ("tail_sag",)  # local, but on the tails
@@ -45,6 +46,11 @@ class Heads(NamedTuple):
     resistance: Floats  # (M, 4, 5)
     length: Floats  # (M,) L
     sense: Floats  # (M,) sign of ω
+
+    @property
+    def couples(self) -> Flags:
+        """Which robots have a couple in yaw from the spin of their tails, (M,)."""
+        return np.asarray(self.resistance[:, 2, 4] != 0)
 
     def at(self, rows: Integers | Flags) -> Heads:
         """Return the heads of the robots at indices or flags (M',)."""

@@ -44,7 +44,7 @@ def half_widths(table: NeuralTable, columns: dict[str, Floats], found: dict[str,
     assert table.intervals is not None
     widths = {}
     for name in [name for name in found if name in table.intervals.factor]:
-        half = table.intervals.half_widths(name, features, error_scale(name, found))
+        half = table.intervals.half_widths(name, features, error_scale(name, found), motions.heads.couples)
         widths[name] = np.where(np.isfinite(found[name]), half, 0.0)
     return widths
 

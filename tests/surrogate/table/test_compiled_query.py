@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sim.effects import catalogue
 from sim.model.groups import DWELL
 from surrogate.input_ranges import ROBOT
+from surrogate.table.intervals import PARTS
+from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
+from surrogate.table.quick_query import MANY
 from surrogate.training.simulated import draw_robots
 from surrogate.wrench.heads import needs_no_learning
 from tests.oracles.query import answer, half_widths
@@ -95,6 +100,29 @@ def test_widths_of_intervals(small: bool) -> None:
         width = (found[f"{name}_high"] - found[f"{name}_low"])[known] / 2
         size = np.abs(found[name][known]) + half[known]
         assert (np.abs(width - half[known]) <= 1e-9 * half[known] + 1e-14 * size).all(), name
+
+
+@pytest.mark.parametrize("effect", ["", "surface_couple", "left_right_bias"])
+@pytest.mark.parametrize("count", [MANY - 1, MANY])
+def test_robots_with_couples_in_yaw_have_factors_of_their_own(effect: str, count: int) -> None:
+    """By the loop, by blocks and with arrays; files of earlier versions have one group for all robots."""
+    drawn = {name: values for name, values in robots(count).items() if name in ROBOT}
+    drawn |= {effect: np.full(count, 0.05)} if effect else {}
+    factors = np.ones(PARTS), np.repeat([1.0, 3.0], PARTS)
+    one, two = (with_factor(load(), factor) for factor in factors)
+    before, after = (lookup.query(drawn, flag=True, intervals=True) for lookup in (one, two))
+    wanted, known = half_widths(two, drawn, answer(two, drawn)), ~after["outside"]
+    assert known.sum() > 2
+    for name, half in wanted.items():
+        narrow, wide = ((found[f"{name}_high"] - found[f"{name}_low"])[known] for found in (before, after))
+        assert wide == pytest.approx((3 if effect else 1) * narrow, rel=1e-6), name
+        assert wide / 2 == pytest.approx(half[known], rel=1e-6), name
+
+
+def with_factor(lookup: NeuralTable, factor: np.ndarray) -> NeuralTable:
+    assert lookup.intervals is not None
+    factors = dict.fromkeys(lookup.intervals.factor, factor)
+    return replace(lookup, intervals=replace(lookup.intervals, factor=factors))
 
 
 def test_a_table_without_networks_for_two_tails() -> None:

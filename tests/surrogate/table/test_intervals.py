@@ -1,4 +1,4 @@
-"""Intervals: they cover as they say, in every part."""
+"""Intervals: they cover as they say, in every part and group."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sim.arrays import Flags, Floats
-from surrogate.table.intervals import Intervals
+from surrogate.table.intervals import PARTS, Intervals
 from tests.surrogate.small import rows, table
 
 
@@ -42,6 +42,21 @@ def test_intervals_cover_in_each_part() -> None:
     assert sorted(set(part.tolist())) == list(range(9))
     for k in range(9):
         assert 0.85 < inside[part == k].mean() < 0.95
+
+
+@pytest.mark.parametrize(("with_couples", "groups"), [(0.5, 2), (0.01, 1)])
+def test_intervals_cover_with_and_without_couples(with_couples: float, groups: int) -> None:
+    """Errors that are five times as large with couples; with too few of these robots nothing is told apart."""
+    random = np.random.default_rng(3)
+    (x, error), (more, other), (test, last) = (
+        sampled(n, random, lambda x: 1 + x[:, 0]) for n in (3000, 3000, 20000)
+    )
+    couples, tested = (random.uniform(size=size) < with_couples for size in (3000, 20000))
+    found = Intervals.learned(x, {"v": error}, more, {"v": other * (1 + 4 * couples)}, couples)
+    inside = np.abs(last * (1 + 4 * tested)) <= found.half_widths("v", test, 1.0, tested)
+    assert len(found.factor["v"]) == groups * PARTS
+    assert inside[~tested].mean() == pytest.approx(0.9, abs=0.02)
+    assert (0.88 < inside[tested].mean() < 0.92) == (groups == 2)
 
 
 def test_a_query_gives_intervals_around_its_answer() -> None:

@@ -88,6 +88,7 @@ EDITS: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
     (lambda c: c["wrench"][1]["state"]["weights.0"].fill(np.nan), "some of its numbers are not finite"),
     (lambda c: c["intervals"]["weights"]["v_z"].fill(np.inf), "some of its numbers are not finite"),
     (lambda c: c["intervals"]["factor"]["v_z"].fill(np.nan), "some of its intervals are no numbers"),
+    (lambda c: c["intervals"]["factor"].update(v_z=np.ones(10)), "an array is not one of 18 numbers"),
     (lambda c: c.update(wrench=[None] * 3, support=[None] * 3), "it has no networks"),
     (lambda c: c.update(support=[None] * 3), "do not belong together"),
     (lambda c: c["curves"].pop(), "no response to a flip"),
