@@ -83,13 +83,15 @@ def test_one_tail_has_one_motion() -> None:
 
 @pytest.mark.parametrize("single", [False, True])
 def test_intervals_hold_with_effects_on_head_and_motor(single: bool) -> None:
-    """Drag, disc, couples and droop, as strong as they were learned."""
+    """Drag, disc, couples and droop, as strong as they were learned; with and without couples."""
     robots = draw_robots(512, 79, wide=False, effects=True)
     robots["N"] = np.ones(512) if single else np.maximum(robots["N"], 2.0)
     answer, truth, good = answered(robots)
     assert good.mean() > 0.7
-    covered = coverage({n: v[good] for n, v in answer.items()}, {n: v[good] for n, v in truth.items()})
-    assert 0.82 < np.mean([*covered.values()]) < 0.98
+    couples = robots["surface_couple"] != 0
+    for group in (good & couples, good & ~couples):
+        covered = coverage({n: v[group] for n, v in answer.items()}, {n: v[group] for n, v in truth.items()})
+        assert 0.82 < np.mean([*covered.values()]) < 0.98
 
 
 def test_a_single_tail_that_a_couple_turns_to_either_side() -> None:
