@@ -11,6 +11,7 @@ from planner.command_line import (
     OBSTACLES,
     TABLE,
     arrival_time,
+    camera_of,
     length_of,
     progress_bar,
     say,
@@ -154,6 +155,7 @@ def _goal_planned(arguments: Namespace) -> GoalPlan:
         feedback=arguments.feedback,
         arrive_seconds=seconds,
         knowledge=knowledge,
+        camera=camera_of(arguments, robot),
     )
 
 

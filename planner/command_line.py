@@ -9,11 +9,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from planner.paths.units import heading_in_degrees, place_in_lab, read_length, read_time
+from planner.paths.units import heading_in_degrees, number_and_unit, place_in_lab, read_length, read_time
 from sim.io.commands import LOOKUP, argument
 from sim.io.units import format_time
 
 if TYPE_CHECKING:
+    from planner.planning.camera import Camera
     from planner.planning.planned import Plan
     from planner.planning.request import PlanRequest
     from planner.vehicle.calibration_table import CalibrationKnowledge
@@ -46,8 +47,11 @@ OBSTACLES = (
              help="circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline; may be given again"),
     argument("--walls", metavar="REGION", help="what the robot must stay within: box:…, or a CSV or SVG outline"),
     argument("--feedback", action="store_true",
-             help="the pose will be measured every 20 flips: the margin around obstacles is the stated error with "
+             help="the pose will be measured for a tracker: the margin around obstacles is the stated error with "
              "feedback"),
+    argument("--camera", nargs=5, metavar=("NOISE", "RAD", "EVERY", "LATE", "LOST"),
+             help="of the stated error with feedback: standard deviations of a place and of a heading in rad, "
+             "seconds between poses, their age in seconds, share that is lost (default: 0.01l 0.01 1 2 0.2)"),
 )  # fmt: skip
 
 
@@ -119,6 +123,22 @@ def length_of(arguments: Namespace, name: str, robot: Robot) -> float | None:
     return None if words is None else read_length(words, arguments.unit, robot, option, above_zero=True)
 
 
+def camera_of(arguments: Namespace, robot: Robot) -> Camera:
+    """Read --camera; default: the camera as documented.
+
+    Raises:
+        InputError: a word is no number, or cannot be.
+    """
+    from planner.planning.camera import Camera
+
+    if (words := getattr(arguments, "camera", None)) is None:
+        return Camera()
+    place, *numbers = words
+    noise = read_length(place, arguments.unit, robot, "--camera", above_zero=True)
+    heading, every_s, delay_s, lost = (number_and_unit(word)[0] for word in numbers)
+    return Camera((noise, heading), every_s, delay_s, lost)
+
+
 def request_of(arguments: Namespace, robot: Robot) -> PlanRequest:
     """Return what the command asks of a plan."""
     from planner.planning.request import PlanRequest
@@ -130,6 +150,7 @@ def request_of(arguments: Namespace, robot: Robot) -> PlanRequest:
         minimum_dwell=arguments.minimum_dwell,
         minimum_seconds=arguments.minimum_seconds,
         tolerance=length_of(arguments, "tolerance", robot),
+        camera=camera_of(arguments, robot),
         **of_paths,
     )
 

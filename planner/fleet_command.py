@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 FLEET = (
     argument("fleet", help="TOML with a table [[member]] for each robot: robot, and path, goal, places or region"),
     argument("--apart", help="least distance between bodies, such as 10cm (default: apart of the file)"),
-    argument("--feedback", action="store_true", help="the poses will be measured every 20 flips"),
+    argument("--feedback", action="store_true", help="the poses will be measured for a tracker"),
     out("folder"),
 )
 

@@ -85,7 +85,7 @@ def replan_from(plan: Plan | Trip, track: pd.DataFrame) -> Rest | GoalPlan:
         passed += int(np.hypot(*(q[passed:] - np.array(via)).T).argmin())
         left += [via] if passed > place else []
     x, y, heading = poses[-1].tolist()
-    request = PlanRequest(objective=plan.objective, minimum_dwell=plan.minimum_dwell)
+    request = PlanRequest(objective=plan.objective, minimum_dwell=plan.minimum_dwell, camera=plan.camera)
     feedback = not trip.free_space.empty and trip.margin < plan.stated_error
     start = x, y, math.remainder(heading, math.tau)
     return make_goal_plan(start, trip.goal, plan.tracked, request, trip.free_space, via=left, feedback=feedback)

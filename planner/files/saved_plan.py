@@ -23,6 +23,7 @@ from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D, arc_length
 from planner.paths.tractrix import Reference, reference_along
 from planner.planning.arrival import Arrival
+from planner.planning.camera import Camera
 from planner.planning.declared_path import Declared
 from planner.planning.errors import PlanErrors
 from planner.planning.kept_clear import Detour, KeptClear
@@ -180,6 +181,8 @@ def _plan(content: Mapping[str, Any], tracked: TrackedVehicle) -> Plan:
         arrival, swing = Arrival.from_dict(content["arrival"], tracked.robot)
         declared = replace(declared, swing=swing)
     plan = Plan(tracked, objective, drawn, declared, straight, guidance, switches, errors, kept_clear, arrival)
+    if "camera" in content:
+        plan = replace(plan, camera=Camera.from_dict(content["camera"]))
     if "lap" in content:
         plan = replace(plan, lap=Lap.from_dict(content["lap"]))
     said = tuple(str(warning) for warning in content["warnings"] if warning not in plan.warnings)
@@ -239,7 +242,6 @@ def _errors(
         declared=path,
         drawn=drawn,
         stated=float(content["stated_error_over_l"]),
-        feedback=float(content["feedback_error_over_l"]),
         guaranteed=None if guaranteed is None else float(guaranteed),
         closure=None if closure is None else float(closure),
         table_share=float(content.get("table_share", 1.0)),

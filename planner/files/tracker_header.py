@@ -17,7 +17,7 @@ import numpy as np
 
 from planner.goal.dubins import ROUNDING
 from planner.paths.path import arc_length
-from planner.planning import line_of_sight
+from planner.planning import feedback_error, line_of_sight
 from planner.planning.lap import turning
 from planner.planning.planned import Plan
 from planner.tracking import clock, displacement, guidance, kalman_filter, tracker, way_back
@@ -145,7 +145,7 @@ def _macros() -> str:
         "FIRST_DIRECTION": _PLAN, "STATES": kalman_filter.STATES, "POINTS": _PLAN, "LAP": _PLAN,
         "TIMES": _PLAN, "KNOTS": len(BEFORE_KNOTS),
         "HALVINGS": line_of_sight.HALVINGS, "MOST_LOOKS": line_of_sight.MOST_LOOKS,
-        "KEPT": tracker.KEPT, "LOST": tracker.LOST, "WINDOW": tracker.WINDOW,
+        "KEPT": feedback_error.KEPT, "LOST": tracker.LOST, "WINDOW": tracker.WINDOW,
         "SEGMENTS": way_back.SEGMENTS, "STRIDE": _PLAN,
         "AGREED": displacement.AGREED, "FLIPS": displacement.FLIPS, "CONFIRMED": clock.CONFIRMED,
     }  # fmt: skip
@@ -164,10 +164,10 @@ def _macros() -> str:
         "GATE": tracker.GATE,
         "ALARM_AT": tracker.ALARM_AT,
         "SPREADS": tracker.SPREADS,
-        "WITHIN_NORMAL": tracker.WITHIN[0],
-        "WITHIN_UNIFORM": tracker.WITHIN[1],
-        "BELOW_NORMAL": tracker.BELOW[0],
-        "BELOW_UNIFORM": tracker.BELOW[1],
+        "WITHIN_NORMAL": feedback_error.WITHIN[0],
+        "WITHIN_UNIFORM": feedback_error.WITHIN[1],
+        "BELOW_NORMAL": feedback_error.BELOW[0],
+        "BELOW_UNIFORM": feedback_error.BELOW[1],
         **dict.fromkeys(("PIVOT_DISTANCE", "WAY_AHEAD", "LIMIT"), _PLAN),
         "AWAY": guidance.AWAY,
         "STRAIGHT": guidance.STRAIGHT,

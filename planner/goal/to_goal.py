@@ -29,6 +29,7 @@ from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift, Reference, slips, slips_at_heading
 from planner.paths.units import LONGEST, in_lab, time_in_lab
+from planner.planning.camera import DOCUMENTED, Camera
 from planner.planning.declared_path import Declared
 from planner.planning.errors import plan_errors
 from planner.planning.plan import choose_guidance, zigzag_drift
@@ -71,6 +72,7 @@ def to_goal(
     arrive_seconds: float | None = None,
     knowledge: CalibrationKnowledge | None = None,
     seed: int = 0,
+    camera: Camera = DOCUMENTED,
 ) -> GoalPlan:
     """Plan the motor's switching times from one pose to another.
 
@@ -86,11 +88,12 @@ def to_goal(
         minimum_dwell: shortest time between flips [μ0 l⁴/EI] that the motor allows.
         minimum_seconds: the same in seconds; the larger one counts.
         tolerance: largest acceptable stated error [l].
-        feedback: the robot's pose will be measured every 20 flips (`planner.tracking.tracker`), so the margin
+        feedback: the robot's pose will be measured (`planner.tracking.tracker`), so the margin
             around obstacles is the stated error with feedback.
         arrive_seconds: the time from start to goal; see `planner.goal.arrive`. Default: as the objective says.
         knowledge: what a calibration found besides the robot: covariance, current.
         seed: of the random robots from which the stated error is computed.
+        camera: of the stated error with feedback.
 
     Raises:
         NoWayError: there is no way to the goal; it is an `InputError`.
@@ -108,6 +111,7 @@ def to_goal(
         minimum_seconds=minimum_seconds,
         tolerance=tolerance,
         seed=seed,
+        camera=camera,
     )
     tracked = tracked_vehicle(robot, lookup, "head_centre", knowledge)
     space = FreeSpace.of(keep_out, walls)
@@ -266,7 +270,10 @@ class _Task:
         drawn = Path2D(reference.p, False)
         # The guaranteed bound is for paths that turn less than the robot can; these arcs turn as much as it can.
         errors = plan_errors(tracked, drawn, declared, switches, guaranteed=None, seed=self.request.seed)
-        plan = Plan(tracked, self.request.objective, drawn, declared, straight, guidance, switches, errors)
+        plan = Plan(
+            tracked, self.request.objective, drawn, declared, straight, guidance, switches, errors,
+            camera=self.request.camera,
+        )  # fmt: skip
         x, y, heading = switches.poses[-1].tolist()
         clearance = math.inf
         if not self.free_space.empty:

@@ -36,7 +36,7 @@ def plan_arrival(
         request: corners, dwells, tolerance.
         seconds: from the start to the end.
         space: what the robot's body must keep clear of.
-        feedback: the pose will be measured every 20 flips, so the margin is the stated error with feedback.
+        feedback: the pose will be measured for a tracker, so the margin is the stated error with feedback.
         progress: called now and then with the share of the path that is done.
 
     Raises:

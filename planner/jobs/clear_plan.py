@@ -53,7 +53,7 @@ def plan_clear(
         tracked: the vehicle and its tracked point.
         request: corners, dwells, tolerance.
         space: what the robot's body must keep clear of.
-        feedback: the pose will be measured every 20 flips, so the margin is the stated error with feedback.
+        feedback: the pose will be measured for a tracker, so the margin is the stated error with feedback.
         progress: called now and then with the share of the path that is done.
 
     Raises:

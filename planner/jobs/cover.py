@@ -75,7 +75,7 @@ def cover(
         request: dwells, tolerance.
         space: what the robot's body must keep clear of.
         angle: direction of the lanes; default: the quickest one.
-        feedback: the pose will be measured every 20 flips. It counts for the margin around obstacles, and for the
+        feedback: the pose will be measured for a tracker. It counts for the margin around obstacles, and for the
             share that is covered within the stated error.
         progress: called now and then with the share of the path that is done.
 

@@ -39,7 +39,6 @@ from planner.vehicle.zigzag import zigzag
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
-MEASURED = 0.01  # l; what poses with errors of 0.01 l and 0.01 rad add to the error with feedback
 _PLACES = 300  # along the path
 _DRAWS = 400
 _SPACING = 0.05  # l, of the points of a tractrix
@@ -74,7 +73,7 @@ def error_with_feedback(plan: Plan) -> tuple[Floats, Floats]:
         for shifted in (arcs + lag, arcs - lag):
             along = np.maximum(along, np.hypot(*(_interpolated(shifted, declared.arc, p) - here).T))
     beyond = max(0.0, max(map(abs, levers)) - tracked.rod)
-    across = plan.predicted_max + plan.feedback_error + MEASURED + plan.straight.swing * beyond
+    across = plan.predicted_max + plan.feedback_error + plan.straight.swing * beyond
     return times_at(plan, arcs), np.hypot(WOBBLE + along, across)
 
 

@@ -82,7 +82,7 @@ def fleet(
     Args:
         members: the robots with their plans; where possible, later ones give way to earlier ones.
         apart: least distance between bodies [m].
-        feedback: poses will be measured every 20 flips, so the errors in place are those with feedback.
+        feedback: poses will be measured for a tracker, so the errors in place are those with feedback.
         progress: called now and then with the share of what is done.
 
     Raises:

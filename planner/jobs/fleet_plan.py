@@ -51,7 +51,7 @@ class FleetPlan:
     scheduled: tuple[Scheduled, ...]  # their motions in time
     order: tuple[int, ...]  # indices of the robots: each gives way only to some of those before it
     apart_m: float  # as asked for
-    feedback: bool  # poses are measured every 20 flips
+    feedback: bool  # poses are measured for a tracker
 
     @property
     def plans(self) -> tuple[Plan, ...]:

@@ -51,7 +51,7 @@ def hold(
         request: dwells, tolerance.
         seconds: for so long; None: until told otherwise.
         space: what the robot's body must keep clear of.
-        feedback: the pose will be measured every 20 flips, so the margin is the stated error with feedback.
+        feedback: the pose will be measured for a tracker, so the margin is the stated error with feedback.
         progress: called now and then with the share of the path that is done.
 
     Raises:

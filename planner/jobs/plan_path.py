@@ -33,7 +33,7 @@ def plan_path(
         space: what the robot's body must keep clear of.
         arrive_seconds: the time from start to end, or of a lap; None: as the objective says.
         loop: the schedule repeats.
-        feedback: the pose will be measured every 20 flips, so the margin is the stated error with feedback.
+        feedback: the pose will be measured for a tracker, so the margin is the stated error with feedback.
         progress: called now and then with the share of the path that is done.
 
     Raises:

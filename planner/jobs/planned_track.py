@@ -48,7 +48,7 @@ def plan_track(
         space: what the robot's body must keep clear of.
         track: the pivot's track with a drift.
         drift: that with the dwell that the objective prefers.
-        feedback: the pose will be measured every 20 flips.
+        feedback: the pose will be measured for a tracker.
         progress: called now and then with the share of the path that is done.
 
     Raises:

@@ -49,7 +49,7 @@ class TimedMotion:
     """A plan in time, from the start of its motor."""
 
     plan: Plan  # in l and μ0 l⁴/EI
-    feedback: bool  # the pose is measured every 20 flips
+    feedback: bool  # the pose is measured for a tracker
 
     @property
     def duration(self) -> float:

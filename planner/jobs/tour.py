@@ -65,7 +65,7 @@ def tour(
         space: what the robot's body must keep clear of.
         any_start: begin at any place, not at the first one.
         back: return to the first one at the end.
-        feedback: the pose will be measured every 20 flips, so the margin is the stated error with feedback.
+        feedback: the pose will be measured for a tracker, so the margin is the stated error with feedback.
         progress: called now and then with the share of the path that is done.
 
     Raises:

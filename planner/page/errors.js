@@ -4,29 +4,30 @@
 import { largest, sum } from "./arrays.js";
 import { distanceTo } from "./distance.js";
 import { errorGrowth } from "./error_growth.js";
+import { feedbackError } from "./feedback_error.js";
 import { polyline } from "./path.js";
 import { rollOut } from "./rollout.js";
 import { flipsBetween, largestDistance, predictedError, rmsInTime, statedError } from "./stated_error.js";
+import { zigzagSpeed } from "./zigzag.js";
 
-const FEEDBACK_EVERY = 20; // flips
 
 /* Compute the errors of a schedule: {track, stated, feedback, guaranteed, closure, predictedRms, predictedMax,
  * drawnRms, drawnMax, tableShare}. plan_errors
  *
  * tracked: see tracked_point.js. drawn: the path as drawn. declared: see declared_path.js. switches: the schedule.
- * guaranteed: bound on the error without uncertainty. seed: of the random robots. */
-function planErrors(tracked, drawn, declared, switches, guaranteed, seed) {
+ * guaranteed: bound on the error without uncertainty. seed: of the random robots.
+ * straight: straight motion with the shortest dwell, see zigzag.js. */
+function planErrors(tracked, drawn, declared, switches, guaranteed, seed, straight) {
   const { vehicle, offset } = tracked, path = declared.reference.p, { dwells } = switches, count = dwells.length;
   const rollout = rollOut(vehicle, switches, offset), { track } = rollout;
   const predicted = predictedError(path, track, drawn.closed), fromDrawn = distanceTo(polyline(drawn), track);
-  const flips = [...new Set([...flipsBetween(count), ...flipsBetween(count, FEEDBACK_EVERY)])];
-  const growth = errorGrowth(vehicle, switches, rollout, flips.sort((one, other) => one - other));
-  const stated = statedError(growth, predicted, 0, seed);
+  const growth = errorGrowth(vehicle, switches, rollout, flipsBetween(count));
+  const stated = statedError(growth, predicted, seed), { timeScale } = tracked.robot;
   const [endX, endY] = track[track.length - 1], [startX, startY] = path[0];
   return {
     track,
     stated,
-    feedback: Math.min(stated, statedError(growth, predicted, FEEDBACK_EVERY, seed)), // feedback may be left out
+    feedback: feedbackError(predicted.distance, dwells, zigzagSpeed(straight), timeScale, stated),
     guaranteed,
     closure: drawn.closed ? Math.hypot(endX - startX, endY - startY) : null,
     predictedRms: rmsInTime(predicted.distance, dwells),
@@ -44,4 +45,4 @@ function tableShare(vehicle, growth) {
   return sum(ofTable) / Math.max(sum(squares), 1e-300);
 }
 
-export { FEEDBACK_EVERY, planErrors };
+export { planErrors };

@@ -49,7 +49,7 @@ function makePlan(drawn, tracked, request, progress = null) {
     const guidance = chooseGuidance(vehicle, declared, straight, dwell);
     const switches = follow(declared.reference, vehicle, guidance, tracked.offset, { progress });
     const bound = guaranteedError(vehicle, rodOf(tracked), straight.swing, guidance.ahead);
-    const errors = planErrors(tracked, drawn, declared, switches, bound, seed);
+    const errors = planErrors(tracked, drawn, declared, switches, bound, seed, straight);
     return { tracked, objective, drawn, declared, straight, guidance, switches, errors };
   };
   if (given === null && objective === "time") {
@@ -68,11 +68,11 @@ function makePlan(drawn, tracked, request, progress = null) {
 
 /* The stated error if the coefficients are those of another robot; null: calibrated, or not known.
  * Plan.unmeasured_error */
-function unmeasuredError({ tracked, drawn, declared, switches }) {
+function unmeasuredError({ tracked, drawn, declared, switches, straight }) {
   const { vehicle, unmeasured } = tracked;
   if (!unmeasured.length) return null;
   const guessed = { ...tracked, vehicle: { ...vehicle, modes: [...vehicle.modes, ...unmeasured] } };
-  return planErrors(guessed, drawn, declared, switches, null, 0).stated;
+  return planErrors(guessed, drawn, declared, switches, null, 0, straight).stated;
 }
 
 /* The dwell with which a declared path takes the least time; straight motion is the fastest with `fastest`.

@@ -4,6 +4,7 @@
  * switches, errors}; tracked is {robot, vehicle, point, offset, model, ownTable, warnings}. Lengths in l, times in
  * μ0 l⁴/EI, unless a name says its unit. */
 import { runningSum, sum } from "./arrays.js";
+import { CAMERA } from "./feedback_error.js";
 import { fixed, repr } from "./format.js";
 import { polyline } from "./path.js";
 import { groupValues } from "./robot.js";
@@ -12,7 +13,6 @@ import { inLab, timeInLab } from "./units.js";
 import { turnRadius, yawRate } from "./vehicle.js";
 
 const FORMAT = 2;
-const FEEDBACK_EVERY = 20; // flips
 const WIDE = 0.25; // turn radii; a predicted track that is further from the declared path gets a warning
 const OWN_TABLE_FROM = 1.7; // stated error over predicted error, from which a table of its own is proposed
 const DEGREES = 180 / Math.PI;
@@ -113,7 +113,7 @@ function planContent(plan) {
     stated_error_unmeasured_over_l: plan.unmeasured,
     table_share: errors.tableShare,
     feedback_error_over_l: errors.feedback,
-    feedback_every: new Whole(FEEDBACK_EVERY),
+    camera: CAMERA,
     predicted_rms_over_l: errors.predictedRms,
     predicted_max_over_l: errors.predictedMax,
     drawn_rms_over_l: errors.drawnRms,

@@ -58,24 +58,19 @@ function predictedError(declared, track, closed) {
   return { distance, signed, normal, closed };
 }
 
-/* Choose the flips of a schedule of `count` dwells between which deviations are drawn; every: flips between
- * measured poses, 0: none is measured. flips_between */
-function flipsBetween(count, every = 0) {
-  const steps = Math.max(every, Math.floor(count / BLOCKS));
-  const flips = every
-    ? [...Array.from({ length: Math.ceil(count / steps) }, (_, i) => i * steps), count]
-    : Array.from(linspace(0, count, Math.min(count, BLOCKS) + 1), Math.trunc);
-  return [...new Set(flips)].sort((one, other) => one - other);
+/* Choose the flips of a schedule of `count` dwells between which deviations are drawn. flips_between */
+function flipsBetween(count) {
+  return [...new Set(Array.from(linspace(0, count, Math.min(count, BLOCKS) + 1), Math.trunc))];
 }
 
 /* The quantile LEVEL of the largest distance from the declared path over random vehicles. stated_error
  *
- * growth: at all flips of `flipsBetween` at least. every: see there. seed: of the draws. */
-function statedError(growth, predicted, every = 0, seed = 0) {
-  const count = growth.flips[growth.flips.length - 1], some = growthAt(growth, flipsBetween(count, every));
+ * growth: at all flips of `flipsBetween` at least. seed: of the draws. */
+function statedError(growth, predicted, seed = 0) {
+  const count = growth.flips[growth.flips.length - 1], some = growthAt(growth, flipsBetween(count));
   const blocks = extremes(predicted, some.flips, (predicted.distance.length - 1) / count);
   const modes = some.modes.length, z = normals(seed, 0, DRAWS * modes), worst = new Float64Array(DRAWS);
-  const added = every ? addedFromMeasured(some, every) : addedFromStart(some);
+  const added = addedFromStart(some);
   const { normal } = blocks, last = blocks.low.length - 1, forward = [normal[2 * last + 1], -normal[2 * last]];
   const across = alongDirections(added, normal);
   const onward = alongDirections(added.map(([x, y]) => [[x[last]], [y[last]]]), forward);
@@ -87,19 +82,9 @@ function statedError(growth, predicted, every = 0, seed = 0) {
   return quantile(worst.sort(), LEVEL) + WOBBLE;
 }
 
-/* How far each mode leads to the end of each block, [x, y], if no pose is measured. */
+/* How far each mode leads to the end of each block, [x, y]. */
 function addedFromStart({ modes }) {
   return modes.map(({ x, y }) => [x.slice(1), y.slice(1)]);
-}
-
-/* The same, if each block starts from a known pose. */
-function addedFromMeasured({ modes, flips, position }, every) {
-  const steps = position.slice(1).map(([x, y], i) => [x - position[i][0], y - position[i][1]]);
-  const shares = steps.map((_, i) => Math.min(Math.max(every / (flips[i + 1] - flips[i]), 0), 1));
-  return modes.map(({ x, y, turned }) => [
-    steps.map(([, dy], i) => (x[i + 1] - x[i] + turned[i] * dy) * shares[i]),
-    steps.map(([dx], i) => (y[i + 1] - y[i] - turned[i] * dx) * shares[i]),
-  ]);
 }
 
 /* What modes [x, y] add in each block along a direction, x and y in turn; block by block in one column. */

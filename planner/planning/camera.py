@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -46,6 +48,17 @@ class Camera:
             if not all(low < value < high for value in values):
                 raise InputError(f"camera: {name} is {getattr(self, name)}; give {allowed}")
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return what the stated error depends on, for plan.json."""
+        return {"noise": list(self.noise), "every_s": self.every_s, "delay_s": self.delay_s, "lost": self.lost}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Camera:
+        """Read what `to_dict` has written."""
+        place, heading = (float(value) for value in content["noise"])
+        every_s, delay_s, lost = (float(content[name]) for name in ("every_s", "delay_s", "lost"))
+        return cls((place, heading), every_s, delay_s, lost)
+
     def sees(self, pose: POSE, time: float, rng: np.random.Generator) -> POSE | None:
         """Return what is measured of a robot at `pose` at a time; None where the pose gets lost."""
         if rng.random() < self.lost:
@@ -56,3 +69,6 @@ class Camera:
             noise = rng.normal(size=3) * [self.noise[0], self.noise[0], self.noise[1]]
             x, y, heading = (planar.compose(np.array(pose), np.array(self.marker)) + noise).tolist()
         return x, y, math.remainder(heading, 2 * math.pi)
+
+
+DOCUMENTED = Camera()  # the camera of the stated error with feedback, unless another one is given

@@ -17,8 +17,6 @@ from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
 
-FEEDBACK_EVERY = 20  # flips
-
 
 @dataclass(frozen=True)
 class PlanErrors:
@@ -30,7 +28,6 @@ class PlanErrors:
     declared: Floats  # (m, 2), the declared path
     drawn: Path2D  # the path as drawn
     stated: float  # holds for 95 % of the robots that the model's uncertainty allows, open loop
-    feedback: float  # the same where the pose is measured, and the rest planned again, every 20 flips
     guaranteed: float | None  # bound for a robot without errors, however long the path; None: not known
     closure: float | None  # from the end of the track to the beginning of a closed path
     table_share: float = 1.0  # of the look-up table in the variance of the deviations
@@ -84,18 +81,14 @@ def plan_errors(
     path, count = declared.reference.p, len(switches.dwells)
     rollout = roll_out(tracked.vehicle, switches, tracked.offset)
     predicted = predicted_error(path, rollout.track, closed=drawn.closed)
-    flips = np.union1d(flips_between(count), flips_between(count, FEEDBACK_EVERY))
-    growth = error_growth(tracked.vehicle, switches, rollout, flips)
-    stated = stated_error(growth, predicted, seed=seed)
-    feedback = stated_error(growth, predicted, every=FEEDBACK_EVERY, seed=seed)
+    growth = error_growth(tracked.vehicle, switches, rollout, flips_between(count))
     return PlanErrors(
         track=rollout.track,
         distance=predicted.distance,
         dwells=switches.dwells,
         declared=path,
         drawn=drawn,
-        stated=stated,
-        feedback=min(feedback, stated),  # a measured robot may keep to the schedule
+        stated=stated_error(growth, predicted, seed=seed),
         guaranteed=guaranteed,
         closure=float(np.linalg.norm(rollout.track[-1] - path[0])) if drawn.closed else None,
         table_share=_table_share(tracked.vehicle, growth),

@@ -124,7 +124,8 @@ def make_plan(
             switches = follow(declared.reference, vehicle, guidance, tracked.offset, progress=progress)
             bound = guaranteed(vehicle, tracked.rod, straight.swing, guidance.ahead)
             errors = plan_errors(tracked, drawn, declared, switches, guaranteed=bound, seed=request.seed)
-            return Plan(tracked, request.objective, drawn, declared, straight, guidance, switches, errors)
+            parts = (tracked, request.objective, drawn, declared, straight, guidance, switches, errors)
+            return Plan(*parts, camera=request.camera)
 
         if redirect is not None:
             return redirect(partial(declared_path, drift), drift, follow_declared)

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from planner.paths.path import Path2D
 from planner.paths.units import heading_in_degrees, in_lab, time_in_lab
 from planner.planning.arrival import Arrival
+from planner.planning.camera import DOCUMENTED, Camera
 from planner.planning.declared_path import Declared
-from planner.planning.errors import FEEDBACK_EVERY, PlanErrors, plan_errors
+from planner.planning.errors import PlanErrors, plan_errors
+from planner.planning.feedback_error import feedback_error
 from planner.planning.kept_clear import KeptClear
 from planner.planning.lap import Lap
 from planner.planning.line_of_sight import Guidance
@@ -84,6 +86,7 @@ class Plan:
     kept_clear: KeptClear | None = None  # walls and regions that it avoids; None: there are none
     arrival: Arrival | None = None  # the duration that was asked for; None: any
     lap: Lap | None = None  # of a schedule that repeats; None: it is carried out once
+    camera: Camera = DOCUMENTED  # whose poses a tracker gets
 
     @property
     def robot(self) -> Robot:
@@ -156,10 +159,11 @@ class Plan:
         """Distance that 95 % of the robots that the model's uncertainty allows keep to, open loop."""
         return self.errors.stated
 
-    @property
+    @cached_property
     def feedback_error(self) -> float:
-        """The stated error where the pose is measured, and the rest planned again, every 20 flips."""
-        return self.errors.feedback
+        """Distance within which a tracker keeps 95 % of the robots in 95 % of the time."""
+        speed, scale = self.straight.net_speed, self.robot.time_scale
+        return feedback_error(self.errors.distance, self.dwells, speed, scale, self.camera, self.stated_error)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -357,8 +361,8 @@ class Plan:
             "stated_error_over_l": self.errors.stated,
             "stated_error_unmeasured_over_l": self.unmeasured_error,
             "table_share": self.errors.table_share,
-            "feedback_error_over_l": self.errors.feedback,
-            "feedback_every": FEEDBACK_EVERY,
+            "feedback_error_over_l": self.feedback_error,
+            "camera": self.camera.to_dict(),
             "predicted_rms_over_l": self.errors.predicted_rms,
             "predicted_max_over_l": self.errors.predicted_max,
             "drawn_rms_over_l": self.errors.drawn_rms,

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal, TypedDict
 
+from planner.planning.camera import DOCUMENTED, Camera
 from planner.vehicle.dwell_choice import QUICK, Objective
 from planner.vehicle.tracked_point import Point
 from sim.io.errors import InputError
@@ -27,6 +28,7 @@ class PlanRequest:
     dwell: float | None = None
     tolerance: float | None = None
     seed: int = 0
+    camera: Camera = DOCUMENTED
 
     def __post_init__(self) -> None:
         if self.tolerance is not None and not (math.isfinite(self.tolerance) and self.tolerance > 0):
@@ -54,3 +56,4 @@ class RequestOptions(TypedDict, total=False):
     dwell: float | None
     tolerance: float | None
     seed: int
+    camera: Camera

@@ -5,8 +5,6 @@ path when they carry out the schedule open-loop. Uncertain are the modes of the 
 look-up table, covariance of a calibration, current) and the phase of the disc at the first flip. Deviations are of
 first order in all of them (`planner.planning.error_growth`). The motion within a revolution of the disc is added.
 
-*With feedback*: the same, if every k flips the pose is measured and the remaining path is planned again.
-
 *Guaranteed error*: a bound for a vehicle without errors on a path of any length. With the swing β of the
 heading (Ω T without lags) and the look-ahead Δ ≥ R′/(1 − κ̄ R′), R′ = R cos θ, and κ̄ the largest curvature of
 the reference,
@@ -25,7 +23,7 @@ import numpy as np
 
 from planner.draws import normals
 from planner.paths.distance import nearest
-from planner.planning.error_growth import ErrorGrowth, left
+from planner.planning.error_growth import ErrorGrowth
 from planner.vehicle.vehicle import SHORTEST, STEP, Vehicle
 from planner.vehicle.zigzag import Zigzag
 from sim.arrays import Floats, Integers
@@ -82,37 +80,24 @@ def predicted_error(declared: Floats, track: Floats, *, closed: bool) -> Predict
     return Predicted(distance, signed, normal, closed)
 
 
-def flips_between(count: int, every: int = 0) -> Integers:
-    """Choose the flips of a schedule of `count` dwells between which deviations are drawn, at most _BLOCKS or so.
-
-    Args:
-        count: number of dwells.
-        every: number of flips between measured poses; 0: none is measured.
-    """
-    if every:
-        return np.unique(np.append(np.arange(0, count, max(every, count // _BLOCKS)), count))
+def flips_between(count: int) -> Integers:
+    """Choose the flips of a schedule of `count` dwells between which deviations are drawn, some _BLOCKS."""
     return np.unique(np.linspace(0, count, min(count, _BLOCKS) + 1).astype(int))
 
 
-def stated_error(growth: ErrorGrowth, predicted: Predicted, *, every: int = 0, seed: int = 0) -> float:
+def stated_error(growth: ErrorGrowth, predicted: Predicted, *, seed: int = 0) -> float:
     """Compute the quantile LEVEL of the largest distance from the declared path [l], over random vehicles.
 
     Args:
         growth: of the errors, at all flips of `flips_between` at least.
         predicted: distances of the predicted track from the path.
-        every: number of flips between measured poses; 0: none is measured.
         seed: of the random draws, see `planner.draws`.
     """
     count = int(growth.flips[-1])
-    growth = growth.at(flips_between(count, every))
+    growth = growth.at(flips_between(count))
     edges = growth.flips
     low, high, normal = _extremes(predicted, edges, (len(predicted.distance) - 1) // count)
-    if every:  # each window starts from a known pose
-        tilt = growth.turned[:-1, :, None] * left(np.diff(growth.position, axis=0))[:, None]
-        share = np.maximum(every / np.diff(edges), 0.0).clip(max=1.0)
-        moved = _sums(_draws(growth, seed), np.diff(growth.deviation, axis=0) - tilt) * share[:, None]
-    else:
-        moved, _ = deviations_open_loop(growth, seed)
+    moved, _ = deviations_open_loop(growth, seed)
     across = np.einsum("dki,ki->dk", moved, normal)
     worst = np.maximum(np.abs(high + across), np.abs(low + across))
     if not predicted.closed:  # past the end of an open path

@@ -201,7 +201,10 @@ def _planned(plan: Plan, path: Reference, pose: POSE, way: int, join: int) -> Pl
     start = Start(pose, -1 if turned > 0 else 1)
     switches = follow(path, tracked.vehicle, plan.guidance, tracked.offset, start=start)
     errors = plan_errors(tracked, drawn, declared, switches, guaranteed=None, seed=0)
-    rest = Plan(tracked, plan.objective, drawn, declared, plan.straight, plan.guidance, switches, errors)
+    rest = Plan(
+        tracked, plan.objective, drawn, declared, plan.straight, plan.guidance, switches, errors,
+        camera=plan.camera,
+    )  # fmt: skip
     if plan.kept_clear is None:
         return rest
     body, kept = Footprint.of(tracked.robot, 0.0), plan.kept_clear

@@ -30,6 +30,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planner.paths.units import heading_in_degrees, in_lab
+from planner.planning.feedback_error import KEPT, bound
 from planner.planning.planned import Plan
 from planner.tracking.clock import SLACK, Clock
 from planner.tracking.displacement import Displacement
@@ -47,11 +48,8 @@ FALSE_ALARM = 1e-3  # probability of an alarm per WINDOW poses, for a robot of t
 WINDOW = 40
 ALARM_AT = 173.6174364561601  # quantile 1 − FALSE_ALARM of χ² with 3 × WINDOW degrees of freedom
 GATE = 21.107513466160444  # quantile 0.9999 of χ² with 3 degrees of freedom
-KEPT = 12  # dwells that are remembered for late poses
 LOST = 10  # consecutive rejected poses after which there is an alarm
 SPREADS = 0.5  # of the filter's standard deviation, which allows for changes; by `benchmarks tracker_bound`
-WITHIN = (1.96, 1.645)  # standard deviations on both sides that hold 95 % of a normal and of a uniform variable
-BELOW = (1.645, 1.559)  # the same for the upper side alone
 
 
 class Command(NamedTuple):
@@ -301,17 +299,3 @@ class Tracker:
         if self._scored == WINDOW:
             self.alarm = self._score > ALARM_AT
             self._score, self._scored = 0.0, 0
-
-
-def bound(first: float, last: float, spread: float) -> float:
-    """Bound in 95 % of all cases what is uniform between two values, with a normal error of deviation `spread`.
-
-    The quantile of the sum lies between those of its parts: it goes with the cube of the uniform part of the
-    variance, within 0.013 standard deviations. Far from zero only one side counts.
-    """
-    middle, uniform = abs(first + last) / 2, (first - last) * (first - last) / 12
-    variance = uniform + spread * spread
-    share, deviation = uniform / max(variance, 1e-30), math.sqrt(variance)
-    share *= share * share
-    within, below = ((normal + share * (even - normal)) * deviation for normal, even in (WITHIN, BELOW))
-    return max(within, middle + below)

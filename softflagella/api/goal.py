@@ -11,6 +11,7 @@ from planner.goal.goal_plan import GoalPlan
 from planner.goal.to_goal import to_goal as plan_to_goal
 from planner.paths.obstacles import Circle, Polygon
 from planner.paths.path import Path2D
+from planner.planning.camera import Camera
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.dwell_choice import Objective
 from sim.io.keywords import checks_keywords
@@ -32,6 +33,7 @@ class GoalOptions(TypedDict, total=False):
     feedback: bool
     arrive_seconds: float | None
     seed: int
+    camera: Camera
 
 
 @checks_keywords()
@@ -64,11 +66,12 @@ def to_goal(
             - minimum_dwell: shortest time between flips [μ0 l⁴/EI] that the motor allows.
             - minimum_seconds: the same in seconds; the larger one counts.
             - tolerance: largest acceptable stated error [l].
-            - feedback: the robot's pose will be measured every 20 flips (`Tracker`), so the margin around
+            - feedback: the robot's pose will be measured (`Tracker`), so the margin around
               obstacles is the stated error with feedback.
             - arrive_seconds: the time from start to goal. Dwells are changed, or swings and waiting circles are
               added, until the plan takes this time.
             - seed: of the random robots from which the stated error is computed.
+            - camera: of the stated error with feedback, see `Camera`.
 
     Raises:
         NoWayError: there is no way to the goal; it is an `InputError`.

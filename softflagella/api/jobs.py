@@ -57,13 +57,13 @@ def tour(
         any_start: begin at any of the places.
         keep_out: circles, and polygons as (n, 2) corners [l], that the robot's body must not touch.
         walls: a polygon (n, 2) that it must not leave.
-        feedback: the pose will be measured every 20 flips, so the margin around obstacles is the stated error with
+        feedback: the pose will be measured for a tracker, so the margin around obstacles is the stated error with
             feedback.
         lookup: trained table, or the table of this one robot; see `plan`.
         own_table: simulate the robot's own table in any case.
         knowledge: what a calibration found besides the robot: covariance, current. Default: that of the file.
         progress: called now and then with the share of the path that is done.
-        options: point, objective, minimum_dwell, minimum_seconds, dwell, tolerance and seed of `plan`.
+        options: point, objective, minimum_dwell, minimum_seconds, dwell, tolerance, seed and camera of `plan`.
 
     Raises:
         InputError: a place is no pair of finite numbers, is there twice, or cannot be visited.
@@ -107,12 +107,12 @@ def cover(
         angle: direction of the lanes [rad]; default: the quickest one.
         keep_out: regions that the robot's body must not touch; they are holes, too.
         walls: a polygon (n, 2) that it must not leave.
-        feedback: the pose will be measured every 20 flips.
+        feedback: the pose will be measured for a tracker.
         lookup: trained table, or the table of this one robot; see `plan`.
         own_table: simulate the robot's own table in any case.
         knowledge: what a calibration found besides the robot: covariance, current. Default: that of the file.
         progress: called now and then with the share of the path that is done.
-        options: point, objective, minimum_dwell, minimum_seconds, dwell, tolerance and seed of `plan`.
+        options: point, objective, minimum_dwell, minimum_seconds, dwell, tolerance, seed and camera of `plan`.
 
     Raises:
         InputError: the region is empty or needs too many lanes, or the width is too small for this robot.
@@ -153,13 +153,13 @@ def hold(
         seconds: for so long; default: until told otherwise.
         keep_out: circles, and polygons as (n, 2) corners [l], that the robot's body must not touch.
         walls: a polygon (n, 2) that it must not leave.
-        feedback: the pose will be measured every 20 flips: the margin around obstacles is the stated error with
+        feedback: the pose will be measured for a tracker: the margin around obstacles is the stated error with
             feedback.
         lookup: trained table, or the table of this one robot; see `plan`.
         own_table: simulate the robot's own table in any case.
         knowledge: what a calibration found besides the robot: covariance, current. Default: that of the file.
         progress: called now and then with the share of the path that is done.
-        options: point, objective, minimum_dwell, minimum_seconds, dwell, tolerance and seed of `plan`.
+        options: point, objective, minimum_dwell, minimum_seconds, dwell, tolerance, seed and camera of `plan`.
 
     Raises:
         InputError: the place is no pair of finite numbers, the time is not above 0, or the body has no room.
@@ -197,7 +197,7 @@ def fleet(
             It is kept although both robots are off by their errors in place.
         names: of the robots; default: robot-1, robot-2 and so on.
         delays_s: times before which they do not begin.
-        feedback: the poses will be measured every 20 flips (`Tracker`, with `begin` at the robot's start).
+        feedback: the poses will be measured (`Tracker`, with `begin` at the robot's start).
         progress: called now and then with the share of what is done.
 
     Raises:

@@ -77,7 +77,7 @@ def plan(
         keep_out: circles, and polygons as (n, 2) corners [l], that the robot's body must not touch. Where they
             stand on the path, a way around is chosen; `Plan.kept_clear` has it.
         walls: a polygon (n, 2) that the body must not leave.
-        feedback: the pose will be measured every 20 flips, so the margin around obstacles is the stated error with
+        feedback: the pose will be measured for a tracker, so the margin around obstacles is the stated error with
             feedback.
         arrive_seconds: the time from start to end. Dwells are changed, or swings and waiting circles are added,
             until the plan takes this time; `Plan.arrival` has it. Default: as the objective says.
@@ -98,6 +98,7 @@ def plan(
             - dwell: this shortest dwell, and not the one that the objective would choose.
             - tolerance: largest acceptable stated error [l]; the dwell is shortened until it is kept.
             - seed: of the random robots from which the stated error is computed.
+            - camera: of the stated error with feedback, see `Camera`.
 
     Raises:
         InputError: the path is bad or too tight, the dwell too short, the tolerance too small, there is no way

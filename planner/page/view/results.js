@@ -25,7 +25,7 @@ function showResults(plan, tails) {
     ["Predicted error", `${size(plan.predictedRms)} rms, ${size(plan.predictedMax)} at most`],
     [`Stated error${plan.calibrated ? "" : " if the coefficients are exact"}`, size(plan.stated)],
     ...(plan.unmeasured === null ? [] : [["With coefficients of another robot", size(plan.unmeasured)]]),
-    ["With a camera every 20 flips", size(plan.feedback)],
+    ["With a tracker and a camera", size(plan.feedback)],
     ["Path to follow from the drawn one", `${size(plan.offDrawn)} at most`],
     ["Drawn points from the path to follow", `${size(plan.missed)} at most`],
   ];

@@ -34,7 +34,7 @@ from tests.planner.vehicles import PROMPT
 ROBOT = PRESETS["paper-control"]
 CORNER = [[0.0, 0.0], [3.0, 0.0], [3.0, 3.0]]
 KNOWN = CalibrationKnowledge(("C_t",), np.array([[1e-4]]), current=(2e-4, 1e-4), current_error=(1e-5, 0.0))
-NEW = ("guidance", "own_table", "calibration")  # entries that files from before do not have
+NEW = ("guidance", "own_table", "calibration", "camera")  # entries that files from before do not have
 
 
 def _clear() -> Plan:

@@ -14,6 +14,7 @@ from planner.jobs.fleet_plan import FleetPlan
 from planner.jobs.separation import Places, Scheduled, distances, instants
 from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.path import Path2D
+from planner.planning.camera import DOCUMENTED, Camera
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
@@ -32,13 +33,13 @@ TAIL = CONTROL.tail_length
 APART = 0.3 * TAIL
 
 
-def straight(*points: tuple[float, float]) -> Plan:
-    return plan(np.array(points), CONTROL)
+def straight(*points: tuple[float, float], camera: Camera = DOCUMENTED) -> Plan:
+    return plan(np.array(points), CONTROL, camera=camera)
 
 
-def crossing() -> list[Plan]:
+def crossing(camera: Camera = DOCUMENTED) -> list[Plan]:
     """Return plans of two robots that would meet, each with a way of 3 l."""
-    return [straight((0, 0), (3, 0)), straight((1.0, -1.9), (1.0, 2.2))]
+    return [straight((0, 0), (3, 0), camera=camera), straight((1.0, -1.9), (1.0, 2.2), camera=camera)]
 
 
 def keep_apart(plans: list[Plan], **options: Any) -> FleetPlan:
@@ -203,7 +204,7 @@ def test_they_keep_apart_in_the_simulator(two: FleetPlan) -> None:
 
 
 def test_robots_under_trackers_keep_apart() -> None:
-    result = keep_apart(crossing(), feedback=True)
+    result = keep_apart(crossing(FINE), feedback=True)
     rng = np.random.default_rng(3)
     for _ in range(3):
         tracks = []

@@ -59,9 +59,9 @@ def plan_to_page(result: Plan) -> dict[str, Any]:
         },
         "errors": {
             _camel(name): getattr(errors, name)
-            for name in ("predicted_rms", "predicted_max", "drawn_rms", "drawn_max", "stated", "feedback",
-                         "guaranteed", "closure", "table_share")
-        },
+            for name in ("predicted_rms", "predicted_max", "drawn_rms", "drawn_max", "stated", "guaranteed",
+                         "closure", "table_share")
+        } | {"feedback": result.feedback_error},
     }  # fmt: skip
 
 

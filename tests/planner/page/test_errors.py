@@ -9,7 +9,7 @@ from planner.planning.plan import plan
 from tests.planner.page.page_core import answer, check_near
 from tests.planner.page.robots import random_robots, shipped, vehicle_to_page
 
-NAMES = {"stated": "stated", "feedback": "feedback", "guaranteed": "guaranteed", "closure": "closure",
+NAMES = {"stated": "stated", "guaranteed": "guaranteed", "closure": "closure",
          "predictedRms": "predicted_rms", "predictedMax": "predicted_max", "drawnRms": "drawn_rms",
          "drawnMax": "drawn_max"}  # fmt: skip
 
@@ -19,9 +19,13 @@ def test_errors_of_a_square() -> None:
     switches = made.switches
     page = {"firstDirection": switches.first_direction, "dwells": switches.dwells, "poses": switches.poses}
     tracked = {"vehicle": vehicle_to_page(made.tracked.vehicle), "offset": made.tracked.offset}
+    tracked["robot"] = {"timeScale": made.robot.time_scale}
+    straight = {"speed": made.straight.speed, "drift": made.straight.drift}
     declared = {"reference": {"p": made.declared.reference.p}}
-    found = answer("errors.js", "planErrors", tracked, made.drawn, declared, page, made.errors.guaranteed, 5)
+    bound = made.errors.guaranteed
+    found = answer("errors.js", "planErrors", tracked, made.drawn, declared, page, bound, 5, straight)
     for name, of_python in NAMES.items():
         check_near(found[name], getattr(made.errors, of_python), 1e-9)
+    check_near(found["feedback"], made.feedback_error, 1e-9)
     assert np.shape(found["track"]) == made.errors.track.shape
     check_near(found["track"], made.errors.track, 1e-12)

@@ -18,7 +18,7 @@ from sim.io.errors import InputError
 from sim.model.robot import Robot
 from tests.planner.page.page_core import EXACT, answers, call, without_digits
 from tests.planner.page.robots import random_robots, shipped, shipped_data
-from tests.planner.page.test_plan import ERRORS, planned, planning_call
+from tests.planner.page.test_plan import ERRORS, errors_of, planned, planning_call
 
 COUNT = 200
 AT_ONCE = 10  # plans of one process
@@ -55,12 +55,12 @@ def random_case(seed: int) -> Case:
 
 
 def numbers(result: Plan) -> list[np.ndarray]:
-    errors = np.array([getattr(result.errors, name) for name in ERRORS.values()])
+    errors = np.array(list(errors_of(result).values()))
     return [result.dwells, result.switches.poses.ravel(), result.declared.reference.p.ravel(), errors]
 
 
 def numbers_of_page(found: dict[str, Any]) -> list[np.ndarray]:
-    errors = np.array([found["errors"][name] for name in ERRORS])
+    errors = np.array([found["errors"][name] for name in (*ERRORS, "feedback")])
     parts = [found["switches"]["dwells"], found["switches"]["poses"], found["declared"]["reference"]["p"]]
     return [*(np.asarray(part, dtype=float).ravel() for part in parts), errors]
 

@@ -29,15 +29,14 @@ PATHS = {"circle": circle(2.0), "bend": Path2D.of([[0, 0], [6, 0], [9, 2], [40, 
 
 
 @pytest.mark.parametrize("name", PATHS)
-@pytest.mark.parametrize("every", [0, 20])
-def test_stated_error(name: str, every: int) -> None:
+def test_stated_error(name: str) -> None:
     path, vehicle = PATHS[name], replace(vehicle_of(random_robots(1)[0]), current=np.array([1e-4, -1e-4]))
     followed = reference(path, vehicle.pivot_distance, 0.02)
     ahead = look_ahead(vehicle, float(np.abs(followed.curvature).max()))
     switches = follow(followed, vehicle, plain_guidance(vehicle, 0.8, ahead))
     rollout = roll_out(vehicle, switches, 0.0)
     predicted = predicted_error(followed.p, rollout.track, closed=path.closed)
-    flips = flips_between(len(switches.dwells), every)
+    flips = flips_between(len(switches.dwells))
     page = {"firstDirection": switches.first_direction, "dwells": switches.dwells, "poses": switches.poses}
     car = vehicle_to_page(vehicle)
     rolled = call("rollout.js", "rollOut", car, page, 0.0)
@@ -46,7 +45,7 @@ def test_stated_error(name: str, every: int) -> None:
     found, stated, rms, largest = answers(
         [
             ("stated_error.js", "predictedError", followed.p, rollout.track, path.closed),
-            ("stated_error.js", "statedError", growth, error, every, 3),
+            ("stated_error.js", "statedError", growth, error, 3),
             ("stated_error.js", "rmsInTime", typed(predicted.distance), switches.dwells),
             ("stated_error.js", "largestDistance", error),
         ]
@@ -54,16 +53,15 @@ def test_stated_error(name: str, every: int) -> None:
     for part in ("distance", "signed", "normal"):
         check_near(found[part], getattr(predicted, part), 1e-10)
     growing = error_growth(vehicle, switches, rollout, flips)
-    check_near(stated, stated_error(growing, predicted, every=every, seed=3), 1e-10)
+    check_near(stated, stated_error(growing, predicted, seed=3), 1e-10)
     check_near(rms, rms_in_time(predicted.distance, switches.dwells), 1e-14)
     check_near(largest, predicted.largest, 1e-12)
 
 
-@pytest.mark.parametrize("every", [0, 20])
-def test_flips_between_which_deviations_are_drawn(every: int) -> None:
+def test_flips_between_which_deviations_are_drawn() -> None:
     counts = [1, 2, 19, 20, 21, 299, 300, 301, 640, 9001]
-    found = answers([("stated_error.js", "flipsBetween", count, every) for count in counts])
-    assert found == [flips_between(count, every).tolist() for count in counts]
+    found = answers([("stated_error.js", "flipsBetween", count) for count in counts])
+    assert found == [flips_between(count).tolist() for count in counts]
 
 
 def test_look_ahead_and_bound() -> None:
