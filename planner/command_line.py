@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator
@@ -135,7 +136,8 @@ def camera_of(arguments: Namespace, robot: Robot) -> Camera:
         return Camera()
     place, *numbers = words
     noise = read_length(place, arguments.unit, robot, "--camera", above_zero=True)
-    heading, every_s, delay_s, lost = (number_and_unit(word)[0] for word in numbers)
+    split = map(number_and_unit, numbers)
+    heading, every_s, delay_s, lost = (math.nan if unit else number for number, unit in split)
     return Camera((noise, heading), every_s, delay_s, lost)
 
 

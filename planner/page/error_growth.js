@@ -10,8 +10,7 @@ const UNCHANGED = { twist: [STILL, STILL], current: [0, 0] };
 /* Propagate the modes of a vehicle, and those of its disc's phase, to some flips of a schedule, given by rising
  * numbers from 0 to that of all dwells. error_growth
  *
- * Returns {flips, position, modes}: predicted positions [x, y] at the flips; of each mode {x, y, turned}, columns
- * over the flips. */
+ * Returns {flips, modes}: of each mode {x, y, turned}, columns over the flips. */
 function errorGrowth(vehicle, switches, rollout, flips) {
   const { dwells, firstDirection } = switches, from = firstDirection < 0 ? 1 : 0;
   const sides = Array.from(dwells, (_, i) => (i + from) % 2);
@@ -23,7 +22,6 @@ function errorGrowth(vehicle, switches, rollout, flips) {
   };
   return {
     flips,
-    position: flips.map((flip) => rollout.poses[flip].slice(0, 2)),
     modes: [
       ...vehicle.modes.map((mode) => modeGrowth(vehicle, mode, schedule, flips, modeLags(mode, sides, places))),
       ...phaseLags(vehicle, sides, dwells).map((added) => modeGrowth(vehicle, UNCHANGED, schedule, flips, added)),
@@ -73,14 +71,4 @@ function modeGrowth(vehicle, mode, schedule, flips, addedLags) {
   return growth;
 }
 
-/* Select some of the flips. ErrorGrowth.at */
-function growthAt(growth, flips) {
-  const rows = new Map(growth.flips.map((flip, row) => [flip, row]));
-  const some = (values) => flips.map((flip) => values[rows.get(flip)]);
-  return {
-    flips, position: some(growth.position),
-    modes: growth.modes.map(({ x, y, turned }) => ({ x: some(x), y: some(y), turned: some(turned) })),
-  };
-}
-
-export { errorGrowth, growthAt };
+export { errorGrowth };

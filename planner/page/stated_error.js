@@ -4,7 +4,6 @@
 import { largest, linspace, sum } from "./arrays.js";
 import { nearest } from "./distance.js";
 import { normals } from "./draws.js";
-import { growthAt } from "./error_growth.js";
 import { BEFORE_KNOTS, COUNT, SHORTEST, STEP, pivotRadius } from "./vehicle.js";
 import { zigzagSpeed } from "./zigzag.js";
 
@@ -65,12 +64,11 @@ function flipsBetween(count) {
 
 /* The quantile LEVEL of the largest distance from the declared path over random vehicles. stated_error
  *
- * growth: at all flips of `flipsBetween` at least. seed: of the draws. */
-function statedError(growth, predicted, seed = 0) {
-  const count = growth.flips[growth.flips.length - 1], some = growthAt(growth, flipsBetween(count));
-  const blocks = extremes(predicted, some.flips, (predicted.distance.length - 1) / count);
-  const modes = some.modes.length, z = normals(seed, 0, DRAWS * modes), worst = new Float64Array(DRAWS);
-  const added = addedFromStart(some);
+ * growth: at the flips of `flipsBetween`. seed: of the draws. */
+function statedError({ flips, modes: growth }, predicted, seed = 0) {
+  const blocks = extremes(predicted, flips, (predicted.distance.length - 1) / flips[flips.length - 1]);
+  const modes = growth.length, z = normals(seed, 0, DRAWS * modes), worst = new Float64Array(DRAWS);
+  const added = growth.map(({ x, y }) => [x.slice(1), y.slice(1)]);
   const { normal } = blocks, last = blocks.low.length - 1, forward = [normal[2 * last + 1], -normal[2 * last]];
   const across = alongDirections(added, normal);
   const onward = alongDirections(added.map(([x, y]) => [[x[last]], [y[last]]]), forward);
@@ -80,11 +78,6 @@ function statedError(growth, predicted, seed = 0) {
     worst[draw] = farthest(ofModes, across, blocks, beyond);
   }
   return quantile(worst.sort(), LEVEL) + WOBBLE;
-}
-
-/* How far each mode leads to the end of each block, [x, y]. */
-function addedFromStart({ modes }) {
-  return modes.map(({ x, y }) => [x.slice(1), y.slice(1)]);
 }
 
 /* What modes [x, y] add in each block along a direction, x and y in turn; block by block in one column. */

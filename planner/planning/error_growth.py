@@ -29,14 +29,8 @@ class ErrorGrowth(NamedTuple):
     """
 
     flips: Integers  # (E,), their numbers; the last one is the end of the schedule
-    position: Floats  # (E, 2), as predicted
-    deviation: Floats  # (E, P, 2), from there
+    deviation: Floats  # (E, P, 2), from the predicted position
     turned: Floats  # (E, P), of the heading
-
-    def at(self, flips: Integers) -> ErrorGrowth:
-        """Select some of the flips."""
-        rows = np.searchsorted(self.flips, flips)
-        return ErrorGrowth(flips, self.position[rows], self.deviation[rows], self.turned[rows])
 
 
 def error_growth(vehicle: Vehicle, switches: Switches, rollout: Rollout, flips: Integers) -> ErrorGrowth:
@@ -63,10 +57,10 @@ def error_growth(vehicle: Vehicle, switches: Switches, rollout: Rollout, flips: 
         change = planar.compose(lag + lags[p], arc) - moves_predicted
         heading = np.concatenate([[0.0], np.cumsum(change[:, 2])])
         moves = planar.turn(change[:, :2], poses[:-1, 2]) + mode.current * dwells[:, None]
-        moves += heading[:-1, None] * left(steps)
+        moves += heading[:-1, None] * np.stack([-steps[:, 1], steps[:, 0]], 1)
         position = np.concatenate([np.zeros((1, 2)), np.cumsum(moves, 0)])
         deviation[:, p], turned[:, p] = position[flips], heading[flips]
-    return ErrorGrowth(flips, poses[flips, :2], deviation, turned)
+    return ErrorGrowth(flips, deviation, turned)
 
 
 def _phase_lags(vehicle: Vehicle, side: Integers, dwells: Floats) -> list[Floats]:
@@ -95,8 +89,3 @@ def _mode_lags(vehicle: Vehicle, side: Integers, dwells: Floats) -> list[Floats 
     for place, p in enumerate(with_lag):
         added[p] = lags[:, place]
     return added
-
-
-def left(vector: Floats) -> Floats:
-    """Turn vectors (..., 2) by a right angle to the left."""
-    return np.stack([-vector[..., 1], vector[..., 0]], -1)

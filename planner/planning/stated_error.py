@@ -89,14 +89,12 @@ def stated_error(growth: ErrorGrowth, predicted: Predicted, *, seed: int = 0) ->
     """Compute the quantile LEVEL of the largest distance from the declared path [l], over random vehicles.
 
     Args:
-        growth: of the errors, at all flips of `flips_between` at least.
+        growth: of the errors, at the flips of `flips_between`.
         predicted: distances of the predicted track from the path.
         seed: of the random draws, see `planner.draws`.
     """
-    count = int(growth.flips[-1])
-    growth = growth.at(flips_between(count))
     edges = growth.flips
-    low, high, normal = _extremes(predicted, edges, (len(predicted.distance) - 1) // count)
+    low, high, normal = _extremes(predicted, edges, (len(predicted.distance) - 1) // int(edges[-1]))
     moved, _ = deviations_open_loop(growth, seed)
     across = np.einsum("dki,ki->dk", moved, normal)
     worst = np.maximum(np.abs(high + across), np.abs(low + across))
@@ -109,20 +107,10 @@ def stated_error(growth: ErrorGrowth, predicted: Predicted, *, seed: int = 0) ->
 
 def deviations_open_loop(growth: ErrorGrowth, seed: int = 0) -> tuple[Floats, Floats]:
     """Draw deviations at the ends of the blocks: of the place (D, E − 1, 2) and of the heading (D, E − 1)."""
-    z = _draws(growth, seed)
-    return _sums(z, growth.deviation[1:]), z @ growth.turned[1:].T
-
-
-def _draws(growth: ErrorGrowth, seed: int) -> Floats:
-    """Draw modes (D, P)."""
-    modes = growth.deviation.shape[1]
-    return normals(seed, 0, _DRAWS * modes).reshape(_DRAWS, modes)
-
-
-def _sums(z: Floats, deviation: Floats) -> Floats:
-    """Add up modes (E, P, 2), z (D, P) standard deviations of each: (D, E, 2)."""
-    flat = np.moveaxis(deviation, 1, 0).reshape(z.shape[1], 2 * len(deviation))
-    return (z @ flat).reshape(len(z), len(deviation), 2)
+    blocks, modes, _ = growth.deviation[1:].shape
+    z = normals(seed, 0, _DRAWS * modes).reshape(_DRAWS, modes)
+    flat = np.moveaxis(growth.deviation[1:], 1, 0).reshape(modes, 2 * blocks)
+    return (z @ flat).reshape(_DRAWS, blocks, 2), z @ growth.turned[1:].T
 
 
 def _extremes(predicted: Predicted, edges: Integers, samples: int) -> tuple[Floats, Floats, Floats]:

@@ -268,7 +268,7 @@ def swim(
     Args:
         pilot: a tracker that has not begun, or a plan, which gets a tracker that knows the camera's noise.
         truth: the robot that swims; default: the one that the plan was made for.
-        camera: what sees it; default: one pose a second, 2 s late, with errors of 0.01 l and 0.01 rad, 20 % lost.
+        camera: what sees it; default: that of the plan.
         current_cm_s: of the fluid, in x and y [cm/s], which the tracker does not know.
         longest: times the planned duration after which the swim ends in any case.
 
@@ -285,9 +285,9 @@ def swim(
         >>> track.finished, track.rms() < 0.1
         (True, True)
     """
-    camera = camera or Camera()
-    tracker = pilot if isinstance(pilot, Tracker) else Tracker(pilot, noise=camera.noise)
-    plan = tracker.plan
+    plan = pilot.plan if isinstance(pilot, Tracker) else pilot
+    camera = camera or plan.camera
+    tracker = pilot if isinstance(pilot, Tracker) else Tracker(plan, noise=camera.noise)
     unit = plan.robot.time_scale / (100 * plan.robot.tail_length)
     return swim_under(
         tracker,

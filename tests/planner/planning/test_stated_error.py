@@ -106,8 +106,8 @@ def test_without_uncertainty_it_is_the_predicted_error_and_the_motion_within_a_r
 def test_a_robot_that_swims_past_an_open_end_is_off_its_path(closed: bool, expected: float) -> None:
     """One mode, a way along the path that is too long or too short: half of the robots stop before the end."""
     x = np.arange(3.0)
-    line, along = np.stack([x, 0 * x], 1), np.stack([0.1 * x, 0 * x], 1)[:, None]
-    growth = ErrorGrowth(np.arange(3), line, along, np.zeros((3, 1)))
+    along = np.stack([0.1 * x, 0 * x], 1)[:, None]
+    growth = ErrorGrowth(np.arange(3), along, np.zeros((3, 1)))
     predicted = Predicted(np.zeros(3), np.zeros(3), np.tile([0.0, 1.0], (3, 1)), closed)
     assert stated_error(growth, predicted) == pytest.approx(expected * 0.2, rel=0.15, abs=0.01)
 
