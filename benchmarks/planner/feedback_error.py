@@ -29,13 +29,12 @@ from benchmarks.proportions import wilson
 from planner.paths.path import circle
 from planner.planning.camera import Camera
 from planner.planning.plan import plan
-from planner.planning.planned import Plan
 from planner.tracking.swim import Swim, swim
 from planner.tracking.tracker import Tracker
-from planner.vehicle.vehicle import Vehicle
 from sim.io.errors import InputError
 from sim.motion.warm import compile_once
 from tests.oracles.unseen_robots import lab_robot
+from tests.planner.vehicles import drawn_vehicle
 
 CURRENT = 0.05  # of the net speed
 LONGEST = 900  # dwells
@@ -71,7 +70,7 @@ def outcomes(seed: int, vehicle: bool) -> list[Outcome] | str:
         return f"{seed}: {refused}"
     if len(planned[0].dwells) > LONGEST:
         return f"{seed}: {len(planned[0].dwells)} dwells"
-    truth = drawn(planned[0], rng) if vehicle else robot
+    truth = drawn_vehicle(planned[0].tracked.vehicle, rng) if vehicle else robot
     angle = rng.uniform(0, 2 * math.pi)
     found = []
     for (name, camera), each in zip(CAMERAS.items(), planned, strict=False):
@@ -88,16 +87,6 @@ def _outcome(seed: int, camera: str, current: float, stated: float, result: Swim
     place = np.searchsorted(np.cumsum(result.weights()[order]), 0.95)
     quantile = float(result.distance[order][place])
     return Outcome(seed, camera, current, stated, result.within(stated), quantile, float(result.distance.max()))
-
-
-def drawn(planned: Plan, rng: np.random.Generator) -> Vehicle:
-    """Draw a vehicle within the plan's uncertainty."""
-    car = planned.tracked.vehicle
-    twist, lag = car.twist.copy(), car.lag.copy()
-    for mode, z in zip(car.modes, rng.standard_normal(len(car.modes)), strict=True):
-        twist += z * mode.twist
-        lag += 0.0 if mode.lag is None else z * mode.lag
-    return replace(car, twist=twist, lag=lag)
 
 
 def main(robots: str = "40", first: str = "5000", vehicle: str = "") -> None:

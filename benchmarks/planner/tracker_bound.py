@@ -29,6 +29,7 @@ from planner.tracking.swim import swim
 from planner.vehicle.dwell_choice import Objective
 from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker
+from tests.planner.vehicles import drawn_vehicle
 
 CURRENTS = (0.0, 0.06, 0.12)  # of the net speed
 
@@ -64,13 +65,10 @@ def covered(planned: Plan, seeds: int, current: float) -> list[tuple[float, floa
         tracker = CompiledTracker(planned, Path(folder))
         for seed in range(seeds):
             tracker.restart()
-            rng, car = np.random.default_rng(seed), planned.tracked.vehicle
-            twist, lag, angle = car.twist.copy(), car.lag.copy(), rng.uniform(0, 2 * math.pi)
-            for mode, z in zip(car.modes, rng.standard_normal(len(car.modes)), strict=True):
-                twist += z * mode.twist
-                lag += 0.0 if mode.lag is None else z * mode.lag
+            rng = np.random.default_rng(seed)
+            angle = rng.uniform(0, 2 * math.pi)
             flow = current * planned.straight.net_speed * np.array([math.cos(angle), math.sin(angle)])
-            truth = replace(car, twist=twist, lag=lag, current=flow)
+            truth = replace(drawn_vehicle(planned.tracked.vehicle, rng), current=flow)
             every, delay = float(rng.choice([0.5, 1.0, 3.0])), float(rng.choice([0.0, 1.0, 2.0]))
             result = swim(tracker, planned, truth, Camera(seed=rng, every_s=every, delay_s=delay, lost=0.1))
             results.append((result.within(result.errors), float(result.errors.mean()), result.rms()))

@@ -11,8 +11,8 @@ const COURSE = 0.085; // rad
 const STRETCH = 0.3; // l
 const CAMERA = { noise: [0.01, 0.01], every_s: 1, delay_s: 2, lost: 0.2 };
 
-/* Compute it from distances of the predicted track, dwells, net speed, the unit of time in seconds, and the error of
- * the open loop. feedback_error */
+/* Compute it from distances of the predicted track, dwells, net speed, the unit of time in seconds, and the error
+ * of the open loop. feedback_error */
 function feedbackError(distance, dwells, netSpeed, timeScale, stated) {
   const delay = CAMERA.delay_s / timeScale, gap = CAMERA.every_s / (timeScale * (1 - CAMERA.lost));
   if (delay * dwells.length > KEPT * sum(dwells)) return stated;

@@ -5,7 +5,7 @@
 import { sum } from "./arrays.js";
 import { declare } from "./declared_path.js";
 import { checkLeast, dwellsFor, longerDwells, nearlyFastest } from "./dwell_choice.js";
-import { planErrors } from "./errors.js";
+import { planErrors, unmeasuredError } from "./errors.js";
 import { InputError } from "./input_error.js";
 import { leastDwell, planRequest } from "./request.js";
 import { follow } from "./schedule.js";
@@ -25,7 +25,8 @@ const OWN_TABLE = "softflagella surrogate robot"; // makes the table of one robo
  * options: see request.js. progress: called now and then with the share of the path that is done. */
 function planPath(path, robot, table, options = {}, progress = null) {
   const request = planRequest(options);
-  return makePlan(path, trackedVehicle(robot, table, request.point), request, progress);
+  const plan = makePlan(path, trackedVehicle(robot, table, request.point), request, progress);
+  return { ...plan, unmeasured: unmeasuredError(plan) };
 }
 
 /* Plan for a path, a vehicle (see tracked_point.js) and a request (see request.js). make_plan */
@@ -61,18 +62,8 @@ function makePlan(drawn, tracked, request, progress = null) {
   if (given === null && objective === "error") {
     first = leastStated(first, longerDwells(vehicle, first.guidance.dwell), withDwell);
   }
-  const kept = tolerance === null || first.errors.stated <= tolerance;
-  const plan = kept ? first : shortened(first, dwells, withDwell, tolerance);
-  return { ...plan, unmeasured: unmeasuredError(plan) };
-}
-
-/* The stated error if the coefficients are those of another robot; null: calibrated, or not known.
- * Plan.unmeasured_error */
-function unmeasuredError({ tracked, drawn, declared, switches, straight }) {
-  const { vehicle, unmeasured } = tracked;
-  if (!unmeasured.length) return null;
-  const guessed = { ...tracked, vehicle: { ...vehicle, modes: [...vehicle.modes, ...unmeasured] } };
-  return planErrors(guessed, drawn, declared, switches, null, 0, straight).stated;
+  if (tolerance === null || first.errors.stated <= tolerance) return first;
+  return shortened(first, dwells, withDwell, tolerance);
 }
 
 /* The dwell with which a declared path takes the least time; straight motion is the fastest with `fastest`.

@@ -4,6 +4,7 @@ import { pathOf, pathLength, polyline, scaled, smoothed } from "./path.js";
 import { repr } from "./format.js";
 import { geomspace } from "./arrays.js";
 import { InputError } from "./input_error.js";
+import { unmeasuredError } from "./errors.js";
 import { makePlan } from "./plan.js";
 import { pageShape } from "./page_shapes.js";
 import { planDuration, planRecord, planSeconds, planWarnings } from "./planned.js";
@@ -54,8 +55,8 @@ async function service(data) {
     const drawn = inTails(drawnPath(wish.path), cm);
     const request = requestOf(wish.options, cm);
     const plan = makePlan(drawn, swims, request, progress);
-    last = { key, plan };
-    return plan;
+    last = { key, plan: { ...plan, unmeasured: unmeasuredError(plan) } };
+    return last.plan;
   }
 
   return {

@@ -26,7 +26,7 @@ from sim.io.errors import InputError, run_command
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay
 from tests.planner.compiled import CompiledTracker
-from tests.planner.vehicles import FINE
+from tests.planner.vehicles import FINE, drawn_vehicle
 
 CONTROL = PRESETS["paper-control"]
 FEW = PlanRequest(dwell=2.03)  # no flip is at the time of a picture
@@ -84,14 +84,8 @@ def test_a_lap_drifts_as_stated(laps: Plan) -> None:
     rng, vehicle, beyond = np.random.default_rng(0), laps.tracked.vehicle, 0
     count = len(laps.dwells)
     for _ in range(40):
-        car = vehicle
-        for mode, size in zip(vehicle.modes, rng.standard_normal(len(vehicle.modes)), strict=True):
-            lag = car.lag if mode.lag is None else car.lag + size * mode.lag
-            car = replace(
-                car, twist=car.twist + size * mode.twist, lag=lag, current=car.current + size * mode.current
-            )
         twice = Switches(laps.first_direction, np.tile(laps.dwells, 2), laps.poses[:1])
-        poses = poses_at_flips(car, twice)
+        poses = poses_at_flips(drawn_vehicle(vehicle, rng), twice)
         x, y, _ = poses[-1] - poses[count]
         beyond += np.hypot(x, y) > laps.lap.drift
     assert beyond <= 6

@@ -29,6 +29,7 @@ IN_JOURNEYS = {"service.js", "worker.js"}  # they are tested in a browser
 TESTED_WITH = {  # the file that uses them
     "number_words.js": "text_tables",
     "times.js": "text_tables",
+    "feedback_error.js": "plan",
     "seals.js": "open_file",
     "style_sheet.js": "svg_drawing",
     "svg_names.js": "svg_drawing",

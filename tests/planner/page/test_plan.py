@@ -82,6 +82,9 @@ def check_plan(found: Any, wanted: Plan) -> None:
     assert without_digits(declared["warnings"]) == without_digits(list(wanted.declared.warnings))
     for name, error in errors_of(wanted).items():
         check_near(found["errors"][name], error)
+    assert (found["unmeasured"] is None) == (wanted.unmeasured_error is None)
+    if wanted.unmeasured_error is not None:
+        check_near(found["unmeasured"], wanted.unmeasured_error)
     assert (found["errors"]["closure"] is None) == (wanted.errors.closure is None)
     if wanted.errors.closure is not None:
         check_near(found["errors"]["closure"], wanted.errors.closure)

@@ -21,7 +21,7 @@ from planner.vehicle.dwell_choice import Objective
 from planner.vehicle.vehicle import Vehicle
 from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker
-from tests.planner.vehicles import PROMPT, root_mean_square
+from tests.planner.vehicles import PROMPT, drawn_vehicle, root_mean_square
 
 ROBOT = PRESETS["paper-control"]
 CURRENT = (0.0, 0.0015)  # l per time unit, a tenth of the net speed
@@ -68,12 +68,9 @@ def test_on_a_straight_line_the_reference_turns_against_the_slip() -> None:
 
 def drawn(planned: Plan, rng: np.random.Generator, current: float) -> Vehicle:
     """Draw a vehicle within the plan's uncertainty, and a current of this size."""
-    car, angle = planned.tracked.vehicle, rng.uniform(0, 2 * math.pi)
-    twist, lag = car.twist.copy(), car.lag.copy()
-    for mode, z in zip(car.modes, rng.standard_normal(len(car.modes)), strict=True):
-        twist += z * mode.twist
-        lag += 0.0 if mode.lag is None else z * mode.lag
-    return replace(car, twist=twist, lag=lag, current=current * np.array([math.cos(angle), math.sin(angle)]))
+    angle = rng.uniform(0, 2 * math.pi)
+    car = drawn_vehicle(planned.tracked.vehicle, rng)
+    return replace(car, current=current * np.array([math.cos(angle), math.sin(angle)]))
 
 
 @pytest.mark.parametrize("current", [0.0, 0.001])
