@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator
@@ -10,8 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from planner.paths.units import heading_in_degrees, number_and_unit, place_in_lab, read_length, read_time
+from planner.paths.units import heading_in_degrees, place_in_lab, read_length, read_time
 from sim.io.commands import LOOKUP, argument
+from sim.io.errors import InputError
 from sim.io.units import format_time
 
 if TYPE_CHECKING:
@@ -136,8 +136,12 @@ def camera_of(arguments: Namespace, robot: Robot) -> Camera:
         return Camera()
     place, *numbers = words
     noise = read_length(place, arguments.unit, robot, "--camera", above_zero=True)
-    split = map(number_and_unit, numbers)
-    heading, every_s, delay_s, lost = (math.nan if unit else number for number, unit in split)
+    try:
+        heading, every_s, delay_s, lost = map(float, numbers)
+    except ValueError:
+        raise InputError(
+            f"--camera {' '.join(words)}: RAD, EVERY, LATE, LOST are numbers without a unit, such as 0.01 1 2 0.2"
+        ) from None
     return Camera((noise, heading), every_s, delay_s, lost)
 
 

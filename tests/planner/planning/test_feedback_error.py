@@ -42,8 +42,14 @@ def test_the_command_takes_a_camera(tmp_path: Path) -> None:
     camera = Camera((0.02, 0.03), 1.5, 0.5, 0.1)
     assert content["camera"] == camera.to_dict()
     assert restore_plan(tmp_path).feedback_error == content["feedback_error_over_l"]
-    with pytest.raises(InputError, match="camera: lost is"):
-        main([*words, "--camera", "0.02l", "0.03", "1.5", "0.5", "1.1"])
+    for given, expected in (
+        ("0.02l 0.03 1.5 0.5 1.1", "camera: lost is 1.1"),
+        ("0.02 0.03 1.5 0.5 0.1", "0.02 has no unit"),
+        ("0.02l 0.03cm 1.5 0.5 0.1", "--camera 0.02l 0.03cm 1.5 0.5 0.1: RAD"),
+        ("0.02l 0.03 1.5 0.5 10%", "numbers without a unit"),
+    ):
+        with pytest.raises(InputError, match=expected):
+            main([*words, "--camera", *given.split()])
 
 
 def test_a_worse_camera_means_a_larger_error() -> None:
