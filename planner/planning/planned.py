@@ -204,19 +204,19 @@ class Plan:
 
     @property
     def error_line(self) -> str:
-        """The errors in one sentence, and what holds where the coefficients are not calibrated."""
+        """The errors in one sentence; on two lines where the coefficients are not calibrated."""
         rms, largest, stated, feedback = (
             in_lab(error, self.robot)
             for error in (self.predicted_rms, self.predicted_max, self.stated_error, self.feedback_error)
         )
-        errors = f"predicted error {rms} rms, {largest} at most; stated error {stated}, with feedback {feedback}"
+        predicted = f"predicted error {rms} rms, {largest} at most;"
+        errors = f"stated error {stated}, with feedback {feedback}"
         if self.tracked.calibrated:
-            return errors
-        exact = f"if the coefficients are exact: {errors}"
-        if self.unmeasured_error is None:
-            return exact
-        unmeasured = in_lab(self.unmeasured_error, self.robot)
-        return f"{exact}\nwith the coefficients of another robot: stated error {unmeasured}"
+            return f"{predicted} {errors}"
+        if self.unmeasured_error is not None:
+            unmeasured = in_lab(self.unmeasured_error, self.robot)
+            errors += f"; with the coefficients of another robot: stated error {unmeasured}"
+        return f"if the coefficients are exact: {predicted}\n{errors}"
 
     def schedule(self, robot: Robot | None = None, *, laps: int = 1) -> Schedule:
         """Return the schedule for `sim.motion.replay`.
