@@ -17,14 +17,15 @@ def test_offsets() -> None:
     robot = random_robots(1)[0]
     page, points = robot_to_page(robot), ("head_centre", "head_tip", "pivot")
     vehicle = vehicle_to_page(replace(vehicle_of(robot), modes=()))
-    found = answers([("tracked_point.js", "trackedPoint", page, vehicle, point, "x", True) for point in points])
+    basis = {"vehicle": vehicle, "unmeasured": [], "calibrated": False, "ownTable": True}
+    found = answers([("tracked_point.js", "trackedPoint", page, basis, point, "x") for point in points])
     for one, point in zip(found, points, strict=True):
         wanted = tracked_vehicle(robot, shipped(), point, None)
         check_near(one["offset"], wanted.offset, 1e-15)
         check_near(answer("tracked_point.js", "rodOf", one), wanted.rod, 1e-15)
         assert (one["point"], one["model"], one["ownTable"]) == (point, "x", True)
     wrong: Any = "nose"
-    refusal = answer("tracked_point.js", "trackedPoint", page, vehicle, wrong, "x", True)
+    refusal = answer("tracked_point.js", "trackedPoint", page, basis, wrong, "x")
     assert str(refusal) == refusal_of(tracked_vehicle, robot, shipped(), wrong, None)
 
 
