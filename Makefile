@@ -25,12 +25,11 @@ OUT ?= reports/dataset.html
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-# Tests run in a process for each core, longest first; tests/conftest.py says what stays together. REST is what `make test` omits.
-XDIST := -n auto --dist loadgroup --no-loadscope-reorder
-REST := long or rates or cluster
+# Tests run in a process for each core. Each test belongs to exactly one of test, test-rest and test-rates.
+PYTEST := -m pytest -n auto --dist worksteal
 
 .DEFAULT_GOAL := help
-.PHONY: help setup constraints demo test test-rest test-all quick lint docs dataset train plan calibrate report bench clean
+.PHONY: help setup constraints demo test test-rest test-rates quick lint docs dataset train plan calibrate report bench clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
@@ -52,17 +51,17 @@ reports/demo.html: $(STAMP) $(SOURCES) $(wildcard $(foreach p,dataset surrogate 
 	$(RUN) -m softflagella demo --out $@
 
 test: $(VENV)/.extras ## run the tests of every feature
-	$(RUN) -m pytest $(XDIST) -m "not ($(REST))"
-test-rest: $(VENV)/.extras ## run what `make test` leaves out: rates over many tables, clusters, the longest tests
-	$(RUN) -m pytest $(XDIST) -m "$(REST)"
-test-all: $(VENV)/.extras ## run every test
-	$(RUN) -m pytest $(XDIST)
+	$(RUN) $(PYTEST) -m "not (rest or rates)"
+test-rest: $(VENV)/.extras ## run clusters and the longer tests
+	$(RUN) $(PYTEST) -m "rest and not rates"
+test-rates: $(VENV)/.extras ## count claims and coverage over many tables, robots and paths
+	$(RUN) $(PYTEST) -m rates
 $(VENV)/.extras: $(STAMP)
 	$(INSTALL) -e '.[clusters,page]'
 	touch $@
 
-quick: $(STAMP) ## run the quick tests, a minute and a half
-	$(RUN) -m pytest $(XDIST) -m "not (slow or page or $(REST))"
+quick: $(STAMP) ## run the quick tests
+	$(RUN) $(PYTEST) -m "not (slow or rest or rates)"
 
 constraints: $(VENV)/bin/uv ## pin what pyproject.toml needs, with hashes (UPGRADE=1: the newest versions)
 	$(RUN) -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"])' \

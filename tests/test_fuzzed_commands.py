@@ -82,7 +82,7 @@ def changed(draw: st.DrawFn, table: pd.DataFrame) -> pd.DataFrame:
 CIRCLE = pd.DataFrame({"x": 2 * np.cos(np.linspace(0, 5, 60)), "y": 2 * np.sin(np.linspace(0, 5, 60))})
 
 
-@pytest.mark.long
+@pytest.mark.rest
 @few
 @given(table=changed(CIRCLE), options=st.dictionaries(
     st.sampled_from(["--scale", "--minimum-dwell", "--tolerance"]), number, max_size=2))  # fmt: skip
@@ -173,7 +173,7 @@ def runs() -> pd.DataFrame:
     return found.assign(elapsed_min=4.0 * np.arange(len(found)), v_cm_s=1.0 + 0.01 * np.arange(len(found)))
 
 
-@pytest.mark.long
+@pytest.mark.rest
 @few
 @given(data=st.data())
 def test_any_table_of_runs(

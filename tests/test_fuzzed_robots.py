@@ -73,7 +73,7 @@ def test_any_robot_is_solved_flagged_or_refused(values: dict[str, float]) -> Non
     assert found["converged"][0] or found["note"][0]
 
 
-@pytest.mark.long
+@pytest.mark.rest
 @quick
 @given(values=robots())
 def test_any_row_of_a_sweep_is_simulated_flagged_or_refused(values: dict[str, float]) -> None:

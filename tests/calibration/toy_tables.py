@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
-from typing import TypeVar
 
 import pandas as pd
 import pytest
@@ -24,19 +21,14 @@ from calibration.verdict.verdict import Verdict
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from tests.calibration import toy
+from tests.shared import shared
 
 START = PRESETS["paper-measured"]
 TRUTH = replace(START, C_t=3.1, C_r=2.4, C_yr=4.4)
 
-Test = TypeVar("Test", bound=Callable[..., None])
 LENGTHS_CM = (5.0, 8.0, 11.0)
 FEW_DRAWS = 200  # of the bootstrap, where no rate is asserted
 FEW_CANDIDATES = ("end_over_end_drag", "left_right_bias", "natural_curvature", "tail_spin_drag")
-
-
-def shares_verdicts(test: Test) -> Test:
-    """Mark a test that uses `calibrated_toy`: all such tests run in one process."""
-    return pytest.mark.slow(pytest.mark.xdist_group("verdicts")(test))
 
 
 def install_toy(patch: pytest.MonkeyPatch) -> None:
@@ -72,9 +64,9 @@ def calibrated(table: pd.DataFrame, *, seed: int = 0, draws: int = FEW_DRAWS) ->
     return calibrate(toy_swimmer(table), correction=correction, seed=seed, draws=draws, progress=False)
 
 
-@cache
+@shared
 def calibrated_toy(seed: int, *, lengths_cm: tuple[float, ...] = LENGTHS_CM, **effects: float) -> Verdict:
-    """The verdict of a toy table, found once a process; for tests with the mark `shares_verdicts`."""
+    """The verdict of a toy table."""
     with pytest.MonkeyPatch.context() as patch:
         install_toy(patch)
         return calibrated(toy_table(seed, lengths_cm=lengths_cm, **effects))

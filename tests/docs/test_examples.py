@@ -31,7 +31,7 @@ def marked() -> list[Any]:
     """Return the pages with something to run."""
     pages = [p for p in PAGES if any(b.language in RUN and not b.reason for b in blocks(p))]
     return [
-        pytest.param(p, id=page_name(p), marks=[pytest.mark.long] if page_name(p) in LONG else []) for p in pages
+        pytest.param(p, id=page_name(p), marks=[pytest.mark.rest] if page_name(p) in LONG else []) for p in pages
     ]
 
 
@@ -44,7 +44,7 @@ def environment(folder: Path) -> dict[str, str]:
     return {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT)}
 
 
-@pytest.mark.page
+@pytest.mark.slow
 @pytest.mark.slow  # so that each page goes to whichever process is free
 @pytest.mark.parametrize("page", marked())
 def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,7 +30,7 @@ from softflagella.demo_files import documentation, header_excerpt
 from softflagella.demo_page import Results, write_page
 from softflagella.replanning import Steered
 from surrogate.table.model_file import load
-from tests.calibration.toy_tables import calibrated_toy, install_toy, shares_verdicts, toy_swimmer, toy_table
+from tests.calibration.toy_tables import calibrated_toy, install_toy, toy_swimmer, toy_table
 from tests.page_text import PageText
 
 ROBOT = PRESETS["paper-control"]
@@ -112,14 +112,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_a_stranger_finds_the_parts_in_order(folder: Path) -> None:
     seen = PageText(folder / "demo.html")
     assert seen.headings == SECTIONS
     assert [link for link in seen.links if link.startswith("#")] == [f"#section-{n}" for n in range(1, 11)]
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_the_page_speaks_in_words_and_in_a_lab_s_units(folder: Path) -> None:
     seen = PageText(folder / "demo.html")
     names = re.findall(r"\b(?:omega_\w+|R_yr\w*|theta_\w+|v_[xz]|l_over_\w+|\w+_bar|\w+_over_l)\b", seen.text)
@@ -134,7 +134,7 @@ def test_the_page_speaks_in_words_and_in_a_lab_s_units(folder: Path) -> None:
     assert {"x [cm]", "heading [°]", "net speed [cm/min]", "motor speed [rpm]"} <= set(seen.words)
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_every_link_leads_to_a_file(folder: Path) -> None:
     seen = PageText(folder / "demo.html")
     files = [unquote(link) for link in seen.links if not link.startswith("#")]
@@ -147,7 +147,7 @@ def test_every_link_leads_to_a_file(folder: Path) -> None:
     assert any(file.endswith(("signs.md", "signs.html")) for file in files)
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_one_file_in_both_colours(folder: Path) -> None:
     html = (folder / "demo.html").read_text()
     assert "prefers-color-scheme: dark" in html
@@ -156,7 +156,7 @@ def test_one_file_in_both_colours(folder: Path) -> None:
     assert not re.search(r'(?:src|href)="https?:', html)
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_the_three_commands_are_commands(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As they stand on the page; the last one, a replay, takes long and is only read."""
     text = "".join(PageText(folder / "demo.html").words)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from planner.paths.path import polygon
 from sim.model.presets import PRESETS
 from softflagella.demo_figures import draw_steered
 from softflagella.replanning import gap_closed, steer
 
 
+@pytest.mark.rest
 def test_the_right_model_brings_the_robot_back_on_its_path() -> None:
     """A robot with end-over-end drag: planned without it, nearly with it, and with the truth."""
     truth = replace(PRESETS["paper-control"], effects={"end_over_end_drag": 5.0})

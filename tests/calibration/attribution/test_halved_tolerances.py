@@ -23,7 +23,6 @@ from tests.calibration.toy_tables import (
     START,
     TRUTH,
     calibrated_toy,
-    shares_verdicts,
     toy_swimmer,
     toy_table,
 )
@@ -97,7 +96,7 @@ def test_a_refit_with_half_of_the_tolerance_finds_the_same_sizes(name: str) -> N
     assert fallen
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_the_best_tolerance_comes_first_in_the_record() -> None:
     result = calibrated_toy(2)
     gains = overall_gains(result.evidence.candidates)

@@ -42,7 +42,7 @@ def table_of(robot: Robot, seed: int) -> pd.DataFrame:
     return make_table(robot, seed=seed, lengths_cm=(5.0, 8.0, 11.0), title="")
 
 
-@pytest.mark.parametrize("seed", [5, pytest.param(4, marks=pytest.mark.long)])
+@pytest.mark.parametrize("seed", [5, pytest.param(4, marks=pytest.mark.rest)])
 def test_a_stiffness_that_was_given_too_high_is_no_inertia(seed: int) -> None:
     """Tail drag 25 % above the formula is Young's modulus 20 % below; with the simulator on both sides."""
     softer = replace(TRUTH, youngs_modulus=0.8 * TRUTH.youngs_modulus)
@@ -168,7 +168,7 @@ def test_an_effect_beside_a_wrong_number_comes_behind_a_single_effect_that_fits_
     assert beside_wrong_numbers(study, base, [*candidates, as_good], tangents) == []
 
 
-@pytest.mark.long
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("share", "sigmas"),
     [

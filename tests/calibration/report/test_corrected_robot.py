@@ -23,10 +23,10 @@ from sim.model.robot import Robot
 from sim.model.schedule import Schedule, load_schedule
 from sim.motion.replay import replay
 from surrogate.table.model_file import load_table
-from tests.calibration.toy_tables import START, calibrated_toy, shares_verdicts
+from tests.calibration.toy_tables import START, calibrated_toy
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -> None:
     result = calibrated_toy(5, end_over_end_drag=5.0)
     assert result.effects == ("end_over_end_drag",)
@@ -49,7 +49,7 @@ def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -
     assert sigma["tail_length"] == pytest.approx(1e-3 / START.tail_length, rel=0.5)  # of ln l, by its prior
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_a_current_is_handed_on_with_its_error() -> None:
     delivered = calibrated_toy(3).fits.final_refit
     current = replace(delivered.fitted[0], name=CURRENT[1], logarithmic=False)
@@ -70,7 +70,7 @@ def test_a_current_is_handed_on_with_its_error() -> None:
     assert CURRENT[1] not in handed_on.names
 
 
-@pytest.mark.long
+@pytest.mark.rest
 def test_from_a_table_to_a_path_whose_stated_error_holds(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -41,7 +41,6 @@ from tests.calibration.toy_tables import (
     TRUTH,
     install_few_candidates,
     install_toy,
-    shares_verdicts,
     toy_swimmer,
     toy_table,
 )
@@ -90,7 +89,7 @@ def load_at(robot: Robot, name: str) -> float:
     return m + math.log(abs(robot.effects[name]) if "_w" in name else robot.C_yr)
 
 
-@shares_verdicts
+@pytest.mark.slow
 @pytest.mark.parametrize("place", HIDDEN)
 def test_a_law_stands_beside_the_verdict_and_takes_the_place_of_the_correction(place: str) -> None:
     verdict = described(place)
@@ -104,7 +103,7 @@ def test_a_law_stands_beside_the_verdict_and_takes_the_place_of_the_correction(p
     assert place in [law.place.name for law in laws_of(verdict).kept]
 
 
-@shares_verdicts
+@pytest.mark.slow
 @pytest.mark.parametrize("place", HIDDEN)
 def test_its_files_have_the_law_its_range_and_its_covariance(place: str, tmp_path: Path) -> None:
     verdict = described(place)
@@ -125,7 +124,7 @@ def test_its_files_have_the_law_its_range_and_its_covariance(place: str, tmp_pat
     assert np.linalg.eigvalsh(known.covariance).min() > -1e-9 * known.covariance.max()
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_an_uncertain_claim_is_set_beside_the_laws_that_fit_as_well(tmp_path: Path) -> None:
     verdict = claimed_beside_laws()
     laws, claim = laws_of(verdict), verdict.final
@@ -151,7 +150,7 @@ def test_an_uncertain_claim_is_set_beside_the_laws_that_fit_as_well(tmp_path: Pa
     assert load_robot(corrected).learnt_from is None
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_the_claim_in_other_words_is_no_rival_of_it() -> None:
     """End-over-end drag is a couple from the yaw rate."""
     verdict = claimed_beside_laws()
@@ -161,7 +160,7 @@ def test_the_claim_in_other_words_is_no_rival_of_it() -> None:
     assert same.words not in [rival.title for rival in laws.as_good_as(verdict.final)]
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_beside_a_claim_a_law_has_the_numbers_of_its_linear_model() -> None:
     for law in laws_of(claimed_beside_laws()).fitted:
         assert set(law.fit.names) & set(EXPONENTS) == set(law.ranked.chosen)
@@ -169,7 +168,7 @@ def test_beside_a_claim_a_law_has_the_numbers_of_its_linear_model() -> None:
     assert set(EXPONENTS) - set(law.fit.names) <= {EXPONENTS[2]}
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_laws_that_fit_less_well_do_not_weaken_a_claim() -> None:
     verdict = claimed_beside_laws()
     better = replace(verdict.final, deviance=verdict.final.deviance - 100)
@@ -177,7 +176,7 @@ def test_laws_that_fit_less_well_do_not_weaken_a_claim() -> None:
     assert laws_of(verdict).beside(better) == "No law of the places that were searched describes it as well."
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_a_robot_outside_the_runs_is_refused_by_everything(tmp_path: Path) -> None:
     robot = described("Cyr").corrected
     robot.group_values()
@@ -198,7 +197,7 @@ def test_a_robot_outside_the_runs_is_refused_by_everything(tmp_path: Path) -> No
             load_robot(tmp_path / "damaged.toml")
 
 
-@shares_verdicts
+@pytest.mark.slow
 @pytest.mark.parametrize("place", HIDDEN)
 def test_the_uncertainty_of_the_exponents_is_that_of_the_load_at_the_robot(place: str) -> None:
     verdict = described(place)
@@ -232,7 +231,7 @@ def test_a_law_is_the_same_in_a_table_of_other_runs() -> None:
             with_law(toy_swimmer(table), {**law.record, **damage})
 
 
-@shares_verdicts
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_new_runs_decide_between_two_laws() -> None:
     verdict = described("Mz_wh")
@@ -249,7 +248,7 @@ def test_new_runs_decide_between_two_laws() -> None:
     assert standing[1].behind > 0
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_the_runs_at_each_input_lie_on_the_law() -> None:
     verdict = described("Cyr")
     law = next(one for one in laws_of(verdict).kept if one.place.name == "Cyr")

@@ -19,7 +19,7 @@ from sim.model.learnt_range import learnt_range
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay
 from tests.calibration.report.test_robot_verdict import verdict_of
-from tests.calibration.toy_tables import shares_verdicts, toy_table
+from tests.calibration.toy_tables import toy_table
 from tests.page_text import PageText
 
 GIVEN = PRESETS["paper-control"]
@@ -129,7 +129,7 @@ def test_a_path_in_physical_units_keeps_its_size(tmp_path: Path) -> None:
     assert wanted.path.length == pytest.approx(0.33 / LENGTH)
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_a_verdict_and_its_report_have_the_error_on_a_path(tmp_path: Path) -> None:
     verdict = verdict_of(5, end_over_end_drag=5.0)
     assert verdict.to_dict()["path"] is None

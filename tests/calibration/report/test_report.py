@@ -26,7 +26,6 @@ from tests.calibration.toy_tables import (
     calibrated_toy,
     install_few_candidates,
     install_toy,
-    shares_verdicts,
     toy_swimmer,
     toy_table,
 )
@@ -69,7 +68,6 @@ def with_errors(result: Verdict, *, before: float, after: float, p_value: float 
     return replace(result, errors=replace(result.errors, rms=rms, p_value=p_value))
 
 
-@pytest.mark.xdist_group("report")
 def test_what_was_given_is_in_the_units_of_a_lab(number: tuple[Verdict, Measurements], tmp_path: Path) -> None:
     """The column used to be called "given [SI]", with 1.2e+06 for Young's modulus."""
     seen = page(*number, tmp_path)
@@ -79,7 +77,6 @@ def test_what_was_given_is_in_the_units_of_a_lab(number: tuple[Verdict, Measurem
     assert "1.600 ± 0.016 cm" in seen.text  # fitted: it used to be "1.3e-08 % below"
 
 
-@pytest.mark.xdist_group("report")
 def test_nothing_is_written_for_machines(number: tuple[Verdict, Measurements], tmp_path: Path) -> None:
     """No exponents ("8.7e-10 % above"), no products of powers ("C_t^0.66 C_r^0.49"), no names of outputs."""
     seen = page(*number, tmp_path)
@@ -89,7 +86,6 @@ def test_nothing_is_written_for_machines(number: tuple[Verdict, Measurements], t
     assert re.search(r"one standard deviation is C_t [\d.]+ % \w+, C_r [\d.]+ % \w+ and C_yr", seen.text)
 
 
-@pytest.mark.xdist_group("report")
 def test_what_to_do_next_comes_first(number: tuple[Verdict, Measurements], tmp_path: Path) -> None:
     seen = page(*number, tmp_path)
     assert seen.headings[0] == "What to do next"
@@ -97,7 +93,6 @@ def test_what_to_do_next_comes_first(number: tuple[Verdict, Measurements], tmp_p
     assert "scale of the camera" in seen.text
 
 
-@pytest.mark.xdist_group("report")
 def test_the_units_of_the_table_do_not_change_the_numbers(number: tuple[Verdict, Measurements]) -> None:
     """verdict.json stays in SI units; only what is shown has others."""
     record = verdict_record(number[0], table="t")
@@ -107,7 +102,6 @@ def test_the_units_of_the_table_do_not_change_the_numbers(number: tuple[Verdict,
     assert record["next_steps"] == next_steps(number[0])
 
 
-@pytest.mark.xdist_group("report")
 def test_a_corrected_robot_that_does_not_lower_the_error_is_not_advised(
     number: tuple[Verdict, Measurements],
 ) -> None:
@@ -120,7 +114,7 @@ def test_a_corrected_robot_that_does_not_lower_the_error_is_not_advised(
         assert "corrected.toml" in " ".join(next_steps(with_errors(result, before=given, after=0.9 * given)))
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_a_claim_that_does_not_lower_the_error_says_so_first(tmp_path: Path) -> None:
     """In the verdict's first sentence, which verdict.json and the report have, too, and in what to do next."""
     result, runs = ambiguous()
@@ -142,7 +136,6 @@ def test_a_claim_that_does_not_lower_the_error_says_so_first(tmp_path: Path) -> 
     assert not next_steps(fallen)[0].startswith("Do not rely")
 
 
-@pytest.mark.xdist_group("report")
 def test_a_wrong_number_that_does_not_lower_the_error_says_so_first(number: tuple[Verdict, Measurements]) -> None:
     risen = with_errors(number[0], before=0.03, after=0.031)
     first = risen.sentence.split(" No effect is claimed.")[0]
@@ -152,7 +145,7 @@ def test_a_wrong_number_that_does_not_lower_the_error_says_so_first(number: tupl
     assert next_steps(risen)[-1].startswith("Until then, plan with the robot as given")
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_where_nothing_is_claimed_nothing_can_fall() -> None:
     none = with_errors(calibrated_toy(3), before=0.03, after=0.03)
     assert none.held_out_error_falls is None
@@ -163,7 +156,7 @@ def test_where_nothing_is_claimed_nothing_can_fall() -> None:
     assert next_steps(odd)[0].startswith("Find out what is different about the held-out runs")
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_rivals_are_told_apart_by_runs_and_a_command(tmp_path: Path) -> None:
     result, runs = ambiguous()
     batch = result.next.batch
@@ -180,7 +173,7 @@ def test_rivals_are_told_apart_by_runs_and_a_command(tmp_path: Path) -> None:
     assert "`" not in seen.text
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_runs_that_seldom_decide_are_not_offered(tmp_path: Path) -> None:
     """Batches that decide in 14 % of cases stood in the report like good ones."""
     result, runs = ambiguous()
@@ -201,7 +194,7 @@ def test_runs_that_seldom_decide_are_not_offered(tmp_path: Path) -> None:
     assert "14 %" not in seen.text
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_a_pull_that_is_not_taken_to_be_wrong_has_its_reason(tmp_path: Path) -> None:
     """Pulls of +19 stood beside a text that did not name them."""
     runs = runs_of_toy(3)
@@ -220,7 +213,7 @@ def test_a_pull_that_is_not_taken_to_be_wrong_has_its_reason(tmp_path: Path) -> 
     assert "None is taken to be wrong" in page(plain, runs, tmp_path).text
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_a_report_without_a_claim_compares_no_model_with_itself(tmp_path: Path) -> None:
     """Residuals before and after were the same picture twice."""
     runs = runs_of_toy(3)
@@ -229,7 +222,7 @@ def test_a_report_without_a_claim_compares_no_model_with_itself(tmp_path: Path) 
     assert seen.text.count("tail length [cm]") == 1
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_the_number_to_measure_better_is_listed_with_what_it_would_show(tmp_path: Path) -> None:
     runs = runs_of_toy(2)
     result = calibrated_toy(2)

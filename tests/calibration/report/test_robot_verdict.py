@@ -14,7 +14,7 @@ from calibration.report.robot_verdict import FILES, RobotVerdict
 from calibration.swimmer.measured_table import read_measurements
 from planner.vehicle.calibration_table import read_knowledge
 from sim.inputs import load_robot
-from tests.calibration.toy_tables import START, calibrated_toy, install_toy, shares_verdicts, toy_table
+from tests.calibration.toy_tables import START, calibrated_toy, install_toy, toy_table
 
 
 def verdict_of(seed: int, **effects: float) -> RobotVerdict:
@@ -24,7 +24,7 @@ def verdict_of(seed: int, **effects: float) -> RobotVerdict:
     return RobotVerdict(**vars(calibrated_toy(seed, **effects)), robot=START, runs=runs, table="runs.csv")
 
 
-@shares_verdicts
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "effects"), [(5, {"end_over_end_drag": 5.0}), (3, {})])
 def test_a_verdict_says_what_it_found_in_a_few_lines(seed: int, effects: dict[str, float]) -> None:
     verdict = verdict_of(seed, **effects)
@@ -45,7 +45,7 @@ def test_a_verdict_says_what_it_found_in_a_few_lines(seed: int, effects: dict[st
     assert axes.patches
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_a_verdict_has_the_corrected_robot_and_writes_its_files(tmp_path: Path) -> None:
     verdict = verdict_of(5, end_over_end_drag=5.0)
     assert verdict.corrected == handed_on(START, verdict.fits.final_refit)[0]
@@ -58,7 +58,7 @@ def test_a_verdict_has_the_corrected_robot_and_writes_its_files(tmp_path: Path) 
     assert "runs.csv" in paths[1].read_text()
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_the_errors_of_a_verdict_as_a_table() -> None:
     verdict = verdict_of(5, end_over_end_drag=5.0)
     frame = verdict.to_frame()

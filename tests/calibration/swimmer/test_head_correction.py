@@ -59,7 +59,6 @@ def correction(**changes: object) -> Correction:
 
 
 @pytest.mark.slow
-@pytest.mark.xdist_group("head correction")
 def test_it_predicts_runs_that_it_was_not_learnt_from(result: Verdict) -> None:
     assert result.verdict == "unexplained"
     assert result.corrections.learnt is not None
@@ -72,7 +71,6 @@ def test_it_predicts_runs_that_it_was_not_learnt_from(result: Verdict) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xdist_group("head correction")
 def test_what_no_effect_does_is_left_unexplained(result: Verdict, table: pd.DataFrame) -> None:
     """No effect is claimed; a correction of the predictions, of no effect's form, helps by itself."""
     assert result.effects == ()
@@ -85,7 +83,6 @@ def test_what_no_effect_does_is_left_unexplained(result: Verdict, table: pd.Data
 
 
 @pytest.mark.slow
-@pytest.mark.xdist_group("head correction")
 def test_the_corrected_robot_simulates_what_was_predicted(
     result: Verdict, table: pd.DataFrame, tmp_path: Path
 ) -> None:
@@ -107,7 +104,6 @@ def test_the_corrected_robot_simulates_what_was_predicted(
 
 
 @pytest.mark.slow
-@pytest.mark.xdist_group("head correction")
 def test_its_uncertainty_is_in_the_covariance(result: Verdict, tmp_path: Path) -> None:
     assert result.corrections.learnt is not None
     (tmp_path / "with.toml").write_text(corrected_toml(START, result.fits.final_refit, result.corrections.learnt))

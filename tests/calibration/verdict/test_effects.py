@@ -23,7 +23,6 @@ from tests.calibration.toy_tables import (
     calibrated,
     calibrated_toy,
     install_few_candidates,
-    shares_verdicts,
     toy_swimmer,
     toy_table,
 )
@@ -31,7 +30,7 @@ from tests.calibration.toy_tables import (
 EFFECT, SIZE = "end_over_end_drag", 5.0
 
 
-@shares_verdicts
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_a_planted_effect_is_found_sized_and_removed() -> None:
     result = calibrated_toy(5, **{EFFECT: SIZE})
@@ -64,7 +63,7 @@ def test_planted_effects_are_mostly_found_sized_and_removed() -> None:
     assert covered >= named - 1
 
 
-@shares_verdicts
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_an_effect_that_the_coefficients_absorb_is_not_testable() -> None:
     """A direction that C_t covers leaves nothing to score, however wrong the model is."""
@@ -77,7 +76,7 @@ def test_an_effect_that_the_coefficients_absorb_is_not_testable() -> None:
     assert misfit.general_p < 0.1
 
 
-@pytest.mark.long  # tests of the head's correction calibrate another such table
+@pytest.mark.rest  # tests of the head's correction calibrate another such table
 @pytest.mark.usefixtures("toy_model")
 def test_an_effect_outside_the_catalogue_is_left_unexplained() -> None:
     table = toy_table(7)
@@ -90,7 +89,7 @@ def test_an_effect_outside_the_catalogue_is_left_unexplained() -> None:
     assert "no effect and no pair" in result.sentence
 
 
-@pytest.mark.long
+@pytest.mark.rest
 @pytest.mark.usefixtures("toy_model")
 def test_what_comes_nearest_is_said_where_nothing_explains() -> None:
     table = toy_table(7, end_over_end_drag=5.0)
@@ -100,7 +99,7 @@ def test_what_comes_nearest_is_said_where_nothing_explains() -> None:
     assert "the nearest, head's end-over-end drag, removes" in result.sentence
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_coefficients_are_recovered_with_their_intervals_and_nothing_is_claimed() -> None:
     result = calibrated_toy(3)
     assert result.verdict == "none"
@@ -127,7 +126,7 @@ def test_fits_arrive_along_a_valley() -> None:
 
 
 @pytest.mark.usefixtures("toy_model")
-@pytest.mark.parametrize("candidates", ["few", pytest.param("all", marks=pytest.mark.long)])
+@pytest.mark.parametrize("candidates", ["few", pytest.param("all", marks=pytest.mark.rest)])
 def test_two_effects_are_found_as_a_pair(candidates: str, monkeypatch: pytest.MonkeyPatch) -> None:
     if candidates == "few":
         install_few_candidates(monkeypatch)
@@ -168,7 +167,7 @@ def in_thinning_fluid(table: pd.DataFrame, rate: float) -> pd.DataFrame:
 
 
 @pytest.mark.usefixtures("toy_model")
-@pytest.mark.parametrize("seed", [7, *(pytest.param(seed, marks=pytest.mark.long) for seed in (8, 9))])
+@pytest.mark.parametrize("seed", [7, *(pytest.param(seed, marks=pytest.mark.rest) for seed in (8, 9))])
 def test_a_drift_with_time_is_found_where_there_is_a_clock(seed: int) -> None:
     """Viscosity that falls by 6 % an hour through a day of runs; nothing is claimed where it does not fall."""
     rate = 0.06
@@ -209,7 +208,7 @@ def test_a_tracked_point_off_the_centre_changes_radius_and_angle_alone() -> None
     }  # fmt: skip
 
 
-@pytest.mark.long  # tests of the head's correction assert it, too
+@pytest.mark.rest  # tests of the head's correction assert it, too
 @pytest.mark.usefixtures("toy_model")
 def test_the_generic_correction_helps_where_no_effect_explains() -> None:
     """A yaw rate that grows with tail length, of no effect's form."""
@@ -223,7 +222,7 @@ def test_the_generic_correction_helps_where_no_effect_explains() -> None:
     assert (corrected**2).mean() < 0.7 * (residual**2).mean()
 
 
-@shares_verdicts
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_an_effect_that_changes_nothing_says_so(tmp_path: Path) -> None:
     """The toy's tails cannot touch: no size of contact shows, and the report has no size for it."""

@@ -9,7 +9,7 @@ from calibration.statistics.fit import least_determined
 from calibration.statistics.study import DRAWS, middle_session
 from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.verdict_json import verdict_record
-from tests.calibration.toy_tables import calibrated, calibrated_toy, shares_verdicts, toy_table
+from tests.calibration.toy_tables import calibrated, calibrated_toy, toy_table
 
 
 @pytest.mark.usefixtures("toy_model", "few_candidates")
@@ -27,7 +27,7 @@ def test_the_locked_session_has_no_say() -> None:
     assert result_of_ruined.error_after > 1.5 * result.error_after
 
 
-@pytest.mark.long
+@pytest.mark.rest
 @pytest.mark.usefixtures("toy_model")
 def test_the_result_is_deterministic() -> None:
     first = calibrated(toy_table(5, end_over_end_drag=5.0))
@@ -35,7 +35,7 @@ def test_the_result_is_deterministic() -> None:
     assert verdict_record(first, table="t") == verdict_record(second, table="t")
 
 
-@shares_verdicts
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_the_locked_session_is_judged_and_used_in_the_end() -> None:
     """p is nothing for a bad model; the last fit has all runs."""
@@ -55,7 +55,7 @@ def test_p_of_the_locked_session_is_even_for_a_good_model() -> None:
     assert 0.2 < np.mean(good) < 0.8
 
 
-@shares_verdicts
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_profile_intervals_are_those_of_the_covariance_where_the_model_is_linear() -> None:
     """And lean to one side where it is not."""

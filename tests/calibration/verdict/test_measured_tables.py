@@ -41,7 +41,7 @@ def test_spheres_in_glycerine_need_the_wall() -> None:
     assert calibrate(read_spheres(source, "ZK2026"), progress=False).verdict == "unexplained"
 
 
-@pytest.mark.long
+@pytest.mark.rates
 @pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured tables are not on this machine")
 @pytest.mark.parametrize(
     ("name", "effect", "size"),

@@ -43,7 +43,6 @@ def nulls() -> list[Verdict]:
 
 
 @pytest.mark.rates
-@pytest.mark.xdist_group("nulls")
 def test_no_effect_is_claimed_where_there_is_none(nulls: list[Verdict]) -> None:
     """One claim in twenty is stated; more than `most` would come from that once in a hundred times (binomial)."""
     most = binom.isf(0.01, len(nulls), 0.05)
@@ -52,7 +51,6 @@ def test_no_effect_is_claimed_where_there_is_none(nulls: list[Verdict]) -> None:
 
 
 @pytest.mark.rates
-@pytest.mark.xdist_group("nulls")
 @pytest.mark.parametrize("name", COEFFICIENTS)
 def test_intervals_of_coefficients_cover(name: str, nulls: list[Verdict]) -> None:
     """As often as 95 % intervals may miss (binomial, once in a hundred times), and they are not too wide.

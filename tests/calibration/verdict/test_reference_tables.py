@@ -31,7 +31,7 @@ def calibrated(name: str) -> Verdict:
 
 
 @pytest.mark.parametrize(
-    "name", [name if name == "ambiguous" else pytest.param(name, marks=pytest.mark.long) for name in TABLES]
+    "name", [name if name == "ambiguous" else pytest.param(name, marks=pytest.mark.rest) for name in TABLES]
 )
 def test_the_files_are_what_make_writes(name: str) -> None:
     assert load_robot(HERE / "robot.toml") == GIVEN
@@ -46,7 +46,7 @@ def test_nothing_is_missing() -> None:
         assert result.final.parameters[name] == pytest.approx(truth, rel=0.1)
 
 
-@pytest.mark.parametrize("candidates", ["few", pytest.param("all", marks=pytest.mark.long)])
+@pytest.mark.parametrize("candidates", ["few", pytest.param("all", marks=pytest.mark.rest)])
 def test_one_effect_is_named_sized_and_handed_on(
     candidates: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -67,7 +67,7 @@ def test_one_effect_is_named_sized_and_handed_on(
     assert "<svg" in (tmp_path / "report.html").read_text()
 
 
-@pytest.mark.long
+@pytest.mark.rest
 def test_what_no_effect_does_is_left_unexplained() -> None:
     result = calibrated("unexplained")
     assert result.verdict == "unexplained"
@@ -75,6 +75,7 @@ def test_what_no_effect_does_is_left_unexplained() -> None:
     assert "no effect and no pair" in result.sentence
 
 
+@pytest.mark.rest
 def test_rivals_are_all_named_with_the_runs_that_would_tell_them_apart(tmp_path: Path) -> None:
     """The verdict, the first rival's size, and the page that a lab reads; the robot is as given."""
     data = read_measurements(HERE / "ambiguous.csv")
@@ -94,6 +95,7 @@ def test_rivals_are_all_named_with_the_runs_that_would_tell_them_apart(tmp_path:
             assert str(value) in text
 
 
+@pytest.mark.rest
 def test_where_tolerances_are_wide_a_wrong_number_comes_ahead_of_those_rivals() -> None:
     """With default tolerances a stiffness 40 % off does what the spin drag does: these runs cannot say which."""
     result = calibrated("ambiguous")

@@ -77,7 +77,7 @@ def test_leaving_an_effect_out_leaves_all_its_columns_out() -> None:
 
 
 @pytest.mark.usefixtures("toy_model")
-@pytest.mark.parametrize("seed", [4, pytest.param(3, marks=pytest.mark.long)])
+@pytest.mark.parametrize("seed", [4, pytest.param(3, marks=pytest.mark.rest)])
 def test_size_and_time_are_recovered_from_the_toy(seed: int) -> None:
     truth = replace(TRUTH, effects=HIDDEN)
     table = make_table(truth, seed=seed, lengths_cm=(5.0, 8.0, 11.0), motor_rpm=SPEEDS, title="")
@@ -88,7 +88,7 @@ def test_size_and_time_are_recovered_from_the_toy(seed: int) -> None:
     assert result.error_after < 1.15 * result.noise_ceiling
 
 
-@pytest.mark.long
+@pytest.mark.rates
 def test_local_thinning_is_found_by_the_simulator() -> None:
     """Truth by time steps on a finer mesh."""
     truth = replace(TRUTH, effects=HIDDEN)

@@ -26,7 +26,7 @@ from calibration.verdict.sequential_test import (
 )
 from calibration.verdict.verdict_json import verdict_record
 from sim.io.errors import InputError
-from tests.calibration.toy_tables import calibrated_toy, install_toy, shares_verdicts, toy_swimmer, toy_table
+from tests.calibration.toy_tables import calibrated_toy, install_toy, toy_swimmer, toy_table
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def undecided(tmp_path_factory: pytest.TempPathFactory) -> tuple[pd.DataFrame, P
     return table, path
 
 
-@shares_verdicts
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_new_runs_of_other_lengths_decide_for_the_truth(undecided: tuple[pd.DataFrame, Path]) -> None:
     table, path = undecided
@@ -57,7 +57,7 @@ def test_new_runs_of_other_lengths_decide_for_the_truth(undecided: tuple[pd.Data
     assert Decision(tuple(standing), 1).sentence.startswith("Decided: head's end-over-end drag.")
 
 
-@shares_verdicts
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_eight_runs_like_the_old_ones_decide_nothing(undecided: tuple[pd.DataFrame, Path]) -> None:
     table, path = undecided

@@ -17,7 +17,7 @@ from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict_json import verdict_record
 from sim.io.errors import InputError, run_command
 from tests.calibration import toy
-from tests.calibration.toy_tables import FEW_DRAWS, START, calibrated, calibrated_toy, shares_verdicts, toy_table
+from tests.calibration.toy_tables import FEW_DRAWS, START, calibrated, calibrated_toy, toy_table
 from tests.page_text import PageText
 
 
@@ -70,7 +70,7 @@ def test_bad_rows_are_named_and_set_aside(toy_model: None) -> None:
 
 
 @pytest.mark.usefixtures("toy_model")
-@pytest.mark.parametrize("names", [("one",), pytest.param(("one", "two"), marks=pytest.mark.long)])
+@pytest.mark.parametrize("names", [("one",), pytest.param(("one", "two"), marks=pytest.mark.rest)])
 def test_few_sessions_give_a_weaker_conclusion(names: tuple[str, ...]) -> None:
     table = toy_table(5, end_over_end_drag=5.0)
     table["session"] = [names[i % len(names)] for i in range(len(table))]
@@ -126,8 +126,8 @@ def test_robots_of_one_kind_are_closed_with_both_limits() -> None:
     "kept",
     [
         ("R_yr_cm", "theta_deg"),
-        pytest.param(("omega_h_rpm", "omega_yr_rad_s"), marks=pytest.mark.long),
-        pytest.param(("omega_t_rpm", "omega_yr_rad_s"), marks=pytest.mark.long),
+        pytest.param(("omega_h_rpm", "omega_yr_rad_s"), marks=pytest.mark.rest),
+        pytest.param(("omega_t_rpm", "omega_yr_rad_s"), marks=pytest.mark.rest),
     ],
 )
 def test_any_two_outputs_are_enough(kept: tuple[str, str]) -> None:
@@ -168,7 +168,7 @@ def test_mistracked_runs_have_little_weight_and_are_named() -> None:
     assert record["rows_of_little_weight"] == list(result.conditions.little_weight)
 
 
-@pytest.mark.long
+@pytest.mark.rest
 @pytest.mark.usefixtures("toy_model")
 def test_the_verdict_is_that_of_the_table_without_the_slipped_decimal_point() -> None:
     table = toy_table(12)
@@ -179,7 +179,7 @@ def test_the_verdict_is_that_of_the_table_without_the_slipped_decimal_point() ->
     assert result.noise_ceiling == pytest.approx(without.noise_ceiling, rel=0.05)
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_noise_and_missing_effects_are_no_gross_errors() -> None:
     assert calibrated_toy(5, end_over_end_drag=5.0).conditions.excluded == ()
 
@@ -229,7 +229,7 @@ def test_runs_of_one_robot_give_a_weaker_conclusion_that_is_stated() -> None:
     assert verdict_record(result, table="t")["limits"] == list(result.conditions.caveats)
 
 
-@pytest.mark.long
+@pytest.mark.rest
 @pytest.mark.usefixtures("toy_model")
 def test_the_papers_protocol_fits_three_and_four_tails_and_predicts_two_and_five() -> None:
     data, held_out = PROTOCOLS["paper"](read_measurements(toy_table(16, end_over_end_drag=5.0)))

@@ -72,7 +72,7 @@ def workers() -> list[int]:
     return [int(mark.name.rsplit("-", 1)[1]) for mark in MARKS.iterdir()]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.rest)])
 def test_an_interrupt_ends_it_with_one_line_and_the_workers(number: int, tmp_path: Path) -> None:
     process = started(building(tmp_path / "out", 400, "endless"))
     until(lambda: len(workers()) == 2, process)
@@ -84,7 +84,7 @@ def test_an_interrupt_ends_it_with_one_line_and_the_workers(number: int, tmp_pat
     assert not (tmp_path / "out" / ".lock").exists()
 
 
-@pytest.mark.long
+@pytest.mark.rest
 def test_the_command_line_stops_and_goes_on(tmp_path: Path) -> None:
     (tmp_path / "sweep.toml").write_text(SMALL.replace("rows = 6", "rows = 64"))
     words = ["build", "--config", str(tmp_path / "sweep.toml"), "--out", str(tmp_path / "out"), "--jobs", "2"]
@@ -106,7 +106,7 @@ def test_the_command_line_stops_and_goes_on(tmp_path: Path) -> None:
     assert without_cost(read(tmp_path / "out")).equals(without_cost(read(tmp_path / "calm")))
 
 
-@pytest.mark.long
+@pytest.mark.rest
 def test_workers_end_with_their_parent(tmp_path: Path) -> None:
     process = started(building(tmp_path / "out", 400, "endless"))
     until(lambda: len(workers()) == 2, process)
@@ -155,7 +155,7 @@ def test_a_worker_killed_at_each_step_of_its_write(tmp_path: Path) -> None:
     assert not [p for p in (tmp_path / "out").rglob(".*")]
 
 
-@pytest.mark.long
+@pytest.mark.rest
 def test_the_build_killed_at_each_of_its_operations(tmp_path: Path) -> None:
     words = [sys.executable, "-m", "tests.dataset.build.dying", str(tmp_path)]
     done = subprocess.run(words, cwd=ROOT, text=True, capture_output=True, timeout=LIMIT)
@@ -195,7 +195,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", "-l", str(disk)], check=True, timeout=LIMIT)
 
 
-@pytest.mark.long
+@pytest.mark.rest
 def test_a_full_disk(small_disk: Path, tmp_path: Path) -> None:
     build(design(200), small_disk / "out", jobs=1, title="", simulate=invented)
     before = read(small_disk / "out")

@@ -24,7 +24,7 @@ def bits(columns: dict[str, np.ndarray], row: int) -> dict[str, object]:
     return {name: values[row].tobytes() for name, values in columns.items() if name != COST}
 
 
-@pytest.mark.parametrize("rows", [4, pytest.param(24, marks=pytest.mark.long)])
+@pytest.mark.parametrize("rows", [4, pytest.param(24, marks=pytest.mark.rest)])
 def test_any_batch_and_any_order_give_the_same_bits(rows: int) -> None:
     """Robots that fall back to time steps used to take their mesh from the fastest robot of their batch."""
     points = load_design().with_rows(rows).points()

@@ -13,6 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 from dataset.build import scheduler as engine
 from dataset.build.build import build
@@ -22,10 +23,10 @@ from sim.io.errors import InputError
 from tests.dataset import sweeps
 from tests.dataset.sweeps import MARKS, ROOT, design, invented
 from tests.processes import LIMIT, printed, until
+from tests.shared import FOLDER
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.xdist_group("clusters"),  # they share the processors and the marks
     pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning"),
 ]
 Head = tuple[str, Callable[[], None]]
@@ -33,9 +34,11 @@ ENVIRONMENT = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('
 
 
 @pytest.fixture(autouse=True)
-def _no_marks() -> None:
-    for mark in MARKS.iterdir():
-        mark.unlink()
+def _one_cluster_at_a_time() -> Iterator[None]:
+    with FileLock(FOLDER / "clusters.lock"):
+        for mark in MARKS.iterdir():
+            mark.unlink()
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +101,7 @@ def test_dask_makes_the_same_rows(dask: Dask, calm: Path, tmp_path: Path, monkey
     assert os.getpid() not in {int(mark.name.rsplit("-", 1)[1]) for mark in MARKS.iterdir()}
 
 
-@pytest.mark.cluster
+@pytest.mark.rest
 def test_dask_replaces_killed_workers(dask: Dask, calm: Path, tmp_path: Path) -> None:
     build(
         design(200), tmp_path / "out", backend="dask", address=dask.address, title="", simulate=sweeps.killing_once
@@ -107,7 +110,7 @@ def test_dask_replaces_killed_workers(dask: Dask, calm: Path, tmp_path: Path) ->
     assert {mark.name.split("-")[-2] for mark in MARKS.iterdir()} >= {"0", "1"}
 
 
-@pytest.mark.cluster
+@pytest.mark.rest
 def test_dask_sets_a_poisonous_chunk_aside(dask: Dask, tmp_path: Path) -> None:
     with pytest.raises(UnfinishedError, match=r"rows \d+ to \d+ \(its worker died 3 times"):
         build(
@@ -117,7 +120,7 @@ def test_dask_sets_a_poisonous_chunk_aside(dask: Dask, tmp_path: Path) -> None:
     assert len(list((tmp_path / "out" / "pending").iterdir())) == 7
 
 
-@pytest.mark.cluster
+@pytest.mark.rest
 def test_dask_goes_on_when_a_nanny_is_killed(dask: Dask, calm: Path, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "slow", "dask", dask.address)
     until(lambda: len(list(MARKS.iterdir())) >= 2 or process.poll() is not None)
@@ -127,7 +130,7 @@ def test_dask_goes_on_when_a_nanny_is_killed(dask: Dask, calm: Path, tmp_path: P
     assert read(tmp_path / "out").equals(read(calm))
 
 
-@pytest.mark.cluster
+@pytest.mark.rest
 def test_dask_ends_when_its_scheduler_is_killed(dask: Dask, calm: Path, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "endless", "dask", dask.address, patience=2)
     until(lambda: len(list(MARKS.iterdir())) >= 2 or process.poll() is not None)
@@ -138,7 +141,7 @@ def test_dask_ends_when_its_scheduler_is_killed(dask: Dask, calm: Path, tmp_path
     assert len(line.splitlines()) == 1
 
 
-@pytest.mark.cluster
+@pytest.mark.rest
 def test_without_dask_workers_it_ends_with_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed", reason="the extra dask is not installed")
     monkeypatch.setattr(engine, "PATIENCE", 1.0)
@@ -211,7 +214,7 @@ def ray(tmp_path: Path) -> Iterator[Head]:
     kill()
 
 
-@pytest.mark.cluster
+@pytest.mark.rest
 def test_ray_ends_when_its_head_is_killed(ray: Head, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "endless", "ray", ray[0], patience=2)
     until(lambda: len(list(MARKS.iterdir())) >= 2 or process.poll() is not None)
@@ -229,7 +232,7 @@ def test_ray_makes_the_same_rows(ray: Head, calm: Path, tmp_path: Path) -> None:
     assert {mark.name.split("-")[-2] for mark in MARKS.iterdir()} >= {"0", "1"}
 
 
-@pytest.mark.cluster
+@pytest.mark.rest
 def test_ray_sets_a_poisonous_chunk_aside_and_stops_when_told(ray: Head, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "poisonous", "ray", ray[0])
     line = printed(process)[1].strip().splitlines()[-1]

@@ -134,6 +134,7 @@ def test_in_c_the_robot_stays_on_its_path_as_well(tmp_path: Path, precise: bool)
     assert min(dwells[:-1]) >= planned().minimum_dwell * (1 - 1e-6)
 
 
+@pytest.mark.rest
 def test_in_single_precision_the_way_back_is_as_short(tmp_path: Path, compiled: CompiledTracker) -> None:
     """From starts within 4 l: both arrive, and at nearly the same time."""
     single, (x, y, _) = CompiledTracker(planned(), tmp_path, single=True), planned().start

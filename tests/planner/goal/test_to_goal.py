@@ -51,7 +51,8 @@ def test_the_motion_begins_and_ends_as_asked(seed: int) -> None:
     assert goal_plan.plan.dwells.min() >= goal_plan.plan.minimum_dwell * (1 - 1e-9)
 
 
-@pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 6))])
+@pytest.mark.rest
+@pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.rest) for seed in (1, 6))])
 def test_time_is_within_5_percent_of_brute_force(seed: int) -> None:
     goal = random_goal(np.random.default_rng(seed))
     goal_plan = to_goal((0, 0, 0), goal, CONTROL)
@@ -104,7 +105,7 @@ def test_the_margin_is_the_stated_error() -> None:
     assert goal_plan.length > direct.length * 1.02
 
 
-@pytest.mark.long
+@pytest.mark.rest
 def test_a_narrow_gap_is_passed_with_shorter_dwells() -> None:
     """With four tails: with two, the phase of the disc makes the stated error wider than the gap."""
     robot = PRESETS["paper-triangle"]
@@ -115,7 +116,8 @@ def test_a_narrow_gap_is_passed_with_shorter_dwells() -> None:
     assert len(goal_plan.plan.dwells) > len(wide.plan.dwells)
 
 
-@pytest.mark.parametrize("seed", [3, pytest.param(0, marks=pytest.mark.long)])
+@pytest.mark.rest
+@pytest.mark.parametrize("seed", [3, pytest.param(0, marks=pytest.mark.rest)])
 def test_a_replay_in_the_simulator_stays_out(seed: int) -> None:
     goal_plan = to_goal(robot=CONTROL, **goal_behind_circles(np.random.default_rng(seed)))
     clearance, off, turned = replayed_clearance(goal_plan)
@@ -147,7 +149,7 @@ def test_a_heading_in_degrees_is_not_taken_as_radians() -> None:
         to_goal((0, 0, -30), (4, 1, 0), CONTROL)
 
 
-@pytest.mark.parametrize("share", [pytest.param(1.2, marks=pytest.mark.long)])
+@pytest.mark.parametrize("share", [pytest.param(1.2, marks=pytest.mark.rest)])
 def test_a_plan_to_a_goal_arrives_when_it_is_asked_to(share: float) -> None:
     fastest = to_goal((0, 0, 0), (2.5, 1, 0), CONTROL, minimum_dwell=2.0)
     seconds = share * float(fastest.plan.seconds.sum())

@@ -79,6 +79,7 @@ def test_a_path_that_is_clear_stays(tracked: TrackedVehicle) -> None:
     assert plan_clear(LINE, tracked, QUICK, FreeSpace()).kept_clear is None
 
 
+@pytest.mark.rest
 def test_a_closed_path_that_is_blocked_at_its_start_begins_elsewhere(tracked: TrackedVehicle) -> None:
     space = FreeSpace.of([Circle(2.5, 0, 0.4)])
     result = plan_clear(circle(2.5), tracked, QUICK, space)
@@ -96,6 +97,7 @@ def test_the_simulator_stays_clear_and_within_the_stated_error(tracked: TrackedV
     assert Footprint.of(CONTROL, 0.0).clearance(poses, space).min() > 0
 
 
+@pytest.mark.rest
 def test_a_tracked_robot_with_wrong_coefficients_stays_clear(tracked: TrackedVehicle) -> None:
     result = plan_clear(LINE, tracked, PlanRequest(), FreeSpace.of([Circle(4, 0.2, 0.5)]))
     assert result.kept_clear is not None
@@ -112,7 +114,7 @@ def test_with_feedback_the_margin_is_smaller(tracked: TrackedVehicle) -> None:
     assert watched.feedback_error <= watched.kept_clear.margin < alone.kept_clear.margin
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 8))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.rest) for seed in range(1, 8))])
 def test_random_obstacles(seed: int, tracked: TrackedVehicle) -> None:
     rng = np.random.default_rng(seed)
     angle = np.linspace(0, 5, 200)

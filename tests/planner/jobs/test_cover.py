@@ -85,7 +85,7 @@ def test_keep_outs_are_not_touched(tracked: TrackedVehicle) -> None:
     assert swept.share > 0.85
 
 
-@pytest.mark.long
+@pytest.mark.rest
 def test_the_simulator_covers_the_same(tracked: TrackedVehicle) -> None:
     swept = cover(FIELD, 0.5, tracked, QUICK)
     track = replay([swept.plan.schedule()])[0][["x_over_l", "y_over_l"]].to_numpy(float)

@@ -82,6 +82,7 @@ def test_the_later_robot_does_not_wait_longer_than_it_must(two: FleetPlan) -> No
         assert (distances(one, other) - one.error - other.error).min() < APART
 
 
+@pytest.mark.rest
 def test_a_robot_that_must_leave_its_start_circles_on_its_way() -> None:
     passing = straight((-1.0, -3.0), (-1.0, 3.5))  # over the start of the last one
     across = straight((3.2, -2.8), (3.2, 3.5))
@@ -127,6 +128,7 @@ def test_delays_are_kept() -> None:
     assert result.begin_s[1] >= 45
 
 
+@pytest.mark.rest
 def test_waiting_circles_keep_clear_of_walls() -> None:
     passing, across = straight((-1.0, -3.0), (-1.0, 3.5)), straight((3.2, -2.8), (3.2, 3.5))
     tracked = tracked_vehicle(CONTROL, None, "head_centre", None)
@@ -203,6 +205,7 @@ def test_they_keep_apart_in_the_simulator(two: FleetPlan) -> None:
     assert least_between(two, poses, times) >= two.sure_m
 
 
+@pytest.mark.rest
 def test_robots_under_trackers_keep_apart() -> None:
     result = keep_apart(crossing(FINE), feedback=True)
     rng = np.random.default_rng(3)

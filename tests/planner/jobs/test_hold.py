@@ -66,6 +66,7 @@ def test_no_pair_of_dwells_stays_nearer_than_one_direction(point: str) -> None:
     assert min(sizes) < smallest * 1.02
 
 
+@pytest.mark.rest
 def test_the_orbit_is_little_wider_than_the_smallest_one(held: HoldPlan, tracked: TrackedVehicle) -> None:
     assert held.smallest == pytest.approx(tracked.vehicle.turn_radius)
     assert held.smallest < held.radius < 1.05 * held.smallest

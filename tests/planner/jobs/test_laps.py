@@ -91,6 +91,7 @@ def test_a_lap_drifts_as_stated(laps: Plan) -> None:
     assert beyond <= 6
 
 
+@pytest.mark.rest
 def test_the_simulator_swims_lap_after_lap(laps: Plan) -> None:
     assert laps.lap is not None
     track = replay([laps.schedule(laps=2)])[0]

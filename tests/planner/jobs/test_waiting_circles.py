@@ -52,6 +52,7 @@ def test_a_plan_without_circles_stays_as_it_is(straight: Plan) -> None:
     assert with_circles(straight, []) is straight
 
 
+@pytest.mark.rest
 def test_a_robot_with_a_goal_still_ends_there() -> None:
     trip = to_goal((0, 0, 0), (3, 1, 1), CONTROL)
     waiting = with_circles(trip.plan, [WaitingCircle(50, -1)], trip.goal)

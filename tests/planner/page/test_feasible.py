@@ -54,6 +54,7 @@ def test_corners_that_are_not_allowed() -> None:
     assert sum(isinstance(outcome, Exception) for outcome in found) > 3
 
 
+@pytest.mark.rest
 def test_noise_and_work() -> None:
     paths = [path.scaled(scale) for path in PATHS.values() for scale in (0.1, 1.0, 20.0)]
     for corner in ("nearest", "minimax"):

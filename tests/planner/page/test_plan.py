@@ -108,6 +108,7 @@ def test_plans_of_presets(name: str, of_presets: dict[str, Any]) -> None:
     check_plan(of_presets[name], plan(path, CONTROL, lookup=shipped(), **options))
 
 
+@pytest.mark.rest
 def test_plans_of_other_robots() -> None:
     robots = [TRIANGLE, *random_robots(3)]
     found = planned([(circle(2.5), robot, {}) for robot in robots])

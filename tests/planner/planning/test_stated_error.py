@@ -51,7 +51,7 @@ def stated_for(car: Vehicle, switches: Switches, rollout: Rollout, error: Predic
     "path",
     [
         pytest.param(circle(1.0), id="circle"),
-        pytest.param(Path2D.of([[0, 0], [25, 0]]), id="line", marks=pytest.mark.long),
+        pytest.param(Path2D.of([[0, 0], [25, 0]]), id="line", marks=pytest.mark.rest),
     ],
 )
 @pytest.mark.parametrize("errors", [1.0, 4.0])
@@ -68,6 +68,7 @@ def test_it_is_the_quantile_over_drawn_vehicles(path: Path2D, errors: float) -> 
     assert np.mean(np.array(worst) + WOBBLE <= stated) == pytest.approx(0.95, abs=0.035)
 
 
+@pytest.mark.rest
 def test_errors_of_the_response_add_up_on_curves() -> None:
     """Drawn vehicles have another curve of lags each; what differs between left and right dwells adds up."""
     car = replace(vehicle(), modes=tuple(_wavy_modes()))

@@ -84,6 +84,7 @@ def test_the_robot_is_as_near_to_its_path_as_the_tracker_says(current: float) ->
     assert 0.9 < np.concatenate(within).mean() < 0.98
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize(("robot", "objective"), [("paper-control", "flips"), ("paper-triangle", "error")])
 def test_the_same_where_the_swings_are_large(robot: str, objective: Objective, tmp_path: Path) -> None:
     """It was in 87 % of the time with few flips, and in 86 % on a wave of a robot with four tails."""

@@ -47,7 +47,7 @@ FURTHER = ("5 % faster turns", "3 % asymmetry")
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.long) if name in FURTHER else name for name in ROBOTS]
+    "name", [pytest.param(name, marks=pytest.mark.rest) if name in FURTHER else name for name in ROBOTS]
 )
 def test_robots_that_differ_stay_on_the_path(name: str) -> None:
     cameras = [replace(PROMPT, seed=seed) for seed in range(3)]
@@ -128,6 +128,7 @@ def alarmed(car: Vehicle, camera: Camera) -> bool:
     return rang
 
 
+@pytest.mark.rest
 def test_alarms_are_rare_for_a_robot_of_the_model_and_come_for_another() -> None:
     cameras = [replace(PROMPT, seed=seed) for seed in range(4)]
     assert sum(alarmed(changed(left=1.02), camera) for camera in cameras) == 0

@@ -194,7 +194,7 @@ def test_end_over_end_drag_slows_the_turn_as_much_as_estimated() -> None:
     assert 0.5 < ratio < 0.75
 
 
-@pytest.mark.long
+@pytest.mark.rates
 def test_a_row_with_contact_is_valid_where_its_gap_is_kept() -> None:
     """0.99 of a diameter: overlap without contact, within its limit with it."""
     assert least_gap([0.0, 0.5, 1.0]).tolist() == [1.0, 0.98, 0.98]

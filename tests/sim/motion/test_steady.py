@@ -150,6 +150,7 @@ def test_a_quick_turn_is_followed_from_rest() -> None:
     assert motion.v_z[1] == alike.v_z[1]
 
 
+@pytest.mark.rest
 def test_tails_in_contact_that_leave_the_orbit_are_stepped_and_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where differences between tails grow, and stepping reaches another motion, that one is the answer."""
     groups = control(1, N=4, omega_bar=30.0, tail_contact=1.0)

@@ -74,13 +74,7 @@ def yaw_after(steps: int, *, edges: int = 12, time: float = 1.5) -> float:
     return float(state.pose[YAW])
 
 
-@pytest.mark.slow
-def test_time_steps_are_of_second_order() -> None:
-    coarse, middle, fine = (yaw_after(n, time=0.5) for n in (80, 160, 320))
-    assert math.log2(abs((coarse - middle) / (middle - fine))) > 1.8
-
-
-@pytest.mark.long
+@pytest.mark.rest
 def test_the_robot_converges_at_second_order_in_edges() -> None:
     yaw = [yaw_after(400, edges=n) for n in (8, 16, 32)]
     assert math.log2(abs((yaw[0] - yaw[1]) / (yaw[1] - yaw[2]))) > 1.8

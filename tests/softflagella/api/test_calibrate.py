@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import softflagella as sf
-from tests.calibration.toy_tables import START, calibrated_toy, install_toy, shares_verdicts, toy_table
+from tests.calibration.toy_tables import START, calibrated_toy, install_toy, toy_table
 
 
 def circle_track(run: int, samples: int) -> pd.DataFrame:
@@ -30,7 +30,7 @@ def test_tracks_that_are_left_out_are_warned_of() -> None:
     assert table.attrs["units"]["v_cm_s"] == "cm/s"
 
 
-@shares_verdicts
+@pytest.mark.slow
 def test_new_runs_decide_a_verdict_that_is_at_hand(monkeypatch: pytest.MonkeyPatch) -> None:
     verdict = calibrated_toy(1, lengths_cm=(8.0,), end_over_end_drag=4.0)
     install_toy(monkeypatch)

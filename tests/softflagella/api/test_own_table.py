@@ -8,6 +8,7 @@ import planner.files.own_table
 import softflagella as sf
 
 
+@pytest.mark.rest
 def test_every_planning_function_takes_the_robot_s_own_table(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(planner.files.own_table, "_TABLES", {})
     robot = "paper-control"

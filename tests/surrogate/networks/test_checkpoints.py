@@ -94,7 +94,7 @@ def trained(
     return network
 
 
-@pytest.mark.long
+@pytest.mark.rest
 def test_training_that_is_killed_twice_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
     folder = tmp_path / "model.pt.states"
     goes_on = "train: tails of N = 3 and more, network 1 of 5: goes on after epoch 10 of 40"

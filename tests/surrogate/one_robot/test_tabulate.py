@@ -61,7 +61,7 @@ def test_it_has_both_directions_of_a_robot_that_turns_unequally() -> None:
     assert np.abs(curves.lag[0] - curves.lag[1]).max() > 1e-5
 
 
-@pytest.mark.long
+@pytest.mark.rest
 def test_a_robot_that_turns_unequally_is_planned_and_stays_within_the_stated_error() -> None:
     robot = replace(PRESETS["paper-control"], effects={"left_right_bias": 0.2})
     result = plan(polygon(4, 3.0), robot, lookup=tabulate(robot))
