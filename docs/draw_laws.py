@@ -1,4 +1,4 @@
-"""Draw the picture of docs/tutorial/laws.md: where the law acts, and on what it depends.
+"""Draw the picture of docs/tutorial/calibration.md: where the law acts, and on what it depends.
 
 Usage: python docs/draw_laws.py [PNG]
 

@@ -24,9 +24,9 @@ def source(cell: dict[str, Any]) -> str:
     return "".join(cell["source"])
 
 
-def test_there_are_two_and_pages_list_them() -> None:
+def test_there_is_one_and_pages_list_it() -> None:
     entries = (DOCS / "index.md").read_text().splitlines()
-    assert len(NOTEBOOKS) == 2
+    assert len(NOTEBOOKS) == 1
     assert all(f"notebooks/{notebook.stem}" in entries for notebook in NOTEBOOKS)
 
 
