@@ -50,7 +50,7 @@ def _properties(effect: Effect) -> Iterator[tuple[str, str]]:
     yield "twice the viscosity at half the speed", "half the rate" if effect.similar else "another motion"
     yield "energy", "only dissipates" if effect.dissipative else "may also drive"
     for driver in effect.drivers:
-        size = f"null + ε × `{driver.column}` [{driver.unit}]"
+        size = f"null + ε × `{driver.column}`; unit of ε: {driver.unit}"
         yield f"candidate in a calibration: `{driver.name}`", f"{driver.title}: {size}"
     if effect.beside:
         yield "shows only beside", f"`{effect.beside}`"
