@@ -21,7 +21,7 @@ SOURCES = [
     file for top in TOP.split("|") for file in (ROOT / top).rglob("*.*") if file.suffix in {".py", ".js", ".h"}
 ]
 LINK = re.compile(r"\]\((?!https?:)([^)\s#]*)#?([^)\s]*)\)")
-FILE = re.compile(rf"`((?:{TOP}|docs)/[\w/.-]+)`|\b(docs/[\w/-]+\.(?:md|py|ipynb))\b")
+FILE = re.compile(rf"`((?:{TOP}|docs)/[\w/.-]+)`|(?<![\w/.-])(docs/[\w/-]+\.(?:md|py|ipynb))\b")
 MODULE = re.compile(rf"`((?:{TOP})(?:\.\w+)+)`|python -m ((?:{TOP})(?:\.\w+)*)")
 BENCHMARK = re.compile(r"python -m\s+benchmarks[ \n]([a-z_]+)\b")
 
