@@ -44,15 +44,16 @@ def velocity(track: pd.DataFrame) -> tuple[float, float]:
     return moved.real.mean(), moved.imag.mean()
 
 
+@pytest.mark.parametrize("tails", [2, 3, 5])
 @pytest.mark.parametrize("direction", [1, -1])
-def test_the_table_holds_in_the_simulator(direction: int) -> None:
-    """Random robots of the domain, two to five tails."""
+def test_the_table_holds_in_the_simulator(direction: int, tails: int) -> None:
+    """Random robots of the domain."""
     rng = np.random.default_rng(7)
-    values = {name: np.exp(rng.uniform(np.log(low), np.log(high), 72)) for name, (low, high) in BOUNDS.items()}
-    turned = {"omega_bar": direction * values["omega_bar"], "N": np.repeat([2, 3, 5], 24)}
+    values = {name: np.exp(rng.uniform(np.log(low), np.log(high), 24)) for name, (low, high) in BOUNDS.items()}
+    turned = {"omega_bar": direction * values["omega_bar"], "N": np.full(24, tails)}
     motion = steady(Groups.from_columns({**values, **turned}))
     solved = motion.converged & ~motion.failed
-    assert solved.sum() > 36
+    assert solved.sum() > 12
     assert len(TABLE) == 5
     for column, (_, sign) in TABLE.items():
         expected = sign if column == "v_z" else sign * direction
