@@ -120,8 +120,11 @@ def test_a_stranger_finds_the_parts_in_order(folder: Path) -> None:
 
 
 @shares_verdicts
-def test_the_page_speaks_in_a_lab_s_units(folder: Path) -> None:
+def test_the_page_speaks_in_words_and_in_a_lab_s_units(folder: Path) -> None:
     seen = PageText(folder / "demo.html")
+    names = re.findall(r"\b(?:omega_\w+|R_yr\w*|theta_\w+|v_[xz]|l_over_\w+|\w+_bar|\w+_over_l)\b", seen.text)
+    assert names == []
+    assert re.findall(r"/ ?l\b|\bl rms", seen.text) == []  # errors and axes were in tail lengths
     for value in ("N = 2", "11 cm", "3.2 mm", "1.2 MPa", "43.3 rpm", "1.49 Pa s"):
         assert value in seen.text, value
     motion = {name: values[0] for name, values in lab_motion([ROBOT], steady(ROBOT.groups()).columns()).items()}
