@@ -120,10 +120,11 @@ def test_an_old_option_works_with_a_warning(tmp_path: Path, capsys: pytest.Captu
     assert min(sf.load_plan(tmp_path / "plan.json")["dwell_s"]) >= 3
 
 
-def test_effects_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_effects_are_listed_with_a_sentence_each(capsys: pytest.CaptureFixture[str]) -> None:
     main(["effects"])
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == list(sf.effects())
+    assert all(len(line.split()) > 3 and line.endswith(".") for line in lines)
 
 
 def test_version_and_unknown_words(capsys: pytest.CaptureFixture[str]) -> None:
