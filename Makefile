@@ -68,10 +68,11 @@ constraints: $(VENV)/bin/uv ## pin what pyproject.toml needs, with hashes (UPGRA
 	| $(UV) pip compile --quiet pyproject.toml - --extra dev --extra clusters --extra docs --extra page --universal --generate-hashes \
 	--no-annotate --custom-compile-command 'make constraints' $(if $(UPGRADE),--upgrade) -o constraints.txt
 
-lint: $(STAMP) ## style and types
+lint: $(STAMP) ## style, types, budget of lines
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
+	$(RUN) .ci/lines
 
 docs: $(VENV)/.docs ## the documentation as pages, docs/_build/html/index.html
 	$(RUN) -m sphinx -q -W --keep-going -b html docs docs/_build/html

@@ -4,192 +4,114 @@ from __future__ import annotations
 
 import ast
 import inspect
-import io
 import os
 import textwrap
-import tokenize
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import is_dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple, get_args, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 import softflagella
 from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS
 from sim.effects import catalogue
-from sim.io.commands import Command
 from sim.model.effect import Effect
 from softflagella.__main__ import PACKAGES, WORDS, command
 
 
 def write_generated_pages(folder: Path) -> None:
-    """Write effects.md, columns.md, objects.md and commands.md into `folder`."""
+    """Write effects.md, columns.md, objects.md and commands.md into `folder`, where they have changed."""
     folder.mkdir(parents=True, exist_ok=True)
-    pages = {
-        "effects": effects_page(),
-        "columns": columns_page(),
-        "objects": objects_page(),
-        "commands": commands_page(),
-    }
-    for name, text in pages.items():
-        page = folder / f"{name}.md"
+    for make in (effects_page, columns_page, objects_page, commands_page):
+        page, text = folder / f"{make.__name__.removesuffix('_page')}.md", "\n\n".join(filter(None, make())) + "\n"
         if not page.exists() or page.read_text() != text:
             page.write_text(text)
 
 
-def effects_page() -> str:
+def effects_page() -> Iterator[str]:
     """Describe every effect as it is declared: equation, source, unit, bounds."""
-    effects = catalogue()
-    summary = table(
-        ("effect", "what it is", "null", "bounds", "unit of ε"),
-        [
-            (f"[`{e.name}`](#{e.name.replace('_', '-')})", e.title, number(e.null), bounds(e.bounds), e.unit)
-            for e in effects.values()
-        ],
-    )
-    parts = [
-        "# Effects",
-        f"Each of these {len(effects)} files in `sim/effects` adds an effect that the base model leaves out. "
-        "An effect has a size ε. At its null value the model is exactly the base model.",
-        "In a robot.toml, effects are lines `name = size` in the table `[effects]`; in a table of robots they are "
-        "columns.",
-        summary,
-    ]
-    for effect in effects.values():
-        parts += [f"## {effect.name.replace('_', ' ')}", _about(effect)]
-    return "\n\n".join(parts) + "\n"
+    effects = catalogue().values()
+    yield "# Effects\n\nEach adds to the base model, with a size ε; at the null of ε the model is the base model."
+    yield "robot.toml has lines `name = size` in the table `[effects]`; a table of robots has columns."
+    links = [f"[`{effect.name}`](#{effect.name.replace('_', '-')})" for effect in effects]
+    rows = [(k, e.title, number(e.null), number(*e.bounds), e.unit) for k, e in zip(links, effects, strict=True)]
+    yield table(("effect", "what it is", "null", "bounds", "unit of ε"), rows)
+    for e in effects:
+        yield f"## {e.name.replace('_', ' ')}\n\n{inspect.getdoc(import_module(f'sim.effects.{e.name}'))}"
+        yield table(("property", ""), _properties(e))
 
 
-def _about(effect: Effect) -> str:
-    if effect.symmetry == "even":
-        reversed_motor = "left and right turns stay mirror images"
-    else:
-        reversed_motor = "left and right turns differ"
-    if effect.similar:
-        viscosity = "the same motion at half the rate"
-    else:
-        viscosity = "another motion: the effect has a scale of its own"
-    properties = [
-        ("name", f"`{effect.name}`"),
-        ("equation", f"`{effect.equation}`"),
-        ("source", effect.source),
-        ("unit of ε", effect.unit),
-        ("null, bounds, typical", f"{number(effect.null)}, {bounds(effect.bounds)}, {number(effect.typical)}"),
-        ("when the motor is reversed", reversed_motor),
-        ("twice the viscosity at half the speed", viscosity),
-        ("energy", "only dissipates" if effect.dissipative else "may also drive"),
-    ]
+def _properties(effect: Effect) -> Iterator[tuple[str, str]]:
+    yield "name", f"`{effect.name}`"
+    yield "equation", f"`{effect.equation}`"
+    yield "source", effect.source
+    yield "null, bounds, typical", f"{number(effect.null)}, {number(*effect.bounds)}, {number(effect.typical)}"
+    yield "left and right turns", "mirror images" if effect.symmetry == "even" else "differ"
+    yield "twice the viscosity at half the speed", "half the rate" if effect.similar else "another motion"
+    yield "energy", "only dissipates" if effect.dissipative else "may also drive"
     for driver in effect.drivers:
-        words = f"`{driver.name}`, {driver.title}: size = null + ε × `{driver.column}`; unit of ε: {driver.unit}"
-        properties.append(("candidate in a calibration", words))
+        size = f"null + ε × `{driver.column}`; unit of ε: {driver.unit}"
+        yield f"candidate in a calibration: `{driver.name}`", f"{driver.title}: {size}"
     if effect.beside:
-        properties.append(("shows only beside", f"`{effect.beside}`"))
-    words = inspect.getdoc(import_module(f"sim.effects.{effect.name}")) or ""
-    return f"{words}\n\n{table(('property', ''), properties)}"
+        yield "shows only beside", f"`{effect.beside}`"
 
 
-def columns_page() -> str:
+def columns_page() -> Iterator[str]:
     """List the columns of a data set as its schema declares them."""
-    parts = ["# Columns of a data set", "The Parquet files store the unit and the meaning of each column, too."]
+    yield "# Columns of a data set\n\nA sweep over [effects](effects.md) has one more for each."
     for title, columns in (("Inputs", INPUTS), ("Outputs", OUTPUTS), ("Flags", FLAGS)):
         rows = [(f"`{c.name}`", str(c.type), c.unit, c.meaning) for c in columns]
-        parts += [f"## {title}", table(("column", "type", "unit", "meaning"), rows)]
-    parts.append("A sweep over effects has one column for each effect, see [Effects](effects.md).")
-    return "\n\n".join(parts) + "\n"
+        yield f"## {title}\n\n{table(('column', 'type', 'unit', 'meaning'), rows)}"
 
 
-class Field(NamedTuple):
-    """A field of a class, as its source declares it."""
-
-    name: str
-    type: str
-    meaning: str  # the comment behind it
-
-
-def objects_page() -> str:
-    """List the fields of the public classes and of their parts."""
-    parts = [
-        "# Fields of objects",
-        "What the objects of [Python](../api.md) hold, and their parts. Lengths are in tail lengths l, times in "
-        "μ0 l⁴/EI, unless a field says its unit.",
-    ]
-    for record in public_records():
-        rows = [(f"`{name}`", f"`{kind}`", meaning) for name, kind, meaning in fields_of(record)]
-        summary = (inspect.getdoc(record) or "").split("\n\n")[0].replace("\n", " ")
-        parts += [f"## {record.__name__}", summary, table(("field", "type", "meaning"), rows)]
-    return "\n\n".join(parts) + "\n"
-
-
-def public_records() -> list[type]:
-    """List the public dataclasses and named tuples, then those of which their fields are made."""
-    public = [getattr(softflagella, name) for name in softflagella.__all__]
-    records = [thing for thing in public if _is_record(thing)]
+def objects_page() -> Iterator[str]:
+    """List the fields of the public classes, then those of the classes of which their fields are made."""
+    yield "# Fields of objects\n\nLengths are in tail lengths l, times in μ0 l⁴/EI, unless a field says its unit."
+    records = [record for name in softflagella.__all__ for record in _records(getattr(softflagella, name))]
     for record in records:  # which grows
-        for hint in get_type_hints(record).values():
-            records += [part for part in _classes(hint) if _is_record(part) and part not in records]
-    return records
+        parts = [part for hint in get_type_hints(record).values() for part in _records(hint)]
+        records += [part for part in dict.fromkeys(parts) if part not in records]
+        summary = (inspect.getdoc(record) or "").split("\n\n")[0].replace("\n", " ")
+        yield f"## {record.__name__}\n\n{summary}"
+        yield table(("field", "type", "meaning"), _fields(record).values())
 
 
-def fields_of(record: type) -> list[Field]:
-    """Read the fields of a class from its source, those of its bases first."""
-    bases = [base for base in reversed(record.__mro__[1:]) if _is_record(base)]
-    fields = {field.name: field for base in bases for field in fields_of(base)}
-    source = textwrap.dedent(inspect.getsource(record))
-    tokens = tokenize.generate_tokens(io.StringIO(source).readline)
-    comments = {token.start[0]: token.string.lstrip("# ") for token in tokens if token.type == tokenize.COMMENT}
-    (definition,) = ast.parse(source).body
-    assert isinstance(definition, ast.ClassDef)
-    for node in definition.body:
-        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
-            meaning = comments.get(node.end_lineno or 0, "")
-            fields[node.target.id] = Field(node.target.id, ast.unparse(node.annotation), meaning)
-    return list(fields.values())
+def _records(hint: Any) -> list[type]:
+    ours = inspect.isclass(hint) and hint.__module__.partition(".")[0] in PACKAGES
+    own = [hint] if ours and (is_dataclass(hint) or hasattr(hint, "_fields")) else []
+    return own + [record for argument in get_args(hint) for record in _records(argument)]
 
 
-def _is_record(thing: Any) -> bool:
-    if not inspect.isclass(thing) or thing.__module__.partition(".")[0] not in PACKAGES:
-        return False
-    return is_dataclass(thing) or (issubclass(thing, tuple) and hasattr(thing, "_fields"))
+def _fields(record: type) -> dict[str, tuple[str, str, str]]:
+    """Map the fields, those of bases first, to name, type and the comment behind them."""
+    fields: dict[str, tuple[str, str, str]] = {}
+    for base in filter(_records, reversed(record.__mro__)):
+        source = textwrap.dedent(inspect.getsource(base))
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.col_offset == 4:
+                meaning = source.splitlines()[(node.end_lineno or 1) - 1].partition("  # ")[2]
+                fields[node.target.id] = (f"`{node.target.id}`", f"`{ast.unparse(node.annotation)}`", meaning)
+    return fields
 
 
-def _classes(hint: Any) -> Iterator[type]:
-    if inspect.isclass(hint):
-        yield hint
-    for part in get_args(hint):
-        yield from _classes(part)
-
-
-def commands_page() -> str:
+def commands_page() -> Iterator[str]:
     """List every command with its help text."""
     os.environ["COLUMNS"] = "100"
-    parts = [
-        "# Commands",
-        "The most frequent commands have a short form. Invalid input ends with one line on stderr and exit "
-        "status 2.",
-    ]
+    usage = "```text\n{}```".format
+    yield "# Commands\n\nFrequent ones have a short form. Bad input ends with one line and exit status 2."
     for word, (package, name) in WORDS.items():
         same = "" if package == "softflagella" else f"The same as `softflagella {package} {name}`."
-        parts += [f"## {word}", same, _help(command(word), f"softflagella {word}")]
+        yield from (f"## {word}", same, usage(command(word).parser(f"softflagella {word}").format_help()))
     for package, what in PACKAGES.items():
-        program = import_module(f"{package}.__main__").program
-        parts += [f"## {package}", f"{what[0].upper()}{what[1:]}."]
-        for name, packaged in program.commands.items():
-            parts += [f"### {package} {name}", _help(packaged, f"softflagella {package} {name}")]
-    return "\n\n".join(part for part in parts if part) + "\n"
+        yield f"## {package}\n\n{what[0].upper()}{what[1:]}."
+        for name, packaged in import_module(f"{package}.__main__").program.commands.items():
+            yield f"### {package} {name}"
+            yield usage(packaged.parser(f"softflagella {package} {name}").format_help())
 
 
-def _help(described: Command, prog: str) -> str:
-    return f"```text\n{described.parser(prog).format_help().rstrip()}\n```"
-
-
-def number(value: float) -> str:
-    """Write a number with a typographic minus."""
-    return f"{value:g}".replace("-", "−")
-
-
-def bounds(ends: tuple[float, float]) -> str:
-    """Write an interval in words."""
-    return f"{number(ends[0])} to {number(ends[1])}"
+def number(*values: float) -> str:
+    """Write a number, or a range, with typographic minus signs."""
+    return " to ".join(f"{value:g}" for value in values).replace("-", "−")
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

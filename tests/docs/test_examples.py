@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import os
 import re
 import subprocess
@@ -61,34 +60,9 @@ def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytes
         if block.language == "python":
             exec(compile(block.code, page_name(page), "exec"), names)
         else:
-            done = subprocess.run(
-                ["sh", "-e", "-c", block.code],
-                env=shell,
-                cwd=work,
-                capture_output=True,
-                text=True,
-                check=False,
-                timeout=LIMIT,
-            )
+            command = ["sh", "-e", "-c", block.code]
+            done = subprocess.run(command, env=shell, capture_output=True, text=True, timeout=LIMIT)
             assert done.returncode == 0, f"{block.code}\n{done.stdout}\n{done.stderr}"
-
-
-# Pages for people who change the package, whose examples are parts of its modules.
-DEEPER = {"howto/effect.md", "howto/column.md", "maintaining.md"}
-PACKAGES = {"sim", "dataset", "surrogate", "planner", "calibration"}
-
-
-@pytest.mark.parametrize("page", [p for p in PAGES if page_name(p) not in DEEPER], ids=page_name)
-def test_pages_need_no_deeper_import_than_softflagella(page: Path) -> None:
-    for block in blocks(page):
-        if block.language != "python":
-            continue
-        for node in ast.walk(ast.parse(block.code)):
-            modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-            modules += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-            for module in modules:
-                assert module.split(".")[0] not in PACKAGES, f"{page_name(page)} imports {module}"
-                assert not module.startswith("softflagella."), f"{page_name(page)} imports {module}"
 
 
 def test_c_on_pages_compiles(tmp_path: Path) -> None:
@@ -110,22 +84,14 @@ def test_every_block_is_of_a_known_language() -> None:
         page_blocks = blocks(page)
         assert len(page_blocks) == len(fences) - len(directives), page_name(page)
         assert {block.language for block in page_blocks} <= SHOWN, page_name(page)
+        for block in page_blocks:
+            if block.language == "toml":
+                tomllib.loads(block.code)
 
 
 def test_the_robot_on_the_page_of_files_is_one(tmp_path: Path) -> None:
     robot = next(block for block in blocks(DOCS / "reference" / "files.md") if block.language == "toml")
     file = tmp_path / "robot.toml"
-    file.write_text(robot.code)
+    file.write_text(robot.code.replace("# [effects]", "[effects]").replace("# end_", "end_"))
     assert load_robot(file).tails == 2
-    file.write_text(
-        robot.code.replace("# [effects]", "[effects]").replace("# end_", "end_").replace("# disc", "disc")
-    )
     assert load_robot(file).effects == {"end_over_end_drag": 5.0}
-    assert load_robot(file).disc_offset == 0.016
-
-
-def test_toml_on_pages_is_toml() -> None:
-    for page in PAGES:
-        for block in blocks(page):
-            if block.language == "toml":
-                tomllib.loads(block.code)
