@@ -1,4 +1,4 @@
-"""Truths for the benchmarks of laws: a design of runs, the score of a signal in it, and laws drawn at random.
+"""Truths for the benchmark of laws: a design of runs, the score of a signal in it, and laws drawn at random.
 
 The score λ is what coefficients and nuisance parameters leave of a signal in the linear model, in standard
 deviations. Truths are drawn from the places of the search (`calibration.laws.places`).
@@ -6,19 +6,17 @@ deviations. Truths are drawn from the places of the search (`calibration.laws.pl
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from benchmarks.calibration.planted import NOISE, ROBOT, SESSION
+from benchmarks.calibration.planted import ROBOT
 from calibration.laws.inputs import EXPONENTS
 from calibration.laws.law_model import LEVER, lever_arms
 from calibration.laws.places import Place, places
-from calibration.report.robot_laws import RobotLaws
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import start_values
@@ -29,20 +27,30 @@ from calibration.swimmer.synthetic_table import make_table
 from sim.arrays import Floats
 from sim.inputs import group_columns
 from sim.model.groups import Groups
-from sim.model.power_law import COEFFICIENTS, Powers
+from sim.model.power_law import Powers
 
 SCORES = (8.0, 16.0, 32.0)
 NULL = 1000  # seed of the table in which nothing is missing
-_MULTIPLIED = ("omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s", "R_yr_cm")  # outputs with relative noise
 _STEEP = 1.0  # largest exponent
 _LEVERS = {"l": (-0.9, -0.2), "L": (0.3, 1.0)}
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What a table hides."""
+
+    kind: str
+    score: float
+    places: list[str]  # those that are true; empty: nothing is hidden
+    table: Callable[[], pd.DataFrame]
+    exponents: dict[str, float] = field(default_factory=dict)  # and lever, by the names that a fit has
 
 
 @dataclass(frozen=True)
 class Setting:
     """The runs of a design with the model that is fitted to them, where nothing is missing."""
 
-    table: pd.DataFrame
+    made: pd.DataFrame
     study: Study
     model: SwimmerModel
     base: Fit
@@ -57,6 +65,10 @@ class Setting:
         names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
         base = fit(model, start_values(model), names, used, title="")
         return cls(table, Study.fitted_to(model, used), model, base, design)
+
+    def table(self, effects: Mapping[str, float], seed: int, **noise: Any) -> pd.DataFrame:
+        """Simulate the table of the robot with effects."""
+        return make_table(replace(ROBOT, effects=dict(effects)), seed=seed, title="", **self.design, **noise)
 
     def score(self, signal: Floats) -> float:
         """Compute λ of a signal (n, k)."""
@@ -80,78 +92,31 @@ class Setting:
         return np.array(logs)[of_run]
 
 
-@dataclass(frozen=True)
-class HiddenLaw:
-    """A law, or nothing."""
-
-    place: Place
-    powers: Powers
-    lever: float
-    score: float
-    effects: dict[str, float]  # empty: nothing
-
-    @property
-    def exponents(self) -> dict[str, float]:
-        """True exponents and lever, by the names that a fit has."""
-        powers = zip(EXPONENTS, (self.powers.speed, self.powers.length, self.powers.tails), strict=True)
-        return {**dict(powers), **({LEVER: self.lever} if self.place.lever_unit else {})}
-
-
-def head_places() -> list[Place]:
-    """List the places at the disc that are even in the direction of the motor."""
-    at_disc = [place for place in places(both_directions=False) if place.part != "tails" and not place.lever_unit]
-    assert all(place.is_term or place.name in COEFFICIENTS for place in at_disc)
-    return at_disc
-
-
-def hidden_law(setting: Setting, seed: int, *, nothing: bool, scores: Sequence[float] = SCORES) -> HiddenLaw:
-    """Draw place, exponents, lever and sign of a law; one seed after the other has each of the scores in turn.
+def hidden_law(setting: Setting, seed: int, *, nothing: bool) -> Truth:
+    """Draw place, exponents, lever and sign of a law; one seed after the other has each of `SCORES` in turn.
 
     One place in two is one at the disc, odd ones included; the others are side forces elsewhere and laws of the
     tails.
     """
     rng = np.random.default_rng(seed)
+    if nothing:
+        return Truth("nothing", 0.0, [], lambda: setting.table({}, seed))
     kinds = [place.part != "tails" and not place.lever_unit for place in places()]
     at_disc = bool(rng.integers(2))
     drawn = [place for place, of_head in zip(places(), kinds, strict=True) if of_head == at_disc]
     place = drawn[rng.integers(len(drawn))]
     powers = Powers(*rng.uniform(-_STEEP, _STEEP, 3))
-    score = scores[seed % len(scores)] * rng.choice([-1, 1])
+    score = SCORES[seed % len(SCORES)]
+    signed = score * rng.choice([-1, 1])
     lever = round(float(rng.uniform(*_LEVERS[place.lever_unit])), 3) if place.lever_unit else 0.0
-    if nothing:
-        return HiddenLaw(place, powers, lever, 0.0, {})
     logs = setting.logarithm(powers)
     factor = np.exp(logs) if place.is_term else logs
-    size = score / setting.score(setting.slope(place, lever) * factor[:, None])
+    size = signed / setting.score(setting.slope(place, lever) * factor[:, None])
     if place.is_term:
-        return HiddenLaw(place, powers, lever, score, {place.effect(powers, lever).name: size})
-    powers = Powers(*(np.clip(size * p, -4, 4) for p in (powers.speed, powers.length, powers.tails)))
-    return HiddenLaw(place, powers, lever, score, {place.effect(powers).name: 1.0})
-
-
-def with_noise(exact: pd.DataFrame, seed: int) -> pd.DataFrame:
-    """Add noise and session scatter as `make_table` does to a table without them."""
-    rng = np.random.default_rng(seed)
-    session = exact["N"].to_numpy() - exact["N"].min()
-    shift = rng.normal(scale=SESSION, size=(session.max() + 1, len(_MULTIPLIED)))[session]
-    factors = np.exp(rng.normal(scale=NOISE, size=shift.shape) + shift)
-    table = exact.copy()
-    table[[*_MULTIPLIED]] *= factors
-    table["theta_deg"] += rng.normal(scale=math.degrees(NOISE), size=len(table))
-    return table
-
-
-def record_of(described: RobotLaws) -> dict[str, Any]:
-    """Record what a search says: the places that are not told apart, the best law, and errors over the noise."""
-    laws = described.laws
-    kept = laws.kept if laws else ()
-    return {
-        "p_value": described.p_value,
-        "complete": bool(laws and laws.complete),
-        "kept": [law.place.name for law in kept],
-        "named": [one.place.name for law in kept for one in (law, *law.elsewhere)],
-        "words": kept[0].words if kept else "",
-        "left": kept[0].p_value if kept else math.nan,
-        "before": described.error_without / described.noise,
-        "after": kept[0].error / described.noise if kept else math.nan,
-    }
+        effects = {place.effect(powers, lever).name: size}
+    else:
+        powers = Powers(*(np.clip(size * p, -4, 4) for p in (powers.speed, powers.length, powers.tails)))
+        effects = {place.effect(powers).name: 1.0}
+    exponents = dict(zip(EXPONENTS, (powers.speed, powers.length, powers.tails), strict=True))
+    exponents |= {LEVER: lever} if place.lever_unit else {}
+    return Truth("hidden", score, [place.name], lambda: setting.table(effects, seed), exponents)

@@ -1,26 +1,21 @@
-"""Planted truths for the operating characteristics: the paper's design of runs, a linear stand-in, and cases.
+"""A linear stand-in for the simulator in the paper's design of runs, and what is seen of signals in it.
 
-The stand-in is the simulator's prediction and its derivatives in coefficients and effects at one robot; a table
-costs a second with it. Noise 2.5 % on every output, session scatter 0.5 %; in the paper's design four sessions.
-λ is the size of an effect in standard deviations of its score, after what the coefficients absorb, and what
+The stand-in is the simulator's prediction and its derivatives in coefficients, nuisance parameters and effects
+at one robot; a table costs a second with it. Noise 2.5 % on every output, session scatter 0.5 %, a session for
+each N.
+λ is the size of an effect in standard deviations of its score, after what coefficients can absorb, and what
 nuisance parameters can absorb within their priors.
-
-    nulls           nothing missing; Gaussian noise, and heavy tails (Student, 3 degrees of freedom)
-    effects         each testable effect at λ = 2, 4, 8, 16; at λ = 8 with heavy tails, too
-    pairs           two effects at λ = 16 each
-    outside         six departures that no effect of the catalogue explains; three of them mimic an effect
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.residual_tests import TESTABLE
 from calibration.statistics.statistical_model import Noise, Parameter, Parameters, Runs, prior_rows, start_values
 from calibration.statistics.study import middle_session
 from calibration.swimmer.measured_table import Measurements, read_measurements
@@ -30,7 +25,7 @@ from sim.model.presets import PRESETS
 
 ROBOT = replace(PRESETS["paper-measured"], C_t=2.6, C_r=2.0, C_yr=3.2)
 NOISE, SESSION = 0.025, 0.005
-LEVELS = (2.0, 4.0, 8.0, 16.0)
+LENGTHS_CM = (5.0, 7.0, 9.0, 11.0, 13.0, 15.0)
 
 
 @dataclass(frozen=True)
@@ -84,39 +79,16 @@ class Linear:
         return start
 
 
-@dataclass(frozen=True)
-class Case:
-    """A truth to be found."""
-
-    label: str
-    sizes: dict[str, float]  # of effects, from their null; empty: a null, or outside the catalogue
-    signal: Floats  # (n, k) of the stand-in
-    heavy: bool = False
-
-
-class Design(NamedTuple):
-    """Which runs are made."""
-
-    lengths_cm: tuple[float, ...] = (5.0, 7.0, 9.0, 11.0, 13.0, 15.0)
-    sessions: int = 4  # 4: each N; 2: each trial; 1
-
-
-PAPER = Design()
-
-
-def design(which: Design) -> Measurements:
+def design(lengths_cm: Sequence[float] = LENGTHS_CM) -> Measurements:
     """Runs as the paper's, with noise for values."""
     rows = [
-        {
-            "N": n, "l_cm": length, "omega_rpm": sign * rpm, "trial": trial,
-            "session": {1: "one", 2: f"day {trial}"}.get(which.sessions, f"N = {n}"),
-        }
+        {"N": n, "l_cm": length, "omega_rpm": sign * rpm, "trial": trial, "session": f"N = {n}"}
         for n in (2, 3, 4, 5)
-        for length in which.lengths_cm
+        for length in lengths_cm
         for rpm in (110.0, 150.0)
         for sign in (1, -1)
         for trial in (1, 2)
-    ]  # fmt: skip
+    ]
     rng = np.random.default_rng(0)
     table = with_values(pd.DataFrame(rows), rng)
     table["elapsed_min"] = 2.0 * rng.permutation(len(table))
@@ -131,13 +103,8 @@ def with_values(settings: pd.DataFrame, rng: np.random.Generator) -> pd.DataFram
     return settings.assign(**{name: v * f for (name, v), f in zip(values.items(), spread.T, strict=True)})
 
 
-def stand_in(which: Design = PAPER) -> Linear:
-    """Derivatives of the simulator at ROBOT."""
-    return linearised(design(which))
-
-
 def linearised(data: Measurements) -> Linear:
-    """The same at the runs of a table."""
+    """Derivatives of the simulator at ROBOT and the runs of a table."""
     model = SwimmerModel(ROBOT, data)
     names = [p.name for p in (*model.coefficients, *model.nuisances, *model.effects)]
     prediction, table = model.derivatives(start_values(model), names)
@@ -146,18 +113,24 @@ def linearised(data: Measurements) -> Linear:
     return Linear(model.runs, model.coefficients, model.nuisances, effects, prediction, J, G, D, {})
 
 
-def scatter(runs: Runs, outputs: int, seed: int, *, heavy: bool = False) -> Floats:
+def restated(model: Linear, sigmas: Mapping[str, float]) -> Linear:
+    """The same with other standard deviations; numbers with none are exact."""
+    given = tuple(replace(p, sigma=sigmas[p.name]) for p in model.nuisances if sigmas.get(p.name))
+    keep = [i for i, p in enumerate(model.nuisances) if sigmas.get(p.name)]
+    return replace(model, nuisances=given, G=model.G[..., keep])
+
+
+def scatter(runs: Runs, outputs: int, seed: int) -> Floats:
     """Noise of runs and sessions, (n, k)."""
     rng = np.random.default_rng(seed)
-    shape = (len(runs), outputs)
-    noise = rng.standard_t(3, size=shape) / np.sqrt(3) if heavy else rng.normal(size=shape)
+    noise = rng.normal(size=(len(runs), outputs))
     shift = rng.normal(scale=SESSION, size=(len(runs.session_names), outputs))[runs.session]
     return NOISE * noise + shift
 
 
-def measured(model: Linear, signal: Floats, seed: int, *, heavy: bool = False) -> Linear:
+def measured(model: Linear, signal: Floats, seed: int) -> Linear:
     """Return the model with data: its prediction, a signal (n, k), and the noise of a seed."""
-    noise = scatter(model.runs, model.prediction.shape[1], seed, heavy=heavy)
+    noise = scatter(model.runs, model.prediction.shape[1], seed)
     return replace(model, runs=replace(model.runs, y=model.prediction + signal + noise))
 
 
@@ -221,34 +194,3 @@ def outside(model: Linear) -> dict[str, Floats]:
         "mimic of sag, flatter in l": sag,
         "mimic of end-over-end drag, steeper in l": mimic,
     }
-
-
-def cases(model: Linear, repeats: int) -> list[Case]:
-    """Everything but the nulls."""
-    signals = Signals(model)
-    lengths, survived = np.linalg.norm(signals.effects, axis=0), signals.survived(model.D)
-    listed: list[Case] = []
-    strong: list[Case] = []
-    for j, effect in enumerate(model.effects):
-        for level in LEVELS:
-            size = level / max(lengths[j], 1e-300)
-            low, high = effect.bounds
-            if survived[j] < TESTABLE or not (size <= high - effect.start or size <= effect.start - low):
-                continue
-            size *= 1 if effect.start + size <= high else -1
-            case = Case(f"{effect.name}, λ = {level:g}", {effect.name: size}, model.D[..., j] * size)
-            listed += [case] * repeats
-            if level == 8.0:
-                listed += [replace(case, label="effects, λ = 8, heavy tails", heavy=True)] * max(repeats // 3, 1)
-            if level == 16.0:
-                strong.append(case)
-    for a, b in zip(strong, strong[1:] + strong[:1], strict=True):
-        both = Case("pairs, λ = 16 each", {**a.sizes, **b.sizes}, a.signal + b.signal)
-        listed += [both] * max(repeats // 3, 1)
-    return listed
-
-
-def nulls(model: Linear, count: int) -> list[Case]:
-    """`count` with Gaussian noise, a fifth as many with heavy tails."""
-    none = Case("null, Gaussian noise", {}, np.zeros_like(model.prediction))
-    return [none] * count + [replace(none, label="null, heavy tails", heavy=True)] * (count // 5)

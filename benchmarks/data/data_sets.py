@@ -1,9 +1,8 @@
 """Data sets: overhead of the engine, bytes a row, speed of reading.
 
-1. Rows a second of one core, and the engine's processor time over that of the bare simulation.
-2. Bytes a row by encoding: Parquet as it comes, without dictionaries, numbers split into streams of bytes.
-3. A million synthetic rows: stored, joined, opened, scanned, read.
-4. What long sweeps take on n cores, by what was measured: start-up, rounds of chunks to the end of the last one,
+1. Processor time of a row, and of a build beside its rows.
+2. A million synthetic rows: bytes a row; stored, joined, opened, scanned, read.
+3. What long sweeps take on n cores, by what was measured: start-up, rounds of chunks to the end of the last one,
    and joining. Compiling, once a machine, is not in it.
 
 Usage: python -m benchmarks data_sets [--rows N]
@@ -14,21 +13,18 @@ Takes 5 minutes.
 from __future__ import annotations
 
 import argparse
-import io
 import os
 import subprocess
 import sys
 import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from benchmarks.timing import processor_time
+from benchmarks.common import processor_time
 from dataset.build.build import build, chunks
-from dataset.rows.design import load_design
 from dataset.storage import shards
 from dataset.storage.data_set import batches, read, read_manifest
 from dataset.storage.shards import SEGMENT
@@ -36,16 +32,6 @@ from dataset.storage.storage import open_storage
 from tests.dataset import sweeps
 
 ROWS = 2048
-_BARE = """
-import sys
-from dataset.rows.design import load_design
-from dataset.rows.simulate import simulate
-from sim.motion.batches import one_thread
-with one_thread():
-    design = load_design().with_rows(int(sys.argv[1]))
-    rows = simulate({**design.points(), "history": design.history()})
-print(rows["cost_s"].sum())
-"""
 _ENGINE = """
 import sys
 from dataset.rows.design import load_design
@@ -60,22 +46,20 @@ build(sweeps.design(int(sys.argv[1])), sys.argv[2], title="", simulate=sweeps.in
 """
 
 
-def processor_seconds(code: str, *words: str) -> tuple[float, str]:
-    """Measure the processor time of a process and its children; return it with what the process prints."""
+def processor_seconds(code: str, *words: str) -> float:
+    """Measure the processor time of a process and its children."""
     with TemporaryDirectory() as folder:
         log = Path(folder, "spent")
         # every process adds its own time to the file when it ends, workers included
         environment = {**os.environ, "SPENT": str(log), "PYTHONPATH": os.pathsep.join([folder, *sys.path])}
         Path(folder, "sitecustomize.py").write_text(_SPENT)
-        done = subprocess.run(
-            [sys.executable, "-c", code, *words], env=environment, check=True, stdout=subprocess.PIPE, text=True
-        )
+        subprocess.run([sys.executable, "-c", code, *words], env=environment, check=True)
         time.sleep(1.0)
         last: dict[str, float] = {}
         for line in log.read_text().splitlines():
             process, seconds = line.split()
             last[process] = float(seconds)
-        return sum(last.values()), done.stdout
+        return sum(last.values())
 
 
 # Workers are killed in the end, so each writes what it has used so far, ten times a second.
@@ -94,58 +78,21 @@ os.register_at_fork(after_in_child=_start)
 
 
 def overhead(rows: int) -> tuple[float, float]:
-    """Print the engine's overhead; return seconds a row, and the seconds of one worker beside its rows.
-
-    The time of a row changes by ten per cent with what else the machine does. So both are compared in what they
-    take beside the rows.
-    """
-    bare, printed = processor_seconds(_BARE, str(rows))
-    rows_alone = float(printed)
-    print(f"{rows} rows of sweep.toml, processor seconds: all, the rows themselves, all the rest")
-    print(f"  bare simulation in one process {bare:8.1f} {rows_alone:8.1f} {bare - rows_alone:8.1f}")
-    start_up = 0.0
-    for jobs in (1, 2):
+    """Print and return processor seconds a row, and those of one worker beside its rows."""
+    for jobs in (2, 1):
         with TemporaryDirectory() as folder:
-            engine, _ = processor_seconds(_ENGINE, str(rows), f"{folder}/out", str(jobs))
+            engine = processor_seconds(_ENGINE, str(rows), f"{folder}/out", str(jobs))
             cost = float(read_manifest(f"{folder}/out")["cost_s"])
-        more = (engine - cost) - (bare - rows_alone)
-        print(f"  engine, workers: {jobs}             {engine:8.1f} {cost:8.1f} {engine - cost:8.1f}   "
-              f"{100 * more / cost:+.1f} % of the rows")  # fmt: skip
-        if jobs == 1:
-            start_up = engine - cost
-    return cost / rows, start_up
-
-
-def encodings() -> None:
-    """Print bytes a row of simulated and synthetic rows, by encoding."""
-    with TemporaryDirectory() as folder:
-        build(load_design().with_rows(512), f"{folder}/out", title="")
-        rows = pa.Table.from_batches(list(batches(f"{folder}/out")))
-        size = Path(folder, "out/rows").iterdir().__next__().stat().st_size
-    words = {"use_dictionary": ["reason"]}
-    print(f"\nBytes a row, {len(rows)} simulated rows ({size / len(rows):.0f} with the footer)")
-    choices: dict[str, dict[str, Any]] = {
-        "as it comes (snappy)": {},
-        "zstd": {"compression": "zstd"},
-        "zstd, no dictionary": {"compression": "zstd", **words},
-        "zstd, numbers split": {"compression": "zstd", **shards.encodings(rows.schema)},
-        "zstd 9, numbers split": {
-            "compression": "zstd", "compression_level": 9, **shards.encodings(rows.schema),
-        },
-    }  # fmt: skip
-    for name, options in choices.items():
-        sink = io.BytesIO()
-        pq.write_table(rows, sink, **options)
-        group = pq.ParquetFile(sink).metadata.row_group(0)
-        pages = sum(group.column(i).total_compressed_size for i in range(group.num_columns))
-        print(f"  {name:24} {pages / len(rows):6.1f}")
+        print(f"{rows} rows of sweep.toml, workers: {jobs}: {1e3 * cost / rows:.2f} ms a row, "
+              f"{engine - cost:.1f} s beside the rows")  # fmt: skip
+    return cost / rows, engine - cost
 
 
 def reading(rows: int) -> float:
     """Print the times of storing and reading many synthetic rows; return the seconds of joining them, a row."""
     with TemporaryDirectory() as folder:
         out = f"{folder}/out"
-        spent, _ = processor_seconds(_SYNTHETIC, str(rows), out)
+        spent = processor_seconds(_SYNTHETIC, str(rows), out)
         files = sorted(Path(out, "rows").iterdir())
         size = sum(path.stat().st_size for path in files)
         form = pq.read_schema(files[0])
@@ -214,6 +161,5 @@ def main(*words: str) -> None:
     parser.add_argument("--rows", type=int, default=ROWS, help=f"rows that are simulated (default: {ROWS})")
     rows = parser.parse_args(words).rows
     cost, start_up = overhead(rows)
-    encodings()
     joining = reading(SEGMENT)
     projection(cost, start_up, joining)

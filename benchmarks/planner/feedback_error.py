@@ -22,10 +22,8 @@ from typing import NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from benchmarks.markdown import heading, row
-from benchmarks.parallel import in_parallel
+from benchmarks.common import heading, in_parallel, per_cent, row
 from benchmarks.planner.stated_errors import random_path
-from benchmarks.proportions import wilson
 from planner.paths.path import circle
 from planner.planning.camera import Camera
 from planner.planning.plan import plan
@@ -108,11 +106,10 @@ def main(robots: str = "40", first: str = "5000", vehicle: str = "") -> None:
     for camera, current in dict.fromkeys((each.camera, each.current) for each in swims):
         some = [each for each in swims if (each.camera, each.current) == (camera, current)]
         held = sum(each.share >= 0.95 for each in some)
-        low, high = wilson(held, len(some))
         shares = [each.share for each in some]
         ratios = [each.stated / each.quantile for each in some]
         print(row(
-            camera, f"{current:.0%}", f"{held} of {len(some)} ({100 * low:.0f} to {100 * high:.0f} %)",
+            camera, f"{current:.0%}", f"{held} of {len(some)}: {per_cent(held, len(some))}",
             f"{np.median(shares):.3f}, {min(shares):.3f}",
             f"{np.median(ratios):.2f}, {np.quantile(ratios, 0.95):.2f}",
             f"{np.median([each.stated for each in some]):.3f} l",

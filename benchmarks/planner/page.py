@@ -1,19 +1,16 @@
 """The page that plans: its size, and how long users wait for it in Chromium.
 
-Prints the size, the time of a query in node, the time from opening to the first plan, from lifting the pen to the
-plan of a drawn circle, and from a changed viscosity to the robot's motion. Medians over several openings. Writes
-pictures of the page on a laptop, on a telephone and in the dark into reports/; docs/page.png is that on a laptop.
-Where there is Firefox, its plans are compared with Python's, too.
+Prints the size, the time from opening to the first plan, from lifting the pen to the plan of a drawn circle, and
+from a changed viscosity to the robot's motion. Medians over several openings. Writes pictures of the page on a
+laptop, on a telephone and in the dark into reports/; docs/page.png is that on a laptop.
 
 Usage: python -m benchmarks page [TIMES]     (default 5)
 
-Takes two minutes. Needs node, chromium and playwright.
+Takes two minutes. Needs chromium and playwright.
 """
 
 from __future__ import annotations
 
-import json
-import subprocess
 import tempfile
 from pathlib import Path
 from statistics import median
@@ -22,12 +19,7 @@ from typing import Any
 import numpy as np
 
 import softflagella as sf
-from benchmarks.markdown import heading, row
-from benchmarks.planner.page_in_firefox import parity
-from planner.page.table_data import table_data
-from sim.model.presets import PRESETS
-from surrogate.table.model_file import load
-from tests.planner.page.page_core import FOLDER, node
+from benchmarks.common import heading, row
 from tests.planner.page.view.browser import chromium, planned
 
 LAPTOP = {"viewport": {"width": 1280, "height": 860}}
@@ -46,7 +38,6 @@ def main(times: str = "5") -> None:
         path = sf.write_page(Path(folder, "page.html"))
         print(heading("quantity", "value"))
         print(row("size", f"{path.stat().st_size / 1e6:.2f} MB"))
-        print(row("a query with the response to one dwell, in node", f"{1e3 * _query(Path(folder)):.1f} ms"))
         browser = control.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
         for name, settings in PICTURES.items():
             _picture(browser, path.as_uri(), Path("reports", f"page-{name}.png"), settings)
@@ -59,29 +50,6 @@ def main(times: str = "5") -> None:
     )
     for name, values in zip(names, zip(*opened, strict=True), strict=True):
         print(row(name, f"{median(values):.2f} s"))
-    compared = parity()
-    if compared is None:
-        print(row("plans in Firefox, against Python's", "no firefox-esr here"))
-    else:
-        print(row(f"{compared[0]} plans in Firefox, against Python's: largest difference", f"{compared[1]:.1e}"))
-
-
-def _query(folder: Path) -> float:
-    """Measure the median time of a query [s] over 300, after 100 others."""
-    (folder / "table.json").write_text(table_data(load()))
-    groups = {name: float(value) for name, value in PRESETS["paper-control"].group_values().items()}
-    script = f"""
-import {{ readFileSync }} from "node:fs";
-import {{ query, readTable }} from "{(FOLDER / "lookup.js").as_uri()}";
-const table = await readTable(JSON.parse(readFileSync("{folder / "table.json"}", "utf8")));
-const robot = {json.dumps({**groups, "dwell_bar": 1.0})}, times = [];
-for (let i = 0; i < 400; i++) {{
-  const began = performance.now();
-  query(table, {{ ...robot, C_t: robot.C_t * (1 + 1e-3 * i) }});
-  if (i >= 100) times.push(performance.now() - began);
-}}
-console.log(times.sort((one, other) => one - other)[150] / 1000);"""
-    return float(subprocess.check_output([node(), "--input-type=module", "-e", script], text=True))
 
 
 def _picture(browser: Any, address: str, out: Path, settings: dict[str, Any]) -> None:

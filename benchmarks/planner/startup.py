@@ -11,12 +11,10 @@ Takes 30 seconds.
 
 from __future__ import annotations
 
-import resource
-import subprocess
-import sys
 from collections.abc import Sequence
-from pathlib import Path
 from tempfile import TemporaryDirectory
+
+from benchmarks.common import interpreter_time
 
 _MARKED = """
 import time
@@ -67,21 +65,11 @@ def main(*words: str) -> None:
             "query": (["query", "paper-control"], _QUERY),
         }
         for name, (command, (imports, answer)) in commands.items():
-            whole = min(_spent(["-m", "softflagella", *command])[0] for _ in range(runs))
+            whole = min(interpreter_time("-m", "softflagella", *command)[0] for _ in range(runs))
             code = _MARKED.format(imports=imports, answer=answer)
-            marks = [_spent(["-c", code, folder])[1].split()[-3:] for _ in range(runs)]
+            marks = [interpreter_time("-c", code, folder)[1].split()[-3:] for _ in range(runs)]
             parts = [_parts([float(mark) for mark in run]) for run in marks]
             print(f"{name:20}{whole:9.2f}" + "".join(f"{min(part):9.3f}" for part in zip(*parts, strict=True)))
-
-
-def _spent(words: Sequence[str]) -> tuple[float, str]:
-    """Run the interpreter; return its processor time in s, and what it printed."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(
-        [sys.executable, *words], cwd=Path(__file__).parents[2], capture_output=True, text=True, check=True
-    )
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stdout
 
 
 def _parts(marks: Sequence[float]) -> tuple[float, float, float]:

@@ -2,10 +2,9 @@
 
 A plan is made with the shipped look-up table, as by default; robots whose turns differ get a table of their own.
 The plan is replayed in the simulator. The robot that swims is drawn from the covariance of the coefficients that
-the planner is told (1 % of each). A stated error must hold in 95 % of the plans. The mean path is the mean
-position over each pair of flips.
+the planner is told (1 % of each). A stated error must hold in 95 % of the plans.
 
-Usage: python -m benchmarks stated_errors [PLANS] [FIRST SEED] [PICTURE]
+Usage: python -m benchmarks stated_errors [PLANS] [FIRST SEED]
 
 Takes 25 seconds of processor time a plan.
 """
@@ -17,17 +16,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 from threadpoolctl import threadpool_limits
 
-from benchmarks.markdown import heading, row
-from benchmarks.parallel import in_parallel
-from benchmarks.proportions import wilson
+from benchmarks.common import heading, in_parallel, per_cent, row, two_quantiles
 from planner.files.tracking_error import tracking_error
-from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import plan
-from planner.planning.planned import Plan
 from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
@@ -42,18 +36,13 @@ QUICK = 0.25  # rad that the robot turns in a time unit: from here on a fast tur
 
 
 class Swum(NamedTuple):
-    """One plan and its replays; lengths in l."""
+    """One plan and its replay; lengths in l."""
 
     seed: int
     robot: Robot
-    flips: int
     yaw: float  # rate of the robot's circle
     stated: float
     wrong: float  # largest error of the robot that differs
-    exact: float  # largest error of the robot as planned
-    rms: float
-    mean_rms: float  # of its mean path
-    floor: float  # rms of the zigzag of straight motion with this dwell
 
 
 def random_robot(rng: np.random.Generator) -> Robot:
@@ -97,7 +86,7 @@ def random_path(rng: np.random.Generator, radius: float) -> Path2D:
 
 
 def swum(seed: int) -> Swum | str:
-    """Plan and replays of one seed, or why there are none."""
+    """Plan and replay of one seed, or why there are none."""
     threadpool_limits(1)
     rng = np.random.default_rng(seed)
     robot = random_robot(rng)
@@ -107,66 +96,29 @@ def swum(seed: int) -> Swum | str:
         path = random_path(rng, plan(circle(4.0), robot, lookup=table).tracked.vehicle.turn_radius)
         result = plan(path, robot, lookup=table, knowledge=knowledge)
         moved = {name: getattr(robot, name) * np.exp(SIGMA * rng.normal()) for name in COEFFICIENTS}
-        tracks = [replay([result.schedule(swimmer)])[0] for swimmer in (replace(robot, **moved), robot)]
+        track = replay([result.schedule(replace(robot, **moved))])[0]
     except InputError as refused:
         return f"{seed}: {refused}"
-    wrong, exact = (tracking_error(result.to_dict(), track) for track in tracks)
-    return Swum(
-        seed, robot, len(result.dwells), result.tracked.vehicle.yaw_rate, result.stated_error,
-        wrong.largest, exact.largest, exact.rms, _mean_path(result, tracks[1]), result.straight.rms,
-    )  # fmt: skip
-
-
-def _mean_path(result: Plan, track: pd.DataFrame) -> float:
-    """Compute the distance of the mean path from the declared one, rms."""
-    pairs = track.groupby(track["dwell"] // 2)[["x_over_l", "y_over_l"]].mean().to_numpy()
-    return float(np.sqrt(np.mean(distance_to(result.reference, pairs[1:-1]) ** 2)))
+    wrong = tracking_error(result.to_dict(), track).largest
+    return Swum(seed, robot, result.tracked.vehicle.yaw_rate, result.stated_error, wrong)
 
 
 def line(name: str, some: list[Swum]) -> str:
     """Format the figures of a class of robots."""
     held = sum(result.wrong <= result.stated for result in some)
-    low, high = wilson(held, len(some))
-
-    def two(value: Callable[[Swum], float]) -> str:
-        values = [value(result) for result in some]
-        return f"{np.median(values):.3f} / {np.quantile(values, 0.95):.3f}"
-
-    return row(
-        name, len(some), f"{100 * held / len(some):.0f} % ({100 * low:.0f} to {100 * high:.0f})",
-        f"{np.median([result.stated / result.wrong for result in some]):.2f}", two(lambda s: s.stated),
-        two(lambda s: s.wrong), two(lambda s: s.mean_rms), two(lambda s: s.rms),
-        f"{np.median([result.rms / result.floor for result in some]):.2f}",
-    )  # fmt: skip
+    ratio = np.median([result.stated / result.wrong for result in some])
+    stated, wrong = (two_quantiles([getattr(result, key) for result in some]) for key in ("stated", "wrong"))
+    return row(name, len(some), per_cent(held, len(some)), f"{ratio:.2f}", stated, wrong)
 
 
-def draw(swims: list[Swum], path: str) -> None:
-    """Plot the largest error of the robot that differs against the stated error."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(5.6, 5.2), layout="constrained")
-    axes = figure.add_subplot()
-    for name, colour, kind in (("slow turners", "#2a7fba", False), ("fast turners", "#d9a441", True)):
-        some = [result for result in swims if (result.yaw >= QUICK) == kind]
-        axes.loglog([s.stated for s in some], [s.wrong for s in some], ".", ms=7, color=colour, label=name)
-    ends = [0.8 * min(result.wrong for result in swims), 1.25 * max(result.stated for result in swims)]
-    axes.plot(ends, ends, color="black", lw=1)
-    axes.set_xlabel("stated error / l")
-    axes.set_ylabel("largest error of the robot that differs / l")
-    axes.legend(frameon=False)
-    axes.grid(alpha=0.3, which="both")
-    figure.savefig(path, dpi=110)
-
-
-def main(count: str = "40", first: str = "0", picture: str = "") -> None:
+def main(count: str = "40", first: str = "0") -> None:
     seeds = range(int(first), int(first) + int(count))
     compile_once()
     results = in_parallel(swum, [(seed,) for seed in seeds])
     swims = [result for result in results if isinstance(result, Swum)]
     for refused in (result for result in results if isinstance(result, str)):
         print(refused)
-    print(heading("robots", "plans", "held", "stated / largest", "stated: median / 95 %", "largest",
-                  "mean path, rms", "rms", "rms / zigzag"))  # fmt: skip
+    print(heading("robots", "plans", "held", "stated / largest", "stated: median / 95 %", "largest"))
     classes: tuple[tuple[str, Callable[[Swum], bool]], ...] = (
         ("all", lambda s: True),
         ("slow turners, N = 2", lambda s: s.yaw < QUICK and s.robot.tails == 2),
@@ -180,5 +132,3 @@ def main(count: str = "40", first: str = "0", picture: str = "") -> None:
             print(line(name, some))
     for result in sorted((s for s in swims if s.wrong > s.stated), key=lambda s: s.seed):
         print(f"not held: seed {result.seed}, {result.wrong:.3f} l, stated {result.stated:.3f} l")
-    if picture:
-        draw(swims, picture)

@@ -19,9 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.markdown import heading, row
-from benchmarks.parallel import in_parallel
-from benchmarks.proportions import wilson
+from benchmarks.common import heading, in_parallel, per_cent, row, two_quantiles
 from planner.files.tracking_error import tracking_error
 from sim.io.errors import InputError
 from sim.motion.replay import replay, replay_error
@@ -71,15 +69,13 @@ def outcome(seed: int, in_time_steps: bool) -> Outcome | str:
 def line(name: str, some: list[Outcome], found: Callable[[Outcome], float]) -> str:
     """Format the figures of a class of plans."""
     held = sum(found(one) <= one.stated for one in some)
-    low, high = wilson(held, len(some))
     ratio = np.median([one.stated / found(one) for one in some])
     own_ratio = np.median([one.own_stated / found(one) for one in some])
-    values = [f"{np.median(part):.3f} / {np.quantile(part, 0.95):.3f}" for part in (
+    values = [two_quantiles(part) for part in (
         [one.predicted for one in some], [one.stated for one in some], [found(one) for one in some],
         [one.own_stated for one in some],
     )]  # fmt: skip
-    share = f"{100 * held / len(some):.0f} % ({100 * low:.0f} to {100 * high:.0f})"
-    return row(name, len(some), share, f"{ratio:.2f}", f"{own_ratio:.2f}", *values)
+    return row(name, len(some), per_cent(held, len(some)), f"{ratio:.2f}", f"{own_ratio:.2f}", *values)
 
 
 def main(count: str = "60", first: str = "9000", replays: str = "10") -> None:

@@ -1,6 +1,6 @@
 """All steady motions of robots with several, along the motor's speed: a table and a picture.
 
-The robots are those of `robustness` that reach another motion from rest (docs/branches.md), by their row.
+The robots are those of `robustness` that reach another motion from rest (docs/steady-motions.md), by their row.
 
 Usage: python -m benchmarks branches [ROW …]
 
@@ -15,10 +15,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.pictures import save_picture
 from benchmarks.simulator.robustness import robots
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.io.files import whole_file
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.motion.batches import one_thread
@@ -73,4 +73,5 @@ def main(*rows: str) -> None:
         stepped = [m for m in (*result.up, *result.down) if m.settled and np.isfinite(m.means).all()]
         known = sum(any(b.has(m.s, m.means) for b in result.branches) for m in stepped)
         print(f"  of {len(stepped)} settled motions of the slow sweeps {known} are on a branch, to 3 %")
-        save_picture(draw_branches(result), f"docs/branches-{row}.png")
+        with whole_file(f"docs/branches-{row}.png") as part:
+            draw_branches(result).savefig(part, format="png", dpi=110)

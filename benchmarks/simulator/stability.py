@@ -1,9 +1,8 @@
-"""Growth of small perturbations of steady motions: agreement with time steps, and its price.
+"""Growth of small perturbations of steady motions: agreement with time steps, and how often they grow.
 
 Perturbed robots are stepped in time beside unperturbed ones on the same mesh (`tests.oracles.stepped_growth`):
 robots of the sweep, robots of the wide domain of `robustness` that yaw fast, and robots with effects on their
-tails. A table counts the robots of `robustness` with N ≥ 2 whose orbit is unstable. The price is the time of rows
-with the growth over that of rows without, also for a robot whose tails push against each other.
+tails. A table counts the robots of `robustness` with N ≥ 2 whose orbit is unstable.
 
 Usage: python -m benchmarks stability [ROBOTS]
 
@@ -12,7 +11,6 @@ Takes 2 minutes.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from itertools import pairwise
 
@@ -34,7 +32,6 @@ _FOLLOWED = 7.0  # natural logarithm of the change that is followed in time
 _MOST_REVOLUTIONS = 60
 _YAWS = (0.0, 0.25, 0.4, 0.5, 0.6, 0.8, np.inf)  # limits of |ω_yr/ω_t| in the table
 _QUICK = 0.5  # |ω_yr/ω_t| of robots that yaw fast
-IN_CONTACT = "tails in contact"
 _EFFECTS = {
     "natural_curvature": (0.5, 1.5),
     "natural_twist": (1.0, 3.0),
@@ -72,8 +69,6 @@ def kinds(count: int) -> Iterator[tuple[str, list[Groups]]]:
         "effects on the tails",
         [with_effects(control, name, size) for name, sizes in _EFFECTS.items() for size in sizes],
     )
-    measured = PRESETS["paper-measured"].groups()
-    yield IN_CONTACT, [with_effects(measured, "tail_contact", 1.0)]
 
 
 def agreement(title: str, selected: list[Groups]) -> None:
@@ -98,21 +93,6 @@ def agreement(title: str, selected: list[Groups]) -> None:
     )
 
 
-def price(title: str, selected: list[Groups]) -> None:
-    """Print the time of rows with and without the growth."""
-    spent = []
-    for perturbed in (Perturbed.NONE, Perturbed.ALL):
-        least = np.inf
-        for _ in range(3):
-            began = time.thread_time()
-            for groups in selected:
-                solve_orbits(numbers(groups), groups.N, phases=FEW, perturbed=perturbed)
-            least = min(least, time.thread_time() - began)
-        spent.append(least)
-    each = 1e3 * spent[0] / len(selected)
-    print(f"  {title:22} {each:8.2f} ms a row without, {100 * (spent[1] / spent[0] - 1):.0f} % more with growth")
-
-
 def domain() -> None:
     """Print how many orbits of the wide domain are unstable, by how fast the robot yaws."""
     wide, rows = robots(4096), []
@@ -132,14 +112,9 @@ def domain() -> None:
 
 
 def main(count: str = "24") -> None:
-    selected = dict(kinds(int(count)))
     with one_thread(), np.errstate(all="ignore"):
         print("\ngrowth of small perturbations in a motor revolution, against time steps on the same mesh")
-        for title, some in selected.items():
-            if title != IN_CONTACT:  # steps of tails in contact are not exact enough
-                agreement(title, some)
+        for title, some in kinds(int(count)):
+            agreement(title, some)
         print("\norbits of the wide domain, N ≥ 2")
         domain()
-        print("\nprice")
-        for title, some in selected.items():
-            price(title, some)

@@ -2,7 +2,7 @@
 
 Usage: softflagella sweep --config surrogate/shipped/domain.toml --out SWEEP
        python -m benchmarks shipped_table WORK --sweep SWEEP --out MODEL    simulate the rest (kept in WORK), train
-       python -m benchmarks shipped_table WORK --test MODEL [--card CARD] [--picture PICTURE]
+       python -m benchmarks shipped_table WORK --test MODEL [--card CARD]
        python -m benchmarks shipped_table WORK --spread-of MODEL --sweep TWO --out NEW
        python -m benchmarks shipped_table WORK --tails-of MODEL [--single] --out NEW
 
@@ -32,7 +32,6 @@ from pathlib import Path
 
 import numpy as np
 
-from dataset.report.figures import plain_logarithms
 from dataset.storage.data_set import read_manifest
 from sim.arrays import Floats
 from sim.io.files import write_text
@@ -172,33 +171,6 @@ def covered(lookup: NeuralTable, rows: SimulatedRobots) -> dict[str, float]:
     return coverage(answered, known)
 
 
-def draw(lookup: NeuralTable, rows: SimulatedRobots, path: str) -> None:
-    """Plot the error of the yaw rate against motor speed, of robots whose tails do not touch."""
-    from matplotlib.figure import Figure
-
-    answer = lookup.query(rows.robots, flag=True)
-    error = 100 * np.abs(answer["omega_yr_bar"] / rows.motion["omega_yr_bar"] - 1)
-    shown = ~answer["outside"] & (rows.motion["tail_gap"] >= 1)
-    figure = Figure(figsize=(7.5, 4.2), layout="constrained")
-    axes = figure.add_subplot()
-    kinds = (
-        ("one tail", rows.robots["N"] == 1, "#d9a441"),
-        ("two tails and more", rows.robots["N"] > 1, "#2a7fba"),
-    )
-    for label, kind, colour in kinds:
-        some = shown & kind
-        axes.plot(rows.robots["omega_bar"][some], error[some], ".", ms=3, color=colour, alpha=0.6, label=label)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_ylim(1e-4, 20)
-    plain_logarithms(axes.xaxis)
-    plain_logarithms(axes.yaxis)
-    axes.set_xlabel("motor speed ω̄")
-    axes.set_ylabel("error of the yaw rate [%]")
-    axes.legend(frameon=False, markerscale=4)
-    figure.savefig(path, dpi=100)
-
-
 def relearned_spread(lookup: NeuralTable, folder: str) -> NeuralTable:
     """Learn the spread of a table's lags anew, and print its error on held-out robots of the sweep."""
     rows, numbers = read_robots(folder)
@@ -245,7 +217,6 @@ def main(*words: str) -> None:
     parser.add_argument("--single", action="store_true", help="with --tails-of: learn that of one tail only")
     parser.add_argument("--spread-of", help="model whose spread is learned anew from --sweep")
     parser.add_argument("--card", help="with --test: write the card, from held-out robots of the domain")
-    parser.add_argument("--picture", help="with --test: draw the errors of the held-out robots")
     arguments = parser.parse_args(words)
     if arguments.single and not arguments.tails_of:
         parser.error("--single needs --tails-of")
@@ -276,5 +247,3 @@ def main(*words: str) -> None:
         test(lookup, locked, *(kept(arguments.work, name) for name in ("locked_couples", "locked_flips")))
         if arguments.card:
             write_text(arguments.card, model_card(lookup, _joined(arguments.work, _HELD_OUT)))
-        if arguments.picture:
-            draw(lookup, locked, arguments.picture)

@@ -4,27 +4,21 @@ Usage: python -m benchmarks single_query [REPEATS]
 
 One robot is the mean of REPEATS queries (default: 2000), the least of five such means. The first answer is the
 processor time from the start of the interpreter, of numpy alone and of all imports, the table and one query, the
-least of five processes. The batch has 4096 robots of the domain; "one by one" is the same batch by the loop that a
-single query takes.
+least of five processes. The batch has 4096 robots of the domain.
 
 Takes 30 seconds.
 """
 
 from __future__ import annotations
 
-import resource
-import subprocess
-import sys
 from collections.abc import Callable, Mapping
-from pathlib import Path
 
 import numpy as np
 
-from benchmarks.timing import processor_time
+from benchmarks.common import interpreter_time, processor_time
 from sim.arrays import Floats
 from sim.inputs import group_columns, load_robot
 from sim.model.groups import DWELL
-from surrogate.table import quick_query
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
 from surrogate.training.simulated import draw_robots
@@ -57,7 +51,7 @@ def main(*words: str) -> None:
         print(f"  {name:28}{1e6 * _least(query, repeats):6.0f}")
     print("\nfirst answer in a new process [s of processor time]")
     for name, code in (("numpy alone", "import numpy"), ("imports, table and query", _QUERY)):
-        print(f"  {name:28}{min(_spent(code) for _ in range(RUNS)):6.2f}")
+        print(f"  {name:28}{min(interpreter_time('-c', code)[0] for _ in range(RUNS)):6.2f}")
     print(f"\neach of a batch of {BATCH} [µs of processor time]")
     drawn = draw_robots(BATCH, 0, wide=False)
     several = drawn | {"N": np.maximum(drawn["N"], 2.0)}
@@ -68,32 +62,15 @@ def main(*words: str) -> None:
         ("with a dwell", several | {DWELL: np.full(BATCH, 2.0)}),
     ):
         plain, widths = (_each(lookup, columns, intervals=intervals) for intervals in (False, True))
-        alone = _each(lookup, columns, intervals=False, one_by_one=True)
-        ratio = f"one by one{alone:6.1f}, {alone / plain:.1f} times"
-        print(f"  {name:28}{plain:6.1f}, with intervals{widths:6.1f}; {ratio}")
+        print(f"  {name:28}{plain:6.1f}, with intervals{widths:6.1f}")
 
 
-def _each(
-    lookup: NeuralTable, columns: Mapping[str, Floats], *, intervals: bool, one_by_one: bool = False
-) -> float:
-    """Return the time of each robot of a batch [µs], in blocks or by the loop of a single query."""
-    many = quick_query.MANY
-    quick_query.MANY = BATCH + 1 if one_by_one else many
-    try:
-        return 1e6 * _least(lambda: lookup.query(columns, flag=True, intervals=intervals), 1) / BATCH
-    finally:
-        quick_query.MANY = many
+def _each(lookup: NeuralTable, columns: Mapping[str, Floats], *, intervals: bool) -> float:
+    """Return the time of each robot of a batch [µs]."""
+    return 1e6 * _least(lambda: lookup.query(columns, flag=True, intervals=intervals), 1) / BATCH
 
 
 def _least(work: Callable[[], object], repeats: int) -> float:
     """Return the least mean time of a call in several runs [s]."""
     work()
     return min(processor_time(work, repeats=repeats) for _ in range(RUNS))
-
-
-def _spent(code: str) -> float:
-    """Run the interpreter; return its processor time in s."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[2], check=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

@@ -5,7 +5,7 @@ begins later or makes waiting circles on its way (`planner.jobs.timetable`). Rob
 that have ended count, too. The distance asked for is kept although both robots are off by their errors in place
 (`planner.jobs.timed_motion`).
 
-Left out: what the flow of one robot does to another (`benchmarks flow_between_robots`). Lengths in m, times in s.
+Left out: what the flow of one robot does to another (docs/results.md). Lengths in m, times in s.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FORMAT = 1
-CLOSE = 2.8  # l between bodies: nearer, flow may move a robot by more than 5 % (`benchmarks flow_between_robots`)
+CLOSE = 2.8  # l between bodies: nearer, flow may move a robot by more than 5 % (docs/results.md)
 
 
 class Nearest(NamedTuple):

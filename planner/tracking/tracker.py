@@ -49,7 +49,7 @@ WINDOW = 40
 ALARM_AT = 173.6174364561601  # quantile 1 − FALSE_ALARM of χ² with 3 × WINDOW degrees of freedom
 GATE = 21.107513466160444  # quantile 0.9999 of χ² with 3 degrees of freedom
 LOST = 10  # consecutive rejected poses after which there is an alarm
-SPREADS = 0.5  # of the filter's standard deviation, which allows for changes; by `benchmarks tracker_bound`
+SPREADS = 0.5  # of the filter's standard deviation, which allows for changes (docs/results.md)
 
 
 class Command(NamedTuple):

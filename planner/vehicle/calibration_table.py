@@ -98,7 +98,7 @@ class CalibrationKnowledge:
 
 UNMEASURED = CalibrationKnowledge(COEFFICIENTS, np.diag(np.square([0.35, 0.22, 0.48])))
 """Coefficients of another robot: rms differences of ln C between two of the eight robots whose coefficients were
-found (docs/measured-tables.md and the paper's two)."""
+found (docs/results-calibration.md and the paper's two)."""
 
 
 def read_knowledge(path: str | Path) -> CalibrationKnowledge:

@@ -17,11 +17,6 @@ def random_goal(rng: np.random.Generator) -> tuple[float, float, float]:
     return x, y, heading
 
 
-def goal_alone(rng: np.random.Generator) -> dict[str, Any]:
-    """Return a task from rest at the origin to a random goal, without obstacles."""
-    return {"start": (0.0, 0.0, 0.0), "goal": random_goal(rng)}
-
-
 def goal_behind_circles(rng: np.random.Generator) -> dict[str, Any]:
     """Return a task with three circles between a start and a goal, in a tank of 11 by 8 l."""
     start = (0.0, float(rng.uniform(-1, 1)), float(rng.uniform(-1, 1)))

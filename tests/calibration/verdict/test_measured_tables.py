@@ -51,7 +51,7 @@ def test_spheres_in_glycerine_need_the_wall() -> None:
     ],
 )
 def test_what_came_out_of_the_measured_tables(name: str, effect: str, size: float) -> None:
-    """docs/measured-tables.md; the others take longer and are written down there."""
+    """docs/results-calibration.md; the others take longer and are written down there."""
     result = calibrate(SwimmerModel(START, read_measurements(MEASURED / name)), progress=False)
     assert result.effects == (effect,)
     assert result.final.parameters[effect] == pytest.approx(size, rel=0.05)

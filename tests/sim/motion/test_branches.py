@@ -167,7 +167,7 @@ def test_an_orbit_survives_the_way_to_a_state_and_back() -> None:
 
 @pytest.mark.slow
 def test_both_stable_motions_of_two_tails_are_found() -> None:
-    """The direct solution reaches one, time steps from rest the other; docs/branches.md."""
+    """The direct solution reaches one, time steps from rest the other; docs/steady-motions.md."""
     result = two_tails()
     s = (TWO_TAILS.omega_bar - 60.0) / 160.0
     alike = [motion for branch in result.branches if branch.alike for motion in branch.at(s)]
