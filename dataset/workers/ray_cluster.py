@@ -49,7 +49,7 @@ class RayCluster:
                 f"no ray cluster at {address or 'this machine'} ({reason}); "
                 "where its head asks for a token, set RAY_AUTH_MODE=token and RAY_AUTH_TOKEN_PATH"
             ) from None
-        self._heir = _heir(descendants(os.getpid()) - before)
+        self._watchdog = _watchdog(descendants(os.getpid()) - before)
         self._run = ray.remote(num_cpus=1, max_retries=0)(run_task)
         self._busy: dict[Any, int] = {}
         self._looked, self._slots = 0.0, 0
@@ -83,7 +83,7 @@ class RayCluster:
             for reference in self._busy:
                 ray.cancel(reference, force=True)
             ray.shutdown()
-            self._heir.communicate()
+            self._watchdog.communicate()
 
     def _answers(self) -> bool:
         try:
@@ -131,12 +131,12 @@ def descendants(ancestor: int) -> set[int]:
     return found
 
 
-def _heir(processes: set[int]) -> subprocess.Popen[bytes]:
+def _watchdog(processes: set[int]) -> subprocess.Popen[bytes]:
     """Start a process that kills others when this one has ended, however that happens.
 
     Ray's head and raylet end with the process that started them; the raylet's agents wait a minute for the head.
     """
-    words = ["sh", "-c", 'cat; kill -9 "$@"', "heir", *map(str, processes)]
+    words = ["sh", "-c", 'cat; kill -9 "$@"', "watchdog", *map(str, processes)]
     nothing = subprocess.DEVNULL
     return subprocess.Popen(words, stdin=subprocess.PIPE, stdout=nothing, stderr=nothing, start_new_session=True)
 
