@@ -33,3 +33,11 @@ def printed(process: subprocess.Popen[Any]) -> tuple[Any, Any]:
         with suppress(subprocess.TimeoutExpired):  # processes of its own may hold the pipes
             words = process.communicate(timeout=10)
         raise AssertionError(f"still running after {LIMIT:.0f} s: {words}") from None
+
+
+def alive(process: int) -> bool:
+    """Say whether a process of this number runs."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False

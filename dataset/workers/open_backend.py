@@ -50,6 +50,8 @@ def open_backend(name: str, *, jobs: int | None = None, address: str | None = No
         from dataset.workers.dask_cluster import DaskCluster
 
         return DaskCluster(address, count)
+    if os.path.exists(os.path.expanduser("~/.ray/auth_token")):
+        os.environ.setdefault("RAY_AUTH_MODE", "token")  # as `ray start` does; ray reads it when it is imported
     from dataset.workers.ray_cluster import RayCluster
 
     return RayCluster(address, count)

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
+import subprocess
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any
 
 import ray
@@ -29,11 +34,22 @@ class RayCluster:
             raise InputError(
                 f"no ray cluster answers at {address}; start one with ray start --head, or give host:port"
             )
-        settings: dict[str, Any] = {"address": address} if address else {"address": "local", "num_cpus": count}
+        local: dict[str, Any] = {"address": "local", "num_cpus": count, "include_dashboard": False}
+        settings = {"address": address} if address else local
+        before = descendants(os.getpid())
         try:
-            ray.init(**settings, log_to_driver=False, logging_level="CRITICAL", include_dashboard=None)
-        except (ConnectionError, RuntimeError, ValueError, OSError) as refusal:
-            raise InputError(f"no ray cluster at {address} ({str(refusal).splitlines()[0]})") from None
+            with _silent():
+                ray.init(**settings, log_to_driver=False, logging_level="CRITICAL")
+        except Exception as refusal:  # ray raises even `Exception` itself
+            for process in descendants(os.getpid()) - before:
+                with suppress(ProcessLookupError):
+                    os.kill(process, signal.SIGKILL)
+            reason = (str(refusal) or repr(refusal)).splitlines()[0]
+            raise InputError(
+                f"no ray cluster at {address or 'this machine'} ({reason}); "
+                "where its head asks for a token, set RAY_AUTH_MODE=token and RAY_AUTH_TOKEN_PATH"
+            ) from None
+        self._watchdog = _watchdog(descendants(os.getpid()) - before)
         self._run = ray.remote(num_cpus=1, max_retries=0)(run_task)
         self._busy: dict[Any, int] = {}
         self._looked, self._slots = 0.0, 0
@@ -67,6 +83,7 @@ class RayCluster:
             for reference in self._busy:
                 ray.cancel(reference, force=True)
             ray.shutdown()
+            self._watchdog.communicate()
 
     def _answers(self) -> bool:
         try:
@@ -86,6 +103,42 @@ def _outcome(reference: Any) -> Outcome | Lost:
         return Refusal("code", f"a worker cannot load this package ({reason}); install it there", "a ray worker")
     except exceptions.RayError:
         return GONE
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Discard what ray's compiled code writes to stderr: it complains of each of 20 attempts to connect."""
+    stderr = os.dup(2)
+    with open(os.devnull, "wb") as nothing:
+        os.dup2(nothing.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(stderr, 2)
+        os.close(stderr)
+
+
+def descendants(ancestor: int) -> set[int]:
+    """Find the processes that a process has started, and theirs (Linux; elsewhere ray has a reaper of its own)."""
+    parents: dict[int, int] = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):  # it has ended
+            parents[int(stat.parent.name)] = int(stat.read_text().rpartition(")")[2].split()[1])
+    found: set[int] = set()
+    parted = {ancestor}
+    while parted := {process for process, parent in parents.items() if parent in parted}:
+        found |= parted
+    return found
+
+
+def _watchdog(processes: set[int]) -> subprocess.Popen[bytes]:
+    """Start a process that kills others when this one has ended, however that happens.
+
+    Ray's head and raylet end with the process that started them; the raylet's agents wait a minute for the head.
+    """
+    words = ["sh", "-c", 'cat; kill -9 "$@"', "watchdog", *map(str, processes)]
+    nothing = subprocess.DEVNULL
+    return subprocess.Popen(words, stdin=subprocess.PIPE, stdout=nothing, stderr=nothing, start_new_session=True)
 
 
 def _head(address: str | None) -> tuple[str, int] | None:

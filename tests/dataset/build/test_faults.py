@@ -23,7 +23,7 @@ from dataset.workers.processes import call_in_worker
 from sim.io.errors import InputError
 from tests.dataset import sweeps
 from tests.dataset.sweeps import MARKS, ROOT, SMALL, design, invented, without_cost
-from tests.processes import LIMIT, printed, until
+from tests.processes import LIMIT, alive, printed, until
 
 pytestmark = pytest.mark.slow
 
@@ -59,13 +59,6 @@ def building(folder: Path, rows: int, rows_by: str, jobs: int = 2) -> str:
         f"sys.exit(run_command(lambda _: run_long_command(lambda: build(design({rows}), {str(folder)!r}, "
         f"jobs={jobs}, title='', simulate={rows_by}, resume='the same words'))))"
     )
-
-
-def alive(process: int) -> bool:
-    try:
-        return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
 
 
 def workers() -> list[int]:

@@ -22,15 +22,18 @@ from dataset.storage.data_set import read
 from sim.io.errors import InputError
 from tests.dataset import sweeps
 from tests.dataset.sweeps import MARKS, ROOT, design, invented
-from tests.processes import LIMIT, printed, until
+from tests.processes import LIMIT, alive, printed, until
 from tests.shared import FOLDER
 
 pytestmark = [
-    pytest.mark.slow,
+    pytest.mark.rest,
     pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning"),
 ]
 Head = tuple[str, Callable[[], None]]
-ENVIRONMENT = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
+ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")} | {
+    "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
+    "RAY_USAGE_STATS_ENABLED": "0",
+}
 
 
 @pytest.fixture(autouse=True)
@@ -101,7 +104,6 @@ def test_dask_makes_the_same_rows(dask: Dask, calm: Path, tmp_path: Path, monkey
     assert os.getpid() not in {int(mark.name.rsplit("-", 1)[1]) for mark in MARKS.iterdir()}
 
 
-@pytest.mark.rest
 def test_dask_replaces_killed_workers(dask: Dask, calm: Path, tmp_path: Path) -> None:
     build(
         design(200), tmp_path / "out", backend="dask", address=dask.address, title="", simulate=sweeps.killing_once
@@ -110,7 +112,6 @@ def test_dask_replaces_killed_workers(dask: Dask, calm: Path, tmp_path: Path) ->
     assert {mark.name.split("-")[-2] for mark in MARKS.iterdir()} >= {"0", "1"}
 
 
-@pytest.mark.rest
 def test_dask_sets_a_poisonous_chunk_aside(dask: Dask, tmp_path: Path) -> None:
     with pytest.raises(UnfinishedError, match=r"rows \d+ to \d+ \(its worker died 3 times"):
         build(
@@ -120,7 +121,6 @@ def test_dask_sets_a_poisonous_chunk_aside(dask: Dask, tmp_path: Path) -> None:
     assert len(list((tmp_path / "out" / "pending").iterdir())) == 7
 
 
-@pytest.mark.rest
 def test_dask_goes_on_when_a_nanny_is_killed(dask: Dask, calm: Path, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "slow", "dask", dask.address)
     until(lambda: len(list(MARKS.iterdir())) >= 2 or process.poll() is not None)
@@ -130,7 +130,6 @@ def test_dask_goes_on_when_a_nanny_is_killed(dask: Dask, calm: Path, tmp_path: P
     assert read(tmp_path / "out").equals(read(calm))
 
 
-@pytest.mark.rest
 def test_dask_ends_when_its_scheduler_is_killed(dask: Dask, calm: Path, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "endless", "dask", dask.address, patience=2)
     until(lambda: len(list(MARKS.iterdir())) >= 2 or process.poll() is not None)
@@ -141,7 +140,6 @@ def test_dask_ends_when_its_scheduler_is_killed(dask: Dask, calm: Path, tmp_path
     assert len(line.splitlines()) == 1
 
 
-@pytest.mark.rest
 def test_without_dask_workers_it_ends_with_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed", reason="the extra dask is not installed")
     monkeypatch.setattr(engine, "PATIENCE", 1.0)
@@ -174,33 +172,52 @@ def test_a_local_cluster_that_does_not_start(
         build(design(9), tmp_path / "out", backend="dask", jobs=1, title="", simulate=invented)
 
 
+def test_a_local_dask_cluster_ends_in_silence(calm: Path, tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="the extra dask is not installed")
+    process = build_apart(tmp_path / "out", "invented", "dask", None)
+    assert printed(process) == ("", "")
+    assert process.returncode == 0
+    assert read(tmp_path / "out").equals(read(calm))
+
+
 def build_apart(
-    folder: Path, rows_by: str, backend: str, address: str, *, patience: float = 60
+    folder: Path, rows_by: str, backend: str, address: str | None, *, patience: float = 60
 ) -> subprocess.Popen[str]:
-    code = (
-        "import sys, dataset.build.scheduler; from tests.dataset.sweeps import *; "
-        "from dataset.build.build import *; "
-        f"from dataset.build.signals import run_long_command; dataset.build.scheduler.PATIENCE = {patience}; "
-        f"run_long_command(lambda: build(design(200), {str(folder)!r}, backend={backend!r}, address={address!r}, "
-        f"title='', simulate={rows_by}))"
+    """Build as the command line does, by a script that would build again wherever it is imported."""
+    script = folder.with_suffix(".py")
+    script.write_text(
+        "import sys, dataset.build.scheduler\nfrom tests.dataset.sweeps import *\n"
+        "from dataset.build.build import *\nfrom sim.io.errors import run_command\n"
+        f"from dataset.build.signals import run_long_command\ndataset.build.scheduler.PATIENCE = {patience}\n"
+        "sys.exit(run_command(lambda _: run_long_command(lambda: build(design(200), "
+        f"{str(folder)!r}, backend={backend!r}, address={address!r}, jobs=2, title='', simulate={rows_by}))))"
     )
     return subprocess.Popen(
-        [sys.executable, "-c", code], env=ENVIRONMENT, cwd=ROOT, text=True,
+        [sys.executable, script], env=ENVIRONMENT, cwd=ROOT, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip
 
 
 @pytest.fixture
-def ray(tmp_path: Path) -> Iterator[Head]:
-    """Start a ray head with two processors; return its address and how to kill it with its children."""
+def home(tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Give this user no token of ray's, or one where the test asks for it."""
     pytest.importorskip("ray", reason="the extra ray is not installed")
+    (tmp_path / ".ray").mkdir()
+    if getattr(request, "param", False):
+        (tmp_path / ".ray" / "auth_token").write_text(64 * "0")
+    monkeypatch.setitem(ENVIRONMENT, "HOME", str(tmp_path))
+
+
+@pytest.fixture
+def ray(home: None, tmp_path: Path) -> Iterator[Head]:
+    """Start a ray head with two processors; return its address and how to kill it with its children."""
     port, log = free_port(), tmp_path / "ray.log"
     words = ["start", "--head", "--block", "--port", str(port), "--num-cpus", "2", "--include-dashboard", "false"]
     code = "import sys; from ray.scripts.scripts import main; sys.exit(main())"
     with open(log, "wb") as file:
         head = subprocess.Popen(
             [sys.executable, "-c", code, *words, "--object-store-memory", "100000000"],
-            env={**ENVIRONMENT, "RAY_USAGE_STATS_ENABLED": "0"}, stdout=file, stderr=file, start_new_session=True,
+            env=ENVIRONMENT, stdout=file, stderr=file, start_new_session=True,
         )  # fmt: skip
     until(lambda: b"Ray runtime started" in log.read_bytes() or head.poll() is not None, log=log)
     assert head.poll() is None, log.read_text()
@@ -214,7 +231,6 @@ def ray(tmp_path: Path) -> Iterator[Head]:
     kill()
 
 
-@pytest.mark.rest
 def test_ray_ends_when_its_head_is_killed(ray: Head, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "endless", "ray", ray[0], patience=2)
     until(lambda: len(list(MARKS.iterdir())) >= 2 or process.poll() is not None)
@@ -224,15 +240,40 @@ def test_ray_ends_when_its_head_is_killed(ray: Head, tmp_path: Path) -> None:
     assert process.returncode == 1
 
 
+@pytest.mark.parametrize("home", [False, True], indirect=True)
 def test_ray_makes_the_same_rows(ray: Head, calm: Path, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "killing_once", "ray", ray[0])
-    _, words = printed(process)
-    assert process.returncode == 0, words
+    assert printed(process) == ("", "")
+    assert process.returncode == 0
     assert read(tmp_path / "out").equals(read(calm))
     assert {mark.name.split("-")[-2] for mark in MARKS.iterdir()} >= {"0", "1"}
 
 
-@pytest.mark.rest
+@pytest.mark.parametrize("home", [True], indirect=True)
+def test_ray_without_its_token_ends_with_a_line(
+    ray: Head, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(ENVIRONMENT, "RAY_AUTH_MODE", "disabled")
+    process = build_apart(tmp_path / "out", "invented", "ray", ray[0])
+    assert re.fullmatch(r"no ray cluster at .* set RAY_AUTH_MODE=token .*\n", printed(process)[1])
+    assert process.returncode == 2
+
+
+def test_a_local_ray_cluster_ends_with_its_parent(home: None, tmp_path: Path) -> None:
+    from dataset.workers.ray_cluster import descendants
+
+    process = build_apart(tmp_path / "out", "endless", "ray", None)
+    until(lambda: len(list(MARKS.iterdir())) >= 2, process)
+    cluster = descendants(process.pid)
+    agents = [each for each in cluster if b"Agent" in Path(f"/proc/{each}/cmdline").read_bytes()]
+    assert len(agents) == 2
+    for agent in agents:
+        os.kill(agent, signal.SIGSTOP)  # or they would end, by themselves, after a minute
+    process.kill()
+    assert printed(process) == ("", "")
+    until(lambda: not any(map(alive, cluster)))
+
+
 def test_ray_sets_a_poisonous_chunk_aside_and_stops_when_told(ray: Head, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "poisonous", "ray", ray[0])
     line = printed(process)[1].strip().splitlines()[-1]
