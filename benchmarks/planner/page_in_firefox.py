@@ -20,8 +20,7 @@ from planner.planning.planned import Plan
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from surrogate.table.model_file import load
-from tests.planner.page.page_core import FOLDER
-from tests.planner.page.plans import robot_to_page
+from tests.planner.page.page_core import FOLDER, to_page
 
 PATHS = (circle(1.5), circle(4.0), polygon(3, 3.0), polygon(4, 3.0), polygon(6, 2.0), Path2D.of([[0, 0], [6, 0]]))
 HARNESS = """<!doctype html><script type="module">
@@ -85,7 +84,7 @@ def parity() -> tuple[int, float] | None:
 
 def _planned(program: str, cases: list[tuple[Path2D, Robot]]) -> list[dict[str, Any]]:
     rows = [
-        {"robot": robot_to_page(robot), "points": path.polyline().tolist(), "closed": path.closed}
+        {"robot": to_page(robot), "points": path.polyline().tolist(), "closed": path.closed}
         for path, robot in cases
     ]
     answers: list[dict[str, Any]] = []

@@ -14,7 +14,7 @@ import softflagella as sf
 from planner.vehicle.coefficient_modes import both_directions
 from sim.io.errors import run_command
 from softflagella.__main__ import main
-from tests.planner.page.robots import shipped
+from tests.planner.page.cases import one_robot, shipped
 
 
 def data_of(page: Path) -> dict:
@@ -54,8 +54,8 @@ def test_paths_and_options_are_what_the_page_begins_with(tmp_path: Path) -> None
 
 
 def test_a_robot_with_an_effect_is_locked_and_small(tmp_path: Path) -> None:
-    robot = replace(sf.load_robot("paper-control"), effects={"left_right_bias": 0.1})
-    page = sf.write_page(tmp_path / "page.html", robot, lookup=sf.tabulate(robot))
+    robot, table = one_robot()
+    page = sf.write_page(tmp_path / "page.html", robot, lookup=table)
     data = data_of(page)
     assert "left_right_bias" in data["locked"]["why"]
     assert [entry["name"] for entry in data["robots"]] == ["paper-control"]
