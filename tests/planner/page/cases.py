@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.paths.path import Path2D, circle, polygon, smoothed
+from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import make_plan, plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
@@ -77,50 +77,20 @@ def random_robots(count: int, seed: int = 0) -> list[Robot]:
     return robots
 
 
-def eight(size: float) -> Path2D:
-    """Make a figure of eight."""
-    turn = np.linspace(0.0, 2 * np.pi, 400, endpoint=False)
-    return Path2D.of(size * np.stack([np.sin(turn), np.sin(2 * turn) / 2], 1), closed=True)
-
-
-def wave(length: float, height: float) -> Path2D:
-    """Make an open wave of three periods."""
-    x = np.linspace(0.0, length, 300)
-    return Path2D.of(np.stack([x, height * np.sin(6 * np.pi * x / length)], 1))
-
-
-def noisy_stroke() -> Path2D:
-    """Make an open stroke as a hand draws it."""
-    t = np.linspace(0.0, 1.0, 150)
-    clean = np.stack([6 * t, 2 * np.sin(4 * t) + t**2], 1)
-    return Path2D.of(clean + 0.01 * np.random.default_rng(24).normal(size=clean.shape))
-
-
-def random_stroke(seed: int) -> Path2D:
-    """Make a random smooth stroke, open or closed."""
-    rng = np.random.default_rng(seed)
-    t = np.linspace(0.0, 2 * np.pi, 200, endpoint=False)
-    closed = bool(rng.integers(2))
-    t = t if closed else t / 2
-    terms = [rng.normal(size=(2, 2)) / k for k in range(1, 5)]
-    points = sum(np.outer(np.cos(k * t), a) + np.outer(np.sin(k * t), b) for k, (a, b) in enumerate(terms, 1))
-    return Path2D.of(rng.uniform(1.5, 4.0) * np.asarray(points), closed=closed)
-
-
+TURN, SHARE, LONG = np.linspace(0, 2 * np.pi, 400, endpoint=False), np.linspace(0, 1, 150), np.linspace(0, 9, 300)
+HAND = np.stack([6 * SHARE, 2 * np.sin(4 * SHARE) + SHARE**2], 1)  # as a hand draws a stroke
 SQUARE, BEND = polygon(4, 3.0), Path2D.of([[0, 0], [3, 0], [3, 4]])
 PATHS = {
     "circle": circle(2.0),
     "square": SQUARE,
     "triangle": polygon(3, 4.0),
-    "eight": eight(3.0),
-    "wave": wave(9.0, 0.8),
-    "stroke": noisy_stroke(),
+    "eight": Path2D.of(3 * np.stack([np.sin(TURN), np.sin(2 * TURN) / 2], 1), closed=True),
+    "wave": Path2D.of(np.stack([LONG, 0.8 * np.sin(2 * np.pi * LONG / 3)], 1)),
+    "stroke": Path2D.of(HAND + 0.01 * np.random.default_rng(24).normal(size=HAND.shape)),
     "bend": BEND,
     "line": Path2D.of([[0, 0], [5, 1]]),
     "star": polygon(5, 3.0),
-    **{f"random {seed}": random_stroke(seed) for seed in range(4)},
 }
-SMOOTH = smoothed(PATHS["stroke"], 0.5)[0]
 
 
 def _in_a_current() -> Vehicle:

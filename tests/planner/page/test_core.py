@@ -25,12 +25,12 @@ PAGE = {*IN_PAGE, "open_file", "compared_track", "compared_runs", "page_shapes",
 TESTED_IN = {
     "test_core": "advice",
     "test_numbers": "arrays close_match draws format lab_units progress sha256 si_units units",
-    "test_paths": "distance fillets nearest_feasible page_shapes path pose_equations tractrix",
+    "test_paths": "distance nearest_feasible page_shapes path pose_equations tractrix",
     "test_lookup": "curve_errors dense ensemble groups heads intervals lookup response response_table support "
                    "table_data tails wrench_balance wrench_table",
     "test_vehicles": "cubic_spline dwell_choice from_table planar refusals tracked_point vehicle",
-    "test_plans": "declared_path error_growth errors feasible feedback_error line_of_sight plan remedy request "
-                  "rollout schedule stated_error zigzag",
+    "test_plans": "declared_path error_growth errors feasible feedback_error fillets line_of_sight plan remedy "
+                  "request rollout schedule stated_error zigzag",
     "test_plan_files": "compared_track plan_files planned tracker_header tracking_error",
     "test_robot_files": "input_error robot robot_toml toml",
     "test_drawings": "style_sheet svg_drawing svg_names svg_segments svg_shapes svg_tree xml",
@@ -105,18 +105,12 @@ def test_a_joined_script_does_what_its_modules_do(folder: Path) -> None:
     assert json.loads(process.stdout) == [1, 2, 5]
 
 
-@pytest.mark.parametrize(
-    "line",
-    ["export function own() {}", 'import own from "./low/one.js";', "export default 1;", 'import "./two.js";',
-     "export { own as first };"],
-)  # fmt: skip
-def test_other_forms_are_refused(folder: Path, line: str) -> None:
-    (folder / "other.js").write_text(f"{line}\n")
-    with pytest.raises(ValueError, match="cannot be joined"):
-        read_module(folder / "other.js")
-
-
-def test_a_circle_is_refused(folder: Path) -> None:
+def test_other_forms_and_circles_are_refused(folder: Path) -> None:
+    for line in ("export function own() {}", 'import own from "./low/one.js";', "export default 1;",
+                 'import "./two.js";', "export { own as first };"):  # fmt: skip
+        (folder / "other.js").write_text(f"{line}\n")
+        with pytest.raises(ValueError, match="cannot be joined"):
+            read_module(folder / "other.js")
     (folder / "a.js").write_text('import { b } from "./b.js";\nconst a = b;\nexport { a };\n')
     (folder / "b.js").write_text('import { a } from "./a.js";\nconst b = a;\nexport { b };\n')
     with pytest.raises(ValueError, match=r"a\.js → b\.js"):

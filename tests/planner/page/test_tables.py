@@ -17,6 +17,7 @@ from sim.io.errors import InputError
 from sim.io.quantities import convert_columns, numbers_of
 from sim.io.seals import sealed
 from sim.io.text_tables import parse_table
+from sim.model.plan_file import plan_id
 from sim.model.robot_toml import robot_toml
 from tests.planner.page.cases import CONTROL, planned
 from tests.planner.page.page_core import answer, answers, check_near, check_parity, refusal_of, without_digits
@@ -192,16 +193,20 @@ def check_plan_opened(content: dict[str, Any]) -> None:
     check_near(drawn["points"], content["raw_path"][:-1] if content["closed"] else content["raw_path"])
 
 
-@pytest.mark.parametrize(
-    ("kind", "options"),
-    [("lap", {"loop": True}), pytest.param("arrival", {"arrive_seconds": 1800.0}, marks=pytest.mark.rest),
-     pytest.param("kept_clear", {"keep_out": [sf.Circle(6.0, 0.0, 0.5)]}, marks=pytest.mark.rest)],
-    ids=["laps", "arrival", "walls"],
-)  # fmt: skip
-def test_plans_with_more_than_a_path_give_it(kind: str, options: dict[str, Any]) -> None:
-    content = sf.plan(circle(2.0), CONTROL, objective="flips", **options).to_dict()
-    assert kind in content
-    check_plan_opened(content)
+def test_a_plan_with_more_than_a_path_gives_it() -> None:
+    content = {**planned("circle", objective="flips").to_dict(), "lap": {"period_s": 1.0}, "arrival": None}
+    check_plan_opened({**content, "id": plan_id(content)})
+
+
+@pytest.mark.rest
+def test_plans_with_laps_walls_or_an_arrival_give_their_paths() -> None:
+    walls = [sf.Circle(6.0, 0.0, 0.5)]
+    options: dict[str, dict[str, Any]] = {"lap": {"loop": True}, "arrival": {"arrive_seconds": 1800.0},
+                                          "kept_clear": {"keep_out": walls}}  # fmt: skip
+    for kind, option in options.items():
+        content = sf.plan(circle(2.0), CONTROL, objective="flips", **option).to_dict()
+        assert kind in content
+        check_plan_opened(content)
 
 
 def test_an_edited_plan_and_a_robot_that_was_cut_are_refused() -> None:

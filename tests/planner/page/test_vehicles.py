@@ -54,9 +54,8 @@ def test_the_vehicle_of_the_table() -> None:
 
 
 REFUSED: list[Robot] = [
-    replace(CONTROL, tails=1), replace(CONTROL, disc_offset=0.0016), replace(CONTROL, C_r=0.02),
-    replace(CONTROL, tail_length=0.3, name="it's long"), replace(CONTROL, tails=12, C_r=0.02),
-    replace(CONTROL, C_t=0.01, C_yr=10.0, motor_speed=9 * RPM),
+    replace(CONTROL, tails=1), replace(CONTROL, disc_offset=0.0016, name="it's"), replace(CONTROL, C_r=0.02),
+    replace(CONTROL, tails=12, C_r=0.02), replace(CONTROL, C_t=0.01, C_yr=10.0, motor_speed=9 * RPM),
 ]  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from planner.files.tracking_error import tracking_error
@@ -17,6 +18,7 @@ from planner.paths.path import circle
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
+from planner.vehicle.rollout import predicted_poses
 from sim.inputs import load_robot
 from sim.io.errors import run_command
 from sim.model.presets import PRESETS
@@ -25,7 +27,6 @@ from softflagella.__main__ import main
 from tests.planner.page.cases import TRIANGLE, one_robot
 from tests.planner.page.cases import planned as planned_by_python
 from tests.planner.page.runs import table_of_runs
-from tests.planner.page.test_plan_files import track_of
 from tests.planner.page.view.browser import (
     address_of,
     drag,
@@ -222,10 +223,13 @@ def test_a_drawing_without_a_unit_is_asked_for_one_and_a_robot_is_opened(page: A
 
 def test_a_track_is_shown_over_its_plan_with_its_error(page: Any, tmp_path: Path) -> None:
     result: Plan = planned_by_python("circle", objective="flips")
-    track = track_of(result, 0.003)
-    lab = {"time_s": track["time_bar"] * result.robot.time_scale, "x_cm": 11 * track["x_over_l"],
-           "y_cm": 11 * track["y_over_l"], "heading_rad": track["heading_rad"]}  # fmt: skip
-    type(track)(lab).to_csv(tmp_path / "track.csv", index=False)
+    starts, share = np.cumsum([0.0, *result.dwells[:-1]]), np.arange(8) / 8
+    time = (starts[:, None] + result.dwells[:, None] * share).ravel() * result.robot.time_scale
+    poses = predicted_poses(result.tracked.vehicle, result.switches).reshape(-1, 9, 3)[:, :8].reshape(-1, 3)
+    track = pd.DataFrame(
+        np.column_stack([time, poses * [11, 11, 1]]), columns=["time_s", "x_cm", "y_cm", "heading_rad"]
+    )
+    track.to_csv(tmp_path / "track.csv", index=False)
     page.select_option("#shape", "circle")
     page.fill("#size", "22")
     planned(page)
