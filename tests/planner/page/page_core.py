@@ -8,10 +8,9 @@ import os
 import re
 import shutil
 import subprocess
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache
-from itertools import starmap
 from pathlib import Path
 from threading import Timer
 from typing import Any
@@ -85,6 +84,7 @@ def answers(calls: Iterable[tuple[Any, ...]], left_out: Sequence[str] = ()) -> l
     process.stdin.write(json.dumps(content, allow_nan=False) + "\n")
     process.stdin.flush()
     patience = Timer(LIMIT, process.kill)
+    patience.daemon = True
     patience.start()
     line = process.stdout.readline()
     patience.cancel()
@@ -161,18 +161,6 @@ def _named(parts: dict[str, Any]) -> dict[str, Any]:
             for name, part in parts.items()}  # fmt: skip
 
 
-def refusal_of(function: Callable[..., object], *given: Any, **options: Any) -> str:
-    """Return the message with which Python refuses."""
-    with pytest.raises(InputError) as refusal:
-        function(*given, **options)
-    return str(refusal.value)
-
-
-def without_digits(message: object) -> str:
-    """Leave numbers out of a message."""
-    return re.sub(r"\d", "#", str(message))
-
-
 def check_near(found: Any, wanted: Any, allowed: float = EXACT) -> None:
     """Assert that numbers of any shape differ by at most `allowed`; a flat table has the numbers of any other."""
     found, wanted = np.asarray(found, dtype=float), np.asarray(wanted, dtype=float)
@@ -182,72 +170,3 @@ def check_near(found: Any, wanted: Any, allowed: float = EXACT) -> None:
     finite = np.isfinite(wanted)
     assert np.array_equal(found[~finite], wanted[~finite], equal_nan=True)
     assert np.abs(found[finite] - wanted[finite]).max(initial=0.0) <= allowed
-
-
-def check_alike(found: Any, wanted: Any, allowed: float) -> None:
-    """Assert that numbers are alike relative to the largest one of each column, the last axis."""
-    columns = np.asarray(wanted, dtype=float).reshape(-1, np.shape(wanted)[-1])
-    sizes = np.abs(columns).max(0)
-    sizes[sizes == 0] = 1.0
-    check_near(np.reshape(found, columns.shape) / sizes, columns / sizes, allowed)
-
-
-def check_same(found: Any, wanted: Any, allowed: float = 0.0) -> None:
-    """Assert that an answer of the core is that of Python; of an object, all that the core has of it."""
-    if hasattr(wanted, "_asdict") or is_dataclass(wanted):
-        for name, part in found.items():
-            check_same(part, getattr(wanted, re.sub(r"([A-Z])", r"_\1", name).lower()), allowed)
-    elif isinstance(wanted, dict):
-        assert set(wanted) <= set(found)
-        for name, part in wanted.items():
-            check_same(found[name], part, allowed)
-    elif isinstance(wanted, list | tuple) and not all(isinstance(part, int | float) for part in wanted):
-        assert len(found) == len(wanted)
-        for one, other in zip(found, wanted, strict=True):
-            check_same(one, other, allowed)
-    elif wanted is None or isinstance(wanted, str | bool):
-        assert found == wanted
-    else:
-        check_near(found, wanted, allowed)
-
-
-def check_parity(
-    file: str,
-    name: str,
-    function: Callable[..., Any],
-    cases: Sequence[tuple[Any, ...]],
-    allowed: float = 0.0,
-    words: Callable[[object], str] = str,
-) -> int:
-    """Assert that a function of the core answers and refuses as Python's does; return the number of refusals.
-
-    Args:
-        file: the core's file.
-        name: of the core's function.
-        function: Python's.
-        cases: arguments of both.
-        allowed: difference of numbers.
-        words: what must be equal of two refusals.
-    """
-    found = answers([(file, name, *case) for case in cases])
-    for one, case, (wanted, refusal) in zip(found, cases, starmap(_outcome(function), cases), strict=True):
-        try:
-            if refusal is not None:
-                assert isinstance(one, InputError), one
-                assert words(one) == words(refusal)
-            else:
-                assert not isinstance(one, InputError), one
-                check_same(one, wanted, allowed)
-        except (AssertionError, AttributeError, TypeError, ValueError) as apart:
-            raise AssertionError(f"{file}, {name}{str(case)[:300]}: {apart}") from apart
-    return sum(isinstance(one, InputError) for one in found)
-
-
-def _outcome(function: Callable[..., Any]) -> Callable[..., tuple[Any, InputError | None]]:
-    def outcome(*case: Any) -> tuple[Any, InputError | None]:
-        try:
-            return function(*case), None
-        except InputError as refusal:
-            return None, refusal
-
-    return outcome

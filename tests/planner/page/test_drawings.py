@@ -10,7 +10,8 @@ import pytest
 
 from planner.paths.svg_drawing import read_svg
 from sim.io.errors import InputError
-from tests.planner.page.page_core import EXACT, answer, check_parity, without_digits
+from tests.planner.page.page_core import EXACT, answer
+from tests.planner.page.parity import check_parity, without_digits
 from tests.planner.paths.svg_cases import ALIKE, REFUSED
 
 BODIES = [

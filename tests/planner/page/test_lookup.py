@@ -1,27 +1,27 @@
-"""The look-up table of the page answers as Python's, in the domain and outside."""
+"""The look-up table of the page, and vehicles of it, answer as Python's, in the domain and outside."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from planner.page.table_data import packed_data, table_data
+from planner.vehicle.dwell_choice import check_least, dwells_for, nearly_fastest
+from planner.vehicle.from_table import table_vehicle
+from planner.vehicle.tracked_point import tracked_vehicle
 from sim.model.groups import DWELL
+from sim.model.response import BEFORE, DWELLS
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.table.errors import RESPONSE_OUTPUTS
 from surrogate.table.lookup import table_content
-from tests.planner.page.cases import columns_of, random_groups, shipped
-from tests.planner.page.page_core import (
-    TABLE,
-    answer,
-    answers,
-    check_alike,
-    check_near,
-    refusal_of,
-    without_digits,
-)
+from surrogate.table.response_table import between_dwells
+from tests.planner.page.cases import CONTROL, VEHICLES, columns_of, random_groups, shipped, tracked_of
+from tests.planner.page.page_core import TABLE, answer, answers, check_near
+from tests.planner.page.parity import check_alike, check_parity, refusal_of, without_digits
 
 SOLVED = 1e-11  # relative; balances are solved until a correction is 2e-12, on different ways
 MOST_LETTERS = 1_350_000
@@ -96,6 +96,12 @@ def test_curves_of_the_response() -> None:
             check_alike(curve, getattr(wanted, name)[row].reshape(-1, 3), SOLVED)
 
 
+def test_curves_between_dwells() -> None:
+    curve, dwells = np.random.default_rng(0).normal(size=(len(DWELLS), 3)), [*DWELLS, *np.geomspace(0.2, 6, 40)]
+    found = answers([("response_table.js", "betweenDwells", curve.ravel(), dwell) for dwell in dwells])
+    check_near(found, between_dwells(np.broadcast_to(curve, (len(dwells), *curve.shape)), np.array(dwells)), 1e-12)
+
+
 def test_modes_of_the_error() -> None:
     for robot, modes in zip(known(4), asked("tableErrorModes", known(4)), strict=True):
         wanted = shipped().error_modes(columns(robot))
@@ -150,3 +156,48 @@ def test_the_shipped_table_comes_back_exactly_from_a_text_that_means_nothing_in_
     for part, network in zip(content["wrench"], wanted["wrench"], strict=True):
         for name, array in network["state"].items():
             assert part["state"][name] == {"shape": list(array.shape), "values": array.ravel().tolist()}
+
+
+REFUSED = [
+    replace(CONTROL, tails=1), replace(CONTROL, disc_offset=0.0016, name="it's"), replace(CONTROL, C_r=0.02),
+    replace(CONTROL, tails=12, C_r=0.02), replace(CONTROL, C_t=0.01, C_yr=10.0, motor_speed=9 * np.pi / 30),
+]  # fmt: skip
+
+
+def test_robots_outside_are_refused_in_lab_units() -> None:
+    found = answers([("from_table.js", "tableVehicle", robot, TABLE) for robot in REFUSED])
+    assert list(map(str, found)) == [refusal_of(table_vehicle, robot, shipped()) for robot in REFUSED]
+
+
+@pytest.mark.parametrize(
+    ("twist", "words"),
+    [
+        ([[-1.0, 1, 1], [0.5, -1, -1]], "robot 'x' does not move forward (v_z = -0.25); turn its motor"),
+        ([[1.0, 1, 1], [1, 1, 1]], "robot 'x' turns to the same side in both directions of its motor; it"),
+    ],
+    ids=["backward", "one side"],
+)
+def test_vehicles_that_cannot_follow_a_path_are_refused(twist: list[list[float]], words: str) -> None:
+    zeros = {"lag": np.zeros(75), "memory": np.zeros(1200), "rest": np.zeros(75), "spread": np.zeros(75)}
+    parts = {"twist": twist, "curves": [zeros, zeros], "before": BEFORE, "modes": []}
+    assert str(answer("from_table.js", "vehicleOfParts", parts, "x")).startswith(words)
+
+
+def test_choices_of_dwells() -> None:
+    vehicle, least = VEHICLES["biased"], (None, 0.2, 1.5, 50.0)
+    cases = [(vehicle, goal, seconds) for goal in ("error", "time", "flips") for seconds in least]
+    assert check_parity("dwell_choice.js", "dwellsFor", dwells_for, cases, 1e-13) == 0
+    check_parity("dwell_choice.js", "nearlyFastest", nearly_fastest, [(vehicle, each) for each in least], 1e-13)
+    too_short = [(0.1,), (-1.0,), (0.19999,)]
+    assert check_parity("dwell_choice.js", "checkLeast", check_least, too_short) == 3
+
+
+def test_tracked_points() -> None:
+    """Plans have offsets of those that are known."""
+    basis = {"vehicle": VEHICLES["biased"], "unmeasured": [], "calibrated": False, "ownTable": True}
+    found = answer("tracked_point.js", "trackedPoint", CONTROL, basis, "nose", "x")
+    assert str(found) == refusal_of(tracked_vehicle, CONTROL, shipped(), "nose", None)
+    for gap, least in ((2.0, 1.0), (0.3, 1.0), (0.99, 0.98), (0.5, 0.98)):
+        vehicle = replace(VEHICLES["symmetric"], tail_gap=gap, least_gap=least)
+        told = answer("tracked_point.js", "gapWarnings", {"tailGap": gap, "leastGap": least})
+        assert told == list(tracked_of(vehicle).warnings)

@@ -15,11 +15,11 @@ import pytest
 from planner.draws import normals
 from planner.paths.path import Path2D, circle, polygon
 from planner.paths.units import check_size, describe, extent, in_lab, place_in_lab, time_in_lab
-from planner.planning import progress
-from sim.io.units import UNITS, convert, find_unit, format_length, format_time, split, to_si
+from sim.io.units import UNITS, convert, format_length, format_time, split, to_si
 from sim.motion.lab_units import lab_columns
 from tests.planner.page.cases import CONTROL
-from tests.planner.page.page_core import FOLDER, answer, answers, check_parity, check_same
+from tests.planner.page.page_core import answer
+from tests.planner.page.parity import check_parity
 
 RNG = np.random.default_rng(0)
 NUMBERS = [
@@ -36,8 +36,6 @@ TEXTS = ["plain", "it's", '"both" it\'s', "a\\b\n\t\r", "\x00\x1f\x7f\xa0", "üm
          "", *("x" * length for length in (54, 55, 56, 63, 64, 65, 119, 120, 1000))]  # fmt: skip
 COLUMNS = [(RNG.normal(size=count),) for count in (1, 5, 8, 100, 129, 1000, 4711)]
 PAIRS = [(0.0, 0.0), (3.0, 4.0), (1e-9, 1.0), (0.0, -2.5), *RNG.lognormal(sigma=3.0, size=(2000, 2)).tolist()]
-SPELLINGS = [*UNITS, "meter", "°", "deg/s", "U/min", "µm", "μm", "min⁻¹", "rad·s⁻¹", "[mm]", " ( cm ) ", "%", "",
-             "-", "RPM", "hz", "constructor", "furlong", "m / s", "mm//s"]  # fmt: skip
 NAMES = ["x", "x_mm", "R_yr [mm]", "X (cm)", "omega_yr_deg_s", "x_1", "viscosity_mPa_s", "a_rad_s",
          "Speed [U/min]", " y_cm ", "x []", "x [mm", "x] [mm]", "_cm", "cm", "name_with_parts", "x (furlong)",
          "x_", "s"]  # fmt: skip
@@ -99,12 +97,6 @@ def test_to_the_last_bit(file: str, name: str, function: Callable[..., Any], cas
     assert check_parity(f"{file}.js", name, function, cases) == 0
 
 
-def test_units_by_their_spellings() -> None:
-    found = answers([("si_units.js", "findUnit", text) for text in SPELLINGS])
-    wanted = [find_unit(text) for text in SPELLINGS]
-    assert found == [None if unit is None else unit._asdict() for unit in wanted]
-
-
 def test_sizes_of_paths_are_refused() -> None:
     assert 0 < check_parity("units.js", "checkSize", check_size, [(path, CONTROL, 1.3) for path in PATHS]) < 6
 
@@ -122,9 +114,3 @@ def test_motions_in_the_units_of_a_laboratory() -> None:
     assert set(wanted) - set(found) == {"circle_s"}
     for name, value in found.items():
         assert value == pytest.approx(float(wanted[name][0]), rel=1e-15)
-
-
-def test_stages_of_planning_have_the_same_words() -> None:
-    text = (FOLDER / "progress.js").read_text()
-    assert all(f'"{stage}"' in text for stage in (progress.DECLARING, progress.REMEDY, progress.FOLLOWING))
-    check_same(answer("progress.js", "tell", None, progress.REMEDY, 0.5), None)

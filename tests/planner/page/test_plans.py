@@ -22,30 +22,11 @@ from planner.planning.request import PlanRequest
 from planner.planning.schedule import Start, follow
 from sim.io.errors import InputError
 from sim.model.robot import Robot
-from tests.planner.page.cases import (
-    BEND,
-    CONTROL,
-    PATHS,
-    SQUARE,
-    TRIANGLE,
-    VEHICLES,
-    random_robots,
-    shipped,
-    tracked_of,
-)
-from tests.planner.page.page_core import (
-    EXACT,
-    TABLE,
-    answer,
-    answers,
-    call,
-    check_near,
-    check_parity,
-    check_same,
-    refusal_of,
-    without_digits,
-)
+from tests.planner.page.cases import CONTROL, PATHS, TRIANGLE, VEHICLES, random_robots, shipped, tracked_of
+from tests.planner.page.page_core import EXACT, TABLE, answer, answers, call, check_near
+from tests.planner.page.parity import check_parity, check_same, refusal_of, without_digits
 
+SQUARE, BEND = PATHS["square"], PATHS["bend"]
 Case = tuple[Path2D, Robot, dict[str, Any]]
 CASES: dict[str, Case] = {
     "circle": (circle(2.0), CONTROL, {}),

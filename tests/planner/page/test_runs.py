@@ -15,7 +15,8 @@ from calibration.swimmer import measured_table
 from calibration.swimmer.copied_rows import find_copies
 from calibration.swimmer.measured_table import read_measurements
 from sim.arrays import Floats
-from tests.planner.page.page_core import FOLDER, TABLE, answer, answers, refusal_of, typed
+from tests.planner.page.page_core import FOLDER, TABLE, answer, answers, typed
+from tests.planner.page.parity import refusal_of
 from tests.planner.page.runs import ROBOT, look_up, table_of_runs
 
 NAME = "table.csv"

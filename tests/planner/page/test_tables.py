@@ -6,21 +6,20 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pandas as pd
 import pytest
 
 import softflagella as sf
 from planner.paths.path import circle
 from planner.paths.path_files import read_path
 from sim.io.errors import InputError
-from sim.io.quantities import convert_columns, numbers_of
+from sim.io.quantities import numbers_of
 from sim.io.seals import sealed
 from sim.io.text_tables import parse_table
 from sim.model.plan_file import plan_id
 from sim.model.robot_toml import robot_toml
 from tests.planner.page.cases import CONTROL, planned
-from tests.planner.page.page_core import answer, answers, check_near, check_parity, refusal_of, without_digits
+from tests.planner.page.page_core import answer, check_near
+from tests.planner.page.parity import check_parity, refusal_of, without_digits
 
 TABLES = [
     b"x,y\n1,2\n3,4\n", b"x;y\n1,5;2\n3;4,25\n", b"x\ty\n1\t2\n", b"x y\n1 2\n 3   4\n", b"\xef\xbb\xbfx,y\n1,2\n",
@@ -79,50 +78,6 @@ def test_numbers_of_tables() -> None:
     assert check_parity("text_tables.js", "parseTable", numbers_in, given) == 0
     bad = [(data, "table.csv", True) for data in BAD_TABLES]
     assert check_parity("text_tables.js", "parseTable", numbers_in, bad, words=without_digits) == len(bad)
-
-
-def test_values_are_shown_as_python_shows_them() -> None:
-    data = b"a;b;c;d;e\n\n1;1,5;NA;2;x\n007;2;3,25;abc;\n-2;nan;1e-7;0,5;3,5\n"
-    found = answer("text_tables.js", "parseWords", data, "table.csv")
-    table = parse_table(data, "table.csv")
-    assert found["lines"] == list(table.index)
-    shown = answers([("number_words.js", "textsOf", column) for column in found["words"]])
-    assert shown == [[str(value) for value in table[name]] for name in table]
-    numbers = answers([("number_words.js", "numbersOf", column) for column in found["words"]])
-    assert np.array_equal(numbers, [numbers_of(table[name]).to_list() for name in table], equal_nan=True)
-
-
-TRACK = ("time_s", "x_cm", "y_cm", "heading_deg")
-RUNS = ("N", "l_cm", "omega_rpm", "omega_yr_rad_s", "temperature_C")
-SYNONYMS = {"rpm": "omega", "motor": "omega", "length": "l", "tails": "N"}
-COLUMNS = [
-    *((names, TRACK, {}) for names in (
-        ["time_s", "x_cm", "y_cm", "heading_deg"], ["time [min]", "x_mm", "Y (m)", "heading_rad"],
-        ["Time_ms", "X [in]", "y_cm", "note"], ["time", "x_cm", "y_cm"], ["time_s", "x_cm", "x_mm"], ["x", "y"],
-        ["time_s", "x_deg", "y_cm"], ["t_s", "x_cm"], ["time_s", "x_cm", "X_cm"])),
-    *((names, RUNS, SYNONYMS) for names in (
-        ["tails", "length_mm", "rpm", "omega_yr_deg_s"], ["N", "l [cm]", "Motor (rad/s)"], ["n", "L_cm", "rpm"],
-        ["N", "l_cm", "omega_rpm", "rpm"], ["N", "length", "rpm"], ["N", "l", "temperature_F"], ["Tails", "N"],
-        ["l_um", "omega_Hz", "omega_yr_rps", "temperature_K"])),
-]  # fmt: skip
-
-
-def test_columns_and_their_units() -> None:
-    refused = 0
-    for names, wanted, synonyms in COLUMNS:
-        columns = [[1.0 + i + 0.3 * k for k in range(3)] for i in range(len(names))]
-        table, others = {"names": names, "columns": columns}, {"map": list(synonyms.items())}
-        found = answer("quantities.js", "convertColumns", table, wanted, "the track", others)
-        frame = pd.DataFrame(dict(zip(names, columns, strict=True)))
-        if isinstance(found, InputError):
-            assert str(found) == refusal_of(convert_columns, frame, wanted, "the track", synonyms)
-            refused += 1
-            continue
-        converted = convert_columns(frame, wanted, "the track", synonyms)
-        assert found["notes"] == list(converted.notes)
-        assert found["table"]["names"] == list(converted.table)
-        assert np.array_equal(found["table"]["columns"], converted.table.to_numpy().T)
-    assert 4 < refused < len(COLUMNS) - 4
 
 
 def path_in(data: bytes, name: str, closed: bool | None = None) -> dict[str, Any]:

@@ -12,7 +12,8 @@ from planner.files.plan_files import write_plan
 from sim.io.errors import run_command
 from softflagella.__main__ import main
 from tests.planner.page.cases import planned as planned_by_python
-from tests.planner.page.page_core import answer, without_digits
+from tests.planner.page.page_core import answer
+from tests.planner.page.parity import without_digits
 from tests.planner.page.view.browser import drop, planned, text_of
 
 OLD = "Picture and numbers are those of the last plan that could be made."
@@ -36,8 +37,6 @@ OPTIONS = {
     "timeWeight": ("-2", "time weight -2; give a number of l², 0 or more"),
 }
 LINKS = [
-    ("v=2&N=3", "path", "The link cannot be read: it is of another version of this page."),
-    ("v=1&points=", "path", "The link cannot be read: it is cut off or damaged."),
     ("v=1&path=cube%3A3", "path", "The link cannot be read: it has an unknown shape, cube."),
     ("v=1&path=circle%3A-3", "path", "circle: its size must be above 0"),
     ("v=1&objective=beauty", "options", "objective 'beauty'; allowed are error, time, flips"),

@@ -26,6 +26,7 @@ from sim.model.robot_toml import robot_toml
 from softflagella.__main__ import main
 from tests.planner.page.cases import TRIANGLE, one_robot
 from tests.planner.page.cases import planned as planned_by_python
+from tests.planner.page.parity import check_header
 from tests.planner.page.runs import table_of_runs
 from tests.planner.page.view.browser import (
     address_of,
@@ -49,15 +50,6 @@ def check_plans(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
     for name in ("dwell_bar", "predicted_poses", "reference", "stated_error_over_l", "feedback_error_over_l",
                  "predicted_rms_over_l"):  # fmt: skip
         assert np.abs(np.array(ours[name]) - np.array(theirs[name])).max() < 1e-9, name
-
-
-def check_headers(ours: str, theirs: str) -> None:
-    """Assert that two headers agree up to rounding, below the line with the plan's identity."""
-    number = re.compile(r"-?\b\d+(?:\.\d+)?(?:e[-+]\d+)?")
-    first, second = (text.split("\n", 1)[1] for text in (ours, theirs))
-    assert number.sub("0", first) == number.sub("0", second)
-    numbers = (np.array([float(word) for word in number.findall(text)]) for text in (first, second))
-    np.testing.assert_allclose(*numbers, rtol=1e-9, atol=1e-9)
 
 
 def test_the_page_opens_with_a_plan_and_a_saved_link_opens_with_the_same(browser: Any, address: str) -> None:
@@ -96,7 +88,8 @@ def test_a_circle_drawn_with_the_mouse_is_planned_and_its_files_are_those_of_the
     theirs = {name: (tmp_path / "out" / name).read_text() for name in names[:4]}
     check_plans(json.loads(files["plan.json"].read_text()), json.loads(theirs["plan.json"]))
     assert files["plan.csv"].read_text().split(",p")[0] == theirs["plan.csv"].split(",p")[0]
-    check_headers(files["tracker.h"].read_text(), theirs["tracker.h"])
+    ours = files["tracker.h"].read_text().split("\n", 1)  # below the line with the plan's identity
+    check_header(ours[1], theirs["tracker.h"].split("\n", 1)[1], 1e-9)
     assert "<svg" in files["plan.svg"].read_text()
 
 
@@ -116,21 +109,6 @@ def test_corners_begin_a_new_path(page: Any, shape: str, anew: bool) -> None:
     page.keyboard.press("Control+z")
     planned(page)
     assert page.input_value("#shape") == shape
-
-
-def test_a_square_is_typed_with_the_keyboard_alone(page: Any) -> None:
-    page.locator(".skip").focus()
-    for _ in range(12):
-        page.keyboard.press("Tab")
-        if page.evaluate("document.activeElement.id") == "shape":
-            break
-    page.keyboard.type("square")
-    page.keyboard.press("Tab")
-    assert page.evaluate("document.activeElement.id") == "size"
-    page.keyboard.press("Control+a")
-    page.keyboard.type("28")
-    assert "dwells" in planned(page)
-    assert "path=square%3A28" in address_of(page)
 
 
 def test_each_field_changes_the_robot_by_number_and_by_slider(page: Any) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sim.model.presets import PRESETS
-from tests.planner.page.page_core import answer, answers, check_near, to_page
+from tests.planner.page.page_core import answer, answers, call, check_near, to_page
 
 ROBOT = PRESETS["paper-measured"]
 SI = {name: value for name, value in to_page(ROBOT).items()
@@ -68,17 +68,11 @@ def test_an_unknown_or_broken_address_gives_the_first_state_and_says_so() -> Non
     assert "it has an unknown shape, squre (is it square?)" in read[-1]["problem"]
 
 
-def test_points_lie_on_the_grid_once() -> None:
-    points = [[0.1234, 2], [0.12341, 2.0001], [-1, 0]]
-    assert answer("view/state.js", "onGrid", points) == [[0.123, 2], [-1, 0]]
-
-
-def test_pixels_and_places_are_inverse_and_a_zoom_keeps_the_place_under_the_pointer() -> None:
+def test_a_zoom_keeps_the_place_under_the_pointer() -> None:
     place = answer("view/viewport.js", "placeAt", VIEW, 40, 70)
     check_near(answer("view/viewport.js", "pixelOf", VIEW, place), [40, 70])
-    nearer, limit = answers([("view/viewport.js", "zoomed", VIEW, factor, 40, 70) for factor in (3, 1e30)])
-    assert nearer["scale"] == 36
-    for view in (nearer, limit):
+    for factor in (3, 1e30):
+        view = call("view/viewport.js", "zoomed", VIEW, factor, 40, 70)
         check_near(answer("view/viewport.js", "placeAt", view, 40, 70), place)
 
 
@@ -99,35 +93,29 @@ def test_the_lens_is_where_it_hides_least() -> None:
     for free in corners:
         points = [place for name, place in corners.items() if name != free]
         assert answer("view/viewport.js", "lensPlace", view, points, 600, 400, 150) == free
-    assert answer("view/viewport.js", "lensPlace", view, [[300, 200]], 600, 400, 150) == "right top"
 
 
 def test_ticks_are_round_and_far_enough_apart() -> None:
     for scale in (0.0123, 0.7, 12.0, 333.0):
         step = answer("view/viewport.js", "tickStep", {**VIEW, "scale": scale})
         assert 70 <= step * scale < 70 * 2.5 * (1 + 1e-9)
-        mantissa = step / 10 ** np.floor(np.log10(step) + 1e-9)
-        assert min(abs(mantissa - each) for each in (1, 2, 5)) < 1e-9
+        assert f"{step:.0e}"[0] in "125"
+        check_near(step, float(f"{step:.0e}"), 1e-9 * step)
     check_near(answer("view/viewport.js", "ticks", -1.1, 2.3, 0.5), [-1, -0.5, 0, 0.5, 1, 1.5, 2])
-    words = answers([("view/viewport.js", "tickWords", value, step) for value, step in ((-0.5, 0.1), (20, 10))])
-    assert words == ["−0.5", "20"]
 
 
-def test_a_stroke_that_comes_back_is_closed() -> None:
-    angles = np.linspace(0, 2 * np.pi, 60)
-    ring = np.stack([np.cos(angles), np.sin(angles)], 1)
-    found = answers([("view/path_editor.js", "closes", points) for points in (ring[:-1], ring[:40])])
-    assert found == [True, False]
-
-
-def test_corners_are_moved_scaled_and_turned_about_their_middle() -> None:
-    square = [[0, 0], [2, 0], [2, 2], [0, 2]]
-    same = {"right": 0, "up": 0, "scale": 1, "turn": 0}
-    changes = [{**same, "right": 1, "up": -2}, {**same, "scale": 2}, {**same, "turn": 90}]
-    found = answers([("view/corner_table.js", "transformed", square, change) for change in changes])
-    moved, scaled, turned = [[1, -2], [3, -2], [3, 0], [1, 0]], [[-1, -1], [3, -1], [3, 3], [-1, 3]], [
-        [2, 0], [2, 2], [0, 2], [0, 0]]  # fmt: skip
-    check_near(found, [moved, scaled, turned])
+def test_words_grid_and_corners() -> None:
+    words = answers([("view/words.js", "clock", seconds) for seconds in (0, 59.94, 179.96, 3599.99)])
+    assert words == ["0:00.0", "0:59.9", "3:00.0", "60:00.0"]
+    assert answer("view/viewport.js", "tickWords", -0.5, 0.1) == "−0.5"
+    points = [[0.1234, 2], [0.12341, 2.0001], [-1, 0]]
+    assert answer("view/state.js", "onGrid", points) == [[0.123, 2], [-1, 0]]
+    square, same = [[0, 0], [2, 0], [2, 2], [0, 2]], {"right": 0, "up": 0, "scale": 1, "turn": 0}
+    changes = [{"right": 1, "up": -2}, {"scale": 2}, {"turn": 90}]
+    found = answers([("view/corner_table.js", "transformed", square, same | change) for change in changes])
+    check_near(found[0], [[1, -2], [3, -2], [3, 0], [1, 0]])
+    check_near(found[1], [[-1, -1], [3, -1], [3, 3], [-1, 3]])
+    check_near(found[2], [[2, 0], [2, 2], [0, 2], [0, 0]])
 
 
 def test_poses_between_samples() -> None:
@@ -137,12 +125,7 @@ def test_poses_between_samples() -> None:
     assert [each["dwell"] for each in poses] == [0, 0, 1, 1, 1]
 
 
-def test_the_clock_never_shows_sixty_seconds() -> None:
-    words = answers([("view/words.js", "clock", seconds) for seconds in (0, 59.94, 179.96, 3599.99)])
-    assert words == ["0:00.0", "0:59.9", "3:00.0", "60:00.0"]
-
-
-@pytest.mark.parametrize("tails", [1, 2, 3, 5, 8])
-def test_no_tail_is_drawn_behind_another(tails: int) -> None:
-    across = sorted(answers([("view/scene.js", "acrossOf", k, tails) for k in range(tails)]))
-    assert np.diff(across).min(initial=1) > 0.05
+def test_no_tail_is_drawn_behind_another() -> None:
+    for tails in range(1, 9):
+        across = sorted(answers([("view/scene.js", "acrossOf", k, tails) for k in range(tails)]))
+        assert np.diff(across).min(initial=1) > 0.05
