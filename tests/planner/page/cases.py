@@ -27,6 +27,7 @@ from surrogate.training.simulated import draw_robots
 from tests.planner.vehicles import vehicle
 from tests.shared import shared
 
+EFFECT = "left_right_bias"
 CONTROL, TRIANGLE = PRESETS["paper-control"], PRESETS["paper-triangle"]
 
 
@@ -38,7 +39,7 @@ def shipped() -> NeuralTable:
 @shared
 def one_robot() -> tuple[Robot, Any]:
     """Return a robot with an effect, and its own table."""
-    robot = replace(CONTROL, effects={"left_right_bias": 0.1})
+    robot = replace(CONTROL, effects={EFFECT: 0.1})
     return robot, tabulate(robot)
 
 

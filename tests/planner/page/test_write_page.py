@@ -15,7 +15,7 @@ import softflagella as sf
 from planner.vehicle.coefficient_modes import both_directions
 from sim.io.errors import run_command
 from softflagella.__main__ import main
-from tests.planner.page.cases import one_robot, shipped
+from tests.planner.page.cases import EFFECT, one_robot, shipped
 
 
 def data_of(page: Path) -> dict:
@@ -49,12 +49,12 @@ def test_paths_and_options_are_what_the_page_begins_with(tmp_path: Path) -> None
     assert "<title>&lt;Tank &amp; 1&gt;</title>" in page.read_text()
 
 
+@pytest.mark.rest
 def test_a_robot_with_an_effect_is_locked_and_small(tmp_path: Path) -> None:
     robot, table = one_robot()
     page = sf.write_page(tmp_path / "page.html", robot, lookup=table)
     data = data_of(page)
-    assert "left_right_bias" in data["locked"]["why"]
-    assert [entry["name"] for entry in data["robots"]] == ["paper-control"]
+    assert EFFECT in data["locked"]["why"]
     assert page.stat().st_size < 0.5e6
 
 
@@ -63,6 +63,7 @@ def test_of_a_table_without_errors_of_the_response_the_vehicle_is_written(tmp_pa
     page = sf.write_page(tmp_path / "page.html", robot, lookup=lookup)
     data = data_of(page)
     assert "one error for all robots" in data["locked"]["why"]
+    assert [entry["name"] for entry in data["robots"]] == ["paper-control"]
     errors = lookup.error_modes(both_directions(robot.group_values())).twist
     assert len(data["planner"]["table"]["vehicle"]["errors"]) == len(errors)
     assert page.stat().st_size < 0.5e6

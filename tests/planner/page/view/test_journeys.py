@@ -24,7 +24,7 @@ from sim.io.errors import run_command
 from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
 from softflagella.__main__ import main
-from tests.planner.page.cases import TRIANGLE, one_robot
+from tests.planner.page.cases import CONTROL, EFFECT, TRIANGLE, one_robot, shipped
 from tests.planner.page.cases import planned as planned_by_python
 from tests.planner.page.parity import check_header
 from tests.planner.page.runs import table_of_runs
@@ -292,13 +292,14 @@ def test_runs_are_compared_and_the_command_is_copied(page: Any, tmp_path: Path) 
     page.locator("#runs-problem", has_text="unknown column 'thetta_deg': is it 'theta_deg'?").wait_for()
 
 
-def test_a_robot_with_an_effect_is_planned_for_as_the_command_does(browser: Any, tmp_path: Path) -> None:
-    robot, table = one_robot()
+@pytest.mark.parametrize("why", ["one error for all robots", pytest.param(EFFECT, marks=pytest.mark.rest)])
+def test_a_locked_robot_is_planned_for_as_by_the_command(browser: Any, tmp_path: Path, why: str) -> None:
+    robot, table = one_robot() if why == EFFECT else (CONTROL, replace(shipped(), curve_errors=None))
     path = write_page(tmp_path / "page.html", robot, table, PlanRequest())
     table_of_runs().to_csv(tmp_path / "table.csv", index=False)
     with opened_page(browser, f"{path.as_uri()}#v=1&objective=flips&path=circle%3A22") as page:
         planned(page)
-        assert "left_right_bias" in text_of(page, "#locked")
+        assert why in text_of(page, "#locked")
         assert not page.is_visible("#robot-fields")
         ours = json.loads(saved(page, "plan.json", tmp_path).read_text())
         drop(page, tmp_path / "table.csv")
