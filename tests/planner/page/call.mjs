@@ -1,16 +1,25 @@
-/* Calls functions of the page's core: JSON in, [[file, function, arguments], …], and JSON out, their answers.
+/* Calls functions of the page's core, as long as its input lasts: each line is {calls: [[file, function, arguments],
+ * …], leftOut: names}, and is answered by a line with the answers. Arguments of the program: the core's folder and
+ * the file of the look-up table.
  *
  * A refusal is {refusal: message}. Numbers that JSON lacks are written as words in an object, typed arrays in base
- * 64, {map: entries} is a Map. The argument "@table" stands for the look-up table that is given as text; {call: [file, function, arguments]}
- * stands for the answer of another call. */
+ * 64, {map: entries} is a Map. The argument "@table" stands for the look-up table; {call: [file, function,
+ * arguments]} stands for the answer of another call. */
 import { readFileSync } from "node:fs";
+import { createInterface } from "node:readline";
 import { pathToFileURL } from "node:url";
 
-function plain(key, value) {
-  if (leftOut?.includes(key)) return undefined;
-  if (ArrayBuffer.isView(value)) return { floats: Buffer.from(Float64Array.from(value).buffer).toString("base64") };
-  if (typeof value === "number" && !Number.isFinite(value)) return { number: String(value) };
-  return value === undefined ? null : value;
+const [, , folder, tableFile] = process.argv;
+const module = (file) => import(`${pathToFileURL(folder)}/${file}`);
+let table = null;
+
+function plain(leftOut) {
+  return (key, value) => {
+    if (leftOut.includes(key)) return undefined;
+    if (ArrayBuffer.isView(value)) return { floats: Buffer.from(Float64Array.from(value).buffer).toString("base64") };
+    if (typeof value === "number" && !Number.isFinite(value)) return { number: String(value) };
+    return value === undefined ? null : value;
+  };
 }
 
 function typed(key, value) {
@@ -20,24 +29,30 @@ function typed(key, value) {
   return new Float64Array(Uint8Array.from(Buffer.from(value.floats, "base64")).buffer);
 }
 
+async function lookUpTable() {
+  return (table ??= await (await module("lookup.js")).readTable(JSON.parse(readFileSync(tableFile, "utf8"))));
+}
+
 async function called([file, name, given]) {
-  const core = await import(`${pathToFileURL(folder)}/${file}`), words = [];
+  const core = await module(file), words = [];
   for (const argument of given) {
-    if (argument === "@table") words.push(table);
+    if (argument === "@table") words.push(await lookUpTable());
     else words.push(argument?.call ? await called(argument.call) : argument);
   }
   return core[name](...words);
 }
 
-const { folder, calls, table: text, leftOut } = JSON.parse(readFileSync(0, "utf8"), typed);
-const table = text && (await (await import(`${pathToFileURL(folder)}/lookup.js`)).readTable(JSON.parse(text)));
-const answers = [];
-for (const call of calls) {
+async function answered(call) {
   try {
-    answers.push({ answer: await called(call) });
+    return { answer: await called(call) };
   } catch (refusal) {
-    if (!(refusal.name in { InputError: 0, OutsideError: 0 })) throw refusal;
-    answers.push({ refusal: refusal.message });
+    if (refusal.name in { InputError: 0, OutsideError: 0 }) return { refusal: refusal.message };
+    return { broken: `${call[0]}, ${call[1]}: ${refusal.stack}` };
   }
 }
-process.stdout.write(JSON.stringify(answers, plain));
+
+for await (const line of createInterface({ input: process.stdin })) {
+  const { calls, leftOut } = JSON.parse(line, typed), answers = [];
+  for (const call of calls) answers.push(await answered(call));
+  process.stdout.write(`${JSON.stringify(answers, plain(leftOut))}\n`);
+}

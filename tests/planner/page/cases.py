@@ -1,106 +1,132 @@
-"""Paths and drifts by which the core is compared with Python."""
+"""Robots, vehicles, paths and plans by which the core is compared with Python."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from planner.paths.nearest_feasible import nearest_path
 from planner.paths.path import Path2D, circle, polygon
-from planner.paths.tractrix import STILL, Drift, Reference
-from planner.planning.feasible import Feasibility
-from planner.vehicle.vehicle import Vehicle
+from planner.planning.plan import make_plan, plan
+from planner.planning.planned import Plan
+from planner.planning.request import PlanRequest
+from planner.vehicle.from_table import table_vehicle
+from planner.vehicle.tracked_point import Point, TrackedVehicle
+from planner.vehicle.vehicle import Mode, Vehicle
+from sim.io.errors import InputError
 from sim.model.presets import PRESETS
-from tests.planner.page.robots import vehicle_to_page
+from sim.model.robot import Robot
+from surrogate.input_ranges import ROBOT as GROUPS
+from surrogate.one_robot.tabulate import tabulate
+from surrogate.table.lookup import NeuralTable
+from surrogate.table.model_file import load
+from surrogate.training.simulated import draw_robots
 from tests.planner.vehicles import vehicle
+from tests.shared import shared
 
-_RNG = np.random.default_rng(24)
-_TURN = np.linspace(0.0, 2 * np.pi, 400, endpoint=False)
-
-
-def eight(size: float) -> Path2D:
-    """Make a figure of eight."""
-    return Path2D.of(size * np.stack([np.sin(_TURN), np.sin(2 * _TURN) / 2], 1), closed=True)
-
-
-def wave(length: float, height: float) -> Path2D:
-    """Make an open wave of three periods."""
-    x = np.linspace(0.0, length, 300)
-    return Path2D.of(np.stack([x, height * np.sin(6 * np.pi * x / length)], 1))
-
-
-def noisy_stroke(noise: float = 0.01) -> Path2D:
-    """Make an open stroke as a hand draws it."""
-    t = np.linspace(0.0, 1.0, 150)
-    clean = np.stack([6 * t, 2 * np.sin(4 * t) + t**2], 1)
-    return Path2D.of(clean + noise * _RNG.normal(size=clean.shape))
-
-
-def random_stroke(seed: int) -> Path2D:
-    """Make a random smooth stroke, open or closed."""
-    rng = np.random.default_rng(seed)
-    t = np.linspace(0.0, 2 * np.pi, 200, endpoint=False)
-    closed = bool(rng.integers(2))
-    t = t if closed else t / 2
-    terms = [rng.normal(size=(2, 2)) / k for k in range(1, 5)]
-    points = sum(np.outer(np.cos(k * t), a) + np.outer(np.sin(k * t), b) for k, (a, b) in enumerate(terms, 1))
-    return Path2D.of(rng.uniform(1.5, 4.0) * np.asarray(points), closed=closed)
-
-
-PATHS = {
-    "circle": circle(2.0),
-    "square": polygon(4, 3.0),
-    "triangle": polygon(3, 4.0),
-    "eight": eight(3.0),
-    "wave": wave(9.0, 0.8),
-    "stroke": noisy_stroke(),
-    "bend": Path2D.of([[0, 0], [3, 0], [3, 4]]),
-    "line": Path2D.of([[0, 0], [5, 1]]),
-    "star": polygon(5, 3.0),
-    **{f"random {seed}": random_stroke(seed) for seed in range(4)},
-}
+EFFECT = "left_right_bias"
+CONTROL, TRIANGLE = PRESETS["paper-control"], PRESETS["paper-triangle"]
 
 
 @cache
-def rounded(name: str, rod: float) -> Path2D:
-    """Find a path near one of PATHS that turns gently."""
-    return nearest_path(PATHS[name], rod, 0.8)
+def shipped() -> NeuralTable:
+    return load()
 
 
-DRIFTS = {"still": STILL, "sideways": Drift(0.15), "current": Drift(-0.05, (0.1, -0.2))}
+@shared
+def one_robot() -> tuple[Robot, Any]:
+    """Return a robot with an effect, and its own table."""
+    robot = replace(CONTROL, effects={EFFECT: 0.1})
+    return robot, tabulate(robot)
 
 
-def drift_to_page(drift: Drift) -> dict[str, Any]:
-    """Write a drift as the core has it."""
-    return {"sideways": drift.sideways, "current": drift.current}
+@cache
+def random_groups(count: int) -> list[dict[str, float]]:
+    """Draw robots with two to eight tails, every other one with its motor reversed."""
+    columns = draw_robots(4 * count, 0, wide=False)
+    rows = [{name: float(columns[name][row]) for name in GROUPS} for row in range(4 * count)]
+    rows = [row for row in rows if row["N"] >= 2][:count]
+    assert len(rows) == count
+    return [row | {"omega_bar": (-1) ** i * row["omega_bar"]} for i, row in enumerate(rows)]
 
 
-ROBOT = PRESETS["paper-control"]
-PAGE_ROBOT = {"tailLength": ROBOT.tail_length, "timeScale": ROBOT.time_scale}
+def columns_of(rows: list[dict[str, float]]) -> dict[str, np.ndarray]:
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+@shared
+def random_robots(count: int, seed: int = 0) -> list[Robot]:
+    """Draw robots near the paper's that the table knows."""
+    rng = np.random.default_rng(seed)
+    robots: list[Robot] = []
+    while len(robots) < count:
+        robot = replace(
+            CONTROL,
+            tails=int(rng.integers(2, 6)),
+            C_t=3 * np.exp(0.3 * rng.normal()),
+            C_r=2.8 * np.exp(0.3 * rng.normal()),
+            C_yr=2 * np.exp(0.5 * rng.normal()),
+            tail_length=float(rng.uniform(0.06, 0.13)),
+            head_length=float(rng.uniform(0.04, 0.08)),
+        ).with_motor(float(rng.uniform(2, 20)))
+        with suppress(InputError):
+            table_vehicle(robot, shipped())
+            robots.append(robot)
+    return robots
+
+
+TURN, SHARE, LONG = np.linspace(0, 2 * np.pi, 400, endpoint=False), np.linspace(0, 1, 150), np.linspace(0, 9, 300)
+HAND = np.stack([6 * SHARE, 2 * np.sin(4 * SHARE) + SHARE**2], 1)  # as a hand draws a stroke
+SQUARE, BEND = polygon(4, 3.0), Path2D.of([[0, 0], [3, 0], [3, 4]])
+PATHS = {
+    "circle": circle(2.0),
+    "square": SQUARE,
+    "triangle": polygon(3, 4.0),
+    "eight": Path2D.of(3 * np.stack([np.sin(TURN), np.sin(2 * TURN) / 2], 1), closed=True),
+    "wave": Path2D.of(np.stack([LONG, 0.8 * np.sin(2 * np.pi * LONG / 3)], 1)),
+    "stroke": Path2D.of(HAND + 0.01 * np.random.default_rng(24).normal(size=HAND.shape)),
+    "bend": BEND,
+    "line": Path2D.of([[0, 0], [5, 1]]),
+    "star": polygon(5, 3.0),
+}
+
+
+def _in_a_current() -> Vehicle:
+    """A vehicle whose current and lags are uncertain, too."""
+    car = vehicle()
+    rng = np.random.default_rng(1)
+    uncertain = Mode("current", np.zeros((2, 3)), None, np.array([1e-4, -2e-4]))
+    lagging = Mode("lag", 1e-4 * rng.normal(size=(2, 3)), 1e-4 * rng.normal(size=car.lag.shape))
+    spread = rng.uniform(0.0, 1e-3, car.spread.shape)
+    current = np.array([0.002, -0.003])
+    return replace(car, current=current, modes=(*car.modes, uncertain, lagging), spread=spread, tail_gap=0.7)
+
+
 VEHICLES = {
     "symmetric": vehicle(),
     "biased": vehicle(bias=0.1),
     "without lags": vehicle(lag=0.0),
     "with a long memory": vehicle(memory=3.0),
-    "in a current": replace(vehicle(), current=np.array([0.002, -0.003])),
+    "in a current": _in_a_current(),
 }
 
 
-def reference_to_page(reference: Reference) -> dict[str, Any]:
-    """Write a reference as the core has it."""
-    names = ("p", "q", "heading", "arc", "curvature", "closed")
-    return {name: getattr(reference, name) for name in names}
+def tracked_of(car: Vehicle, offset: float = 0.0) -> TrackedVehicle:
+    """Return a vehicle with the tracked point, as what is of no table."""
+    point: Point = "head_tip" if offset else "head_centre"
+    return TrackedVehicle(CONTROL, car, point, offset, "none", own_table=False)
 
 
-def feasibility_of(car: Vehicle, corner: str, **options: Any) -> tuple[Feasibility, dict[str, Any]]:
-    """Return what decides whether a path can be followed, as Python and as the core have it."""
-    fields = {"rod": car.pivot_distance, "drift": STILL, "time_weight": 0.0, **options}
-    feasibility = Feasibility(ROBOT, car, fields["rod"], fields["drift"], corner, fields["time_weight"])  # type: ignore[arg-type]
-    page = {
-        "robot": PAGE_ROBOT, "vehicle": vehicle_to_page(car), "rod": fields["rod"],
-        "drift": drift_to_page(fields["drift"]), "corner": corner, "timeWeight": fields["time_weight"],
-    }  # fmt: skip
-    return feasibility, page
+@shared
+def followed(path: str, car: str, offset: float = 0.0, **options: Any) -> Plan:
+    """Plan for one of PATHS and one of VEHICLES."""
+    return make_plan(PATHS[path], tracked_of(VEHICLES[car], offset), PlanRequest(**options))
+
+
+@shared
+def planned(path: str, robot: str = "paper-control", **options: Any) -> Plan:
+    """Plan for one of PATHS with the shipped look-up table."""
+    return plan(PATHS[path], PRESETS[robot], lookup=shipped(), **options)

@@ -9,7 +9,7 @@ import pandas as pd
 
 from sim.model.presets import PRESETS
 from sim.motion.lab_units import lab_columns
-from tests.planner.page.robots import columns_of, shipped
+from tests.planner.page.cases import columns_of, shipped
 
 ROBOT = PRESETS["paper-measured"]
 
@@ -26,7 +26,7 @@ def look_up(runs: pd.DataFrame) -> dict[str, np.ndarray]:
     return lab_columns(shipped().query(groups), length, time)
 
 
-def table_of_runs(noise: float = 0.03, trials: int = 3) -> pd.DataFrame:
+def table_of_runs() -> pd.DataFrame:
     """Make runs of two numbers of tails, two lengths and two speeds, in both directions and three sessions."""
     rows = [
         (tails, length, sense * speed, f"day {k % 3}")
@@ -34,11 +34,11 @@ def table_of_runs(noise: float = 0.03, trials: int = 3) -> pd.DataFrame:
         for length in (7.0, 9.5)
         for speed in (100.0, 150.0)
         for sense in (1, -1)
-        for k in range(trials)
+        for k in range(3)
     ]
     runs = pd.DataFrame(rows, columns=["N", "l_cm", "omega_rpm", "session"])
     rng = np.random.default_rng(7)
     answers = look_up(runs)
     for name in ("omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s", "R_yr_cm", "theta_deg"):
-        runs[name] = answers[name] * np.exp(noise * rng.normal(size=len(runs)))
+        runs[name] = answers[name] * np.exp(0.03 * rng.normal(size=len(runs)))
     return runs

@@ -6,6 +6,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ import softflagella as sf
 from planner.vehicle.coefficient_modes import both_directions
 from sim.io.errors import run_command
 from softflagella.__main__ import main
-from tests.planner.page.robots import shipped
+from tests.planner.page.cases import EFFECT, one_robot, shipped
 
 
 def data_of(page: Path) -> dict:
@@ -36,13 +37,8 @@ def test_the_same_input_gives_the_same_bytes_and_a_policy_without_connections(tm
 
 
 def test_paths_and_options_are_what_the_page_begins_with(tmp_path: Path) -> None:
-    page = sf.write_page(
-        tmp_path / "page.html",
-        paths={"mine": sf.circle(2.0)},
-        objective="flips",
-        tolerance=0.5,
-        title="<Tank & 1>",
-    )
+    options: dict[str, Any] = {"objective": "flips", "tolerance": 0.5, "title": "<Tank & 1>"}
+    page = sf.write_page(tmp_path / "page.html", paths={"mine": sf.circle(2.0)}, **options)
     data = data_of(page)
     assert data["first"] == {"robot": "paper-control", "shape": "mine", "options": {
         "objective": "flips", "corner": "nearest", "point": "head_centre", "minimumSeconds": None,
@@ -53,12 +49,12 @@ def test_paths_and_options_are_what_the_page_begins_with(tmp_path: Path) -> None
     assert "<title>&lt;Tank &amp; 1&gt;</title>" in page.read_text()
 
 
+@pytest.mark.rest
 def test_a_robot_with_an_effect_is_locked_and_small(tmp_path: Path) -> None:
-    robot = replace(sf.load_robot("paper-control"), effects={"left_right_bias": 0.1})
-    page = sf.write_page(tmp_path / "page.html", robot, lookup=sf.tabulate(robot))
+    robot, table = one_robot()
+    page = sf.write_page(tmp_path / "page.html", robot, lookup=table)
     data = data_of(page)
-    assert "left_right_bias" in data["locked"]["why"]
-    assert [entry["name"] for entry in data["robots"]] == ["paper-control"]
+    assert EFFECT in data["locked"]["why"]
     assert page.stat().st_size < 0.5e6
 
 
@@ -67,38 +63,23 @@ def test_of_a_table_without_errors_of_the_response_the_vehicle_is_written(tmp_pa
     page = sf.write_page(tmp_path / "page.html", robot, lookup=lookup)
     data = data_of(page)
     assert "one error for all robots" in data["locked"]["why"]
-    assert len(data["planner"]["table"]["vehicle"]["errors"]) == len(
-        lookup.error_modes(both_directions(robot.group_values())).twist
-    )
+    assert [entry["name"] for entry in data["robots"]] == ["paper-control"]
+    errors = lookup.error_modes(both_directions(robot.group_values())).twist
+    assert len(data["planner"]["table"]["vehicle"]["errors"]) == len(errors)
     assert page.stat().st_size < 0.5e6
 
 
 def test_bad_input_ends_in_one_line_and_leaves_no_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    out = str(tmp_path / "page.html")
-    for words in (
-        ["--robot", "nobody"],
-        ["--path", "squre:3l"],
-        ["--tolerance", "-1cm"],
-        ["--minimum-seconds", "nan"],
-    ):
-        assert run_command(main, ["page", *words, "--out", out]) == 2
+    for words in ("--robot nobody", "--path squre:3l", "--tolerance -1cm", "--minimum-seconds nan"):
+        assert run_command(main, ["page", *words.split(), "--out", str(tmp_path / "page.html")]) == 2
         assert len(capsys.readouterr().err.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
 
 
-def test_paths_have_the_names_of_their_shapes_and_files(tmp_path: Path) -> None:
-    (tmp_path / "my path.csv").write_text("x,y\n0,0\n3,0\n3,2\n")
-    words = [
-        "page",
-        "--path",
-        "circle:1.5l",
-        "--path",
-        str(tmp_path / "my path.csv"),
-        "--unit",
-        "l",
-        "--out",
-        str(tmp_path / "p.html"),
-    ]
+def test_paths_have_the_names_of_their_shapes_and_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("my path.csv").write_text("x,y\n0,0\n3,0\n3,2\n")
+    words = ["page", "--path", "circle:1.5l", "--path", "my path.csv", "--unit", "l", "--out", "p.html"]
     assert run_command(main, words) == 0
-    shapes = data_of(tmp_path / "p.html")["shapes"]
+    shapes = data_of(Path("p.html"))["shapes"]
     assert [shape["name"] for shape in shapes[:3]] == ["circle:1.5l", "my path", "circle"]

@@ -68,10 +68,25 @@ def drop(page: Any, *files: Path | dict[str, Any]) -> None:
     page.locator("#pick").set_input_files([file if isinstance(file, dict) else str(file) for file in files])
 
 
+def middle_of(page: Any) -> tuple[float, float]:
+    """Scroll to the picture, and return the middle of what is seen of it."""
+    page.locator("#view").scroll_into_view_if_needed()
+    box = page.locator("#view").bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def unfold(page: Any) -> None:
+    page.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+
+
+def address_of(page: Any) -> str:
+    return str(page.evaluate("location.hash"))
+
+
 def drag(page: Any, *paths: Path) -> None:
     """Drag files or folders onto the picture, and let them go there."""
-    session, box = page.context.new_cdp_session(page), page.locator("#view").bounding_box()
-    place = {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2}
+    session, (x, y) = page.context.new_cdp_session(page), middle_of(page)
+    place = {"x": x, "y": y}
     data = {"items": [], "files": [str(path) for path in paths], "dragOperationsMask": 1}
     for kind in ("dragEnter", "dragOver", "drop"):
         session.send("Input.dispatchDragEvent", {"type": kind, **place, "data": data})

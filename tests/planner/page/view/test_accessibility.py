@@ -1,31 +1,58 @@
-"""Everybody can use the page: names, keyboard, one word for a finished plan, contrast, sizes of text."""
+"""Everybody can use the page: names, keyboard, one word for a finished plan, contrast, sizes of text, a phone."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 
-from tests.planner.page.view.browser import opened_page, planned
+from tests.planner.page.view.browser import address_of, middle_of, opened_page, planned, unfold
+from tests.planner.page.view.conftest import FIRST
 
 TEXT, LINES = 4.5, 3.0  # contrast at least
 TARGET = 44  # pixels
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 CONTROLS = "a[href], button, input:not([type=hidden]), select, summary, [tabindex='0']"
+ROLES = {"button", "link", "textbox", "spinbutton", "slider", "combobox", "checkbox", "radio", "image"}
 RGB = """([name, part]) => {
   const element = document.querySelector(part);
   const words = getComputedStyle(element)[name];
   return words.match(/[\\d.]+/g).map(Number);
 }"""
+TEXTS = """() => {
+  const numbers = (words) => words.match(/[\\d.]+/g).map(Number);
+  const behind = (part) => {
+    for (; part; part = part.parentElement) {
+      const colour = numbers(getComputedStyle(part).backgroundColor);
+      if (colour.length < 4 || colour[3] > 0) return colour;
+    }
+  };
+  const own = (part) => [...part.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim());
+  return [...document.body.querySelectorAll("*")].filter((part) => part.checkVisibility() && own(part)
+    && !part.closest("script, noscript")).map((part) => {
+      const style = getComputedStyle(part);
+      const colour = part.namespaceURI.endsWith("svg") ? style.fill : style.color;
+      return [part.outerHTML.slice(0, 80), numbers(colour), behind(part)];
+    });
+}"""
+LISTEN = """() => {
+  window.told = [];
+  for (const region of document.querySelectorAll("[role=status], [aria-live=polite], output")) {
+    if (region.getAttribute("aria-live") === "off") continue;
+    new MutationObserver(() => window.told.push(region.textContent)).observe(
+      region, { childList: true, characterData: true, subtree: true });
+  }
+}"""
 
 
-@pytest.fixture(scope="module", params=["light", "dark"])
-def page(browser: Any, address: str, request: pytest.FixtureRequest) -> Iterator[Any]:
+@pytest.fixture(scope="module")
+def page(browser: Any, address: str) -> Iterator[Any]:
     """Open the page, all its parts unfolded, with a plan."""
-    with opened_page(browser, address, color_scheme=request.param) as opened:
+    with opened_page(browser, f"{address}#{FIRST}") as opened:
         planned(opened)
-        opened.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+        unfold(opened)
         opened.locator("#trade-off circle").first.wait_for()
         planned(opened)
         yield opened
@@ -44,21 +71,8 @@ def contrast(first: list[float], second: list[float]) -> float:
 
 
 def test_each_control_has_a_name(page: Any) -> None:
-    session = page.context.new_cdp_session(page)
-    nodes = session.send("Accessibility.getFullAXTree")["nodes"]
-    roles = {
-        "button",
-        "link",
-        "textbox",
-        "spinbutton",
-        "slider",
-        "combobox",
-        "checkbox",
-        "radio",
-        "image",
-        "group",
-    }
-    controls = [node for node in nodes if not node["ignored"] and node["role"]["value"] in roles - {"group"}]
+    nodes = page.context.new_cdp_session(page).send("Accessibility.getFullAXTree")["nodes"]
+    controls = [node for node in nodes if not node["ignored"] and node["role"]["value"] in ROLES]
     assert len(controls) > 60
     assert [node for node in controls if not node.get("name", {}).get("value", "").strip()] == []
 
@@ -81,16 +95,7 @@ def test_tab_reaches_each_control_in_the_order_of_the_page(page: Any) -> None:
 
 
 def test_a_finished_plan_is_told_once(page: Any) -> None:
-    page.evaluate(
-        """() => {
-          window.told = [];
-          for (const region of document.querySelectorAll("[role=status], [aria-live=polite], output")) {
-            if (region.getAttribute("aria-live") === "off") continue;
-            new MutationObserver(() => window.told.push(region.textContent)).observe(
-              region, { childList: true, characterData: true, subtree: true });
-          }
-        }"""
-    )
+    page.evaluate(LISTEN)
     page.fill("#size", "27.5")
     words = planned(page)
     page.click("#play")
@@ -99,38 +104,20 @@ def test_a_finished_plan_is_told_once(page: Any) -> None:
     assert page.evaluate("window.told") == [words]
 
 
-def test_text_and_lines_have_enough_contrast(page: Any) -> None:
-    texts = page.evaluate(
-        """() => {
-          const numbers = (words) => words.match(/[\\d.]+/g).map(Number);
-          const behind = (part) => {
-            for (; part; part = part.parentElement) {
-              const colour = numbers(getComputedStyle(part).backgroundColor);
-              if (colour.length < 4 || colour[3] > 0) return colour;
-            }
-          };
-          const own = (part) => [...part.childNodes].some((node) => node.nodeType === 3
-            && node.textContent.trim());
-          return [...document.body.querySelectorAll("*")].filter((part) => part.checkVisibility() && own(part)
-            && !part.closest("script, noscript")).map((part) => {
-              const style = getComputedStyle(part);
-              const colour = part.namespaceURI.endsWith("svg") ? style.fill : style.color;
-              return [part.outerHTML.slice(0, 80), numbers(colour), behind(part)];
-            });
-        }"""
-    )
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_and_lines_have_enough_contrast_and_differ_by_more_than_colour(page: Any, scheme: str) -> None:
+    page.emulate_media(color_scheme=scheme)
+    texts = page.evaluate(TEXTS)
     assert len(texts) > 100
     assert [(part, colour) for part, colour, behind in texts if contrast(colour, behind) < TEXT] == []
     card = page.evaluate(RGB, ["backgroundColor", "#view"])
+    assert (luminance(card) > 0.5) == (scheme == "light")
     for kind in ("drawn", "declared", "forward", "backward", "start"):
         line = page.evaluate(RGB, ["stroke", f"#scene path.{kind}"])
         assert contrast(line, card) >= LINES, kind
     for part in ("#size", "#shape", "#undo", "#play"):
         edge = page.evaluate(RGB, ["borderTopColor", part])
         assert contrast(edge, page.evaluate(RGB, ["backgroundColor", "section"])) >= LINES, part
-
-
-def test_lines_differ_by_more_than_colour(page: Any) -> None:
     looks = page.evaluate(
         """() => ["drawn", "declared", "forward", "backward"].map((kind) => {
           const style = getComputedStyle(document.querySelector(`#scene path.${kind}`));
@@ -141,10 +128,38 @@ def test_lines_differ_by_more_than_colour(page: Any) -> None:
     assert "motor +" in page.inner_text("#clock") or "motor −" in page.inner_text("#clock")
 
 
-def test_targets_on_a_phone_are_large_enough(browser: Any, address: str) -> None:
-    with opened_page(browser, address, **PHONE) as page:
+@pytest.mark.parametrize(("width", "zoom"), [(320, 1), (640, 2)])
+def test_nothing_scrolls_sideways(page: Any, width: int, zoom: int) -> None:
+    """Nothing does at 320 pixels, nor with text of 200 % on 640 pixels."""
+    page.set_viewport_size({"width": width, "height": 700})
+    page.evaluate(f"document.documentElement.style.fontSize = '{100 * zoom}%'")
+    planned(page)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    size = page.evaluate("parseFloat(getComputedStyle(document.body).fontSize)")
+    assert size == pytest.approx(16 * zoom)
+    cut = page.evaluate(
+        """() => [...document.querySelectorAll("button, label, p, dd, dt, h1, h2, summary")].filter((part) =>
+           part.checkVisibility() && !part.closest(".away, .wide, svg") && !part.classList.contains("away") &&
+           !part.classList.contains("skip") && part.scrollWidth > part.clientWidth + 1 &&
+           getComputedStyle(part).display !== "inline").map((part) => part.outerHTML.slice(0, 90))"""
+    )
+    assert cut == []
+
+
+def test_on_a_phone_targets_are_large_and_a_finger_draws(browser: Any, address: str) -> None:
+    with opened_page(browser, f"{address}#{FIRST}", **PHONE) as page:
         planned(page)
-        page.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        page.check("input[value=draw]")
+        session, (x, y) = page.context.new_cdp_session(page), middle_of(page)
+        for k, angle in enumerate(np.linspace(0.0, 2 * np.pi, 40)):
+            point = {"x": x + 90 * float(np.cos(angle)), "y": y + 90 * float(np.sin(angle))}
+            kind = "touchStart" if k == 0 else "touchMove"
+            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [point]})
+        session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        assert "dwells" in planned(page)
+        assert "points=" in address_of(page)
+        unfold(page)
         planned(page)
         small = page.evaluate(
             f"""() => [...document.querySelectorAll("{CONTROLS}")].filter((control) => control.checkVisibility()
@@ -155,23 +170,3 @@ def test_targets_on_a_phone_are_large_enough(browser: Any, address: str) -> None
                .map(([words, box]) => [words, box.width, box.height])"""
         )
         assert small == []
-
-
-@pytest.mark.parametrize(("width", "zoom"), [(320, 1), (640, 2)])
-def test_nothing_scrolls_sideways(browser: Any, address: str, width: int, zoom: int) -> None:
-    """Nothing does at 320 pixels, nor with text of 200 % on 640 pixels."""
-    with opened_page(browser, address, viewport={"width": width, "height": 700}) as page:
-        planned(page)
-        page.evaluate(f"document.documentElement.style.fontSize = '{100 * zoom}%'")
-        page.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
-        planned(page)
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
-        size = page.evaluate("parseFloat(getComputedStyle(document.body).fontSize)")
-        assert size == pytest.approx(16 * zoom)
-        cut = page.evaluate(
-            """() => [...document.querySelectorAll("button, label, p, dd, dt, h1, h2, summary")].filter((part) =>
-               part.checkVisibility() && !part.closest(".away, .wide, svg") && !part.classList.contains("away") &&
-               !part.classList.contains("skip") && part.scrollWidth > part.clientWidth + 1 &&
-               getComputedStyle(part).display !== "inline").map((part) => part.outerHTML.slice(0, 90))"""
-        )
-        assert cut == []

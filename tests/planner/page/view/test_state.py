@@ -1,33 +1,29 @@
-"""The state of the page: units, addresses, undo and redo."""
+"""Parts of the page that need no browser: units, addresses, zoom, ticks, strokes, corners, poses, the clock."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+import pytest
 
 from sim.model.presets import PRESETS
-from tests.planner.page.page_core import answer, answers
+from tests.planner.page.page_core import answer, answers, call, check_near, to_page
 
 ROBOT = PRESETS["paper-measured"]
-SI = {
-    "tails": ROBOT.tails, "tailLength": ROBOT.tail_length, "motorSpeed": ROBOT.motor_speed,
-    "viscosity": ROBOT.viscosity, "tailRadius": ROBOT.tail_radius, "youngsModulus": ROBOT.youngs_modulus,
-    "headRadius": ROBOT.head_radius, "headLength": ROBOT.head_length, "discOffset": None, "C_t": ROBOT.C_t,
-    "C_r": ROBOT.C_r, "C_yr": ROBOT.C_yr,
-}  # fmt: skip
+SI = {name: value for name, value in to_page(ROBOT).items()
+      if name not in ("name", "effects", "timeScale", "omegaBar", "sigmas")}  # fmt: skip
 OPTIONS = {"objective": "error", "corner": "nearest", "point": "head_centre", "minimumSeconds": None,
            "tolerance": None, "timeWeight": 0, "smooth": None}  # fmt: skip
 SHAPES = ["circle", "square"]
+VIEW = {"scale": 12.0, "left": 310.0, "top": 205.0}
 
 
-def first() -> dict:
+def first() -> dict[str, Any]:
     values = answer("view/state.js", "labValues", SI)
-    return {
-        "robot": {"name": "paper-measured", "values": values},
-        "path": {"shape": "circle", "size": 20},
-        "options": OPTIONS,
-    }
+    path = {"shape": "circle", "size": 20}
+    return {"robot": {"name": "paper-measured", "values": values}, "path": path, "options": OPTIONS}
 
 
 def test_laboratory_units_are_round_numbers_and_lead_back_to_the_last_bit() -> None:
@@ -40,8 +36,7 @@ def test_laboratory_units_are_round_numbers_and_lead_back_to_the_last_bit() -> N
 
 
 def test_an_address_holds_what_differs_and_leads_back_to_the_same_state() -> None:
-    initial = first()
-    rng = np.random.default_rng(1)
+    initial, rng = first(), np.random.default_rng(1)
     drawn = (np.cumsum(rng.integers(-400, 400, (300, 2)), 0) / 1000).tolist()
     opened = [*rng.normal(size=(20, 2)).tolist(), [1e-9, -1e21]]
     values = {**initial["robot"]["values"], "viscosity": 0.97, "discOffset": 12.5}
@@ -63,22 +58,74 @@ def test_an_address_holds_what_differs_and_leads_back_to_the_same_state() -> Non
 def test_an_unknown_or_broken_address_gives_the_first_state_and_says_so() -> None:
     initial = first()
     broken = ["v=2", "rubbish", "v=1&points=1.", "v=1&points=2.3", "v=1&places=2,3", "v=1&places=2,3~4",
-              "v=1&places=2,3~4,x", "v=1&path=heptagon%3A3", "v=1&C_t=x",
-              "v=1&name=%E0%A4%A", "v=1&path=circle%3A", "v=1&unknown=3", "v=1&C_t=none", "=",
-              "v=1&&"]  # fmt: skip
+              "v=1&places=2,3~4,x", "v=1&path=heptagon%3A3", "v=1&C_t=x", "v=1&name=%E0%A4%A",
+              "v=1&path=circle%3A", "v=1&unknown=3", "v=1&C_t=none", "=", "v=1&&",
+              "v=1&path=squre%3A3"]  # fmt: skip
     read = answers([("view/state.js", "fromAddress", address, initial, SHAPES) for address in broken])
     for entry in read:
         assert entry["state"] == initial
         assert entry["problem"].startswith("The link cannot be read: ")
+    assert "it has an unknown shape, squre (is it square?)" in read[-1]["problem"]
 
 
-def test_a_misspelt_shape_in_an_address_is_told_the_nearest_one() -> None:
-    entry = answer("view/state.js", "fromAddress", "v=1&path=squre%3A3", first(), SHAPES)
-    assert "it has an unknown shape, squre (is it square?)" in entry["problem"]
+def test_a_zoom_keeps_the_place_under_the_pointer() -> None:
+    place = answer("view/viewport.js", "placeAt", VIEW, 40, 70)
+    check_near(answer("view/viewport.js", "pixelOf", VIEW, place), [40, 70])
+    for factor in (3, 1e30):
+        view = call("view/viewport.js", "zoomed", VIEW, factor, 40, 70)
+        check_near(answer("view/viewport.js", "placeAt", view, 40, 70), place)
 
 
-def test_points_lie_on_the_grid_once() -> None:
-    assert answer("view/state.js", "onGrid", [[0.1234, 2], [0.12341, 2.0001], [-1, 0]]) == [
-        [0.123, 2],
-        [-1, 0],
-    ]
+def test_everything_fits() -> None:
+    points = np.random.default_rng(0).normal(size=(50, 2)) * [30, 2]
+    view = answer("view/viewport.js", "fitted", points, 600, 400)
+    pixels = np.array(answers([("view/viewport.js", "pixelOf", view, point) for point in points]))
+    assert pixels.min(0)[0] == pytest.approx(600 * 0.12 / 1.24)
+    assert (pixels.min() >= 0, pixels[:, 0].max() <= 600, pixels[:, 1].max() <= 400) == (True, True, True)
+    for few in ([[3, 4]], []):
+        assert answer("view/viewport.js", "fitted", few, 600, 400)["scale"] > 0
+
+
+def test_the_lens_is_where_it_hides_least() -> None:
+    view = {"scale": 1.0, "left": 0.0, "top": 400.0}  # places are pixels, y upwards
+    corners = {"right top": [540, 330], "left top": [60, 330], "right bottom": [540, 70], "left bottom": [60, 70],
+               "middle": [300, 200]}  # fmt: skip
+    for free in corners:
+        points = [place for name, place in corners.items() if name != free]
+        assert answer("view/viewport.js", "lensPlace", view, points, 600, 400, 150) == free
+
+
+def test_ticks_are_round_and_far_enough_apart() -> None:
+    for scale in (0.0123, 0.7, 12.0, 333.0):
+        step = answer("view/viewport.js", "tickStep", {**VIEW, "scale": scale})
+        assert 70 <= step * scale < 70 * 2.5 * (1 + 1e-9)
+        assert f"{step:.0e}"[0] in "125"
+        check_near(step, float(f"{step:.0e}"), 1e-9 * step)
+    check_near(answer("view/viewport.js", "ticks", -1.1, 2.3, 0.5), [-1, -0.5, 0, 0.5, 1, 1.5, 2])
+
+
+def test_words_grid_and_corners() -> None:
+    words = answers([("view/words.js", "clock", seconds) for seconds in (0, 59.94, 179.96, 3599.99)])
+    assert words == ["0:00.0", "0:59.9", "3:00.0", "60:00.0"]
+    assert answer("view/viewport.js", "tickWords", -0.5, 0.1) == "−0.5"
+    points = [[0.1234, 2], [0.12341, 2.0001], [-1, 0]]
+    assert answer("view/state.js", "onGrid", points) == [[0.123, 2], [-1, 0]]
+    square, same = [[0, 0], [2, 0], [2, 2], [0, 2]], {"right": 0, "up": 0, "scale": 1, "turn": 0}
+    changes = [{"right": 1, "up": -2}, {"scale": 2}, {"turn": 90}]
+    found = answers([("view/corner_table.js", "transformed", square, same | change) for change in changes])
+    check_near(found[0], [[1, -2], [3, -2], [3, 0], [1, 0]])
+    check_near(found[1], [[-1, -1], [3, -1], [3, 3], [-1, 3]])
+    check_near(found[2], [[2, 0], [2, 2], [0, 2], [0, 0]])
+
+
+def test_poses_between_samples() -> None:
+    plan = {"dwells": [2, 4], "samples": 2, "motion": [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 2, 1], [2, 4, 1]]}
+    poses = answers([("view/player.js", "poseAt", plan, [0, 2, 6], time) for time in (-1, 0.5, 2, 3, 99)])
+    assert [each["pose"] for each in poses] == [[0, 0, 0], [0.5, 0, 0], [2, 0, 0], [2, 1, 0.5], [2, 4, 1]]
+    assert [each["dwell"] for each in poses] == [0, 0, 1, 1, 1]
+
+
+def test_no_tail_is_drawn_behind_another() -> None:
+    for tails in range(1, 9):
+        across = sorted(answers([("view/scene.js", "acrossOf", k, tails) for k in range(tails)]))
+        assert np.diff(across).min(initial=1) > 0.05

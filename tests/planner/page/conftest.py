@@ -1,0 +1,16 @@
+"""The page's core runs in one process for all tests of a worker."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.planner.page.page_core import stop_core
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _core() -> Iterator[None]:
+    """End the core after the last test."""
+    yield
+    stop_core()
