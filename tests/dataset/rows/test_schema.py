@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from matplotlib.figure import Figure
 
 import dataset.build.build
 from dataset.build.build import build, mend
@@ -37,7 +38,10 @@ def one_column_more(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("one_column_more")
-def test_a_declared_column_is_stored_and_reported(tmp_path: Path) -> None:
+def test_a_declared_column_is_stored_and_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are made, but not drawn."""
+    monkeypatch.setattr("sim.io.pages.figure_markup", lambda _, description, number: f"{number}: {description}")
+    monkeypatch.setattr(Figure, "tight_layout", lambda *_, **__: None)
     build(design(80), tmp_path / "out", title="", simulate=with_tip_speed)
     rows = read(tmp_path / "out")
     assert rows["tip_speed"].to_numpy() == pytest.approx(rows["omega_bar"] / rows["l_over_R"])
