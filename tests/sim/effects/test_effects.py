@@ -161,8 +161,9 @@ def test_a_dissipative_effect_takes_power_and_gives_none(name: str) -> None:
         assert R[3, 4] >= 0  # the disc's own drag
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", list(catalogue()))
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.rest if n == "free_surface" else ()) for n in catalogue()]
+)
 def test_robots_move_at_both_ends_of_its_bounds(name: str) -> None:
     assert not steady(control(2, **{name: catalogue()[name].bounds})).failed.any()
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from sim.__main__ import main
 from sim.io.errors import run_command
-from tests.processes import LIMIT
 from tests.sim.robots import CONTROL_VALUES
 
 
@@ -49,12 +46,3 @@ def test_steady_refuses(case: str, tmp_path: Path, capsys: pytest.CaptureFixture
     assert error.startswith("error: ")
     assert len(error.splitlines()) == 1
     assert [p.name for p in tmp_path.iterdir()] == ["points.csv"]
-
-
-def test_the_command_itself_exits_with_2(tmp_path: Path) -> None:
-    """Through the interpreter, as a user meets it."""
-    words = [sys.executable, "-m", "sim", "steady", str(tmp_path / "none.csv"), "--out", str(tmp_path / "o.csv")]
-    done = subprocess.run(words, capture_output=True, text=True, cwd=Path(__file__).parents[3], timeout=LIMIT)
-    assert done.returncode == 2
-    assert "none.csv" in done.stderr
-    assert len(done.stderr.splitlines()) == 1

@@ -105,7 +105,6 @@ def test_the_width_of_groups_does_not_matter(
 
 
 def test_many_robots_are_solved_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Room for 4,000 robots at once would be 1.1 GB."""
     some = robots(3, 5)
     wanted = solve_orbits(numbers(some), 3), responses(some, history=False)
     monkeypatch.setattr(grouping, "AT_ONCE", 2)

@@ -43,7 +43,6 @@ def test_a_track_of_a_robot_with_a_size_is_in_centimetres_too() -> None:
 
 @pytest.mark.parametrize("tails", [2.0, 4.0])
 def test_a_replay_turns_as_fast_as_the_steady_motion(tails: float) -> None:
-    """A yaw rate 0.2 % too small adds up to a tenth of l in a plan of some hundred dwells."""
     values = {**CONTROL_VALUES, "N": tails}
     track = replay([Schedule(values, 1, np.array([12.0]), (0.0, 0.0, 0.0), 1.0)])[0]
     late = track[track["time_bar"] > 4]
@@ -53,7 +52,7 @@ def test_a_replay_turns_as_fast_as_the_steady_motion(tails: float) -> None:
 
 @pytest.mark.parametrize("robot", [
     pytest.param({**CONTROL_VALUES, "N": 2.0}, id="control"),
-    pytest.param({**CONTROL_VALUES, "N": 4.0, "omega_bar": 30.0}, id="fast", marks=pytest.mark.slow),
+    pytest.param({**CONTROL_VALUES, "N": 4.0, "omega_bar": 30.0}, id="fast", marks=pytest.mark.rest),
 ])  # fmt: skip
 def test_the_error_of_a_track_is_that_against_a_much_finer_mesh(robot: dict[str, float]) -> None:
     """The reference has three times the edges and the steps, so a ninth of the error."""

@@ -104,18 +104,17 @@ def test_a_row_without_an_orbit_is_stepped_and_says_so(monkeypatch: pytest.Monke
 
 
 def test_a_quick_turn_is_followed_from_rest() -> None:
-    """Both robots turn fast beside their discs; straight tails take one of them to another motion."""
+    """The robot turns fast beside its disc; straight tails take it to another motion."""
     size = {"l_over_R": 3.82, "L_over_R": 4.24, "l_over_r0": 16.2, "omega_bar": 117.0}
-    groups = control(2, N=6, C_t=0.55, C_r=0.54, C_yr=[4.1, 2.5], **size)
+    groups = control(1, N=6, C_t=0.55, C_r=0.54, C_yr=4.1, **size)
     alike = orbits(groups)
     assert alike.converged.all()
     assert (np.abs(alike.omega_yr) > QUICK * np.abs(alike.omega_t)).all()
     motion = steady(groups)
-    assert motion.method.tolist() == [STEPPING, DIRECT]
+    assert motion.method.tolist() == [STEPPING]
     assert motion.converged.all()
     assert "another motion" in motion.note[0]
     assert abs(motion.v_z[0] / alike.v_z[0] - 1) > 0.1
-    assert motion.v_z[1] == alike.v_z[1]
 
 
 @pytest.mark.rest

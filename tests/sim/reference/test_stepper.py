@@ -18,14 +18,14 @@ from sim.solve.refinement import FEW, SOLVED, refined_orbit
 from tests.sim.robots import control, first_body
 
 
-@pytest.mark.parametrize("tails", [1, 2, 5])
+@pytest.mark.parametrize("tails", [1, 5])
 def test_total_force_and_moment_vanish_to_round_off(tails: int) -> None:
     """Also in the middle of a transient, where nothing is steady."""
     groups = control(3, N=tails, omega_bar=[3.0, 10.0, -60.0])
     robots = tensor_robots(groups, edges=12)
     state = at_rest(robots)
     dt = torch.full((3,), 0.004, dtype=torch.float64)
-    for _ in range(30):
+    for _ in range(12):
         state = step(robots, state, robots.body.omega, dt, tolerance=1e-12)
     tail, head = fluid_wrench(robots, state.x, state.x_dot, state.pose[PHASE], state.u, robots.body.omega)
     assert (tail + head).abs().max() < 1e-11 * tail.abs().max()
@@ -35,7 +35,7 @@ def test_total_force_and_moment_vanish_to_round_off(tails: int) -> None:
 @pytest.mark.parametrize(("tails", "omega"), [(1, 8.0), (2, 40.0), (5, -15.0)])
 def test_compiled_steps_equal_steps_with_tensors(tails: int, omega: float) -> None:
     """The same scheme on the same equations, from rest, with motor droop, drag on the disc and loads."""
-    groups, steps, edges = control(N=tails, omega_bar=omega, C_yr=5.0), 40, 10
+    groups, steps, edges = control(N=tails, omega_bar=omega, C_yr=5.0), 15, 10
     robots = tensor_robots(groups, edges=edges)
     load = torch.tensor([[0.3], [-0.6], [0.2]], dtype=torch.float64)
     droop = 0.2 / robots.body.resistance[3, 3]

@@ -68,7 +68,7 @@ def test_gaps_are_kept_to_two_per_cent(name: str) -> None:
     assert difference(found.means, plain.means) > 10 * found.error
 
 
-@pytest.mark.parametrize("name", ["measured", "three", "five"])
+@pytest.mark.parametrize("name", ["measured", "five"])
 def test_meshes_converge(name: str) -> None:
     """The means on 8, 12 and 16 edges come nearer and nearer to those on 32, which the stated error covers."""
     groups = with_contact(ROBOTS[name])

@@ -45,7 +45,7 @@ def yaw_rates(groups: Groups) -> np.ndarray:
 
 
 # Friction has no derivative where it starts: its bounds end at its null.
-PLACES = [(name, at) for name in NONLOCAL for at in ("null", "typical") if (name, at) != ("contact_line", "null")]
+PLACES = [*((name, "typical") for name in NONLOCAL), ("tail_interaction", "null"), ("natural_splay", "null")]
 
 
 @pytest.mark.parametrize(("name", "at"), PLACES)
@@ -76,9 +76,9 @@ def test_tensor_steps_refuse_what_they_leave_out() -> None:
 
 def test_the_stated_error_covers_a_much_finer_mesh() -> None:
     """Against 24 and 36 edges, extrapolated: nine rows in ten are within it, all within three times."""
-    points = sweep_points(24)
+    points = sweep_points(12)
     ratios = []
-    for i in range(24):
+    for i in range(12):
         groups = Groups.from_columns({name: values[i : i + 1] for name, values in points.items()})
         body = first_body(groups)
         orbit = refined_orbit(body, groups.N, FEW)

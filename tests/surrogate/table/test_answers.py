@@ -34,9 +34,6 @@ def test_the_error_is_that_of_the_widest_interval() -> None:
     sizes = {"omega_t_bar": 7.588, "omega_h_bar": 2.412, "omega_yr_bar": 0.04903, "v_x": speed, "v_z": speed}
     halves = [(answer[f"{name}_high"] - answer[f"{name}_low"])[0] / 2 / size for name, size in sizes.items()]
     assert answer["error"].item() == pytest.approx(max(halves), rel=1e-3)
-
-
-def test_a_table_without_intervals_has_no_error() -> None:
     assert "error" not in answer_with_error(replace(load(), intervals=None), COLUMNS)
 
 

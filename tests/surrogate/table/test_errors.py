@@ -93,13 +93,10 @@ def test_intervals_cover_with_and_without_couples(with_couples: float, groups: i
     assert (0.88 < inside[tested].mean() < 0.92) == (groups == 2)
 
 
-def test_a_table_of_few_rows_says_that_it_is_poor() -> None:
+def test_figures_of_errors_and_a_table_of_few_rows_that_says_that_it_is_poor() -> None:
     words = shortcomings(table().errors)
     assert any("net speed" in line for line in words)
     assert all("learn more rows" in line for line in words)
-
-
-def test_figures_of_errors() -> None:
     figures = summary({"v": np.array([0.1, -0.2, 5.0])}, np.array([True, True, False]))["v"]
     assert figures["rms"] == pytest.approx(np.sqrt(0.025))
     assert figures["largest"] == pytest.approx(0.2)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from sim.effects import catalogue
-from sim.io.errors import InputError
 from sim.model.groups import Groups
 from sim.motion.batches import steady_columns
 from sim.reference.linear_theory import linear_filament
@@ -37,14 +36,6 @@ def test_effects_on_head_disc_and_motor_need_no_learning(effect: str) -> None:
         assert answer[name] == pytest.approx(truth[name], rel=0.005), name
     if catalogue()[effect].symmetry == "odd":
         assert abs(truth["omega_yr_bar"].sum()) > 1e-3 * abs(truth["omega_yr_bar"][0])
-
-
-def test_effects_on_the_tails_are_refused() -> None:
-    robots = {name: values[:2] for name, values in rows().robots.items()}
-    for effect in ("tail_sag", "tail_interaction", "natural_curvature"):
-        with pytest.raises(InputError, match=f"{effect} changes more.*surrogate robot"):
-            heads_and_tails({**robots, effect: np.full(2, 0.1)})
-        heads_and_tails({**robots, effect: np.zeros(2)})
 
 
 def test_straight_tails_have_the_drag_of_their_nodes() -> None:
