@@ -12,8 +12,6 @@ from sim.io.deprecated import old_attributes
 
 
 class Thing:
-    """A thing whose attributes have moved into its part."""
-
     __getattr__ = old_attributes({"length": "part.size", "twice": "part.double()"})
 
     def __init__(self) -> None:
