@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import subprocess
-import time
 from pathlib import Path
 
-import numpy as np
-import pyarrow as pa
 import pytest
 
 from dataset.__main__ import main
-from dataset.build.build import build
 from dataset.build.verify import verify
 from dataset.rows.design import load_design
-from dataset.rows.schema import arrow_table, schema
 from dataset.storage.data_set import SWEEP, read, read_manifest
 from sim.io.errors import InputError, run_command
 from tests.dataset.sweeps import ROOT, SMALL, write_rows
@@ -36,34 +30,28 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_rows_are_simulated(built: Path) -> None:
-    table, manifest = read(built / "out"), read_manifest(built / "out")
-    assert len(table) == manifest["rows"] == 6
-    assert table["converged"].all()
+    table = read(built / "out")
+    assert table["converged"].tolist() == [True] * 6
     points = load_design(built / "sweep.toml").points()
     assert table["omega_bar"].to_numpy() == pytest.approx(points["omega_bar"])
     assert (table["omega_t_bar"] - table["omega_h_bar"]).to_numpy() == pytest.approx(points["omega_bar"])
     assert (table["cost_s"] > 0).all()
 
 
-def test_verify_passes(built: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_verify_passes_in_a_worker(
+    built: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """This process may have loaded other loops first, so its last digits may differ from those of a build."""
+    monkeypatch.setattr("dataset.rows.simulate.steady", None)
     assert run_command(main, ["verify", str(built / "out"), "--rows", "2", "--mend"]) == 0
     words = capsys.readouterr().out
     assert "6 rows are whole: no row simulated again, manifest kept" in words
     assert "2 rows simulated again: the same bits" in words
 
 
-def test_rows_are_verified_in_a_worker(built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """This process may have loaded other loops first, so its last digits may differ from those of a build."""
-    monkeypatch.setattr("dataset.rows.simulate.steady", None)
-    assert "2 rows simulated again: the same bits" in verify(built / "out", rows=2)
-
-
 def test_verify_notices_a_changed_number_under_sound_digests(built: Path, tmp_path: Path) -> None:
     table, manifest = read(built / "out"), read_manifest(built / "out")
-    for column, change, words in (
-        ("omega_yr_bar", 1.0000001, "omega_yr_bar of rows simulated"),
-        ("C_t", 1.1, "C_t"),
-    ):
+    for column, change, words in (("omega_yr_bar", 1.0000001, "omega_yr_bar of rows"), ("C_t", 1.1, "C_t")):
         columns = {name: table[name].to_numpy() for name in table}
         columns[column] = columns[column] * change
         out = tmp_path / column
@@ -71,27 +59,6 @@ def test_verify_notices_a_changed_number_under_sound_digests(built: Path, tmp_pa
         shutil.copy(built / "out" / SWEEP, out)
         with pytest.raises(InputError, match=words):
             verify(out, rows=6)
-
-
-def test_report_is_one_self_contained_page(built: Path) -> None:
-    page = built / "page.html"
-    assert run_command(main, ["report", str(built / "out"), "--out", str(page)]) == 0
-    text = page.read_text()
-    assert "<svg" in text
-    assert "http" not in text.split("</style>")[1]
-    assert json.loads((built / "out" / "manifest.json").read_text())["config_hash"] in text
-
-
-def test_a_sweep_over_effects_and_both_directions(tmp_path: Path) -> None:
-    text = SMALL.replace('scale = "log" }', 'scale = "log", both_directions = true }', 1)
-    (tmp_path / "s.toml").write_text(text + "left_right_bias = { range = [-0.05, 0.05] }\n")
-    manifest = build(load_design(tmp_path / "s.toml"), tmp_path / "out", jobs=1, title="")
-    table = read(tmp_path / "out")
-    assert manifest["effects"] == ["left_right_bias"]
-    assert (np.sign(table["omega_yr_bar"]) == np.sign(table["omega_bar"])).all()
-    assert {True, False} == set(table["omega_bar"] > 0)
-    assert pa.Table.from_pandas(table).num_columns == len(schema(["left_right_bias"]))
-    assert arrow_table({n: table[n].to_numpy() for n in table}, schema(["left_right_bias"])).num_rows == 6
 
 
 def make(target: str, *words: str) -> subprocess.CompletedProcess[str]:
@@ -106,9 +73,7 @@ def test_make_dataset_knows_its_sources(tmp_path: Path) -> None:
     other_config.write_text(SMALL.replace("seed = 3", "seed = 4"))
     assert make("dataset", f"CONFIG={config}", f"DATA={data}").returncode == 0
     before = (data / "manifest.json").stat().st_mtime_ns
-    time.sleep(0.01)
-    again = make("dataset", f"CONFIG={config}", f"DATA={data}")
-    assert again.returncode == 0
+    assert make("dataset", f"CONFIG={config}", f"DATA={data}").returncode == 0
     assert (data / "manifest.json").stat().st_mtime_ns == before
     for time_of_change in (1, before + 10**10):  # older and newer than the data
         os.utime(other_config, ns=(time_of_change, time_of_change))

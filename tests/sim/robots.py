@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import torch
 
+from dataset.rows.design import load_design
 from sim.mechanics.balance import head_drag
 from sim.model.body import Body
 from sim.model.groups import Groups
@@ -70,3 +71,8 @@ def single_filament(
     offset *= CONTROL_VALUES["l_over_R"]
     groups = control(1, N=1, omega_bar=omega_bar, l_over_r0=l_over_r0, a_over_R=offset, **effects)
     return held(tensor_robots(groups, edges=edges)), groups
+
+
+def sweep_points(count: int) -> dict[str, np.ndarray]:
+    """Return the columns of the first `count` robots of sweep.toml."""
+    return load_design().with_rows(count).points()

@@ -72,11 +72,8 @@ def files(folder: Path) -> dict[str, bytes]:
 
 def main(place: Path) -> None:
     dataset.build.build.open_backend = lambda *_, **__: InThisProcess()  # type: ignore[assignment]
-    dataset.build.sweep_folder.SEGMENT, dataset.storage.shards.SEGMENT, dataset.storage.shards.ROW_GROUP = (
-        128,
-        128,
-        32,
-    )
+    dataset.build.sweep_folder.SEGMENT = dataset.storage.shards.SEGMENT = 128
+    dataset.storage.shards.ROW_GROUP = 32
     invented(design(2).points())  # loads what all children need
     rows_version()
     base, calm, folder = place / "base", place / "calm", place / "folder"
@@ -85,11 +82,7 @@ def main(place: Path) -> None:
     assert in_a_child(lambda: build(calm, MORE)) == 0
     old, new, wanted = read(base), read(calm), files(calm)
     wanted.pop("card.md")
-    assert sorted(name for name in wanted if name.startswith("rows/")) == [
-        "rows/rows-0000000000-0000000128.parquet",
-        "rows/rows-0000000128-0000000256.parquet",
-        "rows/rows-0000000256-0000000300.parquet",
-    ]
+    assert sum(name.startswith("rows/") for name in wanted) == 3
     step = refused = 0
     while True:
         shutil.copytree(base, folder)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import pandas as pd
 import pytest
 
 from dataset.build import scheduler as engine
@@ -12,14 +14,14 @@ from dataset.build.build import build, chunks
 from dataset.build.signals import UnfinishedError
 from dataset.rows.design import Axis
 from dataset.rows.version import rows_version
-from dataset.storage.data_set import read, read_manifest
-from dataset.storage.lock import locked
+from dataset.storage.data_set import read
 from dataset.storage.storage import open_storage
-from dataset.workers.backend import GONE, Lost
-from dataset.workers.tasks import Join, Outcome, Task, run_task
+from dataset.workers.backend import GONE
+from dataset.workers.tasks import Join, Task, run_task
 from sim.io.errors import InputError
 from tests.dataset import sweeps
-from tests.dataset.sweeps import design, invented
+from tests.dataset.sweeps import InThisProcess, design, invented
+from tests.shared import shared
 
 
 @pytest.fixture(autouse=True)
@@ -29,39 +31,38 @@ def marks() -> Path:
     return sweeps.MARKS
 
 
+@shared
+def calm_rows(rows: int) -> pd.DataFrame:
+    """Return the rows of an undisturbed build."""
+    with TemporaryDirectory() as folder:
+        build(design(rows), Path(folder) / "out", jobs=1, title="", simulate=invented)
+        return read(Path(folder) / "out")
+
+
 def files(folder: Path) -> dict[str, int]:
     return {str(p.relative_to(folder)): p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()}
 
 
 @pytest.mark.slow
 def test_more_rows_only_add_chunks(tmp_path: Path, marks: Path) -> None:
-    long, short = tmp_path / "long", tmp_path / "short"
-    build(design(200), long, jobs=2, title="", simulate=invented)
+    short = tmp_path / "short"
     build(design(120), short, jobs=1, title="", simulate=sweeps.slow)
     done = len(list(marks.iterdir()))
     build(design(200), short, jobs=2, title="", simulate=sweeps.slow)
-    assert read(short).equals(read(long))
+    assert read(short).equals(calm_rows(200))
     first = {float(c).hex() for c in design(120).points()["C_t"]}
     made = [p.name.split("-")[1] for p in marks.iterdir()]
     assert len(made) > done == 4
     assert sum(name in first for name in made) == done
-    assert [name for name in files(short) if name.startswith("rows")] == [
-        "rows/rows-0000000000-0000000200.parquet"
-    ]
+    assert [path.name for path in (short / "rows").iterdir()] == ["rows-0000000000-0000000200.parquet"]
 
 
-def test_a_finished_build_is_left_alone(tmp_path: Path) -> None:
-    build(design(50), tmp_path / "out", jobs=1, title="", simulate=invented)
-    before = files(tmp_path / "out")
-    manifest = build(design(50), tmp_path / "out", jobs=1, title="", simulate=invented)
-    assert manifest == build(design(20), tmp_path / "out", jobs=1, title="", simulate=invented)
-    assert manifest["rows"] == 50
-    assert files(tmp_path / "out") == before
-
-
-def test_another_configuration_is_not_mixed_in(tmp_path: Path) -> None:
+def test_a_finished_build_is_left_alone_and_another_configuration_is_not_mixed_in(tmp_path: Path) -> None:
     build(design(20), tmp_path / "out", jobs=1, title="", simulate=invented)
     before = files(tmp_path / "out")
+    manifest = build(design(20), tmp_path / "out", jobs=1, title="", simulate=invented)
+    assert manifest == build(design(9), tmp_path / "out", jobs=1, title="", simulate=invented)
+    assert manifest["rows"] == 20
     with pytest.raises(InputError, match="seed 5 there, 6 here"):
         build(design(20, seed=6), tmp_path / "out", jobs=1, title="", simulate=invented)
     other = design(20)
@@ -71,6 +72,12 @@ def test_another_configuration_is_not_mixed_in(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"made by tests.*invented, not by tests.*raising"):
         build(design(20), tmp_path / "out", jobs=1, title="", simulate=sweeps.raising)
     assert files(tmp_path / "out") == before
+    path = tmp_path / "out" / "sweep.json"
+    content = json.loads(path.read_text())
+    content["config"]["seed"] = 6
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError, match="edited"):
+        build(design(20, seed=6), tmp_path / "out", jobs=1, title="", simulate=invented)
 
 
 @pytest.mark.parametrize("name", ["thesis.txt", "part-00000.parquet", "manifest.json"])
@@ -82,20 +89,10 @@ def test_a_folder_with_other_files_is_left_alone(name: str, tmp_path: Path) -> N
     assert (tmp_path / "out" / name).read_text() == "x"
 
 
-def test_a_second_writer_is_refused_and_told_who_writes(tmp_path: Path) -> None:
-    with (
-        locked(open_storage(tmp_path / "out")),
-        pytest.raises(InputError, match=r"is being written by process \d+ on .* min"),
-    ):
-        build(design(20), tmp_path / "out", jobs=1, title="", simulate=invented)
-    build(design(20), tmp_path / "out", jobs=1, title="", simulate=invented)
-
-
 @pytest.mark.slow
 def test_a_killed_worker_is_replaced_and_its_chunk_tried_again(tmp_path: Path, marks: Path) -> None:
     build(design(100), tmp_path / "out", jobs=2, title="", simulate=sweeps.killing_once)
-    build(design(100), tmp_path / "calm", jobs=1, title="", simulate=invented)
-    assert read(tmp_path / "out").equals(read(tmp_path / "calm"))
+    assert read(tmp_path / "out").equals(calm_rows(100))
     attempts = [p.name.split("-")[-2] for p in marks.iterdir()]
     assert attempts.count("0") == attempts.count("1") == 8
 
@@ -131,22 +128,12 @@ def test_a_damaged_pending_piece_is_made_again(tmp_path: Path) -> None:
         build(design(200), tmp_path / "out", jobs=1, title="", simulate=sweeps.raising)
 
 
-def test_an_edited_sweep_is_refused(tmp_path: Path) -> None:
-    build(design(20), tmp_path / "out", jobs=1, title="", simulate=invented)
-    path = tmp_path / "out" / "sweep.json"
-    content = json.loads(path.read_text())
-    content["config"]["seed"] = 6
-    path.write_text(json.dumps(content))
-    with pytest.raises(InputError, match="edited"):
-        build(design(20, seed=6), tmp_path / "out", jobs=1, title="", simulate=invented)
-
-
-class Forgetful:
+class Forgetful(InThisProcess):
     """A backend in this process that forgets every task once, and has no workers for a while."""
 
     def __init__(self, absent: int = 0):
-        self.absent, self.forgotten = absent, set[tuple[type, int]]()
-        self.waiting, self.seen = list[tuple[int, Task | Join]](), list[Task | Join]()
+        super().__init__()
+        self.absent, self.seen = absent, list[Task | Join]()
 
     def slots(self) -> int:
         self.absent -= 1
@@ -154,38 +141,24 @@ class Forgetful:
 
     def submit(self, number: int, task: Task | Join) -> None:
         self.seen.append(task)
-        self.waiting.append((number, task))
-
-    def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:
-        ended: list[tuple[int, Outcome | Lost]] = []
-        for number, task in self.waiting:
-            span = (type(task), task.start)
-            ended.append((number, run_task(task) if span in self.forgotten else GONE))
-            self.forgotten.add(span)
-        self.waiting = []
-        return ended
-
-    def stop(self) -> None:
-        self.waiting = []
+        if [(type(one), one.start) for one in self.seen].count((type(task), task.start)) > 1:
+            super().submit(number, task)
+        else:
+            self._ended.append((number, GONE))
 
 
-def test_what_a_cluster_forgets_is_asked_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dataset.build.build.open_backend", lambda *_, **__: Forgetful(absent=3))
-    build(design(50), tmp_path / "out", title="", simulate=invented)
-    assert read_manifest(tmp_path / "out")["rows"] == 50
-
-
-def test_files_are_joined_by_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_are_joined_by_workers_and_forgotten_tasks_are_asked_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("dataset.build.sweep_folder.SEGMENT", 64)
-    crew = Forgetful()
+    crew = Forgetful(absent=3)
     monkeypatch.setattr("dataset.build.build.open_backend", lambda *_, **__: crew)
     build(design(200), tmp_path / "out", title="", simulate=invented)
     joined = [(task.start, task.stop) for task in crew.seen if isinstance(task, Join)]
     assert sorted(joined) == sorted(2 * [(0, 64), (64, 128), (128, 192)])  # each of them forgotten once
     assert len(list((tmp_path / "out" / "rows").iterdir())) == 4
     monkeypatch.undo()
-    build(design(200), tmp_path / "calm", jobs=1, title="", simulate=invented)
-    assert read(tmp_path / "out").equals(read(tmp_path / "calm"))
+    assert read(tmp_path / "out").equals(calm_rows(200))
 
 
 def test_a_piece_that_is_damaged_before_it_is_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -201,8 +174,7 @@ def test_a_piece_that_is_damaged_before_it_is_joined(tmp_path: Path, monkeypatch
         build(design(200), tmp_path / "out", title="", simulate=invented)
     monkeypatch.setattr("dataset.build.build.open_backend", lambda *_, **__: Forgetful())
     build(design(200), tmp_path / "out", title="", simulate=invented)
-    build(design(200), tmp_path / "calm", title="", simulate=invented)
-    assert read(tmp_path / "out").equals(read(tmp_path / "calm"))
+    assert read(tmp_path / "out").equals(calm_rows(200))
 
 
 def test_without_workers_it_ends_with_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -212,17 +184,16 @@ def test_without_workers_it_ends_with_a_line(tmp_path: Path, monkeypatch: pytest
         build(design(50), tmp_path / "out", title="", simulate=invented, resume="the same words")
 
 
-def test_a_worker_with_other_code_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_with_other_code_or_without_the_folder_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    there = open_storage(tmp_path / "elsewhere")
+    kind, words = run_task(Task(there.address, design(1).config(), "", rows_version(), invented, 0, 1))
+    assert kind == "storage"
+    assert "does not see" in words
     monkeypatch.setattr("dataset.build.build.rows_version", lambda: "0.0+other")
     with pytest.raises(InputError, match=r"has version .* the build has 0\.0\+other"):
         build(design(50), tmp_path / "out", jobs=1, title="", simulate=invented)
-
-
-def test_a_worker_that_does_not_see_the_folder_is_refused(tmp_path: Path) -> None:
-    there = open_storage(tmp_path / "elsewhere")
-    outcome = run_task(Task(there.address, design(1).config(), "", rows_version(), invented, 0, 1))
-    assert outcome[0] == "storage"
-    assert "does not see" in outcome[1]
 
 
 def test_chunks_are_sized_by_cost_and_workers() -> None:
@@ -237,13 +208,18 @@ def test_chunks_are_sized_by_cost_and_workers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("backend", "words"),
-    [("slurm", "allowed are loky"), ("loky", "jobs = 0"), ("dask", "distributed"), ("ray", "ray")],
+    ("backend", "jobs", "words"),
+    [
+        ("slurm", 1, "allowed are loky"),
+        ("loky", 0, "jobs = 0"),
+        ("dask", 1, r"pip install 'dask\[distributed\]'"),
+        ("ray", 1, "install 'ray'"),
+    ],
 )
 def test_impossible_backends_leave_no_folder(
-    backend: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    backend: str, jobs: int, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("dataset.workers.open_backend.find_spec", lambda _: None)
     with pytest.raises(InputError, match=words):
-        build(design(4), tmp_path / "out", backend=backend, jobs=0, title="", simulate=invented)
+        build(design(4), tmp_path / "out", backend=backend, jobs=jobs, title="", simulate=invented)
     assert not (tmp_path / "out").exists()

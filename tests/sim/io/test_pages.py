@@ -1,13 +1,16 @@
-"""Pages: text is escaped, figures follow light and dark colours, and narrow screens are thought of."""
+"""Pages and what a notebook shows: text is escaped, figures follow the colours, narrow screens get lists."""
 
 from __future__ import annotations
 
+import base64
 import re
 from pathlib import Path
 
 import numpy as np
+from matplotlib import pyplot
 from matplotlib.figure import Figure
 
+from sim.io.notebook import as_html
 from sim.io.page_figures import BLUE, INK, PALETTE, figure_markup
 from sim.io.pages import Page
 from tests.page_text import PageText
@@ -32,18 +35,13 @@ def test_text_is_escaped_and_words_between_backticks_are_code(tmp_path: Path) ->
     page.text("`--own <x>` and <script>")
     page.steps(["one `two`"], numbered=True)
     page.commands(["a < b", "c"])
+    page.links([("plans/a b&c.h", "schedule.h", "the `schedule`")])
     html, seen = written(page, tmp_path)
     assert "<code>--own &lt;x&gt;</code> and &lt;script&gt;" in html
     assert "<li>one <code>two</code></li>" in html
     assert "a < b\nc" in "".join(seen.words)
     assert "A <b>" in seen.text
-
-
-def test_a_link_leads_to_its_file_whatever_its_name(tmp_path: Path) -> None:
-    page = Page("t", "l")
-    page.links([("plans/a b&c.h", "schedule.h", "the `schedule`")])
-    html, seen = written(page, tmp_path)
-    assert seen.links == ["plans/a%20b%26c.h"]
+    assert seen.links == ["plans/a%20b%26c.h"]  # whatever the name of the file
     assert "schedule.h" in seen.text
     assert "<code>schedule</code>" in html
 
@@ -77,12 +75,9 @@ def test_two_figures_share_no_names(tmp_path: Path) -> None:
     assert set(used) <= set(names)
 
 
-def test_the_same_figure_gives_the_same_markup() -> None:
-    assert figure_markup(line(), "d", number=1) == figure_markup(line(), "d", number=1)
-
-
-def test_a_figure_of_many_points_is_a_picture() -> None:
+def test_a_figure_gives_the_same_markup_again_and_one_of_many_points_is_a_picture() -> None:
     """As SVG it would be megabytes."""
+    assert figure_markup(line(), "d", number=1) == figure_markup(line(), "d", number=1)
     markup = figure_markup(line(20_000), "many & more", number=1)
     assert markup.startswith('<img alt="many &amp; more" src="data:image/png;base64,')
     assert len(markup) < 400_000
@@ -106,3 +101,15 @@ def test_a_long_page_begins_with_its_sections(tmp_path: Path) -> None:
     assert seen.links == [f"#section-{n}" for n in range(1, 7)]
     assert all(f'id="{link[1:]}"' in html for link in seen.links)
     assert seen.headings == [f"Part {n}" for n in range(6)]
+
+
+def test_a_notebook_shows_escaped_text_and_the_picture_below_it() -> None:
+    page = as_html('<script>\n  "a" & b')
+    assert "&lt;script&gt;\n  &quot;a&quot; &amp; b</pre>" in page
+    assert "<img" not in page
+    page = as_html('Plan of "x"\nmore', lambda axes: axes.plot([0, 1]), width=2.0)
+    match = re.search(r'<img alt="([^"]*)" src="data:image/png;base64,([^"]+)">$', page)
+    assert match
+    assert match[1] == "Plan of &quot;x&quot;"
+    assert base64.b64decode(match[2]).startswith(b"\x89PNG")
+    assert pyplot.get_fignums() == []

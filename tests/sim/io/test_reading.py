@@ -1,11 +1,10 @@
-"""Readers of files that people bring: whatever a file holds, they end soon, with its content or with one line."""
+"""Files are read in any usual encoding, or refused in one line; edited and cut ones are noticed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
 
-import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -14,7 +13,8 @@ from dataset.rows.design import load_design
 from sim.inputs import load_robot
 from sim.io import tables
 from sim.io.errors import InputError
-from sim.io.reading import ContentError, decode, read_bytes, read_json, read_toml
+from sim.io.reading import ContentError, read_bytes, read_json, read_toml
+from sim.io.seals import check_seal, sealed
 from sim.io.tables import read_table
 from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
@@ -34,7 +34,6 @@ DEEP = [
 def test_settings_that_would_take_minutes_are_rejected(
     load: Callable[[Path], object], text: str, words: str, tmp_path: Path
 ) -> None:
-    """A key of 100,000 parts took a minute and 5.7 GB; nested arrays were a RecursionError."""
     path = tmp_path / "settings.toml"
     path.write_text(text)
     with pytest.raises(InputError, match=words):
@@ -51,7 +50,6 @@ def test_keys_and_numbers_with_dots_are_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
 def test_a_robot_is_read_in_any_usual_encoding(encoding: str, tmp_path: Path) -> None:
-    """A byte order mark, as some editors write it, was an error."""
     path = tmp_path / "robot.toml"
     path.write_bytes(robot_toml(PRESETS["paper-control"]).encode(encoding))
     assert load_robot(path) == PRESETS["paper-control"]
@@ -93,16 +91,6 @@ def test_missing_files_and_folders_are_one_line(tmp_path: Path) -> None:
             read_bytes(path)
 
 
-def test_marks_of_the_byte_order_are_left_out() -> None:
-    assert [decode(text) for text in (b"a", b"\xef\xbb\xbfa", b"\xff\xfea\0", b"\xfe\xff\0a")] == ["a"] * 4
-
-
-def test_a_table_of_nothing_is_no_table(tmp_path: Path) -> None:
-    pd.DataFrame({"a": []}).to_csv(tmp_path / "a.csv", index=False)
-    with pytest.raises(InputError, match="has no rows"):
-        read_table(tmp_path / "a.csv")
-
-
 def test_a_decimal_comma_in_toml_is_pointed_out(tmp_path: Path) -> None:
     (tmp_path / "robot.toml").write_text("[tails]\nyoungs_modulus_MPa = 1,1 # measured\n")
     with pytest.raises(InputError, match=r"is not TOML: .*; write 1\.1 for 1,1$"):
@@ -111,3 +99,33 @@ def test_a_decimal_comma_in_toml_is_pointed_out(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is not TOML") as caught:
         read_toml(tmp_path / "list.toml")
     assert "write" not in str(caught.value)
+
+
+TEXT = robot_toml(PRESETS["paper-control"])
+SEALED = sealed(TEXT)
+
+
+def test_a_text_that_was_cut_is_refused_wherever_it_was_cut() -> None:
+    for end in range(len(SEALED) - len(TEXT), len(SEALED) - 1, 7):
+        with pytest.raises(InputError, match="cut short"):
+            check_seal(SEALED[:end], "corrected.toml")
+
+
+@pytest.mark.parametrize(
+    ("edit", "warnings"),
+    [
+        (lambda text: text, 0),
+        (lambda text: text.replace("\n", " \r\n") + "\r\n", 0),
+        (lambda _: TEXT, 0),
+        (lambda text: text.replace("C_t = 3.", "C_t = 4."), 1),
+        (lambda text: text + "[effects]\ndisc_drag = 1.0\n", 1),
+        (lambda text: text.partition("\n")[2], 1),
+    ],
+)
+def test_an_edited_text_is_read_and_says_so_once(
+    edit: Callable[[str], str], warnings: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "robot.toml").write_text(edit(SEALED))
+    for _ in range(2):
+        load_robot(tmp_path / "robot.toml")
+    assert capsys.readouterr().err.count("was edited or damaged") == warnings

@@ -22,7 +22,6 @@ TABLE = pd.DataFrame({"run": ["a", "b c"], "x [mm]": [0.5, -3.25], "y [mm]": [1.
 TEXTS = {
     "comma": "run,x_mm,y_mm\na,0.5,1\nb c,-3.25,1250\n",
     "semicolon": "run;x_mm;y_mm\na;0.5;1\nb c;-3.25;1250\n",
-    "tab": "run\tx_mm\ty_mm\na\t0.5\t1\nb c\t-3.25\t1250\n",
     "decimal comma": "run;x_mm;y_mm\na;0,5;1,0\nb c;-3,25;1,25e3\n",
     "decimal comma and tab": "run\tx_mm\ty_mm\na\t0,5\t1\nb c\t-3,25\t1250\n",
     "blanks": 'run x_mm y_mm\na 0.5 1\n"b c"   -3.25 1250\n',
@@ -50,33 +49,32 @@ def test_every_dialect_is_the_same_table(dialect: str, tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(table, TABLE, check_dtype=False)
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1", "cp1252"])
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "cp1252"])
 def test_every_encoding_is_the_same_table(encoding: str, tmp_path: Path) -> None:
     (tmp_path / "table.csv").write_bytes("session,theta [°]\nFüllung 1,12.5\n".encode(encoding))
     table = read_table(tmp_path / "table.csv")
     assert table.to_dict("records") == [{"session": "Füllung 1", "theta [°]": 12.5}]
 
 
-@pytest.mark.parametrize("units", [False, True])
-def test_spreadsheets_and_parquet_are_the_same_table(units: bool, tmp_path: Path) -> None:
-    sheet = TABLE.rename(columns={"x [mm]": "x", "y [mm]": "y"}) if units else TABLE
-    rows = pd.concat([pd.DataFrame([{"run": None, "x": "mm", "y": "mm"}]), sheet]) if units else sheet
-    rows.to_excel(tmp_path / "table.xlsx", index=False)
+def test_spreadsheets_and_parquet_are_the_same_table(tmp_path: Path) -> None:
+    below = TABLE.rename(columns={"x [mm]": "x", "y [mm]": "y"})
+    units = pd.DataFrame([{"run": None, "x": "mm", "y": "mm"}])
+    pd.concat([units, below]).to_excel(tmp_path / "below.xlsx", index=False)
+    TABLE.to_excel(tmp_path / "table.xlsx", index=False)
     TABLE.to_parquet(tmp_path / "table.parquet")
-    for name in ("table.xlsx", "table.parquet"):
+    for name in ("below.xlsx", "table.xlsx", "table.parquet"):
         pd.testing.assert_frame_equal(in_millimetres(read_table(tmp_path / name)), TABLE, check_dtype=False)
 
 
-def test_names_in_a_comment_belong_to_the_columns(tmp_path: Path) -> None:
+def test_names_may_be_in_a_comment_or_missing_where_that_is_allowed(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("# made by numpy.savetxt\n# x_cm y_cm\n1 2\n3 4\n")
     assert read_table(tmp_path / "a.txt").to_dict("list") == {"x_cm": [1, 3], "y_cm": [2, 4]}
-
-
-def test_a_table_without_names_has_numbered_columns_where_that_is_allowed(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("1 2\n3 4\n")
     assert read_table(tmp_path / "a.txt", names=False).to_dict("list") == {0: [1, 3], 1: [2, 4]}
     with pytest.raises(InputError, match="no names of columns"):
         read_table(tmp_path / "a.txt")
+    table = parse_table(b"# tank 3\n\nx,y\nmm,mm\n1,2\n\n3,4\n", "table")
+    assert [row_name(table, row) for row in (0, 1)] == ["row 1 (line 5)", "row 2 (line 7)"]
 
 
 @pytest.mark.parametrize(
@@ -137,11 +135,6 @@ def test_a_table_is_read_as_it_is_meant(case: str) -> None:
         )
 
 
-def test_rows_have_the_numbers_of_their_lines() -> None:
-    table = parse_table(b"# tank 3\n\nx,y\nmm,mm\n1,2\n\n3,4\n", "table")
-    assert [row_name(table, row) for row in (0, 1)] == ["row 1 (line 5)", "row 2 (line 7)"]
-
-
 def sheet(path: Path, rows: list[list[object]], formats: dict[str, str] | None = None) -> None:
     book = openpyxl.Workbook()
     assert book.active is not None
@@ -161,18 +154,16 @@ def test_cells_of_a_sheet_are_read_as_their_text(tmp_path: Path) -> None:
     assert (numbers_of(table["t_s"]).tolist(), numbers_of(table["when_h"]).tolist()) == ([90.5], [0.0])
 
 
-@pytest.mark.parametrize(
-    ("rows", "words"),
-    [
+def test_sheets_are_refused_as_texts_are(tmp_path: Path) -> None:
+    refusals: list[tuple[list[list[object]], str]] = [
         ([["x", "y", "x"], [1, 2, 3]], "two columns 'x'"),
         ([["x", "R_yr_cm"], [1, 2], [3, "=B2*2"]], "column R_yr_cm has no values: its formulas .* .cell B3"),
         ([["x", "y"], ["1,200", 300]], "'1,200', which may be"),
-    ],
-)  # fmt: skip
-def test_sheets_are_refused_as_texts_are(rows: list[list[object]], words: str, tmp_path: Path) -> None:
-    sheet(tmp_path / "a.xlsx", rows)
-    with pytest.raises(InputError, match=words):
-        read_table(tmp_path / "a.xlsx")
+    ]
+    for rows, words in refusals:
+        sheet(tmp_path / "a.xlsx", rows)
+        with pytest.raises(InputError, match=words):
+            read_table(tmp_path / "a.xlsx")
 
 
 @pytest.mark.parametrize("name", ["a.xlsx", "a.parquet"])

@@ -1,21 +1,10 @@
-"""Random equations of chains, and the dense matrices that they stand for."""
+"""The dense matrices that equations of chains stand for."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from sim.linear.chains import Chains, new_chains
-
-
-def random_chains(n: int, count: int, instants: int, seed: int) -> Chains:
-    """Draw chains with dominant diagonal blocks."""
-    rng = np.random.default_rng(seed)
-    chains = new_chains(np.empty(0), n, count, instants)
-    for part in chains:
-        part[:] = rng.normal(size=part.shape)
-    chains.diagonal[:] += 20 * np.eye(3)
-    chains.corner[:] += 40 * np.eye(4)
-    return chains
+from sim.linear.chains import Chains
 
 
 def dense_matrix(chains: Chains) -> np.ndarray:

@@ -1,14 +1,17 @@
-"""Contact between tails: what the forces are, and that they are internal."""
+"""Contact between tails: the gap, and forces without net wrench, from an energy, by the stated law."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import pytest
 
+from sim.mechanics.contact import tail_gap
 from sim.mechanics.geometry import straight
 from sim.mechanics.tail_contact import FIRM, SOFTNESS, contact_forces
 from sim.model.body import Body
-from tests.sim.robots import control, first_body
+from tests.sim.robots import CONTROL_VALUES, control, first_body
 
 EDGES = 8
 
@@ -84,16 +87,8 @@ def test_parallel_tails_repel_by_the_law(gap: float) -> None:
     assert not forces(apart, straight(EDGES, 2, apart.offset)).any()
 
 
-def test_the_force_hardly_depends_on_the_mesh() -> None:
-    """Tails are smooth curves through their nodes: 8 edges and 24. A thousandth of 2 r0 changes it by a tenth."""
-    total = []
-    for edges in (8, 24):
-        body = first_body(control(N=4, tail_contact=0.5))
-        x = straight(edges, 4, body.offset)
-        along = -x[:, :, 2]
-        near = 1 - (1 - along) ** 4
-        radius = body.offset * (1 - near) + 1.4 * body.tail_radius * near
-        x[:, :, 0], x[:, :, 1] = radius * np.cos(1.5 * along), radius * np.sin(1.5 * along)
-        total.append(np.abs(forces(body, x)).sum((0, 1)))
-    assert total[0] == pytest.approx(total[1], rel=0.15)
-    assert total[0].min() > 0.01
+def test_the_gap_of_straight_tails() -> None:
+    offset, radius = 1 / CONTROL_VALUES["l_over_R"], 1 / CONTROL_VALUES["l_over_r0"]
+    tails = straight(EDGES, 4, offset)
+    assert tail_gap(tails, offset, radius) == pytest.approx(math.sqrt(2) * offset / (2 * radius), rel=1e-12)
+    assert math.isinf(tail_gap(tails[:, :1].copy(), offset, radius))

@@ -36,31 +36,21 @@ def test_a_motion_by_hand() -> None:
     wanted = {"omega_t_rpm": 15.0, "omega_h_rpm": -30.0, "omega_yr_rad_s": 0.05, "R_yr_cm": 5.0, "theta_deg": 30.0,
               "v_cm_s": 0.25, "circle_s": 40 * math.pi}  # fmt: skip
     assert {name: values.item() for name, values in lab.items()} == pytest.approx(wanted)
+    at_rest = {name: np.array([0.0]) for name in motion}
+    assert lab_columns(at_rest, 10.0, 2.0)["circle_s"] == math.inf
 
 
 def test_lab_units_agree_with_each_other() -> None:
-    """The motor's speed is the difference of the spins; a circle is 2 π R_yr long."""
-    robots = [ROBOT, replace(ROBOT, viscosity=3.0, tail_length=0.09)]
+    """The motor's speed is the difference of the spins; a circle is 2 π R_yr long; slow motors in thick fluids."""
+    robots = [ROBOT, replace(ROBOT, viscosity=2 * ROBOT.viscosity, motor_speed=ROBOT.motor_speed / 2)]
     motions = [motion_of(robot) for robot in robots]
     lab = lab_motion(robots, {name: np.concatenate([m[name] for m in motions]) for name in motions[0]})
     rpm = [robot.motor_speed * 30 / math.pi for robot in robots]
     assert lab["omega_t_rpm"] - lab["omega_h_rpm"] == pytest.approx(rpm, rel=1e-9)
     assert lab["v_cm_s"] * lab["circle_s"] == pytest.approx(2 * math.pi * lab["R_yr_cm"], rel=1e-9)
     assert lab["omega_yr_rad_s"] * lab["circle_s"] == pytest.approx([2 * math.pi] * 2)
-
-
-def test_twice_the_viscosity_at_half_the_speed_takes_twice_the_time() -> None:
-    slow = replace(ROBOT, viscosity=2 * ROBOT.viscosity, motor_speed=ROBOT.motor_speed / 2)
-    lab, slower = (lab_motion([robot], motion_of(robot)) for robot in (ROBOT, slow))
-    assert slower["R_yr_cm"] == pytest.approx(lab["R_yr_cm"])
-    assert slower["circle_s"] == pytest.approx(2 * lab["circle_s"])
-    assert slower["v_cm_s"] == pytest.approx(lab["v_cm_s"] / 2)
-
-
-def test_a_robot_that_does_not_turn_never_completes_a_circle() -> None:
-    motion = {name: np.array([0.0]) for name in ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z",
-                                                 "R_yr_over_l", "theta_deg")}  # fmt: skip
-    assert lab_columns(motion, 10.0, 2.0)["circle_s"] == math.inf
+    for name, ratio in (("R_yr_cm", 1.0), ("circle_s", 2.0), ("v_cm_s", 0.5)):
+        assert lab[name][1] == pytest.approx(ratio * lab[name][0])
 
 
 def test_the_lines_say_what_the_columns_hold() -> None:
@@ -81,33 +71,23 @@ def test_the_command_prints_the_motion_of_a_robot(
     assert run_command(main, ["robot", "paper-control", "--out", "robot.toml"]) == 0
     capsys.readouterr()
     assert run_command(main, ["steady", words, "--out", "motion.csv"]) == 0
-    said = capsys.readouterr().out
-    assert said.startswith(describe_motion(ROBOT, motion_of()))
+    assert capsys.readouterr().out.startswith(describe_motion(ROBOT, motion_of()))
     table = pd.read_csv("motion.csv")
     assert table["robot"].tolist() == ["paper-control"]
     assert list(table)[1 : 1 + len(LAB_COLUMNS)] == list(LAB_COLUMNS)
     assert table["omega_yr_bar"].item() == pytest.approx(motion_of()["omega_yr_bar"].item(), rel=1e-7)
-    assert run_command(main, ["steady", words]) == 0  # no file is needed
 
 
-def test_the_command_says_that_tails_touch(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_command(main, ["steady", "paper-measured"]) == 0
-    assert "tails touch" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("words", "refusal"),
-    [
-        ("points.csv", "name the file of their motion with --out"),
-        ("paper", "no robot 'paper'"),
-        ("robot.tml", "robot.tml: no such file"),  # it used to be called a table of points
-        (".", ". is a folder"),
-    ],
-)
-def test_words_that_name_no_robot(
-    words: str, refusal: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_what_the_command_says_without_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    assert run_command(main, ["steady", "paper-measured"]) == 0
+    assert "tails touch" in capsys.readouterr().out
     Path("points.csv").write_text("N\n2\n")
-    assert run_command(main, ["steady", words]) == 2
-    assert refusal in capsys.readouterr().err
+    for words, refusal in (
+        ("points.csv", "name the file of their motion with --out"), ("paper", "no robot 'paper'"),
+        ("robot.tml", "robot.tml: no such file"), (".", ". is a folder"),
+    ):  # fmt: skip
+        assert run_command(main, ["steady", words]) == 2
+        assert refusal in capsys.readouterr().err

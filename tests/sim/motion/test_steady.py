@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
-import pandas as pd
 import pytest
 
 import sim.motion.settling
@@ -19,16 +16,9 @@ from sim.motion.steady import orbits, steady
 from sim.motion.steady_motion import DIRECT, STEPPING
 from sim.reference.control_example import INDEPENDENT
 from sim.solve.refinement import LOST, REASONS
-from tests.reference.cases import (
-    INDEPENDENT_HEAD_SHARE,
-    MEASURED_HEAD_SHARE,
-    STEADY_INPUTS,
-    STEADY_POINTS,
-)
-from tests.sim.points import sweep_points
-from tests.sim.robots import control
+from tests.reference.cases import INDEPENDENT_HEAD_SHARE, MEASURED_HEAD_SHARE, STEADY_INPUTS, STEADY_POINTS
+from tests.sim.robots import control, sweep_points
 
-ORACLE = Path(__file__).parents[4] / "shared" / "design" / "oracle_points.csv"
 OUTPUTS = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_deg")
 
 
@@ -56,13 +46,6 @@ def test_points_over_the_domain_match_the_independent_solver() -> None:
     check_against(found, dict(zip(OUTPUTS, outputs, strict=True)))
 
 
-@pytest.mark.skipif(not ORACLE.is_file(), reason="the independent solver's table is not on this machine")
-def test_every_point_of_the_independent_solver() -> None:
-    table = pd.read_csv(ORACLE)
-    found = steady_columns({k: table[k].to_numpy(float) for k in STEADY_INPUTS}, title="")
-    check_against(found, {k: table[k].to_numpy(float) for k in OUTPUTS})
-
-
 def test_head_share_of_the_paper_s_measured_robot() -> None:
     motion = steady(PRESETS["paper-measured"].groups())
     share = float(motion.omega_h[0] / (motion.omega_h[0] - motion.omega_t[0]))
@@ -70,28 +53,22 @@ def test_head_share_of_the_paper_s_measured_robot() -> None:
     assert abs(share - MEASURED_HEAD_SHARE) < 0.05  # the paper's own fit misses its point by 0.04
 
 
-def test_reversing_the_motor_mirrors_the_motion() -> None:
+def test_reversing_the_motor_mirrors_the_motion(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By both routes; stepping says on the standard error how far it is."""
+    monkeypatch.setattr(sim.motion.settling, "_SILENT", 0.0)
     for solve in (steady, settle):
         forward, backward = solve(control(N=3)), solve(control(N=3, omega_bar=-10.0))
         for name, sign in (("omega_t", -1), ("omega_h", -1), ("omega_yr", -1), ("v_x", -1), ("v_z", 1)):
             assert getattr(backward, name) == pytest.approx(sign * getattr(forward, name), rel=1e-7)
-
-
-def test_batch_equals_one_by_one() -> None:
-    rng = np.random.default_rng(0)
-    changes = {"C_t": rng.uniform(2, 5, 4), "C_yr": rng.uniform(1, 6, 4), "omega_bar": rng.uniform(5, 15, 4)}
-    for solve, close in ((steady, 1e-12), (settle, 1e-12)):
-        together = solve(control(4, **changes))
-        for i in range(4):
-            alone = solve(control(**{k: v[i] for k, v in changes.items()}))
-            for name in ("omega_t", "omega_yr", "v_x", "v_z", "tail_gap"):
-                assert getattr(alone, name)[0] == pytest.approx(getattr(together, name)[i], rel=close)
+    assert "stepping in time at ω̄ = 10: 0." in capsys.readouterr().err
 
 
 @pytest.mark.slow
 def test_time_stepping_from_rest_reaches_the_same_motion() -> None:
     """Over the sweep's domain; the tolerance is the error of stepping on 24 edges."""
-    points = sweep_points(32)
+    points = sweep_points(16)
     found = steady_columns(points, title="")
     stepped = stepped_columns(points, finer=2, title="")
     assert (found["method"] == DIRECT).all()
@@ -126,28 +103,18 @@ def test_a_row_without_an_orbit_is_stepped_and_says_so(monkeypatch: pytest.Monke
     assert 0 < motion.error[0] < 0.01
 
 
-@pytest.mark.slow
-def test_a_robot_that_is_stepped_says_so(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(sim.motion.settling, "_SILENT", 0.0)
-    settle(control(1))
-    assert "stepping in time at ω̄ = 10: 0." in capsys.readouterr().err
-
-
 def test_a_quick_turn_is_followed_from_rest() -> None:
-    """Both robots turn fast beside their discs; straight tails take one of them to another motion."""
+    """The robot turns fast beside its disc; straight tails take it to another motion."""
     size = {"l_over_R": 3.82, "L_over_R": 4.24, "l_over_r0": 16.2, "omega_bar": 117.0}
-    groups = control(2, N=6, C_t=0.55, C_r=0.54, C_yr=[4.1, 2.5], **size)
+    groups = control(1, N=6, C_t=0.55, C_r=0.54, C_yr=4.1, **size)
     alike = orbits(groups)
     assert alike.converged.all()
     assert (np.abs(alike.omega_yr) > QUICK * np.abs(alike.omega_t)).all()
     motion = steady(groups)
-    assert motion.method.tolist() == [STEPPING, DIRECT]
+    assert motion.method.tolist() == [STEPPING]
     assert motion.converged.all()
     assert "another motion" in motion.note[0]
     assert abs(motion.v_z[0] / alike.v_z[0] - 1) > 0.1
-    assert motion.v_z[1] == alike.v_z[1]
 
 
 @pytest.mark.rest

@@ -92,58 +92,41 @@ def vectors(folder: Path) -> dict[str, np.ndarray]:
     return {str(name): column.to_numpy() for name, column in pd.read_csv(folder / "vectors.csv").items()}
 
 
-def test_it_is_small_and_states_its_loss(folder: Path) -> None:
-    assert (folder / "lookup.safetensors").stat().st_size <= MOST_BYTES
-    arrays = safetensors.numpy.load_file(folder / "lookup.safetensors")
-    assert sum(array.nbytes for array in arrays.values()) == make_small_copy(load()).bytes
+def test_it_is_small_and_states_its_loss(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     data = (folder / "lookup.safetensors").read_bytes()
+    assert len(data) <= MOST_BYTES
+    arrays = safetensors.numpy.load(data)
+    assert sum(array.nbytes for array in arrays.values()) == make_small_copy(load()).bytes
     header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
     manifest = json.loads(header["__metadata__"]["manifest"])
     assert manifest["table"] == load().identity
     assert set(manifest["units"]) == {*ROBOT, DWELL, *OUTPUTS}
     loss = manifest["loss"]
     assert {*OUTPUTS} <= set(loss)
-    for name in ("omega_t_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l"):
-        assert loss[name]["p95"] < 0.05 * load().errors[name]["median"], (
-            name
-        )  # nothing beside the table's own errors
+    for name in ("omega_t_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l"):  # nothing beside the table's errors
+        assert loss[name]["p95"] < 0.05 * load().errors[name]["median"], name
         thrust = name in ("v_z", "R_yr_over_l")  # a small difference of large numbers, with one tail
         assert loss[f"{name} one_tail"]["p95"] < (0.002 if thrust else 0.001)
     for name in (*RESPONSE_OUTPUTS, "tail_gap"):
         assert loss[name]["p95"] < load().errors[name]["p95"], name
-
-
-def test_the_stated_loss_holds_for_other_robots(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("surrogate.export.small_copy._SEED", 91)
-    small = make_small_copy(load())
-    stated = json.loads(stored_manifest(folder))["loss"]
-    for name, figures in measure_losses(load(), small).items():
-        assert figures["p95"] < 2 * stated[name]["p95"], name
-
-
-def stored_manifest(folder: Path) -> str:
-    data = (folder / "lookup.safetensors").read_bytes()
-    header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
-    return str(header["__metadata__"]["manifest"])
-
-
-def test_the_reader_in_c_gives_the_vectors(folder: Path) -> None:
-    wanted = vectors(folder)
-    assert set(wanted["N"]) == set(range(1, 9))
-    assert {-1.0, 1.0} == set(np.sign(wanted["omega_bar"]))
-    found, states = answers(library(folder), wanted)
-    assert (states == 0).all()
-    for name, error in apart(found, wanted).items():
-        assert error.max() < 1e-9, name
+    monkeypatch.setattr("surrogate.export.small_copy._SEED", 91)  # of other robots
+    for name, figures in measure_losses(load(), make_small_copy(load())).items():
+        assert figures["p95"] < 2 * loss[name]["p95"], name
 
 
 def test_the_reader_in_c_answers_for_all_robots(folder: Path) -> None:
-    """In double precision as the table of the same numbers, in single precision nearly."""
+    """In double precision as its vectors and the table of the same numbers, in single precision nearly."""
+    made, wanted = library(folder), vectors(folder)
+    assert set(wanted["N"]) == set(range(1, 9))
+    assert {-1.0, 1.0} == set(np.sign(wanted["omega_bar"]))
+    found, states = answers(made, wanted)
+    assert (states == 0).all()
+    assert all(error.max() < 1e-9 for error in apart(found, wanted).values())
     robots, small = random_robots(1024, 92), make_small_copy(load())
     wanted, groups = small.query(robots), {name: robots[name] for name in ROBOT}
     inside = ~(load().query(groups, flag=True)["outside"] | small.table.query(groups, flag=True)["outside"])
     assert inside.mean() > 0.97
-    found, states = answers(library(folder), robots)
+    found, states = answers(made, robots)
     assert (states[inside] == 0).all()
     assert all(error[inside].max() < 1e-8 for error in apart(found, wanted).values())
     single, states = answers(library(folder, "-DLOOKUP_FLOAT"), robots)
@@ -199,16 +182,15 @@ def test_where_the_response_does_not_fit_it_is_left_out(tmp_path: Path, monkeypa
 
 
 def test_the_command_prints_the_loss(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for words, refusal in (
+        ([], "nothing to write; give --small FOLDER"),
+        (["--onnx", "query.onnx"], "ONNX files are no longer written; give --small FOLDER"),
+    ):
+        assert run_command(main, ["export", *words]) == 2
+        assert refusal in capsys.readouterr().err
     assert run_command(main, ["export", "--small", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().out
     assert "omega_yr_bar" in said
     assert "kB; loss against the whole table" in said
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"lookup.safetensors", "lookup_weights.h", "lookup.h", "vectors.csv"}
-
-
-def test_the_command_says_what_it_writes(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_command(main, ["export"]) == 2
-    assert "nothing to write; give --small FOLDER" in capsys.readouterr().err
-    assert run_command(main, ["export", "--onnx", "query.onnx"]) == 2
-    assert "ONNX files are no longer written; give --small FOLDER" in capsys.readouterr().err

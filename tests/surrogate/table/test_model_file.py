@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 
 from surrogate.table import tensor_file
 from surrogate.table.curve_errors import CURVE_ERRORS
 from surrogate.table.lookup import FORMAT, table_content
 from surrogate.table.model_file import SHIPPED, load
-from tests.surrogate.refusals import refusal
-from tests.surrogate.small import rows, table
+from tests.surrogate.small import refusal, rows, table
 
 
 def test_a_model_comes_back_as_it_was(tmp_path: Path) -> None:
@@ -40,7 +38,7 @@ def test_flipped_bits_are_refused_wherever_they_are(tmp_path: Path) -> None:
     whole, path = SHIPPED.read_bytes(), tmp_path / "changed.safetensors"
     random = np.random.default_rng(5)
     header = 8 + int.from_bytes(whole[:8], "little")
-    places = [*range(8), *random.integers(8, header, 120), *random.integers(header, len(whole), 60)]
+    places = [*range(8), *random.integers(8, header, 60), *random.integers(header, len(whole), 30)]
     for place in places:
         broken = bytearray(whole)
         broken[place] ^= 1 << int(random.integers(8))
@@ -68,12 +66,6 @@ def test_what_is_no_model_is_refused(content: bytes, expected: str, tmp_path: Pa
     path = tmp_path / "m.safetensors"
     path.write_bytes(content)
     assert expected in refusal(path)
-
-
-def test_a_file_of_torch_and_one_of_another_format_are_refused(tmp_path: Path) -> None:
-    path = tmp_path / "model.pt"
-    torch.save({"format": 4, "content": {}}, path)
-    assert "older version; train it again" in refusal(path)
     tensor_file.write(path, table_content(load()), 8)
     assert "has format 8, this version reads 7; train it again" in refusal(path)
 
@@ -112,20 +104,8 @@ def test_a_content_that_cannot_answer_is_refused_though_its_hash_is_right(
     assert expected in refusal(path)
 
 
-@pytest.mark.parametrize("key", sorted({*table_content(load())} - {CURVE_ERRORS}))
-def test_a_missing_key_is_named(key: str, tmp_path: Path) -> None:
+def test_a_missing_key_is_named(tmp_path: Path) -> None:
     path = tmp_path / "m.safetensors"
-    tensor_file.write(path, edited(lambda content: content.pop(key)), FORMAT)
-    assert f"it has no {key!r}" in refusal(path)
-
-
-def test_an_edited_domain_is_refused(tmp_path: Path) -> None:
-    """The header's text is edited as by hand; its length stays the same."""
-    path = tmp_path / "m.safetensors"
-    whole = SHIPPED.read_bytes()
-    low, high = load().ranges["omega_bar"]
-    old = f"{high!r}".encode()
-    assert whole.count(old) == 1
-    path.write_bytes(whole.replace(old, b"9" * len(old)))
-    assert "was changed after it was written" in refusal(path)
-    assert low < high
+    for key in sorted({*table_content(load())} - {CURVE_ERRORS}):
+        tensor_file.write(path, edited(lambda content, key=key: content.pop(key)), FORMAT)  # type: ignore[misc]
+        assert f"it has no {key!r}" in refusal(path)

@@ -1,7 +1,8 @@
-"""Data sets behind URLs: the same files as on a disk, the same refusals."""
+"""Data sets on disks and behind URLs: one writer at a time, no links, the same files, the same refusals."""
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import json
 import os
@@ -11,19 +12,81 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import dataset.build.build
 from dataset.build.build import build, mend
-from dataset.storage import lock
 from dataset.storage.data_set import batches, read, read_manifest
-from dataset.storage.lock import locked
-from dataset.storage.storage import RemoteStorage, open_storage
+from dataset.storage.lock import LOCK, locked
+from dataset.storage.storage import LocalStorage, RemoteStorage, open_storage
 from sim.io.errors import InputError
 from tests.dataset.sweeps import ROOT, InThisProcess, design, invented
 from tests.processes import LIMIT
+
+
+def test_a_lock_does_not_change_another_file(tmp_path: Path) -> None:
+    storage, lock, precious = LocalStorage(str(tmp_path)), tmp_path / LOCK, tmp_path / "precious"
+    precious.write_text("content")
+    lock.symlink_to("precious")
+    with pytest.raises(InputError, match=r"\.lock is a symbolic link; remove it"), locked(storage):
+        pytest.fail("the lock must not be taken")
+    lock.unlink()
+    os.link(precious, lock)
+    with locked(storage):
+        assert '"pid"' in lock.read_text()
+    assert [path.name for path in tmp_path.iterdir()] == ["precious"]
+    assert precious.read_text() == "content"
+
+
+def test_a_second_writer_is_refused_and_a_dead_one_is_followed(tmp_path: Path) -> None:
+    storage = LocalStorage(str(tmp_path))
+    (tmp_path / LOCK).write_text("of a killed process")
+    with (
+        locked(storage),
+        pytest.raises(InputError, match=f"being written by process {os.getpid()} on"),
+        locked(storage),
+    ):
+        pytest.fail("the lock must not be taken twice")
+    with locked(storage):
+        assert (tmp_path / LOCK).exists()
+    assert not (tmp_path / LOCK).exists()
+
+
+def test_a_shard_is_not_written_through_a_link(tmp_path: Path) -> None:
+    """The name of an unfinished file is not known in advance."""
+    (tmp_path / "precious").write_text("content")
+    for name in (".a.txt", f".a.txt.{socket.gethostname()}.{os.getpid()}"):
+        (tmp_path / name).symlink_to("precious")
+    LocalStorage(str(tmp_path)).write("a.txt", "new")
+    assert (tmp_path / "precious").read_text() == "content"
+    assert (tmp_path / "a.txt").read_text() == "new"
+
+
+@pytest.mark.parametrize("left", [None, "of a killed process"], ids=["removed", "replaced"])
+def test_a_lock_that_is_removed_before_it_is_locked_is_made_again(
+    left: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its owner ends between our opening and our locking: what we then hold is no longer the file of that name."""
+    storage, lock, flock = LocalStorage(str(tmp_path)), tmp_path / LOCK, fcntl.flock
+
+    def flock_late(*words: Any) -> None:
+        monkeypatch.setattr(fcntl, "flock", flock)
+        lock.unlink()
+        if left is not None:
+            lock.write_text(left)
+        flock(*words)
+
+    monkeypatch.setattr(fcntl, "flock", flock_late)
+    with (
+        locked(storage),
+        pytest.raises(InputError, match=f"being written by process {os.getpid()} on"),
+        locked(storage),
+    ):
+        pytest.fail("the lock must not be taken twice")
 
 
 def files(address: str) -> dict[str, str]:
@@ -76,76 +139,65 @@ def test_one_writer_behind_a_url(memory: str) -> None:
     with locked(storage), pytest.raises(InputError, match="is being written by process"):
         build(design(9), memory, title="", simulate=invented)
     killed = {"host": "elsewhere", "pid": 1, "since": time.time() - 7200}
-    storage.write(lock.LOCK, json.dumps(killed))
+    storage.write(LOCK, json.dumps(killed))
     with pytest.raises(InputError, match=r"process 1 on elsewhere, for 120 min; .* take over with --force"):
         build(design(9), memory, title="", simulate=invented)
-    assert json.loads(bytes(storage.read(lock.LOCK))) == killed
+    assert json.loads(bytes(storage.read(LOCK))) == killed
     build(design(9), memory, title="", simulate=invented, force=True)
-    assert storage.size(lock.LOCK) is None
+    assert storage.size(LOCK) is None
 
 
-def test_unknown_urls_are_refused(tmp_path: Path) -> None:
+def test_unknown_urls_and_missing_packages_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(_: str) -> None:
+        raise ImportError("Install s3fs to access S3")
+
     with pytest.raises(InputError, match="nonsense"):
         build(design(9), "nonsense://x/y", title="", simulate=invented)
+    monkeypatch.setattr("fsspec.core.url_to_fs", missing)
+    with pytest.raises(InputError, match="pip install s3fs"):
+        RemoteStorage("s3://bucket/folder")
 
 
 @pytest.fixture
-def bucket(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[str]:
+def bucket(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     """Provide a bucket of an S3 server of this machine."""
     pytest.importorskip("s3fs", reason="the extra s3 is not installed")
     pytest.importorskip("moto", reason="moto is not installed")
-    with socket.socket() as connection:
-        connection.bind(("127.0.0.1", 0))
-        port = connection.getsockname()[1]
+    from moto.server import ThreadedMotoServer
+
+    server = ThreadedMotoServer("127.0.0.1", port=0, verbose=False)
+    server.start()
     for name, value in {
-        "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}", "AWS_ACCESS_KEY_ID": "test",
+        "AWS_ENDPOINT_URL": "http://{}:{}".format(*server.get_host_and_port()), "AWS_ACCESS_KEY_ID": "test",
         "AWS_SECRET_ACCESS_KEY": "test", "AWS_DEFAULT_REGION": "us-east-1",
     }.items():  # fmt: skip
         monkeypatch.setenv(name, value)
-    with open(tmp_path / "moto.log", "wb") as log:
-        words = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)]
-        server = subprocess.Popen(words, stdout=log, stderr=log)
-    while True:
-        with socket.socket() as connection:
-            if connection.connect_ex(("127.0.0.1", port)) == 0:
-                break
-        assert server.poll() is None, (tmp_path / "moto.log").read_text()
-        time.sleep(0.05)
     import s3fs
 
     s3fs.S3FileSystem.clear_instance_cache()
     s3fs.S3FileSystem().mkdir("sweeps")
     yield "s3://sweeps/one"
-    server.kill()
-    server.wait(timeout=LIMIT)
+    server.stop()
 
 
-def break_off(storage: RemoteStorage) -> None:
-    with storage.writer("rows/x") as sink:
-        sink.write(b"half")
-        raise ZeroDivisionError
-
-
-@pytest.mark.slow
+@pytest.mark.rest
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 def test_s3_holds_the_same_files(bucket: str, calm: Path) -> None:
     code = (
         "from tests.dataset.sweeps import *; from dataset.build.build import build; "
         f"build(design(200), {bucket!r}, jobs=2, title='', simulate=invented)"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, env=dict(os.environ), text=True, capture_output=True, timeout=LIMIT
-    )
-    assert done.returncode == 0, done.stderr
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, timeout=LIMIT)
     assert read(bucket).equals(read(calm))
     assert files(bucket) == files(str(calm))
     assert read_manifest(bucket) == read_manifest(calm)
     storage = open_storage(bucket)
     assert isinstance(storage, RemoteStorage)
     with locked(storage):
-        assert not storage.create(lock.LOCK, "{}")
-    with pytest.raises(ZeroDivisionError):
-        break_off(storage)
+        assert not storage.create(LOCK, "{}")
+    with suppress(ZeroDivisionError), storage.writer("rows/x") as sink:
+        sink.write(b"half")
+        raise ZeroDivisionError
     assert storage.size("rows/x") is None
     storage.delete("manifest.json")
     with pytest.raises(InputError, match="no finished data set"):

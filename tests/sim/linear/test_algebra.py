@@ -1,0 +1,115 @@
+"""Small dense systems, GMRES, trigonometric interpolants, and derivatives by the complex step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from sim.arrays import Floats
+from sim.effects import catalogue
+from sim.linear.complex_step import angle, derivative, length, magnitude, sign
+from sim.linear.dense import solve_dense
+from sim.linear.gmres import combine, extend, new_krylov, start
+from sim.linear.spectral import differentiation, interpolation, with_phases
+from sim.model.slopes import SLOPE_INPUTS
+from sim.solve.assembly import numbers
+from tests.sim.robots import control
+
+
+def solved(matrix: np.ndarray, right: np.ndarray, most: int, tolerance: float) -> tuple[np.ndarray, list[float]]:
+    """Solve; return the solution and the relative residuals that GMRES states on the way."""
+    krylov = new_krylov(len(right), most)
+    assert start(krylov, right) == pytest.approx(np.linalg.norm(right))
+    left: list[float] = []
+    for i in range(most):
+        left.append(extend(krylov, i, matrix @ krylov.basis[i]))
+        if left[-1] < tolerance:
+            break
+    return combine(krylov, len(left)), left
+
+
+def test_it_solves_in_as_many_steps_as_there_are_unknowns() -> None:
+    rng = np.random.default_rng(0)
+    matrix, right = rng.normal(size=(12, 12)) + 3 * np.eye(12), rng.normal(size=12)
+    found, left = solved(matrix, right, 12, 1e-13)
+    assert matrix @ found == pytest.approx(right, abs=1e-10)
+    assert all(b <= a * (1 + 1e-12) for a, b in pairwise(left))  # residuals never grow
+
+
+def test_the_stated_residual_is_the_true_one() -> None:
+    rng = np.random.default_rng(2)
+    matrix, right = rng.normal(size=(30, 30)) + 8 * np.eye(30), rng.normal(size=30)
+    for steps in (1, 9):
+        found, left = solved(matrix, right, steps, 0.0)
+        true = np.linalg.norm(right - matrix @ found) / np.linalg.norm(right)
+        assert left[-1] == pytest.approx(true, rel=1e-8)
+
+
+def test_nothing_to_solve_for() -> None:
+    krylov = new_krylov(5, 3)
+    assert start(krylov, np.zeros(5)) == 0.0
+    assert combine(krylov, 0) == pytest.approx(np.zeros(5))
+
+
+def test_dense_equations_need_row_exchanges() -> None:
+    matrix = np.array([[0.0, 2.0, 1.0], [1.0, 1.0, 0.0], [3.0, 0.0, 1.0]])
+    right = np.array([[1.0, 2.0], [2.0, 0.0], [3.0, 1.0]])
+    found = right.copy()
+    solve_dense(matrix.copy(), found)
+    assert matrix @ found == pytest.approx(right, abs=1e-14)
+
+
+@pytest.mark.parametrize("phases", [3, 4, 5, 8])
+def test_phases_are_resampled_and_differentiated_exactly(phases: int) -> None:
+    at = 2 * np.pi * np.arange(phases) / phases
+    finer = 2 * np.pi * np.arange(12) / 12
+    for k in range(1, (phases - 1) // 2 + 1):
+        values = np.cos(k * at + 0.3)
+        assert differentiation(phases) @ values == pytest.approx(-k * np.sin(k * at + 0.3), abs=1e-12)
+        assert interpolation(phases, finer) @ values == pytest.approx(np.cos(k * finer + 0.3), abs=1e-12)
+        assert with_phases(values.reshape(1, -1, 1), 12)[0, :, 0] == pytest.approx(
+            np.cos(k * finer + 0.3), abs=1e-12
+        )
+
+
+PLACES = np.array([[1.3, 0.4], [-1.3, 0.4], [-0.7, -2.0], [0.7, -2.0]])  # one in each quadrant
+FORMULAS: list[tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]] = [
+    (lambda p: magnitude(p[:, 0]), lambda p: np.abs(p[:, 0])),
+    (lambda p: sign(p[:, 0]) * p[:, 1], lambda p: np.sign(p[:, 0]) * p[:, 1]),
+    (lambda p: length(p[:, 0], p[:, 1]), lambda p: np.hypot(p[:, 0], p[:, 1])),
+    (lambda p: angle(p[:, 1], p[:, 0]), lambda p: np.arctan2(p[:, 1], p[:, 0])),
+]
+
+
+@pytest.mark.parametrize(("formula", "wanted"), FORMULAS)
+def test_formulas_have_the_derivative_of_what_they_replace(
+    formula: Callable[[Floats], Floats], wanted: Callable[[Floats], Floats]
+) -> None:
+    assert (formula(PLACES) == wanted(PLACES)).all()
+    direction = np.array([0.3, -0.8])
+    differences = (wanted(PLACES + 1e-6 * direction) - wanted(PLACES - 1e-6 * direction)) / 2e-6
+    assert derivative(formula, PLACES, direction) == pytest.approx(differences, rel=1e-8, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", [*SLOPE_INPUTS, *catalogue()])
+def test_numbers_of_a_robot_carry_derivatives(name: str) -> None:
+    """In every input and effect, with all effects there: an effect that drops the imaginary part is found."""
+    sizes = {effect.name: 0.5 * (effect.null + effect.typical) for effect in catalogue().values()}
+    groups = control(2, omega_bar=[10.0, -10.0], **sizes)
+    size = getattr(groups, name) if name in SLOPE_INPUTS else groups.effects[name]
+
+    def at(value: Floats) -> Floats:
+        if name in SLOPE_INPUTS:
+            return numbers(replace(groups, **{name: value}))  # type: ignore[arg-type]
+        return numbers(replace(groups, effects={**groups.effects, name: value}))
+
+    width = 1e-5 * np.abs(size)
+    differences = (at(size + width) - at(size - width)) / (2 * width[:, None])
+    scale = np.abs(at(size)) / np.abs(size)[:, None]
+    assert (
+        np.abs(derivative(at, size, np.ones(2)) - differences) <= 1e-9 * scale + 1e-6 * np.abs(differences)
+    ).all()
