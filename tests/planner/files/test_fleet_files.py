@@ -16,6 +16,7 @@ from sim.model.presets import PRESETS
 TWO = """
 apart = "3cm"
 robot = "paper-control"
+objective = "flips"
 [[member]]
 name = "right"
 path = "right.csv"
@@ -23,7 +24,6 @@ path = "right.csv"
 goal = [11, 24, 90]
 start = [11, -21, 90]
 unit = "cm"
-objective = "error"
 delay_s = 10
 """
 

@@ -33,7 +33,9 @@ def random_smooth_path(seed: int, length: float, sharpest: float) -> Path2D:
     return Path2D.of(np.cumsum(0.02 * np.stack([np.cos(heading), np.sin(heading)], 1), 0), closed=False)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize(
+    "seed", [*range(12), *(pytest.param(seed, marks=pytest.mark.rest) for seed in range(12, 40))]
+)
 def test_the_bound_holds_on_random_paths(seed: int) -> None:
     """Predicted track within the guaranteed error, for paths of many lengths and curvatures."""
     rng = np.random.default_rng(1000 + seed)
@@ -55,11 +57,10 @@ def test_the_bound_holds_on_random_paths(seed: int) -> None:
 def test_error_does_not_grow_with_length() -> None:
     car = vehicle()
     worst = []
-    for length in (20.0, 200.0):
+    for length in (10.0, 80.0):
         ref = reference(Path2D.of([[0, 0], [length, 0]]), car.pivot_distance, 0.01)
         switches = follow(ref, car, plain_guidance(car, 1.0, look_ahead(car, 0.0)))
-        track = trace(car, switches, 0.0)
-        worst.append(np.abs(track[:, 1]).max())
+        worst.append(np.abs(trace(car, switches, 0.0)[:, 1]).max())
     assert worst[1] < 1.2 * worst[0]
 
 
