@@ -67,15 +67,16 @@ def least_between(fleet_plan: FleetPlan, poses: list[Any], times: np.ndarray) ->
 
 
 def test_robots_that_would_meet_keep_apart() -> None:
+    pair = two()
     plans = crossing()
     together = [Scheduled(each.motion, 0.0) for each in keep_apart(plans, apart=1e-6).scheduled]
     times = instants(together)
     assert distances(*(each.places(times) for each in together)).min() < APART
-    assert two().sure_m >= APART
-    assert two().nearest.distance_m > two().sure_m
-    assert two().circles == (0, 0)
-    assert min(two().begin_s) == 0 < max(two().begin_s)
-    assert two().plans[0].to_dict()["id"] == plans[0].to_dict()["id"]
+    assert pair.sure_m >= APART
+    assert pair.nearest.distance_m > pair.sure_m
+    assert pair.circles == (0, 0)
+    assert min(pair.begin_s) == 0 < max(pair.begin_s)
+    assert pair.plans[0].to_dict()["id"] == plans[0].to_dict()["id"]
 
 
 def test_the_later_robot_does_not_wait_longer_than_it_must() -> None:
@@ -182,14 +183,15 @@ def test_ninety_five_per_cent_of_random_robots_keep_within_the_error_in_place() 
 
 
 def test_they_keep_apart_in_the_simulator() -> None:
-    tracks = replay([each.schedule() for each in two().plans])
-    times = np.arange(0.0, two().duration_s, 0.5)
+    pair = two()
+    tracks = replay([each.schedule() for each in pair.plans])
+    times = np.arange(0.0, pair.duration_s, 0.5)
     poses = [
         np.stack([np.interp(times - begin, track["time_s"], track[name])
                   for name in ("x_over_l", "y_over_l", "heading_rad")], 1)
-        for begin, track in zip(two().begin_s, tracks, strict=True)
+        for begin, track in zip(pair.begin_s, tracks, strict=True)
     ]  # fmt: skip
-    assert least_between(two(), poses, times) >= two().sure_m
+    assert least_between(pair, poses, times) >= pair.sure_m
 
 
 @pytest.mark.rest

@@ -115,24 +115,26 @@ def test_the_simulator_swims_lap_after_lap() -> None:
 
 @pytest.mark.parametrize("current", [pytest.param(0.0, marks=pytest.mark.rest), 0.001])
 def test_a_tracked_robot_goes_around_until_it_is_told(current: float) -> None:
-    car = laps().tracked.vehicle
+    lap = laps()
+    car = lap.tracked.vehicle
     car = replace(car, twist=car.twist * np.array([1.02, 1.0, 1.02]), current=np.array([current, 0.0]))
-    tracker = UntilTold(Tracker(laps()), 2.4 * laps().duration)
-    result = swim(tracker, laps(), car, FINE, longest=8)
+    tracker = UntilTold(Tracker(lap), 2.4 * lap.duration)
+    result = swim(tracker, lap, car, FINE, longest=8)
     assert result.finished
-    assert 2.8 < result.times[-1] / laps().duration < 3.2
+    assert 2.8 < result.times[-1] / lap.duration < 3.2
     assert result.distance.max() < 0.15
-    settled = result.times > laps().duration
-    assert result.distance[settled].max() < 2 * laps().predicted_max + 0.03
-    assert tracker.tracker._law.place < TrackerGuidance(laps())._lap
+    settled = result.times > lap.duration
+    assert result.distance[settled].max() < 2 * lap.predicted_max + 0.03
+    assert tracker.tracker._law.place < TrackerGuidance(lap)._lap
 
 
 def test_a_robot_that_was_moved_comes_back_in_any_lap() -> None:
+    lap = laps()
     start = (0.5, -2.0, 2.0)
-    tracker = UntilTold(Tracker(laps(), start=start), 1.5 * laps().duration)
-    result = swim(tracker, laps(), laps().tracked.vehicle, FINE, start=start, longest=8)
+    tracker = UntilTold(Tracker(lap, start=start), 1.5 * lap.duration)
+    result = swim(tracker, lap, lap.tracked.vehicle, FINE, start=start, longest=8)
     assert result.finished
-    assert result.distance[result.times > laps().duration].max() < 2 * laps().predicted_max
+    assert result.distance[result.times > lap.duration].max() < 2 * lap.predicted_max
 
 
 def test_in_c_it_goes_around_as_well(tmp_path: Path) -> None:
@@ -173,13 +175,14 @@ def test_the_command_plans_laps(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 
 def test_the_pipe_is_told_that_this_lap_is_the_last_one() -> None:
-    scale = laps().robot.time_scale
-    tracker, times = Tracker(laps()), np.cumsum(np.tile(laps().dwells, 2)) * scale
-    lines = [*(f"{time:.6f}" for time in times[: len(laps().dwells) // 2]), "finish"]
-    told = list(answers(tracker, lines, laps().robot))
+    lap = laps()
+    scale = lap.robot.time_scale
+    tracker, times = Tracker(lap), np.cumsum(np.tile(lap.dwells, 2)) * scale
+    lines = [*(f"{time:.6f}" for time in times[: len(lap.dwells) // 2]), "finish"]
+    told = list(answers(tracker, lines, lap.robot))
     assert len(told) == len(lines)
     while not tracker.update(tracker.command.flip_at).finished:
-        assert tracker.command.flip_at < 1.2 * laps().duration
+        assert tracker.command.flip_at < 1.2 * lap.duration
 
 
 def orbit_of_a_pair(vehicle: Vehicle, positive: float, negative: float, offset: float) -> float:
@@ -206,41 +209,43 @@ def test_no_pair_of_dwells_stays_nearer_than_one_direction(point: str) -> None:
     assert min(sizes) < smallest * 1.02
 
 
-@pytest.mark.rest
 def test_the_orbit_is_little_wider_than_the_smallest_one() -> None:
-    assert held().smallest == pytest.approx(tracked().vehicle.turn_radius)
-    assert held().smallest < held().radius < 1.05 * held().smallest
-    away = np.hypot(*(held().plan.track - PLACE).T)
-    assert np.abs(away - held().radius).max() <= held().plan.predicted_max + 1e-3
-    assert held().reach > held().radius
-    assert held().laps == math.ceil(1800 / float(held().plan.seconds.sum()))
-    assert held().within < held().within_open_loop(held().laps)
+    place = held()
+    assert place.smallest == pytest.approx(tracked().vehicle.turn_radius)
+    assert place.smallest < place.radius < 1.05 * place.smallest
+    away = np.hypot(*(place.plan.track - PLACE).T)
+    assert np.abs(away - place.radius).max() <= place.plan.predicted_max + 1e-3
+    assert place.reach > place.radius
+    assert place.laps == math.ceil(1800 / float(place.plan.seconds.sum()))
+    assert place.within < place.within_open_loop(place.laps)
 
 
 def test_the_simulator_circles_about_the_place_at_constant_direction() -> None:
-    lap = 2 * math.pi / held().plan.tracked.vehicle.yaw_rate
+    place = held()
+    lap = 2 * math.pi / place.plan.tracked.vehicle.yaw_rate
     still = Schedule(
         CONTROL.group_values(),
-        held().still_direction,
+        place.still_direction,
         np.array([1.5 * lap]),
-        held().still_start,
+        place.still_start,
         CONTROL.time_scale,
     )
     track = replay([still])[0][["x_over_l", "y_over_l"]].to_numpy(float)
-    assert np.abs(np.hypot(*(track - PLACE).T) / held().smallest - 1).max() < 0.02
+    assert np.abs(np.hypot(*(track - PLACE).T) / place.smallest - 1).max() < 0.02
 
 
 @pytest.mark.parametrize(("current", "wrong"), [pytest.param(0.0, 1.05, marks=pytest.mark.rest), (0.001, 0.97)])
 def test_a_tracked_robot_stays(current: float, wrong: float) -> None:
     """A coefficient is 3 or 5 % off; the current would carry the robot 0.4 l away in three laps."""
-    car, plan = tracked().vehicle, held().plan
+    place = held()
+    car, plan = tracked().vehicle, place.plan
     car = replace(car, twist=car.twist * np.array([wrong, 1.0, 1.0]), current=np.array([current, 0.0]))
     result = swim(UntilTold(Tracker(plan), 2.5 * plan.duration), plan, car, FINE, longest=8)
     settled = result.times > plan.duration
     away = np.hypot(*(result.poses[settled, :2] - PLACE).T)
     assert result.finished
-    assert away.max() < held().within + 0.08
-    assert away.min() > held().radius - 0.15
+    assert away.max() < place.within + 0.08
+    assert away.min() > place.radius - 0.15
 
 
 @pytest.mark.parametrize("x", [3.2, pytest.param(5.5, marks=pytest.mark.rest)])
