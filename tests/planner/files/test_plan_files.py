@@ -119,12 +119,15 @@ def test_scales_are_equal_and_ticks_are_in_place(size: tuple[float, float]) -> N
     corners = np.array([7.0, -2.0]) + np.array([[0.0, 0.0], [size[0], 0.0], size, [0.0, size[1]]])
     axes.fill(*corners.T, color="#aabbcc")
     text = axes.text("p1")
-    drawn = places(text)[0]
+    drawn, root = places(text)[0], ElementTree.fromstring(text.encode())
+    _, frame = (rect.attrib for rect in root.iter(f"{SVG}rect"))
+    x, y, width, height = (float(frame[name]) for name in ("x", "y", "width", "height"))
+    assert ((drawn > [x, y]) & (drawn < [x + width, y + height])).all()
     scale = np.ptp(drawn, axis=0).max() / max(size)
     x, y = (drawn - drawn[0]).T
     assert x == pytest.approx(scale * (corners - corners[0])[:, 0], abs=0.02)
     assert y == pytest.approx(-scale * (corners - corners[0])[:, 1], abs=0.02)
-    words = [word for word in ElementTree.fromstring(text.encode()).iter(f"{SVG}text") if word.text]
+    words = [word for word in root.iter(f"{SVG}text") if word.text]
     below = [word for word in words if word.attrib["text-anchor"] == "middle"]
     assert 2 <= len(below) <= 7
     for word in below:

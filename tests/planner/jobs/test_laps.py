@@ -15,7 +15,7 @@ from planner.files.tracker_header import rounded
 from planner.jobs.hold import hold
 from planner.jobs.hold_plan import HoldPlan
 from planner.jobs.laps import looped
-from planner.paths.obstacles import Circle, FreeSpace
+from planner.paths.obstacles import Circle, Footprint, FreeSpace
 from planner.paths.path import circle
 from planner.planning.plan import make_plan
 from planner.planning.planned import Plan
@@ -215,7 +215,9 @@ def test_the_orbit_is_little_wider_than_the_smallest_one() -> None:
     assert place.smallest < place.radius < 1.05 * place.smallest
     away = np.hypot(*(place.plan.track - PLACE).T)
     assert np.abs(away - place.radius).max() <= place.plan.predicted_max + 1e-3
-    assert place.reach > place.radius
+    body = Footprint.of(CONTROL, 0.0)
+    farthest = np.hypot(*np.moveaxis(body.centres(place.plan.poses) - PLACE, -1, 0)).max() + body.radius
+    assert farthest <= place.reach + 1e-9 < farthest + 0.02
     assert place.laps == math.ceil(1800 / float(place.plan.seconds.sum()))
     assert place.within < place.within_open_loop(place.laps)
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from planner.paths import distance
 from planner.paths.distance import distance_to, nearest, two_sided
-from planner.paths.fillets import fillet
+from planner.paths.fillets import fillet, largest_fillet
 from planner.paths.nearest_feasible import nearest_path
 from planner.paths.path import Path2D, circle, polygon, resample, smoothed
 from planner.paths.tractrix import STILL, Drift, reference
@@ -45,6 +45,7 @@ def test_the_last_bit_of_a_length_does_not_choose_the_number_of_points() -> None
 
 def test_fillet_keeps_edges_and_radius() -> None:
     square = polygon(4, 3.0)
+    assert largest_fillet(square) == pytest.approx(1.5)
     rounded = fillet(square, 0.5)
     assert rounded.length == pytest.approx(12 - 8 * 0.5 + math.pi, rel=1e-3)
     assert distance_to(square.polyline(), rounded.points).max() == pytest.approx(
