@@ -53,6 +53,7 @@ def check_clear(result: Plan, space: FreeSpace) -> None:
     assert kept is not None
     axis = np.stack([np.cos(reference.heading), np.sin(reference.heading)], 1)
     assert reference.p == pytest.approx(reference.q + result.tracked.rod * axis, abs=1e-9)
+    assert (np.diff(reference.q, axis=0) * axis[1:]).sum(1).min() > 0  # the pivot moves forward only
     poses = np.concatenate([reference.p, reference.heading[:, None]], 1)
     assert result.stated_error <= kept.margin <= Footprint.of(result.robot, 0.0).clearance(poses, space).min()
     assert kept.clearance > 0
