@@ -17,7 +17,6 @@ from planner.jobs.separation import Places, Scheduled, distances, instants, line
 from planner.jobs.timed_motion import Body
 from planner.paths.obstacles import Circle, Footprint, FreeSpace
 from planner.paths.path import Path2D
-from planner.planning.camera import DOCUMENTED, Camera
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.swim import swim
@@ -38,13 +37,13 @@ FAR = [((20.0 + 4 * k, 20.0), (21.0 + 4 * k, 20.0)) for k in range(4)]
 Motion = tuple[str, int]  # a place, and an hour at it
 
 
-def straight(*points: tuple[float, float], camera: Camera = DOCUMENTED) -> Plan:
-    return planned(points, objective="flips", camera=camera)
+def straight(*points: tuple[float, float], **options: Any) -> Plan:
+    return planned(points, **{"objective": "flips", **options})
 
 
-def crossing(camera: Camera = DOCUMENTED) -> list[Plan]:
+def crossing(**options: Any) -> list[Plan]:
     """Return plans of two robots that would meet, each with a way of 3 l."""
-    return [straight((0, 0), (3, 0), camera=camera), straight((1.0, -1.9), (1.0, 2.2), camera=camera)]
+    return [straight((0, 0), (3, 0), **options), straight((1.0, -1.9), (1.0, 2.2), **options)]
 
 
 def keep_apart(plans: list[Plan], **options: Any) -> FleetPlan:
@@ -196,13 +195,13 @@ def test_they_keep_apart_in_the_simulator() -> None:
 
 @pytest.mark.rest
 def test_robots_under_trackers_keep_apart() -> None:
-    result = keep_apart(crossing(FINE), feedback=True)
+    result = keep_apart(crossing(camera=FINE, objective="error"), feedback=True)
     rng = np.random.default_rng(3)
     for _ in range(3):
         tracks = []
         for each in result.scheduled:
             made = each.motion.plan
-            robot = replace(drawn_vehicle(made.tracked.vehicle, rng), current=np.array([2e-5, -2e-5]))
+            robot = replace(drawn_vehicle(made.tracked.vehicle, rng, 0.7), current=np.array([2e-5, -2e-5]))
             tracks.append(swim(Tracker(made, noise=(0.005, 0.005)), made, robot, replace(FINE, seed=rng)))
         scale = CONTROL.time_scale
         times = np.arange(0.0, result.duration_s, 1.0)

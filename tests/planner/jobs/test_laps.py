@@ -16,7 +16,7 @@ from planner.jobs.hold import hold
 from planner.jobs.hold_plan import HoldPlan
 from planner.jobs.laps import looped
 from planner.paths.obstacles import Circle, Footprint, FreeSpace
-from planner.paths.path import circle
+from planner.paths.path import Path2D, circle
 from planner.planning.plan import make_plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
@@ -33,7 +33,7 @@ from sim.mechanics import planar
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
 from tests.planner.compiled import CompiledTracker
-from tests.planner.plans import CONTROL, path_of, tracked
+from tests.planner.plans import CONTROL, tracked
 from tests.planner.vehicles import FINE, drawn_vehicle
 from tests.shared import shared
 
@@ -67,10 +67,16 @@ class UntilTold:
         return command
 
 
-@pytest.mark.parametrize("path", ["circle:1.2l", pytest.param("eight", marks=pytest.mark.rest)])
-def test_laps_close(path: str) -> None:
-    once = make_plan(path_of(path), tracked(), FEW)
-    plan = laps() if path == "circle:1.2l" else looped(once)
+ANGLE = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+EIGHT = Path2D(np.stack([2 * np.sin(ANGLE), 1.2 * np.sin(2 * ANGLE)], 1), True)
+
+
+@pytest.mark.parametrize(
+    "path", [circle(1.2), pytest.param(EIGHT, marks=pytest.mark.rest)], ids=["circle", "eight"]
+)
+def test_laps_close(path: Path2D) -> None:
+    once = make_plan(path, tracked(), FEW)
+    plan = looped(once) if path is EIGHT else laps()
     count = len(plan.dwells)
     assert count % 2 == 0
     assert plan.dwells.min() >= plan.minimum_dwell * (1 - 1e-6)
@@ -80,7 +86,7 @@ def test_laps_close(path: str) -> None:
     assert max(plan.lap.closes, plan.lap.closes_turn) < 1e-4
     many = Switches(plan.first_direction, np.tile(plan.dwells, 6), plan.poses[:1])
     after = poses_at_flips(tracked().vehicle, many)[count::count]
-    turn = 0.0 if path == "eight" else 2 * np.pi
+    turn = 0.0 if path is EIGHT else 2 * np.pi
     assert np.diff(after, axis=0) == pytest.approx(np.tile([0, 0, turn], (5, 1)), abs=1e-4)
     assert after[0] == pytest.approx(plan.poses[-1], abs=1e-9)
     with pytest.raises(InputError, match="carried out once"):
