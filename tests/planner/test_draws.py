@@ -17,49 +17,29 @@ FIRST_TEN = [
 ]  # fmt: skip
 
 
-@pytest.fixture(scope="module", params=[0, 1, 12345])
-def drawn(request: pytest.FixtureRequest) -> np.ndarray:
-    return normals(request.param, 0, COUNT)
-
-
 def test_the_first_ten_numbers_stay_the_same() -> None:
     assert normals(0, 0, 10) == pytest.approx(FIRST_TEN, rel=1e-14)
+    assert (normals(7, 1000, 50) == normals(7, 0, 1050)[1000:]).all()
+    with pytest.raises(ValueError, match="read-only"):
+        normals(0, 0, 10)[0] = 1.0
 
 
-def test_mean_and_variance(drawn: np.ndarray) -> None:
-    """Within four standard errors."""
+@pytest.mark.parametrize("seed", [0, 1, 12345])
+def test_they_are_normal_and_not_correlated(seed: int) -> None:
+    """Within 4 or 4.5 standard errors: moments, tails, neighbours, and another seed at each lag."""
+    drawn, other = normals(seed, 0, COUNT), normals(2, 0, COUNT)
     assert abs(drawn.mean()) < 4 / math.sqrt(COUNT)
     assert abs(drawn.var() - 1) < 4 * math.sqrt(2 / COUNT)
     assert abs((drawn**3).mean()) < 4 * math.sqrt(15 / COUNT)
-
-
-@pytest.mark.parametrize("limit", [1.0, 2.0, 3.0, 4.0])
-def test_tails(drawn: np.ndarray, limit: float) -> None:
-    expected = math.erfc(limit / math.sqrt(2)) / 2
-    for share in ((drawn > limit).mean(), (drawn < -limit).mean()):
-        assert abs(share - expected) < 4 * math.sqrt(expected / COUNT)
-
-
-@pytest.mark.parametrize("lag", [1, 2, 3, 8, 900, 2**16])
-def test_neighbours_are_not_correlated(drawn: np.ndarray, lag: int) -> None:
-    for one, other in ((drawn[:-lag], drawn[lag:]), (drawn[:-lag] ** 2 - 1, (drawn[lag:] ** 2 - 1) / 2)):
-        assert abs((one * other).mean()) < 4.5 / math.sqrt(COUNT)
-
-
-def test_seeds_are_not_correlated(drawn: np.ndarray) -> None:
-    """Not at any of the lags at which a shifted copy would show."""
-    other = normals(2, 0, COUNT)
+    for limit in (1.0, 2.0, 3.0, 4.0):
+        expected = math.erfc(limit / math.sqrt(2)) / 2
+        for share in ((drawn > limit).mean(), (drawn < -limit).mean()):
+            assert abs(share - expected) < 4 * math.sqrt(expected / COUNT)
+    for lag in (1, 2, 3, 8, 900, 2**16):
+        for one, late in ((drawn[:-lag], drawn[lag:]), (drawn[:-lag] ** 2 - 1, (drawn[lag:] ** 2 - 1) / 2)):
+            assert abs((one * late).mean()) < 4.5 / math.sqrt(COUNT)
     for lag in range(10):
         assert abs((drawn[: COUNT - lag] * other[lag:]).mean()) < 4.5 / math.sqrt(COUNT)
-
-
-def test_a_number_does_not_depend_on_where_the_draw_begins() -> None:
-    assert (normals(7, 1000, 50) == normals(7, 0, 1050)[1000:]).all()
-
-
-def test_drawn_numbers_cannot_be_changed() -> None:
-    with pytest.raises(ValueError, match="read-only"):
-        normals(0, 0, 10)[0] = 1.0
 
 
 def test_the_quantile_is_that_of_scipy() -> None:

@@ -1,13 +1,13 @@
-"""The files of a plan: they agree with it, and the header compiles."""
+"""The files of a plan agree with it and with each other; pictures; the error of a track."""
 
 from __future__ import annotations
 
 import json
-import math
-import shutil
-import subprocess
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
@@ -15,18 +15,17 @@ import pytest
 from matplotlib.figure import Figure
 
 from planner.files.plan_files import milliseconds, write_plan
-from planner.paths.path import circle, polygon
-from planner.planning.plan import plan
+from planner.files.svg_axes import SvgAxes
+from planner.files.tracking_error import tracking_error
+from planner.vehicle.rollout import Switches, poses_at_flips, trace
 from sim.io.errors import InputError
-from sim.model.presets import PRESETS
 from sim.model.schedule import load_schedule
-from tests.processes import LIMIT
-
-CONTROL = PRESETS["paper-control"]
+from tests.planner.compiled import compile_c
+from tests.planner.plans import CONTROL, planned
 
 
 def test_files_of_a_plan(tmp_path: Path) -> None:
-    result = plan(polygon(4, 3.0), CONTROL)
+    result = planned("square:3l", minimum_dwell=0.8)
     written = write_plan(result, tmp_path / "out")
     assert [p.name for p in written] == ["plan.json", "plan.csv", "schedule.h", "tracker.h", "plan.svg"]
     content = json.loads(written[0].read_text())
@@ -41,37 +40,10 @@ def test_files_of_a_plan(tmp_path: Path) -> None:
     assert sum(numbers) == pytest.approx(1000 * result.seconds.sum(), abs=1)
     assert f"SCHEDULE_COUNT {len(numbers)}" in header
     assert "<svg" in written[4].read_text()
-
-
-def test_the_header_compiles(tmp_path: Path) -> None:
-    compiler = shutil.which("cc") or shutil.which("gcc")
-    if compiler is None:
-        pytest.skip("no C compiler on this machine")
-    header = write_plan(plan(circle(2.0), CONTROL), tmp_path)[2]
-    (tmp_path / "main.c").write_text(
-        '#include "schedule.h"\n#include <stdio.h>\nint main(void){long s=0;'
-        "for(int i=0;i<SCHEDULE_COUNT;i++)s+=schedule_ms[i];"
-        'printf("%ld %ld %f %f %ld",s,(long)SCHEDULE_TOTAL_MS,SCHEDULE_START_X_CM,SCHEDULE_START_HEADING_DEG,'
-        "(long)schedule_checkpoints[SCHEDULE_CHECKPOINTS-1].ms);return 0;}"
-    )
-    subprocess.run(
-        [compiler, "-Wall", "-Werror", "-o", str(tmp_path / "a"), str(tmp_path / "main.c")],
-        check=True,
-        timeout=LIMIT,
-    )
-    words = subprocess.run(
-        [str(tmp_path / "a")], capture_output=True, text=True, check=True, timeout=LIMIT
-    ).stdout.split()
-    total = int(words[0])
-    content = json.loads((header.parent / "plan.json").read_text())
-    seconds = content["dwell_s"]
-    assert int(words[1]) == int(words[4]) == total
-    start = [
-        100 * CONTROL.tail_length * content["start"]["x_over_l"],
-        math.degrees(content["start"]["heading_rad"]),
-    ]
-    assert [float(words[2]), float(words[3])] == pytest.approx(start, abs=1e-3)
-    assert total == pytest.approx(1000 * sum(seconds), abs=1)
+    table = result.to_frame()
+    for name in ("x", "y"):
+        assert table[f"{name}_cm"].to_numpy() == pytest.approx(11 * table[f"{name}_over_l"].to_numpy())
+    assert np.radians(table["heading_deg"].to_numpy()) == pytest.approx(table["heading_rad"].to_numpy())
 
 
 def test_milliseconds_carry_rounding_and_split_long_dwells() -> None:
@@ -91,13 +63,11 @@ def identities(folder: Path) -> set[str]:
 
 
 def test_all_files_name_the_same_plan_and_another_plan_replaces_them(tmp_path: Path) -> None:
-    """Two plans in one folder used to mix: plan.json of one beside schedule.h of the other."""
-    small, large = plan(circle(2.0), CONTROL), plan(circle(2.5), CONTROL)
     (tmp_path / "goal.json").write_text("{}")
-    write_plan(small, tmp_path, pictures={"trade_off.svg": Figure()})
+    write_plan(planned(), tmp_path, pictures={"trade_off.svg": Figure()})
     first = identities(tmp_path)
     assert not (tmp_path / "goal.json").exists()
-    write_plan(large, tmp_path)
+    write_plan(planned("circle:2l", objective="flips"), tmp_path)
     assert len(first) == len(identities(tmp_path)) == 1
     assert first != identities(tmp_path)
     assert not (tmp_path / "trade_off.svg").exists()
@@ -106,7 +76,7 @@ def test_all_files_name_the_same_plan_and_another_plan_replaces_them(tmp_path: P
 def test_a_plan_that_cannot_be_drawn_leaves_the_plan_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write_plan(plan(circle(2.0), CONTROL), tmp_path)
+    write_plan(planned(), tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
 
     def broken(*_: object) -> None:
@@ -114,18 +84,135 @@ def test_a_plan_that_cannot_be_drawn_leaves_the_plan_before(
 
     monkeypatch.setattr("planner.files.plan_files.plan_svg", broken)
     with pytest.raises(RuntimeError):
-        write_plan(plan(circle(2.5), CONTROL), tmp_path)
+        write_plan(planned("circle:2l", objective="flips"), tmp_path)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
-@pytest.mark.parametrize("name", [r"a$\frac$b", "*/ #error", '"', "ü\n"])
+@pytest.mark.parametrize(
+    "name", [r"a$\frac$b", "*/ #error", '"', "ü\n"], ids=["formula", "comment", "quote", "line"]
+)
 def test_any_name_of_a_robot_can_be_drawn_and_compiled(name: str, tmp_path: Path) -> None:
-    """A formula in the name used to end with a traceback of the drawing, after four of five files."""
-    write_plan(plan(circle(2.0), replace(CONTROL, name=name)), tmp_path)
+    result = planned("circle:2l", objective="flips")
+    named = replace(result, tracked=result.tracked._replace(robot=replace(CONTROL, name=name)))
+    write_plan(named, tmp_path)
     assert len(identities(tmp_path)) == 1
-    compiler = shutil.which("cc") or shutil.which("gcc")
-    if compiler:
-        source = '#include "schedule.h"\n#include "tracker.h"\nint main(void){return schedule_ms[0]==0;}'
-        (tmp_path / "main.c").write_text(source)
-        words = [compiler, "-std=c99", "-o", str(tmp_path / "a"), str(tmp_path / "main.c"), "-lm"]
-        subprocess.run(words, check=True, timeout=LIMIT)
+    source = '#include "schedule.h"\n#include "tracker.h"\nint main(void){return schedule_ms[0]==0;}'
+    (tmp_path / "main.c").write_text(source)
+    compile_c(tmp_path / "main.c", tmp_path / "main", "-O0", "-Wno-unused")
+
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def places(text: str) -> list[np.ndarray]:
+    """Return the points of every path in px."""
+    found = []
+    for path in ElementTree.fromstring(text.encode()).iter(f"{SVG}path"):
+        pairs = [word.split(",") for word in path.attrib["d"].split()[1:] if "," in word]
+        found.append(np.array(pairs, dtype=float))
+    return found
+
+
+@pytest.mark.parametrize("size", [(3.0, 1.0), (1.0, 400.0), (0.002, 0.002), (5.0, 0.0)])
+def test_scales_are_equal_and_ticks_are_in_place(size: tuple[float, float]) -> None:
+    axes = SvgAxes()
+    corners = np.array([7.0, -2.0]) + np.array([[0.0, 0.0], [size[0], 0.0], size, [0.0, size[1]]])
+    axes.fill(*corners.T, color="#aabbcc")
+    text = axes.text("p1")
+    drawn, root = places(text)[0], ElementTree.fromstring(text.encode())
+    _, frame = (rect.attrib for rect in root.iter(f"{SVG}rect"))
+    x, y, width, height = (float(frame[name]) for name in ("x", "y", "width", "height"))
+    assert ((drawn > [x, y]) & (drawn < [x + width, y + height])).all()
+    scale = np.ptp(drawn, axis=0).max() / max(size)
+    x, y = (drawn - drawn[0]).T
+    assert x == pytest.approx(scale * (corners - corners[0])[:, 0], abs=0.02)
+    assert y == pytest.approx(-scale * (corners - corners[0])[:, 1], abs=0.02)
+    words = [word for word in root.iter(f"{SVG}text") if word.text]
+    below = [word for word in words if word.attrib["text-anchor"] == "middle"]
+    assert 2 <= len(below) <= 7
+    for word in below:
+        number = float((word.text or "").replace("−", "-"))
+        assert float(word.attrib["x"]) == pytest.approx(drawn[0, 0] + scale * (number - 7.0), abs=0.6)
+
+
+def test_any_words_can_be_written() -> None:
+    axes = SvgAxes()
+    axes.plot(1.0, 2.0, "o", color="#000000", label='a < b & "c"')
+    axes.set_title("first\n<second>")
+    axes.set_xlabel("x")
+    axes.set_ylabel("y")
+    texts = [word.text for word in ElementTree.fromstring(axes.text("p&1").encode()).iter(f"{SVG}text")]
+    assert {"first", "<second>", 'a < b & "c"', "x", "y"} <= set(texts)
+
+
+def test_a_long_dwell_is_drawn_as_a_curve() -> None:
+    """Eight samples a dwell would be a polygon."""
+    switches = Switches(1, np.array([60.0, 60.0]), planned().poses[:1])
+    switches = replace(switches, poses=poses_at_flips(planned().tracked.vehicle, switches))
+    long = replace(planned(), switches=switches)
+    kinks = []
+    for track in (trace(long.tracked.vehicle, long.switches, 0.0), long.smooth_track):
+        turns = np.diff(np.unwrap(np.arctan2(*np.diff(track, axis=0).T)))
+        kinks.append((np.abs(turns) > np.radians(8)).sum())
+    assert kinks[1] <= 2 < kinks[0]
+
+
+@cache
+def tracks() -> tuple[dict[str, Any], pd.DataFrame]:
+    """Return a plan, and the track that it predicts at the flips, 1 mm off."""
+    result = planned()
+    x, y, heading = result.poses.T
+    time = np.concatenate([[0.0], np.cumsum(result.dwells)])
+    columns = {
+        "time_bar": time,
+        "x_over_l": x + 0.001 / CONTROL.tail_length,
+        "y_over_l": y,
+        "heading_rad": heading,
+    }
+    return result.to_dict(), pd.DataFrame(columns)
+
+
+def test_a_track_of_a_camera_has_the_error_of_the_same_track_in_tail_lengths() -> None:
+    record, track = tracks()
+    columns = {
+        "time_min": track["time_bar"] * CONTROL.time_scale / 60,
+        "X (mm)": 1000 * CONTROL.tail_length * track["x_over_l"],
+        "y_cm": 100 * CONTROL.tail_length * track["y_over_l"],
+        "heading_deg": np.degrees(track["heading_rad"]),
+    }
+    expected, error = tracking_error(record, track), tracking_error(record, pd.DataFrame(columns))
+    for name in ("rms", "largest", "raw_rms", "raw_largest", "missed"):
+        assert getattr(error, name) == pytest.approx(getattr(expected, name), rel=1e-9)
+    assert error.largest * CONTROL.tail_length < 0.0035
+    assert f"{1000 * error.rms * CONTROL.tail_length:.3g} mm ({error.rms:.3g} l) rms" in error.line
+
+
+def test_the_track_of_another_robot_or_plan_is_refused() -> None:
+    """Places in cm disagree with those in l; a track that has no id is taken as it is."""
+    record, track = tracks()
+    own, other = (
+        track.assign(x_cm=size * track["x_over_l"], y_cm=size * track["y_over_l"], heading_deg=0.0)
+        for size in (100 * CONTROL.tail_length, 15.0)
+    )
+    assert tracking_error(record, own).rms == tracking_error(record, track).rms
+    with pytest.raises(InputError, match=r"x_over_l and x_cm of the track disagree with .* tail length, 11 cm"):
+        tracking_error(record, other)
+    own = track.assign(plan_id=record["id"]).astype({"plan_id": object})
+    own.loc[3, "plan_id"] = None
+    assert tracking_error(record, own).rms == tracking_error(record, track).rms
+    with pytest.raises(InputError, match=f"the track is of plan p0123456789a, not of {record['id']}"):
+        tracking_error(record, track.assign(plan_id="p0123456789a"))
+
+
+def test_a_track_that_cannot_be_read_is_refused() -> None:
+    record, track = tracks()
+    camera = {"time_s": [0.0], "x_cm": [0.0], "y_cm": [0.0], "heading_deg": [0.0]}
+    for bad, expected in (
+        (track.drop(columns="time_bar"), "no column 'time_s'; it needs time_s, x_cm, y_cm and heading_deg"),
+        (pd.DataFrame(camera).drop(columns="x_cm"), "no column 'x_cm'; it needs"),
+        (pd.DataFrame(camera).rename(columns={"y_cm": "y"}), "'y' has no unit"),
+        (track.assign(x_over_l=np.nan), "not a finite number"),
+        (track[::-1], "time goes back at row 2; give a row for each time, in order"),
+    ):
+        with pytest.raises(InputError, match=expected):
+            tracking_error(record, bad)

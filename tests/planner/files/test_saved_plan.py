@@ -1,69 +1,65 @@
-"""A plan made again from plan.json gives the same orders; old files are computed again; others are refused."""
+"""A plan made again from plan.json gives the same orders; old files, own tables and the rest of a plan."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from functools import cache
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
+import softflagella as sf
+from planner.__main__ import main
 from planner.files.goal_files import write_goal_plan
+from planner.files.own_table import table_for
 from planner.files.plan_files import write_plan
+from planner.files.plan_json import load_plan
 from planner.files.saved_plan import is_plan, restore_plan
-from planner.goal.to_goal import to_goal
-from planner.jobs.clear_plan import plan_clear
-from planner.paths.obstacles import Circle, FreeSpace
-from planner.paths.path import Path2D, circle, polygon
+from planner.paths.path import circle
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
-from planner.planning.request import PlanRequest
 from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.calibration_table import CalibrationKnowledge
-from planner.vehicle.tracked_point import tracked_vehicle
-from sim.io.errors import InputError
+from sim.inputs import save_robot
+from sim.io.errors import InputError, run_command
 from sim.model.plan_file import plan_id
-from sim.model.presets import PRESETS
+from sim.model.robot import Robot
+from surrogate.table.model_file import load
 from tests.planner.compiled import CompiledTracker
+from tests.planner.plans import BIASED, CONTROL, CORNER, around, hindered_trip, own_table, planned, trip
 from tests.planner.vehicles import PROMPT
+from tests.shared import shared
 
-ROBOT = PRESETS["paper-control"]
-CORNER = [[0.0, 0.0], [3.0, 0.0], [3.0, 3.0]]
+CM = 100 * CONTROL.tail_length
 KNOWN = CalibrationKnowledge(("C_t",), np.array([[1e-4]]), current=(2e-4, 1e-4), current_error=(1e-5, 0.0))
 NEW = ("guidance", "own_table", "calibration", "camera")  # entries that files from before do not have
 
 
-def _clear() -> Plan:
-    path, space = Path2D.of([[0.0, 0.0], [6.0, 0.0]]), FreeSpace((Circle(3.0, 0.2, 0.5),))
-    request = PlanRequest(objective="flips")
-    return plan_clear(path, tracked_vehicle(ROBOT, None, "head_centre", None), request, space)
+@shared
+def in_current() -> Plan:
+    return plan(circle(1.5), CONTROL, knowledge=KNOWN)
 
 
 PLANS: dict[str, Callable[[], Plan]] = {
-    "circle": lambda: plan(circle(2.0), ROBOT),
-    "square": lambda: plan(polygon(4, 3.0), ROBOT, minimum_dwell=0.8),
-    "head tip": lambda: plan(CORNER, ROBOT, point="head_tip"),
-    "pivot": lambda: plan(CORNER, ROBOT, point="pivot"),
-    "current": lambda: plan(circle(2.0), ROBOT, knowledge=KNOWN),
-    "goal": lambda: to_goal((0, 0, 0), (4, 1, 1), ROBOT).plan,
-    "obstacles": _clear,
+    "square": lambda: planned("square:3l", minimum_dwell=0.8),
+    "head tip": lambda: planned(CORNER, point="head_tip", minimum_dwell=0.8),
+    "pivot": lambda: planned(CORNER, point="pivot", objective="flips"),
+    "current": in_current,
+    "goal": lambda: trip().plan,
+    "obstacles": around,
 }
 
 
-@cache
-def made(name: str) -> Plan:
-    return PLANS[name]()
-
-
 def saved(name: str) -> dict[str, Any]:
-    return json.loads(json.dumps(made(name).to_dict()))  # type: ignore[no-any-return]
+    return json.loads(json.dumps(PLANS[name]().to_dict()))  # type: ignore[no-any-return]
 
 
-def orders(result: Plan, count: int = 200) -> list[tuple[int, float]]:
+def orders(result: Plan, count: int = 100) -> list[tuple[int, float]]:
     """Follow a tracker without poses."""
     tracker = Tracker(result)
     told = []
@@ -76,61 +72,53 @@ def orders(result: Plan, count: int = 200) -> list[tuple[int, float]]:
 
 @pytest.mark.parametrize("name", PLANS)
 def test_a_restored_plan_gives_the_same_orders(name: str) -> None:
-    result, same = made(name), restore_plan(saved(name))
+    result, content = PLANS[name](), saved(name)
+    same = restore_plan(content)
     assert np.array(orders(same)) == pytest.approx(np.array(orders(result)), abs=1e-6)
     assert same.warnings == result.warnings
-    content = saved(name)
     again = json.loads(json.dumps(same.to_dict()))
     assert again.keys() == content.keys()
     for key in ("reference", "predicted_poses", "dwell_s", "raw_path"):
         assert np.array(again[key]) == pytest.approx(np.array(content[key]), abs=1e-12)
     assert again["guidance"]["heading_rad"] == pytest.approx(content["guidance"]["heading_rad"], abs=1e-12)
     assert same.track == pytest.approx(result.track, abs=1e-9)
-
-
-def test_it_has_what_a_calibration_found_and_what_it_keeps_clear_of() -> None:
-    known = restore_plan(saved("current")).tracked.knowledge
-    assert (known.names, known.current, known.current_error) == (KNOWN.names, KNOWN.current, KNOWN.current_error)
-    assert known.covariance == pytest.approx(KNOWN.covariance)
-    kept, same = made("obstacles").kept_clear, restore_plan(saved("obstacles")).kept_clear
-    assert kept is not None
-    assert same is not None
-    assert kept.to_dict() == same.to_dict()
+    known, found = result.tracked.knowledge, same.tracked.knowledge
+    assert (found.names, found.current, found.current_error) == (known.names, known.current, known.current_error)
+    assert found.covariance == pytest.approx(known.covariance)
+    assert (same.kept_clear and same.kept_clear.to_dict()) == (result.kept_clear and result.kept_clear.to_dict())
 
 
 def test_the_microcontroller_gets_the_same_tracker(tmp_path: Path) -> None:
     """Written again, tracker.h gives the orders of the plan in memory."""
     compiled = CompiledTracker(restore_plan(saved("square")), tmp_path)
     now = 0.0
-    for direction, flip_at in orders(made("square"), 30):
+    for direction, flip_at in orders(PLANS["square"](), 30):
         command = compiled.update(now)
         assert (command.direction, command.flip_at) == (direction, pytest.approx(flip_at, abs=1e-3))
         now = command.flip_at
 
 
-@pytest.mark.parametrize("name", ["circle", "square", "head tip", "pivot", "goal", "obstacles"])
+@pytest.mark.parametrize("name", ["square", "head tip", "pivot", "goal", "obstacles"])
 def test_a_file_from_before_is_computed_again(name: str) -> None:
-    old = {key: value for key, value in saved(name).items() if key not in NEW}
-    result, same = made(name), restore_plan(old)
+    result = PLANS[name]()
+    same = restore_plan({key: value for key, value in saved(name).items() if key not in NEW})
     heading = same.declared.reference.heading
     assert heading == pytest.approx(result.declared.reference.heading, abs=1e-3)
-    far, near = (swim(Tracker(each), result, result.tracked.vehicle, PROMPT).rms() for each in (same, result))
-    assert far < 1.1 * near + 0.002
+    if name == "obstacles":
+        far, near = (swim(Tracker(each), result, result.tracked.vehicle, PROMPT).rms() for each in (same, result))
+        assert far < 1.1 * near + 0.002
 
 
 def test_the_files_of_jobs_and_their_folder_lead_to_the_plan(tmp_path: Path) -> None:
-    write_goal_plan(to_goal((0, 0, 0), (3, 1, 1), ROBOT), tmp_path / "trip")
+    write_goal_plan(trip(), tmp_path / "trip")
     places = [tmp_path / "trip", tmp_path / "trip" / "plan.json", tmp_path / "trip" / "goal.json"]
     first, *others = [restore_plan(place) for place in places]
     assert all(is_plan(place) for place in places)
     assert all(other.to_dict() == first.to_dict() for other in others)
-    write_plan(made("circle"), tmp_path / "circle")
+    write_plan(planned(), tmp_path / "circle")
     (tmp_path / "circle" / "goal.json").write_text((tmp_path / "trip" / "goal.json").read_text())
     with pytest.raises(InputError, match=r"is of plan .* is another one; plan again"):
         restore_plan(tmp_path / "circle" / "goal.json")
-
-
-def test_paths_are_no_plans(tmp_path: Path) -> None:
     (tmp_path / "path.csv").write_text("x,y\n0,0\n3,0\n")
     assert not any(map(is_plan, (tmp_path / "path.csv", tmp_path, "circle:2l", tmp_path / "none.json")))
 
@@ -153,7 +141,7 @@ def test_paths_are_no_plans(tmp_path: Path) -> None:
     ],
 )
 def test_edited_plans_are_refused(changes: dict[str, Any], expected: str, tmp_path: Path) -> None:
-    content = {**saved("circle"), **changes}
+    content = {**saved("obstacles"), **changes}
     content["id"] = plan_id(content)
     path = tmp_path / "plan.json"
     path.write_text(json.dumps(content))
@@ -164,5 +152,87 @@ def test_edited_plans_are_refused(changes: dict[str, Any], expected: str, tmp_pa
 
 
 def test_another_table_is_told(capsys: pytest.CaptureFixture[str]) -> None:
-    restore_plan({**saved("circle"), "model": "0123"})
+    restore_plan({**saved("pivot"), "model": "0123"})
     assert "was made with look-up table 0123" in capsys.readouterr().err
+
+
+def track_of(result: Plan, share: float) -> pd.DataFrame:
+    """Return the camera's table of a share of the dwells."""
+    frame = result.to_frame().iloc[: round(share * len(result.dwells)) + 1]
+    return frame[["start_s", "x_cm", "y_cm", "heading_deg"]].rename(columns={"start_s": "time_s"})
+
+
+def test_a_saved_plan_and_one_in_memory_have_the_same_rest_in_other_units_too(tmp_path: Path) -> None:
+    """The last row of the track is not finished."""
+    square = PLANS["square"]()
+    track = track_of(square, 0.4)
+    words = [f"{t / 60},{10 * x},{10 * y},{np.radians(h)}" for t, x, y, h in track.to_numpy().tolist()]
+    (tmp_path / "track.csv").write_text("\n".join(["time_min,x_mm,y_mm,heading_rad", *words, "9.1,30"]) + "\n")
+    sf.write_plan(square, tmp_path / "plan")
+    rest, saved = sf.replan(square, track), sf.replan(tmp_path / "plan", tmp_path / "track.csv")
+    assert isinstance(rest, sf.Plan)
+    assert isinstance(saved, sf.Plan)
+    assert saved.dwells == pytest.approx(rest.dwells, abs=1e-5)
+    assert saved.start == pytest.approx(tuple(track.iloc[-1, 1:] / [CM, CM, 180 / np.pi]))
+
+
+@pytest.mark.parametrize(
+    ("share", "left"), [(0.5, 1), *(pytest.param(*case, marks=pytest.mark.rest) for case in ((0.1, 1), (0.9, 0)))]
+)
+def test_a_trip_goes_on_to_its_goal_through_the_places_that_are_left(
+    share: float, left: int, tmp_path: Path
+) -> None:
+    track = track_of(hindered_trip().plan, share)
+    sf.write_plan(hindered_trip(), tmp_path)
+    after = sf.replan(tmp_path / "goal.json", track)
+    assert isinstance(after, sf.GoalPlan)
+    assert len(after.via) == left
+    assert after.end_error[0] < 0.01
+    assert after.clearance > 0
+    assert after.plan.start == pytest.approx(tuple(track.iloc[-1, 1:] / [CM, CM, 180 / np.pi]), abs=1e-6)
+    if share == 0.1:
+        same = sf.replan(hindered_trip(), track)
+        assert isinstance(same, sf.GoalPlan)
+        assert same.plan.dwells == pytest.approx(after.plan.dwells, abs=1e-4)
+
+
+def test_tours_go_on_along_their_path() -> None:
+    tour = sf.tour([(0, 0), (2, 0), (1.5, 1)], CONTROL)
+    rest = sf.replan(tour, track_of(tour.plan, 0.5))
+    assert isinstance(rest, sf.Plan)
+    assert np.hypot(*(rest.track[-1] - tour.places[tour.order[-1]])) < 0.1
+
+
+def test_a_robot_that_the_package_s_table_knows_gets_that_table(tmp_path: Path) -> None:
+    save_robot(CONTROL, tmp_path / "robot.toml")
+    table = table_for(CONTROL, str(tmp_path / "robot.toml"), CalibrationKnowledge())
+    assert table.identity == load().identity
+    assert [path.name for path in tmp_path.iterdir()] == ["robot.toml"]
+
+
+def test_a_robot_that_it_does_not_know_is_planned_for_at_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its table is kept and used again, but not for another robot, and not if it is damaged."""
+    simulated: list[Robot] = []
+    monkeypatch.setattr(
+        "surrogate.one_robot.tabulate.tabulate", lambda robot: simulated.append(robot) or own_table()
+    )
+    robot, kept = tmp_path / "robot.toml", tmp_path / "robot.table.json"
+    save_robot(BIASED, robot)
+    words = ["plan", "circle:1.5l", "--robot", str(robot), "--objective", "flips", "--out"]
+    assert run_command(main, [*words, str(tmp_path / "first")]) == 0
+    said = capsys.readouterr().err
+    assert "left_right_bias" in said
+    assert f"-> {kept}" in said
+    before = kept.stat().st_mtime_ns
+    assert run_command(main, [*words, str(tmp_path / "again")]) == 0
+    assert capsys.readouterr().err == ""
+    assert kept.stat().st_mtime_ns == before
+    plans = [load_plan(tmp_path / name / "plan.json") for name in ("first", "again")]
+    assert plans[0] == plans[1]
+    assert simulated == [BIASED]
+    kept.write_text("{}")
+    for each in (BIASED, BIASED, replace(BIASED, effects={"left_right_bias": 0.1})):
+        table_for(each, str(robot), CalibrationKnowledge())
+    assert [each.effects["left_right_bias"] for each in simulated] == [0.2, 0.2, 0.1]

@@ -1,4 +1,4 @@
-"""Plans for paths keep clear of obstacles, on the declared path by the stated error, and in the simulator."""
+"""Plans that keep clear of obstacles, and plans that arrive when they are asked to, by waiting circles too."""
 
 from __future__ import annotations
 
@@ -11,56 +11,61 @@ import numpy as np
 import pytest
 
 from planner.files.plan_json import load_plan
+from planner.files.saved_plan import restore_plan
+from planner.files.tracking_error import tracking_error
+from planner.goal.arrive import EXACT
+from planner.jobs.arrival_plan import plan_arrival
 from planner.jobs.clear_plan import plan_clear
+from planner.jobs.hindered import Hindered
+from planner.jobs.waiting_circles import WaitingCircle, circle_reference, with_circles
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
-from planner.paths.path import Path2D, circle, polygon
+from planner.paths.path import Path2D, circle
 from planner.planning.declared_path import TIGHTEST
 from planner.planning.plan import make_plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
-from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from sim.io.errors import InputError, run_command
-from sim.model.presets import PRESETS
 from sim.motion.replay import replay
+from tests.planner.plans import CONTROL, LINE, QUICK, ROCK, around, planned, tracked, trip
 from tests.planner.vehicles import FINE
+from tests.shared import shared
 
-CONTROL = PRESETS["paper-control"]
-LINE = Path2D.of([[0, 0], [8, 0]])
-QUICK = PlanRequest(objective="flips")
-
-
-@pytest.fixture(scope="module")
-def tracked() -> TrackedVehicle:
-    return tracked_vehicle(CONTROL, None, "head_centre", None)
+BODY = Footprint(np.linspace(-0.5, 1.0, 6), 0.15)
+SPACE = FreeSpace((Circle(1.0, 0.3, 0.4), Polygon.of([[-1, -1], [0, -1], [0, -0.4], [-1, -0.4]])))
+POSES = np.array([[-3.0, 0.0, 0.0], [0.1, 0.0, 0.2], [0.4, -0.2, -0.5], [4.0, 0.0, 0.1]])
 
 
-def declared_clearance(result: Plan, space: FreeSpace) -> float:
-    """Compute the least clearance of the body on the declared path, from the headings of its reference."""
-    reference, rod = result.declared.reference, result.tracked.rod
-    axis = np.stack([np.cos(reference.heading), np.sin(reference.heading)], 1)
-    assert reference.p == pytest.approx(reference.q + rod * axis, abs=1e-9)
-    body = Footprint.of(result.robot, 0.0)
-    return float(body.clearance(np.concatenate([reference.p, reference.heading[:, None]], 1), space).min())
+def test_a_hindrance_is_what_the_discs_lack_and_its_derivatives_are_those_of_differences() -> None:
+    hindered = Hindered(BODY, SPACE, 0.1, POSES[[0, -1], 2])
+    residual, slopes = hindered(POSES)
+    assert residual.max(1) == pytest.approx(np.maximum(0.1 - BODY.clearance(POSES, SPACE), 0.0), abs=1e-12)
+    assert (residual[[0, -1]] == 0).all()
+    for i, step in enumerate(1e-5 * np.eye(3)):
+        difference = (hindered(POSES + step)[0] - hindered(POSES - step)[0]) / 2e-5
+        assert slopes[..., i] == pytest.approx(difference, abs=1e-4)
 
 
-def check_clear(result: Plan, space: FreeSpace, tracked: TrackedVehicle) -> None:
-    kept = result.kept_clear
+def check_clear(result: Plan, space: FreeSpace) -> None:
+    """Check the margin on the declared path, from the headings of its reference, and the turns."""
+    kept, reference = result.kept_clear, result.declared.reference
     assert kept is not None
-    assert result.stated_error <= kept.margin
-    assert declared_clearance(result, space) >= kept.margin
+    axis = np.stack([np.cos(reference.heading), np.sin(reference.heading)], 1)
+    assert reference.p == pytest.approx(reference.q + result.tracked.rod * axis, abs=1e-9)
+    assert (np.diff(reference.q, axis=0) * axis[1:]).sum(1).min() > 0  # the pivot moves forward only
+    poses = np.concatenate([reference.p, reference.heading[:, None]], 1)
+    assert result.stated_error <= kept.margin <= Footprint.of(result.robot, 0.0).clearance(poses, space).min()
     assert kept.clearance > 0
-    assert result.declared.curvature * tracked.vehicle.pivot_radius <= TIGHTEST
+    assert result.declared.curvature * result.tracked.vehicle.pivot_radius <= TIGHTEST
 
 
-def test_a_way_around_leaves_the_path_and_joins_it_again(tracked: TrackedVehicle) -> None:
-    space = FreeSpace.of([Circle(4, 0.2, 0.5)])
-    result = plan_clear(LINE, tracked, QUICK, space)
-    check_clear(result, space, tracked)
+def test_a_way_around_leaves_the_path_and_joins_it_again() -> None:
+    result = around()
+    check_clear(result, ROCK)
     assert result.kept_clear is not None
     (detour,) = result.kept_clear.detours
-    assert detour.leaves[0] < 4 < detour.joins[0]
+    assert detour.leaves[0] < 2.5 < detour.joins[0]
     assert detour.leaves[1] == pytest.approx(0, abs=0.05)
     assert detour.joins[1] == pytest.approx(0, abs=0.05)
     assert detour.length > detour.replaced
@@ -68,105 +73,217 @@ def test_a_way_around_leaves_the_path_and_joins_it_again(tracked: TrackedVehicle
     beside = np.abs(result.reference[(result.reference[:, 0] < detour.leaves[0] - 0.1), 1])
     assert beside.max() < 0.05
     assert result.reference[:, 1].min() < -0.3  # on the side on which the way is shorter
+    assert "the way around leaves it at" in repr(result)
 
 
-def test_a_path_that_is_clear_stays(tracked: TrackedVehicle) -> None:
-    space = FreeSpace.of([Circle(4, 3, 0.5)], [[-3, -3], [11, -3], [11, 4], [-3, 4]])
-    result, plain = plan_clear(LINE, tracked, QUICK, space), make_plan(LINE, tracked, QUICK)
-    assert (result.dwells == plain.dwells).all()
+def test_a_path_that_is_clear_stays() -> None:
+    import softflagella as sf
+
+    walls = [[-3, -3], [6, -3], [6, 4], [-3, 4]]
+    line = [[0, 0], [3, 0]]
+    result = sf.plan(line, "paper-control", objective="flips", keep_out=[sf.Circle(2, 3, 0.5)], walls=walls)
+    assert (result.dwells == make_plan(Path2D.of(line), tracked(), QUICK).dwells).all()
     assert result.kept_clear is not None
     assert result.kept_clear.detours == ()
-    assert plan_clear(LINE, tracked, QUICK, FreeSpace()).kept_clear is None
+    assert result.kept_clear.free_space.walls is not None
+    assert plan_clear(Path2D.of(line), tracked(), QUICK, FreeSpace()).kept_clear is None
+    with pytest.raises(InputError, match="radius above 0"):
+        sf.plan(line, "paper-control", keep_out=[sf.Circle(0, 0, math.nan)])
 
 
 @pytest.mark.rest
-def test_a_closed_path_that_is_blocked_at_its_start_begins_elsewhere(tracked: TrackedVehicle) -> None:
+def test_a_closed_path_that_is_blocked_at_its_start_begins_elsewhere() -> None:
     space = FreeSpace.of([Circle(2.5, 0, 0.4)])
-    result = plan_clear(circle(2.5), tracked, QUICK, space)
-    check_clear(result, space, tracked)
+    result = plan_clear(circle(2.5), tracked(), QUICK, space)
+    check_clear(result, space)
     assert result.start[0] < -1.5
     assert result.errors.closure is not None
     assert result.errors.closure < 0.2
 
 
-def test_the_simulator_stays_clear_and_within_the_stated_error(tracked: TrackedVehicle) -> None:
-    space = FreeSpace.of([Polygon.of([[1.4, -0.2], [1.8, -0.2], [1.8, 0.2], [1.4, 0.2]])])
-    result = plan_clear(polygon(4, 3.5), tracked, QUICK, space)
-    track = replay([result.schedule()])[0]
+def test_the_simulator_stays_clear() -> None:
+    track = replay([around().schedule()])[0]
     poses = np.stack([track[name].to_numpy(float) for name in ("x_over_l", "y_over_l", "heading_rad")], 1)
-    assert Footprint.of(CONTROL, 0.0).clearance(poses, space).min() > 0
+    assert Footprint.of(CONTROL, 0.0).clearance(poses, ROCK).min() > 0
 
 
 @pytest.mark.rest
-def test_a_tracked_robot_with_wrong_coefficients_stays_clear(tracked: TrackedVehicle) -> None:
-    result = plan_clear(LINE, tracked, PlanRequest(), FreeSpace.of([Circle(4, 0.2, 0.5)]))
+def test_a_tracked_robot_with_wrong_coefficients_stays_clear() -> None:
+    result = plan_clear(Path2D.of(LINE), tracked(), PlanRequest(), ROCK)
     assert result.kept_clear is not None
-    twist = tracked.vehicle.twist * np.array([1.02, 1.0, 1.02])
-    distances = swim(Tracker(result), result, replace(tracked.vehicle, twist=twist), FINE).distance
+    twist = tracked().vehicle.twist * np.array([1.02, 1.0, 1.02])
+    distances = swim(Tracker(result), result, replace(tracked().vehicle, twist=twist), FINE).distance
     assert distances.max() < result.kept_clear.margin
 
 
-def test_with_feedback_the_margin_is_smaller(tracked: TrackedVehicle) -> None:
-    space = FreeSpace.of([Circle(4, 0.2, 0.5)])
-    alone, watched = (plan_clear(LINE, tracked, QUICK, space, feedback=feedback) for feedback in (False, True))
-    assert alone.kept_clear is not None
+def test_with_feedback_the_margin_is_smaller() -> None:
+    watched = around(2.5, feedback=True)
     assert watched.kept_clear is not None
-    assert watched.feedback_error <= watched.kept_clear.margin < alone.kept_clear.margin
+    assert watched.feedback_error <= watched.kept_clear.margin < watched.stated_error
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.rest) for seed in range(1, 8))])
-def test_random_obstacles(seed: int, tracked: TrackedVehicle) -> None:
+@pytest.mark.rest
+@pytest.mark.parametrize("seed", range(8))
+def test_random_obstacles(seed: int) -> None:
     rng = np.random.default_rng(seed)
     angle = np.linspace(0, 5, 200)
     path = Path2D.of(np.stack([1.6 * angle, rng.uniform(0.3, 1) * np.sin(1.5 * angle)], 1))
     rocks = [Circle(*(path.points[i] + rng.normal(0, 0.3, 2)).tolist(), rng.uniform(0.2, 0.6)) for i in (70, 130)]
     space = FreeSpace.of(rocks)
-    check_clear(plan_clear(path, tracked, QUICK, space), space, tracked)
-
-
-def test_no_way_around_is_one_line_and_exit_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from planner.__main__ import main
-
-    (tmp_path / "line.csv").write_text("x,y\n0,0\n6,0\n")
-    words = ["plan", str(tmp_path / "line.csv"), "--robot", "paper-control", "--out", str(tmp_path / "out")]
-    words += ["--objective", "flips", "--unit", "l"]
-    for options, expected in (
-        (["--keep-out", "circle:0,0.2,0.4"], "the path begins at"),
-        (["--keep-out", "box:3,-2,3.5,2", "--walls", "box:-2,-1.5,8,1.5"], "there is no way around that leaves"),
-        (["--keep-out", "ring:0,1"], "no such file"),
-    ):
-        assert run_command(main, [*words, *options]) == 2
-        error = capsys.readouterr().err
-        assert expected in error
-        assert len(error.splitlines()) == 1
-        assert not (tmp_path / "out").exists()
+    check_clear(plan_clear(path, tracked(), QUICK, space), space)
 
 
 def test_regions_are_in_the_unit_that_is_given(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from planner.__main__ import main
 
     cm = 100 * CONTROL.tail_length
-    (tmp_path / "line.csv").write_text(f"x_cm,y_cm\n0,0\n{6 * cm},0\n")
+    (tmp_path / "line.csv").write_text(f"x_cm,y_cm\n0,0\n{5 * cm},0\n")
     words = ["plan", str(tmp_path / "line.csv"), "--robot", "paper-control", "--out", str(tmp_path / "out")]
-    words += ["--unit", "cm", "--objective", "flips", "--keep-out", f"circle:{3 * cm},0.1,0.4l"]
+    words += ["--unit", "cm", "--objective", "flips", "--keep-out", f"circle:{2.5 * cm},0.1,0.3l"]
     assert run_command(main, words) == 0
     said = capsys.readouterr().out
     assert said.count("the way around leaves it at") == 1
-    kept = load_plan(tmp_path / "out" / "plan.json")["kept_clear"]
-    assert kept["keep_out"][0]["circle"] == pytest.approx([3, 0.1 / cm, 0.4])
+    content = load_plan(tmp_path / "out" / "plan.json")
+    kept = content["kept_clear"]
+    assert kept["keep_out"][0]["circle"] == pytest.approx([2.5, 0.1 / cm, 0.3])
     assert len(kept["detours"]) == 1
     assert kept["margin_over_l"] > 0
-    assert json.loads((tmp_path / "out" / "plan.json").read_text())["id"].startswith("p")
+    assert content["id"].startswith("p")
 
 
-def test_python_takes_regions_and_walls() -> None:
-    import softflagella as sf
+BENT = Path2D.of([[0.0, 0.0], [2.0, 0.0], [3.5, 1.5]])
+FEW = PlanRequest(dwell=2.03)  # no flip is at the time of a picture
 
-    walls = [[-2, -2], [8, -2], [8, 2], [-2, 2]]
-    rock = sf.Circle(3, 0.1, 0.3)
-    result = sf.plan([[0, 0], [6, 0]], "paper-control", objective="flips", keep_out=[rock], walls=walls)
-    assert result.kept_clear is not None
-    assert "the way around leaves it at" in repr(result)
-    assert result.kept_clear.free_space.walls is not None
-    with pytest.raises(InputError, match="radius above 0"):
-        sf.plan(LINE, "paper-control", keep_out=[sf.Circle(0, 0, math.nan)])
+
+@shared
+def waiting() -> Plan:
+    """Plan to arrive after 1.9 times the time that the path takes."""
+    own = make_plan(BENT, tracked(), FEW)
+    return plan_arrival(BENT, tracked(), FEW, 1.9 * float(own.seconds.sum()))
+
+
+def check_arrival(plan: Plan) -> None:
+    assert plan.arrival is not None
+    missed = abs(plan.duration - plan.arrival.wished)
+    assert missed <= max(EXACT * plan.arrival.wished, min(plan.straight.dwells) / 2)
+
+
+@pytest.mark.parametrize("share", [1.0, 1.5])
+def test_dwells_decide_when_a_plan_arrives(share: float) -> None:
+    fastest = make_plan(BENT, tracked(), PlanRequest(objective="time"))
+    plan = plan_arrival(BENT, tracked(), PlanRequest(), share * float(fastest.seconds.sum()))
+    assert plan.arrival is not None
+    assert plan.arrival.fastest == pytest.approx(fastest.duration)
+    check_arrival(plan)
+    assert plan.declared.swing is None
+    assert "as asked" in repr(plan)
+
+
+def test_circles_take_time_where_dwells_do_not_suffice() -> None:
+    plan = waiting()
+    check_arrival(plan)
+    assert plan.declared.swing is not None
+    assert plan.declared.swing.circles >= 1
+    assert plan.declared.missed < 0.1  # circles leave nothing of the path out
+    assert plan.predicted_max < 0.15
+    content = plan.to_dict()["arrival"]
+    assert content["swing"] == list(plan.declared.swing)
+    restored = restore_plan(plan.to_dict())
+    assert restored.arrival == pytest.approx(plan.arrival)
+    assert restored.declared.swing == plan.declared.swing
+    assert content["wished_s"] == pytest.approx(float(plan.seconds.sum()), rel=0.01)
+
+
+def test_a_swing_takes_less_time_than_a_circle() -> None:
+    own = make_plan(BENT, tracked(), FEW)
+    plan = plan_arrival(BENT, tracked(), FEW, 1.2 * float(own.seconds.sum()))
+    check_arrival(plan)
+    assert plan.declared.swing is not None
+    assert plan.declared.swing.circles == 0
+
+
+def test_circles_keep_clear_of_obstacles() -> None:
+    space = FreeSpace.of([Circle(3.5, 0.3, 0.3)])
+    own = make_plan(BENT, tracked(), FEW)
+    plan = plan_arrival(BENT, tracked(), FEW, 2.2 * float(own.seconds.sum()), space)
+    check_arrival(plan)
+    assert plan.kept_clear is not None
+    assert plan.kept_clear.clearance > 0
+    assert plan.kept_clear.margin >= plan.stated_error
+
+
+@pytest.mark.rest
+def test_the_simulator_follows_swings() -> None:
+    plan = waiting()
+    track = replay([plan.schedule()])[0]
+    assert float(track["time_s"].iloc[-1]) == pytest.approx(float(plan.seconds.sum()))
+    error = tracking_error(plan.to_dict(), track)
+    assert error.largest < 1.1 * plan.stated_error  # which 95 % of robots keep
+    end = track[["x_over_l", "y_over_l"]].iloc[-1].to_numpy(float)
+    assert np.hypot(*(end - BENT.points[-1])) < 2 * plan.stated_error
+
+
+def test_a_tracked_robot_swims_the_circles_and_arrives() -> None:
+    car = tracked().vehicle
+    result = swim(Tracker(waiting()), waiting(), replace(car, twist=car.twist * np.array([1.02, 1.0, 1.02])), FINE)
+    assert result.finished
+    assert result.distance.max() < 0.2
+    assert result.times[-1] == pytest.approx(waiting().duration, rel=0.03)  # a robot that is 2 % faster
+
+
+def test_the_command_arrives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from planner.__main__ import main
+
+    words = ["plan", "circle:1.5l", "--robot", "paper-control", "--out", str(tmp_path / "out")]
+    for seconds in (0.0, np.nan, np.inf):
+        with pytest.raises(InputError, match="above 0"):
+            plan_arrival(circle(1.5), tracked(), PlanRequest(), seconds)
+    assert run_command(main, [*words, "--arrive", "25min"]) == 0
+    assert "arrives after 25 min as asked" in capsys.readouterr().out
+    content = json.loads((tmp_path / "out" / "plan.json").read_text())
+    assert sum(content["dwell_s"]) == pytest.approx(1500, rel=0.002)
+
+
+def straight() -> Plan:
+    return planned(((0.0, 0.0), (2.5, 0.0)))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_circle_ends_where_it_began(side: int) -> None:
+    reference = straight().declared.reference
+    around = circle_reference(straight(), WaitingCircle(60, side))
+    assert around.q[0] == pytest.approx(reference.q[60])
+    assert around.q[-1] == pytest.approx(around.q[0], abs=1e-9)
+    assert around.p[-1] == pytest.approx(reference.p[60], abs=1e-9)
+    assert around.heading[-1] - around.heading[0] == pytest.approx(side * math.tau)
+    assert np.abs(around.curvature).max() * straight().tracked.vehicle.pivot_radius < 0.71
+
+
+@pytest.mark.parametrize("place", [0, 60, -1])
+def test_the_robot_follows_circles_anywhere_on_its_path(place: int) -> None:
+    plan = straight()
+    index = place % len(plan.declared.reference.q)
+    once = with_circles(plan, [WaitingCircle(index, 1)])
+    twice = with_circles(plan, [WaitingCircle(index, 1), WaitingCircle(index, -1)])
+    assert max(once.predicted_max, twice.predicted_max) < plan.predicted_max + 0.01
+    longer = once.duration - plan.duration
+    assert longer > 100
+    assert twice.duration - once.duration == pytest.approx(longer, rel=0.03)
+    assert once.poses[-1, :2] == pytest.approx(plan.poses[-1, :2], abs=0.05)
+    assert (once.dwells[:-1] >= plan.minimum_dwell * 0.999).all()
+    assert with_circles(plan, []) is plan
+
+
+def test_a_robot_with_a_goal_still_ends_there() -> None:
+    waiting = with_circles(trip().plan, [WaitingCircle(50, -1)], trip().goal)
+    x, y, heading = waiting.poses[-1]
+    assert (x, y) == pytest.approx(trip().goal[:2], abs=2e-3)
+    assert math.remainder(heading - trip().goal[2], math.tau) == pytest.approx(0, abs=2e-3)
+    assert waiting.start == trip().plan.start
+
+
+def test_a_closed_path_and_a_current() -> None:
+    lap = planned("circle:1.5l", current=(5e-5, 0.0))
+    waiting = with_circles(lap, [WaitingCircle(100, 1)])
+    assert waiting.predicted_max < lap.predicted_max + 0.03
+    assert waiting.duration > lap.duration + 100

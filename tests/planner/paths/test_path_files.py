@@ -1,4 +1,4 @@
-"""Paths from files: tables of several kinds; SVG with transforms, curves, units and several shapes."""
+"""Paths from tables, drawings and shapes in words; regions from them; units."""
 
 from __future__ import annotations
 
@@ -8,11 +8,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planner.files.goal_files import read_region
 from planner.paths.fillets import CORNER, kinks
-from planner.paths.path import Path2D
+from planner.paths.obstacles import Circle, FreeSpace, Polygon
+from planner.paths.path import Path2D, polygon
 from planner.paths.path_files import Drawing, read_path
-from planner.paths.svg_drawing import METRES_PER_PIXEL
+from planner.paths.shapes import SHAPES
+from planner.paths.svg_drawing import METRES_PER_PIXEL, read_svg
+from planner.paths.units import (
+    check_size,
+    heading_in_degrees,
+    in_lab,
+    place_in_lab,
+    read_time,
+)
 from sim.io.errors import InputError
+from sim.model.presets import PRESETS
+from tests.planner.paths.svg_cases import ALIKE, REFUSED
+from tests.planner.plans import CONTROL
 
 
 def drawn(folder: Path, body: str, *, root: str = "", shape: str | None = None) -> Drawing:
@@ -61,18 +74,6 @@ def test_a_bezier_curve_is_followed(tmp_path: Path) -> None:
     assert away.max() < 2e-3
 
 
-def test_transforms_of_shapes_and_groups_apply(tmp_path: Path) -> None:
-    body = "<g transform='translate(10,0) rotate(90)'><path d='M 0 0 L 2 0' transform='scale(3)'/></g>"
-    assert drawn_path(tmp_path, body).points == pytest.approx(np.array([[10, 0], [10, -6]]), abs=1e-9)
-
-
-def test_turned_and_mirrored_shapes_are_where_they_are_drawn(tmp_path: Path) -> None:
-    box = drawn_path(tmp_path, "<rect width='4' height='2' transform='rotate(90)'/>")
-    assert box.points == pytest.approx(np.array([[0, 0], [0, -4], [-2, -4], [-2, 0]]), abs=1e-9)
-    ring = drawn_path(tmp_path, "<circle r='2' cy='5' transform='scale(1,-1)'/>")
-    assert np.linalg.norm(ring.points - [0, 5], axis=1) == pytest.approx(np.full(len(ring.points), 2.0))
-
-
 def test_view_box_and_physical_units(tmp_path: Path) -> None:
     """A hundred units drawn on 5 cm: each is half a millimetre."""
     found = drawn(tmp_path, "<path d='M 0 0 L 100 0'/>", root="width='5cm' height='5cm' viewBox='0 0 100 100'")
@@ -100,22 +101,16 @@ def test_several_paths_are_named_and_one_can_be_chosen(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("<svg", "not SVG"),
-        ("", "not SVG"),
-        ("<html/>", "not SVG"),
+        ("<svg", "not SVG"), ("", "not SVG"), ("<html/>", "not SVG"), ("\xff\xfe\x00", "not SVG"),
         ("<svg/>", "no path"),
-        ("<svg><path d='M 0 0'/></svg>", "no path"),
-        ("<svg><path d='M 0 0 L 0 0'/></svg>", "same"),
+        ("<svg><path d='M 0 0'/></svg>", "no path"), ("<svg><path d='M 0 0 L 0 0'/></svg>", "same"),
         ("<svg><text>hi</text></svg>", "no path"),
     ],
-)
+)  # fmt: skip
 def test_what_is_no_drawing_is_refused(text: str, expected: str, tmp_path: Path) -> None:
-    (tmp_path / "a.svg").write_text(text)
+    (tmp_path / "a.svg").write_bytes(text.encode("latin-1"))
     with pytest.raises(InputError, match=expected):
         read_path(tmp_path / "a.svg")
-    (tmp_path / "b.svg").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="not SVG"):
-        read_path(tmp_path / "b.svg")
 
 
 def test_a_table_has_no_shapes(tmp_path: Path) -> None:
@@ -178,20 +173,152 @@ OWN_GROUP = "a <use> shows a group that it belongs to"
     [
         (f"<defs><g id='g0'><path d='M 0 0 L 1 1'/></g>{USES}</defs><use href='#g7'/>", "more than 50000 shapes"),
         ("<g id='a'><use href='#a'/></g>", OWN_GROUP),
-        (
-            "<g id='a'><use href='#b'/></g><g id='b'><use href='#a'/></g>",
-            "a <use> shows a group that it belongs to",
-        ),
-        ("<g>" * 200_000 + "</g>" * 200_000, "more than 100 levels"),
+        ("<g id='a'><use href='#b'/></g><g id='b'><use href='#a'/></g>", OWN_GROUP),
+        ("<g>" * 20_000 + "</g>" * 20_000, "more than 100 levels"),
         (f"<path d='M 0 0 {CURVES}'/>", "more than 200000 points"),
         ("<path d='M 0 0" + " L 1 2" * 30_000 + "'/>", "more than 50000 shapes and coordinates"),
     ],
+    ids=["uses", "own group", "two groups", "levels", "points", "coordinates"],
 )
 def test_a_drawing_that_would_take_minutes_is_rejected(body: str, words: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=words):
         drawn(tmp_path, body)
 
 
-def test_uses_within_the_limits_are_drawn(tmp_path: Path) -> None:
-    body = "<defs><g id='a'><path d='M 0 0 L 3 4'/></g></defs><use href='#a' transform='scale(2)'/>"
-    assert drawn_path(tmp_path, body).length == pytest.approx(10)
+@pytest.mark.parametrize(("text", "reference"), ALIKE, ids=range(len(ALIKE)))
+def test_drawings_that_show_the_same_are_read_alike(text: str, reference: str, tmp_path: Path) -> None:
+    read = []
+    for name, content in (("a.svg", text), ("b.svg", reference)):
+        (tmp_path / name).write_text(content)
+        read.append(read_svg(tmp_path / name, None, None))
+    (path, unit), (wanted, wanted_unit) = read
+    assert (unit, path.closed) == (wanted_unit, wanted.closed)
+    assert path.points == pytest.approx(wanted.points, rel=1e-8, abs=1e-8 * np.abs(wanted.points).max())
+
+
+@pytest.mark.parametrize(("text", "words"), REFUSED, ids=range(len(REFUSED)))
+def test_what_is_not_read_is_refused_by_name(text: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "a.svg").write_text(text)
+    with pytest.raises(InputError) as refusal:
+        read_svg(tmp_path / "a.svg", None, None)
+    assert words in str(refusal.value)
+
+
+def test_regular_polygons_have_names() -> None:
+    assert read_path("polygon:6:2l").path.points == pytest.approx(polygon(6, 2.0).points)
+    assert read_path("square:3l").path.points == pytest.approx(polygon(4, 3.0).points)
+    assert read_path("polygon:3:1.5l").path.points == pytest.approx(read_path("triangle:1.5l").path.points)
+    assert read_path("circle:2l").path.length == pytest.approx(4 * math.pi, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("words", "near"),
+    [("hexagon:3", ""), ("circle", ""), ("square", ""), ("rectangle:2:3", ""), ("HEXAGON:3", ""),
+     ("squre:3l", "square:3l"), ("cirlce:2l", "circle:2l"), ("Circle:2l", "circle:2l"),
+     ("poligon:6:2l", "polygon:6:2l"), ("traingle", "triangle:SIDE")],
+)  # fmt: skip
+def test_an_unknown_shape_is_told_the_nearest_one_and_which_there_are(words: str, near: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read_path(words)
+    asked = f"is it {near}? " if near else ""
+    assert str(caught.value) == f"{words}: no such file or shape; {asked}shapes are {SHAPES}"
+
+
+@pytest.mark.parametrize(
+    "words", ["circle:", "circle:two", "circle:2:3", "polygon:6", "polygon:2:3l", "polygon:5.5:3l",
+              "polygon:1e9:3l", "polygon:nan:3l", "polygon:6cm:3l", "circle:2km",
+              "square:0l", "square:inf", "triangle:-1", "polygon:6:nan"],
+)  # fmt: skip
+def test_sizes_that_make_no_sense(words: str) -> None:
+    with pytest.raises(InputError, match=r"polygon:6:2l|above 0"):
+        read_path(words)
+
+
+def test_a_file_without_an_ending_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("circle").write_text("x,y\n0,0\n1,2\n")
+    assert read_path("circle").path.points.tolist() == [[0, 0], [1, 2]]
+    with pytest.raises(InputError, match=r"no such file; check|No such file|no such file"):
+        read_path("missing.csv")
+
+
+def test_distances_of_regions() -> None:
+    room = FreeSpace((Circle(0, 0, 1),), Polygon.of([[-3, -2], [3, -2], [3, 2], [-3, 2]]))
+    found = room.distance(np.array([[0, 0], [2, 0], [0, 1.75], [0, 3.0], [-2.9, 0]]))
+    assert found == pytest.approx([-1, 1, 0.25, -1, 0.1])
+    notch = Polygon.of([[0, 0], [4, 0], [4, 3], [2, 1], [0, 3]])
+    assert notch.distance(np.array([[2.0, 2.0], [2.0, 0.5]])) == pytest.approx([np.sqrt(0.5), -0.5])
+    with pytest.raises(InputError, match="not on one line"):
+        Polygon.of([[0, 0], [1, 1], [2, 2]])
+
+
+BAD = {  # outlines, and where they are wrong
+    "eight": ([(0, 0), (40, 40), (40, 0), (0, 40)], "(20, 20)"),
+    "lopsided eight": ([(0, 0), (40, 40), (40, 0), (0, 30)], "(17.14, 17.14)"),
+    "touches an edge": ([(0, 0), (40, 0), (40, 40), (20, 0), (0, 40)], "(20, 0)"),
+    "touches a corner": ([(0, 0), (40, 0), (40, 40), (20, 20), (20, 30), (20, 20), (0, 40)], "(20, 20)"),
+    "spike": ([(0, 0), (40, 0), (40, 40), (40, 0), (0, 5)], "(40, 40)"),
+    "twice": ([(0, 0), (40, 0), (40, 40), (0, 40)] * 2, "(40, 40)"),
+}
+
+
+@pytest.mark.parametrize(("points", "place"), BAD.values(), ids=BAD)
+def test_outlines_that_cross_touch_or_repeat_themselves_are_refused(
+    points: list[tuple[float, float]], place: str, tmp_path: Path
+) -> None:
+    for space in ({"keep_out": [points]}, {"walls": points}):
+        with pytest.raises(InputError) as refusal:
+            FreeSpace.of(**space)
+        assert f"elf-intersection of an outline at {place} l; draw it so" in str(refusal.value)
+    rows = "".join(f"{x},{y}\n" for x, y in points)
+    path = " ".join(f"{x} {-y}" for x, y in points)
+    for name, text, unit, told in (
+        ("a.csv", f"x_mm,y_mm\n{rows}", None, "mm"), ("b.csv", f"x,y\n{rows}", "cm", "cm"),
+        ("c.svg", f"<svg width='100cm' viewBox='0 0 100 100'><path d='M {path} z'/></svg>", "mm", "cm"),
+    ):  # fmt: skip
+        (tmp_path / name).write_text(text)
+        with pytest.raises(InputError) as refusal:
+            read_region(str(tmp_path / name), unit, PRESETS["paper-control"])
+        assert f"{name}: " in str(refusal.value)
+        assert f"at {place} {told}; draw it so" in str(refusal.value)
+
+
+def test_points_that_follow_each_other_twice_are_one() -> None:
+    points = [(0, 0), (4, 0), (4, 0), (4, 4), (0, 4), (0, 4), (0, 0)]
+    assert Polygon.of(points).corners.tolist() == [[0, 0], [4, 0], [4, 4], [0, 4]]
+
+
+def test_lengths_in_messages_are_in_a_laboratory_s_units_first() -> None:
+    assert in_lab(0.32, CONTROL) == "3.52 cm (0.32 l)"
+    assert place_in_lab(1.0, -0.5, CONTROL) == "(11.00, -5.50) cm = (1.000, -0.500) l"
+    assert place_in_lab(-1e-9, 0.0, CONTROL) == "(0.00, 0.00) cm = (0.000, 0.000) l"
+    assert in_lab(1200.0, CONTROL) == "132 m (1200 l)"
+
+
+@pytest.mark.parametrize(
+    ("degrees", "words"),
+    [(-181.8, "178.2"), (180.0, "180.0"), (-180.0, "180.0"), (-179.97, "180.0"), (181.8, "-178.2"), (0.0, "0.0"),
+     (-0.01, "0.0"), (359.99, "0.0"), (725.0, "5.0"), (-90.0, "-90.0")],
+)  # fmt: skip
+def test_headings_are_above_minus_180_and_up_to_180_degrees(degrees: float, words: str) -> None:
+    assert heading_in_degrees(math.radians(degrees)) == f"{words} degrees"
+
+
+def test_long_paths_pass_if_they_are_not_absurd() -> None:
+    check_size(Path2D.of([[0, 0], [10_000, 0]]), CONTROL, 0.9)
+    with pytest.raises(InputError, match="at most 12000 l can be planned"):
+        check_size(Path2D.of([[0, 0], [13_000, 0]]), CONTROL, 0.9)
+
+
+@pytest.mark.parametrize(
+    ("words", "seconds"),
+    [("12min", 720.0), ("90s", 90.0), ("1h20min", 4800.0), ("1.5 h", 5400.0), ("2min 5s", 125.0)],
+)
+def test_times_have_their_units(words: str, seconds: float) -> None:
+    assert read_time(words, "--arrive") == pytest.approx(seconds)
+
+
+@pytest.mark.parametrize("words", ["12", "", "min", "-3min", "0s", "1..2s", "12minutes", "nan s", "3m", "5 min x"])
+def test_other_times_are_refused(words: str) -> None:
+    with pytest.raises(InputError, match="with its unit"):
+        read_time(words, "--arrive")

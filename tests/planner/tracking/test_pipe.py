@@ -3,95 +3,72 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import pytest
 
-from planner.paths.path import circle
-from planner.planning.plan import plan
 from planner.tracking.pipe import answers
 from planner.tracking.tracker import Tracker
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
+from tests.planner.plans import planned
+
+ROBOT = PRESETS["paper-control"]
+SCALE, POSE = ROBOT.time_scale, (0.3, -2.5, 1.0)
+
+
+def begin(pose: tuple[float, float, float], now: float) -> Tracker:
+    return Tracker(planned(), begin=now, start=pose)
+
+
+def words_of(tracker: Tracker | None, lines: Iterable[str]) -> list[list[str]]:
+    return [line.split() for line in answers(tracker, lines, ROBOT, begin)]
 
 
 def test_it_answers_like_the_tracker_in_seconds() -> None:
-    result = plan(circle(2.0), PRESETS["paper-control"])
-    scale = result.robot.time_scale
-    piped, direct = Tracker(result), Tracker(result)
-    lines = [
-        "0",
-        f"1.0 {result.start[0]} {result.start[1]} {result.start[2]}",
-        "nonsense",
-        "",
-        "2.5 nan 0 0",
-        "3 1",
-    ]
-    answered = [line.split() for line in answers(piped, lines, result.robot)]
-    expected = [direct.update(0.0), direct.update(1.0 / scale, result.start)]
-    expected += [
-        direct.update(direct._now),
-        direct.update(direct._now),
-        direct.update(2.5 / scale),
-        direct.update(3 / scale),
-    ]
-    assert len(answered) == len(lines)
-    for words, command in zip(answered, expected, strict=True):
+    start = planned().start
+    piped, direct = Tracker(planned()), Tracker(planned())
+    lines = ["0", f"1.0 {start[0]} {start[1]} {start[2]}", "nonsense", "", "2.5 nan 0 0", "3 1"]
+    expected = [direct.update(0.0), direct.update(1.0 / SCALE, start), direct.update(direct._now)]
+    expected += [direct.update(time) for time in (direct._now, 2.5 / SCALE, 3 / SCALE)]
+    for words, command in zip(words_of(piped, lines), expected, strict=True):
         assert int(words[0]) == command.direction
-        assert float(words[1]) == pytest.approx(command.flip_at * scale, abs=1e-5)
+        assert float(words[1]) == pytest.approx(command.flip_at * SCALE, abs=1e-5)
 
 
 def test_a_line_with_the_announced_time_is_the_flip() -> None:
-    """Times that were printed rounded down were taken for the moment before the flip."""
-    result = plan(circle(2.0), PRESETS["paper-control"])
+    """A time that is printed rounded down is not taken for the moment before the flip."""
     directions, line = [], "0"
 
     def lines() -> Iterator[str]:
         for _ in range(60):
             yield line
 
-    for answer in answers(Tracker(result), lines(), result.robot):
+    for answer in answers(Tracker(planned()), lines(), ROBOT):
         direction, line = answer.split()[:2]
         directions.append(int(direction))
-    assert directions == [result.first_direction * (-1) ** k for k in range(60)]
+    assert directions == [planned().first_direction * (-1) ** k for k in range(60)]
 
 
-def test_the_first_pose_decides_where_the_robot_begins() -> None:
-    result = plan(circle(2.0), PRESETS["paper-control"])
-    scale, pose = result.robot.time_scale, (0.3, -2.5, 1.0)
-
-    def begin(pose: tuple[float, float, float], now: float) -> Tracker:
-        return Tracker(result, begin=now, start=pose)
-
-    lines = ["0", "nonsense", "4 nan 0 0", "5 0.3 -2.5 1.0", "7"]
-    waiting = [line.split() for line in answers(None, lines, result.robot, begin)]
+def test_the_first_pose_or_a_line_decides_where_the_robot_begins() -> None:
+    waiting = words_of(None, ["0", "nonsense", "4 nan 0 0", "5 0.3 -2.5 1.0", "7"])
     assert [words[0] for words in waiting[:3]] == ["0", "0", "0"]
     assert [float(words[1]) for words in waiting[:3]] == [1.0, 1.0, 5.0]
-    direct = begin(pose, 5 / scale)
-    assert waiting[3][:2] == [f"{direct.command.direction}", f"{direct.command.flip_at * scale:.9f}"]
-    command = direct.update(7 / scale)
-    assert waiting[4][:2] == [f"{command.direction}", f"{command.flip_at * scale:.9f}"]
-
-
-def test_a_line_can_order_a_new_beginning() -> None:
-    result = plan(circle(2.0), PRESETS["paper-control"])
-    scale, pose = result.robot.time_scale, (0.3, -2.5, 1.0)
-
-    def begin(pose: tuple[float, float, float], now: float) -> Tracker:
-        return Tracker(result, begin=now, start=pose)
-
+    direct = begin(POSE, 5 / SCALE)
+    commands = [direct.command, direct.update(7 / SCALE)]
+    expected = [[f"{command.direction}", f"{command.flip_at * SCALE:.9f}"] for command in commands]
+    assert [words[:2] for words in waiting[3:]] == expected
     lines = ["0", "begin 1 2", "begin", "begin 1.5 inf 0 0", "begin 2.5 0.3 -2.5 1.0"]
-    told = [line.split() for line in answers(Tracker(result), lines, result.robot, begin)]
+    told = words_of(Tracker(planned()), lines)
     assert all(words == told[0] for words in told[1:3])
-    command = begin(pose, 2.5 / scale).command
-    assert told[4][:2] == [f"{command.direction}", f"{command.flip_at * scale:.9f}"]
+    command = begin(POSE, 2.5 / SCALE).command
+    assert told[4][:2] == [f"{command.direction}", f"{command.flip_at * SCALE:.9f}"]
 
 
 def test_a_header_says_the_units_of_the_laboratory() -> None:
     """The same orders as in tail lengths; the error is in the unit of x, and columns may change places."""
-    result = plan(circle(2.0), PRESETS["paper-control"])
-    x, y, heading = result.start
-    cm, degrees = 100 * result.robot.tail_length, math.degrees(heading)
+    x, y, heading = planned().start
+    cm, degrees = 100 * ROBOT.tail_length, math.degrees(heading)
     plain = ["0", f"1 {x:.9f} {y:.9f} {heading:.9f} 0.5", f"2.1 {x:.9f} {y:.9f} {heading:.9f}", "3"]
     given = [
         "time_s,y_mm,x_cm,heading_deg,seen_s",
@@ -100,9 +77,9 @@ def test_a_header_says_the_units_of_the_laboratory() -> None:
         f"2.1 {10 * cm * y:.9f} {cm * x:.9f} {degrees:.9f}",
         "3",
     ]
-    header, *told = answers(Tracker(result), given, result.robot)
+    header, *told = answers(Tracker(planned()), given, ROBOT)
     assert header == "direction flip_at_s error_cm alarm"
-    for answer, expected in zip(told, answers(Tracker(result), plain, result.robot), strict=True):
+    for answer, expected in zip(told, answers(Tracker(planned()), plain, ROBOT), strict=True):
         direction, flip, error, alarm = (float(word) for word in answer.split())
         wanted = [float(word) for word in expected.split()]
         assert [direction, flip, alarm] == pytest.approx([wanted[0], wanted[1], wanted[3]], abs=1e-5)
@@ -120,7 +97,6 @@ def test_a_header_says_the_units_of_the_laboratory() -> None:
         ('"time_s","x_cm","y_cm","heading_deg"', "is not one of"),
         ("time_s;x_cm;y_cm;heading_deg", "is not one of"),
         ("x_cm,y_cm,heading_deg,time_s", "give time first"),
-        ("timestamp_s,x_cm,y_cm,heading_deg", "'timestamp_s' is not one of"),
         ("# time_s,x_cm,y_cm,heading_deg", "'#' is not one of"),
         ("0.9;22.2;3.2;70", "give numbers, or a header such as time_s x_cm y_cm heading_deg"),
         ("0,9 22,2 3,2 70", "give numbers, or a header"),
@@ -129,7 +105,5 @@ def test_a_header_says_the_units_of_the_laboratory() -> None:
     ],
 )
 def test_a_first_line_that_is_neither_numbers_nor_a_header_is_refused(header: str, message: str) -> None:
-    """Such a header was ignored, and cm and degrees were taken for tail lengths and rad."""
-    result = plan(circle(2.0), PRESETS["paper-control"])
     with pytest.raises(InputError, match=message):
-        list(answers(Tracker(result), [header, "0.9,22.2,3.2,70"], result.robot))
+        list(answers(Tracker(planned()), [header, "0.9,22.2,3.2,70"], ROBOT))

@@ -1,46 +1,38 @@
-"""The rest of a plan: it begins where the robot is, joins the path, and ends where the path ends."""
+"""The rest of a plan: what a track has reached; it begins where the robot is, and ends where the path ends."""
 
 from __future__ import annotations
 
-from functools import cache
+import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from planner.jobs.clear_plan import plan_clear
 from planner.paths.distance import distance_to
-from planner.paths.obstacles import Circle, Footprint, FreeSpace
-from planner.paths.path import Path2D, circle, polygon
-from planner.planning.plan import plan
+from planner.paths.obstacles import Footprint
+from planner.paths.path import Path2D, circle
+from planner.paths.tractrix import Reference, reference
 from planner.planning.planned import Plan
-from planner.planning.request import PlanRequest
+from planner.tracking.reached import reached
 from planner.tracking.rest import Rest, rest_of
-from planner.tracking.swim import swim
-from planner.tracking.tracker import Tracker
 from planner.vehicle.rollout import predicted_poses
-from planner.vehicle.tracked_point import tracked_vehicle
+from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
-from sim.model.presets import PRESETS
 from sim.motion.replay import replay
-from tests.planner.vehicles import PROMPT, root_mean_square
+from tests.planner.plans import CONTROL, CORNER, ROCK, around, planned
 
-ROBOT = PRESETS["paper-control"]
-ROCK = FreeSpace((Circle(3.0, 0.2, 0.5),))
-
-
-@cache
-def made(name: str) -> Plan:
-    if name == "rock":
-        line = Path2D.of([[0.0, 0.0], [6.0, 0.0]])
-        return plan_clear(line, tracked_vehicle(ROBOT, None, "head_centre", None), PlanRequest(dwell=1.6), ROCK)
-    if name == "head tip":
-        return plan([[0, 0], [4, 0], [4, 4]], ROBOT, minimum_dwell=0.8, point="head_tip")
-    return plan(circle(2.0) if name == "circle" else polygon(4, 3.0), ROBOT, minimum_dwell=0.8)
+PLANS: dict[str, Callable[[], Plan]] = {
+    "circle": lambda: planned("circle:2l", minimum_dwell=0.8),
+    "square": lambda: planned("square:3l", minimum_dwell=0.8),
+    "head tip": lambda: planned(CORNER, point="head_tip", minimum_dwell=0.8),
+    "around": around,
+    "rock": lambda: around(dwell=1.6),
+}
 
 
 def rest(name: str, share: float, *moved: float) -> Rest:
     """Follow a share of the dwells; then move the robot, within 10 time units."""
-    result = made(name)
+    result = PLANS[name]()
     count = round(share * len(result.dwells))
     times = np.concatenate([[0.0], np.cumsum(result.dwells[:count])])
     poses = result.poses[: count + 1]
@@ -51,13 +43,12 @@ def rest(name: str, share: float, *moved: float) -> Rest:
 
 def end_error(name: str, after: Plan) -> float:
     """Compute the distance of the predicted track's end from that of the path."""
-    return float(np.hypot(*(after.track[-1] - made(name).reference[-1])))
+    return float(np.hypot(*(after.track[-1] - PLANS[name]().reference[-1])))
 
 
-@pytest.mark.parametrize("name", ["circle", "square", "head tip"])
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
+@pytest.mark.parametrize(("name", "share"), [("circle", 0.0), ("circle", 0.9), ("square", 0.3), ("head tip", 0.3)])
 def test_a_robot_on_its_path_goes_on(name: str, share: float) -> None:
-    result, after = made(name), rest(name, share)
+    result, after = PLANS[name](), rest(name, share)
     assert after.way == 0
     count = len(result.dwells) - round(share * len(result.dwells))
     assert len(after.plan.dwells) == pytest.approx(count, abs=3)
@@ -66,10 +57,15 @@ def test_a_robot_on_its_path_goes_on(name: str, share: float) -> None:
     assert distance_to(result.reference, after.plan.reference).max() < 1e-9
 
 
-@pytest.mark.parametrize("name", ["circle", "square", "head tip"])
-@pytest.mark.parametrize("moved", [(0.3, -0.5, 0.8), (-2.0, 1.0, 3.0), (0.0, 0.0, 3.1), (6.0, 6.0, 100.0)])
+@pytest.mark.parametrize(
+    ("name", "moved"),
+    [
+        ("circle", (-2.0, 1.0, 3.0)), ("square", (0.3, -0.5, 0.8)), ("square", (6.0, 6.0, 100.0)),
+        ("head tip", (0.0, 0.0, 3.1)),
+    ],
+)  # fmt: skip
 def test_a_robot_that_was_moved_finds_back(name: str, moved: tuple[float, float, float]) -> None:
-    result, after = made(name), rest(name, 0.3, *moved)
+    result, after = PLANS[name](), rest(name, 0.3, *moved)
     count = round(0.3 * len(result.dwells))
     expected = result.poses[count] + moved
     assert after.plan.poses[0, :2] == pytest.approx(expected[:2])
@@ -84,34 +80,89 @@ def test_a_robot_that_was_moved_finds_back(name: str, moved: tuple[float, float,
 
 
 def test_the_rest_in_the_simulator_ends_where_the_path_ends() -> None:
-    after = rest("square", 0.8, 0.3, -0.5, 0.8).plan
+    after = rest("square", 0.92, 0.3, -0.5, 0.8).plan
     track = replay([after.schedule()])[0]
     end = track[["x_over_l", "y_over_l"]].iloc[-1].to_numpy()
-    assert np.hypot(*(end - made("square").reference[-1])) < after.stated_error + 0.02
+    assert np.hypot(*(end - PLANS["square"]().reference[-1])) < after.stated_error + 0.02
 
 
-def test_the_rest_is_tracked_like_any_plan() -> None:
-    after = rest("square", 0.5, -2.0, 1.0, 3.0).plan
-    distance = swim(Tracker(after), after, after.tracked.vehicle, PROMPT).distance
-    assert root_mean_square(distance) < 0.03
-
-
-@pytest.mark.parametrize("moved", [(), (-0.3, 0.6, 0.5)])
-def test_the_way_back_keeps_clear_of_obstacles(moved: tuple[float, ...]) -> None:
-    after = rest("rock", 0.3, *moved).plan
-    body = Footprint.of(ROBOT, 0.0)
+@pytest.mark.parametrize(
+    ("name", "moved"), [("around", ()), pytest.param("rock", (-0.3, 0.6, 0.5), marks=pytest.mark.rest)]
+)
+def test_the_way_back_keeps_clear_of_obstacles(name: str, moved: tuple[float, ...]) -> None:
+    after = rest(name, 0.3, *moved).plan
+    body = Footprint.of(CONTROL, 0.0)
     clearance = body.clearance(predicted_poses(after.tracked.vehicle, after.switches), ROCK).min()
     assert after.kept_clear is not None
     assert 0 < after.kept_clear.clearance == pytest.approx(clearance)
-    assert end_error("rock", after) < 0.1
+    assert end_error(name, after) < 0.1
 
 
-def test_a_robot_inside_of_an_obstacle_is_told() -> None:
-    with pytest.raises(InputError, match="at the start") as caught:
-        rest("rock", 0.0, 3.0, 0.2, 0.0)
+@pytest.mark.parametrize(
+    ("name", "share", "moved", "expected"),
+    [("around", 0.0, (2.5, 0.2, 0.0), "at the start"), ("square", 1.0, (), "followed the path to its end")],
+)
+def test_a_robot_inside_an_obstacle_or_at_the_end_is_told(
+    name: str, share: float, moved: tuple[float, ...], expected: str
+) -> None:
+    with pytest.raises(InputError, match=expected) as caught:
+        rest(name, share, *moved)
     assert "\n" not in str(caught.value)
 
 
-def test_nothing_is_left_at_the_end() -> None:
-    with pytest.raises(InputError, match="followed the path to its end"):
-        rest("square", 1.0)
+SPEED = 0.1  # l per time unit
+
+
+def followed(along: Reference, first: int, last: int, count: int = 200) -> tuple[Floats, Floats]:
+    """Return times and poses of a pivot that follows a part of a reference, with the noise of a camera."""
+    rows = np.linspace(first, last, count).round().astype(int)
+    noise = np.random.default_rng(0).normal(0, 0.02, (count, 3))
+    poses = np.column_stack([along.q[rows], along.heading[rows]]) + noise
+    poses[:, 2] = (poses[:, 2] + math.pi) % (2 * math.pi) - math.pi
+    return along.arc[rows] / (0.5 * SPEED), poses
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.5, 0.97])
+@pytest.mark.parametrize("first", [0.0, 0.4])
+def test_a_closed_path_is_followed_from_its_start(share: float, first: float) -> None:
+    """Start and end are one place, and the track may begin later."""
+    along = reference(circle(2.0), 0.9, 0.02)
+    count = len(along.q) - 1
+    begin, end = round(first * count), round(max(share, first) * count)
+    times, poses = followed(along, begin, end)
+    assert reached(along, times, poses, SPEED) == pytest.approx(end, abs=5)
+
+
+LANES = Path2D.of([[0, 0], [6, 0], [6, 0.5], [0, 0.5], [0, 1], [6, 1], [6, 1.5], [0, 1.5]])
+
+
+def test_a_robot_that_was_carried_to_another_lane_has_not_followed_those_between() -> None:
+    along = reference(LANES, 0.0, 0.02)
+    end = round(0.3 * len(along.q))
+    times, poses = followed(along, 0, end)
+    target = round(0.9 * len(along.q))
+    carried = np.append(along.q[target], along.heading[target])
+    times = np.append(times, times[-1] + np.array([5.0, 5.1, 5.2]))
+    place = reached(along, times, np.vstack([poses, carried, carried, carried]), SPEED)
+    assert along.arc[place] - along.arc[end] < 5.2 * 1.5 * SPEED + 0.1
+
+
+def test_one_pose_leads_to_the_nearest_part_of_the_path_that_is_worth_it() -> None:
+    along = reference(LANES, 0.0, 0.02)
+    place = reached(along, np.zeros(1), np.array([[3.0, 0.02, 0.0]]), SPEED)
+    assert along.q[place] == pytest.approx([3.0, 0.0], abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("share", "count", "kept", "faster"),
+    [(0.5, 200, np.r_[:40, 160:200], 1.0), (0.9, 50, np.arange(50), 2.8)],
+    ids=["gap", "fast"],
+)
+def test_gaps_are_bridged_and_fast_robots_followed(
+    share: float, count: int, kept: Integers, faster: float
+) -> None:
+    """A robot may be faster than its model: by 1.4 here, as its track is of half the speed."""
+    along = reference(LANES, 0.0, 0.02)
+    end = round(share * len(along.q))
+    times, poses = followed(along, 0, end, count)
+    assert reached(along, times[kept] / faster, poses[kept], SPEED) == pytest.approx(end, abs=5)

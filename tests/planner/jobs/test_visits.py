@@ -1,0 +1,268 @@
+"""Tours and coverage: all places or lanes in the quickest order, also in the simulator and among obstacles."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from itertools import pairwise, permutations
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.jobs import shortest_order as module
+from planner.jobs.cover import cover
+from planner.jobs.region import Field, lanes, share_covered
+from planner.jobs.shortest_order import EXACT, shortest_order
+from planner.jobs.tour import tour
+from planner.jobs.travel_times import Travel
+from planner.paths.distance import distance_to
+from planner.paths.obstacles import Circle, FreeSpace, Polygon
+from planner.paths.tractrix import STILL
+from planner.planning.declared_path import TIGHTEST
+from planner.planning.request import PlanRequest
+from planner.vehicle.dwell_choice import dwells_for
+from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
+from planner.vehicle.zigzag import zigzag
+from sim.io.errors import InputError, run_command
+from sim.motion.replay import replay
+from tests.planner.plans import CONTROL, tracked
+
+PLACES = [(0.0, 0.0), (4.0, 0.0), (2.0, 1.0), (3.0, 3.0), (-1.0, 2.0)]
+QUICK = PlanRequest(objective="time")
+OPTIONS = 3
+
+
+def random_costs(seed: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Make the costs of visits in the plane, with something for each option; start and end cost a little, too."""
+    rng = np.random.default_rng(seed)
+    places = rng.uniform(0, 10, (count, 2))
+    apart = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
+    costs = apart[:, None, :, None] + rng.uniform(0, 3, (count, OPTIONS, count, OPTIONS))
+    return costs, rng.uniform(0, 2, (count, OPTIONS)), rng.uniform(0, 2, (count, OPTIONS))
+
+
+def cost_of(visits: list[int], options: list[int], costs: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
+    steps = pairwise(zip(visits, options, strict=True))
+    between = sum(costs[i, c, j, d] for (i, c), (j, d) in steps)
+    return float(start[visits[0], options[0]] + between + end[visits[-1], options[-1]])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_search_is_near_the_exact_order_and_the_bound_below(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    costs, start, end = random_costs(seed, 9)
+    exact = shortest_order(costs, start, end)
+    monkeypatch.setattr(module, "EXACT", 0)
+    searched = shortest_order(costs, start, end)
+    assert exact.cost <= searched.cost * (1 + 1e-12)
+    assert searched.cost < 1.1 * exact.cost
+    assert searched.bound <= exact.cost * (1 + 1e-9)
+    assert cost_of(searched.visits, searched.options, costs, start, end) == pytest.approx(searched.cost)
+    assert sorted(searched.visits) == list(range(9))
+
+
+def test_many_visits_have_a_small_gap() -> None:
+    order = shortest_order(*random_costs(0, EXACT + 8))
+    assert sorted(order.visits) == list(range(EXACT + 8))
+    assert 0 <= order.gap < 0.4
+
+
+def test_what_cannot_be_ordered_is_refused() -> None:
+    costs, start, end = random_costs(0, 4)
+    costs[:, :, 2] = np.inf
+    start[2] = np.inf
+    with pytest.raises(InputError, match="no way"):
+        shortest_order(costs, start, end)
+    with pytest.raises(InputError, match="at most 80"):
+        shortest_order(np.zeros((81, 1, 81, 1)), np.zeros((81, 1)), np.zeros((81, 1)))
+
+
+def legs(tracked: TrackedVehicle, places: np.ndarray) -> np.ndarray:
+    """Compute the times (n, 72, n, 72) between places, with 72 directions of motion at each."""
+    dwell = dwells_for(tracked.vehicle, "time", None)[0]
+    travel = Travel.of(tracked, zigzag(tracked.vehicle, dwell), FreeSpace(), STILL, 0.0)
+    course = 2 * np.pi * np.arange(72) / 72
+    axis = np.stack([np.cos(course), np.sin(course)], 1)
+    poses = np.concatenate([[np.c_[place - tracked.rod * axis, course] for place in places]]).reshape(-1, 3)
+    times = travel.times(np.repeat(poses, len(poses), 0), np.tile(poses, (len(poses), 1)))
+    return times.reshape(len(places), 72, len(places), 72)
+
+
+def fixed_order(order: tuple[int, ...], times: np.ndarray) -> float:
+    """Compute the time of an order of places, one leg after another."""
+    total = np.zeros(72)
+    for here, there in pairwise(order):
+        total = (total[:, None] + times[here, :, there]).min(0)
+    return float(total.min())
+
+
+@pytest.mark.parametrize("size", [1.0, 0.4])  # of the places' distances; the smaller ones are those of a turn
+@pytest.mark.parametrize("back", [False, True])
+@pytest.mark.parametrize("any_start", [False, True])
+def test_no_other_order_of_the_places_takes_less_time(size: float, back: bool, any_start: bool) -> None:
+    places = size * np.array([(0, 0), (4, 0), (2, 1), (3, 3), (-1, 2)])
+    best = tour(places.tolist(), tracked(), QUICK, back=back, any_start=any_start)
+    assert best.exact
+    assert 0.7 * best.estimate < best.plan.duration < 1.1 * best.estimate  # longer dwells may be faster
+    assert best.order[0] == (best.order[-1] if back else best.order[0] if any_start else 0)
+    assert sorted(set(best.order)) == [0, 1, 2, 3, 4]
+    times = legs(tracked(), places)
+    for order in permutations(range(5)):
+        if any_start or order[0] == 0:
+            assert best.estimate <= fixed_order((*order, *order[: int(back)]), times) * 1.001
+
+
+def test_every_place_is_on_the_declared_path() -> None:
+    result = tour(PLACES, tracked(), PlanRequest())
+    assert distance_to(result.plan.reference, np.array(PLACES)).max() < 0.005
+    assert result.distance.max() <= result.plan.predicted_max + 0.005
+    assert (np.diff(result.reached) > 0).all()
+
+
+@pytest.mark.parametrize("size", [1.0, 0.4])
+def test_a_quick_tour_begins_on_its_first_place(size: float) -> None:
+    result = tour([(size * x, size * y) for x, y in PLACES], tracked(), QUICK)
+    assert result.distance[0] < 0.03
+    assert result.plan.straight.largest > 0.08  # where a dwell of the zigzag begins
+
+
+def test_the_point_that_is_asked_for_passes() -> None:
+    by_pivot = tracked_vehicle(CONTROL, None, "pivot", None)
+    result = tour(PLACES[:3], by_pivot, QUICK)
+    assert distance_to(result.plan.declared.reference.q, np.array(PLACES[:3])).max() < 0.005
+
+
+def test_among_obstacles_it_keeps_clear() -> None:
+    space = FreeSpace.of([Circle(1.0, 0.6, 0.3)])
+    result = tour(PLACES[:3], tracked(), PlanRequest(objective="flips"), space)
+    kept = result.plan.kept_clear
+    assert kept is not None
+    assert kept.margin >= result.plan.stated_error
+    assert kept.clearance > 0
+    assert not result.exact
+    assert distance_to(result.plan.reference, np.array(PLACES[:3])).max() < 0.05
+
+
+def test_the_simulator_visits_all_places() -> None:
+    result = tour(PLACES[:4], tracked(), QUICK)
+    track = replay([result.plan.schedule()])[0]
+    points = track[["x_over_l", "y_over_l"]].to_numpy(float)
+    assert distance_to(points, np.array(PLACES[:4])).max() < result.plan.stated_error + 0.05
+
+
+def test_the_command_reads_places_from_words_and_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from planner.__main__ import main
+
+    cm = 100 * CONTROL.tail_length
+    (tmp_path / "places.csv").write_text("x_cm,y_cm\n" + "".join(f"{cm * x},{cm * y}\n" for x, y in PLACES[:3]))
+    common = ["--robot", "paper-control", "--objective", "flips", "--out"]
+    assert run_command(main, ["tour", str(tmp_path / "places.csv"), *common, str(tmp_path / "one")]) == 0
+    assert "order: 1 3 2; no other order is quicker" in capsys.readouterr().out
+    assert run_command(main, ["tour", "0,0", "4l,0", "2l,1l", *common, str(tmp_path / "two")]) == 0
+    one, two = (json.loads((tmp_path / name / "tour.json").read_text()) for name in ("one", "two"))
+    assert one["order"] == two["order"] == [0, 2, 1]
+    assert np.array(one["places"]) == pytest.approx(np.array(two["places"]))
+    assert {"plan.json", "schedule.h", "tour.svg"} <= {path.name for path in (tmp_path / "one").iterdir()}
+    with pytest.raises(InputError, match="two or more"):
+        tour([(0, 0, 0), (1, 1, 1)], tracked_vehicle(CONTROL, None, "head_centre", None), QUICK)
+
+
+FIELD = Field(Polygon.of([[0, 0], [3, 0], [3, 1.5], [0, 1.5]]))
+SMALL = Field(Polygon.of([[0, 0], [1, 0], [1, 0.5], [0, 0.5]]))
+SQUARE = Polygon.of([[0, 0], [4, 0], [4, 3], [0, 3]])
+HOLE = Field(SQUARE, (Circle(2, 1.5, 0.7),))
+
+
+def test_areas_and_shares_are_those_of_known_figures() -> None:
+    """A straight track covers its rectangle and two half discs."""
+    points, cell = HOLE.raster(0.01)
+    assert len(points) * cell == pytest.approx(12 - math.pi * 0.49, rel=0.003)
+    with pytest.raises(InputError, match="empty"):
+        Field(SQUARE, (Circle(2, 1.5, 4),)).raster(0.1)
+    share = share_covered(Field(SQUARE), np.array([[1.0, 1.5], [3.0, 1.5]]), 0.6)
+    assert share == pytest.approx((2 * 0.6 + math.pi * 0.09) / 12, rel=0.01)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, math.pi / 2, 2.0])
+def test_a_footprint_wider_than_the_region_needs_one_lane(angle: float) -> None:
+    for width in (5.0, 40.0):
+        (lane,) = lanes(Field(SQUARE), width, angle, apart=0.2)
+        assert np.hypot(*(lane.mean(0) - [2, 1.5])) < 0.6
+        assert share_covered(Field(SQUARE), lane, 2 * width) == 1.0
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, math.pi / 2])
+def test_lanes_cover_the_region_and_leave_holes_out(angle: float) -> None:
+    cut = lanes(HOLE, 0.3, angle, apart=0.2)
+    along = cut[:, 1] - cut[:, 0]
+    assert np.abs(np.sin(np.arctan2(along[:, 1], along[:, 0]) - angle)).max() < 1e-9
+    points, _ = HOLE.raster(0.04)
+    near = np.min([distance_to(lane, points) for lane in cut], axis=0)
+    assert near.max() <= 0.15 + 0.02
+    assert (np.hypot(*(cut.mean(1) - [2, 1.5]).T) > 0.5).all()
+    assert len(lanes(HOLE, 0.3, angle, apart=3.0)) < len(cut)
+
+
+def test_it_covers_the_region_by_turns_that_the_robot_can_make() -> None:
+    """Neither another order of the lanes nor another direction is quicker; the bound is that of its area."""
+    swept = cover(FIELD, 0.5, tracked(), QUICK)
+    assert swept.share > 0.995
+    assert swept.share == share_covered(FIELD, swept.plan.track, 0.5)
+    assert 0.5 < swept.sure <= swept.share
+    assert swept.plan.declared.curvature * tracked().vehicle.pivot_radius < TIGHTEST
+    assert swept.exact
+    assert len(swept.lanes) == 5
+    assert swept.bound == pytest.approx(4.5 / (0.5 * swept.plan.straight.net_speed), rel=0.01)
+    assert swept.plan.duration > swept.bound
+    across = cover(FIELD, 0.5, tracked(), QUICK, angle=np.pi / 2)
+    assert swept.plan.duration < across.plan.duration
+    assert np.ptp(swept.lanes[:, :, 1], axis=1).max() < 1e-9
+
+
+@pytest.mark.parametrize(("share", "proposed"), [(0.8, "80.0 % if a camera"), (0.0, "give more than")])
+def test_what_is_not_certain_without_a_camera_proposes_one(share: float, proposed: str) -> None:
+    swept = cover(SMALL, 0.5, tracked(), QUICK)
+    assert swept.sure <= swept.sure_tracked <= swept.share
+    said = replace(swept, sure=0.0, sure_tracked=share).lines()[1]
+    assert "0.0 % wherever the robot is within the stated error" in said
+    assert proposed in said
+    assert "--feedback" in said
+    assert "--feedback" not in replace(swept, sure=0.9, sure_tracked=0.9).lines()[1]
+
+
+def test_lanes_are_in_the_quickest_order() -> None:
+    """Neighbouring lanes one after another would need wider loops than this robot's turns."""
+    swept = cover(Field(Polygon.of([[0, 0], [4, 0], [4, 3], [0, 3]])), 0.4, tracked(), QUICK)
+    steps = np.abs(np.diff(swept.lanes[:, 0, 1]))
+    assert np.median(steps) > 0.6
+
+
+@pytest.mark.rest
+def test_keep_outs_are_not_touched() -> None:
+    rock = Circle(1.5, 0.8, 0.2)
+    swept = cover(replace(FIELD, holes=(rock,)), 0.5, tracked(), PlanRequest(), FreeSpace((rock,)))
+    kept = swept.plan.kept_clear
+    assert kept is not None
+    assert kept.clearance > 0
+    assert kept.margin >= swept.plan.stated_error
+    assert swept.share > 0.85
+
+
+@pytest.mark.rest
+def test_the_simulator_covers_the_same() -> None:
+    swept = cover(FIELD, 0.5, tracked(), QUICK)
+    track = replay([swept.plan.schedule()])[0][["x_over_l", "y_over_l"]].to_numpy(float)
+    assert share_covered(FIELD, track, 0.5) == pytest.approx(swept.share, abs=0.02)
+    assert share_covered(FIELD, track, 0.5) >= swept.sure
+
+
+def test_refusals() -> None:
+    with pytest.raises(InputError, match="zigzag alone"):
+        cover(FIELD, 0.04, tracked(), PlanRequest())
+    with pytest.raises(InputError, match="more than 80 lanes"):
+        cover(Field(Polygon.of([[0, 0], [60, 0], [60, 60], [0, 60]])), 0.5, tracked(), PlanRequest())
+    with pytest.raises(InputError, match="no lane of the region is clear"):
+        cover(FIELD, 0.5, tracked(), PlanRequest(), FreeSpace((), FIELD.outline))

@@ -1,0 +1,88 @@
+"""Plans that several tests need, each made once for all processes of a test session."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from planner.goal.goal_plan import GoalPlan
+from planner.goal.to_goal import to_goal
+from planner.jobs.clear_plan import plan_clear
+from planner.paths.obstacles import Circle, FreeSpace
+from planner.paths.path import Path2D
+from planner.paths.shapes import shape_of
+from planner.planning.plan import plan
+from planner.planning.planned import Plan
+from planner.planning.request import PlanRequest
+from planner.vehicle.calibration_table import CalibrationKnowledge
+from planner.vehicle.tracked_point import Point, TrackedVehicle, tracked_vehicle
+from sim.model.presets import PRESETS
+from surrogate.one_robot.robot_table import RobotTable
+from surrogate.one_robot.tabulate import tabulate
+from tests.shared import shared
+
+CONTROL = PRESETS["paper-control"]
+BIASED = replace(CONTROL, effects={"left_right_bias": 0.2})
+QUICK = PlanRequest(objective="flips")
+LINE = ((0.0, 0.0), (5.0, 0.0))
+ROCK = FreeSpace((Circle(2.5, 0.2, 0.4),))  # on the line
+CORNER = ((0.0, 0.0), (3.0, 0.0), (3.0, 3.0))
+WALLS = ((-2.5, -3.0), (6.0, -3.0), (6.0, 3.0), (-2.5, 3.0))
+
+
+def path_of(words: str | tuple[tuple[float, float], ...]) -> Path2D:
+    """Make a path from points, from a shape in words, or the path "eight"."""
+    if not isinstance(words, str):
+        return Path2D.of(words)
+    if words == "eight":
+        angle = np.linspace(0, 2 * math.pi, 401)[:-1]
+        return Path2D.of(np.stack([2.05 * np.sin(angle), 1.13 * np.sin(2 * angle)], 1), closed=True)
+    shape = shape_of(words)
+    assert shape is not None
+    return shape[0]
+
+
+@shared
+def tracked(point: Point = "head_centre") -> TrackedVehicle:
+    """Ask the package's table for the vehicle of the control robot."""
+    return tracked_vehicle(CONTROL, None, point, None)
+
+
+@shared
+def planned(
+    path: str | tuple[tuple[float, float], ...] = "circle:2l", robot: str = "paper-control",
+    current: tuple[float, float] | None = None, **options: Any,
+) -> Plan:  # fmt: skip
+    """Plan for a path, in a current [m/s]; see `path_of`."""
+    knowledge = None if current is None else CalibrationKnowledge(current=current)
+    return plan(path_of(path), PRESETS[robot], knowledge=knowledge, **options)
+
+
+@shared
+def around(dwell: float | None = None, *, feedback: bool = False) -> Plan:
+    """Plan a line with a rock on it."""
+    request = QUICK if dwell is None else PlanRequest(dwell=dwell)
+    return plan_clear(Path2D.of(LINE), tracked(), request, ROCK, feedback=feedback)
+
+
+@shared
+def trip(goal: tuple[float, float, float] = (2.0, 0.7, 0.8)) -> GoalPlan:
+    """Plan from rest at the origin to a pose."""
+    return to_goal((0.0, 0.0, 0.0), goal, CONTROL, objective="flips")
+
+
+@shared
+def hindered_trip() -> GoalPlan:
+    """Plan a trip through a place, between walls, around a circle and beside a triangle."""
+    regions = [Circle(1.5, -1.1, 0.3), [[4.0, 1.5], [5.0, 1.5], [5.0, 2.5]]]
+    task = {"keep_out": regions, "walls": WALLS, "via": [(1.5, 0.3)]}
+    return to_goal((0, 0, 0), (3, 0, 0), CONTROL, objective="flips", **task)
+
+
+@shared
+def own_table() -> RobotTable:
+    """Simulate the own table of the robot whose two directions differ."""
+    return tabulate(BIASED)
