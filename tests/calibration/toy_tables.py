@@ -96,7 +96,7 @@ def calibrated(
 
 @shared
 def calibrated_toy(
-    seed: int, *, few: bool = False, lengths_cm: tuple[float, ...] = LENGTHS_CM, **effects: float
+    seed: int, *, few: tuple[str, ...] = (), lengths_cm: tuple[float, ...] = LENGTHS_CM, **effects: float
 ) -> Verdict:
     """The verdict of a toy table."""
     return calibrated(toy_table(seed, lengths_cm=lengths_cm, **effects), few=few)
@@ -104,17 +104,18 @@ def calibrated_toy(
 
 def none() -> Verdict:
     """A verdict on a table in which nothing is missing."""
-    return calibrated_toy(3, few=True)
+    return calibrated_toy(3, few=FEW_CANDIDATES)
 
 
 def effect() -> Verdict:
-    """A verdict that names the hidden drag, among all candidates."""
-    return calibrated_toy(5, **{DRAG: 5.0})
+    """A verdict that names the hidden drag."""
+    return calibrated_toy(5, few=FEW_CANDIDATES, **{DRAG: 5.0})
 
 
 def ambiguous() -> Verdict:
     """A verdict on tails of one length, which do not tell the drag from another effect."""
-    return calibrated_toy(1, lengths_cm=(8.0,), **{DRAG: 4.0})
+    few = (DRAG, "surface_couple", "tail_contact", "left_right_bias")
+    return calibrated_toy(1, few=few, lengths_cm=(8.0,), **{DRAG: 4.0})
 
 
 def wrong_scale() -> pd.DataFrame:

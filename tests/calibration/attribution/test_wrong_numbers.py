@@ -48,9 +48,7 @@ EXACT = {
 }
 
 
-@pytest.mark.parametrize(
-    "names", [("inertia", "left_right_bias"), pytest.param((), marks=pytest.mark.rest)], ids=["few", "all"]
-)
+@pytest.mark.parametrize("names", [("inertia",), pytest.param((), marks=pytest.mark.rest)], ids=["few", "all"])
 def test_a_stiffness_that_was_given_too_high_is_no_inertia(
     names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:

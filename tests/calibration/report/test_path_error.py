@@ -12,7 +12,7 @@ import pytest
 
 import calibration.report.path_error
 from calibration.__main__ import main
-from calibration.report.path_error import PathError, path_errors, wanted_paths
+from calibration.report.path_error import DEFAULT_PATHS, PathError, path_errors, wanted_paths
 from planner.paths.distance import distance_to
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.io.errors import InputError, run_command
@@ -156,21 +156,16 @@ def test_a_verdict_and_its_report_have_the_error_on_a_path(tmp_path: Path) -> No
 
 
 @pytest.mark.usefixtures("toy_model", "few_candidates")
-def test_the_command_states_it_on_a_square_or_the_paths_asked_for(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_states_it_on_the_paths_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     toy_table(3, lengths_cm=(6.0, 9.0)).to_csv(tmp_path / "t.csv", index=False)
     words = ["calibrate", str(tmp_path / "t.csv"), "--robot", "paper-measured", "--out", str(tmp_path / "out")]
     for refused in (["--path", "squre:3l"], ["--path", "circle:2l", "--no-path"]):
         assert run_command(main, [*words, *refused]) == 2
         assert not (tmp_path / "out").exists()
     capsys.readouterr()
-    assert run_command(main, [*words, "--no-path"]) == 0
-    assert "on the path" not in capsys.readouterr().out
-    assert json.loads((tmp_path / "out" / "verdict.json").read_text())["path"] is None
-    both = ["--path", "circle:1.2l", "--path", "circle:2l"]
-    for options, paths in (([], {"square:3l"}), (both, {"circle:1.2l", "circle:2l"})):
-        assert run_command(main, [*words, *options]) == 0
-        printed = capsys.readouterr().out
-        assert all(f"on the path {path}: planned with the robot as given" in printed for path in paths)
-        assert set(json.loads((tmp_path / "out" / "verdict.json").read_text())["path"]) == paths
+    assert run_command(main, [*words, "--path", "circle:1.2l", "--path", "circle:2l"]) == 0
+    printed = capsys.readouterr().out
+    asked_for = ("circle:1.2l", "circle:2l")
+    assert all(f"on the path {path}: planned with the robot as given" in printed for path in asked_for)
+    assert tuple(json.loads((tmp_path / "out" / "verdict.json").read_text())["path"]) == asked_for
+    assert DEFAULT_PATHS == ("square:3l",)

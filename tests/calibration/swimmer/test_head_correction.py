@@ -26,7 +26,7 @@ from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
 from sim.motion.steady import steady
 from surrogate.table.model_file import load
-from tests.calibration.toy_tables import START, calibrated, toy_swimmer, toy_table
+from tests.calibration.toy_tables import DRAG, START, calibrated, toy_swimmer, toy_table
 from tests.shared import shared
 
 CONTROL = PRESETS["paper-control"]
@@ -41,7 +41,7 @@ def bent_table() -> pd.DataFrame:
 
 @shared
 def verdict() -> Verdict:
-    return calibrated(bent_table())
+    return calibrated(bent_table(), few=(DRAG, "surface_couple", "anisotropic_head_drag"))
 
 
 @pytest.fixture

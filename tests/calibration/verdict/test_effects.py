@@ -34,8 +34,9 @@ SIZE = 5.0
 
 
 @pytest.mark.slow
-def test_a_planted_effect_is_found_sized_and_removed() -> None:
-    result = effect()
+@pytest.mark.parametrize("few", [True, pytest.param(False, marks=pytest.mark.rest)], ids=["few", "all"])
+def test_a_planted_effect_is_found_sized_and_removed(few: bool) -> None:
+    result = effect() if few else calibrated(toy_table(5, **{DRAG: SIZE}))
     assert result.verdict == "effect"
     assert result.effects == (DRAG,)
     assert result.conditions.excluded == ()
@@ -69,6 +70,7 @@ def test_an_effect_that_the_coefficients_absorb_is_not_testable() -> None:
     assert misfit.general_p < 0.1
 
 
+@pytest.mark.rest
 def test_what_comes_nearest_is_said_where_nothing_explains() -> None:
     table = toy_table(7, **{DRAG: 5.0})
     table["omega_h_rpm"] *= np.exp(0.04 * np.sin(3.0 * table["l_cm"]) * np.sign(table["omega_rpm"]))
@@ -186,8 +188,7 @@ def test_an_effect_that_changes_nothing_says_so(tmp_path: Path) -> None:
 
 def test_the_held_out_session_has_no_say_judges_and_is_used_in_the_end() -> None:
     """Ruining it changes the reported errors and the last fit, which has all runs, and nothing else."""
-    table = toy_table(5, **{DRAG: SIZE})
-    result = calibrated(table, few=True)
+    table, result = toy_table(5, **{DRAG: SIZE}), effect()
     assert result.errors.p_value > 0.01
     table.loc[table["session"] == result.conditions.split.names, "omega_yr_rad_s"] *= 1.5
     ruined = calibrated(table, few=True)

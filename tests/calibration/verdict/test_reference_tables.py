@@ -30,9 +30,8 @@ def calibrated(name: str) -> Verdict:
     return calibrate(SwimmerModel(load_robot(HERE / "robot.toml"), data), progress=False)
 
 
-@pytest.mark.parametrize(
-    "name", [name if name == "ambiguous" else pytest.param(name, marks=pytest.mark.rest) for name in TABLES]
-)
+@pytest.mark.rest
+@pytest.mark.parametrize("name", TABLES)
 def test_the_files_are_what_make_writes(name: str) -> None:
     assert load_robot(HERE / "robot.toml") == GIVEN
     pd.testing.assert_frame_equal(pd.read_csv(HERE / f"{name}.csv"), TABLES[name](), rtol=1e-4, check_dtype=False)
@@ -53,9 +52,9 @@ def test_one_effect_is_named_sized_and_handed_on(
 ) -> None:
     """Through the command. The truth was simulated on a finer mesh; the command is not told of the effect."""
     if few:
-        install_few_candidates(monkeypatch)
+        install_few_candidates(monkeypatch, (DRAG, "tail_spin_drag"))
     words = ["calibrate", str(HERE / "effect.csv"), "--robot", str(HERE / "robot.toml"), "--out", str(tmp_path)]
-    assert run_command(main, [*words, "--no-path"]) == 0
+    assert run_command(main, [*words, "--no-path", "--no-laws"]) == 0
     record = json.loads((tmp_path / "verdict.json").read_text())
     assert record["verdict"] == "effect"
     assert record["effects"] == [DRAG]
