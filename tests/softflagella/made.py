@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import softflagella as sf
+from surrogate.one_robot.tabulate import tabulate
 from tests.shared import shared
 
 ROBOT = sf.load_robot("paper-control")
@@ -20,4 +21,4 @@ def goal() -> sf.GoalPlan:
 
 @shared
 def own_table(*, odd: bool = False) -> Any:
-    return sf.tabulate(ODD if odd else ROBOT)
+    return tabulate(ODD if odd else ROBOT)

@@ -11,7 +11,7 @@ import pytest
 import softflagella as sf
 from sim.io.keywords import keywords_of
 
-LONG = {"FleetPlan", "GoalPlan", "HoldPlan", "TrackingError", "hold", "load_goal", "tabulate"}
+LONG = {"FleetPlan", "GoalPlan", "HoldPlan", "Swim", "TrackingError", "hold", "load_goal", "tabulate"}
 NAMES = [name for name in sf.__all__ if not name.startswith("_")]
 
 

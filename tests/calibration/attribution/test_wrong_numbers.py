@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +15,7 @@ from calibration.attribution.wrong_numbers import beside_wrong_numbers, notable_
 from calibration.report.corrected_robot import corrected_robot
 from calibration.statistics.fit import fit
 from calibration.statistics.residual_tests import directions, examine_residual
-from calibration.statistics.statistical_model import Parameter, by_differences, start_values
+from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.statistics.study import DRAWS, Study, find_outliers, split_runs
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, LENGTH, TACHOMETER
@@ -230,21 +228,6 @@ def test_pulls_are_those_of_the_textbook() -> None:
     alone = {p.parameter.name: p for p in pulls(free, model.nuisances)}[CAMERA]
     assert alone.freed
     assert alone.change == pytest.approx(bound_pull.alone, abs=0.1 * bound_pull.alone_error)
-
-
-def test_a_freed_parameter_has_the_pull_that_it_had_before() -> None:
-    """One measurement y = 0.4 with s = 0.03, prior σ = 0.04: the pull is 0.4/0.05, with the prior and without."""
-    given = Parameter("p", "p", 1.0, (0.0, 9.0), 1.0, sigma=0.04)
-    shrunk = 0.04**2 / 0.05**2  # share of y that a fit with the prior moves, and of s² that it leaves
-    for share, freed in ((shrunk, False), (1.0, True)):
-        fitted: Any = SimpleNamespace(
-            names=("p",), fitted=(replace(given, sigma=None if freed else 0.04),), inflation=2.0,
-            covariance=np.array([[2.0 * share * 0.03**2]]), parameters={"p": 1.0 + share * 0.4},
-        )  # fmt: skip
-        (pull,) = pulls(fitted, [given])
-        assert (pull.freed, pull.learnt, pull.wrong) == (freed, True, True)
-        numbers = pull.z, pull.alone, pull.alone_error, pull.tolerances
-        assert numbers == pytest.approx((8.0, 0.4, 0.03, 10.0))
 
 
 def test_exact_numbers_are_not_fitted_and_the_table_states_its_own() -> None:

@@ -240,18 +240,6 @@ def test_what_no_family_can_say_gets_no_name() -> None:
     assert {one.name for one in named_curves(few, VALUES)} == {"power", "exponential", "saturation", "threshold"}
 
 
-def test_the_spline_follows_a_peak_and_says_where_it_is() -> None:
-    curve = _curve(groups(1 + 3 * 64 / ((U - 122) ** 2 + 64)), VALUES, 0.04, 2)
-    assert curve.freedom > 6
-    assert curve.turn is not None
-    kind, at = curve.turn
-    assert kind == "maximum"
-    assert at == pytest.approx(121, abs=3)
-    np.testing.assert_allclose(np.interp(U, curve.inputs, curve.factor), 1 + 192 / ((U - 122) ** 2 + 64), atol=0.2)
-    flat = _curve(groups(np.ones(len(U))), VALUES, 0.04, 2)
-    assert flat.turn is None
-
-
 def test_a_level_that_is_unknown_is_that_of_the_law() -> None:
     """And what the runs determine stays."""
     given = groups((U / 110) ** 2)

@@ -167,17 +167,6 @@ def test_normal_noise_has_one_distribution(repeats: int) -> None:
         assert estimate(residual, condition) is None
 
 
-def test_the_run_that_is_farther_from_the_model_loses_its_weight() -> None:
-    residual, condition, _ = residuals(3)
-    residual[20::40] += 0.2  # the first of two repeats
-    noise = estimate(residual, condition)
-    assert noise is not None
-    weight = noise.weights(residual, condition)
-    assert (weight[20::40] < 0.2).all()
-    assert (weight[21::40] > 0.8).all()
-    assert noise.spread > 1
-
-
 def test_a_departure_of_whole_conditions_costs_no_weight_in_any_order_of_the_runs() -> None:
     """An effect that acts on a few conditions only, beside runs that were mis-tracked."""
     residual, condition, bad = residuals(5, share=0.05)
