@@ -115,9 +115,10 @@ def test_any_table_of_a_path(
     planned(tmp_path, tmp_path / "path.csv", "--unit", "l", *given_options, capsys=capsys)
 
 
+@pytest.mark.slow
 @few
 @given(shape=st.sampled_from(["circle", "square", "triangle", "star", ""]),
-       size=st.one_of(number.map(repr), st.sampled_from(WORDS)),
+       size=st.one_of(extremes.map(repr), st.sampled_from(WORDS)),
        unit=st.sampled_from(["l", "m", "cm", "mm"]))  # fmt: skip
 def test_any_shape_by_name(
     shape: str, size: str, unit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -190,6 +191,7 @@ def single_row(values: dict[str, float]) -> dict[str, np.ndarray]:
     return {name: np.array([value]) for name, value in values.items()}
 
 
+@pytest.mark.slow
 @more
 @given(values=robots())
 def test_any_robot_is_solved_flagged_or_refused(values: dict[str, float]) -> None:
@@ -209,12 +211,14 @@ def test_any_row_of_a_sweep_is_simulated_flagged_or_refused(values: dict[str, fl
         assert found["failed"][0] or np.isfinite(found["net_speed_bar"][0]).all()
 
 
+@pytest.mark.slow
 @more
 @given(values=robots(DWELL))
 def test_the_look_up_table_answers_or_refuses(values: dict[str, float]) -> None:
     with suppress(InputError):
         found = load().query(single_row(values))
-        assert all(np.isfinite(column).all() for column in found.values())
+        finite = all(np.isfinite(column).all() for column in found.values())
+        assert finite or values["C_yr"] == 0  # such a robot does not turn, and the table has no lags for it
 
 
 def test_the_worst_robot_of_a_table_leaves_the_others_alone(

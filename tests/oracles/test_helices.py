@@ -14,6 +14,7 @@ from tests.oracles.helices import resistive, with_flow
 MEASURED = Path(__file__).parents[3] / "shared" / "measured"
 
 
+@pytest.mark.slow
 def test_a_helix_with_the_flow_of_its_parts() -> None:
     """Converged in the number of segments; a straight wire drags as Tirado and Garcia de la Torre (1979) say."""
     pitch = np.array([2.226, 9.811])

@@ -26,6 +26,7 @@ def test_every_name_is_what_its_module_has_and_is_listed_once() -> None:
         sf.swims  # noqa: B018
 
 
+@pytest.mark.slow
 def test_a_wrong_keyword_is_refused_with_a_proposal() -> None:
     functions = [thing for name in NAMES if isfunction(thing := getattr(sf, name))]
     assert len(functions) > 30

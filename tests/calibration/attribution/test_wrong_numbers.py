@@ -46,6 +46,7 @@ EXACT = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [("inertia",), pytest.param((), marks=pytest.mark.rest)], ids=["few", "all"])
 def test_a_stiffness_that_was_given_too_high_is_no_inertia(
     names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch

@@ -136,6 +136,7 @@ def test_twins_are_mostly_told_apart_by_the_next_runs_and_not_by_others(truth: d
     assert still_twins >= 4
 
 
+@pytest.mark.slow
 def test_a_profile_interval_sees_that_the_model_bends() -> None:
     """Falling spheres: ln v against inertia is concave, so the upper side of its interval is the longer one."""
     model = spheres({"inertia": 1.0}, 5, (3.0, 5.0, 7.0, 9.0))

@@ -130,6 +130,7 @@ def test_a_curve_is_found_and_named(kind: str, at: float) -> None:
         assert 30 / math.pi * curve.turn[1] == pytest.approx(112, abs=5)
 
 
+@pytest.mark.slow
 def test_a_law_with_a_curve_stands_in_the_sentence_the_record_and_the_picture(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -53,6 +53,7 @@ def described_by(table: pd.DataFrame) -> RobotLaws:
         return find_robot_laws(table, START, progress=False)
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_by_differences() -> None:
     table = toy_table(1, lengths_cm=(5.0, 8.0), design={"tails": (2, 4)})
     for place in places():
@@ -68,6 +69,7 @@ def test_derivatives_are_those_by_differences() -> None:
         np.testing.assert_allclose(slopes, other, rtol=0.06, atol=2e-3 * largest, err_msg=place.name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "places"),
     [
@@ -104,6 +106,7 @@ def test_a_law_is_found_at_its_place_with_its_exponents(name: str, places: tuple
         assert motions[0]["omega_yr_bar"][0] == pytest.approx(motions[1]["omega_yr_bar"][0], rel=2e-3)
 
 
+@pytest.mark.slow
 def test_the_lever_of_a_side_force_is_found_and_handed_on() -> None:
     """What is handed on is a force and a couple, whose uncertainty has that of the lever."""
     described = laws_of_toy(4, **LAWS["Fx_wt_at_l"])
@@ -125,6 +128,7 @@ def test_the_lever_of_a_side_force_is_found_and_handed_on() -> None:
     assert abs(errors[couple] / errors[force] - 1) > 0.2
 
 
+@pytest.mark.slow
 def test_a_law_depends_on_what_the_table_notes() -> None:
     tables = []
     for seed, kelvin in enumerate((-5.0, 0.0, 5.0)):
@@ -146,6 +150,7 @@ def test_a_law_depends_on_what_the_table_notes() -> None:
     assert again.factor(law.fit.parameters) == pytest.approx(np.ones(len(again.runs)), rel=0.2)
 
 
+@pytest.mark.slow
 def test_files_of_a_law_are_read_back_and_there_are_none_where_nothing_is_missing(tmp_path: Path) -> None:
     described = laws_of_toy(4, **LAWS["Cyr"])
     assert [path.name for path in described.save(tmp_path)] == ["laws.json", "law.toml"]
@@ -180,6 +185,7 @@ def test_a_factor_in_the_speed_of_the_robot_is_read_from_the_inputs() -> None:
     assert low < -0.5 < high
 
 
+@pytest.mark.slow
 def test_a_side_force_at_the_disc_says_how_far_from_it_it_may_act() -> None:
     laws = laws_in(laws_of_toy(5, places=("Fx_wt", "Fx_wt_at_l"), law_Fx_wt_speed0_length0_tails1000=4.0))
     law = next(law for law in laws.kept if law.place.name == "Fx_wt")

@@ -56,6 +56,7 @@ def dense(models: LinearModels, residual: Floats, columns: Floats) -> tuple[floa
     return best[1:]
 
 
+@pytest.mark.slow
 def test_gains_weights_and_shares_are_those_of_dense_matrices() -> None:
     models, residual = design(), residuals(60)
     fits = models.fit(residual)

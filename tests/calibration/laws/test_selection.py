@@ -52,6 +52,7 @@ def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(calibration.laws.selection, "_LAW_DRAWS", 100)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_draws")
 def test_p_values_of_a_search_are_uniform_where_there_is_no_law() -> None:
     searches = [searched(noise(seed)) for seed in range(80)]
@@ -109,6 +110,7 @@ def described() -> tuple[RobotLaws, Laws, Selection]:
     return found, found.laws, found.laws.selection
 
 
+@pytest.mark.slow
 def test_the_record_has_what_the_choice_costs() -> None:
     found, laws, selection = described()
     record = found.to_dict()

@@ -61,6 +61,7 @@ def error_of(knowledge: str = "sure") -> PathError:
     return path_errors(wanted_paths(["circle:1.2l"], GIVEN), GIVEN, CORRECTED, known[knowledge])[0]
 
 
+@pytest.mark.slow
 def test_the_error_is_that_of_a_replay_in_time_steps() -> None:
     error = error_of()
     carried = error.carried_out["as_given"]
@@ -99,6 +100,7 @@ def test_the_corrected_robot_s_plan_leads_along_the_path_and_the_other_does_not(
     assert "cm rms" in error.sentence
 
 
+@pytest.mark.slow
 def test_a_less_certain_calibration_states_wider_errors_and_a_current_carries_the_robot() -> None:
     """Only the corrected plan knows the current."""
     sure, unsure, carried = (error_of(known).carried_out for known in ("sure", "unsure", "in a current"))
@@ -155,6 +157,7 @@ def test_a_verdict_and_its_report_have_the_error_on_a_path(tmp_path: Path) -> No
     assert "too small" in seen
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model", "few_candidates")
 def test_the_command_states_it_on_the_paths_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     toy_table(3, lengths_cm=(6.0, 9.0)).to_csv(tmp_path / "t.csv", index=False)

@@ -47,6 +47,7 @@ def with_errors(result: Verdict, *, before: float, after: float, p_value: float 
     return replace(result, errors=replace(result.errors, rms=rms, p_value=p_value))
 
 
+@pytest.mark.slow
 def test_a_report_is_in_the_words_and_units_of_a_lab_with_what_to_do_next_first(tmp_path: Path) -> None:
     """verdict.json stays in SI units; only what is shown has others."""
     result = number()
@@ -150,6 +151,7 @@ def test_rivals_are_told_apart_by_runs_that_are_worth_making_and_a_command(tmp_p
     assert "14 %" not in seen.text
 
 
+@pytest.mark.slow
 def test_a_pull_that_is_not_taken_to_be_wrong_has_its_reason(tmp_path: Path) -> None:
     """And a report without a claim compares no model with itself."""
     runs, plain = read_measurements(toy_table(3)), none()

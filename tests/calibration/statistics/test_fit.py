@@ -120,6 +120,7 @@ def test_mistracked_runs_do_not_raise_the_noise() -> None:
     assert np.mean(held_out) == pytest.approx(1, abs=0.15)
 
 
+@pytest.mark.slow
 def test_p_values_with_mistracked_runs_are_spread_evenly() -> None:
     p_values = []
     for seed in range(30):

@@ -60,6 +60,7 @@ def test_an_excluded_row_is_named_with_its_line(tmp_path: Path) -> None:
     assert runs.excluded == ("row 5 (line 8): l_cm = nan is not a finite number",)
 
 
+@pytest.mark.slow
 def test_a_missing_table_is_refused_before_anything_slow_is_loaded() -> None:
     code = """
 import sys

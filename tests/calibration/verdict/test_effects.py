@@ -103,6 +103,7 @@ def test_fits_arrive_along_a_valley() -> None:
     assert from_preset.deviance == pytest.approx(from_truth.deviance, abs=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("few", [True, pytest.param(False, marks=pytest.mark.rest)], ids=["few", "all"])
 def test_two_effects_are_found_as_a_pair(few: bool) -> None:
     result = calibrated(toy_table(31, left_right_bias=0.15, **{DRAG: 5.0}), few=few)
@@ -186,6 +187,7 @@ def test_an_effect_that_changes_nothing_says_so(tmp_path: Path) -> None:
     assert "e+150" not in text
 
 
+@pytest.mark.slow
 def test_the_held_out_session_has_no_say_judges_and_is_used_in_the_end() -> None:
     """Ruining it changes the reported errors and the last fit, which has all runs, and nothing else."""
     table, result = toy_table(5, **{DRAG: SIZE}), effect()

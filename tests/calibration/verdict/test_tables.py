@@ -159,6 +159,7 @@ def test_mistracked_runs_have_little_weight_and_are_named() -> None:
     assert record["rows_of_little_weight"] == list(result.conditions.little_weight)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model", "few_candidates")
 def test_half_of_a_table_does_not_go_missing_without_a_word(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

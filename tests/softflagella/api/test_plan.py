@@ -28,6 +28,7 @@ def calibrated_file(tmp_path: Path) -> Path:
     return tmp_path / "robot.toml"
 
 
+@pytest.mark.slow
 def test_a_robot_in_any_form_has_the_plan_of_the_planner(calibrated_file: Path) -> None:
     exact, wanted = (plan(sf.circle(1.5), ROBOT, knowledge=known) for known in (None, KNOWN))
     for robot in (ROBOT, "paper-control"):
@@ -37,11 +38,13 @@ def test_a_robot_in_any_form_has_the_plan_of_the_planner(calibrated_file: Path) 
         assert given.stated_error == wanted.stated_error > exact.stated_error
 
 
+@pytest.mark.slow
 def test_a_plan_to_a_goal_is_that_of_the_planner(calibrated_file: Path) -> None:
     wanted = to_goal(START, GOAL, ROBOT, knowledge=KNOWN)
     assert sf.to_goal(START, GOAL, calibrated_file).to_dict() == wanted.to_dict()
 
 
+@pytest.mark.slow
 def test_a_path_in_any_form_has_its_unit(tmp_path: Path) -> None:
     square = 33 * np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
     np.savetxt(tmp_path / "cm.csv", square, delimiter=",", header="x_cm,y_cm", comments="")
@@ -95,6 +98,7 @@ def test_every_planning_function_takes_the_robot_s_own_table(monkeypatch: pytest
     assert sf.plan(sf.circle(1.5), robot).tracked.model != own
 
 
+@pytest.mark.slow
 def test_a_track_is_checked_against_a_plan_in_any_form(tmp_path: Path) -> None:
     result = sf.plan(sf.circle(1.0), ROBOT, objective="flips")
     track = sf.replay(result)
@@ -110,6 +114,7 @@ def test_a_track_is_checked_against_a_plan_in_any_form(tmp_path: Path) -> None:
         sf.check(result, camera.drop(columns="x_cm"))
 
 
+@pytest.mark.slow
 def test_a_goal_plan_is_written_with_its_goal_and_checked_as_its_plan(tmp_path: Path) -> None:
     names = [path.name for path in sf.write_plan(goal(), tmp_path)]
     assert names[-2:] == ["goal.json", "goal.svg"]

@@ -96,6 +96,7 @@ def test_runs_that_cannot_be_are_refused(runs: pd.DataFrame, words: str) -> None
         robot_rows(runs, ROBOT)
 
 
+@pytest.mark.slow
 def test_a_response_in_lab_units(file: Path) -> None:
     both = sf.response([ROBOT, file])
     alone = sf.response(file)
