@@ -170,11 +170,19 @@ def dataset_config(made: Path, out: Path) -> str:
 
 
 def surrogate_train(made: Path, out: Path) -> str:
-    """Learn rows that were not simulated, of robots with two tails."""
+    """Learn rows that were not simulated, of robots with two tails, by the smallest networks."""
+    from surrogate.networks import training_loop  # loads torch
+    from surrogate.training import fit_response, fit_wrench
+
     sweep = design(100)
     sweep = replace(sweep, axes={**sweep.axes, "N": Axis(2, 2, "integer")})
     build(sweep, str(out / "data"), jobs=1, title="", simulate=invented)
-    done("surrogate", "train", out / "data", "--out", out / "model.safetensors", "--epochs", 2)
+    small = training_loop.Settings(width=8, depth=1, members=1, epochs=2, iterations=2)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fit_wrench, "_GAP", small)
+        patch.setattr(fit_response, "SETTINGS", small)
+        patch.setattr(training_loop, "Settings", lambda: small)
+        done("surrogate", "train", out / "data", "--out", out / "model.safetensors", "--epochs", 2)
     assert load(out / "model.safetensors").provenance["rows"]["train"] > 50
     assert not (out / "model.safetensors.states").exists()
     return "held-out error on"

@@ -180,7 +180,7 @@ def _little_work(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @st.composite
 def robots(draw: st.DrawFn, *extra: str) -> dict[str, float]:
-    """Replace one to three columns of the control example by number."""
+    """Replace one to three columns of the control example by anything."""
     values: dict[str, float] = {**CONTROL, **dict.fromkeys(extra, 1.0)}
     for name in draw(st.lists(st.sampled_from((*INPUTS, *extra, *catalogue())), min_size=1, max_size=3)):
         values[name] = draw(number)

@@ -37,6 +37,7 @@ from tests.calibration.toy_tables import (
     START,
     calibrated,
     few_places,
+    laws_of_toy,
     toy_swimmer,
     toy_table,
     verdict_of,
@@ -222,9 +223,9 @@ def test_new_runs_decide_between_two_laws() -> None:
 
 @pytest.mark.slow
 def test_the_runs_at_each_input_lie_on_the_law() -> None:
-    verdict = described("Mz_wh")
-    law = next(one for one in laws_of(verdict).kept if one.place.name == "Mz_wh")
-    used = verdict.conditions.split.fitted
+    found = laws_of_toy(4, **HIDDEN["Cyr"])
+    assert found.laws is not None
+    law, used = next(one for one in found.laws.kept if one.place.name == "Cyr"), found.study.split.fitted
     curves = dependences(law, used)
     assert [curve.symbol for curve in curves] == ["ω", "l", "N"]
     pulls = []
