@@ -1,7 +1,6 @@
 """Every reader, given anything: it ends with a result, or with one line that names the file.
 
-The formats and the mutations are those of `tests.oracles`. The benchmark `damaged_files` tries many more
-mutations, and limits time and memory.
+The formats and the mutations are those of `tests.oracles`.
 """
 
 from __future__ import annotations
@@ -19,21 +18,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.oracles.file_formats import FORMATS, FileFormat, judged
-from tests.oracles.mutations import changed_content
+from tests.oracles.file_formats import FORMATS, judged
 
-CASES, FEW = 60, 10  # mutations of a format; of one whose reader takes more than 10 ms
+CASES, FEW = 40, 5  # mutations of a format; of one whose reader takes more than 10 ms
 COSTLY = (
-    "camera tracks",
-    "runs of camera tracks",
-    "replayed track",
-    "plan to track",
-    "table of one robot, sealed",
+    "camera tracks", "runs of camera tracks", "replayed track", "plan to track", "table of one robot, sealed",
     "model, sealed",
-)
+)  # fmt: skip
 FILES = {name: form for name, form in FORMATS.items() if form.seal is None}
-TEXTS = {name: form for name, form in FILES.items() if form.tokens and name != "model"}
-SEALED = {name: form for name, form in FORMATS.items() if form.seal is not None}
+TEXTS = {name: form for name, form in FILES.items() if form.tokens and name not in {"model", "plan to track"}}
 
 few = settings(
     max_examples=15, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
@@ -47,40 +40,20 @@ values = st.recursive(
 )
 
 
-def replaced(form: FileFormat, path: Path, pattern: str, text: str) -> bool:
-    """Replace what matches a pattern in the example's file, and read it."""
-    data = next(iter(form.example().values())).decode()
-    changed, times = re.subn(pattern, lambda _: text, data)
-    assert times
-    path.write_bytes(changed.encode("utf-8", errors="surrogatepass"))
-    return judged(form, path)
-
-
 @pytest.mark.parametrize("name", FORMATS)
-def test_the_examples_are_read(name: str, tmp_path: Path) -> None:
-    assert judged(FORMATS[name], FORMATS[name].install(tmp_path))
-
-
-@pytest.mark.parametrize("name", FORMATS)
-def test_mutated_files_are_read_or_refused(name: str, tmp_path: Path) -> None:
-    _try(name, range(FEW if name in COSTLY else CASES), tmp_path)
-
-
-def _try(name: str, cases: range, folder: Path) -> None:
+def test_examples_are_read_and_mutated_files_are_read_or_refused(name: str, tmp_path: Path) -> None:
     form = FORMATS[name]
-    path = form.install(folder)
-    for case in cases:
-        path.write_bytes(form.mutated(Random(f"{name} {case}")))
+    path = form.install(tmp_path)
+    assert judged(form, path)
+    for case in range(FEW if name in COSTLY else CASES):
+        data = form.mutated(Random(f"{name} {case}"))
+        path.write_bytes(data)
         try:
             judged(form, path)
         except BaseException as error:
             error.add_note(f"case {case} of {name!r}")
             raise
-
-
-def test_the_same_seed_gives_the_same_file() -> None:
-    for form in (FORMATS["robot"], SEALED["sweep.json, sealed"]):
-        assert form.mutated(Random(3)) == form.mutated(Random(3)) != form.mutated(Random(4))
+    assert data == form.mutated(Random(f"{name} {case}"))  # the same seed, the same file
 
 
 @pytest.mark.parametrize("name", TEXTS)
@@ -96,21 +69,6 @@ def test_any_word_in_place_of_a_value(name: str, data: st.DataObject, tmp_path: 
     written = data.draw(st.one_of(values.map(json.dumps), numbers.map(str), st.text(max_size=8)))
     changed = text[: place.start()] + written + text[place.end() :]
     path.write_bytes(changed.encode("utf-8", errors="surrogatepass"))
-    judged(form, path)
-
-
-@pytest.mark.parametrize("name", [name for name in SEALED if name != "model, sealed"])
-@few
-@given(data=st.data())
-def test_any_value_of_a_forged_file(name: str, data: st.DataObject, tmp_path: Path) -> None:
-    form = FORMATS[name]
-    assert form.seal is not None
-    assert form.content is not None
-    path = form.install(tmp_path)
-    content = changed_content(form.content(), Random(data.draw(st.integers(0, 9))))
-    if isinstance(content, dict) and content:
-        content[data.draw(st.sampled_from(sorted(content)))] = data.draw(values)
-    path.write_bytes(form.seal(content))
     judged(form, path)
 
 
@@ -153,10 +111,13 @@ ONCE = [  # format, pattern, what replaced it: each was another error than an In
 ]
 
 
-@pytest.mark.parametrize(("name", "pattern", "text"), ONCE)
+@pytest.mark.parametrize(("name", "pattern", "text"), ONCE, ids=range(len(ONCE)))
 def test_what_once_ended_otherwise(name: str, pattern: str, text: str, tmp_path: Path) -> None:
     path = FORMATS[name].install(tmp_path)
-    assert not replaced(FORMATS[name], path, pattern, text)
+    changed, times = re.subn(pattern, lambda _: text, path.read_text())
+    assert times
+    path.write_bytes(changed.encode("utf-8", errors="surrogatepass"))
+    assert not judged(FORMATS[name], path)
 
 
 def _set(name: str, value: Any) -> Callable[[Any], None]:
@@ -216,7 +177,6 @@ def test_mutations_that_once_ended_otherwise(name: str, case: int, tmp_path: Pat
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
 def test_a_truncated_parquet_file_is_refused(share: float, tmp_path: Path) -> None:
-    """It was an OSError."""
     form = FORMATS["table of robots, Parquet"]
     path = form.install(tmp_path)
     data = path.read_bytes()

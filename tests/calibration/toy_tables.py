@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -10,9 +13,13 @@ import pytest
 import calibration.swimmer.swimmer
 import calibration.swimmer.synthetic_table
 import sim.motion.batches
+from calibration.laws import law_fits
+from calibration.laws.places import place_named
+from calibration.report.robot_laws import RobotLaws, find_robot_laws
+from calibration.report.robot_verdict import RobotVerdict
 from calibration.swimmer.candidate_effects import influences
 from calibration.swimmer.head_correction import learn_head_correction
-from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.possible_runs import Owned
 from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
@@ -25,10 +32,12 @@ from tests.shared import shared
 
 START = PRESETS["paper-measured"]
 TRUTH = replace(START, C_t=3.1, C_r=2.4, C_yr=4.4)
+DRAG = "end_over_end_drag"
 
 LENGTHS_CM = (5.0, 8.0, 11.0)
 FEW_DRAWS = 200  # of the bootstrap, where no rate is asserted
-FEW_CANDIDATES = ("end_over_end_drag", "left_right_bias", "natural_curvature", "tail_spin_drag")
+FEW_CANDIDATES = (DRAG, "left_right_bias", "natural_curvature", "tail_spin_drag")
+FEW_PLACES = ("Cyr", "Ct", "Fx_wt", "Fx_wt_at_l", "Mz_wh")
 
 
 def install_toy(patch: pytest.MonkeyPatch) -> None:
@@ -41,9 +50,9 @@ def install_toy(patch: pytest.MonkeyPatch) -> None:
         patch.setattr(sim.motion.batches, name, refuse_to_simulate)
 
 
-def install_few_candidates(patch: pytest.MonkeyPatch) -> None:
+def install_few_candidates(patch: pytest.MonkeyPatch, names: Sequence[str] = FEW_CANDIDATES) -> None:
     """Let every SwimmerModel search a few effects only, where the number of candidates is not the subject."""
-    few = {name: influence for name, influence in influences().items() if name in FEW_CANDIDATES}
+    few = {name: influence for name, influence in influences().items() if name in names}
     patch.setattr(calibration.swimmer.swimmer, "influences", lambda: few)
 
 
@@ -51,22 +60,93 @@ def refuse_to_simulate(*_: object, **__: object) -> None:
     raise AssertionError("a test on the toy simulated")
 
 
-def toy_table(seed: int, *, lengths_cm: tuple[float, ...] = LENGTHS_CM, **effects: float) -> pd.DataFrame:
-    return make_table(replace(TRUTH, effects=effects), seed=seed, lengths_cm=lengths_cm, title="")
+@contextmanager
+def on_the_toy(*, few: bool | Sequence[str] = False) -> Iterator[None]:
+    """The toy in place of the simulator, with all candidates or few, which may be named."""
+    with pytest.MonkeyPatch.context() as patch:
+        install_toy(patch)
+        if few:
+            install_few_candidates(patch, FEW_CANDIDATES if few is True else few)
+        yield
+
+
+def toy_table(
+    seed: int, *, lengths_cm: Sequence[float] = LENGTHS_CM, truth: Robot = TRUTH,
+    design: dict[str, Any] | None = None, **effects: float,
+) -> pd.DataFrame:  # fmt: skip
+    """Make a table of the true robot with these effects; a design may have what `make_table` takes."""
+    with on_the_toy():
+        robot = replace(truth, effects=effects)
+        return make_table(robot, seed=seed, lengths_cm=lengths_cm, title="", **design or {})
 
 
 def toy_swimmer(table: pd.DataFrame, robot: Robot = START, own: Owned | None = None) -> SwimmerModel:
     return SwimmerModel(robot, read_measurements(table), solver=toy.SOLVER, own=own or {})
 
 
-def calibrated(table: pd.DataFrame, *, seed: int = 0, draws: int = FEW_DRAWS) -> Verdict:
-    correction = learn_head_correction
-    return calibrate(toy_swimmer(table), correction=correction, seed=seed, draws=draws, progress=False)
+def calibrated(
+    table: pd.DataFrame, *, few: bool | Sequence[str] = False, robot: Robot = START, draws: int = FEW_DRAWS,
+    **options: Any,
+) -> Verdict:  # fmt: skip
+    """Calibrate the toy with a table."""
+    with on_the_toy(few=few):
+        model = toy_swimmer(table, robot)
+        return calibrate(model, correction=learn_head_correction, draws=draws, progress=False, **options)
 
 
 @shared
-def calibrated_toy(seed: int, *, lengths_cm: tuple[float, ...] = LENGTHS_CM, **effects: float) -> Verdict:
+def calibrated_toy(
+    seed: int, *, few: tuple[str, ...] = (), lengths_cm: tuple[float, ...] = LENGTHS_CM, **effects: float
+) -> Verdict:
     """The verdict of a toy table."""
+    return calibrated(toy_table(seed, lengths_cm=lengths_cm, **effects), few=few)
+
+
+def none() -> Verdict:
+    """A verdict on a table in which nothing is missing."""
+    return calibrated_toy(3, few=FEW_CANDIDATES)
+
+
+def effect() -> Verdict:
+    """A verdict that names the hidden drag."""
+    return calibrated_toy(5, few=FEW_CANDIDATES, **{DRAG: 5.0})
+
+
+def ambiguous() -> Verdict:
+    """A verdict on tails of one length, which do not tell the drag from another effect."""
+    few = (DRAG, "surface_couple", "tail_contact", "left_right_bias")
+    return calibrated_toy(1, few=few, lengths_cm=(8.0,), **{DRAG: 4.0})
+
+
+def wrong_scale() -> pd.DataFrame:
+    """A table by a camera whose scale is off by six of its standard deviations."""
+    table = toy_table(4)
+    return table.assign(R_yr_cm=1.06 * table["R_yr_cm"])
+
+
+@shared
+def number() -> Verdict:
+    """The verdict that the scale of the camera is wrong."""
+    return calibrated(wrong_scale(), few=True)
+
+
+def verdict_of(verdict: Verdict, runs: Measurements | pd.DataFrame) -> RobotVerdict:
+    """The verdict with its runs and its robot."""
+    runs = read_measurements(runs) if isinstance(runs, pd.DataFrame) else runs
+    return RobotVerdict(**vars(verdict), robot=START, runs=runs, table="runs.csv")
+
+
+@contextmanager
+def few_places(names: Sequence[str]) -> Iterator[None]:
+    """Let laws be looked for at some places only."""
     with pytest.MonkeyPatch.context() as patch:
-        install_toy(patch)
-        return calibrated(toy_table(seed, lengths_cm=lengths_cm, **effects))
+        patch.setattr(law_fits, "places", lambda **_: tuple(map(place_named, names)))
+        yield
+
+
+@shared
+def laws_of_toy(seed: int, *, places: tuple[str, ...] = FEW_PLACES, **effects: float) -> RobotLaws:
+    """The laws that describe a toy table of four lengths, at these places or all."""
+    with on_the_toy(), few_places(places) if places else nullcontext():
+        table = toy_table(seed, lengths_cm=(5.0, 7.0, 9.0, 11.0), **effects)
+        return find_robot_laws(table, START, progress=False)

@@ -40,6 +40,7 @@ from surrogate.table.lookup import FORMAT
 from surrogate.table.model_file import SHIPPED, load
 from tests.calibration.track import track
 from tests.dataset.sweeps import design, invented
+from tests.shared import shared
 
 ROBOT = PRESETS["paper-control"]
 
@@ -160,17 +161,17 @@ def sealed_model(content: Any) -> bytes:
     return tensor_file.packed(content, FORMAT)
 
 
-@cache
+@shared
 def plan_file() -> bytes:
     """Make a plan.json without its id, so that a mutation is read, not refused as one."""
     content = plan(circle(1.0), ROBOT).to_dict()
     return json.dumps({name: value for name, value in content.items() if name != "id"}).encode()
 
 
-@cache
+@shared
 def goal_file() -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        trip = to_goal((0, 0, 0), (3, 1, 1), ROBOT, keep_out=[Circle(1.0, -1.5, 0.3)])
+        trip = to_goal((0, 0, 0), (2.5, 0.5, 0.3), ROBOT, keep_out=[Circle(1.0, -1.5, 0.3)])
         write_goal_plan(trip, folder)
         return Path(folder, "goal.json").read_bytes()
 

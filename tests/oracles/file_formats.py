@@ -1,9 +1,8 @@
 """All formats of files that people bring: a valid example of each, and the function that reads it.
 
-The contract of every reader, whatever a file holds: it returns a result, or it raises an `InputError` of one line
-that names the file, or another one in its folder; nothing else, and no warning. `judged` checks it. Files that are
-protected by a hash appear twice: as they are, and as somebody could forge them, with the hash of their changed
-content (`seal`).
+Whatever a file holds, its reader returns a result, or raises an `InputError` of one line that names the file, or
+another one in its folder; nothing else, and no warning. Files that are protected by a hash appear twice: as they
+are, and as somebody could forge them, with the hash of their changed content (`seal`).
 """
 
 from __future__ import annotations
@@ -80,23 +79,14 @@ from tests.oracles.mutations import changed_content, mutated
 
 @dataclass(frozen=True)
 class FileFormat:
-    """A format of files.
+    """A format of files; with `seal`, entries of the content are changed, not bytes."""
 
-    Attributes:
-        example: a valid file, and the files beside it that its reader needs.
-        read: reads the file of this path; what it returns has been checked.
-        tokens: what matters to the format.
-        seal: makes the file, with its hash, of its content; then entries of the content are changed, not bytes.
-        content: of the example, if `seal` is given.
-        first_bytes: how much of the file is mutated: its header, where the rest is numbers.
-    """
-
-    example: Callable[[], Files]
-    read: Callable[[Path], object]
-    tokens: tuple[bytes, ...] = ()
-    seal: Callable[[Any], bytes] | None = None
-    content: Callable[[], Any] | None = None
-    first_bytes: int | None = None
+    example: Callable[[], Files]  # a valid file, and the files beside it that its reader needs
+    read: Callable[[Path], object]  # reads the file of this path, and checks what it returns
+    tokens: tuple[bytes, ...] = ()  # what matters to the format
+    seal: Callable[[Any], bytes] | None = None  # makes the file, with its hash, of its content
+    content: Callable[[], Any] | None = None  # of the example
+    first_bytes: int | None = None  # that are mutated: a header, where the rest is numbers
 
     def install(self, folder: Path) -> Path:
         """Write the example into a folder; return the path of the file that is read."""
@@ -115,12 +105,7 @@ class FileFormat:
 
 
 def judged(form: FileFormat, path: Path) -> bool:
-    """Read a file; return whether it was read (or refused).
-
-    Raises:
-        AssertionError: a refusal is not one line that names the file.
-        Exception: whatever the reader raised.
-    """
+    """Read a file; return whether it was read, or refused in one line that names it."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -136,9 +121,6 @@ def judged(form: FileFormat, path: Path) -> bool:
 def _finite(*values: Any) -> None:
     for value in values:
         assert np.isfinite(np.asarray(value, dtype=float)).all(), "a result is not finite"
-
-
-# Robots and sweeps
 
 
 def _read_robot(path: Path) -> None:
@@ -163,9 +145,6 @@ def _read_design(path: Path) -> None:
     _finite(*sweep.with_rows(4).points().values())
 
 
-# Data sets
-
-
 def _read_rows(path: Path) -> None:
     for batch in batches(path.parent):
         assert batch.num_rows
@@ -185,9 +164,6 @@ def _read_shard(path: Path) -> None:
         raise InputError(f"{path}: {bad}") from None
 
 
-# Look-up tables
-
-
 def _read_robot_table(path: Path) -> None:
     table = load_robot_table(path)
     columns = {name: np.array([value]) for name, value in table.robot.items()}
@@ -198,9 +174,6 @@ def _read_robot_table(path: Path) -> None:
 
 def _read_model(path: Path) -> None:
     _finite(*load(path).query({name: np.array([value]) for name, value in ROBOT.group_values().items()}).values())
-
-
-# Paths, regions and plans
 
 
 def _read_path(path: Path) -> None:
@@ -229,9 +202,6 @@ def _read_track(path: Path) -> None:
     with naming(path):
         error = tracking_error(content, read_table(path))
     _finite(error.rms, error.largest, error.raw_rms)
-
-
-# Measurements
 
 
 def _read_runs(path: Path) -> None:

@@ -6,41 +6,28 @@ With the pitch angle ψ, tan ψ = 2πR/λ, and the contour length L/cos ψ,
     thrust/(μΩR²) = (ζ⊥ − ζ∥) sin ψ cos ψ × length/R,
     torque/(μΩR³) = (ζ⊥ cos²ψ + ζ∥ sin²ψ) × length/R,    drag/(μUR) = (ζ⊥ sin²ψ + ζ∥ cos²ψ) × length/R,
 
-with ζ∥ = 2π/(ln(2λ/a) − ½), ζ⊥ = 4π/(ln(2λ/a) + ½) after Gray and Hancock, or 2π/ln q, 4π/(ln q + ½) with
-q = 0.18 λ/(a cos ψ) after Lighthill. Both leave out the flow that one part of the wire makes at another part:
-the Stokeslets of `sim.mechanics.flow`, spread over √e a, which is slender-body theory (Keller and Rubinow 1976).
-
-A table has the columns lambda_over_R, thrust_over_etaOmR2, torque_over_etaOmR3 and drag_over_etaUR, and one row
-for each helix. Rodenborn et al. (2013) measured such helices.
+with ζ∥ = 2π/(ln(2λ/a) − ½), ζ⊥ = 4π/(ln(2λ/a) + ½) after Gray and Hancock. They leave out the flow that one part
+of the wire makes at another part: the Stokeslets of `sim.mechanics.flow`, spread over √e a, which is slender-body
+theory (Keller and Rubinow 1976). Rodenborn et al. (2013) measured such helices.
 """
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 
 from sim.arrays import Floats
 from sim.compiling import compiled
-from sim.io.errors import InputError
-from sim.io.tables import read_table
 from sim.mechanics.stokeslets import stokeslets
 
 RADIUS, LENGTH, WIRE = 6.3, 130.0, 0.397  # mm, of Rodenborn et al. (2013)
-COLUMNS = ("thrust_over_etaOmR2", "torque_over_etaOmR3", "drag_over_etaUR")
 PIECES = 480
 
 
-def resistive(pitch: Floats, *, lighthill: bool = False) -> Floats:
+def resistive(pitch: Floats) -> Floats:
     """Compute thrust, torque, drag of helices of pitch λ/R (m,), (m, 3), by resistive force theory."""
     angle = np.arctan(2 * np.pi / pitch)
-    wire, length = WIRE / RADIUS, LENGTH / RADIUS / np.cos(angle)
-    if lighthill:
-        log = np.log(0.18 * pitch / (wire * np.cos(angle)))
-        parallel, perp = 2 * np.pi / log, 4 * np.pi / (log + 0.5)
-    else:
-        log = np.log(2 * pitch / wire)
-        parallel, perp = 2 * np.pi / (log - 0.5), 4 * np.pi / (log + 0.5)
+    length, log = LENGTH / RADIUS / np.cos(angle), np.log(2 * pitch * RADIUS / WIRE)
+    parallel, perp = 2 * np.pi / (log - 0.5), 4 * np.pi / (log + 0.5)
     s, c = np.sin(angle), np.cos(angle)
     forces = [(perp - parallel) * s * c, perp * c**2 + parallel * s**2, perp * s**2 + parallel * c**2]
     return np.stack(forces, 1) * length[:, None]
@@ -79,26 +66,8 @@ def _mobility(nodes: Floats, at: Floats, spread: float) -> Floats:
         start, end = (nodes[j, 0], nodes[j, 1], nodes[j, 2]), (nodes[j + 1, 0], nodes[j + 1, 1], nodes[j + 1, 2])
         for i in range(m):
             place = (at[i, 0], at[i, 1], at[i, 2])
-            x = stokeslets(place, start, end, (1.0, 0.0, 0.0), spread)
-            y = stokeslets(place, start, end, (0.0, 1.0, 0.0), spread)
-            z = stokeslets(place, start, end, (0.0, 0.0, 1.0), spread)
-            for c in range(3):
-                matrix[3 * i + c, 3 * j], matrix[3 * i + c, 3 * j + 1], matrix[3 * i + c, 3 * j + 2] = (
-                    x[c],
-                    y[c],
-                    z[c],
-                )
+            for k, force in enumerate(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))):
+                velocity = stokeslets(place, start, end, force, spread)
+                for c in range(3):
+                    matrix[3 * i + c, 3 * j + k] = velocity[c]
     return matrix
-
-
-def read_helices(source: str | Path) -> tuple[Floats, Floats]:
-    """Read pitch λ/R (m,) and measured thrust, torque, drag (m, 3).
-
-    Raises:
-        InputError: a column is missing.
-    """
-    table = read_table(source)
-    for column in ("lambda_over_R", *COLUMNS):
-        if column not in table:
-            raise InputError(f"the table has no column {column!r}")
-    return table["lambda_over_R"].to_numpy(dtype=float), table[list(COLUMNS)].to_numpy(dtype=float)

@@ -29,27 +29,15 @@ _COMMON = (
     b"../../etc/passwd", b"$\\frac$", b"=1+1", b"A" * 10_000,
 )  # fmt: skip
 _PAIRS = (
-    (b"[", b"]"),
-    (b"{", b"}"),
-    (b"(", b")"),
-    (b"<g>", b"</g>"),
-    (b'{"a":', b"}"),
-    (b'"', b'"'),
-    (b"a.", b""),
-)
+    (b"[", b"]"), (b"{", b"}"), (b"(", b")"), (b"<g>", b"</g>"), (b'{"a":', b"}"), (b'"', b'"'), (b"a.", b""),
+)  # fmt: skip
 _ENCODINGS = ("utf-16", "utf-16-le", "utf-8-sig", "utf-32", "latin-1", "utf-7", "cp500")
 
 Change = Callable[[bytes, Sequence[bytes], Random], bytes]
 
 
 def mutated(data: bytes, tokens: Sequence[bytes], random: Random) -> bytes:
-    """Mutate a file one to five times.
-
-    Args:
-        data: content of a valid file.
-        tokens: words and signs that matter to the format.
-        random: its state decides all.
-    """
+    """Mutate a file one to five times, with the words and signs that matter to its format."""
     for _ in range(random.choice((1, 1, 1, 2, 3, 5))):
         data = random.choice(_CHANGES)(data, tokens, random)[:MOST]
     return data

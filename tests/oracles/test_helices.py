@@ -6,13 +6,15 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from tests.oracles.helices import read_helices, resistive, with_flow
+from tests.oracles.helices import resistive, with_flow
 
 MEASURED = Path(__file__).parents[3] / "shared" / "measured"
 
 
+@pytest.mark.slow
 def test_a_helix_with_the_flow_of_its_parts() -> None:
     """Converged in the number of segments; a straight wire drags as Tirado and Garcia de la Torre (1979) say."""
     pitch = np.array([2.226, 9.811])
@@ -26,7 +28,9 @@ def test_a_helix_with_the_flow_of_its_parts() -> None:
 @pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured tables are not on this machine")
 def test_resistive_force_theory_fails_for_a_helix_and_flow_explains_it() -> None:
     """Rodenborn et al. (2013): thrust three times too large at the shortest pitch; 6 % with the flow."""
-    pitch, measured = read_helices(MEASURED / "published" / "rodenborn_fig2.csv")
+    table = pd.read_csv(MEASURED / "published" / "rodenborn_fig2.csv")
+    pitch = table["lambda_over_R"].to_numpy()
+    measured = table[["thrust_over_etaOmR2", "torque_over_etaOmR3", "drag_over_etaUR"]].to_numpy()
     thrust = resistive(pitch)[:, 0] / measured[:, 0]
     assert thrust[0] == pytest.approx(3.0, abs=0.1)
     assert thrust[-1] < 0.8

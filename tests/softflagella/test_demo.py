@@ -1,32 +1,223 @@
-"""The demo runs independent steps side by side, and loses neither their output nor their errors."""
+"""The demo: its page, in a lab's words; steps that run side by side; and what a correction is worth."""
 
+from __future__ import annotations
+
+import re
 import subprocess
+from dataclasses import replace
+from pathlib import Path
+from urllib.parse import unquote
 
+import numpy as np
+import pandas as pd
 import pytest
 
+from planner.files.plan_files import write_plan
+from planner.files.plan_json import load_plan
+from planner.files.tracking_error import tracking_error
+from planner.paths.path import circle, polygon
+from planner.planning.plan import plan
+from sim.model.presets import PRESETS
+from sim.model.response import DWELLS
+from sim.motion.lab_units import lab_motion
+from sim.motion.steady import steady
+from softflagella.__main__ import command
 from softflagella.demo import _beside
+from softflagella.demo_figures import draw_circles, draw_schedule, draw_steered, in_lab_units
+from softflagella.demo_files import documentation, header_excerpt
+from softflagella.demo_page import Results, write_page
+from softflagella.replanning import Steered, gap_closed, steer
+from surrogate.table.model_file import load
+from tests.calibration.toy_tables import DRAG, ambiguous, none, toy_swimmer, toy_table
+from tests.page_text import PageText
+
+ROBOT = PRESETS["paper-control"]
+SECTIONS = [
+    "The robot",
+    "Its motion",
+    "Three paths, planned without simulating",
+    "The schedule itself",
+    "A small sweep",
+    "Look-up table against simulator",
+    "Calibration with a table of runs: hidden effect",
+    "Calibration with a table of runs: nothing hidden",
+    "Planning again: what the correction is worth",
+    "With your own robot: three commands",
+]
 
 
-def test_output_of_a_command_beside_a_step_follows_the_output_of_the_step(capfd):
+def sweep_rows() -> pd.DataFrame:
+    """Rows of a small sweep, as the shipped table predicts them."""
+    rng = np.random.default_rng(1)
+    low, high = [2.0, 1.5, 1.0, 4.0, 3.0, 20.0, 3.0], [5.0, 3.5, 7.0, 9.0, 5.0, 45.0, 10.0]
+    names = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar")
+    rows = pd.DataFrame(rng.uniform(low, high, (24, 7)), columns=list(names))
+    rows = rows.assign(N=2 + np.arange(24) % 3, a_over_R=1.0)
+    motion = load().query({name: rows[name].to_numpy(float) for name in rows}, flag=True)
+    outputs = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "R_yr_over_l", "theta_deg", "v_x", "v_z")
+    return rows.assign(**{n: motion[n] for n in outputs}, converged=True, failed=False, touching=False)
+
+
+def write_demo(out: Path) -> None:
+    """Write a page with small results: a true plan, its prediction as its replay, and verdicts on the toy."""
+    planned = plan(circle(1.5), ROBOT, lookup=load())
+    plans = {}
+    for name in ("circle", "square", "triangle"):
+        write_plan(planned, out / "demo" / name)
+        record = load_plan(out / "demo" / name / "plan.json")
+        times = np.concatenate([[0.0], np.cumsum(record["dwell_s"])])
+        x, y, heading = np.array(record["predicted_poses"]).T
+        track = pd.DataFrame({"time_bar": times / ROBOT.time_scale, "time_s": times, "x_over_l": x, "y_over_l": y,
+                              "heading_rad": heading})  # fmt: skip
+        track.to_csv(out / "demo" / name / "track.csv", index=False)
+        plans[name] = (record, tracking_error(record, track))
+    loops = {
+        "hidden effect": (ambiguous(), toy_swimmer(toy_table(1, lengths_cm=(8.0,), **{DRAG: 4.0})).runs),
+        "nothing hidden": (none(), toy_swimmer(toy_table(3)).runs),
+    }
+    for name in loops:
+        case = out / "demo" / name.replace(" ", "-")
+        case.mkdir()
+        for file in ("report.html", "corrected.toml", "table.csv", "verdict.json"):
+            (case / file).touch()
+    for file in ("demo/robot.toml", "demo/model.md", "robot.html"):
+        (out / file).touch()
+    record, error = plans["square"]
+    shares = {"calibrated": 10.0, "corrected": 1.2, "truth known": 1.0}
+    groups = ROBOT.groups()
+    results = Results(
+        robot=ROBOT,
+        motions=[steady(replace(groups, omega_bar=sign * groups.omega_bar)) for sign in (1.0, -1.0)],
+        net_speed=np.linspace(0.01, 0.03, len(DWELLS)),
+        plans=plans,
+        rows=sweep_rows(),
+        small=load(),
+        loops=loops,
+        steered={
+            label: Steered(record, replace(error, rms=0.01 * share), error.track)
+            for label, share in shares.items()
+        },
+        seconds=200.0,
+    )
+    write_page(out / "demo.html", results)
+
+
+@pytest.mark.slow
+def test_a_stranger_finds_the_parts_of_the_page_in_order_in_the_words_of_a_lab(tmp_path: Path) -> None:
+    write_demo(tmp_path)
+    seen = PageText(tmp_path / "demo.html")
+    assert seen.headings == SECTIONS
+    assert [link for link in seen.links if link.startswith("#")] == [f"#section-{n}" for n in range(1, 11)]
+    names = re.findall(r"\b(?:omega_\w+|R_yr\w*|theta_\w+|v_[xz]|l_over_\w+|\w+_bar|\w+_over_l)\b", seen.text)
+    assert names == []
+    assert re.findall(r"/ ?l\b|\bl rms", seen.text) == []  # errors and axes are not in tail lengths
+    motion = {name: values[0] for name, values in lab_motion([ROBOT], steady(ROBOT.groups()).columns()).items()}
+    for value in (
+        "N = 2", "11 cm", "3.2 mm", "1.2 MPa", "43.3 rpm", "1.49 Pa s",
+        f"{motion['R_yr_cm']:.3g} cm", f"{motion['v_cm_s']:.3g} cm/s", f"{motion['theta_deg']:.3g}°",
+    ):  # fmt: skip
+        assert value in seen.text, value
+    assert re.search(r"\d mm rms", seen.text)
+    assert {"x [cm]", "heading [°]", "net speed [cm/min]", "motor speed [rpm]"} <= set(seen.words)
+    files = [unquote(link) for link in seen.links if not link.startswith("#")]
+    assert [file for file in files if not (tmp_path / file).exists()] == []
+    assert {
+        "demo/robot.toml", "demo/model.md", "demo/square/schedule.h", "demo/triangle/plan.json",
+        "demo/hidden-effect/report.html", "demo/nothing-hidden/corrected.toml", "robot.html",
+    } <= set(files)  # fmt: skip
+    assert any(file.endswith(("signs.md", "signs.html")) for file in files)
+    html = (tmp_path / "demo.html").read_text()  # one file in both colours
+    assert "prefers-color-scheme: dark" in html
+    assert html.count("<figure>") == html.count("<svg ") >= 15
+    assert html.count("<img") == 1  # the page that plans; figures are vectors
+    assert not re.search(r'(?:src|href)="https?:', html)
+    commands = [line.split()[1:] for line in "".join(seen.words).splitlines() if line.startswith("softflagella ")]
+    assert [words[0] for words in commands] == ["robot", "plan", "replay"]
+    for word, *further in commands:
+        command(word).parser(word).parse_args(further)
+
+
+def test_circles_are_drawn_to_scale() -> None:
+    motions = [steady(replace(ROBOT.groups(), omega_bar=sign * ROBOT.groups().omega_bar)) for sign in (1.0, -1.0)]
+    lines = draw_circles(ROBOT, motions).axes[0].get_lines()[:2]
+    for line, side in zip(lines, (1.0, -1.0), strict=True):
+        x, y = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+        assert np.ptp(x) / 2 == pytest.approx(100 * ROBOT.tail_length * float(motions[0].turn_radius[0]), rel=1e-3)
+        assert np.sign(y.mean()) == side  # a motor at +1 turns left
+        assert np.diff(y)[0] * side > 0  # and moves to the left
+
+
+def test_the_schedule_is_drawn_from_its_first_direction() -> None:
+    """Dwells of 2 s at +1 and 1 s at −1, then one long dwell, which the magnified interval shows."""
+    dwells = [2.0, 1.0] * 20 + [30.0] + [1.0, 2.0] * 20
+    track = pd.DataFrame({"time_s": np.arange(150.0), "heading_rad": np.zeros(150)})
+    for first in (1, -1):
+        figure = draw_schedule({"dwell_s": dwells, "first_direction": first}, track)
+        bars = figure.axes[1].collections
+        longest = [max(np.ptp(path.vertices[:, 0]) for path in collection.get_paths()) for collection in bars[:2]]
+        assert longest[0 if first == 1 else 1] == pytest.approx(30.0)
+        low, high = figure.axes[1].get_xlim()
+        assert low < 60.0 < high
+
+
+def test_rows_are_read_as_robots_with_this_head_and_silicone() -> None:
+    """The control robot's own row gives its own motion."""
+    motion = steady(ROBOT.groups()).columns()
+    rows = pd.DataFrame({name: [value] for name, value in ROBOT.group_values().items()})
+    lab = in_lab_units(rows, motion, ROBOT).iloc[0]
+    assert lab["l_cm"] == pytest.approx(11.0)
+    assert lab["omega_rpm"] == pytest.approx(43.26, rel=1e-3)
+    for name, values in lab_motion([ROBOT], motion).items():
+        assert lab[name] == pytest.approx(values[0])
+
+
+def test_the_excerpt_of_a_header_ends_with_its_first_numbers() -> None:
+    defined = "#define SCHEDULE_FIRST_DIRECTION (1)\n#define SCHEDULE_START_X -0.5\n"
+    macros = "#ifdef __AVR__\n#define SCHEDULE_TABLE(name) name\n#endif\n"
+    header = f"/* 1 */\n{defined}{macros}static x[] = {{\n    12, 34,\n    56,\n}};"
+    assert header_excerpt(header) == [*defined.splitlines(), "static x[] = {", "    12, 34,", "    …"]
+
+
+def test_without_a_checkout_there_are_no_links_to_the_documentation(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert len(documentation(tmp_path)) == 5
+    monkeypatch.setattr("softflagella.demo_files._DOCS", tmp_path / "docs")
+    assert documentation(tmp_path) == []
+
+
+def test_a_command_beside_a_step_prints_after_it_or_fails(capfd: pytest.CaptureFixture[str]) -> None:
     with _beside("--version"):
         print("the step")
-    lines = capfd.readouterr().out.splitlines()
-    assert lines[0].split() == ["softflagella", "--version"]
-    assert lines[1] == "the step"
-    assert lines[2].startswith("softflagella ")
-    assert len(lines) == 3
-
-
-def test_a_command_that_fails_beside_a_step_is_an_error_with_its_message(capfd):
+    first, second, third = capfd.readouterr().out.splitlines()
+    assert first.split() == ["softflagella", "--version"]
+    assert second == "the step"
+    assert third.startswith("softflagella ")
     with pytest.raises(subprocess.CalledProcessError), _beside("train", "no-such-folder", "--out", "m"):
         pass
     assert "no-such-folder" in capfd.readouterr().out.splitlines()[-1]
 
 
-def test_a_step_that_fails_ends_the_command_beside_it(monkeypatch):
-    started = []
+def test_a_step_that_fails_ends_the_command_beside_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[subprocess.Popen[str]] = []
     start = subprocess.Popen
-    monkeypatch.setattr(subprocess, "Popen", lambda *a, **k: started.append(start(*a, **k)) or started[0])
+    monkeypatch.setattr(subprocess, "Popen", lambda *a, **k: (started.append(start(*a, **k)), started[0])[1])
     with pytest.raises(KeyboardInterrupt), _beside("steady", "paper-control"):
         raise KeyboardInterrupt
     assert started[0].poll() is not None
+
+
+@pytest.mark.rest
+def test_the_right_model_brings_the_robot_back_on_its_path() -> None:
+    """A robot with end-over-end drag: planned without it, nearly with it, and with the truth."""
+    truth = replace(PRESETS["paper-control"], effects={"end_over_end_drag": 5.0})
+    models = {
+        "without": replace(truth, effects={}),
+        "nearly": replace(truth, effects={"end_over_end_drag": 4.9}),
+        "truth": truth,
+    }
+    steered = steer(models, truth, polygon(4, 2.5))
+    rms = [each.error.rms for each in steered.values()]
+    assert rms[0] > 5 * rms[2]
+    assert gap_closed(*rms) > 0.8
+    assert [len(draw_steered(run).axes[0].get_lines()) for run in steered.values()] == [3, 3, 3]

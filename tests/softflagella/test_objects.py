@@ -7,34 +7,33 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib import pyplot
 from matplotlib.figure import Figure
 
 import softflagella as sf
+from tests.softflagella.made import ROBOT, goal, own_table
 
-ROBOT = sf.load_robot("paper-control")
 CM = 100 * ROBOT.tail_length
 MAKE: dict[str, Callable[[], Any]] = {
     "robot": lambda: ROBOT,
     "robot with effects": lambda: replace(ROBOT, effects={name: 1.0 for name in list(sf.effects())[:3]}),
-    "plan": lambda: sf.plan(sf.polygon(4, side=3.0), ROBOT),
-    "goal": lambda: sf.to_goal((0, 0, 0), (4, 1, 0.5), ROBOT, keep_out=[sf.Circle(2.0, -0.8, 0.3)]),
-    "tracker": lambda: sf.Tracker(sf.plan(sf.circle(2.0), ROBOT)),
+    "plan": lambda: sf.plan(sf.circle(2.0), ROBOT),
+    "goal": goal,
+    "tracker": lambda: sf.Tracker(made("plan")),
     "table": sf.load_table,
-    "own table": lambda: sf.tabulate(ROBOT),
+    "own table": own_table,
 }
-_made: dict[str, Any] = {}
 
 
+@cache
 def made(name: str) -> Any:
-    """Make an object once."""
-    if name not in _made:
-        _made[name] = MAKE[name]()
-    return _made[name]
+    return MAKE[name]()
 
 
 def number(pattern: str, text: str) -> float:
@@ -57,13 +56,10 @@ def test_an_object_says_what_it_is_in_a_few_lines(name: str) -> None:
         data = re.search(r'src="data:image/png;base64,([^"]+)"', page)
         assert data
         assert base64.b64decode(data[1]).startswith(b"\x89PNG")
-
-
-@pytest.mark.parametrize("name", [name for name in MAKE if "robot" not in name])
-def test_pictures_go_on_given_axes(name: str) -> None:
-    axes = Figure().add_subplot()
-    assert made(name).plot(axes) is axes
-    assert axes.lines
+    if "robot" not in name:
+        axes = Figure().add_subplot()
+        assert thing.plot(axes) is axes
+        assert axes.lines
 
 
 def test_pictures_are_in_centimetres() -> None:
@@ -75,19 +71,14 @@ def test_pictures_are_in_centimetres() -> None:
     axes = tracker.plot(Figure().add_subplot())
     estimated = next(line for line in axes.lines if line.get_label() == "estimated")
     np.testing.assert_allclose(estimated.get_xydata()[0], CM * np.array(tracker.pose[:2]))
-
-
-def test_axes_are_made_where_none_are_given() -> None:
-    from matplotlib import pyplot
-
-    axes = made("plan").plot()
+    axes = plan.plot()  # none are given
     assert axes.figure.number in pyplot.get_fignums()
     pyplot.close(axes.figure)
 
 
 def test_a_plan_says_what_it_holds() -> None:
     plan, text = made("plan"), repr(made("plan"))
-    assert number(r"of # cm \(12 l\)", text) == pytest.approx(12 * CM)
+    assert number(r"of # cm \(12.6 l\)", text) == pytest.approx(4 * math.pi * CM, rel=0.01)
     assert number(r"# dwells of", text) == len(plan.dwells)
     assert number(r"dwells of # s", text) == pytest.approx(plan.minimum_dwell * ROBOT.time_scale, rel=0.01)
     assert number(r"more, # min", text) == pytest.approx(plan.seconds.sum() / 60, rel=0.01)
@@ -119,15 +110,14 @@ def test_a_goal_plan_says_where_it_ends() -> None:
     assert number(r"way of # cm", text) == pytest.approx(CM * goal.length, rel=0.01)
     assert text.endswith(repr(goal.plan))
     assert goal.to_frame().equals(goal.plan.to_frame())
-    assert goal.to_dict()["keep_out"] == [{"circle": [2.0, -0.8, 0.3]}]
+    assert goal.to_dict()["keep_out"] == [{"circle": [1.2, -1.5, 0.3]}]
 
 
 def test_a_tracker_says_what_the_motor_does() -> None:
     tracker = sf.Tracker(made("plan"))
     command = tracker.update(0.0)
-    assert number(r"motor \+1 until # s", repr(tracker)) == pytest.approx(
-        command.flip_at * ROBOT.time_scale, rel=0.01
-    )
+    until = number(r"motor \+1 until # s", repr(tracker))
+    assert until == pytest.approx(command.flip_at * ROBOT.time_scale, rel=0.01)
     assert "alarm: none" in repr(tracker)
     assert tracker.pose == pytest.approx(made("plan").start)
     command = tracker.update(command.flip_at)
@@ -136,29 +126,20 @@ def test_a_tracker_says_what_the_motor_does() -> None:
     assert set(tracker.to_dict()["learned"]) == set(tracker.learned)
 
 
-def test_a_robot_in_the_units_of_a_lab() -> None:
+def test_robots_and_tables_say_their_numbers_and_tables_are_saved_and_loaded(tmp_path: Path) -> None:
     text = repr(ROBOT)
     assert number(r"l = # cm", text) == 11
     assert number(r"motor # rpm", text) == pytest.approx(ROBOT.motor_speed * 30 / math.pi, rel=1e-3)
     assert number(r"unit of time # s", text) == pytest.approx(ROBOT.time_scale, rel=1e-3)
     assert list(sf.effects())[1] in repr(made("robot with effects"))
-
-
-def test_a_table_says_its_errors() -> None:
-    table, text = made("table"), repr(made("table"))
+    table, own, text = made("table"), made("own table"), repr(made("table"))
     assert table.identity in text
     assert number(r"yaw rate # %", text) == pytest.approx(100 * table.errors["omega_yr_bar"]["median"], rel=0.05)
     assert table.to_frame().loc["v_z", "median"] == table.errors["v_z"]["median"]
-    own = made("own table")
-    assert number(r"largest error # %", repr(own)) == pytest.approx(
-        100 * max(error["rms"] for error in own.errors.values()), rel=0.05
-    )
+    largest = 100 * max(error["rms"] for error in own.errors.values())
+    assert number(r"largest error # %", repr(own)) == pytest.approx(largest, rel=0.05)
     assert number(r"turn radius # l", repr(own)) == pytest.approx(own.steady["R_yr_over_l"][0], rel=1e-3)
     assert own.to_dict()["robot"] == own.robot
-
-
-@pytest.mark.parametrize("name", ["table", "own table"])
-def test_tables_are_saved_and_loaded(name: str, tmp_path: Path) -> None:
-    path = tmp_path / ("own.json" if name == "own table" else "model.safetensors")
-    made(name).save(path)
-    assert sf.load_table(path).identity == made(name).identity
+    for saved, file in ((table, "model.safetensors"), (own, "own.json")):
+        saved.save(tmp_path / file)
+        assert sf.load_table(tmp_path / file).identity == saved.identity

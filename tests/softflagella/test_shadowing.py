@@ -7,8 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from softflagella.shadowing import PACKAGES
 from tests.processes import LIMIT
 
@@ -20,33 +18,24 @@ def run_script(folder: Path, code: str, *, first: str = "") -> subprocess.Comple
     script = folder / "my_script.py"
     script.write_text(code)
     path = os.pathsep.join(part for part in (first, str(ROOT)) if part)
-    return subprocess.run(
-        [sys.executable, str(script)],
-        capture_output=True,
-        text=True,
-        cwd=folder,
-        timeout=LIMIT,
-        env={**os.environ, "PYTHONPATH": path},
-    )
+    environment = {**os.environ, "PYTHONPATH": path}
+    words = [sys.executable, str(script)]
+    return subprocess.run(words, capture_output=True, text=True, cwd=folder, timeout=LIMIT, env=environment)
 
 
-@pytest.mark.parametrize("name", PACKAGES)
-def test_a_file_beside_a_script_is_named(name: str, tmp_path: Path) -> None:
-    """It was an AttributeError or `'sim' is not a package`, from somewhere inside."""
-    file = tmp_path / f"{name}.py"
-    file.write_text("x = 1\n")
-    done = run_script(tmp_path, "import softflagella\n")
-    assert done.returncode != 0
-    last = done.stderr.splitlines()[-1]
-    assert last.startswith(f"ImportError: {file} hides the package '{name}' of softflagella ({ROOT / name})")
-    assert last.endswith("rename it, or run from another folder")
+def last_line(*given: object, first: str = "") -> str:
+    return run_script(*given, first=first).stderr.splitlines()[-1]  # type: ignore[arg-type]
 
 
-def test_a_package_beside_a_script_is_named(tmp_path: Path) -> None:
+def test_a_file_or_a_package_beside_a_script_is_named(tmp_path: Path) -> None:
+    assert {"sim", "dataset", "surrogate", "planner", "calibration"} == set(PACKAGES)
     (tmp_path / "planner").mkdir()
-    (tmp_path / "planner" / "__init__.py").write_text("")
-    last = run_script(tmp_path, "import softflagella\n").stderr.splitlines()[-1]
-    assert f"{tmp_path / 'planner' / '__init__.py'} hides the package 'planner'" in last
+    for name, file in (("sim", tmp_path / "sim.py"), ("planner", tmp_path / "planner" / "__init__.py")):
+        file.write_text("x = 1\n")
+        last = last_line(tmp_path, "import softflagella\n")
+        assert last.startswith(f"ImportError: {file} hides the package '{name}' of softflagella ({ROOT / name})")
+        assert last.endswith("rename it, or run from another folder")
+        file.unlink()
 
 
 def test_a_folder_without_code_hides_nothing(tmp_path: Path) -> None:
@@ -60,24 +49,25 @@ def test_a_folder_without_code_hides_nothing(tmp_path: Path) -> None:
 def test_a_folder_that_does_hide_a_package_is_named(tmp_path: Path) -> None:
     """Where softflagella is installed for development, another folder of the name comes first."""
     (tmp_path / "dataset").mkdir()
-    finder = (
-        "import sys\n"
-        "class Last:\n"
-        "    def find_spec(name, path=None, target=None):\n"
-        "        from importlib.machinery import PathFinder\n"
-        f"        return PathFinder.find_spec(name, [{str(ROOT)!r}]) if path is None else None\n"
-        f"sys.path.remove({str(ROOT)!r}); sys.path = [p for p in sys.path if p != {str(ROOT)!r}]\n"
-        "sys.meta_path.append(Last)\n"
-    )
-    last = run_script(tmp_path, finder + "import softflagella\n").stderr.splitlines()[-1]
-    assert f"{tmp_path / 'dataset'} hides the package 'dataset'" in last
+    code = f"""
+import sys
+from importlib.machinery import PathFinder
+from pathlib import Path
+class Last:
+    def find_spec(name, path=None, target=None):
+        return PathFinder.find_spec(name, [{str(ROOT)!r}]) if path is None else None
+sys.path = [p for p in sys.path if not Path(p, "softflagella").is_dir()]
+sys.meta_path.append(Last)
+import softflagella
+"""
+    assert f"{tmp_path / 'dataset'} hides the package 'dataset'" in last_line(tmp_path, code)
 
 
 def test_another_package_of_the_index_is_named(tmp_path: Path) -> None:
     installed = tmp_path / "site-packages"
     (installed / "dataset").mkdir(parents=True)
     (installed / "dataset" / "__init__.py").write_text("")
-    last = run_script(tmp_path, "import softflagella\n", first=str(installed)).stderr.splitlines()[-1]
+    last = last_line(tmp_path, "import softflagella\n", first=str(installed))
     assert f"{installed / 'dataset' / '__init__.py'} hides the package 'dataset'" in last
     assert "uninstall that package (pip uninstall dataset)" in last
 
@@ -86,4 +76,4 @@ def test_a_module_that_was_imported_before_is_named(tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "sim.py").write_text("")
     code = "import sys; sys.path.insert(0, 'other'); import sim; sys.path.remove('other'); import softflagella\n"
-    assert "hides the package 'sim'" in run_script(tmp_path, code).stderr.splitlines()[-1]
+    assert "hides the package 'sim'" in last_line(tmp_path, code)

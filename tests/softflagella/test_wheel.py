@@ -39,6 +39,7 @@ def data_files(root: Path) -> set[str]:
     return {str(f.relative_to(root)) for f in files if f.suffix not in CODE and "__pycache__" not in f.parts}
 
 
+@pytest.mark.rest
 def test_all_package_data_are_in_the_wheel(wheel: Path) -> None:
     expected = data_files(ROOT)
     assert {
@@ -48,7 +49,7 @@ def test_all_package_data_are_in_the_wheel(wheel: Path) -> None:
     assert data_files(wheel) == expected
 
 
-@pytest.mark.slow
+@pytest.mark.rest
 def test_the_demo_s_sweep_runs_from_the_wheel(wheel: Path, tmp_path: Path) -> None:
     """The demo's robot and its sweep, in another folder, from the unpacked wheel alone."""
     code = (

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.stats import binom
 
@@ -18,8 +15,8 @@ from calibration.attribution.wrong_numbers import beside_wrong_numbers, notable_
 from calibration.report.corrected_robot import corrected_robot
 from calibration.statistics.fit import fit
 from calibration.statistics.residual_tests import directions, examine_residual
-from calibration.statistics.statistical_model import Parameter, by_differences, start_values
-from calibration.statistics.study import Study, find_outliers, split_runs
+from calibration.statistics.statistical_model import by_differences, start_values
+from calibration.statistics.study import DRAWS, Study, find_outliers, split_runs
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, LENGTH, TACHOMETER
 from calibration.swimmer.swimmer import SwimmerModel
@@ -27,10 +24,21 @@ from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict_json import verdict_record
 from sim.io.errors import InputError
-from sim.model.robot import Robot
 from sim.model.uncertainty import Sigma
-from tests.calibration import toy
-from tests.calibration.toy_tables import FEW_DRAWS, START, TRUTH, calibrated, toy_swimmer, toy_table
+from tests.calibration.toy_tables import (
+    DRAG,
+    FEW_CANDIDATES,
+    FEW_DRAWS,
+    START,
+    TRUTH,
+    calibrated,
+    install_few_candidates,
+    none,
+    number,
+    on_the_toy,
+    toy_swimmer,
+    toy_table,
+)
 
 EXACT = {
     name: Sigma(0.0, False)
@@ -38,16 +46,18 @@ EXACT = {
 }
 
 
-def table_of(robot: Robot, seed: int) -> pd.DataFrame:
-    return make_table(robot, seed=seed, lengths_cm=(5.0, 8.0, 11.0), title="")
-
-
-@pytest.mark.parametrize("seed", [5, pytest.param(4, marks=pytest.mark.rest)])
-def test_a_stiffness_that_was_given_too_high_is_no_inertia(seed: int) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("names", [("inertia",), pytest.param((), marks=pytest.mark.rest)], ids=["few", "all"])
+def test_a_stiffness_that_was_given_too_high_is_no_inertia(
+    names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Tail drag 25 % above the formula is Young's modulus 20 % below; with the simulator on both sides."""
+    if names:
+        install_few_candidates(monkeypatch, names)
     softer = replace(TRUTH, youngs_modulus=0.8 * TRUTH.youngs_modulus)
-    model = SwimmerModel(START, read_measurements(make_table(softer, seed=seed, title="")))
+    model = SwimmerModel(START, read_measurements(make_table(softer, seed=5, title="")))
     result = calibrate(model, progress=False)
+    assert "inertia" in {c.effect.name for c in result.evidence.candidates}
     assert "inertia" not in result.effects
     assert result.verdict != "number"
     stiffness = next(p for p in result.fits.pulls if p.parameter.name == "youngs_modulus")
@@ -56,7 +66,6 @@ def test_a_stiffness_that_was_given_too_high_is_no_inertia(seed: int) -> None:
 
 
 @pytest.mark.rates
-@pytest.mark.usefixtures("toy_model")
 def test_numbers_drawn_from_their_priors_are_no_effects() -> None:
     """One claim in twenty is stated; more than `most` would come from that once in a hundred times (binomial)."""
     rng = np.random.default_rng(2)
@@ -65,11 +74,11 @@ def test_numbers_drawn_from_their_priors_are_no_effects() -> None:
     for seed in range(count):
         values = {n: float(getattr(TRUTH, n) or TRUTH.head_radius) for n in names}
         drawn = {n: v * math.exp(rng.normal() * START.sigma(n).of(v) / v) for n, v in values.items()}
-        table = table_of(replace(TRUTH, **drawn), seed)  # type: ignore[arg-type]
+        table = toy_table(seed, truth=replace(TRUTH, **drawn))  # type: ignore[arg-type]
         table["l_cm"] += rng.normal(scale=0.1)
         table["R_yr_cm"] *= math.exp(rng.normal(scale=0.01))
         table["theta_deg"] += rng.normal() * np.sign(table["omega_rpm"])
-        result = calibrate(SwimmerModel(START, read_measurements(table)), progress=False)
+        result = calibrated(table, draws=DRAWS)
         claimed += bool(result.effects) or result.verdict == "unexplained"
         low, high = result.base.interval("youngs_modulus")
         covered += low < drawn["youngs_modulus"] < high
@@ -90,10 +99,8 @@ def test_one_table_in_twenty_has_a_notable_pull_by_chance(count: int, correlatio
     assert correlation or share == pytest.approx(0.05, abs=3 * math.sqrt(0.05 * 0.95 / tables))
 
 
-@pytest.mark.usefixtures("toy_model", "few_candidates")
 def test_a_pull_of_two_and_a_half_among_ten_is_not_mentioned() -> None:
-    result = calibrated(toy_table(3))
-    assert result.verdict == "none"
+    result = none()
     learnt = sum(p.learnt for p in result.fits.pulls)
     for z, named in ((0.99 * notable_pull(learnt), False), (1.01 * notable_pull(learnt), True)):
         pulled = (replace(result.fits.pulls[0], z=z), *result.fits.pulls[1:])
@@ -103,12 +110,9 @@ def test_a_pull_of_two_and_a_half_among_ten_is_not_mentioned() -> None:
     assert 2.2 < notable_pull(learnt) < 3
 
 
-@pytest.mark.usefixtures("toy_model")
 def test_a_number_beyond_its_tolerance_is_a_finding_of_its_own() -> None:
-    """A camera's scale off by six of its σ: said as such, freed, and ahead of every effect."""
-    table = toy_table(4)
-    table["R_yr_cm"] *= 1.06
-    result = calibrated(table)
+    """It is said as such, freed, and ahead of every effect."""
+    result = number()
     assert result.verdict == "number"
     assert result.effects == ()
     assert CAMERA in {p.parameter.name for p in result.wrong_numbers[0]}
@@ -119,19 +123,18 @@ def test_a_number_beyond_its_tolerance_is_a_finding_of_its_own() -> None:
     assert result.error_after < 1.25 * result.noise_ceiling
 
 
-@pytest.mark.usefixtures("toy_model", "few_candidates")
 def test_a_number_far_beyond_its_tolerance_does_not_come_ahead_of_an_effect(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A head's length nine of its tolerances off explains as much as the effect that was there."""
-    table = toy_table(2, end_over_end_drag=0.6)
-    result = calibrated(table)
+    table = toy_table(2, **{DRAG: 0.6})
+    result = calibrated(table, few=True)
     assert result.verdict == "ambiguous"
     assert result.effects == ("end_over_end_drag",)
-    (number,) = result.evidence.rival_numbers
-    assert number.parameter.name == "head_length"
-    assert number.tolerances > wrong_numbers.IMPLAUSIBLE
-    assert f"L (head length) that is {number.departure} (9 of its tolerances)" in result.sentence
+    (rival,) = result.evidence.rival_numbers
+    assert rival.parameter.name == "head_length"
+    assert rival.tolerances > wrong_numbers.IMPLAUSIBLE
+    assert f"L (head length) that is {rival.departure} (9 of its tolerances)" in result.sentence
     assert result.sentence.index("end-over-end drag") < result.sentence.index("head length")
     titles = [e.title for e in result.next.explanations]
     assert titles == ["head's end-over-end drag", "the stated value of L (head length) is wrong"]
@@ -139,18 +142,19 @@ def test_a_number_far_beyond_its_tolerance_does_not_come_ahead_of_an_effect(
     assert record["numbers_instead"] == ["head_length"]
     assert record["wrong_numbers"] == []
     assert record["next_steps"][1].startswith("Measure L (head length) again")
-    monkeypatch.setattr(wrong_numbers, "IMPLAUSIBLE", 2 * number.tolerances)
-    ahead = calibrated(table)
+    monkeypatch.setattr(wrong_numbers, "IMPLAUSIBLE", 2 * rival.tolerances)
+    ahead = calibrated(table, few=True)
     assert ahead.verdict == "number"
     assert [c.effect.name for c in ahead.evidence.rival_effects] == ["end_over_end_drag"]
 
 
-@pytest.mark.usefixtures("toy_model", "few_candidates")
 def test_an_effect_beside_a_wrong_number_comes_behind_a_single_effect_that_fits_as_well() -> None:
     """Both are off: the pair is found. Were there a single effect that fits as well, it would not be."""
-    table = toy_table(1, end_over_end_drag=1.5)
+    table = toy_table(1, **{DRAG: 1.5})
     table["R_yr_cm"] *= 1.08
-    model = toy_swimmer(table)
+    with on_the_toy(few=True):
+        model = toy_swimmer(table)
+        assert len(model.effects) == len(FEW_CANDIDATES)
     start = start_values(model)
     split = split_runs(model.runs, None, find_outliers(model.runs, model.predict([start])[0]))
     study = Study(model, split, draws=FEW_DRAWS, progress=False)
@@ -169,16 +173,9 @@ def test_an_effect_beside_a_wrong_number_comes_behind_a_single_effect_that_fits_
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize(
-    ("share", "sigmas"),
-    [
-        (0.6, {}),
-        (0.8, {"youngs_modulus": Sigma(0.03, True), **EXACT}),
-    ],
-    ids=["40 %", "20 %"],
-)
-def test_a_stiffness_far_off_is_named_with_what_looks_like_it(share: float, sigmas: dict[str, Sigma]) -> None:
-    """40 % with the default tolerances; 20 % where E is stated to 3 % and the other numbers to be exact."""
+def test_a_stiffness_far_off_is_named_with_what_looks_like_it() -> None:
+    """20 % where E is stated to 3 % and the other numbers to be exact."""
+    share, sigmas = 0.8, {"youngs_modulus": Sigma(0.03, True), **EXACT}
     softer = replace(TRUTH, youngs_modulus=share * TRUTH.youngs_modulus)
     data = read_measurements(make_table(softer, seed=5, title=""))
     result = calibrate(SwimmerModel(replace(START, sigmas=sigmas), data), progress=False)
@@ -193,10 +190,9 @@ def test_a_stiffness_far_off_is_named_with_what_looks_like_it(share: float, sigm
 def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
     """By the powers of the groups, against differences of predictions; off the nominal parameters."""
     table = toy_table(6)
-    table["v_cm_s"] = (
-        table["R_yr_cm"] * table["omega_yr_rad_s"].abs() * np.random.default_rng(0).uniform(0.9, 1.1, len(table))
-    )
-    model = SwimmerModel(START, read_measurements(table), solver=toy.SOLVER)
+    speed = table["R_yr_cm"] * table["omega_yr_rad_s"].abs()
+    table["v_cm_s"] = speed * np.random.default_rng(0).uniform(0.9, 1.1, len(table))
+    model = toy_swimmer(table)
     at = {
         **start_values(model),
         "tracked_point": 0.2,
@@ -216,7 +212,7 @@ def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
 
 def test_pulls_are_those_of_the_textbook() -> None:
     """One number, one measurement: x = y σ²/(σ² + s²), pull y/√(σ² + s²), alone y."""
-    model = SwimmerModel(START, read_measurements(toy_table(8)), solver=toy.SOLVER)
+    model = toy_swimmer(toy_table(8))
     used = np.ones(len(model.runs), bool)
     names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
     bound = fit(model, start_values(model), names, used, title="")
@@ -235,24 +231,9 @@ def test_pulls_are_those_of_the_textbook() -> None:
     assert alone.change == pytest.approx(bound_pull.alone, abs=0.1 * bound_pull.alone_error)
 
 
-def test_a_freed_parameter_has_the_pull_that_it_had_before() -> None:
-    """One measurement y = 0.4 with s = 0.03, prior σ = 0.04: the pull is 0.4/0.05, with the prior and without."""
-    given = Parameter("p", "p", 1.0, (0.0, 9.0), 1.0, sigma=0.04)
-    shrunk = 0.04**2 / 0.05**2  # share of y that a fit with the prior moves, and of s² that it leaves
-    for share, freed in ((shrunk, False), (1.0, True)):
-        fitted: Any = SimpleNamespace(
-            names=("p",), fitted=(replace(given, sigma=None if freed else 0.04),), inflation=2.0,
-            covariance=np.array([[2.0 * share * 0.03**2]]), parameters={"p": 1.0 + share * 0.4},
-        )  # fmt: skip
-        (pull,) = pulls(fitted, [given])
-        assert (pull.freed, pull.learnt, pull.wrong) == (freed, True, True)
-        numbers = pull.z, pull.alone, pull.alone_error, pull.tolerances
-        assert numbers == pytest.approx((8.0, 0.4, 0.03, 10.0))
-
-
 def test_exact_numbers_are_not_fitted_and_the_table_states_its_own() -> None:
     table = toy_table(9).assign(camera_scale_sigma_percent=2.0, heading_zero_sigma_deg=0.0)
-    model = SwimmerModel(replace(START, sigmas=EXACT), read_measurements(table), solver=toy.SOLVER)
+    model = toy_swimmer(table, replace(START, sigmas=EXACT))
     sigmas = {p.name: p.sigma for p in model.nuisances}
     assert sigmas == {"youngs_modulus": pytest.approx(0.1), CAMERA: 0.02, TACHOMETER: 0.005}
     for bad in (-1.0, np.arange(len(table), dtype=float)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,9 +15,12 @@ from calibration.statistics.statistical_model import Noise, Runs, start_values
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
 from calibration.verdict.verdict_json import verdict_record
+from sim.arrays import Floats, Integers
+
+SMALL_NOISE = 0.01
 
 
-def falls(diameter: np.ndarray, session: np.ndarray, truth: dict[str, float], seed: int, noise: float) -> Spheres:
+def falls(diameter: Floats, session: Integers, truth: dict[str, float], seed: int, noise: float = 0.02) -> Spheres:
     """Falls of beads of `diameter` (n,) in glycerine in the rounds `session` (n,), drawn from a truth."""
     runs = Runs(
         outputs=("v",), y=np.zeros((len(diameter), 1)), condition=np.unique(diameter, return_inverse=True)[1],
@@ -30,29 +34,18 @@ def falls(diameter: np.ndarray, session: np.ndarray, truth: dict[str, float], se
     return replace(model, runs=replace(runs, y=drawn))
 
 
-def spheres(wall: float, inertia: float, seed: int, diameters: np.ndarray, *, noise: float = 0.02) -> Spheres:
+def spheres(truth: dict[str, float], seed: int, diameters_mm: Sequence[float], *, noise: float = 0.02) -> Spheres:
     """Five rounds of falls, a fall a bead."""
-    session = np.repeat(np.arange(5), len(diameters))
-    return falls(np.tile(diameters, 5), session, {"wall": wall, "inertia": inertia}, seed, noise)
+    diameters = np.array(diameters_mm) / 1000
+    return falls(np.tile(diameters, 5), np.repeat(np.arange(5), len(diameters)), truth, seed, noise)
 
 
-def with_more_falls(
-    model: Spheres, diameter: np.ndarray, truth: dict[str, float], seed: int, noise: float
-) -> Spheres:
-    """The measured falls and further ones (m,), spread over the five rounds."""
-    session = np.concatenate([model.runs.session, np.arange(len(diameter)) % 5])
-    both = falls(np.concatenate([model.diameter, diameter]), session, truth, seed, noise)
-    y = np.concatenate([model.runs.y, both.runs.y[len(model.runs) :]])
-    return replace(both, runs=replace(both.runs, y=y))
-
-
-BEADS = np.array([1.5, 2.5, 3.5, 5.0, 7.0, 9.0]) / 1000
-SMALL_BEADS, SMALL_NOISE = np.array([3.0, 4.0, 5.0, 5.5]) / 1000, 0.01
+BEADS, SMALL_BEADS = (1.5, 2.5, 3.5, 5.0, 7.0, 9.0), (3.0, 4.0, 5.0, 5.5)  # mm
 
 
 def test_a_model_that_is_no_robot_is_calibrated() -> None:
-    assert calibrate(spheres(0.0, 0.0, 0, BEADS), progress=False).verdict == "none"
-    result = calibrate(spheres(1.0, 0.0, 2, BEADS), progress=False)
+    assert calibrate(spheres({}, 0, BEADS), progress=False).verdict == "none"
+    result = calibrate(spheres({"wall": 1.0}, 2, BEADS), progress=False)
     assert result.effects == ("wall",)
     low, high = result.final.interval("wall")
     assert low < 1.0 < high
@@ -60,21 +53,21 @@ def test_a_model_that_is_no_robot_is_calibrated() -> None:
 
 def test_without_the_names_of_effects_the_wall_is_a_power_of_the_diameter() -> None:
     """Its exponent is the slope of Faxén's correction over the diameters of the beads."""
-    beads = np.array([1.6, 2.4, 3.2, 4.7, 6.3]) / 1000
-    words = law_of_diameter(spheres(1.0, 0.0, 2, beads))
+    beads = (1.6, 2.4, 3.2, 4.7, 6.3)
+    words = law_of_diameter(spheres({"wall": 1.0}, 2, beads))
     power = re.search(r"d\^([\d.]+) \(([\d.]+) to ([\d.]+)\)", words)
     assert power is not None
     value, low, high = map(float, power.groups())
-    ends = beads[[0, -1]] / 0.094
+    ends = np.array([beads[0], beads[-1]]) / 94
     slope = -np.diff(np.log(1 - 2.104 * ends + 2.089 * ends**3))[0] / np.log(beads[-1] / beads[0])
     assert low < slope < high
     assert value == pytest.approx(slope, abs=0.03)
-    assert law_of_diameter(spheres(0.0, 0.0, 0, beads)) == "not described by a power of the diameter"
+    assert law_of_diameter(spheres({}, 0, beads)) == "not described by a power of the diameter"
 
 
 @pytest.mark.rates
 def test_the_wall_is_mostly_found_and_sized() -> None:
-    results = [calibrate(spheres(1.0, 0.0, seed, BEADS), progress=False) for seed in range(1, 9)]
+    results = [calibrate(spheres({"wall": 1.0}, seed, BEADS), progress=False) for seed in range(1, 9)]
     assert sum(r.effects == ("wall",) for r in results) >= 7
     intervals = [r.final.interval("wall") for r in results if r.effects == ("wall",)]
     assert sum(low < 1.0 < high for low, high in intervals) >= len(intervals) - 2
@@ -98,16 +91,20 @@ def twins(truth: dict[str, float], seed: int) -> Verdict:
 
 
 def small_beads(truth: dict[str, float], seed: int) -> Spheres:
-    return spheres(truth.get("wall", 0.0), truth.get("inertia", 0.0), seed, SMALL_BEADS, noise=SMALL_NOISE)
+    return spheres(truth, seed, SMALL_BEADS, noise=SMALL_NOISE)
 
 
-def diameters_wanted(result: Verdict) -> np.ndarray:
+def diameters_wanted(result: Verdict) -> Floats:
     return np.concatenate([np.full(r.repeats, r.settings["d_mm"] / 1000) for r in result.next_runs])
 
 
-def after_more_falls(truth: dict[str, float], seed: int, diameter: np.ndarray) -> Verdict:
-    model = with_more_falls(small_beads(truth, seed), diameter, truth, 100 + seed, SMALL_NOISE)
-    return calibrate(model, progress=False)
+def after_more_falls(truth: dict[str, float], seed: int, diameter: Floats) -> Verdict:
+    """The verdict with further falls (m,), spread over the five rounds."""
+    before = small_beads(truth, seed)
+    session = np.concatenate([before.runs.session, np.arange(len(diameter)) % 5])
+    both = falls(np.concatenate([before.diameter, diameter]), session, truth, 100 + seed, SMALL_NOISE)
+    y = np.concatenate([before.runs.y, both.runs.y[len(before.runs) :]])
+    return calibrate(replace(both, runs=replace(both.runs, y=y)), progress=False)
 
 
 TRUTHS = pytest.mark.parametrize("truth", [{"wall": 1.0}, {"inertia": 5.0}], ids=["wall", "inertia"])
@@ -132,16 +129,17 @@ def test_twins_are_mostly_told_apart_by_the_next_runs_and_not_by_others(truth: d
         assert after.effects in {(), tuple(truth)} or after.verdict == "ambiguous"
         rejected += after.verdict == "unexplained"  # the true effect is lost in one of fifty tables by the level
         assert (after.next_runs == ()) == (after.verdict != "ambiguous")
-        more = after_more_falls(truth, seed, np.resize(SMALL_BEADS, len(diameter)))
+        more = after_more_falls(truth, seed, np.resize(SMALL_BEADS, len(diameter)) / 1000)
         still_twins += more.verdict == "ambiguous"
     assert rejected <= 1
     assert told_apart >= 5
     assert still_twins >= 4
 
 
+@pytest.mark.slow
 def test_a_profile_interval_sees_that_the_model_bends() -> None:
     """Falling spheres: ln v against inertia is concave, so the upper side of its interval is the longer one."""
-    model = spheres(0.0, 1.0, 5, np.array([3.0, 5.0, 7.0, 9.0]) / 1000)
+    model = spheres({"inertia": 1.0}, 5, (3.0, 5.0, 7.0, 9.0))
     every = np.ones(20, bool)
     fitted = fit(model, start_values(model), ("viscosity", "inertia"), every)
     low, high = profile_intervals(model, fitted, every)["inertia"]
@@ -151,7 +149,7 @@ def test_a_profile_interval_sees_that_the_model_bends() -> None:
     white = Noise(fitted.noise.run, fitted.noise.share).whitener(model.runs.session)
 
     def deviance(inertia: float) -> float:
-        grid = [{"viscosity": v, "wall": 0.0, "inertia": inertia} for v in np.linspace(0.8, 1.8, 2001)]
+        grid = [{"viscosity": v, "wall": 0.0, "inertia": inertia} for v in np.linspace(0.8, 1.8, 501)]
         residual = model.runs.y - model.predict(grid)
         return float(min((white(r) ** 2).sum() for r in residual))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -12,16 +13,25 @@ import pytest
 
 from calibration.laws.inputs import EXPONENTS
 from calibration.laws.law import NO_LEVER, NO_SESSIONS, UNDETERMINED, Law
+from calibration.laws.law_fits import Laws
 from calibration.laws.law_model import LEVER, SIZE, LawModel, with_law
-from calibration.laws.places import Place, places
+from calibration.laws.places import in_common, place_named, places
 from calibration.report.law_robot import law_handed_on, robot_with_law
-from calibration.report.robot_laws import find_robot_laws
+from calibration.report.robot_laws import RobotLaws, find_robot_laws
 from calibration.statistics.statistical_model import by_differences, start_values
-from calibration.swimmer.synthetic_table import make_table
 from sim.effects import catalogue
 from sim.inputs import group_columns, load_robot
 from tests.calibration import toy
-from tests.calibration.toy_tables import START, TRUTH, toy_swimmer, toy_table
+from tests.calibration.toy_tables import (
+    FEW_PLACES,
+    START,
+    TRUTH,
+    few_places,
+    laws_of_toy,
+    on_the_toy,
+    toy_swimmer,
+    toy_table,
+)
 
 LAWS = {
     "Cyr": {"law_Cyr_speed500_length-500_tails0": 1.0},
@@ -33,31 +43,48 @@ LAWS = {
 WARMER = 0.05  # of C_yr, per kelvin
 
 
-def place(name: str) -> Place:
-    return next(one for one in places() if one.name == name)
-
-
-@pytest.mark.usefixtures("toy_model")
-@pytest.mark.parametrize("name", [one.name for one in places()])
-def test_derivatives_are_those_by_differences(name: str) -> None:
-    model = LawModel.of(toy_swimmer(toy_table(1)), place(name), 0.1)
-    values = {SIZE: 0.1, LEVER: place(name).levers[0], **dict(zip(EXPONENTS, (0.3, -0.4, 0.2), strict=True))}
-    law = {p.name: values[p.name] for p in model.effects}
-    names = ["C_t", "C_yr", "youngs_modulus", *law]
-    parameters = {**start_values(model), **law}
-    seen, slopes = model.derivatives(parameters, names)
-    other_seen, other = by_differences(model, parameters, names)
-    np.testing.assert_allclose(seen, other_seen, atol=1e-9)
-    np.testing.assert_allclose(slopes, other, rtol=0.06, atol=2e-3 * np.abs(slopes).max())
-
-
-@pytest.mark.usefixtures("toy_model")
-@pytest.mark.parametrize("name", LAWS)
-def test_a_law_is_found_at_its_place_with_its_exponents(name: str) -> None:
-    table = make_table(replace(TRUTH, effects=LAWS[name]), seed=4, title="")
-    described = find_robot_laws(table, START, progress=False)
+def laws_in(described: RobotLaws) -> Laws:
     assert described.laws is not None
-    kept = {law.place.name: law for law in described.laws.kept}
+    return described.laws
+
+
+def described_by(table: pd.DataFrame) -> RobotLaws:
+    with on_the_toy(), few_places(("Cyr", "Ct", "Fx_wt")):
+        return find_robot_laws(table, START, progress=False)
+
+
+@pytest.mark.slow
+def test_derivatives_are_those_by_differences() -> None:
+    table = toy_table(1, lengths_cm=(5.0, 8.0), design={"tails": (2, 4)})
+    for place in places():
+        model = LawModel.of(toy_swimmer(table), place, 0.1)
+        values = {SIZE: 0.1, LEVER: place.levers[0], **dict(zip(EXPONENTS, (0.3, -0.4, 0.2), strict=True))}
+        law = {p.name: values[p.name] for p in model.effects}
+        names = ["C_yr", *law]
+        parameters = {**start_values(model), **law}
+        seen, slopes = model.derivatives(parameters, names)
+        other_seen, other = by_differences(model, parameters, names)
+        np.testing.assert_allclose(seen, other_seen, atol=1e-9, err_msg=place.name)
+        largest = np.abs(slopes).max()
+        np.testing.assert_allclose(slopes, other, rtol=0.06, atol=2e-3 * largest, err_msg=place.name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "places"),
+    [
+        *((name, FEW_PLACES) for name in ("Cyr", "Mz_wh", "Fx_wt_at_l")),
+        *(pytest.param(name, (), marks=pytest.mark.rest) for name in LAWS),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "few" if value else "all",
+)
+def test_a_law_is_found_at_its_place_with_its_exponents(name: str, places: tuple[str, ...]) -> None:
+    described = laws_of_toy(4, places=places, **LAWS[name])
+    selection = laws_in(described).selection
+    assert selection is not None
+    if not places:
+        assert selection.models == {1: 86, 2: 228, 3: 218, 4: 71}  # of 71 terms and 5 factors of three inputs
+    kept = {law.place.name: law for law in laws_in(described).kept}
     assert name in kept
     law = kept[name]
     (effect,) = LAWS[name]
@@ -65,19 +92,9 @@ def test_a_law_is_found_at_its_place_with_its_exponents(name: str) -> None:
         low, high = law.fit.interval(exponent)
         margin = high - low  # the interval is one of 95 %
         assert low - margin / 2 < true < high + margin / 2
-    assert law.error < 0.7 * described.error_without
-    assert law.error < 1.2 * described.noise
+    assert law.error < min(0.7 * described.error_without, 1.2 * described.noise)
     assert "described by" in described.sentence
-
-
-@pytest.mark.usefixtures("toy_model")
-@pytest.mark.parametrize("name", LAWS)
-def test_the_robot_with_a_law_moves_as_its_fit_says(name: str) -> None:
-    table = make_table(replace(TRUTH, effects=LAWS[name]), seed=4, title="")
-    described = find_robot_laws(table, START, progress=False)
-    assert described.laws is not None
-    law = next(one for one in described.laws.fitted if one.place.name == name)
-    robot = robot_with_law(START, law, law.fit.parameters)
+    robot = robot_with_law(START, law, law.fit.parameters)  # it moves as the fit says
     runs, place_of_run = law.model.robots(law.fit.parameters)
     for row in (0, 17):
         fitted = runs[place_of_run[row]]
@@ -89,13 +106,11 @@ def test_the_robot_with_a_law_moves_as_its_fit_says(name: str) -> None:
         assert motions[0]["omega_yr_bar"][0] == pytest.approx(motions[1]["omega_yr_bar"][0], rel=2e-3)
 
 
-@pytest.mark.usefixtures("toy_model")
+@pytest.mark.slow
 def test_the_lever_of_a_side_force_is_found_and_handed_on() -> None:
     """What is handed on is a force and a couple, whose uncertainty has that of the lever."""
-    table = make_table(replace(TRUTH, effects=LAWS["Fx_wt_at_l"]), seed=4, title="")
-    described = find_robot_laws(table, START, progress=False)
-    assert described.laws is not None
-    law = described.laws.kept[0]
+    described = laws_of_toy(4, **LAWS["Fx_wt_at_l"])
+    law = laws_in(described).kept[0]
     low, high = law.fit.interval(LEVER)
     assert low < -0.5 < high < -0.2
     assert "l (" in law.words
@@ -113,17 +128,17 @@ def test_the_lever_of_a_side_force_is_found_and_handed_on() -> None:
     assert abs(errors[couple] / errors[force] - 1) > 0.2
 
 
-@pytest.mark.usefixtures("toy_model")
+@pytest.mark.slow
 def test_a_law_depends_on_what_the_table_notes() -> None:
     tables = []
     for seed, kelvin in enumerate((-5.0, 0.0, 5.0)):
         robot = replace(TRUTH, C_yr=TRUTH.C_yr * float(np.exp(WARMER * kelvin)))
-        tables.append(make_table(robot, seed=seed, title="").assign(temperature_C=20.0 + kelvin))
+        table = toy_table(seed, truth=robot, lengths_cm=(6.0, 9.0))
+        tables.append(table.assign(temperature_C=20.0 + kelvin))
     table = pd.concat(tables, ignore_index=True)
     table["run"] = np.arange(1, len(table) + 1)
-    described = find_robot_laws(table, START, progress=False)
-    assert described.laws is not None
-    law = described.laws.kept[0]
+    described = described_by(table)
+    law = laws_in(described).kept[0]
     assert law.place.name == "Cyr"
     low, high = law.fit.interval("law_temperature_K")
     assert low < WARMER < high < 2 * WARMER
@@ -135,54 +150,44 @@ def test_a_law_depends_on_what_the_table_notes() -> None:
     assert again.factor(law.fit.parameters) == pytest.approx(np.ones(len(again.runs)), rel=0.2)
 
 
-@pytest.mark.usefixtures("toy_model")
-def test_nothing_is_described_where_nothing_is_missing(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    described = find_robot_laws(toy_table(3), START, progress=False)
-    assert described.laws is None
-    assert "within the noise" in described.sentence
-    assert described.to_frame().empty
-    assert [path.name for path in described.save(tmp_path)] == ["laws.json"]
-
-
-@pytest.mark.usefixtures("toy_model")
-def test_files_of_a_law_are_read_back(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    table = make_table(replace(TRUTH, effects=LAWS["Cyr"]), seed=4, title="")
-    described = find_robot_laws(table, START, progress=False)
-    described.save(tmp_path)
-    assert described.laws is not None
-    robot = load_robot(tmp_path / "law.toml")
-    assert robot == law_handed_on(START, described.laws.kept[0], described.study.split.kept)[0]
+@pytest.mark.slow
+def test_files_of_a_law_are_read_back_and_there_are_none_where_nothing_is_missing(tmp_path: Path) -> None:
+    described = laws_of_toy(4, **LAWS["Cyr"])
+    assert [path.name for path in described.save(tmp_path)] == ["laws.json", "law.toml"]
+    law = laws_in(described).kept[0]
+    assert load_robot(tmp_path / "law.toml") == law_handed_on(START, law, described.study.split.kept)[0]
     assert SIZE.removeprefix("law_") in described.to_frame().columns
+    nothing = described_by(toy_table(3, lengths_cm=(6.0, 9.0)))
+    assert nothing.laws is None
+    assert "within the noise" in nothing.sentence
+    assert nothing.to_frame().empty
+    assert [path.name for path in nothing.save(tmp_path / "nothing")] == ["laws.json"]
 
 
-@pytest.mark.usefixtures("toy_model")
+@pytest.mark.rest
 def test_a_factor_in_the_speed_of_the_robot_is_read_from_the_inputs() -> None:
     """C_yr ∝ |v|^−0.5, which no law of the search states; each run has the C_yr of its own speed."""
     parts = []
     for seed, (tails, length, speed) in enumerate(product((2, 3, 4, 5), (5.0, 7.0, 9.0, 11.0), (100.0, 150.0))):
-        cell = {"tails": (tails,), "lengths_cm": (length,), "motor_rpm": (speed,), "title": ""}
+        cell = {"tails": (tails,), "motor_rpm": (speed,), "session_noise": 0.0}
         robot = TRUTH
         for _ in range(20):
-            still = make_table(robot, seed=0, noise=0.0, session_noise=0.0, **cell).iloc[0]
+            still = toy_table(0, truth=robot, lengths_cm=(length,), design={**cell, "noise": 0.0}).iloc[0]
             swims = abs(still["omega_yr_rad_s"]) * still["R_yr_cm"]
             robot = replace(TRUTH, C_yr=TRUTH.C_yr * float(swims / 4.0) ** -0.5)
-        parts.append(make_table(robot, seed=100 + seed, session_noise=0.0, **cell))
+        parts.append(toy_table(100 + seed, truth=robot, lengths_cm=(length,), design=cell))
     table = pd.concat(parts, ignore_index=True)
     table["run"] = np.arange(len(table))
-    described = find_robot_laws(table, START, progress=False)
-    assert described.laws is not None
-    law = next(law for law in described.laws.kept if law.place.name == "Cyr")
+    law = next(law for law in laws_in(described_by(table)).kept if law.place.name == "Cyr")
     power = re.search(r"\|v\|\^(-[\d.]+) \((-[\d.]+) to (-[\d.]+)\)", law.words)
     assert power is not None
     _, low, high = map(float, power.groups())
     assert low < -0.5 < high
 
 
-@pytest.mark.usefixtures("toy_model")
+@pytest.mark.slow
 def test_a_side_force_at_the_disc_says_how_far_from_it_it_may_act() -> None:
-    table = make_table(replace(TRUTH, effects={"law_Fx_wt_speed0_length0_tails1000": 4.0}), seed=5, title="")
-    laws = find_robot_laws(table, START, progress=False).laws
-    assert laws is not None
+    laws = laws_in(laws_of_toy(5, places=("Fx_wt", "Fx_wt_at_l"), law_Fx_wt_speed0_length0_tails1000=4.0))
     law = next(law for law in laws.kept if law.place.name == "Fx_wt")
     (behind,) = (one for one in law.elsewhere if one.place.name == "Fx_wt_at_l")
     assert behind.reason == NO_LEVER
@@ -191,14 +196,12 @@ def test_a_side_force_at_the_disc_says_how_far_from_it_it_may_act() -> None:
     assert f"at the disc or up to {-low:.2f} l behind" in law.words
 
 
-@pytest.mark.usefixtures("toy_model")
 def test_what_the_runs_do_not_exclude_stays_in_the_set() -> None:
     """A law that fits better, but does not predict sessions, and one whose numbers the runs do not determine."""
-    table = make_table(replace(TRUTH, effects=LAWS["Cyr"]), seed=4, title="")
-    laws = find_robot_laws(table, START, progress=False).laws
-    assert laws is not None
+    laws = laws_in(laws_of_toy(4, **LAWS["Cyr"]))
     best = laws.kept[0]
-    worse = replace(best, place=place("Ct"), gain=best.gain - 1, gain_at_lever=best.gain - 1)
+    worse = replace(best, place=place_named("Ct"), gain=best.gain - 1, gain_at_lever=best.gain - 1)
+    far = replace(worse, gain=best.gain - 10, gain_at_lever=best.gain - 10)
 
     def kept(*fitted: Law) -> list[str]:
         return [law.place.name for law in replace(laws, fitted=fitted).kept]
@@ -207,12 +210,35 @@ def test_what_the_runs_do_not_exclude_stays_in_the_set() -> None:
     for reason in UNDETERMINED:
         assert kept(replace(best, reason=reason), worse) == ["Ct", "Cyr"]
         assert kept(best, replace(worse, reason=reason)) == ["Cyr", "Ct"]
-        assert kept(best, replace(worse, gain=best.gain - 10, gain_at_lever=best.gain - 10, reason=reason)) == [
-            "Cyr"
-        ]
+        assert kept(best, replace(far, reason=reason)) == ["Cyr"]
     assert kept(replace(best, reason="its BIC is not smaller than that without a law"), worse) == ["Ct"]
     assert kept(best, replace(worse, reason=NO_SESSIONS)) == ["Cyr"]
-    far = replace(worse, gain=best.gain - 10, gain_at_lever=best.gain - 10)
     assert kept(best, far) == ["Cyr"]
     assert kept(best, replace(far, gain_at_lever=best.gain - 4)) == ["Cyr", "Ct"]
     assert kept(replace(best, gain_at_lever=best.gain + 7), worse) == ["Cyr", "Ct"]
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("Fz_wt", "Fz_vx"), "are a force along the axis"),
+        (("Fz_wt", "Cr"), ""),
+        (("Ct", "Fx_wt"), "act on the head"),
+        (("Ct", "Cyr"), "act on the head"),
+        (("tail_drag", "tail_stiffness"), "act on the tails"),
+        (("Fx_wt_at_l", "tail_drag_along"), "act on the tails"),
+        (("Fx_wt_at_l", "Fx_wt"), ""),
+        (("Fx_wt_at_L", "Fx_wt"), "act on the head, driven by the spin of the tails ω_t"),
+        (("Fx_wt_at_L", "Fx_wt_odd"), "act on the head, driven by the spin of the tails ω_t"),
+    ],
+    ids=lambda value: "+".join(value) if isinstance(value, tuple) else "",
+)
+def test_what_they_have_in_common_is_said(names: tuple[str, ...], said: str) -> None:
+    assert in_common([place_named(name) for name in names]) == said
+
+
+def test_places_have_names_of_their_own() -> None:
+    assert len({place.name for place in places()}) == len(places()) == 61
+    assert len(places(both_directions=False)) == 40
+    with pytest.raises(KeyError):
+        place_named("no such place")

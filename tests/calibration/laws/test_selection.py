@@ -17,10 +17,9 @@ from calibration.laws.search import Search
 from calibration.laws.selection import Selection, examine_selection
 from calibration.report.law_card import _row, _simultaneous
 from calibration.report.quantities import plain
-from calibration.report.robot_laws import RobotLaws, find_robot_laws
-from calibration.swimmer.synthetic_table import make_table
+from calibration.report.robot_laws import RobotLaws
 from sim.arrays import Floats
-from tests.calibration.toy_tables import START, TRUTH, install_toy
+from tests.calibration.toy_tables import laws_of_toy
 
 SESSION = np.repeat(np.arange(4), 16)
 CONDITION = np.arange(len(SESSION)) // 2
@@ -53,19 +52,20 @@ def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(calibration.laws.selection, "_LAW_DRAWS", 100)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_draws")
 def test_p_values_of_a_search_are_uniform_where_there_is_no_law() -> None:
-    p = np.array([examine_selection(searched(noise(seed)), seed=seed).p_value for seed in range(80)])
+    searches = [searched(noise(seed)) for seed in range(80)]
+    p = np.array([examine_selection(search, seed=seed).p_value for seed, search in enumerate(searches)])
     assert kstest(p, "uniform").pvalue > 0.05
     assert (p >= 1 / 200).all()
-    best = [searched(noise(seed)).fits.gain.max() for seed in range(80)]
-    assert np.mean(np.array(best) > 0) > 0.1  # so many have a smaller BIC than without a law
+    smaller_bic = np.array([search.fits.gain.max() for search in searches]) > 0
+    assert smaller_bic.mean() > 0.1
 
 
 @pytest.mark.usefixtures("few_draws")
 def test_a_law_is_beyond_all_draws_and_its_place_is_first_in_most_of_them() -> None:
-    residual = noise(1) + 1.2 * TABLE[:, :, 3, 0]
-    search = searched(residual)
+    search = searched(noise(1) + 1.2 * TABLE[:, :, 3, 0])
     selection = examine_selection(search, seed=2)
     names = [place.name for place in search.places]
     assert search.ranked[0].place.name == names[3]
@@ -73,6 +73,10 @@ def test_a_law_is_beyond_all_draws_and_its_place_is_first_in_most_of_them() -> N
     assert selection.first[names[3]] > 0.95
     assert sum(selection.first.values()) == pytest.approx(1.0)
     assert all(selection.near[name] >= selection.first[name] for name in names)
+    first = search.places[0]  # of variants of a place the best counts
+    variants = replace(search, places=(first, first, *search.places[2:3], first, *search.places[4:]))
+    assert len(variants.ranked) == len(variants.names) == PLACES - 2
+    assert (variants.ranked[0].place.name, variants.ranked[0].gain) == (first.name, search.ranked[0].gain)
 
 
 @pytest.mark.usefixtures("few_draws")
@@ -99,59 +103,36 @@ def test_simultaneous_intervals_are_those_of_one_weight_where_there_is_one_model
     assert 1.3 * one < every < norm.ppf(1 - 0.025 / (2 * len(MODELS))) * 1.15  # below Bonferroni's
 
 
-def test_of_variants_of_a_place_the_best_counts() -> None:
-    search = searched(noise(1) + 1.2 * TABLE[:, :, 3, 0])
-    first = search.places[0]
-    variants = replace(search, places=(first, first, *search.places[2:3], first, *search.places[4:]))
-    assert len(variants.ranked) == len(variants.names) == PLACES - 2
-    assert variants.ranked[0].place.name == first.name
-    assert variants.ranked[0].gain == search.ranked[0].gain
+def described() -> tuple[RobotLaws, Laws, Selection]:
+    found = laws_of_toy(4, **{"law_Mz_wh_speed1000_length-1000_tails0": 5.0})
+    assert found.laws is not None
+    assert found.laws.selection is not None
+    return found, found.laws, found.laws.selection
 
 
-def test_ebic_counts_the_models_with_as_many_columns() -> None:
-    selection = Selection(0.5, {}, {}, 2.0, {1: 8, 2: 40})
-    assert selection.ebic_gain(30.0, 1) == pytest.approx(30 - 2 * math.log(8))
-    assert selection.ebic_gain(30.0, 2) == pytest.approx(30 - 2 * math.log(40))
-
-
-@pytest.fixture(scope="module")
-def described() -> RobotLaws:
-    effects = {"law_Mz_wh_speed1000_length-1000_tails0": 5.0}
-    with pytest.MonkeyPatch.context() as patch:
-        install_toy(patch)
-        return find_robot_laws(
-            make_table(replace(TRUTH, effects=effects), seed=4, title=""), START, progress=False
-        )
-
-
-def laws_of(described: RobotLaws) -> Laws:
-    assert described.laws is not None
-    assert described.laws.selection is not None
-    return described.laws
-
-
-def test_the_record_has_what_the_choice_costs(described: RobotLaws) -> None:
-    laws, record = laws_of(described), described.to_dict()
-    selection = laws.selection
-    assert selection is not None
+@pytest.mark.slow
+def test_the_record_has_what_the_choice_costs() -> None:
+    found, laws, selection = described()
+    record = found.to_dict()
     assert record["search_p_value"] == selection.p_value == 0.001
-    assert selection.models == {1: 86, 2: 228, 3: 218, 4: 71}  # of 71 terms and 5 factors of three inputs
     assert [one["place"] for one in record["places"]] == [one.place.name for one in laws.ranked]
     assert sum(one["first"] for one in record["places"]) == pytest.approx(1.0)
-    for one, ranked in zip(record["places"], laws.ranked, strict=True):
-        assert one["near_first"] >= one["first"]
-        assert one["gain"] - one["ebic_gain"] == pytest.approx(2 * math.log(selection.models[ranked.columns]))
-    for one, law in zip(record["laws"], laws.fitted, strict=True):
-        assert one["gain"] - one["ebic_gain"] == pytest.approx(2 * math.log(selection.models[law.numbers]))
-    assert "(with the choice among all places counted, p ≤ 0.001)" in described.sentence
+    assert all(one["near_first"] >= one["first"] for one in record["places"])
+    for one, columns in (
+        *zip(record["places"], (ranked.columns for ranked in laws.ranked), strict=True),
+        *zip(record["laws"], (law.numbers for law in laws.fitted), strict=True),
+    ):
+        assert one["gain"] - one["ebic_gain"] == pytest.approx(2 * math.log(selection.models[columns]))
+    assert "(with the choice among all places counted, p ≤ 0.001)" in found.sentence
+    first = laws.fitted[0]  # the report shows in how many tables its place is first
+    assert f"{100 * selection.first[first.place.name]:.0f} %" in _row(first, laws)
 
 
-def test_a_law_is_claimed_only_if_noise_hardly_ever_gains_as_much(described: RobotLaws) -> None:
-    laws = laws_of(described)
-    assert laws.selection is not None
+def test_a_law_is_claimed_only_if_noise_hardly_ever_gains_as_much() -> None:
+    _, laws, selection = described()
     assert laws.complete
     for p, claimed in ((0.03, True), (0.05, False)):
-        other = replace(laws, selection=replace(laws.selection, p_value=p))
+        other = replace(laws, selection=replace(selection, p_value=p))
         assert other.complete is claimed
         assert ("is described by" in other.sentence) is claimed
         assert f"p = {p}" in other.sentence
@@ -162,25 +143,15 @@ def test_a_law_is_claimed_only_if_noise_hardly_ever_gains_as_much(described: Rob
     assert _row(laws.kept[0], laws)[-1] == "describes the runs"
 
 
-def test_the_report_shows_in_how_many_tables_a_place_is_first(described: RobotLaws) -> None:
-    laws = laws_of(described)
-    assert laws.selection is not None
-    law = laws.fitted[0]
-    assert f"{100 * laws.selection.first[law.place.name]:.0f} %" in _row(law, laws)
-
-
-def test_simultaneous_intervals_contain_those_of_the_place(described: RobotLaws) -> None:
-    laws, record = laws_of(described), described.to_dict()
-    assert laws.selection is not None
+def test_simultaneous_intervals_contain_those_of_the_place() -> None:
+    found, laws, selection = described()
     best = laws.kept[0]
-    numbers = next(one for one in record["laws"] if one["place"] == best.place.name)
+    numbers = next(one for one in found.to_dict()["laws"] if one["place"] == best.place.name)
     for name in ("size", "speed", "length", "tails"):
         (low, high), (lower, higher) = numbers[name]["interval"], numbers[name]["simultaneous_interval"]
         assert lower < low < high < higher
+    low, high = numbers["speed"]["simultaneous_interval"]
     at = best.fit.names.index("law_speed")
     deviation = math.sqrt(best.fit.covariance[at, at] / best.fit.inflation)
-    assert numbers["speed"]["simultaneous_interval"][1] == pytest.approx(
-        best.fit.parameters["law_speed"] + laws.selection.widest * deviation
-    )
-    low, high = numbers["speed"]["simultaneous_interval"]
+    assert high == pytest.approx(best.fit.parameters["law_speed"] + selection.widest * deviation)
     assert f"ω {plain(low, 2)} to {plain(high, 2)}" in _simultaneous(laws)

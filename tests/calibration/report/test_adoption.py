@@ -81,13 +81,10 @@ def test_the_file_is_an_effect_with_the_law_s_formula(
         own_test.test_the_motion_is_that_of_the_law(*case)
 
 
-def test_the_best_law_is_adopted_by_default(tmp_path: Path) -> None:
+def test_the_best_law_is_adopted_by_default_and_words_cannot_end_a_string(tmp_path: Path) -> None:
     effect_file, _ = adopt_law(verdict(tmp_path), "new_effect", tmp_path)
     assert "Words of Fx_wh" in effect_file.read_text()
-
-
-def test_words_and_names_cannot_end_a_string(tmp_path: Path) -> None:
-    content = json.loads(verdict(tmp_path).read_text())
+    content = json.loads((tmp_path / "verdict.json").read_text())
     content["table"] = 'a".csv\\'
     content["laws"]["laws"][0]["words"] = 'words """ raise SystemExit'
     (tmp_path / "verdict.json").write_text(json.dumps(content))
@@ -96,35 +93,27 @@ def test_words_and_names_cannot_end_a_string(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "place", "message"),
+    ("name", "place", "content", "message"),
     [
-        ("New Effect", "", "write lower-case letters"),
-        ("lambda", "", "no keyword of Python"),
-        ("disc_drag", "", "there is an effect disc_drag already"),
-        ("new_effect", "Mz_wh", "no law 'Mz_wh' was kept; kept are Fx_wh, Cyr, tail_drag, "),
+        ("New Effect", "", None, "write lower-case letters"),
+        ("lambda", "", None, "no keyword of Python"),
+        ("disc_drag", "", None, "there is an effect disc_drag already"),
+        ("new_effect", "Mz_wh", None, "no law 'Mz_wh' was kept; kept are Fx_wh, Cyr, tail_drag, "),
+        ("new_effect", "", "{}", "has no laws"),
+        ("new_effect", "", "[1]", "has no laws"),
+        ("new_effect", "", "no", "is no verdict.json"),
+        ("new_effect", "", '{"error_before": 0.1, "laws": {"kept": [], "laws": []}}', "no law describes the runs"),
+        ("new_effect", "", '{"error_before": 0.1, "laws": {"kept": ["Ct"], "laws": [{"place": "Ct"}]}}',
+         "cannot be read"),
     ],
-)
+    ids=["capitals", "keyword", "taken", "not kept", "no laws", "list", "no JSON", "none kept", "no effect"],
+)  # fmt: skip
 def test_what_cannot_be_adopted_is_refused_and_nothing_is_written(
-    name: str, place: str, message: str, tmp_path: Path
+    name: str, place: str, content: str | None, message: str, tmp_path: Path
 ) -> None:
     source = verdict(tmp_path)
+    if content is not None:
+        source.write_text(content)
     with pytest.raises(InputError, match=message):
         adopt_law(source, name, tmp_path / "out", place=place)
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("{}", "has no laws"),
-        ("[1]", "has no laws"),
-        ("no", "is no verdict.json"),
-        ('{"error_before": 0.1, "laws": {"kept": [], "laws": []}}', "no law describes the runs"),
-        ('{"error_before": 0.1, "laws": {"kept": ["Ct"], "laws": [{"place": "Ct"}]}}', "cannot be read"),
-    ],
-)
-def test_a_file_without_laws_is_refused(content: str, message: str, tmp_path: Path) -> None:
-    path = tmp_path / "verdict.json"
-    path.write_text(content)
-    with pytest.raises(InputError, match=message):
-        adopt_law(path, "new_effect", tmp_path / "out")

@@ -1,48 +1,28 @@
-"""The tests of the residual: their products, their scores, and their p-values."""
+"""The tests of the residual: noise from repeats and sessions, scores, and p-values."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from calibration.statistics.fit import fit
-from calibration.statistics.residual_tests import Directions, FixedColumns, _kernel, examine_residual
+from calibration.statistics.residual_tests import Directions, _kernel, examine_residual
 from calibration.statistics.statistical_model import (
     Noise,
     changes,
     features,
+    inverse_root,
+    least_squares,
     precisions,
     repeat_covariance,
     start_values,
     sums,
 )
-from calibration.statistics.study import DRAWS, Study, middle_session
+from calibration.statistics.study import Study, middle_session
 from sim.arrays import Floats
-from tests.calibration.toy_tables import calibrated, toy_swimmer, toy_table
+from tests.calibration.toy_tables import toy_swimmer, toy_table
 
 
-@pytest.mark.parametrize(
-    "weights", [np.ones(7), np.array([1.0, 0.1, 1.0, 0.4, 0.02, 0.7, 1.0])], ids=["equal", "weighted"]
-)
-def test_a_design_makes_the_same_products_for_many_residuals(weights: Floats) -> None:
-    """Each residual has its own S; against columns that are whitened one residual after the other."""
-    rng = np.random.default_rng(3)
-    session = np.array([0, 0, 1, 1, 1, 2, 2])
-    columns, residuals = rng.normal(size=(7, 3, 4)), rng.normal(size=(5, 7, 3))
-    roots = np.linalg.inv(np.linalg.cholesky([np.eye(3) + np.outer(v, v) for v in rng.normal(size=(5, 3))]))
-    scale = np.sqrt(weights)
-    rows = scale[:, None, None]
-    precision = np.swapaxes(roots, -1, -2) @ roots
-    products = FixedColumns(columns * rows, session, scale).sums(precision, residuals * rows[..., 0])
-    for i, (root, residual) in enumerate(zip(roots, residuals, strict=True)):
-        expected = sums(root @ np.concatenate([columns, residual[..., None]], -1), session, 3, scale)
-        assert products.within[i] == pytest.approx(expected.within)
-        assert products.between[i] == pytest.approx(expected.between)
-
-
-@pytest.mark.usefixtures("toy_model")
 def test_scores_along_features_are_those_of_least_squares() -> None:
     """One output along one feature: its coefficient over its error, with coefficients and numbers beside it."""
     model = toy_swimmer(toy_table(8))
@@ -68,27 +48,6 @@ def test_scores_along_features_are_those_of_least_squares() -> None:
         assert scores.shapes[output, feature] == pytest.approx(step[-1] / error, rel=1e-6)
 
 
-@pytest.mark.rates
-@pytest.mark.usefixtures("toy_model")
-def test_p_values_of_nulls_are_spread_evenly() -> None:
-    """The bootstrap accounts for the fit: p-values of pure noise are neither small nor large on the whole."""
-    table = toy_table(11)
-    model = toy_swimmer(table)
-    data = model.runs
-    used = ~middle_session(data)
-    base = calibrated(table, draws=DRAWS).base
-    rng = np.random.default_rng(0)
-    p = []
-    for seed in range(40):
-        noise = rng.multivariate_normal(np.zeros(len(data.outputs)), base.noise.run, size=len(data))
-        drawn = replace(model, runs=replace(data, y=base.prediction + noise))
-        study = Study.fitted_to(drawn, used, level=0.05, seed=seed, draws=100)
-        p.append(examine_residual(study, base, Directions.plain(np.zeros((*data.y.shape, 0)))))
-    kernel = np.array([m.general_p for m in p])
-    assert 0.3 < kernel.mean() < 0.7
-    assert (kernel < 0.1).mean() < 0.25
-
-
 def test_the_kernel_of_repeats_is_that_of_all_runs() -> None:
     """Runs with equal inputs share a row of the kernel: 20,000 runs of 96 conditions used to take gigabytes."""
     rng = np.random.default_rng(0)
@@ -100,3 +59,37 @@ def test_the_kernel_of_repeats_is_that_of_all_runs() -> None:
     assert places.shape == (20, 200)
     added = places @ white
     assert np.einsum("bik,ij,bjk->b", added, kernel, added) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("scale", [None, np.sqrt([1.0, 0.1, 1.0, 0.4, 0.02])], ids=["equal", "weighted"])
+def test_whitener_is_the_inverse_root_of_the_block_covariance(scale: Floats | None) -> None:
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(3, 3))
+    noise = Noise(root @ root.T + np.eye(3), 0.7)
+    session = np.array([0, 0, 1, 1, 1])
+    same = (session[:, None] == session[None]).astype(float)
+    factors = np.eye(5) if scale is None else np.diag(scale**-2)
+    covariance = np.kron(factors + noise.share * same, noise.run)
+    whiten = noise.whitener(session, scale)
+    W = whiten(np.eye(15).reshape(5, 3, 15))
+    assert W @ covariance @ W.T == pytest.approx(np.eye(15), abs=1e-10)
+
+
+def test_noise_is_recovered_from_repeats_and_sessions() -> None:
+    """Without bias, though the fit takes degrees of freedom from the means of the sessions; with weights, too."""
+    rng = np.random.default_rng(1)
+    session = np.repeat(np.arange(4), 30)
+    condition = np.arange(120) // 2
+    J = rng.normal(size=(120, 2, 1)) + 1.0
+    scale = np.where(np.arange(120) % 7 == 0, 0.2, 1.0)
+    shares, covariances = [], []
+    for _ in range(300):
+        scatter = rng.normal(scale=[0.03, 0.05], size=(120, 2)) / scale[:, None]
+        shift = np.sqrt(0.1) * rng.normal(scale=[0.03, 0.05], size=(4, 2))[session]
+        y = rng.normal(size=(60, 2))[condition] + scatter + shift
+        covariances.append(repeat_covariance(y, condition, scale))
+        root = inverse_root(covariances[-1])
+        columns = root @ np.concatenate([J, (scatter + shift)[..., None]], -1)
+        shares.append(least_squares(sums(columns, session, 2, scale), passes=3).share)
+    assert np.sqrt(np.diag(np.mean(covariances, 0))) == pytest.approx([0.03, 0.05], rel=0.02)
+    assert np.mean(shares) == pytest.approx(0.1, rel=0.1)

@@ -1,4 +1,4 @@
-"""Which sessions are held out, and which runs are outliers."""
+"""Which sessions are held out, which runs are outliers, and how excluded rows are said."""
 
 from __future__ import annotations
 
@@ -8,7 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from calibration.statistics.exclusions import caveat_of_excluded, count_of_rows, summary_of_excluded
 from calibration.statistics.study import find_outliers, middle_session
+
+SIGN = "has the wrong sign for its omega_rpm: the head turns against the motor"
+EXCLUDED = (
+    "row 9: theta_deg = nan is not a finite number",
+    *(f"row {i}: omega_h_rpm = {i / 7:g} {SIGN}" for i in (2, 3, 5, 8)),
+    *(f"row {i}: a copy of an earlier row, equal in all inputs and outputs (row {i - 10})" for i in (11, 12)),
+    *(f"row {i}: R_yr is {i} standard deviations from its repeat" for i in (14, 17)),
+    "column colour: not known, left out",
+)
 
 
 def runs_of(sizes: list[int]) -> Any:
@@ -52,9 +62,26 @@ def test_runs_that_were_mistracked_are_excluded_and_clean_ones_are_not() -> None
     assert all("theta is" in reason for reason in reasons)
     kept = runs.y[~bad]
     assert kept.std(0) == pytest.approx([1, 1], abs=0.12)
+    effect = pairs(200, seed=1)
+    effect.y[:200] += 15.0  # it changes all repeats
+    assert not find_outliers(effect, np.zeros_like(effect.y))[0].any()
 
 
-def test_an_effect_that_changes_all_repeats_excludes_none() -> None:
-    runs = pairs(200, seed=1)
-    runs.y[:200] += 15.0
-    assert not find_outliers(runs, np.zeros_like(runs.y))[0].any()
+def test_excluded_rows_of_one_reason_are_one_line() -> None:
+    assert summary_of_excluded(EXCLUDED, 40) == [
+        f"4 of 40 rows (rows 2, 3, 5 and 1 more): omega_h_rpm {SIGN}",
+        "2 of 40 rows (rows 11, 12): a copy of an earlier row, equal in all inputs and outputs",
+        "2 of 40 rows (rows 14, 17): R_yr is standard deviations from its repeat",
+        "row 9: theta_deg = nan is not a finite number",
+        "column colour: not known, left out",
+    ]
+    assert summary_of_excluded((), 40) == []
+    assert count_of_rows(EXCLUDED) == 9
+    lines = (
+        "row 1: N = 2.5 is not a whole number",
+        "row 2: N = three is not a finite number",
+        "row 3: N = 7 is not above 0",
+    )
+    assert summary_of_excluded(lines, 9) == list(lines)  # they differ in more than a value
+    assert caveat_of_excluded(EXCLUDED, 45) == ()  # a fifth
+    assert caveat_of_excluded(EXCLUDED, 44)[0].startswith("9 of 44 rows (20 %) were excluded")

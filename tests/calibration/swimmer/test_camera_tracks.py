@@ -1,4 +1,4 @@
-"""Camera tracks: bad samples, units, axes, and what the robot as given does."""
+"""Camera tracks: circles and lines fitted to them, bad samples, units, axes, and what the robot as given does."""
 
 from __future__ import annotations
 
@@ -10,30 +10,31 @@ import pytest
 
 from calibration.report.track_pictures import draw_tracks
 from calibration.swimmer.camera_tracks import measure_tracks
+from calibration.swimmer.track_fit import measure_track
 from sim.inputs import load_robot
 from sim.io.errors import InputError
 from sim.motion.steady import steady
-from tests.calibration.track import RADIUS, track
+from tests.calibration.track import RADIUS, RATE, SLIP, track
+
+RUNS = pd.DataFrame({"run": [1], "N": 2, "l_cm": 11.0, "omega_rpm": -150.0})
+TWO = pd.concat([RUNS, RUNS.assign(run=2)], ignore_index=True)
 
 
 def test_bad_samples_and_short_tracks_are_named() -> None:
     samples = pd.concat([track(0), track(1).assign(run=2).head(5)]).astype({"x_cm": object})
     samples.iloc[3, 2] = "lost"
-    runs = pd.DataFrame({"run": [1, 2], "N": 2, "l_cm": 11.0, "omega_rpm": -150.0})
-    measured_runs = measure_tracks(samples, runs)
+    measured_runs = measure_tracks(samples, TWO)
     table, aside = measured_runs.table, measured_runs.excluded
     assert table["R_yr_cm"][0] == pytest.approx(RADIUS, rel=5e-3)
     assert np.isnan(table["R_yr_cm"][1])
     assert [line.split(":")[0] for line in aside] == ["run 1", "run 2"]
+    with pytest.raises(InputError, match=r"no track gives a number \(run 1: 5 samples"):
+        measure_tracks(track(0).head(5), RUNS)
     with pytest.raises(InputError, match="heading_deg"):
-        measure_tracks(samples.drop(columns="heading_deg"), runs)
-
-
-RUNS = pd.DataFrame({"run": [1], "N": 2, "l_cm": 11.0, "omega_rpm": -150.0})
+        measure_tracks(samples.drop(columns="heading_deg"), TWO)
 
 
 def test_headings_in_radians_are_refused() -> None:
-    """They used to give a slow straight run, without a word."""
     with pytest.raises(InputError, match=r"run 1: heading_deg turns by .* the headings seem to be in radians"):
         measure_tracks(track(0).assign(heading_deg=lambda t: np.radians(t["heading_deg"])), RUNS)
     straight = track(1, rate=0.002, wobble=0.0).assign(heading_deg=lambda t: 0.5 + 0.02 * t["time_s"])
@@ -41,7 +42,6 @@ def test_headings_in_radians_are_refused() -> None:
 
 
 def test_a_picture_s_y_axis_is_noticed_and_can_be_said() -> None:
-    """Left and right used to be exchanged, without a word."""
     picture = track(0).assign(y_cm=lambda t: -t["y_cm"], heading_deg=lambda t: -t["heading_deg"])
     with pytest.raises(InputError, match=r"all runs turn to the other side .*: give --y-down"):
         measure_tracks(picture, RUNS)
@@ -52,23 +52,12 @@ def test_a_picture_s_y_axis_is_noticed_and_can_be_said() -> None:
         measure_tracks(track(0), RUNS, y_down=True)
 
 
-def test_tracks_without_any_number_are_an_error() -> None:
-    with pytest.raises(InputError, match=r"no track gives a number \(run 1: 5 samples"):
-        measure_tracks(track(0).head(5), RUNS)
-
-
 def test_tracks_in_other_units_are_converted() -> None:
-    """Headings in radians and positions in mm used to give wrong numbers or an error."""
     given = track(0)
-    other = pd.DataFrame(
-        {
-            "run": given["run"],
-            "t [ms]": 1000 * given["time_s"],
-            "X (mm)": 10 * given["x_cm"],
-            "Y (mm)": 10 * given["y_cm"],
-            "heading_rad": np.radians(given["heading_deg"]),
-        }
-    )
+    other = pd.DataFrame({
+        "run": given["run"], "t [ms]": 1000 * given["time_s"], "X (mm)": 10 * given["x_cm"],
+        "Y (mm)": 10 * given["y_cm"], "heading_rad": np.radians(given["heading_deg"]),
+    })  # fmt: skip
     seen = measure_tracks(other, RUNS.rename(columns={"omega_rpm": "rpm"}))
     expected = measure_tracks(given, RUNS)
     pd.testing.assert_frame_equal(seen.table, expected.table, rtol=1e-6)
@@ -98,7 +87,6 @@ def swum(rpm: float) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def test_tracks_are_compared_with_the_robot_as_given() -> None:
-    """Positions in mm under the name x_cm used to pass without a word."""
     samples, runs = swum(100.0)
     measure_tracks(samples, runs, robot=ROBOT)
     for wrong, words in (
@@ -113,8 +101,7 @@ def test_tracks_are_compared_with_the_robot_as_given() -> None:
 
 def test_the_picture_has_a_panel_for_each_run_with_track_and_fit() -> None:
     samples = pd.concat([track(0), track(1, rate=0.002).assign(run=2)])
-    runs = pd.DataFrame({"run": [1, 2], "N": 2, "l_cm": 11.0, "omega_rpm": -150.0})
-    figure = draw_tracks(measure_tracks(samples, runs).tracks)
+    figure = draw_tracks(measure_tracks(samples, TWO).tracks)
     first, second = (axes for axes in figure.axes if axes.get_visible())
     assert first.get_title().startswith("run 1\nR = 10")
     assert "turns right" in first.get_title()
@@ -126,14 +113,12 @@ def test_the_picture_has_a_panel_for_each_run_with_track_and_fit() -> None:
 
 @pytest.mark.parametrize("change", [0.0, 8.0, None], ids=["zeros", "restart", "wrap"])
 def test_a_clock_that_goes_back_excludes_its_run(change: float | None) -> None:
-    """The samples used to be sorted by time, and gave radii of 8.2 and 6.6 cm instead of 9."""
     samples = pd.concat([track(0), track(1).assign(run=2)], ignore_index=True)
     late = (samples["run"] == 1) & (samples["time_s"] > 30)
     samples.loc[late, "time_s"] = samples["time_s"] % 20 if change is None else samples["time_s"] - 30 + change
     if change == 0.0:
         samples.loc[late, "time_s"] = 0.0
-    runs = pd.DataFrame({"run": [1, 2], "N": 2, "l_cm": 11.0, "omega_rpm": -150.0})
-    measured = measure_tracks(samples, runs)
+    measured = measure_tracks(samples, TWO)
     assert measured.excluded == [
         "run 1: its time goes back at row 152; give its samples in order, with a clock that runs on"
     ]
@@ -151,24 +136,55 @@ def test_a_track_may_begin_at_any_time(start: float | str) -> None:
     pd.testing.assert_frame_equal(seen, expected, rtol=1e-4)
 
 
-@pytest.mark.parametrize("name", [1, 1.0, "1", " 1 ", "1.0", "01"], ids=repr)
-def test_names_of_runs_are_compared_as_text(name: object) -> None:
-    named = track(0).assign(run=[str(name)] * 299 + ["checkerboard"])
-    measured = measure_tracks(named, RUNS.assign(run=1))
-    assert measured.excluded == ["run checkerboard: a track, but no row among the runs"]
-    assert measured.table["R_yr_cm"].notna().all()
-
-
-@pytest.mark.parametrize("blank", [None, float("nan"), "", " "])
-def test_rows_without_a_name_of_a_run_are_named(blank: object) -> None:
-    named = track(0).assign(run=pd.Series([1.0] * 299 + [blank], dtype=object))
-    assert measure_tracks(named, RUNS).excluded == ["1 samples have no name of a run"]
-    with pytest.raises(InputError, match="row 1 of the runs has no name of a run"):
-        measure_tracks(track(0), RUNS.assign(run=pd.Series([blank], dtype=object)))
-
-
-def test_names_that_do_not_agree_are_shown() -> None:
+def test_names_of_runs_are_compared_as_text_and_rows_without_are_named() -> None:
+    for name in (1, 1.0, "1", " 1 ", "1.0", "01"):
+        measured = measure_tracks(track(0).assign(run=[str(name)] * 299 + ["checkerboard"]), RUNS.assign(run=1))
+        assert measured.excluded == ["run checkerboard: a track, but no row among the runs"]
+        assert measured.table["R_yr_cm"].notna().all()
+    for blank in (None, float("nan"), "", " "):
+        named = track(0).assign(run=pd.Series([1.0] * 299 + [blank], dtype=object))
+        assert measure_tracks(named, RUNS).excluded == ["1 samples have no name of a run"]
+        with pytest.raises(InputError, match="row 1 of the runs has no name of a run"):
+            measure_tracks(track(0), RUNS.assign(run=pd.Series([blank], dtype=object)))
     with pytest.raises(InputError, match="no run has a track: the runs are run 1; the tracks are 1"):
         measure_tracks(track(0), RUNS.assign(run="run 1"))
     with pytest.raises(InputError, match="run 1 is there twice"):
         measure_tracks(track(0), pd.concat([RUNS, RUNS.assign(run="1.0")]))
+
+
+def measured(table: pd.DataFrame) -> dict[str, float]:
+    return vars(measure_track(*(table[c].to_numpy() for c in ("time_s", "x_cm", "y_cm", "heading_deg"))))
+
+
+@pytest.mark.parametrize("rate", [RATE, -RATE])
+def test_a_circle_gives_rate_radius_angle_and_speed(rate: float) -> None:
+    motion = measured(track(0, rate=rate))
+    assert motion["omega_yr_rad_s"] == pytest.approx(rate, rel=5e-3)
+    assert motion["R_yr_cm"] == pytest.approx(RADIUS, rel=5e-3)
+    assert motion["theta_deg"] == pytest.approx(SLIP, abs=0.5)
+    assert motion["v_cm_s"] == pytest.approx(abs(rate) * RADIUS, rel=5e-3)
+
+
+def test_a_current_drifts_the_circle_and_leaves_its_radius() -> None:
+    still = track(2)
+    moved = still.assign(x_cm=still["x_cm"] + 0.05 * still["time_s"], y_cm=still["y_cm"] - 0.02 * still["time_s"])
+    motion = measured(moved)
+    assert motion["drift_x_cm_s"] == pytest.approx(0.05, abs=4 * motion["drift_error"])
+    assert motion["drift_y_cm_s"] == pytest.approx(-0.02, abs=4 * motion["drift_error"])
+    assert motion["drift_error"] < 0.005
+    assert motion["R_yr_cm"] == pytest.approx(measured(still)["R_yr_cm"], rel=1e-3)
+    assert np.isnan(measured(track(2, seconds=30.0))["drift_x_cm_s"])  # two thirds of a turn
+
+
+def test_errors_are_as_large_as_the_scatter_of_repeated_tracks() -> None:
+    many = pd.DataFrame([measured(track(seed)) for seed in range(60)])
+    errors = {"omega_yr_rad_s": "omega_yr_error", "R_yr_cm": "R_yr_error", "theta_deg": "theta_error"}
+    for value, error in errors.items():
+        assert 0.5 < many[error].mean() / many[value].std() < 3
+
+
+def test_a_run_that_hardly_turns_gives_a_speed_alone() -> None:
+    motion = measured(track(1, rate=0.002, wobble=0.0))
+    assert np.isnan(motion["R_yr_cm"])
+    assert np.isnan(motion["omega_yr_rad_s"])
+    assert motion["v_cm_s"] == pytest.approx(0.02, rel=0.1)

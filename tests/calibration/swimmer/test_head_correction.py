@@ -9,8 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.__main__ import main
 from calibration.report.corrected_robot import corrected_robot, corrected_toml
 from calibration.swimmer.swimmer import SwimmerModel
+from calibration.verdict.experiment import LearntCorrection
 from calibration.verdict.verdict import Verdict
 from calibration.verdict.verdict_json import verdict_record
 from planner.paths.path import circle
@@ -24,26 +26,29 @@ from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
 from sim.motion.steady import steady
 from surrogate.table.model_file import load
-from tests.calibration.toy_tables import START, calibrated, install_toy, toy_swimmer, toy_table
+from tests.calibration.toy_tables import DRAG, START, calibrated, toy_swimmer, toy_table
+from tests.shared import shared
 
 CONTROL = PRESETS["paper-control"]
 
 
-@pytest.fixture(scope="module")
-def table() -> pd.DataFrame:
+def bent_table() -> pd.DataFrame:
     """A yaw rate that bends with the tails' length, of no effect's form."""
-    with pytest.MonkeyPatch.context() as patch:
-        install_toy(patch)
-        bent = toy_table(9, lengths_cm=(5.0, 6.5, 8.0, 9.5, 11.0))
+    bent = toy_table(9, lengths_cm=(5.0, 6.5, 8.0, 9.5, 11.0))
     bent["omega_yr_rad_s"] *= np.exp(0.02 * (bent["l_cm"] - 8.0) ** 2)
     return bent
 
 
-@pytest.fixture(scope="module")
-def result(table: pd.DataFrame) -> Verdict:
-    with pytest.MonkeyPatch.context() as patch:
-        install_toy(patch)
-        return calibrated(table)
+@shared
+def verdict() -> Verdict:
+    return calibrated(bent_table(), few=(DRAG, "surface_couple", "anisotropic_head_drag"))
+
+
+@pytest.fixture
+def learnt() -> tuple[Verdict, LearntCorrection]:
+    result = verdict()
+    assert result.corrections.learnt is not None
+    return result, result.corrections.learnt
 
 
 def correction(**changes: object) -> Correction:
@@ -59,41 +64,38 @@ def correction(**changes: object) -> Correction:
 
 
 @pytest.mark.slow
-def test_it_predicts_runs_that_it_was_not_learnt_from(result: Verdict) -> None:
+def test_what_no_effect_does_is_left_unexplained_and_a_correction_predicts_it(
+    learnt: tuple[Verdict, LearntCorrection],
+) -> None:
+    """No effect is claimed; a correction of no effect's form helps in runs that it was not learnt from."""
+    result, correction = learnt
     assert result.verdict == "unexplained"
-    assert result.corrections.learnt is not None
+    assert result.effects == ()
+    assert corrected_robot(START, result.final.parameters).effects == {}
+    assert "no effect and no pair" in result.sentence
+    assert any("ln l/R" in term for term in correction.terms)
     assert result.error_predictive is not None
-    assert any("ln l/R" in term for term in result.corrections.learnt.terms)
     excess = result.error_before**2 - result.noise_ceiling**2
     assert result.error_predictive**2 - result.noise_ceiling**2 < 0.4 * excess
     assert f"{100 * result.error_predictive:.1f} % on runs" in result.sentence
     assert verdict_record(result, table="t")["error_predictive"] == result.error_predictive
+    regression, fitted = result.corrections.regression, result.conditions.split.fitted
+    assert any("ln l" in name for name in regression.features)
+    residual = (toy_swimmer(bent_table()).runs.y - result.base.prediction)[fitted]
+    assert ((residual - regression.correction[fitted]) ** 2).mean() < 0.7 * (residual**2).mean()
 
 
 @pytest.mark.slow
-def test_what_no_effect_does_is_left_unexplained(result: Verdict, table: pd.DataFrame) -> None:
-    """No effect is claimed; a correction of the predictions, of no effect's form, helps by itself."""
-    assert result.effects == ()
-    assert corrected_robot(START, result.final.parameters).effects == {}
-    assert "no effect and no pair" in result.sentence
-    assert any("ln l" in name for name in result.corrections.regression.features)
-    residual = (toy_swimmer(table).runs.y - result.base.prediction)[result.conditions.split.fitted]
-    corrected = residual - result.corrections.regression.correction[result.conditions.split.fitted]
-    assert (corrected**2).mean() < 0.7 * (residual**2).mean()
-
-
-@pytest.mark.slow
-def test_the_corrected_robot_simulates_what_was_predicted(
-    result: Verdict, table: pd.DataFrame, tmp_path: Path
+def test_the_corrected_robot_simulates_what_was_predicted_and_states_its_uncertainty(
+    learnt: tuple[Verdict, LearntCorrection], tmp_path: Path
 ) -> None:
     """The file's robot, with the table's settings, moves as the correction that was learnt from all runs says."""
-    assert result.corrections.learnt is not None
-    (tmp_path / "corrected.toml").write_text(
-        corrected_toml(START, result.fits.final_refit, result.corrections.learnt)
-    )
-    robot = load_robot(tmp_path / "corrected.toml")
-    assert robot.correction == result.corrections.learnt.correction
-    model = toy_swimmer(table)
+    result, correction = learnt
+    (tmp_path / "with.toml").write_text(corrected_toml(START, result.fits.final_refit, correction))
+    (tmp_path / "without.toml").write_text(corrected_toml(START, result.fits.final_refit))
+    robot = load_robot(tmp_path / "with.toml")
+    assert robot.correction == correction.correction
+    model = toy_swimmer(bent_table())
     corrected = SwimmerModel(replace(robot, tail_length=START.tail_length), model.runs, solver=model.solver)
     start = {p.name: p.start for p in (*corrected.coefficients, *corrected.nuisances, *corrected.effects)}
     start["tail_length_offset"] = robot.tail_length - START.tail_length
@@ -101,13 +103,6 @@ def test_the_corrected_robot_simulates_what_was_predicted(
     residual = (model.runs.y - corrected.predict([start])[0])[result.conditions.split.fitted]
     uncorrected = (model.runs.y - result.base.prediction)[result.conditions.split.fitted]
     assert (residual**2).mean() < 0.6 * (uncorrected**2).mean()
-
-
-@pytest.mark.slow
-def test_its_uncertainty_is_in_the_covariance(result: Verdict, tmp_path: Path) -> None:
-    assert result.corrections.learnt is not None
-    (tmp_path / "with.toml").write_text(corrected_toml(START, result.fits.final_refit, result.corrections.learnt))
-    (tmp_path / "without.toml").write_text(corrected_toml(START, result.fits.final_refit))
     known, plain = (read_knowledge(tmp_path / f"{name}.toml") for name in ("with", "without"))
     assert {"surface_couple", "anisotropic_head_drag"} <= set(known.names)
     place = known.names.index("C_yr")
@@ -127,12 +122,9 @@ def test_a_robot_with_a_correction_is_that_with_other_drag() -> None:
         }
     moved, still = steady(robot.groups()), steady(CONTROL.groups())
     assert abs(moved.omega_yr[0]) > 1.1 * abs(still.omega_yr[0])
-
-
-def test_it_is_written_and_read(tmp_path: Path) -> None:
-    robot = replace(CONTROL, correction=correction())
-    (tmp_path / "robot.toml").write_text(robot_toml(robot))
-    assert load_robot(tmp_path / "robot.toml") == robot
+    planned, plain_plan = (table_vehicle(swimmer, load()).yaw_rate for swimmer in (robot, CONTROL))
+    assert planned == pytest.approx(abs(moved.omega_yr[0]), rel=0.01)  # the planner steers with it
+    assert planned > 1.1 * plain_plan
 
 
 def test_outside_its_range_it_refuses() -> None:
@@ -146,14 +138,6 @@ def test_outside_its_range_it_refuses() -> None:
             plan(circle(2.0), robot)
 
 
-def test_the_planner_steers_with_it() -> None:
-    robot = replace(CONTROL, correction=correction())
-    turned, plain = (table_vehicle(swimmer, load()).yaw_rate for swimmer in (robot, CONTROL))
-    exact = abs(steady(robot.groups()).omega_yr[0])
-    assert turned == pytest.approx(exact, rel=0.01)
-    assert turned > 1.1 * plain
-
-
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
@@ -164,9 +148,15 @@ def test_the_planner_steers_with_it() -> None:
         ("error = 0.03", 'error = "small"|cannot be read'),
         ("error = 0.03", "error = nan|finite"),
     ],
+    ids=["name", "weights", "powers", "no error", "words", "nan"],
 )
-def test_a_wrong_table_is_refused(change: str, expected: str, tmp_path: Path) -> None:
-    text = robot_toml(replace(CONTROL, correction=correction()))
+def test_it_is_read_as_it_is_written_and_a_wrong_table_is_refused(
+    change: str, expected: str, tmp_path: Path
+) -> None:
+    robot = replace(CONTROL, correction=correction())
+    text = robot_toml(robot)
+    (tmp_path / "robot.toml").write_text(text)
+    assert load_robot(tmp_path / "robot.toml") == robot
     new, _, message = expected.partition("|")
     assert change in text
     (tmp_path / "robot.toml").write_text(text.replace(change, new))
@@ -174,10 +164,7 @@ def test_a_wrong_table_is_refused(change: str, expected: str, tmp_path: Path) ->
         load_robot(tmp_path / "robot.toml")
 
 
-@pytest.mark.usefixtures("toy_model")
 def test_a_corrected_robot_is_not_calibrated_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from calibration.__main__ import main
-
     toy_table(1).to_csv(tmp_path / "t.csv", index=False)
     (tmp_path / "robot.toml").write_text(robot_toml(replace(CONTROL, correction=correction())))
     words = ["calibrate", str(tmp_path / "t.csv"), "--robot", str(tmp_path / "robot.toml"), "--out", str(tmp_path)]

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from calibration.statistics.statistical_model import by_differences, start_values
+from calibration.swimmer.candidate_effects import influences
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
@@ -17,16 +18,15 @@ from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from surrogate.table.model_file import load
 from tests.calibration import toy
+from tests.calibration.toy_tables import START, TRUTH, toy_swimmer, toy_table
 
-START = PRESETS["paper-measured"]
+FRICTION, SPEED = "contact_line", "contact_line_speed"  # of the contact line
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def table() -> pd.DataFrame:
     """A table with everything that can be noted and measured; values by the toy."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("calibration.swimmer.synthetic_table.stepped_columns", toy.steady_columns)
-        measured = make_table(START, seed=3, tails=(2, 3, 5), lengths_cm=(6.0, 9.0), title="")
+    measured = toy_table(3, truth=START, lengths_cm=(6.0, 9.0), design={"tails": (2, 3, 5)})
     rng = np.random.default_rng(0)
     measured["v_cm_s"] = 2.0 * np.exp(rng.normal(scale=0.03, size=len(measured)))
     measured["elapsed_min"] = 3.0 * np.arange(len(measured))
@@ -83,14 +83,14 @@ def test_an_odd_effect_of_the_robot_itself_tells_left_from_right(table: pd.DataF
 
 
 def test_a_current_shows_in_the_speed_along_its_heading(table: pd.DataFrame) -> None:
-    model = SwimmerModel(START, read_measurements(table), solver=toy.SOLVER)
+    model = toy_swimmer(table)
     at = start_values(model)
     still, moving = model.predict([at, {**at, "current_along_x": 0.001}])
     speed = model.runs.outputs.index("v")
     gained = np.exp(moving[:, speed]) - np.exp(still[:, speed])
     assert gained == pytest.approx(0.001 * np.cos(np.radians(table["course_deg"])))
     assert np.delete(moving - still, speed, 1) == pytest.approx(0)
-    without = SwimmerModel(START, read_measurements(table.drop(columns="course_deg")), solver=toy.SOLVER)
+    without = toy_swimmer(table.drop(columns="course_deg"))
     assert "current in the tank along x" in without.untestable
 
 
@@ -105,15 +105,13 @@ def test_a_current_shows_in_the_speed_along_its_heading(table: pd.DataFrame) -> 
         ("theta_deg", np.pi / 180, "theta_deg is 0.0175 times"),
         ("omega_yr_rad_s", 1e-3, "omega_yr_rad_s is 0.001"),
     ],
+    ids=["l in mm", "l in m", "krpm", "rad/s", "R in µm", "θ in rad", "ω_yr in krad/s"],
 )
 def test_wrong_units_are_refused(table: pd.DataFrame, column: str, factor: float, expected: str) -> None:
     rows = table.assign(**{column: table[column] * factor}).drop(columns="v_cm_s")
     with pytest.raises(InputError, match=expected):
-        calibrate(SwimmerModel(START, read_measurements(rows), solver=toy.SOLVER), progress=False)
-
-
-def test_right_units_are_taken(table: pd.DataFrame) -> None:
-    model = SwimmerModel(START, read_measurements(table.drop(columns="v_cm_s")), solver=toy.SOLVER)
+        calibrate(toy_swimmer(rows), progress=False)
+    model = toy_swimmer(table.drop(columns="v_cm_s"))  # right units are taken
     model.check(model.predict([start_values(model)])[0])
 
 
@@ -128,3 +126,24 @@ def test_the_first_guess_is_found_from_any_start(table: pd.DataFrame) -> None:
         model = SwimmerModel(start, runs)
         guess = model.guess(start_values(model), np.ones(len(runs), bool))
         assert [guess[n] for n in ("C_t", "C_r", "C_yr")] == pytest.approx([3.4, 1.5, 4.5], rel=0.05)
+
+
+def test_derivatives_along_the_friction_of_the_contact_line_and_its_speed() -> None:
+    second = influences()[FRICTION].parameter.second
+    assert second is not None
+    assert second.name == SPEED
+    table = make_table(TRUTH, seed=2, tails=(2, 3), lengths_cm=(6.0, 9.0), title="")
+    model = SwimmerModel(START, read_measurements(table))
+    at = {**start_values(model), FRICTION: 0.3, SPEED: 6.0}
+    ours, J = model.derivatives(at, [FRICTION, SPEED])
+    theirs, differences = by_differences(model, at, [FRICTION, SPEED])
+    assert ours == pytest.approx(theirs, abs=1e-3)
+    scale = np.abs(differences).max((0, 1))
+    assert (scale > 1e-4).all()
+    assert (np.abs(J - differences).max((0, 1)) < 0.05 * scale).all()
+
+
+def test_a_motion_that_does_not_settle_is_refused_and_named() -> None:
+    thins = replace(PRESETS["paper-control"], effects={"shear_thinning": 0.8})
+    with pytest.raises(InputError, match=r"1 of 1 motions .* example N = 2, l = 11 cm"):
+        make_table(thins, seed=0, tails=(2,), lengths_cm=(11.0,), motor_rpm=(100.0,), trials=1, title="")

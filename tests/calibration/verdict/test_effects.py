@@ -1,4 +1,4 @@
-"""Planted effects: found, sized, told from what no effect explains."""
+"""Planted effects: found, sized, told from what no effect explains; and the held-out runs that judge them."""
 
 from __future__ import annotations
 
@@ -12,96 +12,76 @@ import pytest
 
 from calibration.report.corrected_robot import corrected_robot
 from calibration.report.report import write_report
-from calibration.statistics.fit import fit
+from calibration.statistics.fit import fit, least_determined
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import DRAWS, Study, middle_session
+from calibration.verdict.verdict_json import verdict_record
 from tests.calibration import toy
 from tests.calibration.toy_tables import (
+    DRAG,
     START,
     TRUTH,
+    ambiguous,
     calibrated,
-    calibrated_toy,
-    install_few_candidates,
+    effect,
+    none,
     toy_swimmer,
     toy_table,
 )
 
-EFFECT, SIZE = "end_over_end_drag", 5.0
+SIZE = 5.0
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("toy_model")
-def test_a_planted_effect_is_found_sized_and_removed() -> None:
-    result = calibrated_toy(5, **{EFFECT: SIZE})
+@pytest.mark.parametrize("few", [True, pytest.param(False, marks=pytest.mark.rest)], ids=["few", "all"])
+def test_a_planted_effect_is_found_sized_and_removed(few: bool) -> None:
+    result = effect() if few else calibrated(toy_table(5, **{DRAG: SIZE}))
     assert result.verdict == "effect"
-    assert result.effects == (EFFECT,)
-    low, high = result.final.interval(EFFECT)
+    assert result.effects == (DRAG,)
+    assert result.conditions.excluded == ()
+    low, high = result.final.interval(DRAG)
     assert low <= SIZE <= high
     assert result.error_after < 1.25 * result.noise_ceiling
     assert result.error_after <= result.error_before
-    assert corrected_robot(START, result.final.parameters).effects[EFFECT] == result.final.parameters[EFFECT]
+    assert corrected_robot(START, result.final.parameters).effects[DRAG] == result.final.parameters[DRAG]
 
 
 @pytest.mark.rates
-@pytest.mark.usefixtures("toy_model")
 def test_planted_effects_are_mostly_found_sized_and_removed() -> None:
-    named, covered = 0, 0
-    for seed in range(6):
-        result = calibrated(toy_table(100 + seed, **{EFFECT: SIZE}), draws=DRAWS)
-        assert result.verdict != "none"
-        assert EFFECT in result.effects or result.verdict == "unexplained"
-        if result.effects == (EFFECT,):
-            named += 1
-            low, high = result.final.interval(EFFECT)
-            covered += low <= SIZE <= high
-            assert result.error_after < 1.25 * result.noise_ceiling
-            assert result.error_after <= result.error_before
-            robot = corrected_robot(START, result.final.parameters)
-            assert robot.effects[EFFECT] == result.final.parameters[EFFECT]
-    assert named >= 5
-    assert covered >= named - 1
+    results = [calibrated(toy_table(100 + seed, **{DRAG: SIZE}), draws=DRAWS) for seed in range(6)]
+    assert all(r.verdict != "none" and (DRAG in r.effects or r.verdict == "unexplained") for r in results)
+    named = [r for r in results if r.effects == (DRAG,)]
+    assert len(named) >= 5
+    assert all(r.error_after < 1.25 * r.noise_ceiling and r.error_after <= r.error_before for r in named)
+    intervals = [r.final.interval(DRAG) for r in named]
+    assert sum(low <= SIZE <= high for low, high in intervals) >= len(named) - 1
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("toy_model")
 def test_an_effect_that_the_coefficients_absorb_is_not_testable() -> None:
     """A direction that C_t covers leaves nothing to score, however wrong the model is."""
-    model = toy_swimmer(toy_table(5, **{EFFECT: SIZE}))
+    model = toy_swimmer(toy_table(5, **{DRAG: SIZE}))
     study = Study.fitted_to(model, ~middle_session(model.runs), draws=20)
-    base = calibrated_toy(5, **{EFFECT: SIZE}).base
+    base = effect().base
     misfit = examine_residual(study, base, Directions.plain(base.jacobian[..., :1]))
     assert misfit.scores.survived[0] < 1e-5
     assert misfit.p["score"] == 1.0
     assert misfit.general_p < 0.1
 
 
-@pytest.mark.rest  # tests of the head's correction calibrate another such table
-@pytest.mark.usefixtures("toy_model")
-def test_an_effect_outside_the_catalogue_is_left_unexplained() -> None:
-    table = toy_table(7)
-    odd = 0.12 * np.sin(table["l_cm"] * 1.1) * np.where(table["omega_rpm"].abs() > 120, 1, -1)
-    table["omega_yr_rad_s"] *= np.exp(odd)
-    result = calibrated(table)
-    assert result.verdict == "unexplained"
-    assert result.effects == ()
-    assert corrected_robot(START, result.final.parameters).effects == {}
-    assert "no effect and no pair" in result.sentence
-
-
 @pytest.mark.rest
-@pytest.mark.usefixtures("toy_model")
 def test_what_comes_nearest_is_said_where_nothing_explains() -> None:
-    table = toy_table(7, end_over_end_drag=5.0)
+    table = toy_table(7, **{DRAG: 5.0})
     table["omega_h_rpm"] *= np.exp(0.04 * np.sin(3.0 * table["l_cm"]) * np.sign(table["omega_rpm"]))
-    result = calibrated(table)
+    result = calibrated(table, few=True)
     assert result.verdict == "unexplained"
     assert "the nearest, head's end-over-end drag, removes" in result.sentence
 
 
 @pytest.mark.slow
 def test_coefficients_are_recovered_with_their_intervals_and_nothing_is_claimed() -> None:
-    result = calibrated_toy(3)
+    result = none()
     assert result.verdict == "none"
     assert result.effects == ()
     for name in ("C_t", "C_r", "C_yr"):
@@ -111,28 +91,24 @@ def test_coefficients_are_recovered_with_their_intervals_and_nothing_is_claimed(
         assert middle == pytest.approx(getattr(TRUTH, name), rel=0.1)
 
 
-@pytest.mark.usefixtures("toy_model")
 def test_fits_arrive_along_a_valley() -> None:
     """The spin of the tails and the radius tell the rigid robot's coefficients apart along a bent valley only."""
-    hidden = "end_over_end_drag"
-    table = toy_table(6, **{hidden: 5.0}).drop(columns=["omega_h_rpm", "omega_yr_rad_s", "theta_deg"])
+    table = toy_table(6, **{DRAG: 5.0}).drop(columns=["omega_h_rpm", "omega_yr_rad_s", "theta_deg"])
     model, true_model = toy_swimmer(table), toy_swimmer(table, TRUTH)
-    names, every = (*(p.name for p in model.coefficients), hidden), np.ones(len(table), bool)
-    from_preset = fit(model, {**start_values(model), hidden: 5.0}, names, every)
-    from_truth = fit(true_model, {**start_values(true_model), hidden: 5.0}, names, every)
+    names, every = (*(p.name for p in model.coefficients), DRAG), np.ones(len(table), bool)
+    from_preset = fit(model, {**start_values(model), DRAG: 5.0}, names, every)
+    from_truth = fit(true_model, {**start_values(true_model), DRAG: 5.0}, names, every)
     assert from_preset.converged
     assert from_truth.converged
     assert from_preset.deviance == pytest.approx(from_truth.deviance, abs=0.5)
 
 
-@pytest.mark.usefixtures("toy_model")
-@pytest.mark.parametrize("candidates", ["few", pytest.param("all", marks=pytest.mark.rest)])
-def test_two_effects_are_found_as_a_pair(candidates: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    if candidates == "few":
-        install_few_candidates(monkeypatch)
-    result = calibrated(toy_table(31, end_over_end_drag=5.0, left_right_bias=0.15))
+@pytest.mark.slow
+@pytest.mark.parametrize("few", [True, pytest.param(False, marks=pytest.mark.rest)], ids=["few", "all"])
+def test_two_effects_are_found_as_a_pair(few: bool) -> None:
+    result = calibrated(toy_table(31, left_right_bias=0.15, **{DRAG: 5.0}), few=few)
     assert result.verdict == "effect"
-    assert set(result.effects) == {"end_over_end_drag", "left_right_bias"}
+    assert set(result.effects) == {DRAG, "left_right_bias"}
     assert result.error_after < 1.15 * result.noise_ceiling
 
 
@@ -166,38 +142,28 @@ def in_thinning_fluid(table: pd.DataFrame, rate: float) -> pd.DataFrame:
     return table.assign(**ratios, theta_deg=table["theta_deg"] + after["theta_deg"] - before["theta_deg"])
 
 
-@pytest.mark.usefixtures("toy_model")
 @pytest.mark.parametrize("seed", [7, *(pytest.param(seed, marks=pytest.mark.rest) for seed in (8, 9))])
 def test_a_drift_with_time_is_found_where_there_is_a_clock(seed: int) -> None:
     """Viscosity that falls by 6 % an hour through a day of runs; nothing is claimed where it does not fall."""
+    few = ("viscosity_with_time", DRAG, "left_right_bias") if seed == 7 else ()
     rate = 0.06
     table = toy_table(seed)
     assert "viscosity drifting with time" in toy_swimmer(table).untestable
     table["elapsed_min"] = 4.0 * np.arange(len(table))
-    assert calibrated(table).verdict == "none"
-    result = calibrated(in_thinning_fluid(table, rate))
+    assert calibrated(table, few=few).verdict == "none"
+    drifting = in_thinning_fluid(table, rate)
+    result = calibrated(drifting, few=few)
     assert result.effects == ("viscosity_with_time",)
     low, high = result.fits.final_intervals["viscosity_with_time"]
-    assert low < rate < high < 2 * rate
-    assert low > 0.5 * rate
+    assert 0.5 * rate < low < rate < high < 2 * rate
     assert result.error_after < result.error_before
     assert result.error_after < 1.25 * result.noise_ceiling
+    without_clock = calibrated(drifting.drop(columns="elapsed_min"), few=few)
+    assert "viscosity_with_time" not in without_clock.effects
+    missing = without_clock.evidence.untestable["viscosity drifting with time"]
+    assert missing == "needs elapsed_min, differing between the runs"
 
 
-@pytest.mark.usefixtures("toy_model")
-def test_without_a_clock_a_drift_is_no_effect_of_the_robot() -> None:
-    """It stays unexplained, or passes for nothing; no effect is named for it, and the table says what it lacks."""
-    table = toy_table(7)
-    table["elapsed_min"] = 4.0 * np.arange(len(table))
-    result = calibrated(in_thinning_fluid(table, 0.06).drop(columns="elapsed_min"))
-    assert "viscosity_with_time" not in result.effects
-    assert (
-        result.evidence.untestable["viscosity drifting with time"]
-        == "needs elapsed_min, differing between the runs"
-    )
-
-
-@pytest.mark.usefixtures("toy_model")
 def test_a_tracked_point_off_the_centre_changes_radius_and_angle_alone() -> None:
     model = toy_swimmer(toy_table(8), TRUTH)
     names = {p.name: p.start for p in (*model.coefficients, *model.effects)}
@@ -208,29 +174,53 @@ def test_a_tracked_point_off_the_centre_changes_radius_and_angle_alone() -> None
     }  # fmt: skip
 
 
-@pytest.mark.rest  # tests of the head's correction assert it, too
-@pytest.mark.usefixtures("toy_model")
-def test_the_generic_correction_helps_where_no_effect_explains() -> None:
-    """A yaw rate that grows with tail length, of no effect's form."""
-    table = toy_table(9)
-    table["omega_yr_rad_s"] *= 1 + 0.02 * (table["l_cm"] - 8.0) ** 2
-    model = toy_swimmer(table)
-    result = calibrated(table)
-    residual = (model.runs.y - result.base.prediction)[result.conditions.split.fitted]
-    corrected = residual - result.corrections.regression.correction[result.conditions.split.fitted]
-    assert any("ln l" in name for name in result.corrections.regression.features)
-    assert (corrected**2).mean() < 0.7 * (residual**2).mean()
-
-
 @pytest.mark.slow
-@pytest.mark.usefixtures("toy_model")
 def test_an_effect_that_changes_nothing_says_so(tmp_path: Path) -> None:
     """The toy's tails cannot touch: no size of contact shows, and the report has no size for it."""
-    model = toy_swimmer(toy_table(1, lengths_cm=(8.0,), end_over_end_drag=4.0))
-    result = calibrated_toy(1, lengths_cm=(8.0,), end_over_end_drag=4.0)
+    model = toy_swimmer(toy_table(1, lengths_cm=(8.0,), **{DRAG: 4.0}))
+    result = ambiguous()
     contact = next(c for c in result.evidence.candidates if c.effect.name == "tail_contact")
     assert contact.verdict == "it changes nothing in these runs"
     write_report(result, model.runs, tmp_path / "report.html", title="t")
     text = (tmp_path / "report.html").read_text()
     assert "–</td>" in text
     assert "e+150" not in text
+
+
+@pytest.mark.slow
+def test_the_held_out_session_has_no_say_judges_and_is_used_in_the_end() -> None:
+    """Ruining it changes the reported errors and the last fit, which has all runs, and nothing else."""
+    table, result = toy_table(5, **{DRAG: SIZE}), effect()
+    assert result.errors.p_value > 0.01
+    table.loc[table["session"] == result.conditions.split.names, "omega_yr_rad_s"] *= 1.5
+    ruined = calibrated(table, few=True)
+    assert ruined.final.parameters == result.final.parameters
+    assert ruined.evidence.misfit.p_value == result.evidence.misfit.p_value
+    assert ruined.error_after > 1.5 * result.error_after
+    assert ruined.errors.p_value < 0.01
+    assert ruined.fits.final_refit.parameters["C_yr"] != pytest.approx(ruined.final.parameters["C_yr"], rel=0.02)
+
+
+def test_the_result_is_deterministic() -> None:
+    first, second = (calibrated(toy_table(3), few=True) for _ in range(2))
+    assert verdict_record(first, table="t") == verdict_record(second, table="t")
+
+
+@pytest.mark.rates
+def test_p_of_the_locked_session_is_even_for_a_good_model() -> None:
+    good = [calibrated(toy_table(seed), draws=DRAWS).errors.p_value for seed in range(17, 25)]
+    assert 0.2 < np.mean(good) < 0.8
+
+
+@pytest.mark.slow
+def test_profile_intervals_are_those_of_the_covariance_where_the_model_is_linear() -> None:
+    """And lean to one side where it is not."""
+    result = effect()
+    for name, (low, high) in result.fits.final_intervals.items():
+        wald = result.final.interval(name)
+        assert low < result.final.parameters[name] < high
+        assert (low, high) == pytest.approx(wald, abs=0.35 * (wald[1] - wald[0]))
+    direction, error = least_determined(result.base)
+    assert set(direction) == {"C_t", "C_r", "C_yr"}
+    assert sum(part**2 for part in direction.values()) == pytest.approx(1.0)
+    assert 0 < error < 1.0

@@ -15,9 +15,9 @@ from calibration.verdict.calibrate import calibrate
 from tests.calibration.toy_tables import START
 
 MEASURED = Path(__file__).parents[4] / "shared" / "measured"
+pytestmark = pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured tables are not on this machine")
 
 
-@pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured tables are not on this machine")
 @pytest.mark.parametrize("name", ["run01.csv", "run02.csv"])
 def test_measured_tables_are_read_whole(name: str) -> None:
     data = read_measurements(MEASURED / name)
@@ -28,7 +28,6 @@ def test_measured_tables_are_read_whole(name: str) -> None:
     assert ((spread > 0.01) & (spread < 0.05)).all()
 
 
-@pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured tables are not on this machine")
 def test_spheres_in_glycerine_need_the_wall() -> None:
     """5.1 % to 1.3 %; inertia does as well, so the verdict names both. One bead of ZK2026 is odd."""
     source = MEASURED / "published" / "falling_sphere_glycerine.csv"
@@ -42,7 +41,6 @@ def test_spheres_in_glycerine_need_the_wall() -> None:
 
 
 @pytest.mark.rates
-@pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured tables are not on this machine")
 @pytest.mark.parametrize(
     ("name", "effect", "size"),
     [

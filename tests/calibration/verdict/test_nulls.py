@@ -15,7 +15,8 @@ from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import COEFFICIENTS, DIRECT, SwimmerModel
 from calibration.verdict.verdict import Verdict
 from tests.calibration import toy
-from tests.calibration.toy_tables import START, TRUTH, calibrated, install_toy, toy_table
+from tests.calibration.toy_tables import START, TRUTH, calibrated, toy_table
+from tests.shared import shared
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -34,40 +35,31 @@ def test_tests_on_the_toy_do_not_simulate() -> None:
         sim.motion.batches.stepped_columns({k: np.array([v]) for k, v in START.group_values().items()}, title="")
 
 
-@pytest.fixture(scope="module")
+@shared
 def nulls() -> list[Verdict]:
     """60 tables of 64 runs in which nothing is missing."""
-    with pytest.MonkeyPatch.context() as patch:
-        install_toy(patch)
-        return [calibrated(toy_table(seed, lengths_cm=(6.0, 9.0)), draws=DRAWS) for seed in range(60)]
+    return [calibrated(toy_table(seed, lengths_cm=(6.0, 9.0)), draws=DRAWS) for seed in range(60)]
 
 
 @pytest.mark.rates
-def test_no_effect_is_claimed_where_there_is_none(nulls: list[Verdict]) -> None:
-    """One claim in twenty is stated; more than `most` would come from that once in a hundred times (binomial)."""
-    most = binom.isf(0.01, len(nulls), 0.05)
-    assert sum(null.verdict != "none" for null in nulls) <= most < 0.15 * len(nulls)
-    assert all(null.effects == () for null in nulls if null.verdict == "none")
-
-
-@pytest.mark.rates
-@pytest.mark.parametrize("name", COEFFICIENTS)
-def test_intervals_of_coefficients_cover(name: str, nulls: list[Verdict]) -> None:
-    """As often as 95 % intervals may miss (binomial, once in a hundred times), and they are not too wide.
+def test_no_effect_is_claimed_where_there_is_none_and_intervals_cover() -> None:
+    """One claim in twenty is stated; more than `most` would come from that once in a hundred times (binomial).
 
     Stated errors allow for the tolerances of the nuisance parameters. Here these are exact.
     """
-    ends = [null.fits.base_intervals[name] for null in nulls]
-    missed = sum(not low < getattr(TRUTH, name) < high for low, high in ends)
-    assert missed <= binom.isf(0.01, len(nulls), 0.05)
-    place = nulls[0].base.names.index(name)
-    stated = np.sqrt(np.mean([null.base.covariance[place, place] for null in nulls]))
-    scatter = np.std([math.log(null.base.parameters[name]) for null in nulls])
-    assert 0.7 < stated / scatter < 3.0  # 2.4 for C_r
+    most = binom.isf(0.01, len(nulls()), 0.05)
+    assert sum(null.verdict != "none" for null in nulls()) <= most < 0.15 * len(nulls())
+    assert all(null.effects == () for null in nulls() if null.verdict == "none")
+    for name in COEFFICIENTS:
+        ends = [null.fits.base_intervals[name] for null in nulls()]
+        assert sum(not low < getattr(TRUTH, name) < high for low, high in ends) <= most
+        place = nulls()[0].base.names.index(name)
+        stated = np.sqrt(np.mean([null.base.covariance[place, place] for null in nulls()]))
+        scatter = np.std([math.log(null.base.parameters[name]) for null in nulls()])
+        assert 0.7 < stated / scatter < 3.0  # 2.4 for C_r
 
 
 @pytest.mark.rates
-@pytest.mark.usefixtures("toy_model")
 def test_twice_the_heavy_tails_do_not_make_an_effect() -> None:
     """Student noise with three degrees of freedom on the toy."""
     rng = np.random.default_rng(5)

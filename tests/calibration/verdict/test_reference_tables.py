@@ -19,7 +19,7 @@ from calibration.verdict.verdict import Verdict
 from sim.inputs import load_robot
 from sim.io.errors import run_command
 from sim.model.uncertainty import DEFAULTS, Sigma
-from tests.calibration.toy_tables import install_few_candidates
+from tests.calibration.toy_tables import DRAG, install_few_candidates
 from tests.reference.make import GIVEN, HERE, TABLES
 
 pytestmark = pytest.mark.slow
@@ -30,15 +30,15 @@ def calibrated(name: str) -> Verdict:
     return calibrate(SwimmerModel(load_robot(HERE / "robot.toml"), data), progress=False)
 
 
-@pytest.mark.parametrize(
-    "name", [name if name == "ambiguous" else pytest.param(name, marks=pytest.mark.rest) for name in TABLES]
-)
+@pytest.mark.rest
+@pytest.mark.parametrize("name", TABLES)
 def test_the_files_are_what_make_writes(name: str) -> None:
     assert load_robot(HERE / "robot.toml") == GIVEN
     pd.testing.assert_frame_equal(pd.read_csv(HERE / f"{name}.csv"), TABLES[name](), rtol=1e-4, check_dtype=False)
 
 
-def test_nothing_is_missing() -> None:
+def test_nothing_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    install_few_candidates(monkeypatch)
     result = calibrated("none")
     assert result.verdict == "none"
     assert result.effects == ()
@@ -46,23 +46,23 @@ def test_nothing_is_missing() -> None:
         assert result.final.parameters[name] == pytest.approx(truth, rel=0.1)
 
 
-@pytest.mark.parametrize("candidates", ["few", pytest.param("all", marks=pytest.mark.rest)])
+@pytest.mark.parametrize("few", [True, pytest.param(False, marks=pytest.mark.rest)], ids=["few", "all"])
 def test_one_effect_is_named_sized_and_handed_on(
-    candidates: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    few: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Through the command. The truth was simulated on a finer mesh; the command is not told of the effect."""
-    if candidates == "few":
-        install_few_candidates(monkeypatch)
+    if few:
+        install_few_candidates(monkeypatch, (DRAG, "tail_spin_drag"))
     words = ["calibrate", str(HERE / "effect.csv"), "--robot", str(HERE / "robot.toml"), "--out", str(tmp_path)]
-    assert run_command(main, words) == 0
+    assert run_command(main, [*words, "--no-path", "--no-laws"]) == 0
     record = json.loads((tmp_path / "verdict.json").read_text())
     assert record["verdict"] == "effect"
-    assert record["effects"] == ["end_over_end_drag"]
-    size = record["parameters"]["end_over_end_drag"]
+    assert record["effects"] == [DRAG]
+    size = record["parameters"][DRAG]
     low, high = size["interval"]
     assert low < 5.0 < high
     assert record["error_after"] < 1.25 * record["noise_ceiling"] < record["error_before"]
-    corrected = load_robot(tmp_path / "corrected.toml").effects["end_over_end_drag"]
+    corrected = load_robot(tmp_path / "corrected.toml").effects[DRAG]
     assert corrected == pytest.approx(size["value_all_runs"], abs=0.05 * (high - low) / 4)
     assert "<svg" in (tmp_path / "report.html").read_text()
 

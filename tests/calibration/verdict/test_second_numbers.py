@@ -17,7 +17,7 @@ from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
-from tests.calibration.toy_tables import START, TRUTH, calibrated, toy_swimmer, toy_table
+from tests.calibration.toy_tables import DRAG, START, TRUTH, calibrated, toy_swimmer, toy_table
 
 SIZE, TIME = "shear_thinning", "shear_thinning_time"
 HIDDEN = {SIZE: 0.45, TIME: 0.6}
@@ -34,15 +34,6 @@ def recovered(refit: Fit | None) -> None:
     assert high - low < 0.6
 
 
-def test_the_second_number_is_no_candidate_of_its_own() -> None:
-    assert TIME not in influences()
-    second = influences()[SIZE].parameter.second
-    assert second is not None
-    assert second.name == TIME
-    assert len(second.grid) > 1
-
-
-@pytest.mark.usefixtures("toy_model")
 def test_scores_are_taken_at_several_values_and_the_largest_counts() -> None:
     model = toy_swimmer(toy_table(5, **HIDDEN))
     used = np.ones(len(model.runs), bool)
@@ -50,7 +41,11 @@ def test_scores_are_taken_at_several_values_and_the_largest_counts() -> None:
     candidates = directions(model, base.parameters, model.effects)
     place = [e.name for e in model.effects].index(SIZE)
     columns = candidates.table[..., candidates.owner == place]
-    grid = influences()[SIZE].parameter.second.grid  # type: ignore[union-attr]
+    second = influences()[SIZE].parameter.second
+    assert second is not None
+    assert second.name == TIME
+    assert TIME not in influences()  # it is no candidate of its own
+    grid = second.grid
     assert columns.shape[-1] == len(grid)
     for column, value in zip(np.moveaxis(columns, -1, 0), grid, strict=True):
         expected = by_differences(model, {**base.parameters, TIME: value, SIZE: 1e-6}, [SIZE])[1][..., 0]
@@ -62,29 +57,21 @@ def test_scores_are_taken_at_several_values_and_the_largest_counts() -> None:
     assert abs(misfit.scores.z[place]) == pytest.approx(z.max())
     assert misfit.second[place] == grid[int(np.argmax(z))]
     assert len(misfit.scores.z) == len(model.effects)
-    all_values = Directions(columns, np.zeros(3, int), np.array(grid))
-    together = examine_residual(study, base, all_values, draws=200)
-    first_value = Directions.plain(columns[..., [0]])
-    first = examine_residual(study, base, first_value, draws=200)
+    together = examine_residual(study, base, Directions(columns, np.zeros(3, int), np.array(grid)), draws=200)
+    first = examine_residual(study, base, Directions.plain(columns[..., [0]]), draws=200)
     assert together.critical_z >= first.critical_z  # the bootstrap takes the largest, too
-
-
-def test_leaving_an_effect_out_leaves_all_its_columns_out() -> None:
-    table = np.arange(4.0) * np.ones((2, 1, 4))
+    table = np.arange(4.0) * np.ones((2, 1, 4))  # leaving an effect out leaves all its columns out
     remaining = Directions(table, np.array([0, 1, 1, 2]), np.array([np.nan, 0.0, 1.0, np.nan])).without(1)
     assert remaining.owner.tolist() == [0, 1]
     assert remaining.table[0, 0].tolist() == [0.0, 3.0]
 
 
-@pytest.mark.usefixtures("toy_model")
 @pytest.mark.parametrize("seed", [4, pytest.param(3, marks=pytest.mark.rest)])
 def test_size_and_time_are_recovered_from_the_toy(seed: int) -> None:
-    truth = replace(TRUTH, effects=HIDDEN)
-    table = make_table(truth, seed=seed, lengths_cm=(5.0, 8.0, 11.0), motor_rpm=SPEEDS, title="")
-    result = calibrated(table)
+    few = (SIZE, DRAG) if seed == 4 else ()
+    result = calibrated(toy_table(seed, design={"motor_rpm": SPEEDS}, **HIDDEN), few=few)
     assert SIZE in result.effects
-    refit = next(c.refit for c in result.explaining if c.effect.name == SIZE)
-    recovered(refit)
+    recovered(next(c.refit for c in result.explaining if c.effect.name == SIZE))
     assert result.error_after < 1.15 * result.noise_ceiling
 
 

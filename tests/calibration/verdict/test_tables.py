@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.__main__ import main
 from calibration.statistics.statistical_model import SESSION_SHARE
 from calibration.statistics.study import middle_session
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.protocols import PROTOCOLS
-from calibration.swimmer.swimmer import SwimmerModel
-from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict_json import verdict_record
 from sim.io.errors import InputError, run_command
-from tests.calibration import toy
-from tests.calibration.toy_tables import FEW_DRAWS, START, calibrated, calibrated_toy, toy_table
+from tests.calibration.toy_tables import DRAG, calibrated, effect, toy_table
 from tests.page_text import PageText
+
+PAPER = ("N", "l_cm", "trial", "session", "omega_rpm", "omega_h_rpm", "omega_yr_rad_s")  # what its protocol takes
+
+
+def commanded(table: pd.DataFrame, folder: Path) -> int:
+    """Calibrate a table by the command; return its status."""
+    table.to_csv(folder / "t.csv", index=False)
+    words = ["calibrate", str(folder / "t.csv"), "--robot", "paper-measured", "--out", str(folder / "out")]
+    return run_command(main, [*words, "--no-path"])
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -37,26 +46,23 @@ from tests.page_text import PageText
         (lambda t: t.assign(R_yr_cm=1000 * t["R_yr_cm"]), "check its unit"),
         (lambda t: t.head(3), "3 usable runs"),
         (lambda t: t.assign(R_yr_cm="far"), "0 usable runs"),
+        (lambda t: t.assign(l_cm=np.nan), "0 usable runs"),
+        (lambda t: t.assign(omega_yr_rad_s=np.nan, R_yr_cm=np.nan, theta_deg=np.nan), "without any value: om"),
     ],
-)
+    ids=["column", "twice", "spins alone", "one output", "ten rows", "no repeats", "sign of the spin",
+         "sign of the yaw", "constant", "unit", "three rows", "words", "no lengths", "empty outputs"],
+)  # fmt: skip
 def test_bad_tables_are_refused(
-    change: object, expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    import re
-
-    from calibration.__main__ import main
-
-    table = change(toy_table(1))  # type: ignore[operator]
-    table.to_csv(tmp_path / "t.csv", index=False)
-    words = ["calibrate", str(tmp_path / "t.csv"), "--robot", "paper-measured", "--out", str(tmp_path / "out")]
-    assert run_command(main, words) == 2
-    error = capsys.readouterr().err.splitlines()
-    assert len(error) == 1
-    assert re.search(expected, error[0])
+    change: Callable[[pd.DataFrame], pd.DataFrame], expected: str, tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    assert commanded(change(toy_table(1)), tmp_path) == 2
+    (error,) = capsys.readouterr().err.splitlines()
+    assert re.search(expected, error)
     assert not (tmp_path / "out").exists()
 
 
-def test_bad_rows_are_named_and_set_aside(toy_model: None) -> None:
+def test_bad_rows_are_named_and_set_aside() -> None:
     table = toy_table(2).astype({"omega_yr_rad_s": object})
     table.loc[0, "omega_yr_rad_s"] = "fast"
     table.loc[1, "theta_deg"] = np.nan
@@ -69,59 +75,47 @@ def test_bad_rows_are_named_and_set_aside(toy_model: None) -> None:
         read_measurements(table.rename(columns={"trial": "tri al"}))
 
 
-@pytest.mark.usefixtures("toy_model")
-@pytest.mark.parametrize("names", [("one",), pytest.param(("one", "two"), marks=pytest.mark.rest)])
-def test_few_sessions_give_a_weaker_conclusion(names: tuple[str, ...]) -> None:
-    table = toy_table(5, end_over_end_drag=5.0)
-    table["session"] = [names[i % len(names)] for i in range(len(table))]
+def test_a_single_session_gives_a_weaker_conclusion() -> None:
+    table = toy_table(5, **{DRAG: 5.0}).assign(session="one")
     data = read_measurements(table)
     locked = middle_session(data)
     assert 0.15 < locked.mean() < 0.35
-    within = table["session"].to_numpy()
-    for condition in np.unique(data.condition):
-        for name in names:  # repeats of a session stay together
-            assert len(set(locked[(data.condition == condition) & (within == name)])) <= 1
-    result = calibrated(table)
-    assert result.effects == ("end_over_end_drag",)
-    assert any(f"{len(names)} session" in limit for limit in result.conditions.caveats)
+    for condition in np.unique(data.condition):  # repeats stay together
+        assert len(set(locked[data.condition == condition])) == 1
+    result = calibrated(table, few=True)
+    assert result.effects == (DRAG,)
+    assert any("1 session" in limit for limit in result.conditions.caveats)
     assert "block" in result.conditions.split.names
+    table = toy_table(5).assign(session="one")
+    table["R_yr_cm"] *= 1.03  # what shifts all runs of a session is no evidence
+    table["omega_h_rpm"] *= 0.98
+    shifted = calibrated(table, few=True)
+    assert shifted.verdict == "none"
+    assert shifted.base.noise.share == SESSION_SHARE
 
 
-@pytest.mark.usefixtures("toy_model")
 def test_two_sessions_kept_whole_are_not_called_blocks() -> None:
     """The paper's protocol locks N = 2 and 5; where these are a session, none is divided."""
     table = toy_table(5)
     table["session"] = np.where(table["N"].isin((3, 4)), "inner", "outer")
-    data, held_out = PROTOCOLS["paper"](read_measurements(table))
-    result = calibrate(
-        SwimmerModel(START, data, solver=toy.SOLVER), held_out=held_out, draws=FEW_DRAWS, progress=False
-    )
+    _, held_out = PROTOCOLS["paper"](read_measurements(table))
+    result = calibrated(table[["run", *PAPER]], few=True, held_out=held_out)
     assert result.conditions.split.names == "outer"
     assert not any("sessions only" in limit for limit in result.conditions.caveats)
 
 
-@pytest.mark.usefixtures("toy_model")
-def test_what_shifts_all_runs_of_a_single_session_is_no_evidence() -> None:
-    shifted = toy_table(5).assign(session="one")
-    shifted["R_yr_cm"] *= 1.03
-    shifted["omega_h_rpm"] *= 0.98
-    result = calibrated(shifted)
-    assert result.verdict == "none"
-    assert result.base.noise.share == SESSION_SHARE
-
-
-@pytest.mark.usefixtures("toy_model")
 def test_robots_of_one_kind_are_closed_with_both_limits() -> None:
     table = pd.concat([t[t["N"] == 3] for t in (toy_table(5), toy_table(6))])
-    result = calibrated(table)
+    result = calibrated(table, few=True)
     assert result.verdict == "none"
-    assert [("N = 3" in limit, "1 session only" in limit) for limit in result.conditions.caveats] == [
+    caveats = result.conditions.caveats
+    assert [("N = 3" in caveat, "1 session only" in caveat) for caveat in caveats] == [
         (True, False),
         (False, True),
     ]
+    assert verdict_record(result, table="t")["limits"] == list(caveats)
 
 
-@pytest.mark.usefixtures("toy_model")
 @pytest.mark.parametrize(
     "kept",
     [
@@ -131,35 +125,32 @@ def test_robots_of_one_kind_are_closed_with_both_limits() -> None:
     ],
 )
 def test_any_two_outputs_are_enough(kept: tuple[str, str]) -> None:
-    table = toy_table(5, end_over_end_drag=5.0)
-    outputs = [
-        c for c in ("omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s", "R_yr_cm", "theta_deg") if c not in kept
-    ]
-    result = calibrated(table.drop(columns=outputs))
+    outputs = {"omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s", "R_yr_cm", "theta_deg"}
+    result = calibrated(toy_table(5, **{DRAG: 5.0}).drop(columns=list(outputs - set(kept))), few=True)
     assert result.verdict in {"effect", "ambiguous"}
-    assert "end_over_end_drag" in result.effects
+    assert DRAG in result.effects
 
 
-@pytest.mark.usefixtures("toy_model")
 def test_a_slipped_decimal_point_is_named_and_set_aside() -> None:
-    """The run, not its repeat."""
+    """The run, not its repeat; the verdict is that of the table without it."""
     table = toy_table(12)
     table.loc[17, "omega_yr_rad_s"] *= 10
-    result = calibrated(table)
+    result, without = (calibrated(each, few=True) for each in (table, table.drop(index=17)))
     assert [line.split(" is ")[0] for line in result.conditions.excluded] == ["row 18: omega_yr"]
     assert not result.conditions.split.fitted[17]
+    assert result.verdict == without.verdict
+    assert result.noise_ceiling == pytest.approx(without.noise_ceiling, rel=0.05)
 
 
-@pytest.mark.usefixtures("toy_model", "few_candidates")
 def test_mistracked_runs_have_little_weight_and_are_named() -> None:
-    table = toy_table(5, end_over_end_drag=5.0)
-    clean = calibrated(table)
+    table = toy_table(5, **{DRAG: 5.0})
+    clean = effect()
     rng = np.random.default_rng(0)
     mistracked = np.flatnonzero(rng.random(len(table)) < 0.05)
     for run in mistracked:
         table.loc[run, "R_yr_cm"] *= 1 + rng.uniform(0.1, 0.3)
-    result = calibrated(table)
-    assert result.effects == clean.effects == ("end_over_end_drag",)
+    result = calibrated(table, few=True)
+    assert result.effects == clean.effects == (DRAG,)
     assert clean.conditions.little_weight == ()
     assert set(result.conditions.little_weight) <= set((mistracked + 1).tolist())
     assert len(result.conditions.little_weight) >= 2
@@ -168,35 +159,16 @@ def test_mistracked_runs_have_little_weight_and_are_named() -> None:
     assert record["rows_of_little_weight"] == list(result.conditions.little_weight)
 
 
-@pytest.mark.rest
-@pytest.mark.usefixtures("toy_model")
-def test_the_verdict_is_that_of_the_table_without_the_slipped_decimal_point() -> None:
-    table = toy_table(12)
-    table.loc[17, "omega_yr_rad_s"] *= 10
-    result = calibrated(table)
-    without = calibrated(table.drop(index=17))
-    assert result.verdict == without.verdict
-    assert result.noise_ceiling == pytest.approx(without.noise_ceiling, rel=0.05)
-
-
 @pytest.mark.slow
-def test_noise_and_missing_effects_are_no_gross_errors() -> None:
-    assert calibrated_toy(5, end_over_end_drag=5.0).conditions.excluded == ()
-
-
 @pytest.mark.usefixtures("toy_model", "few_candidates")
 def test_half_of_a_table_does_not_go_missing_without_a_word(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The spins of the camera without their sign: one line named row 1."""
-    from calibration.__main__ import main
-
     table = toy_table(3)
     table["omega_h_rpm"] = table["omega_h_rpm"].abs()
     count, wrong = len(table), int((table["omega_rpm"] > 0).sum())
-    table.to_csv(tmp_path / "t.csv", index=False)
-    words = ["calibrate", str(tmp_path / "t.csv"), "--robot", "paper-measured", "--out", str(tmp_path / "out")]
-    assert run_command(main, words) == 0
+    assert commanded(table, tmp_path) == 0
     printed = capsys.readouterr()
     reason = "omega_h_rpm has the wrong sign for its omega_rpm: the head turns against the motor"
     for text in (printed.out, printed.err):
@@ -208,7 +180,6 @@ def test_half_of_a_table_does_not_go_missing_without_a_word(
     assert reason in seen
 
 
-@pytest.mark.usefixtures("toy_model")
 def test_an_output_that_follows_from_others_is_counted_once() -> None:
     table = toy_table(14)
     table["v_cm_s"] = table["R_yr_cm"] * table["omega_yr_rad_s"].abs()
@@ -217,35 +188,19 @@ def test_an_output_that_follows_from_others_is_counted_once() -> None:
     assert any("v_cm_s: follows from" in line for line in data.excluded)
 
 
-@pytest.mark.usefixtures("toy_model")
-def test_runs_of_one_robot_give_a_weaker_conclusion_that_is_stated() -> None:
-    table = toy_table(15)
-    table = pd.concat([table[table["N"] == 3]] * 2, ignore_index=True)
-    table["session"] = np.repeat(["a", "b", "c", "d"], len(table) // 4)
-    noise = np.random.default_rng(0).normal(scale=0.02, size=len(table))
-    table["omega_yr_rad_s"] *= np.exp(noise)
-    result = calibrated(table)
-    assert any("N = 3" in line for line in result.conditions.caveats)
-    assert verdict_record(result, table="t")["limits"] == list(result.conditions.caveats)
-
-
-@pytest.mark.rest
-@pytest.mark.usefixtures("toy_model")
 def test_the_papers_protocol_fits_three_and_four_tails_and_predicts_two_and_five() -> None:
-    data, held_out = PROTOCOLS["paper"](read_measurements(toy_table(16, end_over_end_drag=5.0)))
+    table = toy_table(16, **{DRAG: 5.0})
+    data, held_out = PROTOCOLS["paper"](read_measurements(table))
     assert data.outputs == ("omega_h", "omega_yr")
     assert set(data.tails[held_out]) == {2.0, 5.0}
-    result = calibrate(
-        SwimmerModel(START, data, solver=toy.SOLVER), held_out=held_out, draws=FEW_DRAWS, progress=False
-    )
+    result = calibrated(table[["run", *PAPER]], few=True, held_out=held_out)
     assert result.conditions.split.names == "N=2, N=5"
-    assert "end_over_end_drag" in result.effects
+    assert DRAG in result.effects
     assert result.error_after < 0.5 * result.error_before
     with pytest.raises(InputError, match="N = 2, 3, 4 and 5"):
         PROTOCOLS["paper"](read_measurements(toy_table(16).query("N != 5")))
 
 
-@pytest.mark.usefixtures("toy_model")
 def test_a_table_may_be_parquet(tmp_path: Path) -> None:
     table = toy_table(18)
     table.to_parquet(tmp_path / "table.parquet")

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import softflagella as sf
-from tests.calibration.toy_tables import START, calibrated_toy, install_toy, toy_table
+from tests.calibration.toy_tables import DRAG, START, ambiguous, on_the_toy, toy_table
 
 
 def circle_track(run: int, samples: int) -> pd.DataFrame:
@@ -31,14 +31,11 @@ def test_tracks_that_are_left_out_are_warned_of() -> None:
 
 
 @pytest.mark.slow
-def test_new_runs_decide_a_verdict_that_is_at_hand(monkeypatch: pytest.MonkeyPatch) -> None:
-    verdict = calibrated_toy(1, lengths_cm=(8.0,), end_over_end_drag=4.0)
-    install_toy(monkeypatch)
-    table = toy_table(1, lengths_cm=(8.0,), end_over_end_drag=4.0)
-    more = (
-        toy_table(2, lengths_cm=(5.0, 11.0), end_over_end_drag=4.0).assign(session="new").sample(8, random_state=1)
-    )
-    decision = sf.decide(pd.concat([table, more], ignore_index=True), verdict, START)
+def test_new_runs_decide_a_verdict_that_is_at_hand() -> None:
+    table = toy_table(1, lengths_cm=(8.0,), **{DRAG: 4.0})
+    more = toy_table(2, lengths_cm=(5.0, 11.0), **{DRAG: 4.0}).assign(session="new").sample(8, random_state=1)
+    with on_the_toy():
+        decision = sf.decide(pd.concat([table, more], ignore_index=True), ambiguous(), START)
     assert decision.new_runs == 8
     assert decision.decided == "head's end-over-end drag"
     assert decision.sentence.startswith("Decided: head's end-over-end drag.")

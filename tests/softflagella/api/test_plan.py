@@ -1,4 +1,4 @@
-"""Plans from files, for robots that the shipped table does not know, and checks of tracks."""
+"""Robots and paths in any form, for plans and goals; the robot's own table; checks of tracks."""
 
 from __future__ import annotations
 
@@ -6,22 +6,46 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import planner.files.own_table
 import softflagella as sf
+import surrogate.one_robot.tabulate
+from planner.goal.to_goal import to_goal
 from planner.planning.plan import plan
+from tests.softflagella.made import GOAL, ODD, ROBOT, START, goal, own_table
 
-ROBOT = sf.load_robot("paper-control")
-
-
-def test_a_plan_of_a_robot_is_that_of_the_planner() -> None:
-    wanted = plan(sf.circle(1.5), ROBOT).to_dict()["id"]
-    assert sf.plan(sf.circle(1.5), ROBOT).to_dict()["id"] == wanted
-    assert sf.plan(sf.circle(1.5), "paper-control").to_dict()["id"] == wanted
+KNOWN = sf.CalibrationKnowledge(names=("C_yr",), covariance=np.array([[0.01]]))
 
 
-def test_a_file_with_a_unit_is_converted(tmp_path: Path) -> None:
+@pytest.fixture
+def calibrated_file(tmp_path: Path) -> Path:
+    """The robot's file with what a calibration found besides."""
+    sf.save_robot(ROBOT, tmp_path / "robot.toml")
+    with (tmp_path / "robot.toml").open("a") as file:
+        file.write('\n[calibration]\nnames = ["C_yr"]\ncovariance = [[0.01]]\n')
+    return tmp_path / "robot.toml"
+
+
+@pytest.mark.slow
+def test_a_robot_in_any_form_has_the_plan_of_the_planner(calibrated_file: Path) -> None:
+    exact, wanted = (plan(sf.circle(1.5), ROBOT, knowledge=known) for known in (None, KNOWN))
+    for robot in (ROBOT, "paper-control"):
+        assert sf.plan(sf.circle(1.5), robot).to_dict()["id"] == exact.to_dict()["id"]
+    uncertain = sf.plan(sf.circle(1.5), ROBOT, knowledge=KNOWN)
+    for given in (uncertain, sf.plan(sf.circle(1.5), str(calibrated_file))):
+        assert given.stated_error == wanted.stated_error > exact.stated_error
+
+
+@pytest.mark.slow
+def test_a_plan_to_a_goal_is_that_of_the_planner(calibrated_file: Path) -> None:
+    wanted = to_goal(START, GOAL, ROBOT, knowledge=KNOWN)
+    assert sf.to_goal(START, GOAL, calibrated_file).to_dict() == wanted.to_dict()
+
+
+@pytest.mark.slow
+def test_a_path_in_any_form_has_its_unit(tmp_path: Path) -> None:
     square = 33 * np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
     np.savetxt(tmp_path / "cm.csv", square, delimiter=",", header="x_cm,y_cm", comments="")
     np.savetxt(tmp_path / "l.csv", square / 11, delimiter=",", header="x,y", comments="")
@@ -40,31 +64,43 @@ def test_a_file_with_a_unit_is_converted(tmp_path: Path) -> None:
 
 
 def test_a_robot_that_the_shipped_table_does_not_know_gets_its_own_once(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    robot = replace(ROBOT, effects={"left_right_bias": 0.2})
-    with pytest.raises(sf.InputError, match="left_right_bias"):
-        plan(sf.circle(2.0), robot)
+    """In memory, or beside its file; the table is simulated elsewhere."""
+    own = own_table(odd=True)
     monkeypatch.setattr(planner.files.own_table, "_TABLES", {})
-    first = sf.plan(sf.circle(2.0), robot)
-    assert "simulating this robot's own look-up table" in capsys.readouterr().err
-    again = sf.plan(sf.circle(1.8), replace(robot, name="same groups"))
-    assert capsys.readouterr().err == ""
-    assert first.tracked.model == again.tracked.model == sf.tabulate(robot).identity
+    monkeypatch.setattr(surrogate.one_robot.tabulate, "tabulate", lambda robot: own)
+    with pytest.raises(sf.InputError, match="left_right_bias"):
+        plan(sf.circle(2.0), ODD)
+    file = tmp_path / "robot.toml"
+    sf.save_robot(ODD, file)
+    for first, again in ((ODD, replace(ODD, name="same groups")), (file, str(file))):
+        made = sf.plan(sf.circle(1.5), first)
+        assert "simulating this robot's own look-up table" in capsys.readouterr().err
+        assert sf.plan(sf.circle(1.2), again).tracked.model == made.tracked.model == own.identity
+        assert capsys.readouterr().err == ""
+    assert (tmp_path / "robot.table.json").exists()
 
 
-def test_knowledge_of_a_calibration_comes_from_the_robot_s_file(tmp_path: Path) -> None:
-    sf.save_robot(ROBOT, tmp_path / "robot.toml")
-    with (tmp_path / "robot.toml").open("a") as file:
-        file.write('\n[calibration]\nnames = ["C_yr"]\ncovariance = [[0.01]]\n')
-    known = sf.CalibrationKnowledge(names=("C_yr",), covariance=np.array([[0.01]]))
-    exact = sf.plan(sf.circle(2.0), ROBOT).stated_error
-    uncertain = sf.plan(sf.circle(2.0), ROBOT, knowledge=known).stated_error
-    assert sf.plan(sf.circle(2.0), tmp_path / "robot.toml").stated_error == uncertain > exact
+@pytest.mark.rest
+def test_every_planning_function_takes_the_robot_s_own_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planner.files.own_table, "_TABLES", {})
+    robot = "paper-control"
+    square = [[0, 0], [2, 0], [2, 2], [0, 2]]
+    plans = [
+        sf.plan(sf.circle(1.5), robot, own_table=True),
+        sf.to_goal((0, 0, 0), (4, 1, 0), robot, own_table=True).plan,
+        sf.tour([(0, 0), (4, 0)], robot, objective="time", own_table=True).plan,
+        sf.cover(square, 0.8, robot, objective="time", own_table=True).plan,
+    ]
+    own = own_table().identity
+    assert {plan.tracked.model for plan in plans} == {own}
+    assert sf.plan(sf.circle(1.5), robot).tracked.model != own
 
 
+@pytest.mark.slow
 def test_a_track_is_checked_against_a_plan_in_any_form(tmp_path: Path) -> None:
-    result = sf.plan(sf.circle(1.2), ROBOT, objective="flips")
+    result = sf.plan(sf.circle(1.0), ROBOT, objective="flips")
     track = sf.replay(result)
     error = sf.check(result, track)
     assert error.largest < error.stated == result.stated_error
@@ -78,10 +114,12 @@ def test_a_track_is_checked_against_a_plan_in_any_form(tmp_path: Path) -> None:
         sf.check(result, camera.drop(columns="x_cm"))
 
 
+@pytest.mark.slow
 def test_a_goal_plan_is_written_with_its_goal_and_checked_as_its_plan(tmp_path: Path) -> None:
-    goal = sf.to_goal((0, 0, 0), (2.5, 0.5, 0.3), ROBOT)
-    names = [path.name for path in sf.write_plan(goal, tmp_path)]
+    names = [path.name for path in sf.write_plan(goal(), tmp_path)]
     assert names[-2:] == ["goal.json", "goal.svg"]
-    assert sf.load_plan(tmp_path / "plan.json")["id"] == goal.plan.to_dict()["id"]
-    track = sf.replay(goal.plan)
-    assert sf.check(goal, track).rms == sf.check(goal.plan, track).rms
+    assert sf.load_plan(tmp_path / "plan.json")["id"] == goal().plan.to_dict()["id"]
+    plan = goal().plan
+    track = pd.DataFrame(plan.poses, columns=["x_over_l", "y_over_l", "heading_rad"])
+    track["time_bar"] = np.concatenate([[0.0], np.cumsum(plan.dwells)])
+    assert sf.check(goal(), track).rms == sf.check(plan, track).rms

@@ -1,4 +1,4 @@
-"""Robots as people give them, and tables in lab units."""
+"""Robots as people give them; tables in lab units; inverse queries and sweeps."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ import surrogate.__main__
 from sim.io.tables import read_table
 from sim.motion.lab_units import LAB_COLUMNS
 from softflagella.api.robots import robot_rows, with_units
-
-ROBOT = sf.load_robot("paper-control")
+from tests.softflagella.made import ROBOT, own_table
 
 
 @pytest.fixture
@@ -37,9 +36,6 @@ def test_a_list_fills_in_the_null_of_an_effect_that_a_robot_lacks() -> None:
     odd = replace(ROBOT, effects={"anisotropic_head_drag": 1.5})
     null = sf.effects()["anisotropic_head_drag"].null
     assert robot_rows([ROBOT, odd]).columns["anisotropic_head_drag"].tolist() == [null, 1.5]
-
-
-def test_columns_that_differ_in_length_and_no_robots_are_refused() -> None:
     with pytest.raises(sf.InputError, match="differ in length"):
         robot_rows({**ROBOT.group_values(), "C_t": [1.0, 2.0], "C_r": [1.0, 2.0, 3.0]})
     with pytest.raises(sf.InputError, match="no robots"):
@@ -57,10 +53,7 @@ def test_a_table_begins_with_names_and_lab_units(file: Path) -> None:
         assert {units[name] for name in LAB_COLUMNS} == {"rpm", "rad/s", "cm", "degrees", "cm/s", "s"}
         assert units["omega_yr_bar"] == "EI/(mu0 l^4)"
         assert (motion["error"] < 0.01).all()
-
-
-def test_dimensionless_robots_have_no_lab_units() -> None:
-    motion = sf.steady({**ROBOT.group_values(), "omega_bar": [5.0, 10.0]})
+    motion = sf.steady({**ROBOT.group_values(), "omega_bar": [5.0, 10.0]})  # without lab units
     assert len(motion) == 2
     assert not {"robot", *LAB_COLUMNS} - {"theta_deg"} & set(motion)
     assert motion["omega_yr_bar"].iloc[1] == sf.steady(ROBOT)["omega_yr_bar"].item()
@@ -70,7 +63,6 @@ RUNS = pd.DataFrame({"Tails": [2, 3], "l_mm": [90.0, 110.0], "rpm": [60.0, -40.0
 
 
 def test_runs_of_a_robot_come_back_with_their_inputs(tmp_path: Path) -> None:
-    """The columns of `calibrate` were unknown to `steady` and `query`."""
     alone = [
         replace(ROBOT, tails=n, tail_length=length, motor_speed=rpm * np.pi / 30)
         for n, length, rpm in ((2, 0.09, 60.0), (3, 0.11, 40.0))
@@ -97,12 +89,14 @@ def test_runs_of_a_robot_come_back_with_their_inputs(tmp_path: Path) -> None:
         (RUNS[["day"]], "the table: no column N, l_cm, omega_rpm"),
         ([ROBOT], "robot goes with a table of runs"),
     ],
+    ids=["half a tail", "a word", "no columns", "robots"],
 )
 def test_runs_that_cannot_be_are_refused(runs: pd.DataFrame, words: str) -> None:
     with pytest.raises(sf.InputError, match=words):
         robot_rows(runs, ROBOT)
 
 
+@pytest.mark.slow
 def test_a_response_in_lab_units(file: Path) -> None:
     both = sf.response([ROBOT, file])
     alone = sf.response(file)
@@ -117,34 +111,68 @@ def test_a_response_in_lab_units(file: Path) -> None:
     )
     assert np.degrees(alone["lag_psi_rad"]).to_numpy() == pytest.approx(alone["lag_psi_deg"].to_numpy())
     assert list(both)[:3] == ["robot", "direction", "before_s"]
-
-
-def test_a_response_of_dimensionless_robots_names_rows() -> None:
-    """Robots with different numbers of tails in any order."""
-    table = sf.response({**ROBOT.group_values(), "N": [3, 2, 3], "C_yr": [2.0, 2.0, 3.0]})
+    table = sf.response({**ROBOT.group_values(), "N": [3, 2, 3], "C_yr": [2.0, 2.0, 3.0]})  # in any order
     assert table["row"].unique().tolist() == [0, 1, 2]
-    alone = sf.response(ROBOT)
-    np.testing.assert_allclose(table.loc[table["row"] == 1, "lag_z"], alone["lag_z"], rtol=1e-9, atol=1e-12)
+    of_robot = both.loc[both["robot"] == "paper-control", "lag_z"]
+    np.testing.assert_allclose(table.loc[table["row"] == 1, "lag_z"], of_robot, rtol=1e-9, atol=1e-12)
     assert "dwell_s" not in table
 
 
 def test_units_of_columns() -> None:
-    units = {
-        "R_yr_cm": "cm",
-        "omega_yr_rad_s": "rad/s",
-        "lag_psi_rad": "rad",
-        "v_z_low": "EI/(mu0 l^3)",
-        "x_s": "s",
-    }
+    units = {"R_yr_cm": "cm", "omega_yr_rad_s": "rad/s", "lag_psi_rad": "rad", "v_z_low": "EI/(mu0 l^3)"}
     assert with_units(pd.DataFrame(columns=[*units, "note"])).attrs["units"] == units
 
 
-def test_a_replay_of_a_file_and_by_another_robot(tmp_path: Path, file: Path) -> None:
-    result = sf.plan(sf.circle(1.2), ROBOT)
-    sf.write_plan(result, tmp_path)
-    small = sf.Schedule(ROBOT.group_values(), 1, result.dwells[:2], result.start, ROBOT.time_scale)
+def test_a_replay_needs_a_file_and_a_tail_length(tmp_path: Path) -> None:
+    small = sf.Schedule(ROBOT.group_values(), 1, np.array([0.8, 0.8]), (0.0, 0.0, 0.0), ROBOT.time_scale)
     assert sf.replay(small).attrs["units"]["time_s"] == "s"
     with pytest.raises(sf.InputError, match="no tail length"):
         sf.replay(small, ROBOT)
     with pytest.raises(sf.InputError, match=r"none\.json"):
         sf.replay(tmp_path / "none.json")
+
+
+def test_a_robot_is_found_by_its_motion() -> None:
+    values = ROBOT.group_values()
+    motion = sf.query(ROBOT)
+    given = {name: value for name, value in values.items() if name not in ("C_t", "C_yr")}
+    targets = {name: motion[name].item() for name in ("omega_yr_bar", "v_z")}
+    robots = sf.inverse(pd.DataFrame([{**given, **targets}] * 2), free=["C_t", "C_yr"])
+    for target in (1, 2):
+        found = robots[robots["target"] == target].iloc[0]
+        assert (found["C_t"], found["C_yr"]) == pytest.approx((values["C_t"], values["C_yr"]), rel=1e-4)
+    with pytest.raises(sf.InputError, match="has no outputs"):
+        sf.inverse(given)
+    with pytest.raises(sf.InputError, match="N cannot be found"):
+        sf.inverse({**given, **targets}, free=["N"])
+
+
+def test_a_small_copy_is_of_a_trained_table(tmp_path: Path) -> None:
+    own = own_table()
+    with pytest.raises(sf.InputError, match="table of a single robot"):
+        sf.export(tmp_path, lookup=own)
+    assert sf.query(ROBOT, lookup=own)["error"].item() < 0.01
+    own.save(tmp_path / "own.json")
+    assert sf.query(ROBOT, lookup=tmp_path / "own.json").equals(sf.query(ROBOT, lookup=own))
+
+
+def test_a_sweep_around_a_robot_varies_its_inputs_alone(tmp_path: Path) -> None:
+    ranges = {"motor_speed_rpm": (20.0, 40.0), "C_yr": (1.0, 4.0)}
+    sf.sweep(ROBOT, tmp_path / "sweep", inputs=ranges, rows=8, jobs=1)
+    rows = sf.read_sweep(tmp_path / "sweep")
+    values = ROBOT.group_values()
+    assert len(rows) == 8
+    assert rows["l_over_R"].to_numpy() == pytest.approx(values["l_over_R"])
+    assert rows["C_yr"].between(1.0, 4.0).all()
+    rpm = rows["omega_bar"] / values["omega_bar"] * ROBOT.motor_speed * 30 / 3.141592653589793
+    assert rpm.between(20.0, 40.0).all()
+    assert rpm.nunique() == 8
+
+
+def test_a_sweep_that_cannot_be_says_why(tmp_path: Path) -> None:
+    with pytest.raises(sf.InputError, match="inputs are for a sweep around a robot"):
+        sf.sweep("sweep.toml", tmp_path, inputs={"tail_length_cm": (6, 11)})
+    with pytest.raises(sf.InputError, match="tail_lenght"):
+        sf.sweep(ROBOT, tmp_path, inputs={"tail_lenght_cm": (6, 11)})
+    with pytest.raises(sf.InputError, match="ordered"):
+        sf.sweep(replace(ROBOT, tails=3), tmp_path, inputs={"tail_length_cm": (11, 6)})

@@ -14,6 +14,7 @@ from tests.planner.vehicles import FINE
 ROBOT = sf.load_robot("paper-control")
 
 
+@pytest.mark.slow
 def test_a_simulated_robot_swims_like_the_vehicle_of_its_plan() -> None:
     plan = sf.plan(sf.circle(1.0), ROBOT, objective="flips")
     simulated, moved = sf.swim(plan, camera=FINE), swim(sf.Tracker(plan), plan, plan.tracked.vehicle, FINE)
@@ -23,6 +24,7 @@ def test_a_simulated_robot_swims_like_the_vehicle_of_its_plan() -> None:
     assert simulated.to_frame()["x_over_l"].to_numpy() == pytest.approx(simulated.poses[:, 0])
 
 
+@pytest.mark.slow
 def test_another_robot_with_an_askew_marker_in_a_current() -> None:
     """A tail that is a tenth shorter has other units of time and length; those of the plan are told."""
     plan = sf.plan(sf.circle(1.0), ROBOT, objective="flips")

@@ -1,0 +1,24 @@
+"""Plans and tables that several tests look at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import softflagella as sf
+from surrogate.one_robot.tabulate import tabulate
+from tests.shared import shared
+
+ROBOT = sf.load_robot("paper-control")
+ODD = replace(ROBOT, effects={"left_right_bias": 0.2})  # the shipped table does not know it
+START, GOAL = (0, 0, 0), (2.5, 0.5, 0.3)
+
+
+@shared
+def goal() -> sf.GoalPlan:
+    return sf.to_goal(START, GOAL, ROBOT, keep_out=[sf.Circle(1.2, -1.5, 0.3)])
+
+
+@shared
+def own_table(*, odd: bool = False) -> Any:
+    return tabulate(ODD if odd else ROBOT)
