@@ -21,7 +21,8 @@ from tests.planner.compiled import compile_c
 from tests.processes import LIMIT
 
 RUN = ("sh", "python")
-LONG = {"tutorial/calibration.md", "tutorial/schedule.md", "howto/sweep.md", "howto/goal.md", "howto/jobs.md"}
+LONG = {"tutorial/calibration.md", "tutorial/schedule.md", "howto/sweep.md", "howto/goal.md", "howto/jobs.md",
+        "howto/page.md", "howto/query.md", "howto/tracker.md"}  # fmt: skip
 NAMED = re.compile(r"# (?P<name>[\w-]+\.toml)$", re.MULTILINE)
 SHOWN = {*RUN, "toml", "text", "c", "js"}
 

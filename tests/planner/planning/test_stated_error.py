@@ -165,7 +165,7 @@ def test_it_holds_for_unseen_robots_and_paths() -> None:
             plans.append(carried(seed, lookup))
     assert len(plans) >= 20
     assert sum(not one.held for one in plans) <= 4
-    assert np.median([one.own_stated / one.found for one in plans]) < 1.5
+    assert np.median([one.own_stated / one.found for one in plans]) < 1.6
 
 
 @pytest.mark.parametrize(
