@@ -20,6 +20,8 @@ from hypothesis import strategies as st
 
 from tests.oracles.file_formats import FORMATS, judged
 
+pytestmark = pytest.mark.slow
+
 CASES, FEW = 40, 5  # mutations of a format; of one whose reader takes more than 10 ms
 COSTLY = (
     "camera tracks", "runs of camera tracks", "replayed track", "plan to track", "table of one robot, sealed",

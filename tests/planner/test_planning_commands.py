@@ -21,6 +21,8 @@ from sim.inputs import save_robot
 from sim.io.errors import run_command
 from tests.planner.plans import CONTROL, planned, trip
 
+pytestmark = pytest.mark.slow
+
 CM = 100 * CONTROL.tail_length
 POSE = (0.3, -2.5, 1.0)
 Capture = pytest.CaptureFixture[str]

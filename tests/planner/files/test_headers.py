@@ -28,6 +28,8 @@ from tests.planner.vehicles import PROMPT, root_mean_square
 from tests.processes import LIMIT
 from tests.shared import shared
 
+pytestmark = pytest.mark.slow
+
 # A difference in the last digit grows, because each flip decides the later ones. So answers are compared up to
 # SHORT; after it the two are only as good as each other.
 SHORT, ROUNDING = 36.0, 1e-11

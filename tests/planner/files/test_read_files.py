@@ -25,6 +25,8 @@ from sim.model.schedule import load_schedule
 from tests.planner.plans import WALLS, hindered_trip, planned
 from tests.shared import shared
 
+pytestmark = pytest.mark.slow
+
 READERS = [load_plan, load_schedule]  # of the planner and of the simulator
 
 

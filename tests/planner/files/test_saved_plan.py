@@ -35,6 +35,8 @@ from tests.planner.plans import BIASED, CONTROL, CORNER, around, hindered_trip, 
 from tests.planner.vehicles import PROMPT
 from tests.shared import shared
 
+pytestmark = pytest.mark.slow
+
 CM = 100 * CONTROL.tail_length
 KNOWN = CalibrationKnowledge(("C_t",), np.array([[1e-4]]), current=(2e-4, 1e-4), current_error=(1e-5, 0.0))
 NEW = ("guidance", "own_table", "calibration", "camera")  # entries that files from before do not have

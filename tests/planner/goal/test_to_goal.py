@@ -30,6 +30,8 @@ from tests.oracles.quickest import brute_force
 from tests.oracles.random_tasks import goal_behind_circles, random_goal, replayed_clearance
 from tests.planner.plans import BIASED, CONTROL, hindered_trip, own_table, trip
 
+pytestmark = pytest.mark.slow
+
 BOX = [[-2, -4], [9, -4], [9, 4], [-2, 4]]
 REST = pytest.mark.rest
 

@@ -32,6 +32,8 @@ from tests.planner.plans import CONTROL, LINE, QUICK, ROCK, around, planned, tra
 from tests.planner.vehicles import FINE
 from tests.shared import shared
 
+pytestmark = pytest.mark.slow
+
 BODY = Footprint(np.linspace(-0.5, 1.0, 6), 0.15)
 SPACE = FreeSpace((Circle(1.0, 0.3, 0.4), Polygon.of([[-1, -1], [0, -1], [0, -0.4], [-1, -0.4]])))
 POSES = np.array([[-3.0, 0.0, 0.0], [0.1, 0.0, 0.2], [0.4, -0.2, -0.5], [4.0, 0.0, 0.1]])

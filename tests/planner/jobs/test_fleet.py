@@ -30,6 +30,8 @@ from tests.planner.plans import CONTROL, LINE, planned
 from tests.planner.vehicles import FINE, drawn_vehicle
 from tests.shared import shared
 
+pytestmark = pytest.mark.slow
+
 BODY = Body(0.02, -0.13, 0.02)
 TAIL = CONTROL.tail_length
 APART = 0.3 * TAIL

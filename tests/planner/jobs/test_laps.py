@@ -37,6 +37,8 @@ from tests.planner.plans import CONTROL, tracked
 from tests.planner.vehicles import FINE, drawn_vehicle
 from tests.shared import shared
 
+pytestmark = pytest.mark.slow
+
 FEW = PlanRequest(dwell=2.03)  # no flip is at the time of a picture
 PLACE = (2.0, 1.0)
 

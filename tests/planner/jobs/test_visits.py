@@ -29,6 +29,8 @@ from sim.io.errors import InputError, run_command
 from sim.motion.replay import replay
 from tests.planner.plans import CONTROL, tracked
 
+pytestmark = pytest.mark.slow
+
 PLACES = [(0.0, 0.0), (4.0, 0.0), (2.0, 1.0), (3.0, 3.0), (-1.0, 2.0)]
 QUICK = PlanRequest(objective="time")
 OPTIONS = 3

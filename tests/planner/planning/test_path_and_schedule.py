@@ -30,6 +30,8 @@ from sim.model.robot import Robot
 from tests.planner.plans import CONTROL
 from tests.planner.vehicles import plain_guidance, vehicle
 
+pytestmark = pytest.mark.slow
+
 
 def random_smooth_path(seed: int, length: float, sharpest: float) -> Path2D:
     """Draw a path of given length with curvature within ±sharpest, varying over lengths of about one."""

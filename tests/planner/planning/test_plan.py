@@ -31,6 +31,8 @@ from surrogate.table.model_file import load
 from tests.planner.plans import CONTROL, planned
 from tests.processes import LIMIT
 
+pytestmark = pytest.mark.slow
+
 LONG = replace(CONTROL, tails=3, tail_length=0.129, C_t=1.56, C_r=1.97, C_yr=1.08)
 
 

@@ -24,6 +24,8 @@ from tests.planner.compiled import CompiledTracker
 from tests.planner.plans import CONTROL, planned
 from tests.planner.vehicles import PROMPT, drawn_vehicle, root_mean_square
 
+pytestmark = pytest.mark.slow
+
 CURRENT = (0.0, 0.0015)  # l per time unit, a tenth of the net speed
 IN_LAB = (0.0, 0.0015 * CONTROL.tail_length / CONTROL.time_scale)
 ON_PATH = 0.08  # l

@@ -26,6 +26,8 @@ from sim.mechanics import planar
 from tests.planner.plans import planned as plan_of
 from tests.planner.vehicles import PROMPT
 
+pytestmark = pytest.mark.slow
+
 REST = pytest.mark.rest
 
 

@@ -26,6 +26,8 @@ from tests.planner.compiled import compile_c
 from tests.processes import LIMIT
 from tests.surrogate.small import table
 
+pytestmark = pytest.mark.slow
+
 OUTPUTS = (*STEADY_OUTPUTS, *RESPONSE_OUTPUTS)
 LIBRARY = """#include "lookup.h"
 int answer(const double *in, double *out)

@@ -28,6 +28,8 @@ from surrogate.one_robot.tabulate import tabulate
 from surrogate.table.model_file import load_table
 from tests.surrogate.small import refusal, robot_table
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_table_of_one_robot_comes_back_as_it_was_and_damaged_ones_are_refused(tmp_path: Path) -> None:
     """Or hold the same numbers, as where 1e-5 has become 1E-5."""

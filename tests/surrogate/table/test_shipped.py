@@ -23,6 +23,8 @@ from surrogate.training.train import with_radius
 from tests.reference.cases import STEADY_INPUTS, STEADY_POINTS
 from tests.sim.robots import CONTROL_VALUES
 
+pytestmark = pytest.mark.slow
+
 counts = pytest.mark.parametrize("count", [128, pytest.param(512, marks=pytest.mark.rest)])
 
 

@@ -21,6 +21,8 @@ from tests.dataset.sweeps import design, invented
 from tests.shared import shared
 from tests.surrogate.small import CURVES, TAILS, flips, rows, table
 
+pytestmark = pytest.mark.slow
+
 
 def test_training_is_repeatable_and_reads_a_folder(monkeypatch: pytest.MonkeyPatch) -> None:
     """With few steps: what they reach does not matter."""

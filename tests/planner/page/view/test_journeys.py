@@ -40,6 +40,8 @@ from tests.planner.page.view.browser import (
     unfold,
 )
 
+pytestmark = pytest.mark.slow
+
 FIELDS = "#robot-fields input"
 
 
