@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-import signal
 import socket
 import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from typing import Any
 
+import psutil
 import ray
 from ray import exceptions
 
@@ -36,20 +35,20 @@ class RayCluster:
             )
         local: dict[str, Any] = {"address": "local", "num_cpus": count, "include_dashboard": False}
         settings = {"address": address} if address else local
-        before = descendants(os.getpid())
+        before = _descendants()
         try:
             with _silent():
                 ray.init(**settings, log_to_driver=False, logging_level="CRITICAL")
         except Exception as refusal:  # ray raises even `Exception` itself
-            for process in descendants(os.getpid()) - before:
-                with suppress(ProcessLookupError):
-                    os.kill(process, signal.SIGKILL)
+            for process in _descendants() - before:
+                with suppress(psutil.NoSuchProcess):
+                    process.kill()
             reason = (str(refusal) or repr(refusal)).splitlines()[0]
             raise InputError(
                 f"no ray cluster at {address or 'this machine'} ({reason}); "
                 "where its head asks for a token, set RAY_AUTH_MODE=token and RAY_AUTH_TOKEN_PATH"
             ) from None
-        self._watchdog = _watchdog(descendants(os.getpid()) - before)
+        self._watchdog = _watchdog(_descendants() - before)
         self._run = ray.remote(num_cpus=1, max_retries=0)(run_task)
         self._busy: dict[Any, int] = {}
         self._looked, self._slots = 0.0, 0
@@ -118,25 +117,17 @@ def _silent() -> Iterator[None]:
         os.close(stderr)
 
 
-def descendants(ancestor: int) -> set[int]:
-    """Find the processes that a process has started, and theirs (Linux; elsewhere ray has a reaper of its own)."""
-    parents: dict[int, int] = {}
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        with suppress(OSError):  # it has ended
-            parents[int(stat.parent.name)] = int(stat.read_text().rpartition(")")[2].split()[1])
-    found: set[int] = set()
-    parted = {ancestor}
-    while parted := {process for process, parent in parents.items() if parent in parted}:
-        found |= parted
-    return found
+def _descendants() -> set[psutil.Process]:
+    """Find the processes that this one has started, and theirs."""
+    return set(psutil.Process().children(recursive=True))
 
 
-def _watchdog(processes: set[int]) -> subprocess.Popen[bytes]:
+def _watchdog(processes: set[psutil.Process]) -> subprocess.Popen[bytes]:
     """Start a process that kills others when this one has ended, however that happens.
 
     Ray's head and raylet end with the process that started them; the raylet's agents wait a minute for the head.
     """
-    words = ["sh", "-c", 'cat; kill -9 "$@"', "watchdog", *map(str, processes)]
+    words = ["sh", "-c", 'cat; kill -9 "$@"', "watchdog", *(str(process.pid) for process in processes)]
     nothing = subprocess.DEVNULL
     return subprocess.Popen(words, stdin=subprocess.PIPE, stdout=nothing, stderr=nothing, start_new_session=True)
 

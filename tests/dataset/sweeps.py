@@ -20,6 +20,7 @@ from dataset.storage.storage import open_storage
 from dataset.workers.backend import Lost
 from dataset.workers.tasks import Join, Outcome, Task, run_task
 from sim.model.response import BEFORE, DWELLS
+from tests.shared import FOLDER
 
 SMALL = """
 rows = 6
@@ -37,7 +38,7 @@ N = { range = [2, 3], scale = "integer" }
 Rows = Callable[[dict[str, np.ndarray]], dict[str, Any]]
 ROOT = Path(__file__).parents[2]
 # Where workers of tests leave marks; set before any worker starts.
-MARKS = Path(os.environ.setdefault("SOFTFLAGELLA_TEST_MARKS", mkdtemp()))
+MARKS = Path(os.environ.setdefault("SOFTFLAGELLA_TEST_MARKS", mkdtemp(dir=FOLDER)))
 
 
 class InThisProcess:

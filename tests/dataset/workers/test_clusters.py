@@ -261,11 +261,11 @@ def test_ray_without_its_token_ends_with_a_line(
 
 
 def test_a_local_ray_cluster_ends_with_its_parent(home: None, tmp_path: Path) -> None:
-    from dataset.workers.ray_cluster import descendants
+    import psutil
 
     process = build_apart(tmp_path / "out", "endless", "ray", None)
     until(lambda: len(list(MARKS.iterdir())) >= 2, process)
-    cluster = descendants(process.pid)
+    cluster = [each.pid for each in psutil.Process(process.pid).children(recursive=True)]
     agents = [each for each in cluster if b"Agent" in Path(f"/proc/{each}/cmdline").read_bytes()]
     assert len(agents) == 2
     for agent in agents:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -14,3 +15,9 @@ def _core() -> Iterator[None]:
     """End the core after the last test."""
     yield
     stop_core()
+
+
+@pytest.fixture
+def empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work in an empty folder, so that a file has the same name in Python and in the page."""
+    monkeypatch.chdir(tmp_path)

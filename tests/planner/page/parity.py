@@ -38,6 +38,7 @@ def check_alike(found: Any, wanted: Any, allowed: float) -> None:
 def check_same(found: Any, wanted: Any, allowed: float = 0.0) -> None:
     """Assert that an answer of the core is that of Python; of an object, all that the core has of it."""
     if hasattr(wanted, "_asdict") or is_dataclass(wanted):
+        assert found
         for name, part in found.items():
             check_same(part, getattr(wanted, re.sub(r"([A-Z])", r"_\1", name).lower()), allowed)
     elif isinstance(wanted, dict):

@@ -14,6 +14,8 @@ from tests.planner.page.page_core import EXACT, answer
 from tests.planner.page.parity import check_parity, without_digits
 from tests.planner.paths.svg_cases import ALIKE, REFUSED
 
+pytestmark = pytest.mark.usefixtures("empty_folder")
+
 BODIES = [
     "<polyline points='0,0 3,0 3,-4'/>", "<polygon points='0,0 3,0 3,-4'/>", "<path d='M 0 0 h 3 v -4 Z'/>",
     "<path d='M 1 1 L 4 1 l 0 -4'/>", "<line x1='1' y1='1' x2='4' y2='-3'/>", "<circle cx='2' cy='1' r='3'/>",
@@ -47,12 +49,6 @@ BAD = [
     "<svg xmlns:xlink='http://www.w3.org/1999/xlink'><g id='a'><use xlink:href='#a'/></g></svg>",
     f"<svg><path d='M{'1 ' * 50_001}'/></svg>", f"<svg>{'<g>' * 120}{'</g>' * 120}</svg>", f"<svg>{SEVERAL}</svg>",
 ]  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work in an empty folder, so that a drawing has the same name in Python and in the page."""
-    monkeypatch.chdir(tmp_path)
 
 
 def svg(body: str, root: str = "", before: str = "") -> str:

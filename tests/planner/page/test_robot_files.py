@@ -19,6 +19,8 @@ from tests.planner.page.cases import CONTROL
 from tests.planner.page.page_core import answer, answers, call, to_page
 from tests.planner.page.parity import check_parity, refusal_of, without_digits
 
+pytestmark = pytest.mark.usefixtures("empty_folder")
+
 ROBOTS = [
     *PRESETS.values(),
     replace(CONTROL, name='it\'s "quoted" \\ ü\n\x7f', disc_offset=0.0123, tails=3),
@@ -55,12 +57,6 @@ CHANGES = [
     ("length_cm = 11", "viscosity_Pa_s = 11"), ("length_cm = 11", "lenght_mm = 110"), ("C_t = 3.0", "C_t = inf"),
     (VISCOSITY, "viscosity_Pa_s = 1,49"),
 ]  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work in an empty folder, so that a file has the same name in Python and in the page."""
-    monkeypatch.chdir(tmp_path)
 
 
 def written(text: str, name: str) -> Path:

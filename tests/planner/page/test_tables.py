@@ -21,6 +21,8 @@ from tests.planner.page.cases import CONTROL, planned
 from tests.planner.page.page_core import answer, check_near
 from tests.planner.page.parity import check_parity, refusal_of, without_digits
 
+pytestmark = pytest.mark.usefixtures("empty_folder")
+
 TABLES = [
     b"x,y\n1,2\n3,4\n", b"x;y\n1,5;2\n3;4,25\n", b"x\ty\n1\t2\n", b"x y\n1 2\n 3   4\n", b"\xef\xbb\xbfx,y\n1,2\n",
     b'"x [cm]","y [cm]"\n"1.5","2"\n', b"# a\n% x y\n1 2\n3 4\n", b"1,2\n3,4\n", b"x,y\nmm,mm\n1,2\n",
@@ -59,12 +61,6 @@ BAD_PATHS = [
     b"x,x_mm,y\n1,2,3\n4,5,6\n", b"1\n2\n", b"x,y\n1,inf\n2,3\n", b"x,y\n1,nan\n2,3\n", b"x,y\n1e120,2\n3,4\n",
     b"x_cm,y_cm\n1,5,2,5\n3,5,4,5\n",
 ]  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work in an empty folder, so that a file has the same name in Python and in the page."""
-    monkeypatch.chdir(tmp_path)
 
 
 def numbers_in(data: bytes, name: str, names: bool) -> dict[str, Any]:
