@@ -106,7 +106,7 @@ def settle_plainly(groups: Groups, *, edges: int = 16, tolerance: float = 1e-5) 
     Runs for three time units, or for two and a turn where that is longer (at 0.4 of the motor's speed).
     """
     swimmer = PlainSwimmer(groups, edges)
-    time = max(3.0, 2.0 + 2 * np.pi / (0.4 * abs(float(groups.omega_bar))))
+    time = max(3.0, 2.0 + 2 * np.pi / (0.4 * abs(float(groups.omega_bar[0]))))
     answer = solve_ivp(
         swimmer.rates, (0.0, time), swimmer.start(), method="BDF", rtol=tolerance, atol=1e-8, dense_output=True
     )

@@ -39,7 +39,7 @@ def robots() -> None:
         slow, reference = timed(lambda groups=groups: settle_plainly(groups))  # type: ignore[misc]
         apart = abs(reference[1] / motion.omega_yr[0] - 1)
         ratios.append(slow / quick)
-        speed = float(groups.omega_bar)
+        speed = float(groups.omega_bar[0])
         line = f"  {groups.N}  {speed:11.1f}   {slow:13.1f}   {1e3 * quick:11.2f}   {ratios[-1]:5.0f}"
         print(f"{line}   yaw rate {100 * apart:.2f} %")
     print(f"  smallest ratio {min(ratios):.0f}, geometric mean {np.exp(np.mean(np.log(ratios))):.0f}")

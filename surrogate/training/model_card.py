@@ -25,6 +25,11 @@ _TITLES = {
     "omega_h_bar": "spin of the head", _YAW_RATE: "yaw rate",
     "R_yr_over_l": "turn radius", "v_z": "surge, of the speed", "theta_deg": "slip angle [degrees]",
 }  # fmt: skip
+_YAW_RATE_HEAD = ("median", "95 %", "worst", "coverage")
+_YAW_RATE_WORDS = (
+    f"Coverage is the share of intervals for {100 * COVERAGE:.0f} % that hold the simulator's value. The lines "
+    "for one N are for robots without effects, touching or not."
+)
 _NO_TRUST = """
 - One tail: errors are several times larger, mostly where a strong couple yaws the robot (surface couple,
   left-right bias). Its response to a flip is not learned.
@@ -80,11 +85,8 @@ def model_card(lookup: NeuralTable, held_out: SimulatedRobots) -> str:
         "effects on head, disc and motor are answered, too.",
         "## Errors",
         _about_errors(int(known.sum()), int((~known).sum())),
-        _lines(("robots", *_TITLES.values()), by_output),
-        "## Yaw rate",
-        f"Coverage is the share of intervals for {100 * COVERAGE:.0f} % that hold the simulator's value. The "
-        "lines for one N are for robots without effects, touching or not.",
-        _lines(("robots", "median", "95 %", "worst", "coverage"), yaw_rate),
+        *([_lines(("robots", *_TITLES.values()), by_output)] if by_output else []),
+        *(["## Yaw rate", _YAW_RATE_WORDS, _lines(("robots", *_YAW_RATE_HEAD), yaw_rate)] if yaw_rate else []),
         "## Where not to trust it",
         _NO_TRUST.strip(),
     ]) + "\n"  # fmt: skip

@@ -132,3 +132,4 @@ def test_a_card_without_known_errors_says_why() -> None:
     card = model_card(table(), replace(held, robots=beyond))
     assert "Not known: all 64 held-out robots are outside its domain" in card
     assert "On 0" not in card
+    assert "| robots |" not in card, "a table without rows"
