@@ -21,8 +21,9 @@ from tests.planner.compiled import compile_c
 from tests.processes import LIMIT
 
 RUN = ("sh", "python")
-LONG = {"tutorial/calibration.md", "tutorial/schedule.md", "howto/sweep.md", "howto/goal.md", "howto/jobs.md",
-        "howto/page.md", "howto/query.md", "howto/tracker.md"}  # fmt: skip
+LONG = {"tutorial/schedule.md", "howto/sweep.md", "howto/goal.md", "howto/jobs.md", "howto/page.md",
+        "howto/query.md", "howto/tracker.md"}  # fmt: skip
+LONGEST = {"tutorial/calibration.md"}
 NAMED = re.compile(r"# (?P<name>[\w-]+\.toml)$", re.MULTILINE)
 SHOWN = {*RUN, "toml", "text", "c", "js"}
 
@@ -30,9 +31,8 @@ SHOWN = {*RUN, "toml", "text", "c", "js"}
 def marked() -> list[Any]:
     """Return the pages with something to run."""
     pages = [p for p in PAGES if any(b.language in RUN and not b.reason for b in blocks(p))]
-    return [
-        pytest.param(p, id=page_name(p), marks=[pytest.mark.rest] if page_name(p) in LONG else []) for p in pages
-    ]
+    marks = {**dict.fromkeys(LONG, [pytest.mark.rest]), **dict.fromkeys(LONGEST, [pytest.mark.rates])}
+    return [pytest.param(p, id=page_name(p), marks=marks.get(page_name(p), [])) for p in pages]
 
 
 def environment(folder: Path) -> dict[str, str]:

@@ -74,7 +74,7 @@ def test_derivatives_are_those_by_differences() -> None:
     ("name", "places"),
     [
         *((name, FEW_PLACES) for name in ("Cyr", "Mz_wh", "Fx_wt_at_l")),
-        *(pytest.param(name, (), marks=pytest.mark.rest) for name in LAWS),
+        *(pytest.param(name, (), marks=pytest.mark.rates) for name in LAWS),
     ],
     ids=lambda value: value if isinstance(value, str) else "few" if value else "all",
 )

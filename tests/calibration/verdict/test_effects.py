@@ -34,7 +34,7 @@ SIZE = 5.0
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("few", [True, pytest.param(False, marks=pytest.mark.rest)], ids=["few", "all"])
+@pytest.mark.parametrize("few", [True, pytest.param(False, marks=pytest.mark.rates)], ids=["few", "all"])
 def test_a_planted_effect_is_found_sized_and_removed(few: bool) -> None:
     result = effect() if few else calibrated(toy_table(5, **{DRAG: SIZE}))
     assert result.verdict == "effect"
@@ -104,7 +104,7 @@ def test_fits_arrive_along_a_valley() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("few", [True, pytest.param(False, marks=pytest.mark.rest)], ids=["few", "all"])
+@pytest.mark.parametrize("few", [True, pytest.param(False, marks=pytest.mark.rates)], ids=["few", "all"])
 def test_two_effects_are_found_as_a_pair(few: bool) -> None:
     result = calibrated(toy_table(31, left_right_bias=0.15, **{DRAG: 5.0}), few=few)
     assert result.verdict == "effect"

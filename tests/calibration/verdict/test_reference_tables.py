@@ -46,7 +46,7 @@ def test_nothing_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
         assert result.final.parameters[name] == pytest.approx(truth, rel=0.1)
 
 
-@pytest.mark.parametrize("few", [True, pytest.param(False, marks=pytest.mark.rest)], ids=["few", "all"])
+@pytest.mark.parametrize("few", [True, pytest.param(False, marks=pytest.mark.rates)], ids=["few", "all"])
 def test_one_effect_is_named_sized_and_handed_on(
     few: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

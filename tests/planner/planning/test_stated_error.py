@@ -76,8 +76,8 @@ def wavy(car: Vehicle) -> Vehicle:
     [
         pytest.param(CIRCLE, vehicle(errors=4.0), id="circle"),
         pytest.param(CIRCLE, vehicle(), id="circle, certain", marks=pytest.mark.rest),
-        pytest.param(LINE, vehicle(), id="line, certain", marks=pytest.mark.rest),
-        pytest.param(LINE, vehicle(errors=4.0), id="line", marks=pytest.mark.rest),
+        pytest.param(LINE, vehicle(), id="line, certain", marks=pytest.mark.rates),
+        pytest.param(LINE, vehicle(errors=4.0), id="line", marks=pytest.mark.rates),
         pytest.param(circle(2.0), wavy(vehicle()), id="response", marks=pytest.mark.rest),
     ],
 )

@@ -129,7 +129,7 @@ def test_the_map_over_a_turn_has_the_orbit_as_fixed_point_with_its_growth() -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("low", "steps", "count"), [(160.0, 2, 2), pytest.param(60.0, 6, 3, marks=pytest.mark.rest)]
+    ("low", "steps", "count"), [(160.0, 2, 2), pytest.param(60.0, 6, 3, marks=pytest.mark.rates)]
 )
 def test_both_stable_motions_of_two_tails_are_found_and_drawn(low: float, steps: int, count: int) -> None:
     """The direct solution reaches one, time steps from rest the other; docs/steady-motions.md."""

@@ -25,7 +25,7 @@ from tests.sim.robots import CONTROL_VALUES
 
 pytestmark = pytest.mark.slow
 
-counts = pytest.mark.parametrize("count", [128, pytest.param(512, marks=pytest.mark.rest)])
+counts = pytest.mark.parametrize("count", [128, pytest.param(512, marks=pytest.mark.rates)])
 
 
 def input_columns(points: tuple[tuple[float, ...], ...]) -> dict[str, np.ndarray]:
@@ -117,7 +117,7 @@ def test_a_single_tail_that_a_couple_turns_to_either_side(count: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("tails", "count"), [(2.0, 128), *(pytest.param(tails, 512, marks=pytest.mark.rest) for tails in (1.0, 4.0))]
+    ("tails", "count"), [(2.0, 128), *(pytest.param(tails, 512, marks=pytest.mark.rates) for tails in (1.0, 4.0))]
 )
 def test_a_drag_number_that_was_not_learned_is_outside(tails: float, count: int) -> None:
     """Inertia raises the drag of thick, fast tails up to twentyfold, at a motor speed that is in its range."""
