@@ -31,8 +31,8 @@ SHOWN = {*RUN, "toml", "text", "c", "js"}
 def marked() -> list[Any]:
     """Return the pages with something to run."""
     pages = [p for p in PAGES if any(b.language in RUN and not b.reason for b in blocks(p))]
-    marks = {**dict.fromkeys(LONG, [pytest.mark.rest]), **dict.fromkeys(LONGEST, [pytest.mark.rates])}
-    return [pytest.param(p, id=page_name(p), marks=marks.get(page_name(p), [])) for p in pages]
+    marks = {**dict.fromkeys(LONG, pytest.mark.rest), **dict.fromkeys(LONGEST, pytest.mark.rates)}
+    return [pytest.param(p, id=page_name(p), marks=marks.get(page_name(p), ())) for p in pages]
 
 
 def environment(folder: Path) -> dict[str, str]:
