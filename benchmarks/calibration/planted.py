@@ -16,7 +16,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.statistical_model import Noise, Parameter, Parameters, Runs, prior_rows, start_values
+from calibration.statistics.statistical_model import (
+    Noise,
+    Parameter,
+    Parameters,
+    Runs,
+    Value,
+    prior_rows,
+    start_values,
+)
 from calibration.statistics.study import middle_session
 from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
@@ -50,13 +58,10 @@ class Linear:
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
         """Predictions (P, n, k)."""
-        predictions = []
-        for p in sets:
-            c = np.array([np.log(p[q.name] / q.start) for q in self.coefficients])
-            e = np.array([p[q.name] - q.start for q in self.effects])
-            x = np.array([np.log(p[q.name] / q.start) if q.logarithmic else p[q.name] for q in self.nuisances])
-            predictions.append(self.prediction + self.J @ c + self.D @ e + (self.G @ x if self.nuisances else 0.0))
-        return np.array(predictions)
+        every = (*self.coefficients, *self.nuisances, *self.effects)
+        table = np.moveaxis(np.concatenate([self.J, self.G, self.D], -1), -1, 0)
+        columns = list(zip(every, table, strict=True))
+        return np.array([self.prediction + sum(d * _changed(q, p[q.name]) for q, d in columns) for p in sets])
 
     def derivatives(
         self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
@@ -77,6 +82,12 @@ class Linear:
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """The start as it is."""
         return start
+
+
+def _changed(parameter: Parameter, value: Value) -> Floats:
+    """Change of a parameter on its own scale: one, or one for each run (n, 1)."""
+    change = np.log(value / parameter.start) if parameter.logarithmic else value - parameter.start
+    return np.reshape(change, (-1, 1))
 
 
 def design(lengths_cm: Sequence[float] = LENGTHS_CM) -> Measurements:
@@ -134,12 +145,21 @@ def measured(model: Linear, signal: Floats, seed: int) -> Linear:
     return replace(model, runs=replace(model.runs, y=model.prediction + signal + noise))
 
 
+def in_days(model: Linear, days: int, seed: int) -> Linear:
+    """Return the model with runs of every kind in each of some sessions; repeats are in different ones."""
+    rng = np.random.default_rng(seed)
+    session = np.concatenate([rng.permutation(days)[:2] for _ in range(len(model.runs) // 2)])
+    places = np.argsort(np.argsort(model.runs.condition, kind="stable"))
+    names = tuple(f"day {i + 1}" for i in range(days))
+    return replace(model, runs=replace(model.runs, session=session[places], session_names=names))
+
+
 class Signals:
     """What is seen of signals in this design."""
 
-    def __init__(self, model: Linear):
+    def __init__(self, model: Linear, used: Flags | None = None):
         k = model.prediction.shape[1]
-        self.used = ~middle_session(model.runs)
+        self.used = ~middle_session(model.runs) if used is None else used
         white = Noise(NOISE**2 * np.eye(k), (SESSION / NOISE) ** 2)
         self.white = white.whitener(model.runs.session[self.used])
         fitted = (*model.coefficients, *model.nuisances)

@@ -10,10 +10,10 @@ The whole procedure (`calibration.verdict.calibrate.calibrate`) runs on tables o
 A truth "is named" if it is named alone, in a set of effects, or beside a wrong number that does the same. A number
 "is wrong" if it explains the residual, alone or beside effects that explain as much.
 
-Usage: python -m benchmarks rates [linear|simulator] [TABLES] [FIRST_SEED] [CASES]
+Usage: python -m benchmarks rates [linear|simulator|balls] [TABLES] [FIRST_SEED] [CASES]
        CASES: words of the cases to run, separated by |; default all. A case has the same seeds in every run.
 
-Takes 100 minutes of one core (linear), an hour (simulator).
+Takes 100 minutes of one core (linear), an hour (simulator), half an hour (balls).
 """
 
 from __future__ import annotations
@@ -21,27 +21,41 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.calibration.planted import ROBOT, Linear, Signals, design, linearised, measured, outside, restated
+from benchmarks.calibration.planted import (
+    ROBOT,
+    Linear,
+    Signals,
+    design,
+    in_days,
+    linearised,
+    measured,
+    outside,
+    restated,
+)
 from benchmarks.calibration.simulated_truth import LENGTHS_CM, THINNING, simulated, sized, thinning
 from benchmarks.common import heading, in_parallel, per_cent, row
+from calibration.examples.balls import read_balls
 from calibration.statistics.residual_tests import TESTABLE
-from calibration.statistics.statistical_model import Parameter
+from calibration.statistics.statistical_model import Experiment, Parameter
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.experiment import Experiment
 from calibration.verdict.verdict import Verdict
 from sim.arrays import Floats
+from tests.oracles.falling_balls import DRAGS, NULLS, OUTSIDE, falls
 
+_DAYS, _MOVING = 4, ("C_t", "C_r", "C_yr", "youngs_modulus", "camera_scale")
 _AT_ONCE = 10  # tables of a case in one call
 _NULLS = 20
 _CLAIMED, _CLAIMED_PLAINLY = "an effect is claimed", "an effect is claimed without a warning"
 _WRONG, _UNEXPLAINED, _COVERED = "a number is wrong", "unexplained", "interval covers the true value"
+_ADOPTED, _RISES = "a form is adopted", "a form is adopted, and the error on the held-out runs rises"
+_MOVED, _MOVED_NAMED = "a number moved", "the number that moved and the day, or in the set"
 _OF_AN_EFFECT = (_NAMED, _OTHER, _NUMBER) = (
     "named, or in the set",
     "another effect",
@@ -79,6 +93,10 @@ def answers(verdict: Verdict, case: Case) -> dict[str, bool]:
         _CLAIMED_PLAINLY: bool(sets) and not any(c.uncertain for c in verdict.explaining),
         _WRONG: verdict.verdict == "number" or bool(verdict.evidence.rival_numbers),
         _UNEXPLAINED: verdict.verdict == "unexplained",
+        _MOVED: bool(verdict.moves),
+        _MOVED_NAMED: any(case.planted[0] in move.words for move in verdict.moves),
+        _ADOPTED: verdict.nearest is not None,
+        _RISES: verdict.nearest is not None and not verdict.held_out_error_falls,
         _NAMED: {name} in (*sets, *beside),
         _OTHER: bool(sets) and {name} not in sets,
         _NUMBER: verdict.verdict == "number" and {name} not in beside,
@@ -111,6 +129,58 @@ def drawn_tables(model: Linear, truth: Linear, seeds: list[int]) -> list[Experim
     return [measured(model, np.asarray(truth.G @ x), seed) for x, seed in zip(off, seeds, strict=True)]
 
 
+def falling(truth: str, withheld: tuple[str, ...], seeds: list[int]) -> list[Experiment]:
+    """Tables of falling balls."""
+    models = (read_balls(falls(truth, seed)) for seed in seeds)
+    return [replace(m, effects=tuple(e for e in m.effects if e.name not in withheld)) for m in models]
+
+
+def falling_cases() -> list[Case]:
+    """Truths of falling balls, with quadratic drag in the catalogue and without it."""
+    return [
+        Case(f"{truth}; {words}", partial(falling, truth, withheld), (_CLAIMED, _ADOPTED, _RISES))
+        for truth in (*NULLS, *DRAGS, *OUTSIDE)
+        for words, withheld in (("all effects", ()), ("no quadratic drag", ("quadratic_drag",)))
+    ]
+
+
+def moved_tables(model: Linear, place: int, day: int, seeds: list[int]) -> list[Experiment]:
+    """Let a number differ on a day of four, by 8 standard deviations of its score over all runs."""
+    tables: list[Experiment] = []
+    for seed in seeds:
+        crossed = in_days(model, _DAYS, seed)
+        column = (
+            np.concatenate([model.J, model.G], -1)[..., [place]] * (crossed.runs.session == day)[:, None, None]
+        )
+        length = np.linalg.norm(Signals(crossed, np.ones(len(model.runs), dtype=bool)).rest(column))
+        tables.append(measured(crossed, column[..., 0] * (8.0 / max(float(length), 1e-9)), seed))
+    return tables
+
+
+def days_without(model: Linear, seeds: list[int]) -> list[Experiment]:
+    """The same days, on which nothing differs."""
+    return [measured(in_days(model, _DAYS, seed), np.zeros_like(model.prediction), seed) for seed in seeds]
+
+
+def cases_in_days(model: Linear) -> list[Case]:
+    """Truths in sessions that have runs of every kind."""
+    numbers = (*model.coefficients, *model.nuisances)
+    listed = [
+        Case("four days, nothing differs", partial(days_without, model), (_MOVED, _CLAIMED, _ADOPTED), weight=2.0)
+    ]
+    for name in _MOVING:
+        place = [p.name for p in numbers].index(name)
+        for day in range(_DAYS):
+            planted = f"{numbers[place].title} in session day {day + 1}"
+            tables = partial(moved_tables, model, place, day)
+            listed.append(
+                Case(
+                    f"{name} differs on a day, 8 σ", tables, (_MOVED_NAMED, _MOVED, _CLAIMED), (planted, 0.0), 0.1
+                )
+            )
+    return listed
+
+
 def linear_cases() -> list[Case]:
     """Truths of the stand-in."""
     model = linearised(design())
@@ -118,7 +188,7 @@ def linear_cases() -> list[Case]:
     exact, place = restated(model, {}), [p.name for p in model.nuisances].index("youngs_modulus")
     alone = restated(model, {**sigmas, "youngs_modulus": 0.03})
     of_table = {k: sigmas[k] for k in ("camera_scale", "heading_zero", "tachometer")}
-    bare, both = restated(model, {**of_table, "youngs_modulus": 0.03}), (_CLAIMED, _WRONG)
+    bare, both = restated(model, {**of_table, "youngs_modulus": 0.03}), (_CLAIMED, _WRONG, _ADOPTED, _RISES)
 
     def soft(words: str, share: float, given: Linear, *asked: str) -> Case:
         tables = partial(linear_tables, given, model.G[..., place] * math.log(share))
@@ -149,8 +219,8 @@ def linear_cases() -> list[Case]:
             tables = partial(linear_tables, model, signal * (level / signals.beyond_catalogue(signal)))
             kind = "mimics" if label.startswith("mimic") else "others"
             words = f"outside, three {kind}, size {level:g}"
-            listed.append(Case(words, tables, (_CLAIMED, _CLAIMED_PLAINLY), weight=0.5))
-    return listed
+            listed.append(Case(words, tables, (_CLAIMED, _CLAIMED_PLAINLY, _ADOPTED, _RISES), weight=0.5))
+    return listed + cases_in_days(model)
 
 
 def simulated_cases(tables: int) -> list[Case]:
@@ -191,7 +261,8 @@ def report(done: list[Result], cases: list[Case]) -> None:
 
 def main(truth: str = "linear", tables: str = "100", first: str = "0", chosen: str = "") -> None:
     simulator, seed = truth == "simulator", int(first)
-    cases, work = simulated_cases(int(tables)) if simulator else linear_cases(), []
+    cases = simulated_cases(int(tables)) if simulator else falling_cases() if truth == "balls" else linear_cases()
+    work = []
     for case in cases:
         count, step = max(round(case.weight * int(tables)), 1), 1 if simulator else 37
         seeds = list(range(seed, seed + step * count, step))

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.calibration.planted import ROBOT, Signals, design, scatter
-from calibration.statistics.statistical_model import Parameter, prior_rows, start_values, stepped
+from calibration.statistics.statistical_model import Experiment, Parameter, prior_rows, start_values, stepped
 from calibration.swimmer.swimmer import DIRECT, SwimmerModel
-from calibration.verdict.experiment import Experiment
 from sim.arrays import Floats
 from sim.motion.batches import stepped_columns
 

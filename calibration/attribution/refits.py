@@ -26,7 +26,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from tqdm import tqdm
 
-from calibration.statistics.fit import Fit, fit, noise_at_most
+from calibration.statistics.fit import Fit, UnsolvedError, fit, noise_at_most
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
 from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, prior_rows, start_values
 from calibration.statistics.study import Study, groups, leave_one_group_out
@@ -165,7 +165,11 @@ def examine(
         start = {**(base.parameters if local else start_values(study.model)), **size}
         names = (*base.names, *size)
         target = noise_at_most(study.values, len(names))
-        refit = fit(study.model, start, names, study.split.fitted, target=target, title="")
+        try:
+            refit = fit(study.model, start, names, study.split.fitted, target=target, title="")
+        except UnsolvedError:
+            examined.append(replace(candidate, verdict="with it the motion of some runs is not found directly"))
+            continue
         examined.append(judge(study, candidate, base, refit, directions.without(j)))
     return examined
 
@@ -206,7 +210,7 @@ def pairs(study: Study, candidates: Sequence[Candidate]) -> list[Candidate]:
     for first in refitted[:FIRST]:
         assert first.refit is not None
         others = [e for e in study.model.effects if e.name != first.effect.name]
-        tangents = directions(study.model, first.refit.parameters, others, title=title)
+        tangents = directions(study.model, first.refit.parameters, others, title=title, quick=True)
         misfit = examine_residual(again, first.refit, tangents)
         second += examine(again, first.refit, misfit, tangents, beside=(first.effect,))
     single = lowest_ebic(study, candidates)
@@ -277,12 +281,21 @@ def session_gain(study: Study, base: Fit, refit: Fit) -> tuple[float, float]:
 
     With whitened residuals r of the refit and r + d of the base, a session gains ½|d|² + d·r, |d| of it by noise.
     """
-    gain, variance = 0.0, 0.0
-    for learn, out in leave_one_group_out(groups(study.model.runs)[0], study.split.fitted):
-        before, after = (_left_out_residual(study, fitted, refit, learn, out) for fitted in (base, refit))
-        gain += 0.5 * float(before @ before - after @ after)
-        variance += float(((before - after) ** 2).sum())
-    return gain, float(np.sqrt(variance))
+    before, after = left_out_residuals(study, base, refit)
+    return float(before @ before - after @ after) / 2, float(np.linalg.norm(before - after))
+
+
+def left_out_residuals(study: Study, base: Fit, refit: Fit) -> tuple[Floats, Floats]:
+    """Whiten the residuals of all fitted runs, each from fits to the other sessions: of the base and of the refit.
+
+    Both are white in the noise of the refit.
+    """
+    pairs = [
+        [_left_out_residual(study, fitted, refit, learn, out) for fitted in (base, refit)]
+        for learn, out in leave_one_group_out(groups(study.model.runs)[0], study.split.fitted)
+    ]
+    before, after = (np.concatenate(residuals) for residuals in zip(*pairs, strict=True))
+    return before, after
 
 
 def _left_out_residual(study: Study, fitted: Fit, refit: Fit, learn: Flags, out: Flags) -> Floats:

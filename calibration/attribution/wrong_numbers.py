@@ -27,7 +27,7 @@ from collections.abc import Sequence
 from scipy.stats import norm as normal
 
 from calibration.attribution.refits import INDISTINGUISHABLE, Candidate, ebic, judge, lowest_ebic
-from calibration.statistics.fit import Fit, fit
+from calibration.statistics.fit import Fit, fit, noise_at_most
 from calibration.statistics.pull import Pull
 from calibration.statistics.residual_tests import Directions
 from calibration.statistics.statistical_model import Parameter, change
@@ -93,14 +93,15 @@ def implausible(freed: Sequence[Pull]) -> bool:
     return any(pull.tolerances > IMPLAUSIBLE for pull in freed)
 
 
-def without_wrong_priors(study: Study, fitted: Fit) -> Fit:
-    """Fit again without the priors of wrong numbers; the same fit if no number is wrong."""
+def without_wrong_priors(study: Study, fitted: Fit, *, target: float = math.inf) -> Fit:
+    """Fit again without the priors of wrong numbers, see `fit`; the same fit if no number is wrong."""
     while len(fitted.wrong_numbers) < _MOST:
         alike = wrong_number([p for p in pulls(fitted, study.model.nuisances) if not p.freed])
         if not alike:
             break
         wrong, used = (*fitted.wrong_numbers, alike), study.split.fitted
-        fitted = fit(study.model, fitted.parameters, fitted.names, used, wrong_numbers=wrong, title="")
+        start, names = fitted.parameters, fitted.names
+        fitted = fit(study.model, start, names, used, wrong_numbers=wrong, target=target, title="")
     return fitted
 
 
@@ -125,7 +126,8 @@ def beside_wrong_numbers(
     judged = []
     for _, name, candidate in sorted(promising, key=lambda p: p[:2])[:_TRIED]:
         assert candidate.refit is not None
-        refit = without_wrong_priors(study, candidate.refit)
+        target = noise_at_most(study.values, len(candidate.refit.names))
+        refit = without_wrong_priors(study, candidate.refit, target=target)
         judged.append(judge(study, candidate, base, refit, directions.without(names.index(name))))
     single = lowest_ebic(study, candidates)
     return [c for c in judged if c.refit and ebic(study, c.refit, len(c.refit.wrong_numbers) + 1) < single]

@@ -79,7 +79,7 @@ class Spheres:
         diameter = np.linspace(1.0, 12.0, 23) / 1000
         count = len(diameter)
         runs = replace(
-            self.runs, y=np.zeros((count, 1)), weight=None, condition=np.arange(count),
+            self.runs, y=np.zeros((count, 1)), weight=None, specimen=None, condition=np.arange(count),
             session=np.zeros(count, int),
             session_names=("next",), inputs=np.log(diameter)[:, None], rows=np.arange(count),
             excluded=(), caveats=(),

@@ -191,7 +191,7 @@ class _LinearModel:
     contrasts: Floats  # (G, G − 2) shifts that are no power law
     as_given: Floats  # (n, k) residual with the nuisance parameters as given
     session: Integers  # (n,)
-    condition: Integers  # (n,)
+    repeated: Integers | Floats  # see `Runs.repeated`
     scale: Floats  # (n,) roots of the weights of the runs
 
     @cached_property
@@ -217,7 +217,7 @@ class _LinearModel:
 
     def gain(self, residual: Floats) -> Floats:
         """Compute T (B,) of residuals (B, n, k), each in its own S and ρ."""
-        root = inverse_root(repeat_covariance(residual, self.condition, self.scale))
+        root = inverse_root(repeat_covariance(residual, self.repeated, self.scale))
         products = _products(self.tested, residual * self.scale[:, None], root, self.precision)
         normal = products.at(session_share(products, passes=_PASSES))
         information, score = _eliminated(normal, normal.shape[-1] - 1 - self.contrasts.shape[1])
@@ -265,7 +265,7 @@ def _linear_model(model: LawModel, fitted: Fit, used: Flags, place: int, x: Floa
         contrasts=np.linalg.svd(np.stack([np.ones_like(middle), middle]))[2][2:].T,
         as_given=(data.y - fitted.prediction)[used] + J @ shift,
         session=data.session[used],
-        condition=data.condition[used],
+        repeated=data.repeated[used],
         scale=data.scale[used],
     )
 

@@ -180,7 +180,7 @@ class LawModel(SwimmerModel):
             slopes[LEVER] = parameters[SIZE] * (m * self._arms)[:, None] * slopes[moved[1]]
         for i, name in enumerate(self.exponents):
             slopes[name] = along * self._inputs[:, [i]]
-        return seen, np.stack([slopes[name] for name in names], -1)
+        return seen, np.stack([slopes[name] for name in names], -1) if names else np.empty((*seen.shape, 0))
 
     def _along(self, slopes: Sequence[Floats], lever: float) -> Floats:
         """Combine the derivatives along what the place moves, (n, k) each."""

@@ -61,7 +61,7 @@ class LinearModels:
         columns: Floats,
         models: Sequence[tuple[int, tuple[int, ...]]],
         session: Integers,
-        condition: Integers,
+        repeated: Integers | Floats,
         *,
         scale: Floats | None = None,
         further: Sequence[int] = (),
@@ -74,13 +74,13 @@ class LinearModels:
             columns: (n, k, P, v) of P places.
             models: place and columns of each.
             session: (n,) numbers of the runs' sessions.
-            condition: (n,) repeats share a number.
+            repeated: what tells repeats, see `Runs.repeated`.
             scale: (n,) roots of the weights of the runs; default 1.
             further: parameters that a model has beside its columns; default none.
         """
         n, k, self.p = absorbed.shape
         self.absorbed, self.precision, self.columns = absorbed, precision, columns
-        self.models, self.session, self.condition = tuple(models), session, condition
+        self.models, self.session, self.repeated = tuple(models), session, repeated
         self._further = np.array(further if len(further) else [0] * len(self.models))
         self._places, self._count = columns.shape[2:]
         self.scale = np.ones(n) if scale is None else scale
@@ -156,7 +156,7 @@ class LinearModels:
         """
         count, _, k = residual.shape
         p, places, columns = self.p, self._places, self._count
-        root = inverse_root(repeat_covariance(residual, self.condition, self.scale))
+        root = inverse_root(repeat_covariance(residual, self.repeated, self.scale))
         residual = residual * self.scale[:, None]
         inverse = np.swapaxes(root, -1, -2) @ root
         flat = inverse.reshape(count, k * k)

@@ -102,7 +102,7 @@ class _Draws:
     def __init__(self, search: Search, rng: np.random.Generator):
         self._search, self._rng = search, rng
         models = search.models
-        self._root = np.linalg.cholesky(repeat_covariance(search.residual, models.condition, models.scale))
+        self._root = np.linalg.cholesky(repeat_covariance(search.residual, models.repeated, models.scale))
         self._session = np.unique(models.session, return_inverse=True)[1].reshape(-1)
         known = models.precision > 0
         self._sigma = np.where(known, 1 / np.sqrt(np.where(known, models.precision, 1.0)), 0.0)

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from calibration.laws.law_fits import Laws
 from calibration.report.figures import draw_summary, final_model
-from calibration.report.quantities import LABELS, feature_in_words, output_error, plain, range_in_words
-from calibration.swimmer.measured_table import Measurements
+from calibration.report.quantities import feature_in_words, output_error, output_label, plain, ranges_in_words
+from calibration.statistics.statistical_model import Runs
 from calibration.verdict.verdict import DISAGREES, Verdict
 from sim.io.pages import Page
 
 
-def add_errors(page: Page, result: Verdict, data: Measurements) -> None:
+def add_errors(page: Page, result: Verdict, data: Runs) -> None:
     """Add the section on the errors of each model on the held-out runs."""
     page.section("Error on the held-out runs")
     errors, split = result.errors, result.conditions.split
@@ -44,7 +42,7 @@ def add_errors(page: Page, result: Verdict, data: Measurements) -> None:
         f"{100 * errors.noise:.2f} %",
         *(output_error(output, error) for output, error in zip(data.outputs, scatter, strict=True)),
     )
-    page.table(("model", "all outputs", *(LABELS[o] for o in data.outputs)), [*rows, noise])
+    page.table(("model", "all outputs", *(output_label(o) for o in data.outputs)), [*rows, noise])
     _add_agreement(page, result)
     if result.held_out_error_falls is False:
         page.text(
@@ -77,18 +75,13 @@ def _add_agreement(page: Page, result: Verdict) -> None:
     )
 
 
-def _add_correction(page: Page, result: Verdict, data: Measurements) -> None:
+def _add_correction(page: Page, result: Verdict, data: Runs) -> None:
     learnt = result.corrections.learnt
     if learnt is None:
         return
-    ranges = (
-        range_in_words("N", data.tails, ""),
-        range_in_words("l", 100 * data.length, " cm"),
-        range_in_words("ω", np.abs(data.omega) * 30 / math.pi, " rpm"),
-    )
     page.text(
         "So that the robot can be steered although nothing explains the residual, corrected.toml has a correction "
         f"of the head's load in {', '.join(learnt.terms)}. It holds between these runs only: "
-        f"{', '.join(ranges)}. "
+        f"{ranges_in_words(data.settings)}. "
         "A robot outside is refused. The response to a flip is simulated with the same load."
     )

@@ -9,16 +9,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
+from calibration.attribution.nearest import Nearest
 from calibration.attribution.refits import UNSEEN
-from calibration.report.quantities import LABELS, feature_in_words, output_scale
+from calibration.report.quantities import feature_in_words, output_label, output_scale
 from calibration.statistics.residual_tests import Misfit
-from calibration.swimmer.measured_table import Measurements
+from calibration.statistics.statistical_model import Runs
 from calibration.verdict.verdict import Verdict
 from sim.arrays import Flags, Floats
 from sim.io.page_figures import BLUE, GREEN, INK, ORANGE, PALE, RED, VIOLET
 
 _WIDTH = 4.4  # inches
-_TAILS = {2: BLUE, 3: ORANGE, 4: GREEN, 5: VIOLET}
+_KINDS = (BLUE, ORANGE, GREEN, VIOLET, RED)
 _ON_CELLS = "#101010"  # of numbers on pale cells, whatever the colours of the page
 _TICKS = (3.0, 10.0, 30.0, 100.0, 300.0)
 
@@ -27,6 +28,8 @@ def final_model(result: Verdict) -> str:
     """Name the final model, in words for a column or a caption; empty if it is the calibrated one."""
     if result.verdict == "number":
         return "with the wrong value corrected"
+    if result.nearest:
+        return "with the adopted form"
     return "with the verdict's effects" if result.effects else ""
 
 
@@ -42,7 +45,7 @@ def compared(result: Verdict) -> list[tuple[str, Floats]]:
     return models
 
 
-def draw_summary(result: Verdict, data: Measurements) -> Figure:
+def draw_summary(result: Verdict, data: Runs) -> Figure:
     """Draw the residual of each output for each model, as rms over the fitted runs, in units of the noise."""
     figure = Figure(figsize=(_WIDTH, 0.9 + 0.42 * len(data.outputs)))
     plot_summary(figure.add_subplot(), result, data)
@@ -51,7 +54,7 @@ def draw_summary(result: Verdict, data: Measurements) -> Figure:
     return figure
 
 
-def plot_summary(axes: Axes, result: Verdict, data: Measurements) -> None:
+def plot_summary(axes: Axes, result: Verdict, data: Runs) -> None:
     """Draw the bars of `draw_summary`, without a legend."""
     noise = np.sqrt(np.diag(result.base.noise.run))
     place = np.arange(len(data.outputs))[::-1]
@@ -63,51 +66,52 @@ def plot_summary(axes: Axes, result: Verdict, data: Measurements) -> None:
             place + height * ((len(models) - 1) / 2 - i), rms, height=0.9 * height, color=colour, label=label
         )
     axes.axvline(1.0, color=INK, lw=1.4, label="noise of a run")
-    axes.set_yticks(place, [LABELS[o] for o in data.outputs], fontsize=9)
+    axes.set_yticks(place, [output_label(o) for o in data.outputs], fontsize=9)
     axes.set_xlabel("measured − model, rms, over the noise of a run", fontsize=9)
     axes.tick_params(axis="x", labelsize=8)
 
 
-def draw_residuals(result: Verdict, data: Measurements) -> list[tuple[Figure, str]]:
-    """Draw measured minus model against tail length, a figure for each model; return each with its model."""
+def draw_residuals(result: Verdict, data: Runs) -> list[tuple[Figure, str]]:
+    """Draw measured minus model against a setting, a figure for each model; return each with its model."""
     used = result.conditions.split.fitted
     residuals = {label: (data.y - prediction)[used] for label, prediction in compared(result)}
     limits = 1.1 * np.max([np.abs(residual).max(0) for residual in residuals.values()], 0)
     return [(_draw_residual(residual, limits, used, data), label) for label, residual in residuals.items()]
 
 
-def _draw_residual(residual: Floats, limits: Floats, used: Flags, data: Measurements) -> Figure:
+def _draw_residual(residual: Floats, limits: Floats, used: Flags, data: Runs) -> Figure:
     """Draw a residual (n, k) of the runs in `used`, an output in each panel."""
     figure = Figure(figsize=(_WIDTH, 1.25 * len(data.outputs) + 0.5))
     jitter = np.random.default_rng(0).uniform(-1, 1, len(residual))
-    tails, length = data.tails[used], 100 * data.length[used]
-    jitter *= 0.1 * max(float(np.ptp(length)) / 6, 0.3)
+    setting, (_, kind, kinds) = data.drawn
+    values, unit_of_setting = data.settings[setting]
+    kind, values = kind[used], values[used]
+    jitter *= 0.1 * max(float(np.ptp(values)) / 6, 0.02 * float(np.abs(values).max()))
     panels = figure.subplots(len(data.outputs), 1, sharex=True, squeeze=False)[:, 0]
     for i, (name, axes) in enumerate(zip(data.outputs, panels, strict=True)):
         scale, unit = output_scale(name)
-        for n in np.unique(tails):
-            some = tails == n
-            colour = _TAILS.get(int(n), RED)
-            axes.plot(length[some] + jitter[some], scale * residual[some, i], ".", ms=4, color=colour)
+        for place in range(len(kinds)):
+            some, colour = kind == place, _KINDS[place % len(_KINDS)]
+            axes.plot(values[some] + jitter[some], scale * residual[some, i], ".", ms=4, color=colour)
         axes.axhline(0, color=INK, lw=0.6)
         axes.set_ylim(-scale * limits[i], scale * limits[i])
-        axes.set_ylabel(f"{LABELS[name]} [{unit}]", fontsize=8)
+        axes.set_ylabel(f"{output_label(name)} [{unit}]", fontsize=8)
         axes.tick_params(labelsize=8)
-    lengths = np.unique(length)
-    if len(lengths) <= 8:
-        panels[-1].set_xticks(lengths, [f"{value:g}" for value in lengths])
-    panels[-1].set_xlabel("tail length [cm]", fontsize=9)
-    _name_tails(panels[0], np.unique(tails))
+    levels = np.unique(values)
+    if len(levels) <= 8:
+        panels[-1].set_xticks(levels, [f"{value:g}" for value in levels])
+    panels[-1].set_xlabel(f"{setting} [{unit_of_setting.strip()}]" if unit_of_setting else setting, fontsize=9)
+    _name_kinds(panels[0], kinds)
     figure.align_ylabels()
     figure.tight_layout(h_pad=0.3)
     return figure
 
 
-def _name_tails(axes: Axes, numbers: Floats) -> None:
-    """Add a legend of the numbers of tails above a panel."""
-    for n in numbers:
-        axes.plot([], [], ".", ms=7, color=_TAILS.get(int(n), RED), label=f"N = {int(n)}")
-    axes.legend(fontsize=8, frameon=False, ncols=len(numbers), loc="lower center", bbox_to_anchor=(0.5, 1.0))
+def _name_kinds(axes: Axes, kinds: Sequence[str]) -> None:
+    """Add a legend of the kinds of runs above a panel."""
+    for place, name in enumerate(kinds):
+        axes.plot([], [], ".", ms=7, color=_KINDS[place % len(_KINDS)], label=name)
+    axes.legend(fontsize=8, frameon=False, ncols=min(len(kinds), 5), loc="lower center", bbox_to_anchor=(0.5, 1.0))
 
 
 def draw_maps(result: Verdict, outputs: Sequence[str]) -> list[tuple[Figure, str]]:
@@ -129,8 +133,29 @@ def _draw_map(misfit: Misfit, outputs: Sequence[str], limit: float) -> Figure:
         colour = "white" if abs(z[i, j]) > 0.4 * limit else _ON_CELLS
         axes.text(j, i, f"{z[i, j]:+.0f}", ha="center", va="center", fontsize=8, color=colour)
     axes.set_yticks(range(len(z)), [feature_in_words(name) for name in misfit.features], fontsize=8)
-    axes.set_xticks(range(len(outputs)), [LABELS[o].replace(" ", "\n") for o in outputs], fontsize=8)
+    axes.set_xticks(range(len(outputs)), [output_label(o).replace(" ", "\n") for o in outputs], fontsize=8)
     axes.tick_params(length=0)
+    figure.tight_layout()
+    return figure
+
+
+def draw_sizes(nearest: Nearest) -> Figure:
+    """Draw the size of an adopted form for each specimen, with its interval, and the interval of the mean."""
+    figure = Figure(figsize=(_WIDTH, 0.9 + 0.3 * len(nearest.sizes)))
+    axes = figure.add_subplot()
+    axes.axvspan(*nearest.interval, color=PALE, label="mean, 95 %")
+    ranked = sorted(nearest.sizes.items(), key=lambda item: item[1][0])
+    for place, (_, (value, low, high)) in enumerate(ranked):
+        axes.plot([low, high], [place, place], color=GREEN, lw=1.6)
+        axes.plot(value, place, "o", ms=5, color=GREEN)
+    axes.set_yticks(range(len(ranked)), [name for name, _ in ranked], fontsize=8)
+    if nearest.logarithmic:
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    unit = "" if nearest.effect.unit == "1" else f" [{nearest.effect.unit}]"
+    axes.set_xlabel(f"{nearest.effect.title}{unit}", fontsize=9)
+    axes.tick_params(axis="x", labelsize=8)
+    axes.legend(fontsize=8, frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     figure.tight_layout()
     return figure
 

@@ -8,6 +8,7 @@ shown in degrees. Nuisance parameters and effects know the unit in which they ar
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from calibration.statistics.pull import Pull
 from calibration.statistics.statistical_model import Parameter
 from sim.arrays import Floats
 
-LABELS = {
+_OUTPUTS = {
     "omega_h": "head spin",
     "omega_t": "tail spin",
     "omega_yr": "yaw rate",
@@ -26,6 +27,11 @@ LABELS = {
 }
 _FEATURES = {"omega": "ω", "direction": "motor's direction"}  # what words of a feature's name read as
 _IN_DEGREES = "theta"
+
+
+def output_label(output: str) -> str:
+    """Return the words for an output; its name where there are none."""
+    return _OUTPUTS.get(output, output)
 
 
 def output_scale(output: str) -> tuple[float, str]:
@@ -123,7 +129,10 @@ def direction_in_words(direction: dict[str, float], error: float) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
 
 
-def range_in_words(name: str, values: Floats, unit: str) -> str:
-    """Say between which values a quantity lies in the runs, values (n,)."""
-    low, high = float(values.min()), float(values.max())
-    return f"{name} = {plain(low)}{unit}" if low == high else f"{name} from {plain(low)} to {plain(high)}{unit}"
+def ranges_in_words(settings: Mapping[str, tuple[Floats, str]]) -> str:
+    """Say between which values each of the settings of runs lies (`Runs.settings`)."""
+    ends = [(name, float(values.min()), float(values.max()), unit) for name, (values, unit) in settings.items()]
+    return ", ".join(
+        f"{name} = {plain(low)}{unit}" if low == high else f"{name} from {plain(low)} to {plain(high)}{unit}"
+        for name, low, high, unit in ends
+    )

@@ -11,27 +11,26 @@ import numpy as np
 from calibration.attribution.halved_tolerances import notable_gains
 from calibration.attribution.refits import IMITABLE, SURE, UNSEEN, Candidate
 from calibration.report.error_card import add_errors
-from calibration.report.figures import draw_evidence, draw_maps, draw_residuals, final_model
+from calibration.report.figures import draw_evidence, draw_maps, draw_residuals, draw_sizes, final_model
 from calibration.report.law_card import add_laws
 from calibration.report.path_card import add_paths
 from calibration.report.path_error import PathError
 from calibration.report.quantities import (
-    LABELS,
     detectable,
     direction_in_words,
     fitted_value,
     given,
     output_error,
+    output_label,
     plain,
-    range_in_words,
+    ranges_in_words,
     size,
     tolerance,
 )
 from calibration.statistics.exclusions import count_of_rows
 from calibration.statistics.fit import Fit, least_determined
 from calibration.statistics.pull import WRONG, Pull
-from calibration.statistics.statistical_model import Parameter
-from calibration.swimmer.measured_table import Measurements
+from calibration.statistics.statistical_model import Parameter, Runs
 from calibration.verdict.next_runs import STOP, Batch
 from calibration.verdict.next_steps import next_steps
 from calibration.verdict.verdict import Verdict
@@ -44,7 +43,7 @@ _TESTS = {"lack": "lack of fit", "kernel": "smooth structure", "shape": "shapes"
 
 
 def write_report(
-    result: Verdict, data: Measurements, out: str | Path, *, title: str, paths: Sequence[PathError] = ()
+    result: Verdict, data: Runs, out: str | Path, *, title: str, paths: Sequence[PathError] = ()
 ) -> None:
     """Write report.html, with a section on the errors on `paths` where there are some."""
     page = Page(f"Calibration: {title}", result.sentence)
@@ -52,11 +51,12 @@ def write_report(
     page.write(out, f"code {code_version()}; fixed before the data was looked at: {result.conditions.hash}")
 
 
-def add_sections(page: Page, result: Verdict, data: Measurements, paths: Sequence[PathError]) -> None:
+def add_sections(page: Page, result: Verdict, data: Runs, paths: Sequence[PathError]) -> None:
     """Add the sections of the report."""
     _add_next_steps(page, result)
     add_errors(page, result, data)
     add_paths(page, paths)
+    _add_nearest(page, result)
     add_laws(page, result)
     _add_numbers(page, result)
     _add_halved_tolerances(page, result)
@@ -104,6 +104,23 @@ def _add_batch(page: Page, batch: Batch) -> None:
         f"is {STOP:.0f} times as likely. So the right one is given up in about {100 / STOP:.0f} % of cases at "
         "most, however often you look."
     )
+
+
+def _add_nearest(page: Page, result: Verdict) -> None:
+    nearest = result.nearest
+    if nearest is None:
+        return
+    effect = nearest.effect
+    page.section("The nearest form")
+    low, high = (size(effect, end) for end in nearest.interval)
+    page.text(
+        f"Left-out runs, groups of them in turn, are predicted better with {effect.title}: their log likelihood "
+        f"gains {nearest.gain:.0f} ± {nearest.gain_error:.0f}. What is left counts as noise there: it has "
+        f"{nearest.birge:.1f} times the variance of the repeats. The mean size is {size(effect, nearest.size)}; "
+        f"its 95 % interval, {low} to {high}."
+    )
+    if nearest.sizes:
+        page.figures([(draw_sizes(nearest), f"size of {effect.title} for each specimen", "")])
 
 
 def _add_numbers(page: Page, result: Verdict) -> None:
@@ -188,14 +205,12 @@ def _add_halved_tolerances(page: Page, result: Verdict) -> None:
     )
 
 
-def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
+def _add_data(page: Page, result: Verdict, data: Runs) -> None:
     page.section("Data")
     sessions, conditions = len(data.session_names), result.conditions
-    speed = np.abs(data.omega) * 30 / math.pi
     page.text(
         f"{len(data)} usable runs in {sessions} session{'s' if sessions > 1 else ''}: "
-        f"{range_in_words('N', data.tails, '')}, {range_in_words('tail length', 100 * data.length, ' cm')}, "
-        f"{range_in_words('motor speed', speed, ' rpm')}. Held out for the test: {conditions.split.names}."
+        f"{ranges_in_words(data.settings)}. Held out for the test: {conditions.split.names}."
     )
     excluded = conditions.summary_of_excluded
     page.text(
@@ -204,7 +219,9 @@ def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
     if excluded:
         page.steps(excluded)
     scatter = np.sqrt(np.diag(result.base.noise.run)).tolist()
-    noise = ", ".join(f"{LABELS[o]} {output_error(o, s)}" for o, s in zip(data.outputs, scatter, strict=True))
+    noise = ", ".join(
+        f"{output_label(o)} {output_error(o, s)}" for o, s in zip(data.outputs, scatter, strict=True)
+    )
     share = math.sqrt(result.final.noise.share)
     if sessions == 1:
         shift = f"With one session its shift cannot be measured; {100 * share:.0f} % of the scatter is assumed."
@@ -224,9 +241,10 @@ def _add_fit(page: Page, result: Verdict) -> None:
     ]
     if final_model(result):
         models.append((final_model(result), result.final, result.fits.final_intervals))
-    fitted = {p.name: p for _, fit, _ in models for p in fit.fitted if p.name not in stated}
+    shown = refit.parameters.keys() - stated  # sizes of single specimens have their own section
+    fitted = {p.name: p for _, fit, _ in models for p in fit.fitted if p.name in shown}
     page.table(
-        ("parameter", *(name for name, _, _ in models), "in corrected.toml"),
+        ("parameter", *(name for name, _, _ in models), "fitted to all runs"),
         [
             (
                 p.title,
@@ -237,14 +255,15 @@ def _add_fit(page: Page, result: Verdict) -> None:
         ],
     )
     page.text(
-        "In brackets: 95 % interval, by profile deviance. corrected.toml has the model fitted once more to all "
-        "runs, with the held-out ones."
+        "In brackets: 95 % interval, by profile deviance. The last column is handed on: the model fitted once "
+        "more to all runs, with the held-out ones."
     )
-    direction, error = least_determined(result.final)
-    page.text(
-        "What the runs determine worst: one standard deviation is "
-        f"{direction_in_words(direction, error)}, together."
-    )
+    if any(p.logarithmic and p.sigma is None for p in result.final.fitted):
+        direction, error = least_determined(result.final)
+        page.text(
+            "What the runs determine worst: one standard deviation is "
+            f"{direction_in_words(direction, error)}, together."
+        )
 
 
 def _with_interval(parameter: Parameter, fit: Fit, intervals: dict[str, tuple[float, float]]) -> str:
@@ -255,12 +274,13 @@ def _with_interval(parameter: Parameter, fit: Fit, intervals: dict[str, tuple[fl
     return f"{value} ({plain(low * parameter.shown, 4)} to {plain(high * parameter.shown, 4)})"
 
 
-def _add_residuals(page: Page, result: Verdict, data: Measurements) -> None:
+def _add_residuals(page: Page, result: Verdict, data: Runs) -> None:
     page.section("Residuals on the runs that were fitted")
-    page.text("Measured minus model, of every run, against the length of its tails.")
+    setting, (kind, _, _) = data.drawn
+    page.text(f"Measured minus model, of every run, against {setting}; colours are {kind}.")
     page.figures(
         [
-            (figure, f"residuals by output and number of tails, {model}", model)
+            (figure, f"residuals by output and {kind}, {model}", model)
             for figure, model in draw_residuals(result, data)
         ]
     )

@@ -39,12 +39,14 @@ from calibration.statistics.statistical_model import (
     least_squares,
     moved,
     parameter,
+    prior_rows,
+    repeat_count,
     repeat_covariance,
     stepped,
     sums,
     with_prior,
 )
-from sim.arrays import Flags, Floats, Integers
+from sim.arrays import Flags, Floats
 
 _MOST_STEPS = 25
 _TRIED = 4  # steps before a search is given up
@@ -54,10 +56,15 @@ _LARGEST = 0.7  # change of ln C in one step
 _PASSES = 3  # iterations for the scatter of the sessions
 _DAMPING = (0.0, *(10.0**e for e in range(-3, 9)))  # λ
 _NEARER = 5  # starts that are tried
+_KEPT = 0.25  # share of the promised fall below which the next step is damped
 _UNSETTLED = 1.0  # a fit has not converged if one more step is expected to reduce rᵀ Σ⁻¹ r by more
 _FAR = 6.0  # standard deviations of χ²
 _FLAT = 0.05  # share of the expected rise; if the rise is smaller, the deviance is flat and the end stays
 _STEEP = 5.0  # if it is larger, the others were not refitted along a bent valley, and the end stays
+
+
+class UnsolvedError(Exception):
+    """A model with an effect that cannot be solved quickly, however small the effect."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +110,9 @@ def fit(
 ) -> Fit:
     """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay.
 
+    Raises:
+        UnsolvedError: the model cannot be solved quickly with the effects among `names`, however small.
+
     Args:
         target: of rᵀ Σ⁻¹ r. Where the steps that are left cannot reach it, the search ends before it converges.
         wrong_numbers: nuisance parameters that are wrong, each followed by those that may be wrong in its place;
@@ -112,13 +122,13 @@ def fit(
     freed = {alike[0].parameter.name for alike in wrong_numbers}
     fitted = tuple(parameter(model, name) for name in names)
     fitted = tuple(replace(p, sigma=None) if p.name in freed else p for p in fitted)
-    run = repeat_covariance(data.y[used], data.condition[used], data.scale[used])
+    run = repeat_covariance(data.y[used], data.repeated[used], data.scale[used])
     problem = _Problem(model, fitted, used, inverse_root(run), title)
     point = _descend(problem, problem.first(dict(start)), target)
     linear = least_squares(point.products, passes=_PASSES)
     share = float(linear.share)
     normal = point.products.at(linear.share)
-    inflation = _inflation(data.condition[used], len(run))
+    inflation = _inflation(repeat_count(data.repeated[used]), len(run))
     return Fit(
         parameters=point.parameters,
         fitted=fitted,
@@ -161,14 +171,20 @@ class _Problem:
 
     def first(self, parameters: dict[str, float]) -> _Point:
         """Run the model at the start; effects move towards their null while it cannot be solved quickly there."""
-        effects = [p for p in self.fitted if p.name in {e.name for e in self.model.effects}]
-        tried = dict(parameters)
+        tried, effects = dict(parameters), self.effects
         for _ in range(_NEARER if effects else 1):
             point = self.at(tried, None, 1)
             if point.solved:
                 return point
             tried.update({p.name: (tried[p.name] + p.start) / 2 for p in effects})
+        if effects:
+            raise UnsolvedError
         return self.at(parameters, None, 1, quick=False)
+
+    @property
+    def effects(self) -> list[Parameter]:
+        """Those of the parameters that are effects."""
+        return [p for p in self.fitted if p.name in {e.name for e in self.model.effects}]
 
     def at(
         self, parameters: dict[str, float], derivative: Floats | None, count: int, *, quick: bool = True
@@ -180,7 +196,7 @@ class _Problem:
                 parameters, [p.name for p in self.fitted], title=title, quick=quick
             )
         else:
-            prediction = self.model.predict([parameters], title=title)[0]
+            prediction = self.model.derivatives(parameters, [], title=title, quick=quick)[0]
         data = self.model.runs
         table = np.concatenate([derivative, (data.y - prediction)[..., None]], -1)[self.used]
         products = sums(self.root @ table, data.session[self.used], len(self.root), data.scale[self.used])
@@ -213,10 +229,17 @@ def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
         if count > _TRIED and (_MOST_STEPS - count) * step.promise < above:
             break
         tried = problem.at(step.parameters, None if step.size > _SHORT else point.derivative, count + 1)
-        if tried.solved and tried.products.at(share)[-1, -1] < point.products.at(share)[-1, -1] + _SMALL:
-            point, least, kept = tried, max(least - 2, 0), step.size <= _SHORT
+        fall = float((point.products.at(share) - tried.products.at(share))[-1, -1])
+        if tried.solved and fall > -_SMALL:
+            # A step that keeps little of its promise overshoots, and the next one is damped (Marquardt 1963).
+            least = step.damping + 1 if fall < _KEPT * step.promise else max(step.damping - 2, 0)
+            least = min(least, len(_DAMPING) - 1)
+            point, kept = tried, step.size <= _SHORT
         elif kept:
-            point, kept = problem.at(point.parameters, None, count + 1, quick=False), False
+            again = problem.at(point.parameters, None, count + 1, quick=bool(problem.effects))
+            if not again.solved:
+                break
+            point, kept = again, False
         else:
             least = max(step.damping + 1, 2)
             if least >= len(_DAMPING):
@@ -233,6 +256,17 @@ def noise_at_most(values: int, parameters: int) -> float:
     """
     freedom = values - parameters
     return freedom + _FAR * math.sqrt(2 * freedom)
+
+
+def birge(runs: Runs, fitted: Fit, used: Flags) -> float:
+    """Compute the factor by which the variance of what a fit leaves exceeds that of the noise, at least 1.
+
+    Source: Birge (1932).
+    """
+    white = fitted.noise.whitener(runs.session[used], runs.scale[used])((runs.y - fitted.prediction)[used])
+    prior = prior_rows(fitted.fitted, fitted.parameters)[1]
+    freedom = len(white) + len(prior) - len(fitted.names)
+    return max(1.0, float(white @ white + prior @ prior) / max(freedom, 1))
 
 
 def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, least: int) -> _Step:
@@ -272,12 +306,11 @@ def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal:
     return change
 
 
-def _inflation(condition: Integers, outputs: int) -> float:
+def _inflation(repeats: int, outputs: int) -> float:
     """Compute the factor by which the variance is larger because S is estimated from ν repeats of k outputs.
 
     ν/(ν − k − 1), because 1/S is overestimated, times 1 + (k − 1)/(ν − k), because its weights are not optimal.
     """
-    repeats = len(condition) - len(np.unique(condition))
     if repeats <= outputs + 1:
         return 2.0 * repeats
     return repeats / (repeats - outputs - 1) * (1 + (outputs - 1) / (repeats - outputs))

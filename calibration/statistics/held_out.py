@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm as normal
@@ -16,6 +16,7 @@ from calibration.statistics.statistical_model import (
     Runs,
     inverse_root,
     least_squares,
+    repeat_count,
     stepped,
     sums,
     with_prior,
@@ -64,7 +65,7 @@ def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> floa
     rng = np.random.default_rng(seed)
     sessions = np.unique(data.session[rows], return_inverse=True)[1].reshape(-1)
     n, k = residual.shape
-    freedom = max(len(data) - n - len(np.unique(data.condition[~rows])), k + 1)
+    freedom = max(repeat_count(data.repeated[~rows]), k + 1)
     spread = np.linalg.cholesky(fitted.covariance + 1e-15 * np.diag(np.diag(fitted.covariance)))
     count = 0
     for _ in range(_DRAWS):
@@ -100,7 +101,16 @@ def refit_to_all(model: ForwardModel, fitted: Fit, rows: Flags, *, moved: bool =
     The covariance allows for the estimates of S and ρ, as the intervals of the fit do.
     """
     refit = one_step(model.runs, fitted, rows)
-    wider = student.ppf(0.975, fitted.freedom) / normal.ppf(0.975)
-    covariance = fitted.inflation * refit.covariance * np.outer(wider, wider)
     step = refit.step if moved else np.zeros_like(refit.step)
-    return FinalRefit(stepped(fitted.fitted, fitted.parameters, step), fitted.fitted, covariance)
+    at = replace(
+        fitted,
+        parameters=stepped(fitted.fitted, fitted.parameters, step),
+        covariance=fitted.inflation * refit.covariance,
+    )
+    return final_refit(at)
+
+
+def final_refit(fitted: Fit) -> FinalRefit:
+    """Hand on a fit to all runs; its intervals, those of Student's t, become those of a normal distribution."""
+    wider = student.ppf(0.975, fitted.freedom) / normal.ppf(0.975)
+    return FinalRefit(fitted.parameters, fitted.fitted, fitted.covariance * np.outer(wider, wider))

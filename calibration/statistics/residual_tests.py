@@ -88,10 +88,18 @@ class Directions:
 
 
 def directions(
-    model: ForwardModel, parameters: Parameters, effects: Sequence[Parameter], *, title: str = ""
+    model: ForwardModel,
+    parameters: Parameters,
+    effects: Sequence[Parameter],
+    *,
+    title: str = "",
+    quick: bool = False,
 ) -> Directions:
-    """Compute the directions of effects that are at their null in `parameters`, (n, k, m)."""
-    at_null = model.derivatives(parameters, [e.name for e in effects], title=title)[1]
+    """Compute the directions of effects that are at their null in `parameters`, (n, k, m).
+
+    With `quick` a direction is zero, which no test notices, where it cannot be computed quickly.
+    """
+    at_null = model.derivatives(parameters, [e.name for e in effects], title=title, quick=quick)[1]
     columns, owner, second = [], [], []
     for place, effect in enumerate(effects):
         values: dict[float, Floats] = {}
@@ -103,11 +111,13 @@ def directions(
                 if value == parameters[name]:
                     values[value] = at_null[..., place]
                 else:
-                    values[value] = model.derivatives({**parameters, name: value}, [effect.name])[1][..., 0]
+                    at = {**parameters, name: value}
+                    values[value] = model.derivatives(at, [effect.name], quick=quick)[1][..., 0]
         columns += list(values.values())
         owner += [place] * len(values)
         second += list(values)
     table = np.stack(columns, -1) if columns else at_null
+    table = np.where(np.isfinite(table).all((0, 1)), table, 0.0)
     return Directions(table, np.array(owner, dtype=np.int64), np.array(second, dtype=float))
 
 
@@ -188,7 +198,7 @@ class _Tester:
 
     def __init__(self, data: Runs, used: Flags, J: Floats, D: Floats, precision: Floats):
         self.session, self.condition = data.session[used], data.condition[used]
-        self.scale = data.scale[used]
+        self.repeated, self.scale = data.repeated[used], data.scale[used]
         self.J, self.D, self.precision = J * self.scale[:, None, None], D * self.scale[:, None, None], precision
         self.design = FixedColumns(np.concatenate([self.J, self.D], -1), self.session, self.scale)
         inputs = data.inputs[used]
@@ -209,7 +219,7 @@ class _Tester:
         Each residual is judged in its own noise.
         """
         p, e = self.J.shape[-1], self.D.shape[-1]
-        root = inverse_root(repeat_covariance(residual, self.condition, self.scale))  # (B, k, k)
+        root = inverse_root(repeat_covariance(residual, self.repeated, self.scale))  # (B, k, k)
         residual = residual * self.scale[:, None]
         products = self.design.sums(np.swapaxes(root, -1, -2) @ root, residual)
         products.within[..., range(p), range(p)] += self.precision
@@ -236,7 +246,7 @@ class _Tester:
             residual: (n, k), as `scores` takes it.
         """
         p, e = self.J.shape[-1], self.D.shape[-1]
-        root = inverse_root(repeat_covariance(residual, self.condition, self.scale))
+        root = inverse_root(repeat_covariance(residual, self.repeated, self.scale))
         products = self.design.sums((root.T @ root)[None], residual[None] * self.scale[:, None])
         products.within[..., range(p), range(p)] += self.precision
         normal = _score_equations(products, p)[0]  # (e, p + 2, p + 2)
@@ -331,7 +341,7 @@ def examine_residual(
     exact = _Tester(data, used, J[..., free], D, precision[free]).scores(residual[None])
     testable = observed.survived[0] >= TESTABLE
     rng = np.random.default_rng(study.seed)
-    root = np.linalg.cholesky(repeat_covariance(residual, data.condition[used], tester.scale))
+    root = np.linalg.cholesky(repeat_covariance(residual, tester.repeated, tester.scale))
     scatter = float(np.sqrt(observed.share[0]))
     session = np.unique(tester.session, return_inverse=True)[1].reshape(-1)
     sigma = np.where(precision > 0, 1 / np.sqrt(np.where(precision > 0, precision, 1.0)), 0.0)

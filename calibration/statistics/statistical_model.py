@@ -39,7 +39,8 @@ import numpy as np
 
 from sim.arrays import Flags, Floats, Integers
 
-Parameters = Mapping[str, float]
+Value = float | Floats  # one number, or one for each run (n,)
+Parameters = Mapping[str, Any]  # name -> Value
 
 SESSION_SHARE = 1.0  # largest ρ
 _LOG_STEP, _STEP = 0.01, 0.02  # finite-difference steps: in ln C, in units of a typical size
@@ -86,6 +87,8 @@ class Runs:
     excluded: tuple[str, ...]  # "row 7: …"
     caveats: tuple[str, ...]  # what these runs cannot show, in words
     weight: Floats | None = field(default=None, kw_only=True)  # (n,) variance of a run is S over it; None: 1
+    specimen: Integers | None = field(default=None, kw_only=True)  # (n,) 0, 1, …: what was run; None: not noted
+    specimen_names: tuple[str, ...] = field(default=(), kw_only=True)  # by number
 
     @property
     def scale(self) -> Floats:
@@ -94,6 +97,42 @@ class Runs:
 
     def __len__(self) -> int:
         return len(self.y)
+
+    @property
+    def repeated(self) -> Integers | Floats:
+        """What tells repeats: the condition (n,); where repeats differ otherwise, too, a design (n, m).
+
+        Its columns are the levels of condition and session, and what was noted (`noted_of_repeats`). Repeats in
+        several sessions differ by what changed between these, which is no noise of a run.
+        """
+        count = len(np.unique(self.condition))
+        crossed = len(np.unique(np.stack([self.condition, self.session]), axis=1).T) > count
+        noted = self.noted_of_repeats
+        if not crossed and not noted.size:
+            return self.condition
+        factors = (self.condition, self.session) if crossed else (self.condition,)
+        levels = [(f[:, None] == np.unique(f)).astype(float) for f in factors]
+        return np.column_stack([*levels, noted])
+
+    @property
+    def noted_of_repeats(self) -> Floats:
+        """Notes (n, c) in which repeats may differ."""
+        return np.empty((len(self), 0))
+
+    @property
+    def partners(self) -> Floats:
+        """Settings (n, q) that runs must share so that a shift between them is no effect of a setting."""
+        return self.inputs
+
+    @property
+    def settings(self) -> dict[str, tuple[Floats, str]]:
+        """What was set or noted, as people read it: name -> values (n,) and unit."""
+        return {name: (column, "") for name, column in zip(self.input_names, self.inputs.T, strict=True)}
+
+    @property
+    def drawn(self) -> tuple[str, tuple[str, Integers, tuple[str, ...]]]:
+        """What residuals are drawn against: a setting; and the kinds in colour: a name, (n,), and their names."""
+        return self.input_names[0], ("session", self.session, self.session_names)
 
     def subset(self, rows: Flags | Integers) -> Any:
         """Choose the runs in `rows`: flags (n,), or places."""
@@ -131,8 +170,36 @@ class ForwardModel(Protocol):
     ) -> tuple[Floats, Floats]:
         """Compute the prediction (n, k) and its derivatives (n, k, p) on the scales of the parameters `names`.
 
-        With `quick` they may be NaN where they would take long.
+        With `quick` they may be NaN where they would take long; `names` may be empty.
         """
+        ...
+
+
+class Experiment(ForwardModel, Protocol):
+    """A forward model of runs that were made somewhere, and can be made again."""
+
+    @property
+    def untestable(self) -> Mapping[str, str]:
+        """Effects that these runs cannot test: title -> what is missing."""
+        ...
+
+    def check(self, prediction: Floats) -> None:
+        """Reject measurements that are inconsistent with their stated units.
+
+        Args:
+            prediction: (n, k) of the model as given.
+
+        Raises:
+            InputError: a column is wrong by a factor that is not possible.
+        """
+        ...
+
+    def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
+        """Find a better start for the coefficients, from the runs in `used` (n,), if there is a cheap one."""
+        ...
+
+    def possible(self) -> tuple[ForwardModel, list[dict[str, Any]]]:
+        """Return a model of runs that can be made next, and their settings."""
         ...
 
 
@@ -151,10 +218,11 @@ def _every(model: ForwardModel) -> tuple[Parameter, ...]:
     return (*model.coefficients, *model.nuisances, *model.effects, *seconds)
 
 
-def moved(changed: Parameter, value: float, by: float) -> float:
-    """Change `value` by `by`, on the parameter's own scale, within its bounds."""
-    new = value * float(np.exp(min(by, _LARGEST))) if changed.logarithmic else value + by
-    return max(changed.bounds[0], min(changed.bounds[1], new))
+def moved(changed: Parameter, value: Any, by: Any) -> Any:
+    """Change a Value by `by`, on the parameter's own scale, within its bounds."""
+    new = value * np.exp(np.minimum(by, _LARGEST)) if changed.logarithmic else value + by
+    within = np.clip(new, *changed.bounds)
+    return within if np.ndim(within) else float(within)
 
 
 def stepped(fitted: Sequence[Parameter], parameters: Parameters, step: Floats) -> dict[str, float]:
@@ -171,7 +239,7 @@ def by_differences(
     for name in names:
         changed = parameter(model, name)
         width = _LOG_STEP if changed.logarithmic else _STEP * abs(changed.typical)
-        if moved(changed, parameters[name], 2 * width) == changed.bounds[1]:  # downwards where the bound is near
+        if np.any(moved(changed, parameters[name], 2 * width) == changed.bounds[1]):  # downwards near the bound
             width = -width
         sets.append({**parameters, name: moved(changed, parameters[name], width)})
         widths.append(width)
@@ -318,20 +386,32 @@ def solved(normal: Floats) -> tuple[Floats, Floats]:
     return (covariance @ normal[..., :p, p, None])[..., 0], covariance
 
 
-def repeat_covariance(y: Floats, condition: Integers, scale: Floats | None = None) -> Floats:
-    """Estimate S (..., k, k) from the scatter of (..., n, k) about the mean of each condition, pooled.
+def repeat_covariance(y: Floats, repeated: Integers | Floats, scale: Floats | None = None) -> Floats:
+    """Estimate S (..., k, k) from the scatter of (..., n, k) between repeats, pooled.
 
     Args:
+        repeated: see `Runs.repeated`; each level, and each column of a design, has its own effect on y.
         scale: (n,) roots of the weights of the runs.
     """
-    places = np.unique(condition, return_inverse=True)[1].reshape(-1)
-    weight = np.ones(len(places)) if scale is None else scale**2
-    count = np.bincount(places, weight)
-    picks = (np.arange(len(count))[:, None] == places) * (weight / count[places])
-    centred = y - (picks @ y)[..., places, :]
-    if scale is not None:
-        centred = centred * scale[:, None]
-    return np.asarray(np.swapaxes(centred, -1, -2) @ centred / (len(places) - len(count)))
+    basis = _same_in_repeats(repeated, scale)
+    y = y if scale is None else y * scale[:, None]
+    centred = y - basis @ (basis.T @ y)
+    return np.asarray(np.swapaxes(centred, -1, -2) @ centred / (len(basis) - basis.shape[1]))
+
+
+def repeat_count(repeated: Integers | Floats) -> int:
+    """Count the degrees of freedom of `repeat_covariance`."""
+    basis = _same_in_repeats(repeated, None)
+    return len(basis) - basis.shape[1]
+
+
+def _same_in_repeats(repeated: Integers | Floats, scale: Floats | None) -> Floats:
+    """Return an orthonormal basis (n, r) of what is no noise, times the roots of the weights."""
+    if repeated.ndim == 1:
+        return averaging_rows(repeated.astype(np.int64), scale)[0].T
+    design = repeated if scale is None else repeated * scale[:, None]
+    left, values, _ = np.linalg.svd(design, full_matrices=False)
+    return np.asarray(left[:, values > 1e-9 * values[0]])
 
 
 def precisions(fitted: Sequence[Parameter]) -> Floats:

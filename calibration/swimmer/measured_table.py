@@ -7,7 +7,8 @@ Needed: N, l_cm, omega_rpm (tails relative to head; docs/reference/signs.md has 
 Columns in other units (R_yr_mm, "theta [rad]") are converted, and `Measurements.converted` says which.
 
 Some conditions must be repeated, because the noise is estimated from repeats. `session` names the group of runs
-that were made together. Without it, all runs of one N are one session. Some effects need elapsed_min,
+that were made together. Without it, all runs of one N are one session. `robot` names the specimen, where the table
+has several. Some effects need elapsed_min,
 temperature_C, tank_diameter_cm or course_deg (direction of the path in the lab, where a run is a part of a
 circle). Rows that cannot be used are excluded with number and reason, and so are copies of rows
 (`calibration.swimmer.copied_rows`), and rows that lack a note which nearly all others have. Columns without any
@@ -74,6 +75,7 @@ KNOWN_COLUMNS = {
     "run",
     "trial",
     "session",
+    "robot",
     *_NOTED,
     *_ERRORS,
     *_SIGMAS,
@@ -96,6 +98,29 @@ class Measurements(Runs):
     sigmas: Mapping[str, float]  # σ of camera scale, zero of the heading [rad] and tachometer, where stated
     noted_names: tuple[str, ...]  # elapsed_h, temperature_K (above the mean), tank_diameter, course_x, course_y
     converted: tuple[str, ...]  # columns that were renamed or converted, in words
+
+    @property
+    def noted_of_repeats(self) -> Floats:
+        """Temperature and course."""
+        kept = [i for i, name in enumerate(self.noted_names) if name in ("temperature_K", "course_x", "course_y")]
+        return self.noted[:, kept]
+
+    @property
+    def partners(self) -> Floats:
+        """Numbers of tails and lengths; speeds are interpolated."""
+        return np.stack([self.tails, self.length], 1)
+
+    @property
+    def settings(self) -> dict[str, tuple[Floats, str]]:
+        """Numbers of tails, lengths and speeds of the runs."""
+        speed = np.abs(self.omega) * 30 / math.pi
+        return {"N": (self.tails, ""), "tail length": (100 * self.length, " cm"), "motor speed": (speed, " rpm")}
+
+    @property
+    def drawn(self) -> tuple[str, tuple[str, Integers, tuple[str, ...]]]:
+        """The tail length, and the number of tails in colour."""
+        tails, kind = np.unique(self.tails, return_inverse=True)
+        return "tail length", ("N", kind.reshape(-1), tuple(f"N = {n:.0f}" for n in tails))
 
 
 def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
@@ -131,7 +156,7 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
             "the spins alone do not tell the coefficients apart"
             + (f" (without any value: {', '.join(empty)})" if empty else "")
         )
-    numbers = table.drop(columns="session", errors="ignore").apply(numbers_of)
+    numbers = table.drop(columns=["session", "robot"], errors="ignore").apply(numbers_of)
     reasons = _reasons(table, numbers, outputs)
     sparse = _mark_gaps(reasons, table, numbers)
     _mark_copies(reasons, numbers, outputs)
@@ -146,7 +171,9 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         if "session" in table
         else "N = " + good["N"].astype(int).astype(str)
     )
-    condition: Integers = np.asarray(good.groupby(list(INPUTS), sort=True).ngroup(), dtype=np.int64)
+    robots = table.loc[keep, "robot"].astype(str).to_numpy() if "robot" in table else np.full(len(good), "")
+    robot_names, robot = np.unique(robots, return_inverse=True)
+    condition: Integers = np.asarray(good.groupby([*INPUTS, robot], sort=True).ngroup(), dtype=np.int64)
     session_names, session = np.unique(names.to_numpy(dtype=str), return_inverse=True)
     repeats = len(good) - len(np.unique(condition))
     if repeats < _FEWEST_REPEATS:
@@ -185,6 +212,8 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
             *(f"column {name}: not known, left out" for name in unknown),
         ),
         caveats=_caveats(tails, length, omega),
+        specimen=robot if "robot" in table else None,
+        specimen_names=tuple(str(n) for n in robot_names) if "robot" in table else (),
         tails=tails,
         length=length,
         omega=omega,

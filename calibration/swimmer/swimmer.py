@@ -1,8 +1,9 @@
 """The swimming robot as a model for the calibration: the simulator, for any coefficients and influences.
 
 Runs under equal conditions share one simulation. A reversed motor mirrors the motion, unless an odd influence is
-present. Motions are solved directly and extrapolated in the mesh (`sim.motion.orbits`); their errors of a few
-hundredths of a percent are far below those of measurements. Outputs are compared as ln |output|, θ in radians.
+present. A parameter may differ from run to run: then it is an array (n,). Motions are solved directly and
+extrapolated in the mesh (`sim.motion.orbits`); their errors of a few hundredths of a percent are far below those
+of measurements. Outputs are compared as ln |output|, θ in radians.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from calibration.statistics.statistical_model import (
     Noise,
     Parameter,
     Parameters,
+    Value,
     by_differences,
     repeat_covariance,
 )
@@ -71,6 +73,7 @@ class _Run(NamedTuple):
     sign: float  # direction of the motor
     point: float  # tracked, head lengths ahead of the head's centre
     current: float  # of the fluid along the path [m/s]
+    camera: float  # factor of its scale
 
 
 class Solver(NamedTuple):
@@ -145,12 +148,11 @@ class SwimmerModel:
         parts = [self._conditions(parameters) for parameters in sets]
         runs = [run for conditions, _ in parts for run in conditions]
         columns = self._columns(runs, sets)
-        camera = np.repeat([p.get(CAMERA, 1.0) for p in sets], [len(conditions) for conditions, _ in parts])
         if lookup is not None:
             motion: Mapping[str, Floats] = lookup.query(columns)
         else:
             motion = self.solver.steady(columns, jobs=self.jobs, title=title)
-        table = self._observation(runs, camera).see(motion)
+        table = self._observation(runs).see(motion)
         if not np.isfinite(table).all():
             raise InputError("the simulation of a run broke down; check the robot and the run's motor speed")
         ends = np.cumsum([len(conditions) for conditions, _ in parts])
@@ -171,14 +173,15 @@ class SwimmerModel:
         runs, place = self._conditions(parameters, signed=odd)
         columns = self._columns(runs, [parameters])
         for second in (i.parameter.second for i in influences.values() if i and i.parameter.second):
-            columns.setdefault(second.name, np.full(len(runs), float(parameters.get(second.name, second.start))))
+            value = parameters.get(second.name, second.start)
+            columns.setdefault(second.name, np.full(len(runs), float(np.ravel(value)[0])))
         moves = {name: _moves(name, influence) for name, influence in influences.items()}
         wanted = tuple(dict.fromkeys(move for group in moves.values() for move in group))
         # Non-local effects at their null may need more phases than the motion; with effects at work it has them.
         at_null = any(catalogue()[name].reach == "nonlocal" for name in wanted if name in catalogue())
         phases = MANY if at_null and self._is_at_null(parameters) else FEW
         sensitivities = self.solver.slopes(columns, wanted, phases=phases, jobs=self.jobs, title=title)
-        view = self._observation(runs, np.array(parameters.get(CAMERA, 1.0)))
+        view = self._observation(runs)
         J = np.empty((*self.runs.y.shape, len(names)))
         for j, (name, influence) in enumerate(influences.items()):
             if name in POWERS:
@@ -191,9 +194,9 @@ class SwimmerModel:
             slope = view.slopes(
                 sensitivities.values, motion, point=float(name == TRACKED_POINT), current=float(name in CURRENT)
             )
-            if name == SLIP:
-                slope = slope * (-columns["omega_bar"] / (1 - parameters[SLIP]))[:, None]
             scale = self._drivers[influence.needs] if influence and influence.needs else np.ones(len(place))
+            if name == SLIP:
+                scale = scale * -columns["omega_bar"][place] / (1 - parameters[SLIP])
             J[..., j] = slope[place] * (scale if influence else parameters[name] * scale)[:, None]
         seen = view.see(sensitivities.values)[place] + self._turned(parameters.get(HEADING, 0.0))
         if not quick and not (np.isfinite(J).all() and np.isfinite(seen).all()):
@@ -219,7 +222,7 @@ class SwimmerModel:
         scales: dict[str, Floats] = {k: powers[k] * by for k in ("time", "length", "ahead") if k in powers}
         return view.slopes(sensitivities.values, motion, camera=float(name == CAMERA), scales=scales)
 
-    def _turned(self, zero: float) -> Floats:
+    def _turned(self, zero: Value) -> Floats:
         """Change (n, k) of the outputs if the zero of the heading is off: θ grows in one direction of the
         motor.
         """
@@ -247,7 +250,7 @@ class SwimmerModel:
     def _fit_lookup(self, lookup: NeuralTable, start: dict[str, float]) -> tuple[dict[str, float], float]:
         """Fit coefficients from one start; with the sum of squares that they leave, infinite off the table."""
         data, parameters, remainder = self.runs, dict(start), math.inf
-        whiten = Noise(repeat_covariance(data.y, data.condition), 0.0).whitener(data.session)
+        whiten = Noise(repeat_covariance(data.y, data.repeated), 0.0).whitener(data.session)
         for _ in range(_MOST_GUESSES):
             moved = [{**parameters, name: parameters[name] * math.exp(_STEP)} for name in COEFFICIENTS]
             try:
@@ -275,7 +278,7 @@ class SwimmerModel:
         noted = np.tile(runs.noted.mean(0), (count, 1))
         settings = [{"N": int(n), "l_cm": length, "omega_rpm": speed} for n, length, speed in grid.tolist()]
         possible_runs = replace(
-            runs, y=np.zeros((count, len(runs.outputs))), weight=None,
+            runs, y=np.zeros((count, len(runs.outputs))), weight=None, specimen=None,
             condition=np.arange(count), session=np.zeros(count, int),
             session_names=("next",), inputs=np.zeros((count, runs.inputs.shape[1])), excluded=(),
             rows=np.arange(count), caveats=(), tails=grid[:, 0], length=grid[:, 1] / 100,
@@ -302,7 +305,7 @@ class SwimmerModel:
         """List influences that are not at their null."""
         return [
             influence for name, influence in self._influences.items()
-            if name in parameters and parameters[name] != influence.parameter.start
+            if name in parameters and np.any(parameters[name] != influence.parameter.start)
         ]  # fmt: skip
 
     @cached_property
@@ -321,7 +324,9 @@ class SwimmerModel:
         runs, work = self.runs, self._at_work(parameters)
         signed |= any(i.odd for i in work) or any(catalogue()[e].symmetry == "odd" for e in self.robot.effects)
         omega = runs.omega if signed else np.abs(runs.omega)
-        table = np.column_stack([runs.tails, runs.length, omega, *self._noted_at_work(parameters)]).round(9)
+        differing = [value for value in parameters.values() if np.ndim(value)]
+        table = np.column_stack([runs.tails, runs.length, omega, *differing, *self._noted_at_work(parameters)])
+        table = table.round(9)
         _, first, place = np.unique(table, axis=0, return_index=True, return_inverse=True)
         return [self._run(parameters, int(row), float(omega[row])) for row in first], place.reshape(-1)
 
@@ -335,6 +340,7 @@ class SwimmerModel:
         return not any(influence.effect for influence in self._at_work(parameters))
 
     def _run(self, parameters: Parameters, row: int, omega: float) -> _Run:
+        parameters = {name: float(v[row]) if np.ndim(v) else v for name, v in parameters.items()}
         effects, current = dict(self.robot.effects), 0.0
         for influence in self._at_work(parameters):
             by = parameters[influence.parameter.name] - influence.parameter.start
@@ -354,7 +360,8 @@ class SwimmerModel:
             motor_speed=abs(omega) * parameters.get(TACHOMETER, 1.0) * (1 - parameters.get(SLIP, 0.0)),
             effects=effects,
         )  # fmt: skip
-        return _Run(robot, math.copysign(1.0, omega), parameters.get(TRACKED_POINT, 0.0), current)
+        camera = parameters.get(CAMERA, 1.0)
+        return _Run(robot, math.copysign(1.0, omega), parameters.get(TRACKED_POINT, 0.0), current, camera)
 
     def _columns(self, runs: list[_Run], sets: Sequence[Parameters]) -> dict[str, Floats]:
         """Write runs as columns for the simulator, with every effect that is present in any of the sets."""
@@ -367,7 +374,7 @@ class SwimmerModel:
         columns["omega_bar"] = columns["omega_bar"] * np.array([run.sign for run in runs])
         return columns
 
-    def _observation(self, runs: list[_Run], camera: Floats) -> Observation:
+    def _observation(self, runs: list[_Run]) -> Observation:
         return Observation(
             self.runs.outputs,
             time=np.array([run.robot.time_scale for run in runs]),
@@ -375,7 +382,7 @@ class SwimmerModel:
             ahead=np.array([run.robot.head_length / run.robot.tail_length for run in runs]),
             point=np.array([run.point for run in runs]),
             current=np.array([run.current for run in runs]),
-            camera=camera,
+            camera=np.array([run.camera for run in runs]),
         )
 
 

@@ -10,9 +10,9 @@
    nothing before explains the residual.
 4. The verdict (`calibration.verdict.verdict.reach_verdict`).
 5. If several explanations are left, next runs that would tell them apart (`calibration.verdict.next_runs`).
-   If nothing explains the residual, laws that describe it (`describe`), and where none does, a correction that
-   is handed on for steering. If something outside the catalogue could imitate what is claimed, laws that fit as
-   well.
+   If nothing explains the residual, laws that describe it (`describe`). Where none does, the nearest form is
+   adopted (`calibration.attribution.nearest`), and a correction of what is left is handed on for steering. If
+   something outside the catalogue could imitate what is claimed, laws that fit as well.
 6. Errors on the held-out runs: as given, calibrated, with the effect, with a regression of the residual
    (`calibration.statistics.residual_regression`), and from noise alone. Whether the held-out runs agree with the
    final model (`calibration.statistics.held_out`).
@@ -31,6 +31,8 @@ from typing import TypeVar, cast
 import numpy as np
 
 from calibration.attribution.claim_checks import with_checks
+from calibration.attribution.moves import Move, StatedMove, find_moves, groups_that_may_differ
+from calibration.attribution.nearest import Nearest, adopt_nearest
 from calibration.attribution.refits import (
     FIRST,
     INDISTINGUISHABLE,
@@ -50,12 +52,20 @@ from calibration.attribution.wrong_numbers import (
     without_wrong_priors,
 )
 from calibration.statistics.exclusions import caveat_of_excluded, count_of_rows
-from calibration.statistics.fit import Fit, profile_intervals
-from calibration.statistics.held_out import error_interval, errors, held_out_p_value, refit_to_all
+from calibration.statistics.fit import Fit, fit, profile_intervals
+from calibration.statistics.held_out import (
+    FinalRefit,
+    error_interval,
+    errors,
+    final_refit,
+    held_out_p_value,
+    refit_to_all,
+)
 from calibration.statistics.pull import Pull
 from calibration.statistics.residual_regression import regress_residual
-from calibration.statistics.residual_tests import TESTABLE, Misfit, directions, examine_residual
-from calibration.statistics.statistical_model import ForwardModel, start_values
+from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
+from calibration.statistics.shifted import Shifted
+from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values
 from calibration.statistics.study import DRAWS, LEVEL, Split, Study, find_outliers, split_runs
 from calibration.statistics.weighted_fit import (
     caveat_of_weights,
@@ -64,7 +74,7 @@ from calibration.statistics.weighted_fit import (
     rows_of_little_weight,
 )
 from calibration.verdict.contents import Conditions, Corrections, Evidence, Fits, HeldOutErrors, Next
-from calibration.verdict.experiment import Describe, Experiment, LearntCorrection, Rival
+from calibration.verdict.experiment import Describe, LearntCorrection, Rival
 from calibration.verdict.next_runs import next_runs
 from calibration.verdict.sequential_test import Explanation
 from calibration.verdict.verdict import Verdict, reach_verdict
@@ -109,7 +119,7 @@ def calibrate(
     guess, began = model.guess(start, split.fitted), time.monotonic()
     study, base = fit_weighted(study, guess)
     model = cast(Subject, study.model)
-    explained = explain(study, base, time.monotonic() - began)
+    study, explained, moves = _explain_with_moves(study, base, time.monotonic() - began)
     evidence = Evidence(
         misfit=explained.misfit,
         draws=draws,
@@ -122,25 +132,36 @@ def calibrate(
     verdict = reach_verdict(evidence, level, number_explains=explained.number is not None)
     unexplained, uncertain = verdict == "unexplained", any(c.uncertain for c in explained.best)
     description = None
-    if describe and (unexplained or uncertain):
+    if describe and study.model is model and (unexplained or uncertain):
         description = describe(study, explained.base, beside_claim=uncertain)
     described = unexplained and description is not None and description.complete
     steered = unexplained and not described
-    learnt = correction(model, explained.base, split) if correction and steered else None
+    if steered:
+        nearest = adopt_nearest(study, explained.base, explained.misfit, explained.candidates, explained.tangents)
+        explained = replace(explained, nearest=nearest)
+        verdict = "partial" if nearest else verdict
+    learnt = correction(model, _of_runs(study, explained), split) if correction and steered else None
     fixed = {"level": level, "seed": seed, "catalogue": [e.name for e in model.effects], "locked": split.names}
     regression = regress_residual(model.runs, explained.base.prediction, split.fitted)
     corrections = Corrections(regression, learnt, description)
     laws = description.as_good_as(explained.final) if description and uncertain else ()
-    rivals = description.rivals if description and described else explained.rivals(model, laws)
+    rivals = (
+        description.rivals if description and described else explained.rivals(cast(Experiment, study.model), laws)
+    )
     rivals = tuple(replace(r, fit=replace(r.fit, noise=noise_of_any_run(study, r.fit.noise))) for r in rivals)
     little = rows_of_little_weight(study)
     excluded = (*model.runs.excluded, *split.reasons)
     rows = len(model.runs) + count_of_rows(model.runs.excluded)
+    of_all, moves_of_all = _fit_moves(study, model, explained)
+    moves, with_moves = (moves_of_all, of_all) if of_all else (moves, explained.base)
+    fits = _fits(study, explained, uncalibrated, moved=learnt is None)
     return Verdict(
         verdict=verdict,
         evidence=evidence,
-        fits=_fits(study, explained, uncalibrated, moved=learnt is None),
+        fits=replace(fits, final_refit=final_refit(of_all)) if of_all else fits,
         errors=_errors(study, explained, uncalibrated, corrections),
+        nearest=explained.nearest,
+        moves=tuple(StatedMove(move.words(with_moves), move.record(with_moves)) for move in moves),
         corrections=corrections,
         conditions=Conditions(
             split=split,
@@ -167,15 +188,19 @@ class Explained:
 
     base: Fit
     misfit: Misfit  # of the base
+    tangents: Directions  # of the effects
     candidates: tuple[Candidate, ...]
     best: tuple[Candidate, ...] = ()  # what explains the residual, best first; more than one: not told apart
     number: Fit | None = None  # the fit with a wrong nuisance parameter freed, if that explains the residual
     rival_effects: tuple[Candidate, ...] = ()  # effects that explain as much as the wrong number does
     rival_numbers: tuple[Pull, ...] = ()  # the wrong numbers, where effects come ahead of them
+    nearest: Nearest | None = None  # the form that is adopted where nothing explains the residual
 
     @property
     def final(self) -> Fit:
-        """The model with the effects of the verdict, or without any."""
+        """The model with the effects of the verdict, with the form that is adopted, or without any."""
+        if self.nearest:
+            return self.nearest.fit
         if self.best and self.best[0].refit:
             return self.best[0].refit
         return self.number or self.base
@@ -195,6 +220,56 @@ class Explained:
         return rivals if len(rivals) > 1 else ()
 
 
+def _explain_with_moves(
+    study: Study, base: Fit, seconds_of_fit: float
+) -> tuple[Study, Explained, tuple[Move, ...]]:
+    """Explain the residual, with numbers that differ in some runs, unless effects do without them as well.
+
+    Such numbers are looked for before the effects, and again beside those that are named.
+    """
+    moved, with_moves, moves = find_moves(study, base)
+    explained = explain(study, base, seconds_of_fit)
+    if moves:
+        if explained.best and explained.final.deviance < with_moves.deviance + INDISTINGUISHABLE:
+            return study, explained, ()
+        return moved, explain(moved, with_moves, seconds_of_fit), moves
+    if explained.best:
+        moved, _, moves = find_moves(study, explained.final)
+        if moves:
+            none = {move.name: 0.0 for move in moves}
+            start, names = {**base.parameters, **none}, (*base.names, *none)
+            with_moves = fit(moved.model, start, names, study.split.fitted, title="")
+            return moved, explain(moved, with_moves, seconds_of_fit), moves
+    return study, explained, ()
+
+
+def _fit_moves(study: Study, plain: Experiment, explained: Explained) -> tuple[Fit | None, tuple[Move, ...]]:
+    """Fit the final model to all runs, the held-out ones included, with the numbers that differ in some of them.
+
+    Returns:
+        The fit, and what differs; no fit if nothing does.
+    """
+    if not groups_that_may_differ(plain.runs):
+        return None, ()
+    final = explained.base if explained.nearest else explained.final
+    known = {p.name for p in (*plain.coefficients, *plain.nuisances, *plain.effects)}
+    known |= {e.second.name for e in plain.effects if e.second}
+    names = tuple(name for name in final.names if name in known)
+    every = Study.fitted_to(plain, study.split.kept, level=study.level, seed=study.seed)
+    _, fitted, moves = find_moves(every, fit(plain, final.parameters, names, study.split.kept, title=""))
+    return fitted if moves else None, moves
+
+
+def _of_runs(study: Study, explained: Explained) -> Fit:
+    """Return the fit that a correction starts from, with the parameters of the model itself, some of every run."""
+    nearest = explained.nearest
+    fitted, model = (nearest.fit, nearest.model) if nearest else (explained.base, study.model)
+    parameters = fitted.parameters
+    while isinstance(model, Shifted):
+        parameters, model = model.of_runs(parameters), model.inner
+    return replace(fitted, parameters=parameters)
+
+
 def explain(study: Study, base: Fit, seconds_of_fit: float) -> Explained:
     """Test the residual of the fit without effects, and look for what explains it, from the simplest on."""
     model, level = study.model, study.level
@@ -209,7 +284,7 @@ def explain(study: Study, base: Fit, seconds_of_fit: float) -> Explained:
         misfit.p_value >= level or examine_residual(study, freed, tangents).p_value >= level
     )
     if misfit.p_value >= level and not number_is_wrong:
-        return Explained(base, misfit, tuple(unexamined(misfit, model.effects, misfit.critical_z)))
+        return Explained(base, misfit, tangents, tuple(unexamined(misfit, model.effects, misfit.critical_z)))
     threshold = misfit.critical_z
     if number_is_wrong:  # every effect that may explain as much as the wrong number does
         gain = base.deviance - freed.deviance
@@ -218,20 +293,20 @@ def explain(study: Study, base: Fit, seconds_of_fit: float) -> Explained:
         print(_forecast(misfit, threshold, seconds_of_fit, derived - fitted), file=sys.stderr)
     candidates = examine(study, base, misfit, tangents, threshold=threshold)
     best = explaining(candidates)
-    if number_explains and not beats_number(best, freed):
+    if number_explains and (misfit.p_value >= level or not beats_number(best, freed)):
         rival_effects = tuple(as_good_as_number(candidates, freed, level))
         claims = [c for c in rival_effects if c.kept]
         off = tuple(p for p in pulls(freed, model.nuisances) if p.freed)
         if claims and misfit.p_value < level and implausible(off):
             checked = tuple(with_checks(study, claims, base))
-            return Explained(base, misfit, tuple(candidates), checked, freed, rival_numbers=off)
-        return Explained(base, misfit, tuple(candidates), (), freed, rival_effects)
+            return Explained(base, misfit, tangents, tuple(candidates), checked, freed, rival_numbers=off)
+        return Explained(base, misfit, tangents, tuple(candidates), (), freed, rival_effects)
     best = (
         best
         or explaining(beside_wrong_numbers(study, base, candidates, tangents))
         or explaining(pairs(study, candidates))
     )
-    return Explained(base, misfit, tuple(candidates), tuple(with_checks(study, best, base)))
+    return Explained(base, misfit, tangents, tuple(candidates), tuple(with_checks(study, best, base)))
 
 
 def _forecast(misfit: Misfit, threshold: float, seconds_of_fit: float, seconds_of_directions: float) -> str:
@@ -257,16 +332,30 @@ def _fits(study: Study, explained: Explained, uncalibrated: Floats, *, moved: bo
     base_intervals = profile_intervals(study.model, base, used, title=title)
     final_intervals = base_intervals
     if final is not base:
-        final_intervals = profile_intervals(study.model, final, used, title=title)
+        model = explained.nearest.model if explained.nearest else study.model
+        final_intervals = profile_intervals(model, final, used, title=title)
+    if explained.nearest:
+        final_intervals[explained.nearest.effect.name] = explained.nearest.interval
     return Fits(
         uncalibrated=uncalibrated,
         base=base,
         base_intervals=base_intervals,
         final=final,
         final_intervals=final_intervals,
-        final_refit=refit_to_all(study.model, final, study.split.kept, moved=moved),
+        final_refit=_handed_on(study, explained, moved=moved),
         pulls=pulls(final, study.model.nuisances),
     )
+
+
+def _handed_on(study: Study, explained: Explained, *, moved: bool) -> FinalRefit:
+    """Fit the final model to all runs, an adopted form only where it lowers the error on the held-out ones."""
+    nearest, base, final = explained.nearest, explained.base, explained.final
+    runs, split = study.model.runs, study.split
+    before, after = (errors(runs, fitted.prediction, split.test)[0] for fitted in (base, final))
+    if nearest and after >= before:
+        nearest, final = None, base
+    refit = refit_to_all(study.model, final, split.kept, moved=moved)
+    return nearest.handed_on(refit) if nearest else refit
 
 
 def _next_runs(rivals: tuple[Rival, ...], seed: int) -> Next:
@@ -291,6 +380,8 @@ def _errors(study: Study, explained: Explained, uncalibrated: Floats, correction
         predictions["predictive"] = corrections.learnt.prediction
     if corrections.law is not None:
         predictions["law"] = corrections.law.prediction
+    if explained.nearest and explained.nearest.sizes:
+        predictions["new_specimen"] = explained.nearest.of_new_specimen()
     stated = {name: errors(runs, prediction, test) for name, prediction in predictions.items()}
     noise = base.noise.run
     return HeldOutErrors(

@@ -17,7 +17,7 @@ from calibration.verdict.next_runs import Batch, NextRun
 from calibration.verdict.sequential_test import Explanation
 from sim.arrays import Floats
 
-MODELS = ("uncalibrated", "before", "after", "generic", "predictive", "law")  # whose errors are stated
+MODELS = ("uncalibrated", "before", "after", "generic", "predictive", "law", "new_specimen")  # with stated errors
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ class HeldOutErrors:
     """How far each model is from the held-out runs, relative rms, and how far noise alone would be.
 
     The models are "uncalibrated", "before" (calibrated), "after" (with the effects of the verdict), "generic"
-    (with a regression of the residual), and, if there are such, "law" (with the best law) and "predictive" (with a
-    learnt correction).
+    (with a regression of the residual), and, if there are such, "law" (with the best law), "predictive" (with a
+    learnt correction) and "new_specimen" (the adopted form with its mean size for every specimen).
     """
 
     rms: dict[str, float]  # of each model, over all outputs

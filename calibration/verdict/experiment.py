@@ -1,7 +1,4 @@
-"""What `calibrate` needs of its subject beside the forward model: units, a start, runs that can be made next.
-
-Beside the catalogue a subject may have two ways to describe what no effect explains: a law, and a correction.
-"""
+"""Two ways to describe what no effect of the catalogue explains: a law, and a correction."""
 
 from __future__ import annotations
 
@@ -10,37 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from calibration.statistics.fit import Fit
-from calibration.statistics.statistical_model import ForwardModel
+from calibration.statistics.statistical_model import Experiment
 from calibration.statistics.study import Study
-from sim.arrays import Flags, Floats
-
-
-class Experiment(ForwardModel, Protocol):
-    """A forward model of runs that were made somewhere, and can be made again."""
-
-    @property
-    def untestable(self) -> Mapping[str, str]:
-        """Effects that these runs cannot test: title -> what is missing."""
-        ...
-
-    def check(self, prediction: Floats) -> None:
-        """Reject measurements that are inconsistent with their stated units.
-
-        Args:
-            prediction: (n, k) of the model as given.
-
-        Raises:
-            InputError: a column is wrong by a factor that is not possible.
-        """
-        ...
-
-    def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
-        """Find a better start for the coefficients, from the runs in `used` (n,), if there is a cheap one."""
-        ...
-
-    def possible(self) -> tuple[ForwardModel, list[dict[str, Any]]]:
-        """Return a model of runs that can be made next, and their settings."""
-        ...
+from sim.arrays import Floats
 
 
 class LearntCorrection(Protocol):

@@ -7,6 +7,7 @@ corrected robot that does not lower their error is not advised.
 from __future__ import annotations
 
 from calibration.verdict.verdict import DISAGREES, Verdict
+from surrogate.input_ranges import COEFFICIENTS
 
 _PLAN = "Plan with the corrected robot: `softflagella plan square:3l --robot corrected.toml --out plan`."
 _NEW_SESSION = "add the new runs to the table with a session of their own (column `session`)"
@@ -19,10 +20,15 @@ def next_steps(result: Verdict) -> list[str]:
         "number": _after_number,
         "effect": _after_effect,
         "ambiguous": _after_ambiguous,
+        "partial": _after_partial,
         "unexplained": _after_unexplained,
     }
-    steps = [*_contradicted(result), *by_verdict[result.verdict](result)]
-    if result.error_corrected < result.error_uncalibrated:
+    steps = [*_moved(result), *_contradicted(result), *by_verdict[result.verdict](result)]
+    if not set(COEFFICIENTS) <= set(result.base.names):  # no robot is handed on
+        return [step for step in steps if "corrected" not in step and "softflagella" not in step]
+    if (
+        result.moves or result.error_corrected < result.error_uncalibrated
+    ):  # the held-out runs may be those that differ
         return steps
     return [
         "Plan with the robot as given: the corrected one does not lower the error on the held-out runs "
@@ -32,10 +38,21 @@ def next_steps(result: Verdict) -> list[str]:
     ]
 
 
+def _moved(result: Verdict) -> list[str]:
+    """What comes first if a number differs in some runs."""
+    if not result.moves:
+        return []
+    where = " and ".join(dict.fromkeys(move.record["where"] for move in result.moves))
+    return [
+        f"Find out what changed {where}: look at the set-up, the fluid and the camera of these runs. Repeat a few "
+        f"of them, {_NEW_SESSION}, and calibrate again; or leave them out."
+    ]
+
+
 def _contradicted(result: Verdict) -> list[str]:
     """What comes first if the held-out runs do not bear the verdict out."""
     held_out = result.conditions.split.names
-    if result.errors.p_value < DISAGREES and result.verdict != "unexplained":
+    if result.errors.p_value < DISAGREES and result.verdict not in ("partial", "unexplained"):
         return [
             f"Find out what is different about the held-out runs ({held_out}): they do not agree with the final "
             f"model (p = {result.errors.p_value:.2g}). Look for a change of the set-up on that day, or make more "
@@ -102,6 +119,25 @@ def _after_ambiguous(result: Verdict) -> list[str]:
         *_telling_apart(result),
         f"Until then, corrected.toml has {first}. It predicts runs like those of this table; elsewhere the "
         "explanations differ.",
+    ]
+
+
+def _after_partial(result: Verdict) -> list[str]:
+    assert result.nearest is not None
+    title = result.nearest.effect.title
+    if not result.held_out_error_falls:
+        return [
+            f"Do not use {title}: it does not lower the error on the held-out runs. corrected.toml is without it."
+        ]
+    specimens = (
+        [f"Find out what differs between the specimens: the report shows the size of {title} for each."]
+        if result.nearest.sizes
+        else []
+    )
+    return [
+        *specimens,
+        f"Make runs where most is left ({result.nearest.largest_along}), {_NEW_SESSION}, and calibrate again.",
+        f"{_PLAN} It has {title}, with its spread between specimens in the stated error.",
     ]
 
 

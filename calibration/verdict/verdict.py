@@ -3,6 +3,8 @@
 "none": no departure beyond noise. "number": a nuisance parameter is wrong, and explains it. "effect": one effect,
 or one pair, explains it. "ambiguous": several do, and the runs cannot tell them apart. "unexplained": there is a
 departure, and nothing in the catalogue explains it. A law may describe it; a law is no claim about the cause.
+"partial": the same, but an effect, with a size that may differ between specimens, predicts runs that it has not
+seen (`calibration.attribution.nearest`). It is adopted as a description, and claims no cause.
 """
 
 from __future__ import annotations
@@ -12,6 +14,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from calibration.attribution.halved_tolerances import overall_gains
+from calibration.attribution.moves import StatedMove
+from calibration.attribution.nearest import Nearest
 from calibration.attribution.refits import Candidate
 from calibration.attribution.wrong_numbers import notable_pull, wrong_number
 from calibration.statistics.fit import Fit
@@ -33,7 +37,8 @@ def reach_verdict(evidence: Evidence, level: float, *, number_explains: bool) ->
     A wrong nuisance parameter comes ahead of every effect that is not better, or it is one of several explanations
     (`Evidence.rival_numbers`). Without one, a residual within the noise is "none". Beyond it, the number of
     explanations that the runs cannot tell apart decides. What new runs say about an "ambiguous" verdict is decided
-    by `calibration.verdict.sequential_test.standings`.
+    by `calibration.verdict.sequential_test.standings`. An "unexplained" verdict becomes "partial" where a form is
+    adopted.
 
     Args:
         level: α of the residual's p-value.
@@ -57,19 +62,21 @@ class Verdict:
         'No effect is missing that these runs can show (p = 0.43).'
     """
 
-    verdict: str  # "none", "number", "effect", "ambiguous", "unexplained"; see `reach_verdict`
+    verdict: str  # "none", "number", "effect", "ambiguous", "partial", "unexplained"; see `reach_verdict`
     evidence: Evidence  # the residual, and what explains it
     fits: Fits  # the fitted models
     errors: HeldOutErrors  # on the held-out runs
     corrections: Corrections  # descriptions of the residual
     next: Next  # runs to make next
     conditions: Conditions  # what was fixed before the fit
+    nearest: Nearest | None  # the form that is adopted, of a partial verdict
+    moves: tuple[StatedMove, ...]  # numbers that differ in some runs
 
     def __repr__(self) -> str:
         sentence = self.sentence if len(self.sentence) <= _LONGEST else f"{self.sentence[:_LONGEST]} …"
         errors = f"as given {_percent(self.error_uncalibrated)}, calibrated {_percent(self.error_before)}"
-        if self.effects:
-            errors += f", with the effects {_percent(self.error_after)}"
+        if self.effects or self.nearest:
+            errors += f", with the {'effects' if self.effects else 'adopted form'} {_percent(self.error_after)}"
         names = ", ".join(self.effects)
         return (
             f"Verdict {self.verdict!r}{f': {names}' if names else ''}\n"
@@ -95,7 +102,7 @@ class Verdict:
 
     @property
     def final(self) -> Fit:
-        """The model with the effects of the verdict, or without any."""
+        """The model with the effects of the verdict, with the form that is adopted, or without any."""
         return self.fits.final
 
     @property
@@ -128,6 +135,8 @@ class Verdict:
         """Relative error of the corrected robot on the held-out runs."""
         if self.described:
             return self.errors.rms["law"]
+        if self.nearest and not self.held_out_error_falls and self.error_predictive is None:
+            return self.error_before
         return self.error_after if self.error_predictive is None else self.error_predictive
 
     @property
@@ -149,7 +158,7 @@ class Verdict:
 
         Where nothing explains the residual there are none: what is missing pulls at them, too.
         """
-        if self.verdict == "unexplained":
+        if self.verdict in ("partial", "unexplained"):
             return ()
         freed = {p.parameter.name: p for p in self.fits.pulls if p.freed}
         known = tuple((freed[alike[0].parameter.name], *alike[1:]) for alike in self.fits.final.wrong_numbers)
@@ -182,7 +191,17 @@ class Verdict:
                 f"{sentences[0].removesuffix('.')}, but the error on the held-out runs does not fall with it "
                 f"({without:.2f} % without, {with_claim:.2f} % with it)."
             )
-        return " ".join(sentences)
+        return " ".join([*self._of_some_runs, *sentences])
+
+    @property
+    def _of_some_runs(self) -> list[str]:
+        """What is said first: that the held-out runs do not agree, and which numbers differ in some runs."""
+        said = [f"{move.words[0].upper()}{move.words[1:]}." for move in self.moves]
+        p = self.errors.p_value
+        if p < DISAGREES and self.verdict not in ("partial", "unexplained"):
+            agree = f"The held-out runs ({self.conditions.split.names}) do not agree with the model (p = {p:.1g})."
+            return [agree, *said]
+        return said
 
     @property
     def _sentences(self) -> list[str]:
@@ -203,7 +222,11 @@ class Verdict:
             said = "; and ".join(", or ".join(p.words for p in alike) for alike in self.wrong_numbers)
             return f"A nuisance parameter is wrong: {said}."
         learnt = [p for p in self.fits.pulls if p.learnt]
-        if not learnt or self.verdict == "unexplained" or abs(learnt[0].z) <= notable_pull(len(learnt)):
+        if (
+            not learnt
+            or self.verdict in ("partial", "unexplained")
+            or abs(learnt[0].z) <= notable_pull(len(learnt))
+        ):
             return ""
         return f"{learnt[0].words}."
 
@@ -234,9 +257,43 @@ class Verdict:
             names = " or ".join(c.words for c in self.explaining)
             names += self._outside + self._or_number
             return f"The residual ({p}) is explained by {names}: these runs cannot tell them apart.{self._beside}"
+        if self.nearest:
+            return f"{self._adopted(p)}{self._steered}"
         none = "no effect and no pair of effects of the catalogue explains"
         return (
             f"There is a residual ({p}) that {none}{self._nearest}.{self._small}{self._described}{self._steered}"
+        )
+
+    def _adopted(self, p: str) -> str:
+        """The words for a form that is adopted, with what it leaves and the errors before and after."""
+        nearest = self.nearest
+        assert nearest is not None
+        low, high = nearest.interval
+        size = f"{nearest.size:.3g} ({low:.3g} to {high:.3g})"
+        if nearest.sizes:
+            values = [value for value, _, _ in nearest.sizes.values()]
+            size = f"differs between specimens: {size} at the mean, from {min(values):.3g} to {max(values):.3g}"
+        else:
+            size = f"is {size}"
+        others = f" {' or '.join(nearest.as_well)} would do as well." if nearest.as_well else ""
+        left = "nothing beyond the noise"
+        if nearest.remainder > 0:
+            left = f"{_percent(nearest.remainder)} beyond the noise, most of it in {nearest.largest_along}"
+        falls = ""
+        if self.held_out_error_falls:
+            falls = (
+                f" The error on the held-out runs falls from {_percent(self.error_before)} to "
+                f"{_percent(self.error_after)}; noise alone makes {_percent(self.noise_ceiling)}."
+            )
+        if "new_specimen" in self.errors.rms:
+            falls += (
+                f" With the mean size, as for a new specimen, it is {_percent(self.errors.rms['new_specimen'])}."
+            )
+        return (
+            f"Something is surely missing ({p}), and no effect and no pair of effects of the catalogue explains "
+            f"all of it. The nearest form, {nearest.effect.words}, is adopted as a description: it removes "
+            f"{_share(nearest.removed)} of it on runs that it was not fitted to. Its size {size}. It leaves "
+            f"{left}.{others} This is no claim about the cause.{falls}"
         )
 
     @property
@@ -334,8 +391,12 @@ class Verdict:
         share = (self.fits.base.deviance - deviance) / max(self.fits.base.deviance - expected, 1e-9)
         if share < _NEAR:
             return ""
-        return f"; the nearest, {title}, removes {100 * min(share, 1.0):.0f} % of it and leaves more than noise"
+        return f"; the nearest, {title}, removes {_share(share)} of it and leaves more than noise"
 
 
 def _percent(error: float) -> str:
     return f"{100 * error:.2f} %"
+
+
+def _share(share: float) -> str:
+    return "nearly all" if share > 0.995 else f"{100 * share:.0f} %"

@@ -22,6 +22,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
             "value_all_runs": result.fits.final_refit.parameters[name],
         }
         for name in final.names
+        if name in result.fits.final_refit.parameters
     }
     return {
         "verdict": result.verdict,
@@ -41,6 +42,8 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
             {"name": name, "title": parameter_titles[name], "smallest_detectable_sizes_fall_by": gain}
             for name, gain in result.halved_tolerances.items()
         ],
+        "moves": [move.record for move in result.moves],
+        "nearest": result.nearest.record() if result.nearest else None,
         **{f"error_{name}": errors.rms.get(name) for name in MODELS},
         "harmless": result.harmless,
         "held_out_error_falls": result.held_out_error_falls,

@@ -54,8 +54,9 @@ def calibrate(
         progress: show progress bars.
 
     Returns:
-        The verdict, with `verdict` ("none", "number", "effect", "ambiguous", "unexplained"), `sentence`,
-        `effects`, fits with intervals, errors on the held-out runs, the `corrected` robot, and `save(folder)`.
+        The verdict, with `verdict` ("none", "number", "effect", "ambiguous", "partial", "unexplained"),
+        `sentence`, `effects`, `nearest`, `moves`, fits with intervals, errors on the held-out runs, the
+        `corrected` robot, and `save(folder)`.
 
     Raises:
         InputError: the table cannot be used; the message says why.

@@ -162,7 +162,7 @@ def test_the_gain_is_that_of_dense_least_squares() -> None:
     """With the covariance of all runs written out, for a scatter of the sessions that is at its limit."""
     whole = linear_model("threshold")
     linear = replace(whole, session=np.zeros(len(whole.session), dtype=int))  # one session: ρ is at its limit
-    run = repeat_covariance(linear.as_given, linear.condition)
+    run = repeat_covariance(linear.as_given, linear.repeated)
     inverse = np.linalg.inv(Noise(run, SESSION_SHARE).covariance(linear.session))
     free = linear.load[..., None] * (linear.members @ linear.contrasts)[:, None]
     law = linear.load[..., None] * np.stack([np.ones_like(linear.x), linear.x], 1)[:, None]

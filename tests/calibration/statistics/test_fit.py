@@ -58,9 +58,8 @@ class Line:
     ) -> tuple[Floats, Floats]:
         x = self.runs.inputs
         slopes = {"a": np.stack([x[:, 0], 1 - x[:, 0], x[:, 0]], -1), "b": np.stack([x[:, 0] ** 2] * 3, -1)}
-        return np.asarray(sum(parameters[n] * s for n, s in slopes.items())), np.stack(
-            [slopes[n] for n in names], -1
-        )
+        table = np.array([slopes[n] for n in names]).reshape(-1, *self.runs.y.shape)
+        return np.asarray(sum(parameters[n] * s for n, s in slopes.items())), np.moveaxis(table, 0, -1)
 
 
 def line(seed: int, *, mistracked: float = 0.0) -> tuple[Line, Floats]:
@@ -214,8 +213,8 @@ class Valley:
         a, b = parameters["a"], parameters["b"]
         self.calls.append(a)
         slopes = {"a": np.array([0.02 * a, -20 * a]), "b": np.array([0.0, 10.0])}
-        table = np.stack([np.tile(slopes[name], (FEW, 1)) for name in names], -1)
-        return self._at(a, b), table
+        table = np.array([np.tile(slopes[name], (FEW, 1)) for name in names]).reshape(-1, FEW, 2)
+        return self._at(a, b), np.moveaxis(table, 0, -1)
 
     def _at(self, a: float, b: float) -> Floats:
         return np.tile([0.01 * a**2, 10 * (b - a**2)], (FEW, 1))

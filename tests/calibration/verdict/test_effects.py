@@ -28,6 +28,7 @@ from tests.calibration.toy_tables import (
     none,
     toy_swimmer,
     toy_table,
+    verdict_of,
 )
 
 SIZE = 5.0
@@ -70,13 +71,17 @@ def test_an_effect_that_the_coefficients_absorb_is_not_testable() -> None:
     assert misfit.general_p < 0.1
 
 
-@pytest.mark.rest
-def test_what_comes_nearest_is_said_where_nothing_explains() -> None:
+@pytest.mark.slow
+def test_what_comes_nearest_is_adopted_where_nothing_explains() -> None:
     table = toy_table(7, **{DRAG: 5.0})
     table["omega_h_rpm"] *= np.exp(0.04 * np.sin(3.0 * table["l_cm"]) * np.sign(table["omega_rpm"]))
     result = calibrated(table, few=True)
-    assert result.verdict == "unexplained"
-    assert "the nearest, head's end-over-end drag, removes" in result.sentence
+    assert (result.verdict, result.effects) == ("partial", ())
+    assert "The nearest form, head's end-over-end drag (end_over_end_drag), is adopted" in result.sentence
+    assert result.error_after < 0.7 * result.error_before
+    robot = verdict_of(result, table)
+    assert 2.0 < robot.corrected.effects[DRAG] < 8.0
+    assert robot.knowledge.names.count(DRAG) == 1
 
 
 @pytest.mark.slow

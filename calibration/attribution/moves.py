@@ -1,0 +1,173 @@
+"""What moved: a coefficient or a nuisance parameter that differs in a session, since one, or on a specimen.
+
+Bubbles, another batch of fluid, a camera that was bumped: the model is right, and one of its numbers is not the
+same in all runs. So before an effect is looked for, each number may differ in each group of runs. Groups are
+
+    every session,   the sessions from each one on, in the order of the runs,   every specimen,
+
+as far as their runs have partners: every pair of N and l of a group (`Runs.partners`) must be outside it, too.
+Else a shift is no different from an effect of N or l. A number that differs by x in the group G has the derivative
+∂f/∂x = ∂f/∂p in the runs of G, and 0 in the others. So every pair of number and group has a score
+(`calibration.statistics.residual_tests`), and costs no simulation. The largest is taken to be real if it is beyond
+what a bootstrap of all scores gives at a quarter of the level, beyond `CERTAIN` standard deviations of what the
+fit with it leaves (its Birge factor counts), and at most `CREDIBLE` tolerances of the number. Of pairs that cannot
+be told apart the one comes first that is off by the fewest of its tolerances, a coefficient before a number; the
+others are named with it. With it in the fit, a second one is looked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from calibration.attribution.refits import INDISTINGUISHABLE
+from calibration.statistics.fit import Fit, birge, fit
+from calibration.statistics.residual_tests import TESTABLE, Directions, examine_residual
+from calibration.statistics.shifted import Shift, Shifted
+from calibration.statistics.statistical_model import Experiment, Parameter, Runs
+from calibration.statistics.study import Study
+from sim.arrays import Flags
+
+CERTAIN = 5.0  # standard deviations
+CREDIBLE = 10.0  # tolerances of a number: a camera may be bumped, but no head is a third shorter on a day
+_MOST = 2  # numbers that move
+_NEAR, _FITTED = 0.9, 5  # share of the largest score; pairs that are fitted
+_SHARE_OF_LEVEL = 0.25
+_DRAWS = 400  # of the bootstrap
+_FEWEST = 6  # runs in a group, and outside it
+
+
+@dataclass(frozen=True)
+class Move:
+    """A number of the model that differs in some runs."""
+
+    shift: Shift
+    z: float  # its score
+    instead: tuple[str, ...] = ()  # others that cannot be told from it, in words
+
+    @property
+    def name(self) -> str:
+        """The name of the change, as a parameter."""
+        return self.shift.parameter.name
+
+    def words(self, fitted: Fit) -> str:
+        """Say by how much it differs, with its 95 % interval, from a fit that has it."""
+        number, (low, high) = self.shift.of, fitted.interval(self.name)
+        sizes = np.array([fitted.parameters[self.name], low, high])
+        sizes, unit = (100 * np.expm1(sizes), "%") if number.logarithmic else (sizes * number.shown, number.unit)
+        value, *ends = np.abs(sizes).tolist()
+        others = f", or {' or '.join(self.instead)} differs" if self.instead else ""
+        return (
+            f"{self.shift.parameter.title} is {value:.2g} {unit} ({min(ends):.2g} to {max(ends):.2g}) "
+            f"{'above' if sizes[0] > 0 else 'below'} that of the other runs ({abs(self.z):.1f} σ){others}"
+        )
+
+    def record(self, fitted: Fit) -> dict[str, Any]:
+        """Return the record for verdict.json."""
+        return {
+            "number": self.shift.of.name,
+            "where": self.shift.where,
+            "change": fitted.parameters[self.name],
+            "interval": list(fitted.interval(self.name)),
+            "scale": "logarithm" if self.shift.of.logarithmic else "as it is",
+            "score": self.z,
+            "instead": list(self.instead),
+        }
+
+
+class StatedMove(NamedTuple):
+    """A number that differs in some runs, as a verdict states it."""
+
+    words: str
+    record: dict[str, Any]
+
+
+def groups_that_may_differ(runs: Runs) -> list[tuple[str, Flags]]:
+    """List groups of runs with partners outside them, with words for each."""
+    names, session = runs.session_names, runs.session
+    found: list[tuple[str, Flags]] = []
+    if runs.specimen is not None:
+        found += [(f"on robot {name}", runs.specimen == i) for i, name in enumerate(runs.specimen_names)]
+    found += [(f"in session {name}", session == i) for i, name in enumerate(names)]
+    by_time = sorted(range(len(names)), key=lambda i: int(runs.rows[session == i].min()))
+    found += [
+        (f"since session {names[by_time[k]]}", np.isin(session, by_time[k:])) for k in range(2, len(names) - 1)
+    ]
+    distinct: list[tuple[str, Flags]] = []
+    for words, rows in found:
+        same = any(np.array_equal(rows, other) or np.array_equal(rows, ~other) for _, other in distinct)
+        if not same and min(rows.sum(), (~rows).sum()) >= _FEWEST and _has_partners(runs, rows):
+            distinct.append((words, rows))
+    return distinct
+
+
+def _has_partners(runs: Runs, rows: Flags) -> bool:
+    """Tell whether the settings that runs must share are outside a group, too."""
+    settings = runs.partners
+    inside, outside = (set(map(tuple, settings[part].round(9).tolist())) for part in (rows, ~rows))
+    return inside <= outside
+
+
+def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[Move, ...]]:
+    """Find the numbers that differ in some runs, the clearest first, and fit them.
+
+    Args:
+        base: a fit to the runs that the study uses.
+
+    Returns:
+        The study, with a model `Shifted` if something differs; the fit; and what differs.
+    """
+    used, plain = study.split.fitted, cast(Experiment, study.model)
+    groups = [
+        (words, rows)
+        for words, rows in groups_that_may_differ(plain.runs)
+        if min((rows & used).sum(), (~rows & used).sum()) >= _FEWEST
+    ]
+    numbers = (*plain.coefficients, *plain.nuisances)
+    moves: tuple[Move, ...] = ()
+    while groups and len(moves) < _MOST:
+        fits: list[tuple[Move, Study, Fit]] = []
+        for move in _clearest(study, base, groups, numbers):
+            shifts = (*(m.shift for m in moves), move.shift)
+            moved = replace(study, model=Shifted(plain, shifts))
+            start, names = {**base.parameters, move.name: 0.0}, (*base.names, move.name)
+            fits.append((move, moved, fit(moved.model, start, names, used, title="")))
+        fits = [each for each in fits if _is_real(plain.runs, used, each[0], each[2])]
+        if not fits:
+            break
+        least = min(fitted.deviance for _, _, fitted in fits)
+        alike = [each for each in fits if each[2].deviance - least < INDISTINGUISHABLE]
+        (move, study, base), *others = sorted(alike, key=lambda each: _tolerances(each[0], each[2]))
+        moves = (*moves, replace(move, instead=tuple(other.shift.parameter.title for other, _, _ in others)))
+    return study, base, moves
+
+
+def _is_real(runs: Runs, used: Flags, move: Move, fitted: Fit) -> bool:
+    """Tell whether a number that differs is beyond what the fit with it leaves, and credible."""
+    certain = abs(move.z) >= CERTAIN * math.sqrt(birge(runs, fitted, used))
+    return fitted.converged and certain and _tolerances(move, fitted) <= CREDIBLE
+
+
+def _tolerances(move: Move, fitted: Fit) -> float:
+    """Return how many of its tolerances a number is off; none for a coefficient."""
+    return abs(fitted.parameters[move.name]) / (move.shift.of.sigma or math.inf)
+
+
+def _clearest(
+    study: Study, base: Fit, groups: Sequence[tuple[str, Flags]], numbers: Sequence[Parameter]
+) -> list[Move]:
+    """Find the numbers and the groups with the largest scores, if these are real, the largest first."""
+    pairs = [(number, words, rows) for words, rows in groups for number in numbers if number.name in base.names]
+    columns = [base.jacobian[..., base.names.index(n.name)] * rows[:, None] for n, _, rows in pairs]
+    tested = replace(study, seed=study.seed + 6, level=study.level * _SHARE_OF_LEVEL)
+    misfit = examine_residual(tested, base, Directions.plain(np.stack(columns, -1)), draws=_DRAWS)
+    z = np.where(misfit.scores.survived >= TESTABLE, misfit.scores.z, 0.0)
+    largest = float(np.abs(z).max())
+    if largest < max(misfit.critical_z, CERTAIN):
+        return []
+    near = [j for j in np.argsort(-np.abs(z)).tolist() if abs(z[j]) > _NEAR * largest]
+    return [Move(Shift(pairs[j][0], pairs[j][2], pairs[j][1]), float(z[j])) for j in near[:_FITTED]]

@@ -1,0 +1,353 @@
+"""The nearest form: an effect that describes a residual which no effect explains, with a size that may differ.
+
+No form of a catalogue is exact, and specimens differ. So an effect may be missing beyond doubt while none leaves
+no more than noise. The question here is not which effect is the cause, but whether a known form, with a size
+that may differ between specimens, predicts runs that it has not seen. The size ε_g of specimen g (of a session,
+where the table names no specimens) varies about its mean:
+
+    ε_g = ε + u_g,  u_g ~ N(0, τ²),      or     ε_g = ε exp(u_g)
+
+where the null is an end of the effect's range, so that a size has one sign only. A normal distribution about the
+mean would have a good part of its sizes beyond the null; on a logarithmic scale there are none, and the fit stays
+within the range. The u_g are nuisance parameters with the standard deviation τ. It is estimated by expectation
+maximisation, τ² ← mean of u_g² + V_gg (Dempster, Laird, Rubin 1977).
+
+What the form leaves counts as noise: variances are multiplied by b = max(1, χ²/ν) of that remainder (Birge 1932).
+
+A form is adopted if
+
+1. nothing explains the residual, and its fit converged, inside the bounds;
+2. its gain on left-out groups of runs is more than twice its standard error, both in the noise b S. The size of a
+   specimen that is left out as a whole is the mean;
+3. on these left-out runs it removes at least half of what the model without it leaves beyond noise;
+4. its mean size differs from the null. With one size, its interval says so; with several, a t-test over the sizes
+   that the specimens ask for on their own, either sign allowed, by one linear step without the spread. The
+   interval of a size that varies in its logarithm must stay within a factor of 100.
+
+Sizes differ if the restricted likelihood gains by it: -2 ln of its ratio is above 2.71, the 95 % quantile where a
+variance is at its bound of zero (Self and Liang 1987). Of the forms adopted the one with the largest gain is
+taken. Others within one standard error of it are named.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+from scipy.stats import norm as normal
+from scipy.stats import t as student
+
+from calibration.attribution.refits import FIRST, Candidate, left_out_residuals
+from calibration.statistics.fit import Fit, UnsolvedError, birge, fit
+from calibration.statistics.held_out import FinalRefit
+from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, examine_residual
+from calibration.statistics.shifted import Shift, Shifted
+from calibration.statistics.statistical_model import (
+    Experiment,
+    ForwardModel,
+    Parameter,
+    Parameters,
+    Runs,
+    prior_rows,
+)
+from calibration.statistics.study import Study
+from sim.arrays import Floats, Integers
+
+_REMOVED = 0.5  # least share of what is beyond noise
+_CERTAIN = 2.0  # standard errors of the gain
+_DIFFERS = 2.71  # ½ χ²₁ at 5 %
+_FEWEST = 3  # specimens, for sizes that differ
+_DRAWS = 400  # of the bootstrap, for what the form leaves
+_LARGEST = 300.0  # half width, so that its exponential is a number
+_VAGUE = math.log(100.0)  # half width of the interval of a logarithm, which says nothing
+_ROUNDS, _SETTLED = 12, 0.03  # of the estimate of τ; its last relative change
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """An effect that is adopted as a description of what no effect explains."""
+
+    effect: Parameter
+    model: ForwardModel  # the study's own, or `Shifted` with a shift for each specimen
+    fit: Fit
+    spread: float  # τ, on the scale of the fit; 0: one size
+    birge: float  # b
+    interval: tuple[float, float]  # 95 % of the mean size
+    sizes: Mapping[str, tuple[float, float, float]]  # of each fitted specimen, with its interval; empty: one size
+    gain: float  # on left-out groups, in log likelihood
+    gain_error: float
+    removed: float  # share of what is beyond noise that it removes there
+    remainder: float  # relative rms that it leaves there beyond noise
+    as_well: tuple[str, ...] = ()  # titles of others within one standard error of its gain
+    misfit: Misfit | None = None  # tests of what it leaves
+
+    @property
+    def size(self) -> float:
+        """The mean size."""
+        return float(self.fit.parameters[self.effect.name])
+
+    @property
+    def logarithmic(self) -> bool:
+        """Whether its sizes vary in their logarithm."""
+        return bool(self.sizes) and next(p for p in self.fit.fitted if p.name == self.effect.name).logarithmic
+
+    @property
+    def _departures(self) -> tuple[str, ...]:
+        """Names of u_g."""
+        return (
+            tuple(f"{self.effect.name} of {name}" for name in specimens(self.model.runs)[1]) if self.sizes else ()
+        )
+
+    def of_new_specimen(self) -> Floats:
+        """Predict (n, k) all runs with the mean size."""
+        none = dict.fromkeys(self._departures, 0.0)
+        return self.model.predict([{**self.fit.parameters, **none}])[0]
+
+    @property
+    def largest_along(self) -> str:
+        """The output and the feature of the inputs along which most is left, in words."""
+        assert self.misfit is not None
+        shapes = np.abs(self.misfit.scores.shapes)
+        if not shapes.size:
+            return ""
+        output, feature = np.unravel_index(np.argmax(shapes), shapes.shape)
+        return f"{self.model.runs.outputs[output]} along {self.misfit.features[feature]}"
+
+    def record(self) -> dict[str, Any]:
+        """Return the record for verdict.json."""
+        assert self.misfit is not None
+        return {
+            "effect": self.effect.name,
+            "mean": self.size,
+            "interval": list(self.interval),
+            "spread": self.spread,
+            "scale": "logarithm" if self.logarithmic else "as it is",
+            "sizes": {name: list(size) for name, size in self.sizes.items()},
+            "removed_share": self.removed,
+            "session_gain": [self.gain, self.gain_error],
+            "birge": self.birge,
+            "remainder": self.remainder,
+            "remainder_p": self.misfit.p_value,
+            "largest_along": self.largest_along,
+            "as_well": list(self.as_well),
+        }
+
+    def handed_on(self, refit: FinalRefit) -> FinalRefit:
+        """Return the refit to all runs for a new specimen: the mean size, with the spread in its variance."""
+        own = self._departures
+        kept = [i for i, p in enumerate(refit.fitted) if p.name not in own]
+        fitted = [refit.fitted[i] for i in kept]
+        covariance = self.birge * refit.covariance[np.ix_(kept, kept)]
+        place = next(i for i, p in enumerate(fitted) if p.name == self.effect.name)
+        covariance[place, place] += self.spread**2
+        if fitted[place].logarithmic:  # corrected.toml states the size itself
+            slope = np.ones(len(kept))
+            slope[place] = refit.parameters[self.effect.name]
+            covariance *= np.outer(slope, slope)
+            fitted[place] = self.effect
+        parameters = {name: value for name, value in refit.parameters.items() if name not in own}
+        return FinalRefit(parameters, tuple(fitted), covariance)
+
+
+def specimens(runs: Runs) -> tuple[Integers, tuple[str, ...]]:
+    """Number the specimens of the runs, (n,), and name them; sessions where none are noted."""
+    if runs.specimen is None:
+        return runs.session, runs.session_names
+    return runs.specimen, runs.specimen_names
+
+
+def varying(model: ForwardModel, effect: Parameter, spread: float) -> Shifted:
+    """Let an effect differ between the specimens of a model's runs, by `spread` on its scale."""
+    numbered, names = specimens(model.runs)
+    mean = replace(effect, logarithmic=effect.start in effect.bounds)
+    shifts = (Shift(mean, numbered == g, f"of {name}", spread) for g, name in enumerate(names))
+    return Shifted(cast(Experiment, model), tuple(shifts))
+
+
+def sizes_of(model: Shifted, parameters: Parameters) -> Floats:
+    """Compute ε_g of every specimen."""
+    sizes = model.of_runs(parameters)[model.shifts[0].of.name]
+    return np.array([sizes[s.rows][0] for s in model.shifts])
+
+
+def adopt_nearest(
+    study: Study, base: Fit, misfit: Misfit, candidates: Sequence[Candidate], tangents: Directions
+) -> Nearest | None:
+    """Find the form that describes best what no effect explains; None if none does.
+
+    Args:
+        base: the fit without effects.
+        misfit: of its residual.
+        candidates: all effects, with their refits.
+        tangents: their directions.
+    """
+    adopted: list[Nearest] = []
+    for candidate in _promising(base, misfit, candidates):
+        try:
+            constant = _converged(study, base, candidate)
+            forms = [(study.model, constant, 0.0)]
+            if len(np.unique(specimens(study.model.runs)[0][study.split.fitted])) >= _FEWEST:
+                forms.append(_with_spread(study, constant, candidate.effect))
+        except UnsolvedError:
+            continue
+        b = _birge(study, forms[-1][1])
+        if len(forms) > 1 and _restricted(study, constant, b) - _restricted(study, forms[1][1], b) <= _DIFFERS:
+            forms.pop()
+        judged = (_judged(study, base, candidate.effect, *form) for form in reversed(forms))
+        adopted += [form for form in judged if form][:1]
+    if not adopted:
+        return None
+    best = max(adopted, key=lambda form: form.gain)
+    others = [f.effect.title for f in adopted if f is not best and f.gain > best.gain - best.gain_error]
+    place = next(i for i, e in enumerate(study.model.effects) if e.name == best.effect.name)
+    left = examine_residual(replace(study, seed=study.seed + 5), best.fit, tangents.without(place), draws=_DRAWS)
+    return replace(best, as_well=tuple(others), misfit=left)
+
+
+def _birge(study: Study, fitted: Fit) -> float:
+    return birge(study.model.runs, fitted, study.split.fitted)
+
+
+def _promising(base: Fit, misfit: Misfit, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Choose the effects that remove most by their refits, or by their scores where they have none."""
+    tested = [c for c in candidates if abs(c.z) > misfit.critical_z and c.survived >= TESTABLE]
+    return sorted(tested, key=lambda c: c.refit.deviance if c.refit else base.deviance - c.z**2)[:FIRST]
+
+
+def _converged(study: Study, base: Fit, candidate: Candidate) -> Fit:
+    """Fit an effect to its end: the search for explanations stops where noise is out of reach."""
+    if candidate.refit is not None and candidate.refit.converged:
+        return candidate.refit
+    effect = candidate.effect
+    start = dict(candidate.refit.parameters if candidate.refit else base.parameters)
+    if candidate.refit is None:
+        guess = start[effect.name] + candidate.z * candidate.detectable / max(abs(candidate.z), 1e-300)
+        start[effect.name] = min(max(guess, effect.bounds[0]), effect.bounds[1])
+    seconds = (effect.second.name,) if effect.second else ()
+    return fit(study.model, start, (*base.names, effect.name, *seconds), study.split.fitted, title="")
+
+
+def _with_spread(study: Study, constant: Fit, effect: Parameter) -> tuple[Shifted, Fit, float]:
+    """Fit an effect whose size differs between specimens, with τ by expectation maximisation."""
+    runs, used = study.model.runs, study.split.fitted
+    seen = np.unique(specimens(runs)[0][used])
+    logarithmic = effect.start in effect.bounds
+    spread = 1.0 if logarithmic else max(abs(constant.parameters[effect.name]) / 2, effect.typical / 10)
+    least = 1e-3 * (1.0 if logarithmic else effect.typical)
+    departures = [s.parameter.name for s in varying(study.model, effect, spread).shifts]
+    start = {**constant.parameters, **dict.fromkeys(departures, 0.0)}
+    if logarithmic:
+        start[effect.name] = max(start[effect.name], effect.typical / 100)
+    names = (*constant.names, *departures)
+    b = _birge(study, constant)
+    for _ in range(_ROUNDS):
+        # In units of S the prior is narrower by √b: the remainder counts as noise.
+        model = varying(study.model, effect, spread / math.sqrt(b))
+        fitted = fit(model, start, names, used, title="")
+        places = [fitted.names.index(departures[g]) for g in seen]
+        u = np.array([fitted.parameters[fitted.names[i]] for i in places])
+        V = b * np.diag(fitted.covariance)[places] / fitted.inflation
+        new = max(math.sqrt(float((u**2 + V).mean())), least)
+        new_b, start = _birge(study, fitted), fitted.parameters
+        settled = abs(new / spread - 1) < _SETTLED and abs(new_b / b - 1) < _SETTLED
+        spread, b = new, new_b
+        if settled or spread == least:
+            break
+    return model, fitted, spread
+
+
+def _restricted(study: Study, fitted: Fit, b: float) -> float:
+    """Compute -2 ln of the restricted likelihood of a fit in the noise b S, up to a constant (Laplace).
+
+    Priors of its parameters are in units of S, as those of the study are.
+    """
+    runs, used = study.model.runs, study.split.fitted
+    white = fitted.noise.whitener(runs.session[used], runs.scale[used])
+    rows, prior = prior_rows(fitted.fitted, fitted.parameters)
+    J = np.concatenate([white(fitted.jacobian[used]), rows])
+    residual = np.concatenate([white((runs.y - fitted.prediction)[used]), prior])
+    sigmas = [p.sigma for p in fitted.fitted if p.sigma is not None]
+    curvature = np.linalg.slogdet(J.T @ J / b)[1]
+    return float(residual @ residual / b + curvature + sum(math.log(b * s**2) for s in sigmas))
+
+
+def _judged(
+    study: Study, base: Fit, effect: Parameter, model: ForwardModel, fitted: Fit, spread: float
+) -> Nearest | None:
+    """Describe a form by its left-out runs; None if it is not adopted."""
+    size = fitted.parameters[effect.name]
+    if not fitted.converged or not effect.bounds[0] < size < effect.bounds[1]:
+        return None
+    b = _birge(study, fitted)
+    before, after = left_out_residuals(study, base, fitted)
+    values = len(after)
+    gain = float((before**2 - after**2).sum()) / (2 * b)
+    error = math.sqrt(float(((before - after) ** 2).sum()) / b)
+    beyond = float((before**2).sum()) - values
+    removed = float((before**2 - after**2).sum()) / max(beyond, 1e-9)
+    if gain <= _CERTAIN * error or removed < _REMOVED:
+        return None
+    place = fitted.names.index(effect.name)
+    sigma = math.sqrt(b * fitted.covariance[place, place])
+    half = float(normal.ppf(0.975)) * sigma
+    sizes = {}
+    if spread:
+        assert isinstance(model, Shifted)
+        seen = np.unique(specimens(study.model.runs)[0][study.split.fitted])
+        if not _differs_from_null(study, model, fitted, seen):
+            return None
+        half = float(student.ppf(0.975, len(seen) - 1)) * max(sigma, spread / math.sqrt(len(seen)))
+        sizes = _sizes(model, fitted, b, seen)
+    if fitted.fitted[place].logarithmic and half > _VAGUE:
+        return None
+    low, high = _ends(fitted.fitted[place], size, half)
+    if not spread and low <= effect.start <= high:
+        return None
+    leaves = math.sqrt(max(float((after**2).sum()) / values - 1, 0.0))
+    noise = math.sqrt(float(np.trace(fitted.noise.run)) / len(fitted.noise.run))
+    return Nearest(
+        effect, model, fitted, spread, b, (low, high), sizes, gain, error, min(removed, 1.0), leaves * noise
+    )
+
+
+def _differs_from_null(study: Study, model: Shifted, fitted: Fit, seen: Integers) -> bool:
+    """Tell by a t-test whether the mean of the sizes that specimens ask for on their own is not the null."""
+    runs, used = study.model.runs, study.split.fitted
+    effect = model.shifts[0].of
+    own = {effect.name, *(s.parameter.name for s in model.shifts)}
+    kept = [i for i, name in enumerate(fitted.names) if name not in own]
+    sizes = sizes_of(model, fitted.parameters)[seen]
+    along = model.inner.derivatives(model.of_runs(fitted.parameters), [effect.name])[1][used]
+    along = along * (specimens(runs)[0][used][:, None] == seen)[:, None, :]
+    white = fitted.noise.whitener(runs.session[used], runs.scale[used])
+    rows, prior = prior_rows([fitted.fitted[i] for i in kept], fitted.parameters)
+    J = np.block(
+        [[white(fitted.jacobian[used][..., kept]), white(along)], [rows, np.zeros((len(rows), len(seen)))]]
+    )
+    residual = np.concatenate([white((runs.y - fitted.prediction)[used]), prior])
+    asked = sizes - effect.start + np.linalg.lstsq(J, residual, rcond=None)[0][len(kept) :]
+    error = asked.std(ddof=1) / math.sqrt(len(seen))
+    return bool(abs(asked.mean()) > student.ppf(0.975, len(seen) - 1) * error)
+
+
+def _sizes(model: Shifted, fitted: Fit, b: float, seen: Integers) -> dict[str, tuple[float, float, float]]:
+    """Compute the size of each fitted specimen, and its interval."""
+    effect, names, sizes = model.shifts[0].of, specimens(model.runs)[1], sizes_of(model, fitted.parameters)
+    mean = fitted.names.index(effect.name)
+    stated = {}
+    for g in seen.tolist():
+        place = fitted.names.index(model.shifts[g].parameter.name)
+        pair = fitted.covariance[np.ix_([mean, place], [mean, place])].sum()
+        half = min(float(normal.ppf(0.975)) * math.sqrt(b * pair), _LARGEST)
+        stated[names[g]] = (float(sizes[g]), *_ends(effect, float(sizes[g]), half))
+    return stated
+
+
+def _ends(parameter: Parameter, size: float, half: float) -> tuple[float, float]:
+    """Return the ends of an interval, whose half width is on the parameter's own scale."""
+    if parameter.logarithmic:
+        return size * math.exp(-half), size * math.exp(half)
+    return size - half, size + half

@@ -1,0 +1,142 @@
+"""What moved, when, and on which specimen: numbers that differ in some runs are named, and nothing else."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from calibration.attribution.moves import groups_that_may_differ
+from calibration.report.robot_verdict import RobotVerdict, calibrate_robot
+from calibration.statistics.shifted import Shift, Shifted
+from calibration.statistics.statistical_model import by_differences, repeat_count, repeat_covariance, start_values
+from calibration.swimmer.measured_table import read_measurements
+from calibration.verdict.next_steps import next_steps
+from calibration.verdict.verdict_json import verdict_record
+from sim.inputs import load_robot
+from tests.calibration.toy_tables import DRAG, START, TRUTH, on_the_toy, toy_swimmer, toy_table
+from tests.shared import shared
+
+MEASURED = Path(__file__).parents[4] / "shared" / "measured"
+DAYS = 4
+
+
+def in_days(table: pd.DataFrame, column: str = "session") -> pd.DataFrame:
+    """Put runs of every kind into each of some days; repeats are on different ones."""
+    kind, repeat = np.divmod(np.arange(len(table)), 2)
+    day = (kind + repeat * (1 + kind // DAYS % 3)) % DAYS + 1
+    return table.assign(**{column: [f"day {d}" for d in day]})
+
+
+def of_two(column: str, other: str, seed: int, **changed: float) -> pd.DataFrame:
+    """A table in days, or on robots, of which those called `other` are of another truth."""
+    table = in_days(toy_table(seed), column)
+    moved = in_days(toy_table(seed, truth=replace(TRUTH, **changed)), column)
+    return table.where(table[column] != other, moved)
+
+
+@shared
+def moved_on(day: int, **changed: float) -> RobotVerdict:
+    with on_the_toy(few=True):
+        return calibrate_robot(of_two("session", f"day {day}", 3, **changed), START, laws=False, progress=False)
+
+
+def test_sessions_of_one_number_of_tails_each_are_no_groups() -> None:
+    """There a shift is no different from an effect of N."""
+    table = toy_table(3)
+    assert groups_that_may_differ(read_measurements(table)) == []
+    names = [words for words, _ in groups_that_may_differ(read_measurements(in_days(table)))]
+    assert names == [*(f"in session day {d}" for d in range(1, 5)), "since session day 3"]
+
+
+def test_the_noise_of_repeats_in_several_sessions_is_without_the_shifts_of_sessions() -> None:
+    rng = np.random.default_rng(0)
+    condition, session = np.repeat(np.arange(60), 2), in_days(pd.DataFrame({"run": range(120)}))["session"]
+    session = session.str[-1].astype(int).to_numpy() - 1
+    noise, shift = 0.02 * rng.normal(size=(2000, 120, 1)), np.array([0.3, -0.2, 0.5, 0.0])[session][:, None]
+    design = np.column_stack([factor[:, None] == np.unique(factor) for factor in (condition, session)]).astype(
+        float
+    )
+    assert repeat_count(design) == 120 - 60 - 3
+    estimates = repeat_covariance(noise + shift + condition[:, None], design)[:, 0, 0]
+    assert estimates.mean() == pytest.approx(0.02**2, rel=0.02)
+    assert repeat_covariance(noise, design[:, :60]) == pytest.approx(repeat_covariance(noise, condition))
+
+
+def test_derivatives_along_a_change_are_those_of_differences() -> None:
+    with on_the_toy():
+        model = toy_swimmer(in_days(toy_table(3)))
+        rows = model.runs.session == 1
+        numbers = (model.coefficients[1], model.nuisances[0])
+        moved = Shifted(model, tuple(Shift(number, rows, "in session day 2") for number in numbers))
+        names = ["C_r", *(shift.parameter.name for shift in moved.shifts)]
+        at = {**start_values(moved), **{name: 0.1 for name in names[1:]}}
+        close = by_differences(moved, at, names)[1]
+        assert moved.derivatives(at, names)[1] == pytest.approx(close, abs=0.02 * np.abs(close).max())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("day", [2, 3])
+def test_a_coefficient_that_differs_on_a_day_is_named(day: int) -> None:
+    """On day 3 it is in the held-out session."""
+    result = moved_on(day, C_r=0.8 * TRUTH.C_r)
+    assert result.effects == ()
+    assert len(result.moves) == 1
+    record = result.moves[0].record
+    assert (record["number"], record["where"]) == ("C_r", f"in session day {day}")
+    low, high = record["interval"]
+    assert low < np.log(0.8) < high
+    assert result.corrected.C_r == pytest.approx(TRUTH.C_r, rel=0.05)
+    held_out = "The held-out runs (day 3) do not agree with the model"
+    assert result.sentence.startswith(held_out if day == 3 else "C_r in session day 2 is 2")
+    assert f"C_r in session day {day} is" in result.sentence
+    assert next_steps(result)[0].startswith(f"Find out what changed in session day {day}")
+    assert verdict_record(result, table="t")["moves"] == [record]
+
+
+@pytest.mark.slow
+def test_nothing_differs_where_nothing_did() -> None:
+    assert moved_on(2).moves == ()
+    assert moved_on(2).verdict == "none"
+
+
+@pytest.mark.slow
+def test_an_effect_in_all_sessions_is_no_move() -> None:
+    with on_the_toy(few=True):
+        result = calibrate_robot(in_days(toy_table(5, **{DRAG: 5.0})), START, laws=False, progress=False)
+    assert result.effects == (DRAG,)
+    assert result.moves == ()
+
+
+@pytest.mark.slow
+def test_another_robot_is_named() -> None:
+    table = of_two("robot", "day 2", 3, C_yr=0.85 * TRUTH.C_yr)
+    table["robot"] = table["robot"].where(table["robot"] == "day 2", "A").replace({"day 2": "B"})
+    with on_the_toy(few=True):
+        turned = in_days(table.iloc[::-1].reset_index(drop=True))
+        result = calibrate_robot(turned, START, laws=False, progress=False)
+    assert result.effects == ()
+    (move,) = result.moves
+    assert re.search(r"on robot [AB] is 1", move.words)
+    assert "C_yr on robot" in move.words
+
+
+@pytest.mark.rest
+@pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured tables are not on this machine")
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("bench-c.csv", ["C_r in session day3 is 20 %"]),
+        ("bench-d.csv", ["C_yr since session B1", "E (Young's modulus) since session B1"]),
+    ],
+)
+def test_what_moved_on_a_bench_is_named(name: str, said: list[str]) -> None:
+    """Bubbles on day 3 (C_r 20 % lower); two robots (E 25 % higher, C_yr 15 % lower)."""
+    robot = load_robot(MEASURED / "bench-robot.toml")
+    result = calibrate_robot(MEASURED / name, robot, laws=False, progress=False)
+    assert result.effects == ()
+    assert all(words in result.sentence for words in said)
