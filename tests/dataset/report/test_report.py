@@ -31,7 +31,7 @@ def test_indices_of_a_known_function() -> None:
     assert found.first[:3] == pytest.approx([value / whole for value in parts.values()], abs=0.02)
     assert found.total[0] - found.first[0] == pytest.approx(interaction / whole, abs=0.01)
     assert found.total[3] < 0.01
-    assert found.explained > 0.99
+    assert 0.99 < found.explained <= 1
     assert (found.total_bounds[:, 1] - found.total_bounds[:, 0] < 0.02).all()
     assert np.abs(found.total_bounds.mean(1) - found.total).max() < 0.01
     # Of an input with few values, and of one with one.

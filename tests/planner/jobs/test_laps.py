@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import planner.jobs.laps
 from planner.files.saved_plan import restore_plan
 from planner.files.tracker_header import rounded
 from planner.jobs.hold import hold
@@ -94,6 +95,12 @@ def test_laps_close(path: Path2D) -> None:
     with pytest.raises(InputError, match="carried out once"):
         replace(plan, lap=None).schedule(laps=2)
     assert len(plan.schedule(laps=3).dwells) == 3 * count
+
+
+def test_a_path_that_no_schedule_repeats_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planner.jobs.laps, "_closed", lambda *_: None)
+    with pytest.raises(InputError, match="no schedule of this path repeats"):
+        looped(laps())
 
 
 def test_a_lap_drifts_as_stated() -> None:

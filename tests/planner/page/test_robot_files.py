@@ -6,8 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from planner.page.first_state import slider_ends
 from sim.inputs import load_robot
 from sim.io.errors import InputError
 from sim.io.reading import read_toml
@@ -15,6 +17,7 @@ from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml
 from sim.model.uncertainty import Sigma
+from surrogate.table.model_file import load
 from tests.planner.page.cases import CONTROL
 from tests.planner.page.page_core import answer, answers, call, to_page
 from tests.planner.page.parity import check_parity, refusal_of, without_digits
@@ -140,3 +143,14 @@ def test_robots_that_cannot_be_are_refused() -> None:
         with pytest.raises(ValueError, match=r".") as refusal:
             replace(CONTROL, **changes)
         assert str(answer("robot.js", "makeRobot", given)) == str(refusal.value)
+
+
+def test_sliders_end_where_the_look_up_table_does() -> None:
+    domain = load().domain
+    ends, units = (
+        slider_ends(CONTROL, domain),
+        {"motor_speed": 2 * np.pi / 60, "viscosity": 1.0, "youngs_modulus": 1e6},
+    )
+    for field, key in zip(units, ("motorSpeed", "viscosity", "youngsModulus"), strict=True):
+        reached = sorted(replace(CONTROL, **{field: end * units[field]}).omega_bar for end in ends[key])
+        assert reached == pytest.approx(domain["omega_bar"], rel=0.1)
