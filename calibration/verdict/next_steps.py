@@ -52,7 +52,8 @@ def _moved(result: Verdict) -> list[str]:
 def _contradicted(result: Verdict) -> list[str]:
     """What comes first if the held-out runs do not bear the verdict out."""
     held_out = result.conditions.split.names
-    if result.errors.p_value < DISAGREES and result.verdict not in ("partial", "unexplained"):
+    missing = result.verdict in ("partial", "unexplained")
+    if result.errors.p_value < DISAGREES and not missing and not result.moves:
         return [
             f"Find out what is different about the held-out runs ({held_out}): they do not agree with the final "
             f"model (p = {result.errors.p_value:.2g}). Look for a change of the set-up on that day, or make more "

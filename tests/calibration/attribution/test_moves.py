@@ -94,7 +94,9 @@ def test_a_coefficient_that_differs_on_a_day_is_named(day: int) -> None:
     held_out = "The held-out runs (day 3) do not agree with the model"
     assert result.sentence.startswith(held_out if day == 3 else "C_r in session day 2 is 2")
     assert f"C_r in session day {day} is" in result.sentence
-    assert next_steps(result)[0].startswith(f"Find out what changed in session day {day}")
+    first, second, *_ = next_steps(result)
+    assert first.startswith(f"Find out what changed in session day {day}")
+    assert second.startswith("Plan with the corrected robot")
     assert verdict_record(result, table="t")["moves"] == [record]
 
 
