@@ -16,13 +16,14 @@ import numpy as np
 
 from calibration.statistics.contaminated_normal import estimate
 from calibration.statistics.fit import Fit, fit
-from calibration.statistics.statistical_model import ForwardModel, Noise
+from calibration.statistics.statistical_model import ForwardModel, Noise, Runs
 from calibration.statistics.study import Study
 from sim.arrays import Floats
 
 HALF = 0.5  # a run of less weight is named
 _ROUNDS = 2
 _NAMED = 10  # runs
+_FEWEST = 3  # runs that can agree by more than chance
 _FAR_OFF = "{} farther from {} repeats than the noise of the others allows"
 
 Model = TypeVar("Model", bound=ForwardModel)
@@ -76,8 +77,24 @@ def rows_of_little_weight(study: Study) -> tuple[int, ...]:
     return tuple(sorted(runs.rows[study.split.kept & (runs.weight < HALF)].tolist()))
 
 
-def caveat_of_weights(rows: Sequence[int], runs: int) -> tuple[str, ...]:
-    """Say which of so many runs have little weight."""
+def alike(runs: Runs, rows: Sequence[int]) -> str:
+    """Say in which settings some rows of the table agree, and the other runs do not; empty if in none."""
+    some = np.isin(runs.rows, rows)
+    if some.sum() < _FEWEST:
+        return ""
+    agree = [
+        f"{name} = {values[some][0]:.4g}{unit}"
+        for name, (values, unit) in runs.settings.items()
+        if np.ptp(values[some]) < 1e-9 < np.ptp(values)
+    ]
+    session = np.unique(runs.session[some])
+    if len(session) == 1 < len(runs.session_names):
+        agree.append(f"session {runs.session_names[session[0]]}")
+    return ", ".join(agree)
+
+
+def caveat_of_weights(rows: Sequence[int], runs: int, alike: str = "") -> tuple[str, ...]:
+    """Say which of so many runs have little weight, and what they have in common."""
     if not rows:
         return ()
     said = ", ".join(map(str, rows[:_NAMED]))
@@ -86,5 +103,5 @@ def caveat_of_weights(rows: Sequence[int], runs: int) -> tuple[str, ...]:
         return (f"1 of {runs} runs has a weight below one half (row {said}): {_FAR_OFF.format('it is', 'its')}",)
     return (
         f"{len(rows)} of {runs} runs have a weight below one half (rows {said}): "
-        f"{_FAR_OFF.format('they are', 'their')}",
+        f"{_FAR_OFF.format('they are', 'their')}{f'. All of them have {alike}: check that' if alike else ''}",
     )

@@ -68,6 +68,7 @@ from calibration.statistics.shifted import Shifted
 from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values
 from calibration.statistics.study import DRAWS, LEVEL, Split, Study, find_outliers, split_runs
 from calibration.statistics.weighted_fit import (
+    alike,
     caveat_of_weights,
     fit_weighted,
     noise_of_any_run,
@@ -174,7 +175,7 @@ def calibrate(
                 *model.runs.caveats,
                 *caveat_of_excluded(excluded, rows),
                 *split.caveats,
-                *caveat_of_weights(little, int(split.kept.sum())),
+                *caveat_of_weights(little, int(split.kept.sum()), alike(model.runs, little)),
                 *_caveats(model, explained),
             ),
         ),

@@ -14,6 +14,7 @@ from calibration.attribution.moves import groups_that_may_differ
 from calibration.report.robot_verdict import RobotVerdict, calibrate_robot
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import by_differences, repeat_count, repeat_covariance, start_values
+from calibration.statistics.weighted_fit import alike
 from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.next_steps import next_steps
 from calibration.verdict.verdict_json import verdict_record
@@ -98,6 +99,15 @@ def test_a_coefficient_that_differs_on_a_day_is_named(day: int) -> None:
     assert first.startswith(f"Find out what changed in session day {day}")
     assert second.startswith("Plan with the corrected robot")
     assert verdict_record(result, table="t")["moves"] == [record]
+
+
+def test_rows_of_little_weight_are_looked_at_together() -> None:
+    runs = read_measurements(in_days(toy_table(3)))
+    rows = np.flatnonzero((runs.tails == 4) & (runs.length > 0.1))
+    assert alike(runs, runs.rows[rows]) == "N = 4, tail length = 11 cm"
+    assert alike(runs, runs.rows[runs.session == 1]) == "session day 2"
+    assert alike(runs, runs.rows[[0, 43, 82]]) == ""
+    assert alike(runs, runs.rows[rows[:2]]) == ""
 
 
 @pytest.mark.slow

@@ -89,6 +89,7 @@ def test_without_mistracked_runs_the_fit_is_the_plain_one() -> None:
     (one,), (many,) = caveat_of_weights((7,), 96), caveat_of_weights(tuple(range(1, 15)), 96)
     assert one.startswith("1 of 96 runs has a weight below one half (row 7)")
     assert many.startswith("14 of 96 runs have a weight below one half (rows 1, 2, ")
+    assert caveat_of_weights((1, 2, 3), 96, "N = 4")[0].endswith("All of them have N = 4: check that")
     assert "10 and 4 more" in many
 
 
