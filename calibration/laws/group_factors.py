@@ -191,7 +191,7 @@ class _LinearModel:
     contrasts: Floats  # (G, G − 2) shifts that are no power law
     as_given: Floats  # (n, k) residual with the nuisance parameters as given
     session: Integers  # (n,)
-    repeated: Integers | Floats  # see `Runs.repeated`
+    repeated: Integers | Floats  # see `Runs.repeats`
     scale: Floats  # (n,) roots of the weights of the runs
 
     @cached_property
@@ -265,7 +265,7 @@ def _linear_model(model: LawModel, fitted: Fit, used: Flags, place: int, x: Floa
         contrasts=np.linalg.svd(np.stack([np.ones_like(middle), middle]))[2][2:].T,
         as_given=(data.y - fitted.prediction)[used] + J @ shift,
         session=data.session[used],
-        repeated=data.repeated[used],
+        repeated=data.repeats(used),
         scale=data.scale[used],
     )
 

@@ -74,7 +74,7 @@ class LinearModels:
             columns: (n, k, P, v) of P places.
             models: place and columns of each.
             session: (n,) numbers of the runs' sessions.
-            repeated: what tells repeats, see `Runs.repeated`.
+            repeated: what tells repeats, see `Runs.repeats`.
             scale: (n,) roots of the weights of the runs; default 1.
             further: parameters that a model has beside its columns; default none.
         """

@@ -141,7 +141,7 @@ def search(model: SwimmerModel, base: Fit, used: Flags, candidates: Sequence[Pla
         columns[used],
         kinds,
         data.session[used],
-        data.repeated[used],
+        data.repeats(used),
         scale=data.scale[used],
         further=with_lever,
     )

@@ -122,13 +122,13 @@ def fit(
     freed = {alike[0].parameter.name for alike in wrong_numbers}
     fitted = tuple(parameter(model, name) for name in names)
     fitted = tuple(replace(p, sigma=None) if p.name in freed else p for p in fitted)
-    run = repeat_covariance(data.y[used], data.repeated[used], data.scale[used])
+    run = repeat_covariance(data.y[used], data.repeats(used), data.scale[used])
     problem = _Problem(model, fitted, used, inverse_root(run), title)
     point = _descend(problem, problem.first(dict(start)), target)
     linear = least_squares(point.products, passes=_PASSES)
     share = float(linear.share)
     normal = point.products.at(linear.share)
-    inflation = _inflation(repeat_count(data.repeated[used]), len(run))
+    inflation = _inflation(repeat_count(data.repeats(used)), len(run))
     return Fit(
         parameters=point.parameters,
         fitted=fitted,

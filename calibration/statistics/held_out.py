@@ -65,7 +65,7 @@ def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> floa
     rng = np.random.default_rng(seed)
     sessions = np.unique(data.session[rows], return_inverse=True)[1].reshape(-1)
     n, k = residual.shape
-    freedom = max(repeat_count(data.repeated[~rows]), k + 1)
+    freedom = max(repeat_count(data.repeats(~rows)), k + 1)
     spread = np.linalg.cholesky(fitted.covariance + 1e-15 * np.diag(np.diag(fitted.covariance)))
     count = 0
     for _ in range(_DRAWS):

@@ -34,7 +34,7 @@ class Regression:
 def regress_residual(runs: Runs, prediction: Floats, used: Flags) -> Regression:
     """Learn the residual of `prediction` (n, k) from the runs in `used` (n,)."""
     names, table = features(runs, used)
-    scale = np.sqrt(np.diag(repeat_covariance(runs.y[used], runs.repeated[used], runs.scale[used])))
+    scale = np.sqrt(np.diag(repeat_covariance(runs.y[used], runs.repeats(used), runs.scale[used])))
     residual = runs.scale[:, None] * (runs.y - prediction) / scale
     group = groups(runs)[0]
     start: tuple[int, ...] = ()

@@ -198,7 +198,7 @@ class _Tester:
 
     def __init__(self, data: Runs, used: Flags, J: Floats, D: Floats, precision: Floats):
         self.session, self.condition = data.session[used], data.condition[used]
-        self.repeated, self.scale = data.repeated[used], data.scale[used]
+        self.repeated, self.scale = data.repeats(used), data.scale[used]
         self.J, self.D, self.precision = J * self.scale[:, None, None], D * self.scale[:, None, None], precision
         self.design = FixedColumns(np.concatenate([self.J, self.D], -1), self.session, self.scale)
         inputs = data.inputs[used]

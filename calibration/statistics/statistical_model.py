@@ -36,6 +36,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
+from scipy.special import fdtrc
 
 from sim.arrays import Flags, Floats, Integers
 
@@ -46,6 +47,7 @@ SESSION_SHARE = 1.0  # largest ρ
 _LOG_STEP, _STEP = 0.01, 0.02  # finite-difference steps: in ln C, in units of a typical size
 _LARGEST = 100.0  # change of ln C, so that C stays a number
 _RIDGE = 1e-11  # so that columns without any signal get a large variance
+_DIFFER = 0.001  # p-value below which repeats differ with sessions or notes
 _CUBIC = 0.2  # share of a cube that lower powers must leave
 
 
@@ -98,21 +100,22 @@ class Runs:
     def __len__(self) -> int:
         return len(self.y)
 
-    @property
-    def repeated(self) -> Integers | Floats:
-        """What tells repeats: the condition (n,); where repeats differ otherwise, too, a design (n, m).
+    def repeats(self, rows: Flags | slice = slice(None)) -> Integers | Floats:
+        """Tell what is the same in repeats among some rows, by these alone: the condition (n',), or a design.
 
-        Its columns are the levels of condition and session, and what was noted (`noted_of_repeats`). Repeats in
-        several sessions differ by what changed between these, which is no noise of a run.
+        A design (n', m) is taken where repeats differ otherwise, too: levels of condition and session, and what was
+        noted (`noted_of_repeats`). Repeats in several sessions differ by what changed between these, which is no
+        noise of a run.
         """
-        count = len(np.unique(self.condition))
-        crossed = len(np.unique(np.stack([self.condition, self.session]), axis=1).T) > count
-        noted = self.noted_of_repeats
+        condition, session, noted = self.condition[rows], self.session[rows], self.noted_of_repeats[rows]
+        crossed = len(np.unique(np.stack([condition, session]), axis=1).T) > len(np.unique(condition))
         if not crossed and not noted.size:
-            return self.condition
-        factors = (self.condition, self.session) if crossed else (self.condition,)
-        levels = [(f[:, None] == np.unique(f)).astype(float) for f in factors]
-        return np.column_stack([*levels, noted])
+            return condition
+        levels = [
+            (f[:, None] == np.unique(f)).astype(float) for f in ((condition, session) if crossed else (condition,))
+        ]
+        design = np.column_stack([*levels, noted])
+        return design if _differ_more(self.y[rows], condition, design) else condition
 
     @property
     def noted_of_repeats(self) -> Floats:
@@ -390,13 +393,24 @@ def repeat_covariance(y: Floats, repeated: Integers | Floats, scale: Floats | No
     """Estimate S (..., k, k) from the scatter of (..., n, k) between repeats, pooled.
 
     Args:
-        repeated: see `Runs.repeated`; each level, and each column of a design, has its own effect on y.
+        repeated: see `Runs.repeats`; each level, and each column of a design, has its own effect on y.
         scale: (n,) roots of the weights of the runs.
     """
     basis = _same_in_repeats(repeated, scale)
     y = y if scale is None else y * scale[:, None]
     centred = y - basis @ (basis.T @ y)
     return np.asarray(np.swapaxes(centred, -1, -2) @ centred / (len(basis) - basis.shape[1]))
+
+
+def _differ_more(y: Floats, condition: Integers, design: Floats) -> bool:
+    """Tell by F-tests of the outputs (n, k) whether a design of repeats takes more from them than noise allows."""
+    plain, further = repeat_count(condition), repeat_count(design)
+    if further < 1 or plain == further:
+        return False
+    with_design = np.diag(repeat_covariance(y, design)) * further
+    taken = np.diag(repeat_covariance(y, condition)) * plain - with_design
+    ratio = taken / (plain - further) / np.maximum(with_design / further, 1e-300)
+    return bool(fdtrc(plain - further, further, ratio).min() < _DIFFER / len(ratio))
 
 
 def repeat_count(repeated: Integers | Floats) -> int:

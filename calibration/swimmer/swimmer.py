@@ -250,7 +250,7 @@ class SwimmerModel:
     def _fit_lookup(self, lookup: NeuralTable, start: dict[str, float]) -> tuple[dict[str, float], float]:
         """Fit coefficients from one start; with the sum of squares that they leave, infinite off the table."""
         data, parameters, remainder = self.runs, dict(start), math.inf
-        whiten = Noise(repeat_covariance(data.y, data.repeated), 0.0).whitener(data.session)
+        whiten = Noise(repeat_covariance(data.y, data.repeats()), 0.0).whitener(data.session)
         for _ in range(_MOST_GUESSES):
             moved = [{**parameters, name: parameters[name] * math.exp(_STEP)} for name in COEFFICIENTS]
             try:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.page.first_state import slider_ends
+from planner.page.first_state import first_options, slider_ends
+from planner.planning.request import PlanRequest
 from sim.inputs import load_robot
 from sim.io.errors import InputError
 from sim.io.reading import read_toml
@@ -154,3 +155,9 @@ def test_sliders_end_where_the_look_up_table_does() -> None:
     for field, key in zip(units, ("motorSpeed", "viscosity", "youngsModulus"), strict=True):
         reached = sorted(replace(CONTROL, **{field: end * units[field]}).omega_bar for end in ends[key])
         assert reached == pytest.approx(domain["omega_bar"], rel=0.1)
+
+
+@pytest.mark.parametrize("wanted", [PlanRequest(dwell=1.0), PlanRequest(seed=3)])
+def test_a_plan_that_the_page_cannot_make_is_refused(wanted: PlanRequest) -> None:
+    with pytest.raises(InputError, match="no option for a dwell or a seed"):
+        first_options(wanted, CONTROL, None)
