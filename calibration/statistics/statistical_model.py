@@ -103,9 +103,9 @@ class Runs:
     def repeats(self, rows: Flags | slice = slice(None)) -> Integers | Floats:
         """Tell what is the same in repeats among some rows, by these alone: the condition (n',), or a design.
 
-        A design (n', m) is taken where repeats differ otherwise, too: levels of condition and session, and what was
-        noted (`noted_of_repeats`). Repeats in several sessions differ by what changed between these, which is no
-        noise of a run.
+        A design (n', m) is taken where repeats differ otherwise, too: levels of condition and session, and what
+        was noted (`noted_of_repeats`). Repeats in several sessions differ by what changed between these, which is
+        no noise of a run.
         """
         condition, session, noted = self.condition[rows], self.session[rows], self.noted_of_repeats[rows]
         crossed = len(np.unique(np.stack([condition, session]), axis=1).T) > len(np.unique(condition))
