@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
@@ -131,8 +131,7 @@ def drawn_tables(model: Linear, truth: Linear, seeds: list[int]) -> list[Experim
 
 def falling(truth: str, withheld: tuple[str, ...], seeds: list[int]) -> list[Experiment]:
     """Tables of falling balls."""
-    models = (read_balls(falls(truth, seed)) for seed in seeds)
-    return [replace(m, effects=tuple(e for e in m.effects if e.name not in withheld)) for m in models]
+    return [read_balls(falls(truth, seed), withheld) for seed in seeds]
 
 
 def falling_cases() -> list[Case]:

@@ -97,9 +97,7 @@ class Nearest:
     @property
     def _departures(self) -> tuple[str, ...]:
         """Names of u_g."""
-        return (
-            tuple(f"{self.effect.name} of {name}" for name in specimens(self.model.runs)[1]) if self.sizes else ()
-        )
+        return tuple(s.parameter.name for s in cast(Shifted, self.model).shifts) if self.sizes else ()
 
     def of_new_specimen(self) -> Floats:
         """Predict (n, k) all runs with the mean size."""

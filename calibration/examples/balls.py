@@ -21,7 +21,7 @@ import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,6 @@ from scipy.special import lambertw
 from calibration.report.report import write_report
 from calibration.statistics.statistical_model import Parameter, Parameters, Runs, Value, by_differences
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.verdict import Verdict
 from calibration.verdict.verdict_json import verdict_record
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError, run_command
@@ -70,15 +69,14 @@ class Balls:
 
     def speed(self, parameters: Parameters) -> Floats:
         """Compute speeds [m/s], (n,); each parameter is one number, or one for each run (n,)."""
-        size = {effect.name: parameters.get(effect.name, effect.start) for effect in self.effects}
-        gravity = parameters["gravity"] * np.maximum(1 - size.get("buoyancy", 0.0) * AIR * self.volume, _SMALL)
-        depth = np.maximum(self.depth + size.get("release", 0.0), _SMALL)
-        exponent = size.get("quadratic_drag", 0.0) * AIR * self.area * depth
+        buoyancy, release = parameters.get("buoyancy", 0.0), parameters.get("release", 0.0)
+        gravity = parameters["gravity"] * np.maximum(1 - buoyancy * AIR * self.volume, _SMALL)
+        depth = np.maximum(self.depth + release, _SMALL)
+        exponent = parameters.get("quadratic_drag", 0.0) * AIR * self.area * depth
         slower = np.where(exponent > 0, -np.expm1(-exponent) / np.where(exponent > 0, exponent, 1.0), 1.0)
         fall = np.sqrt(depth / gravity)
-        return np.asarray(
-            gravity * fall * np.sqrt(2 * slower) * _by_linear_drag(size.get("linear_drag", 0.0), fall)
-        )
+        linear = _by_linear_drag(parameters.get("linear_drag", 0.0), fall)
+        return np.asarray(gravity * fall * np.sqrt(2 * slower) * linear)
 
     def derivatives(
         self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
@@ -106,12 +104,20 @@ def _by_linear_drag(rate: Value, fall: Floats) -> Floats:
     return np.asarray(np.where(s > _SMALL, exact, 1 - s / 3 + s**2 / 36))
 
 
-def read_balls(source: str | Path | pd.DataFrame) -> Balls:
+def read_balls(source: str | Path | pd.DataFrame, without: Sequence[str] = ()) -> Balls:
     """Read a table of falls.
 
+    Args:
+        source: the table.
+        without: names of effects that are withheld.
+
     Raises:
-        InputError: the table lacks a column, or has too few falls.
+        InputError: the table lacks a column, or has too few falls; or there is no such effect.
     """
+    for name in without:
+        if name not in (effect.name for effect in Balls.effects):
+            raise InputError(f"no effect {name!r}; there are {', '.join(e.name for e in Balls.effects)}")
+    effects = tuple(effect for effect in Balls.effects if effect.name not in without)
     table = source if isinstance(source, pd.DataFrame) else pd.read_csv(source, comment="#")
     for column in COLUMNS:
         if column not in table:
@@ -139,33 +145,17 @@ def read_balls(source: str | Path | pd.DataFrame) -> Balls:
         specimen=specimen,
         specimen_names=tuple(balls.tolist()),
     )
-    return Balls(runs, depth, math.pi * radius**2 / mass, 4 / 3 * math.pi * radius**3 / mass)
-
-
-def calibrate_balls(source: str | Path, without: Sequence[str] = ()) -> Verdict:
-    """Calibrate the model with a table of falls.
-
-    Args:
-        source: the table.
-        without: names of effects that are withheld.
-
-    Raises:
-        InputError: the table cannot be used, or there is no such effect.
-    """
-    model = read_balls(source)
-    for name in without:
-        if name not in (effect.name for effect in model.effects):
-            raise InputError(f"no effect {name!r}; there are {', '.join(e.name for e in model.effects)}")
-    effects = tuple(effect for effect in model.effects if effect.name not in without)
-    return calibrate(replace(model, effects=effects), progress=False)
+    area, volume = math.pi * radius**2 / mass, 4 / 3 * math.pi * radius**3 / mass
+    return Balls(runs, depth, area, volume, effects=effects)
 
 
 def main(table: str, without: Sequence[str] = (), out: str | None = None) -> None:
-    verdict = calibrate_balls(table, without)
+    model = read_balls(table, without)
+    verdict = calibrate(model, progress=False)
     print(verdict.sentence)
     if out:
         with files_together(out, ("verdict.json", "report.html")) as folder:
-            write_report(verdict, read_balls(table).runs, folder / "report.html", title=Path(table).name)
+            write_report(verdict, model.runs, folder / "report.html", title=Path(table).name)
             record = verdict_record(verdict, table=Path(table).name)
             write_text(folder / "verdict.json", json.dumps(record, indent=1) + "\n")
         print(f"-> {out}/report.html, {out}/verdict.json")

@@ -110,25 +110,26 @@ def fit(
 ) -> Fit:
     """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay.
 
-    Raises:
-        UnsolvedError: the model cannot be solved quickly with the effects among `names`, however small.
-
     Args:
         target: of rᵀ Σ⁻¹ r. Where the steps that are left cannot reach it, the search ends before it converges.
         wrong_numbers: nuisance parameters that are wrong, each followed by those that may be wrong in its place;
             the first of each is fitted without its prior.
+
+    Raises:
+        UnsolvedError: the model cannot be solved quickly with the effects among `names`, however small.
     """
     data = model.runs
     freed = {alike[0].parameter.name for alike in wrong_numbers}
     fitted = tuple(parameter(model, name) for name in names)
     fitted = tuple(replace(p, sigma=None) if p.name in freed else p for p in fitted)
-    run = repeat_covariance(data.y[used], data.repeats(used), data.scale[used])
+    repeats = data.repeats(used)
+    run = repeat_covariance(data.y[used], repeats, data.scale[used])
     problem = _Problem(model, fitted, used, inverse_root(run), title)
     point = _descend(problem, problem.first(dict(start)), target)
     linear = least_squares(point.products, passes=_PASSES)
     share = float(linear.share)
     normal = point.products.at(linear.share)
-    inflation = _inflation(repeat_count(data.repeats(used)), len(run))
+    inflation = _inflation(repeat_count(repeats), len(run))
     return Fit(
         parameters=point.parameters,
         fitted=fitted,

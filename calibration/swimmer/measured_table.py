@@ -171,7 +171,8 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         if "session" in table
         else "N = " + good["N"].astype(int).astype(str)
     )
-    robots = table.loc[keep, "robot"].astype(str).to_numpy() if "robot" in table else np.full(len(good), "")
+    noted_robot = "robot" in table
+    robots = table.loc[keep, "robot"].astype(str).to_numpy() if noted_robot else np.full(len(good), "")
     robot_names, robot = np.unique(robots, return_inverse=True)
     condition: Integers = np.asarray(good.groupby([*INPUTS, robot], sort=True).ngroup(), dtype=np.int64)
     session_names, session = np.unique(names.to_numpy(dtype=str), return_inverse=True)
@@ -212,8 +213,8 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
             *(f"column {name}: not known, left out" for name in unknown),
         ),
         caveats=_caveats(tails, length, omega),
-        specimen=robot if "robot" in table else None,
-        specimen_names=tuple(str(n) for n in robot_names) if "robot" in table else (),
+        specimen=robot if noted_robot else None,
+        specimen_names=tuple(map(str, robot_names)) if noted_robot else (),
         tails=tails,
         length=length,
         omega=omega,

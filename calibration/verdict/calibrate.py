@@ -155,12 +155,14 @@ def calibrate(
     rows = len(model.runs) + count_of_rows(model.runs.excluded)
     of_all, moves_of_all = _fit_moves(study, model, explained)
     moves, with_moves = (moves_of_all, of_all) if of_all else (moves, explained.base)
-    fits = _fits(study, explained, uncalibrated, moved=learnt is None)
+    held_out_errors = _errors(study, explained, uncalibrated, corrections)
+    falls = held_out_errors.rms["after"] < held_out_errors.rms["before"]
+    refit = final_refit(of_all) if of_all else _handed_on(study, explained, falls=falls, moved=learnt is None)
     return Verdict(
         verdict=verdict,
         evidence=evidence,
-        fits=replace(fits, final_refit=final_refit(of_all)) if of_all else fits,
-        errors=_errors(study, explained, uncalibrated, corrections),
+        fits=_fits(study, explained, uncalibrated, refit),
+        errors=held_out_errors,
         nearest=explained.nearest,
         moves=tuple(StatedMove(move.words(with_moves), move.record(with_moves)) for move in moves),
         corrections=corrections,
@@ -326,8 +328,8 @@ def _duration(seconds: float) -> str:
     return f"{max(seconds, 1):.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
-def _fits(study: Study, explained: Explained, uncalibrated: Floats, *, moved: bool) -> Fits:
-    """Add intervals to the fits, and fit the final model once more to all runs if it may be `moved`."""
+def _fits(study: Study, explained: Explained, uncalibrated: Floats, refit: FinalRefit) -> Fits:
+    """Add intervals to the fits, and the `refit` to all runs that is handed on."""
     base, final, used = explained.base, explained.final, study.split.fitted
     title = "intervals" if study.progress else ""
     base_intervals = profile_intervals(study.model, base, used, title=title)
@@ -343,19 +345,17 @@ def _fits(study: Study, explained: Explained, uncalibrated: Floats, *, moved: bo
         base_intervals=base_intervals,
         final=final,
         final_intervals=final_intervals,
-        final_refit=_handed_on(study, explained, moved=moved),
+        final_refit=refit,
         pulls=pulls(final, study.model.nuisances),
     )
 
 
-def _handed_on(study: Study, explained: Explained, *, moved: bool) -> FinalRefit:
+def _handed_on(study: Study, explained: Explained, *, falls: bool, moved: bool) -> FinalRefit:
     """Fit the final model to all runs, an adopted form only where it lowers the error on the held-out ones."""
-    nearest, base, final = explained.nearest, explained.base, explained.final
-    runs, split = study.model.runs, study.split
-    before, after = (errors(runs, fitted.prediction, split.test)[0] for fitted in (base, final))
-    if nearest and after >= before:
-        nearest, final = None, base
-    refit = refit_to_all(study.model, final, split.kept, moved=moved)
+    nearest, final = explained.nearest, explained.final
+    if nearest and not falls:
+        nearest, final = None, explained.base
+    refit = refit_to_all(study.model, final, study.split.kept, moved=moved)
     return nearest.handed_on(refit) if nearest else refit
 
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from calibration.attribution.nearest import sizes_of, varying
-from calibration.examples.balls import AIR, GRAVITY, Balls, calibrate_balls, main, read_balls
+from calibration.examples.balls import AIR, GRAVITY, Balls, main, read_balls
 from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.next_steps import next_steps
@@ -27,9 +27,7 @@ MEASURED = Path(__file__).parents[4] / "shared/measured/published/falling_balls.
 @shared
 def verdict(truth: str, seed: int, *, without: tuple[str, ...] = ()) -> Verdict:
     """The verdict on a table with a hidden truth."""
-    model = read_balls(falls(truth, seed))
-    effects = tuple(e for e in model.effects if e.name not in without)
-    return calibrate(replace(model, effects=effects), draws=200, progress=False)
+    return calibrate(read_balls(falls(truth, seed), without), draws=200, progress=False)
 
 
 def differing(seed: int = 3) -> Verdict:
@@ -160,7 +158,7 @@ def test_the_record_of_other_verdicts_has_none() -> None:
 @pytest.mark.parametrize("without", [(), ("quadratic_drag",)])
 def test_of_real_balls_drag_is_adopted(without: tuple[str, ...]) -> None:
     """Falls from a bridge (de Silva, Higdon, Brunton, Kutz 2020)."""
-    result = calibrate_balls(MEASURED, without)
+    result = calibrate(read_balls(MEASURED, without), progress=False)
     assert result.verdict == "partial"
     assert result.error_before > 0.2
     assert result.error_after < 0.06
@@ -191,4 +189,4 @@ def test_a_row_with_a_gap_is_left_out_by_its_number() -> None:
 def test_an_effect_that_is_not_there_is_refused(tmp_path: Path) -> None:
     falls("nothing", 0).to_csv(tmp_path / "falls.csv")
     with pytest.raises(InputError, match="no effect 'drag'"):
-        calibrate_balls(tmp_path / "falls.csv", ["drag"])
+        read_balls(tmp_path / "falls.csv", ["drag"])
