@@ -51,7 +51,6 @@ def _refuse_early(*tables: str) -> None:
         "move in each other's flow or touch",
     ),
     JOBS,
-    aliases=("close",),
 )
 def _calibrate(arguments: Namespace) -> None:
     _refuse_early(arguments.table)

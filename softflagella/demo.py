@@ -36,8 +36,8 @@ from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
+from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
-from calibration.verdict.verdict_json import verdict_record
 from dataset.storage.data_set import read
 from planner.files.plan_json import load_plan
 from planner.files.tracking_error import TrackingError, tracking_error

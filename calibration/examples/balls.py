@@ -32,7 +32,7 @@ from scipy.special import lambertw
 from calibration.report.report import write_report
 from calibration.statistics.statistical_model import Parameter, Parameters, Runs, Value, by_differences
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.verdict_json import verdict_record
+from calibration.verdict.record import verdict_record
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError, run_command
 from sim.io.files import files_together, write_text

@@ -8,7 +8,7 @@ from calibration.laws.law_fits import Laws
 from calibration.report.figures import draw_summary, final_model
 from calibration.report.quantities import feature_in_words, output_error, output_label, plain, ranges_in_words
 from calibration.statistics.statistical_model import Runs
-from calibration.verdict.verdict import DISAGREES, Verdict
+from calibration.verdict.verdict import Verdict
 from sim.io.pages import Page
 
 
@@ -63,7 +63,7 @@ def add_errors(page: Page, result: Verdict, data: Runs) -> None:
 def _add_agreement(page: Page, result: Verdict) -> None:
     """Say whether the held-out runs agree with the final model, and how well its error is known."""
     errors, law = result.errors, result.corrections.law
-    agree = errors.p_value >= DISAGREES
+    agree = result.held_out_runs_agree
     model, whose, (low, high) = "final", "Its", errors.after_interval
     if result.described and isinstance(law, Laws):
         model, whose, (low, high) = "calibrated", "With the law, the", law.kept[0].error_interval

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calibration.attribution.halved_tolerances import notable_gains
+from calibration.attribution.halved_tolerances import notable_gains, overall_gains
 from calibration.attribution.refits import IMITABLE, SURE, UNSEEN, Candidate
 from calibration.report.error_card import add_errors
 from calibration.report.figures import draw_evidence, draw_maps, draw_residuals, draw_sizes, final_model
@@ -32,8 +32,9 @@ from calibration.statistics.fit import Fit, least_determined
 from calibration.statistics.pull import WRONG, Pull
 from calibration.statistics.statistical_model import Parameter, Runs
 from calibration.verdict.next_runs import STOP, Batch
-from calibration.verdict.next_steps import next_steps
+from calibration.verdict.record import facts
 from calibration.verdict.verdict import Verdict
+from calibration.words.render import next_steps
 from sim.io.pages import Page
 from sim.io.provenance import code_version
 
@@ -68,7 +69,7 @@ def add_sections(page: Page, result: Verdict, data: Runs, paths: Sequence[PathEr
 
 def _add_next_steps(page: Page, result: Verdict) -> None:
     page.section("What to do next")
-    page.steps(next_steps(result), numbered=True)
+    page.steps(next_steps(facts(result)), numbered=True)
     for caveat in result.conditions.caveats:
         page.text(f"The conclusion is weaker: {caveat}.", tone="bad")
     if result.next.batch is not None and result.next.batch.worth_making:
@@ -169,7 +170,7 @@ def _pull(pull: Pull) -> str:
 
 def _add_halved_tolerances(page: Page, result: Verdict) -> None:
     candidates = result.evidence.candidates
-    gains, notable = result.halved_tolerances, notable_gains(candidates)
+    gains, notable = overall_gains(candidates), notable_gains(candidates)
     nuisances = {p.name: p for p in result.base.fitted}
     ranked = [
         f"{nuisances[name].title} ({100 * gain:.1f} %)" for name, gain in gains.items() if gain >= _SMALLEST_GAIN

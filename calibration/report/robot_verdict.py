@@ -23,8 +23,8 @@ from calibration.swimmer.possible_runs import Owned
 from calibration.swimmer.protocols import PROTOCOLS
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
+from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
-from calibration.verdict.verdict_json import verdict_record
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.io.files import files_together, write_text
 from sim.io.notebook import as_html, given_axes

@@ -17,8 +17,6 @@ from calibration.verdict.next_runs import Batch, NextRun
 from calibration.verdict.sequential_test import Explanation
 from sim.arrays import Floats
 
-MODELS = ("uncalibrated", "before", "after", "generic", "predictive", "law", "new_specimen")  # with stated errors
-
 
 @dataclass(frozen=True)
 class Evidence:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import re
 import sys
 from argparse import SUPPRESS, Action, ArgumentParser, Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple, NoReturn
 
 from sim.io.errors import InputError, run_command
@@ -88,7 +88,6 @@ class Command(NamedTuple):
     name: str
     help: str
     arguments: tuple[Argument, ...]
-    aliases: tuple[str, ...]
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Add the arguments to a parser, and the function that runs the command."""
@@ -115,13 +114,11 @@ class Program:
         self.package, self.about = package, about
         self.commands: dict[str, Command] = {}
 
-    def command(
-        self, name: str, help: str, *arguments: Argument, aliases: Sequence[str] = ()
-    ) -> Callable[[Run], Run]:
+    def command(self, name: str, help: str, *arguments: Argument) -> Callable[[Run], Run]:
         """Decorate the function that runs a command."""
 
         def add(run: Run) -> Run:
-            self.commands[name] = Command(run, name, help, arguments, tuple(aliases))
+            self.commands[name] = Command(run, name, help, arguments)
             return run
 
         return add
@@ -137,9 +134,7 @@ class Program:
         subparsers = parser.add_subparsers(required=True, metavar="COMMAND")
         for command in self.commands.values():
             command.add_arguments(
-                subparsers.add_parser(
-                    command.name, help=command.help, description=_sentence(command.help), aliases=command.aliases
-                )
+                subparsers.add_parser(command.name, help=command.help, description=_sentence(command.help))
             )
         return parser
 

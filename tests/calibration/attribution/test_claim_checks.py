@@ -23,7 +23,7 @@ from calibration.statistics.statistical_model import parameter, start_values
 from calibration.statistics.study import Study
 from calibration.swimmer.swimmer import COEFFICIENTS, SwimmerModel
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.verdict_json import verdict_record
+from calibration.verdict.record import verdict_record
 from sim.arrays import Flags, Floats
 from tests.calibration.toy_tables import DRAG, FEW_DRAWS, TRUTH, on_the_toy, toy_swimmer, toy_table
 from tests.shared import shared

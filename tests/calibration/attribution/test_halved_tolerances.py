@@ -14,7 +14,7 @@ from calibration.statistics.statistical_model import parameter, start_values
 from calibration.statistics.study import Study
 from calibration.swimmer.nuisance_numbers import CAMERA, TACHOMETER
 from calibration.swimmer.swimmer import SwimmerModel
-from calibration.verdict.verdict_json import verdict_record
+from calibration.verdict.record import verdict_record
 from sim.arrays import Floats
 from tests.calibration.toy_tables import FEW_DRAWS, calibrated_toy, toy_swimmer, toy_table
 

@@ -16,8 +16,8 @@ from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import by_differences, repeat_count, repeat_covariance, start_values
 from calibration.statistics.weighted_fit import alike
 from calibration.swimmer.measured_table import read_measurements
-from calibration.verdict.next_steps import next_steps
-from calibration.verdict.verdict_json import verdict_record
+from calibration.verdict.record import facts, verdict_record
+from calibration.words.render import next_steps
 from sim.inputs import load_robot
 from tests.calibration.toy_tables import DRAG, START, TRUTH, on_the_toy, toy_swimmer, toy_table
 from tests.shared import shared
@@ -95,10 +95,10 @@ def test_a_coefficient_that_differs_on_a_day_is_named(day: int) -> None:
     held_out = "The held-out runs (day 3) do not agree with the model"
     assert result.sentence.startswith(held_out if day == 3 else "C_r in session day 2 is 2")
     assert f"C_r in session day {day} is" in result.sentence
-    first, second, *_ = next_steps(result)
+    first, second, *_ = next_steps(facts(result))
     assert first.startswith(f"Find out what changed in session day {day}")
     assert second.startswith("Plan with the corrected robot")
-    assert verdict_record(result, table="t")["moves"] == [record]
+    assert verdict_record(result, table="t")["moves"] == [{"words": result.moves[0].words, **record}]
 
 
 def test_rows_of_little_weight_are_looked_at_together() -> None:

@@ -22,7 +22,7 @@ from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, LENGTH, TACHOM
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.verdict_json import verdict_record
+from calibration.verdict.record import verdict_record
 from sim.io.errors import InputError
 from sim.model.uncertainty import Sigma
 from tests.calibration.toy_tables import (

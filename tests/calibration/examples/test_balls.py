@@ -14,9 +14,9 @@ from calibration.attribution.nearest import sizes_of, varying
 from calibration.examples.balls import AIR, GRAVITY, Balls, main, read_balls
 from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.next_steps import next_steps
+from calibration.verdict.record import facts, verdict_record
 from calibration.verdict.verdict import Verdict
-from calibration.verdict.verdict_json import verdict_record
+from calibration.words.render import next_steps
 from sim.io.errors import InputError
 from tests.oracles.falling_balls import DRAGS, NULLS, OUTSIDE, falls
 from tests.shared import shared
@@ -114,7 +114,7 @@ def test_a_form_is_adopted_without_a_look_at_the_held_out_runs() -> None:
     assert result.held_out_error_falls is False
     assert "the error on the held-out runs does not fall with it" in result.sentence
     assert "linear_drag" not in {p.name for p in result.fits.final_refit.fitted}
-    assert next_steps(replace(result)) != next_steps(differing())
+    assert next_steps(facts(result)) != next_steps(facts(differing()))
 
 
 def test_a_new_specimen_has_the_mean_size_and_the_spread_in_its_variance() -> None:

@@ -13,8 +13,8 @@ from calibration.examples.spheres import Spheres, law_of_diameter
 from calibration.statistics.fit import fit, profile_intervals
 from calibration.statistics.statistical_model import Noise, Runs, start_values
 from calibration.verdict.calibrate import calibrate
+from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
-from calibration.verdict.verdict_json import verdict_record
 from sim.arrays import Floats, Integers
 
 SMALL_NOISE = 0.01

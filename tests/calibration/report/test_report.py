@@ -17,9 +17,9 @@ from calibration.statistics.statistical_model import Parameter
 from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.nuisance_numbers import nuisance_parameters
 from calibration.verdict.contents import Next
-from calibration.verdict.next_steps import next_steps
+from calibration.verdict.record import facts, verdict_record
 from calibration.verdict.verdict import Verdict
-from calibration.verdict.verdict_json import verdict_record
+from calibration.words.render import next_steps
 from tests.calibration.toy_tables import (
     DRAG,
     START,
@@ -66,17 +66,19 @@ def test_a_report_is_in_the_words_and_units_of_a_lab_with_what_to_do_next_first(
     given = {entry["name"]: entry["given"] for entry in record["numbers_as_given"]}
     assert given["youngs_modulus"] == START.youngs_modulus
     assert given["head_length"] == START.head_length
-    assert record["next_steps"] == next_steps(result)
+    assert record["next_steps"] == next_steps(facts(result))
 
 
 def test_a_corrected_robot_that_does_not_lower_the_error_is_not_advised() -> None:
     given = number().error_uncalibrated
     for result in (with_errors(number(), before=given, after=given), replace(number(), verdict="none")):
         worse = with_errors(result, before=given, after=1.1 * given)
-        first, *others = next_steps(worse)
+        first, *others = next_steps(facts(worse))
         assert first.startswith("Plan with the robot as given: the corrected one does not lower the error")
         assert not [step for step in others if "corrected" in step]
-        assert "corrected.toml" in " ".join(next_steps(with_errors(result, before=given, after=0.9 * given)))
+        assert "corrected.toml" in " ".join(
+            next_steps(facts(with_errors(result, before=given, after=0.9 * given)))
+        )
 
 
 @pytest.mark.slow
@@ -97,8 +99,8 @@ def test_a_claim_that_does_not_lower_the_error_says_so_first(tmp_path: Path) -> 
     assert words in seen.text
     assert [c.effect.name for c in risen.evidence.candidates if f"({c.effect.name})" not in seen.text] == []
     assert f"({risen.explaining[0].effect.name})" in risen.sentence  # as one types it
-    assert next_steps(risen)[0].startswith("Do not rely on this claim yet")
-    assert not next_steps(fallen)[0].startswith("Do not rely")
+    assert next_steps(facts(risen))[0].startswith("Do not rely on this claim yet")
+    assert not next_steps(facts(fallen))[0].startswith("Do not rely")
 
 
 def test_a_wrong_number_that_does_not_lower_the_error_says_so_first() -> None:
@@ -106,8 +108,8 @@ def test_a_wrong_number_that_does_not_lower_the_error_says_so_first() -> None:
     first = risen.sentence.split(" No effect is claimed.")[0]
     assert first.startswith("A nuisance parameter is wrong: ")
     assert first.endswith("does not fall with it (3.00 % without, 3.10 % with it).")
-    assert "without measuring it" in next_steps(risen)[0]
-    assert next_steps(risen)[-1].startswith("Until then, plan with the robot as given")
+    assert "without measuring it" in next_steps(facts(risen))[0]
+    assert next_steps(facts(risen))[-1].startswith("Until then, plan with the robot as given")
 
 
 def test_where_nothing_is_claimed_nothing_can_fall() -> None:
@@ -115,9 +117,9 @@ def test_where_nothing_is_claimed_nothing_can_fall() -> None:
     assert nothing.held_out_error_falls is None
     assert "does not fall" not in nothing.sentence
     assert verdict_record(nothing, table="t")["held_out_error_falls"] is None
-    assert next_steps(nothing)[0].startswith("Plan with the corrected robot: `softflagella plan ")
+    assert next_steps(facts(nothing))[0].startswith("Plan with the corrected robot: `softflagella plan ")
     odd = with_errors(nothing, before=0.03, after=0.03, p_value=0.001)
-    assert next_steps(odd)[0].startswith("Find out what is different about the held-out runs")
+    assert next_steps(facts(odd))[0].startswith("Find out what is different about the held-out runs")
 
 
 @pytest.mark.slow
@@ -132,10 +134,10 @@ def test_rivals_are_told_apart_by_runs_that_are_worth_making_and_a_command(tmp_p
         return replace(result, next=Next(result.next.explanations, single, replace(batch, decides=share)))
 
     often, seldom = proposing(0.8), proposing(0.1)
-    assert next_steps(often)[0].startswith("Make the 8 runs of the table below")
-    assert "`softflagella calibration decide " in next_steps(often)[1]
-    assert next_steps(seldom)[0].startswith("Do not make runs with these settings")
-    assert "--own" in next_steps(seldom)[0]
+    assert next_steps(facts(often))[0].startswith("Make the 8 runs of the table below")
+    assert "`softflagella calibration decide " in next_steps(facts(often))[1]
+    assert next_steps(facts(seldom))[0].startswith("Do not make runs with these settings")
+    assert "--own" in next_steps(facts(seldom))[0]
     poor = proposing(0.14, 0.14)
     seen = page(poor, runs, tmp_path)
     assert "decide in 14 % of cases only" in seen.text
@@ -176,7 +178,7 @@ def test_the_number_to_measure_better_is_listed_with_what_it_would_show(tmp_path
     result = calibrated_toy(2)
     seen = page(result, read_measurements(toy_table(2)), tmp_path).text
     title = "Which number, measured better, would show what"
-    best = next(p.title for p in result.base.fitted if p.name == next(iter(result.halved_tolerances)))
+    best = next(p.title for p in result.base.fitted if p.name == facts(result)["halved_tolerances"][0]["name"])
     assert f"by: {best} (" in seen[seen.index(title) :]
     halved = notable_gains(result.evidence.candidates)[0]
     assert detectable(halved.effect.effect, halved.halved) in seen[seen.index(title) :]

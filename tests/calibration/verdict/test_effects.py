@@ -16,7 +16,7 @@ from calibration.statistics.fit import fit, least_determined
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import DRAWS, Study, middle_session
-from calibration.verdict.verdict_json import verdict_record
+from calibration.verdict.record import verdict_record
 from tests.calibration import toy
 from tests.calibration.toy_tables import (
     DRAG,

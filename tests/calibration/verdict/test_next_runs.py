@@ -18,6 +18,7 @@ from calibration.statistics.fit import fit
 from calibration.statistics.statistical_model import Noise, start_values
 from calibration.verdict.experiment import Rival
 from calibration.verdict.next_runs import BATCH, GIVEN_UP, STOP, Pair, _greedy, _together, next_runs
+from calibration.verdict.record import verdict_record
 from calibration.verdict.sequential_test import (
     Decision,
     Explanation,
@@ -26,7 +27,6 @@ from calibration.verdict.sequential_test import (
     read_explanations,
     standings,
 )
-from calibration.verdict.verdict_json import verdict_record
 from sim.io.errors import InputError
 from tests.calibration.toy_tables import DRAG, TRUTH, ambiguous, toy_swimmer, toy_table
 

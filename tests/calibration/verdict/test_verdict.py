@@ -1,18 +1,17 @@
-"""The rule of the verdict, what is harmless, and the old names of its parts."""
+"""The rule of the verdict, and what is harmless."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from operator import attrgetter
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from calibration.verdict.contents import Corrections, Evidence, HeldOutErrors
-from calibration.verdict.next_steps import next_steps
-from calibration.verdict.old_names import OLD_NAMES
+from calibration.verdict.contents import HeldOutErrors
+from calibration.verdict.record import facts
 from calibration.verdict.verdict import Verdict, reach_verdict
+from calibration.words.render import next_steps
 from tests.calibration.toy_tables import none
 
 
@@ -40,10 +39,7 @@ def unexplained(
 ) -> Verdict:
     """A verdict with errors on its held-out runs; noise 2.36 %."""
     rms = {"uncalibrated": 0.2, "before": error, "after": error}
-    misfit: Any = SimpleNamespace(p_value=0.004)
-    errors, nothing = HeldOutErrors(rms, {}, interval, 0.0236, p_value), Corrections(None, None)  # type: ignore[arg-type]
-    evidence = Evidence(misfit, 1000, (), (), (), {})
-    return replace(none(), verdict=verdict, evidence=evidence, errors=errors, corrections=nothing)
+    return replace(none(), verdict=verdict, errors=HeldOutErrors(rms, {}, interval, 0.0236, p_value))
 
 
 def test_a_residual_that_the_held_out_runs_do_not_show_is_harmless() -> None:
@@ -51,8 +47,8 @@ def test_a_residual_that_the_held_out_runs_do_not_show_is_harmless() -> None:
     assert small.harmless
     assert "harmless for prediction" in small.sentence
     assert "off by 2.37 %, and noise alone makes 2.36 %" in small.sentence
-    assert next_steps(small)[0].startswith("Plan with the corrected robot")
-    assert "harmless" in next_steps(small)[0]
+    assert next_steps(facts(small))[0].startswith("Plan with the corrected robot")
+    assert "harmless" in next_steps(facts(small))[0]
     assert not unexplained(0.0237, (0.0219, 0.0256), verdict="effect").harmless
     for shown in (
         unexplained(0.0265, (0.0245, 0.0290)),  # the held-out runs show it
@@ -61,13 +57,4 @@ def test_a_residual_that_the_held_out_runs_do_not_show_is_harmless() -> None:
     ):
         assert not shown.harmless
         assert "harmless" not in shown.sentence
-        assert "Look where the residual is large" in next_steps(shown)[0]
-
-
-def test_old_names_warn_and_find_their_part() -> None:
-    verdict = none()
-    for old, new in OLD_NAMES.items():
-        with pytest.warns(DeprecationWarning, match=f"Verdict.{old} is deprecated; use Verdict.{new}"):
-            assert getattr(verdict, old) is attrgetter(new)(verdict)
-    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
-        verdict.nothing  # noqa: B018
+        assert "Look where the residual is large" in next_steps(facts(shown))[0]

@@ -1,0 +1,235 @@
+"""The record of a verdict: the content of verdict.json, flat, from which every text is made.
+
+Its keys are a format, and older than the names here. `calibration.words` has the texts.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from calibration.attribution.halved_tolerances import notable_gains, overall_gains
+from calibration.attribution.refits import Candidate
+from calibration.attribution.wrong_numbers import notable_pull
+from calibration.statistics.exclusions import count_of_rows
+from calibration.statistics.pull import Pull
+from calibration.statistics.statistical_model import Parameter
+from calibration.words.render import next_steps, sentence
+from sim.io.provenance import provenance
+from surrogate.input_ranges import COEFFICIENTS
+
+if TYPE_CHECKING:
+    from calibration.verdict.verdict import Verdict
+
+MODELS = ("uncalibrated", "before", "after", "generic", "predictive", "law", "new_specimen")  # with stated errors
+_NEAR = 0.5  # share of the residual that the best effect must remove to be named where none explains it
+
+
+def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
+    """Write a verdict as verdict.json has it."""
+    record = facts(result)
+    return {
+        **{key: record[key] for key in ("verdict", "effects")},
+        "sentence": sentence(record),
+        "next_steps": next_steps(record),
+        **record,
+        "table": table,
+        "provenance": provenance({"table": table}),
+    }
+
+
+def facts(result: Verdict) -> dict[str, Any]:
+    """Collect what a verdict is made of: numbers and names, without sentences."""
+    return {
+        "verdict": result.verdict,
+        "effects": list(result.effects),
+        **_fitted(result),
+        **_claims(result),
+        **_numbers(result),
+        **_errors(result),
+        **_tests(result),
+        **_descriptions(result),
+        **_next(result),
+        **_data(result),
+    }
+
+
+def _shown(parameter: Parameter) -> dict[str, Any]:
+    """Write what a reader needs with a number: its title, unit, and value as given (of an effect its null)."""
+    return {
+        "title": parameter.title,
+        "unit": parameter.unit,
+        "shown": parameter.shown,
+        "given": parameter.start,
+        "scale": "logarithm" if parameter.logarithmic else "as it is",
+    }
+
+
+def _fitted(result: Verdict) -> dict[str, Any]:
+    final, refit = result.final, result.fits.final_refit.parameters
+    fitted = {p.name: p for p in (*result.base.fitted, *final.fitted)}
+    intervals = result.fits.final_intervals
+    return {
+        "parameters": {
+            name: {
+                **_shown(fitted[name]),
+                "value": final.parameters[name],
+                "interval": list(intervals[name]),
+                "value_all_runs": refit[name],
+            }
+            for name in final.names
+            if name in refit
+        },
+        "parameters_without_effects": {
+            name: {"value": result.base.parameters[name], "interval": list(interval)}
+            for name, interval in result.fits.base_intervals.items()
+        },
+        "hands_on_a_robot": set(COEFFICIENTS) <= set(result.base.names),
+    }
+
+
+def _claims(result: Verdict) -> dict[str, Any]:
+    evidence, nearest = result.evidence, result.nearest
+    return {
+        "claims": [
+            {"title": c.title, "words": c.words, "effects": [e.name for e in c.claimed]} for c in result.explaining
+        ],
+        "in_form_only": list(result.in_form_only),
+        "imitability": [c.imitable for c in result.explaining],
+        "transfer_p": [c.transfer for c in result.explaining],
+        "imitable": any(c.uncertain for c in result.explaining),
+        "effects_instead": [[e.name for e in c.claimed] for c in evidence.rival_effects],
+        "claims_instead": [c.title for c in evidence.rival_effects],
+        "nearest": {**_shown(nearest.effect), **nearest.record()} if nearest else None,
+        "nearest_candidate": _nearest_candidate(result),
+        "candidates": [_candidate(c) for c in evidence.candidates],
+        "untestable": evidence.untestable,
+    }
+
+
+def _candidate(c: Candidate) -> dict[str, Any]:
+    return {
+        "effect": c.effect.name,
+        **_shown(c.effect),
+        "bounds": list(c.effect.bounds),
+        "z": c.z,
+        "survived_share": c.survived,
+        "smallest_detectable": c.detectable,
+        "smallest_detectable_if_numbers_were_exact": c.detectable_exact,
+        "smallest_detectable_with_half_of_a_tolerance": dict(c.detectable_halved),
+        "size": c.refit.parameters[c.effect.name] if c.refit else None,
+        "deviance": c.refit.deviance if c.refit else None,
+        "session_gain": [c.gain, c.gain_error],
+        "verdict": c.verdict,
+    }
+
+
+def _nearest_candidate(result: Verdict) -> dict[str, Any] | None:
+    """Find the single effect that removes most of the residual, if one was refitted and removes much."""
+    refits = [(c.refit.deviance, c.effect.title) for c in result.evidence.candidates if c.refit]
+    if not refits:
+        return None
+    (deviance, title), before = min(refits), result.base.deviance
+    expected = int(result.conditions.split.fitted.sum()) * result.base.prediction.shape[1]
+    share = (before - deviance) / max(before - expected, 1e-9)
+    return {"title": title, "removed_share": share} if share >= _NEAR else None
+
+
+def _numbers(result: Verdict) -> dict[str, Any]:
+    pulls, candidates = result.fits.pulls, result.evidence.candidates
+    titles = {p.name: p.title for p in result.base.fitted}
+    learnt = [p for p in pulls if p.learnt]
+    explained = result.verdict not in ("partial", "unexplained")
+    notable = explained and learnt and abs(learnt[0].z) > notable_pull(len(learnt))
+    return {
+        "numbers_instead": [p.parameter.name for p in result.evidence.rival_numbers],
+        "rival_numbers": [_number(p) for p in result.evidence.rival_numbers],
+        "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
+        "wrong_number_records": [[_number(p) for p in alike] for alike in result.wrong_numbers],
+        "notable_number": learnt[0].words if notable else None,
+        "numbers_as_given": [_number(p) for p in pulls],
+        "halved_tolerances": [
+            {"name": name, "title": titles[name], "smallest_detectable_sizes_fall_by": gain}
+            for name, gain in overall_gains(candidates).items()
+        ],
+        "notable_halved_tolerances": [
+            {"effect": halved.effect.effect.name, "name": halved.nuisance} for halved in notable_gains(candidates)
+        ],
+        "moves": [{"words": move.words, **move.record} for move in result.moves],
+    }
+
+
+def _number(pull: Pull) -> dict[str, Any]:
+    return {
+        "name": pull.parameter.name,
+        **_shown(pull.parameter),
+        "sigma": pull.parameter.sigma,
+        "change": pull.change,
+        "change_error": pull.error,
+        "change_by_the_runs_alone": pull.alone,
+        "change_by_the_runs_alone_error": pull.alone_error,
+        "pull": pull.z,
+        "learnt": pull.learnt,
+        "wrong": pull.wrong,
+        "tolerances": pull.tolerances,
+        "departure": pull.departure,
+        "words": pull.words,
+    }
+
+
+def _errors(result: Verdict) -> dict[str, Any]:
+    errors = result.errors
+    return {
+        **{f"error_{name}": errors.rms.get(name) for name in MODELS},
+        "error_corrected": result.error_corrected,
+        "harmless": result.harmless,
+        "held_out_error_falls": result.held_out_error_falls,
+        "error_after_interval": list(errors.after_interval),
+        "noise_ceiling": errors.noise,
+        "errors_by_output": errors.by_output,
+        "locked_test": result.conditions.split.names,
+        "locked_p_value": errors.p_value,
+        "held_out_runs_agree": result.held_out_runs_agree,
+    }
+
+
+def _tests(result: Verdict) -> dict[str, Any]:
+    misfit = result.evidence.misfit
+    return {
+        "p_value": misfit.p_value,
+        "p_general": misfit.general_p,
+        "p_of_each_test": misfit.p,
+        "critical_z": misfit.critical_z,
+        "draws": result.evidence.draws,
+    }
+
+
+def _descriptions(result: Verdict) -> dict[str, Any]:
+    learnt, law = result.corrections.learnt, result.corrections.law
+    return {
+        "generic_features": list(result.corrections.regression.features),
+        "correction_terms": list(learnt.terms) if learnt else [],
+        "laws": {**law.to_dict(), "beside": law.beside(result.final)} if law else None,
+        "described": result.described,
+    }
+
+
+def _next(result: Verdict) -> dict[str, Any]:
+    plan = result.next
+    return {
+        "explanations": [e.record() for e in plan.explanations],
+        "next_runs": [run.record() for run in plan.runs],
+        "next_batch": plan.batch.record() if plan.batch else None,
+    }
+
+
+def _data(result: Verdict) -> dict[str, Any]:
+    conditions = result.conditions
+    return {
+        "sessions": list(conditions.sessions),
+        "fixed_before": conditions.hash,
+        "rows": conditions.rows,
+        "rows_set_aside": list(conditions.excluded),
+        "number_of_rows_set_aside": count_of_rows(conditions.excluded),
+        "rows_of_little_weight": list(conditions.little_weight),
+        "limits": list(conditions.caveats),
+    }

@@ -1,0 +1,89 @@
+"""What a verdict says: templates over a stored verdict.json, in every branch."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from jinja2 import UndefinedError
+
+from calibration.verdict.record import verdict_record
+from calibration.words.render import next_steps, sentence
+from tests.calibration.toy_tables import ambiguous, effect, none, number
+
+VERDICTS = {"none": none, "number": number, "effect": effect, "ambiguous": ambiguous}
+
+
+def stored(name: str, **changes: Any) -> dict[str, Any]:
+    """Return the content of a verdict.json, with some of its entries changed."""
+    record: dict[str, Any] = json.loads(json.dumps(verdict_record(VERDICTS[name](), table="t.csv")))
+    assert not changes.keys() - record.keys()
+    return record | changes
+
+
+@pytest.mark.parametrize("name", VERDICTS)
+def test_a_stored_verdict_says_again_what_it_said(name: str) -> None:
+    record = stored(name)
+    assert (record["verdict"], record["sentence"]) == (name, VERDICTS[name]().sentence)
+    assert sentence(record) == record["sentence"]
+    assert next_steps(record) == record["next_steps"] != []
+
+
+NEAREST = {"title": "a wall", "removed_share": 0.8}
+HEAD = {"title": "L (head length)", "departure": "9 % above what was given", "tolerances": 9.4}
+UNEXPLAINED = {"verdict": "unexplained", "p_value": 0.001, "held_out_error_falls": None}
+SPREAD = {
+    "effect": "wall", "title": "a wall", "mean": 2.0, "interval": [1.0, 3.0],
+    "sizes": {"A": [1.5, 1.0, 2.0], "B": [9.0, 8.0, 10.0]}, "removed_share": 0.999, "remainder": 0.0,
+    "largest_along": "", "as_well": ["drag", "a current"],
+}  # fmt: skip
+PARTIAL = {"verdict": "partial", "nearest": SPREAD, "held_out_error_falls": True}
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "said"),
+    [
+        ("none", UNEXPLAINED, "There is a residual (p ≤ 0.001) that no effect and no pair of"),
+        ("none", UNEXPLAINED | {"nearest_candidate": NEAREST}, "; the nearest, a wall, removes 80 % of it and"),
+        ("none", UNEXPLAINED | {"harmless": True}, ". It is smaller than the noise of a run, and harmless for"),
+        ("none", UNEXPLAINED | {"error_predictive": 0.03}, "a correction that describes it: 3.0"),
+        ("none", {"held_out_runs_agree": False, "locked_p_value": 5e-4}, "The held-out runs (N=4) do not"),
+        ("none", {"notable_number": "E is 9 % off"}, "E is 9 % off. No effect is missing"),
+        ("number", {"claims_instead": ["a", "b"]}, "If the number is right, a or b would explain as much."),
+        ("effect", {"in_form_only": ["end_over_end_drag"]}, "is consistent with something in form like head's"),
+        ("effect", {"imitable": True}, "or something outside the catalogue that looks like it, and with no other"),
+        ("ambiguous", {"imitable": True}, ", or something outside the catalogue that looks like them: these runs"),
+        ("ambiguous", {"rival_numbers": [HEAD]}, ", or by L (head length) that is 9 % above what was given (9"),
+        ("none", PARTIAL, "differs between specimens: 2 (1 to 3) at the mean, from 1.5"),
+        ("none", PARTIAL, "It leaves nothing beyond the noise. drag or a current would"),
+    ],
+)  # fmt: skip
+def test_every_branch_of_the_sentence(name: str, changes: dict[str, Any], said: str) -> None:
+    assert said in sentence(stored(name, **changes))
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "said"),
+    [
+        ("none", {"moves": [{"where": "on day 2"}]}, "Find out what changed on day 2: look at the set-up"),
+        ("ambiguous", {"rival_numbers": [HEAD]}, "Measure L (head length) again, to rule out"),
+        ("effect", {"in_form_only": ["drag"]}, "Take the effect as a description of the runs"),
+        ("none", PARTIAL | {"held_out_error_falls": False}, "Do not use a wall: it does"),
+        ("none", PARTIAL, "Find out what differs between"),
+        ("none", UNEXPLAINED | {"untestable": {"drift": "needs elapsed_min"}}, "Note more in the table, so"),
+        ("none", UNEXPLAINED | {"described": True}, "When the cause is known, make the law an effect"),
+        ("none", UNEXPLAINED | {"error_predictive": 0.03}, "It has a correction of the residual, which"),
+    ],
+)  # fmt: skip
+def test_every_branch_of_the_next_steps(name: str, changes: dict[str, Any], said: str) -> None:
+    assert any(said in step for step in next_steps(stored(name, **changes)))
+    without_robot = next_steps(stored(name, **changes, hands_on_a_robot=False))
+    assert not [step for step in without_robot if "corrected.toml" in step or "`softflagella" in step]
+
+
+def test_an_entry_that_is_missing_is_no_empty_text() -> None:
+    record = stored("none")
+    del record["p_value"]
+    with pytest.raises(UndefinedError, match="p_value"):
+        sentence(record)
