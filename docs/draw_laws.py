@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from calibration.laws.law_fits import Laws
 from calibration.laws.partial_residuals import dependences
-from calibration.report.law_card import draw_dependences, draw_place
+from calibration.report.figures import draw_dependences, draw_place
 from calibration.report.robot_verdict import calibrate_robot
 from calibration.swimmer.synthetic_table import make_table
 from sim.model.presets import PRESETS

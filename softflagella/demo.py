@@ -208,7 +208,7 @@ def _calibrate(folder: Path, name: str) -> tuple[Verdict, Measurements]:
     verdict = calibrate(SwimmerModel(start, data), correction=learn_head_correction)
     record = verdict_record(verdict, table="table.csv")
     write_text(case / "verdict.json", json.dumps(record, indent=1) + "\n")
-    write_report(verdict, data, case / "report.html", title=f"table with {name}")
+    write_report(verdict, case / "report.html", title=f"table with {name}")
     write_text(
         case / "corrected.toml", corrected_toml(start, verdict.fits.final_refit, verdict.corrections.learnt)
     )

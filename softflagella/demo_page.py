@@ -15,9 +15,9 @@ import numpy as np
 import pandas as pd
 
 from calibration.report.figures import draw_summary
-from calibration.report.quantities import plain
 from calibration.swimmer.measured_table import Measurements
 from calibration.verdict.verdict import Verdict
+from calibration.words.quantities import plain
 from dataset.report.report import usable_rows
 from planner.files.tracking_error import TrackingError
 from sim.arrays import Floats
@@ -295,7 +295,7 @@ def _add_calibration(page: Page, results: Results, name: str) -> None:
         (f"error on the held-out session ({verdict.conditions.split.names})", "relative rms"),
         [(label, f"{100 * value:.2f} %") for label, value in errors],
     )
-    page.figures([(draw_summary(verdict, data), "residual of each output over the noise of a run",
+    page.figures([(draw_summary(verdict), "residual of each output over the noise of a run",
                    "Residuals of the runs that were fitted.")])  # fmt: skip
     page.links(
         [

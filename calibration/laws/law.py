@@ -123,6 +123,7 @@ class Law:
         }
         return {
             "place": self.place.name,
+            "acts": ", ".join(filter(None, (self.place.words, self.where))),
             "words": self.words,
             "effect": {"name": effect.name, "size": size},
             **numbers,

@@ -175,6 +175,7 @@ class Laws:
         return {
             "sentence": self.sentence,
             "complete": self.complete,
+            "significant": self.significant,
             **(self.selection.to_dict() if self.selection else {}),
             "places": [self._place_record(one) for one in self.ranked],
             "laws": [self._law_record(law) for law in self.fitted],
@@ -190,7 +191,12 @@ class Laws:
         return value - half, value + half
 
     def _law_record(self, law: Law) -> dict[str, Any]:
-        record = {**law.to_dict(), "ebic_gain": self._ebic_gain(law.gain, law.numbers)}
+        record = {
+            **law.to_dict(),
+            "ebic_gain": self._ebic_gain(law.gain, law.numbers),
+            "first": self.selection.first[law.place.name] if self.selection else None,
+            "leaves_noise": law.p_value >= self.level / 2,
+        }
         for name in (SIZE, *EXPONENTS):
             if self.selection and name in law.fit.names:
                 interval = list(self.simultaneous_interval(law, name))

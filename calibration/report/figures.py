@@ -2,42 +2,44 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
 from calibration.attribution.nearest import Nearest
 from calibration.attribution.refits import UNSEEN
-from calibration.report.quantities import feature_in_words, output_label, output_scale
+from calibration.laws.curves import Curve
+from calibration.laws.partial_residuals import Dependence
+from calibration.laws.places import Place
+from calibration.report.path_error import WORDS, Model, PathError
 from calibration.statistics.residual_tests import Misfit
 from calibration.statistics.statistical_model import Runs
 from calibration.verdict.verdict import Verdict
+from calibration.words.quantities import feature_in_words, final_model, output_label, output_scale
 from sim.arrays import Flags, Floats
 from sim.io.page_figures import BLUE, GREEN, INK, ORANGE, PALE, RED, VIOLET
+from sim.model.robot import Robot
+from sim.motion.robot_views import arrow, curved_arrow, draw_robot, scene
 
 _WIDTH = 4.4  # inches
 _KINDS = (BLUE, ORANGE, GREEN, VIOLET, RED)
 _ON_CELLS = "#101010"  # of numbers on pale cells, whatever the colours of the page
+_COLOURS: dict[Model, str] = {"as_given": ORANGE, "corrected": GREEN}
+_SCALES = {"ω": (30 / math.pi, "motor speed ω [rpm]"), "l": (100.0, "tail length l [cm]"), "N": (1.0, "tails N")}
+_LONG = 0.45  # of an arrow, in l
 _TICKS = (3.0, 10.0, 30.0, 100.0, 300.0)
-
-
-def final_model(result: Verdict) -> str:
-    """Name the final model, in words for a column or a caption; empty if it is the calibrated one."""
-    if result.verdict == "number":
-        return "with the wrong value corrected"
-    if result.nearest:
-        return "with the adopted form"
-    return "with the verdict's effects" if result.effects else ""
 
 
 def compared(result: Verdict) -> list[tuple[str, Floats]]:
     """List the models whose residuals are drawn, with their predictions (n, k)."""
     models = [("calibrated", result.base.prediction)]
-    if final_model(result):
-        models.append((final_model(result), result.final.prediction))
+    if final := final_model(result.verdict, result.nearest, result.effects):
+        models.append((final, result.final.prediction))
     elif result.described and result.corrections.law is not None:
         models.append(("with the law in corrected.toml", result.corrections.law.prediction))
     elif result.corrections.learnt is not None:
@@ -45,17 +47,18 @@ def compared(result: Verdict) -> list[tuple[str, Floats]]:
     return models
 
 
-def draw_summary(result: Verdict, data: Runs) -> Figure:
+def draw_summary(result: Verdict) -> Figure:
     """Draw the residual of each output for each model, as rms over the fitted runs, in units of the noise."""
-    figure = Figure(figsize=(_WIDTH, 0.9 + 0.42 * len(data.outputs)))
-    plot_summary(figure.add_subplot(), result, data)
+    figure = Figure(figsize=(_WIDTH, 0.9 + 0.42 * len(result.runs.outputs)))
+    plot_summary(figure.add_subplot(), result)
     figure.legend(fontsize=8, frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     figure.tight_layout()
     return figure
 
 
-def plot_summary(axes: Axes, result: Verdict, data: Runs) -> None:
+def plot_summary(axes: Axes, result: Verdict) -> None:
     """Draw the bars of `draw_summary`, without a legend."""
+    data = result.runs
     noise = np.sqrt(np.diag(result.base.noise.run))
     place = np.arange(len(data.outputs))[::-1]
     models = compared(result)
@@ -71,9 +74,9 @@ def plot_summary(axes: Axes, result: Verdict, data: Runs) -> None:
     axes.tick_params(axis="x", labelsize=8)
 
 
-def draw_residuals(result: Verdict, data: Runs) -> list[tuple[Figure, str]]:
+def draw_residuals(result: Verdict) -> list[tuple[Figure, str]]:
     """Draw measured minus model against a setting, a figure for each model; return each with its model."""
-    used = result.conditions.split.fitted
+    data, used = result.runs, result.conditions.split.fitted
     residuals = {label: (data.y - prediction)[used] for label, prediction in compared(result)}
     limits = 1.1 * np.max([np.abs(residual).max(0) for residual in residuals.values()], 0)
     return [(_draw_residual(residual, limits, used, data), label) for label, residual in residuals.items()]
@@ -114,13 +117,14 @@ def _name_kinds(axes: Axes, kinds: Sequence[str]) -> None:
     axes.legend(fontsize=8, frameon=False, ncols=min(len(kinds), 5), loc="lower center", bbox_to_anchor=(0.5, 1.0))
 
 
-def draw_maps(result: Verdict, outputs: Sequence[str]) -> list[tuple[Figure, str]]:
+def draw_maps(result: Verdict) -> list[tuple[Figure, str]]:
     """Draw z of every output along every feature of the inputs, a figure for each model; each with its model."""
     maps = [("calibrated", result.evidence.misfit)]
     if result.explaining and result.explaining[0].refit_misfit is not None:
-        maps.append((final_model(result), result.explaining[0].refit_misfit))
+        final = final_model(result.verdict, result.nearest, result.effects)
+        maps.append((final, result.explaining[0].refit_misfit))
     limit = max(4.0, float(np.abs(result.evidence.misfit.scores.shapes).max(initial=0.0)))
-    return [(_draw_map(misfit, outputs, limit), label) for label, misfit in maps]
+    return [(_draw_map(misfit, result.runs.outputs, limit), label) for label, misfit in maps]
 
 
 def _draw_map(misfit: Misfit, outputs: Sequence[str], limit: float) -> Figure:
@@ -188,3 +192,99 @@ def draw_evidence(result: Verdict) -> Figure:
     axes.set_xlabel("score z", fontsize=9)
     figure.tight_layout()
     return figure
+
+
+def draw_paths(errors: Sequence[PathError]) -> Figure:
+    """Draw each wanted path with the tracks of both schedules, a panel for each path, in cm."""
+    figure = Figure(figsize=(_WIDTH, 3.6 * len(errors) + 0.4), layout="constrained")
+    panels = figure.subplots(len(errors), 1, squeeze=False)[:, 0]
+    for axes, error in zip(panels, errors, strict=True):
+        _draw_path(axes, error)
+    labels = {
+        label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(list(labels.values()), list(labels), loc="outside upper center", fontsize=8, frameon=False)
+    return figure
+
+
+def _draw_path(axes: Axes, error: PathError) -> None:
+    axes.plot(*(100 * error.polyline.T), color=INK, lw=1.4, ls="--", label="wanted path", zorder=3)
+    for name, each in error.carried_out.items():
+        track, colour = 100 * each.track, _COLOURS[name]
+        axes.plot(*track.T, color=colour, lw=0.9, label=f"planned with {WORDS[name]}")
+        axes.plot(*track[-1], "o", color=colour, ms=5)
+    axes.set_aspect("equal", "datalim")
+    axes.set_title(error.wanted.words, fontsize=9, parse_math=False)
+    axes.set_xlabel("x [cm]", fontsize=9)
+    axes.set_ylabel("y [cm]", fontsize=9)
+    axes.tick_params(labelsize=8)
+
+
+def draw_place(robot: Robot, place: Place, lever: float = 0.0) -> Figure:
+    """Draw the robot from above with the load of a place: a force or a couple on the axis, or the tails.
+
+    Args:
+        lever: of a side force that has one.
+    """
+    shown = scene(robot)
+    figure = Figure(figsize=(_WIDTH, 2.2))
+    axes = figure.add_subplot()
+    pose = np.zeros(3)
+    draw_robot(axes, shown, pose, 1.0)
+    disc = shown.seen_from_above(pose, np.zeros(3))
+    if place.part == "tails" and not place.lever_unit:
+        for tail in shown.tails:
+            axes.plot(*shown.seen_from_above(pose, tail).T, color=RED, lw=4, alpha=0.8, zorder=4)
+    else:
+        ahead = lever * (shown.length if place.lever_unit == "L" else 1.0)
+        _draw_load(axes, place, disc + np.array([ahead, 0.0]), shown.length)
+        axes.plot(*disc, "o", color=INK, ms=4, zorder=6)
+    axes.set_aspect("equal")
+    axes.axis("off")
+    axes.margins(0.12)
+    figure.tight_layout(pad=0.1)
+    return figure
+
+
+def _draw_load(axes: Any, place: Place, disc: Floats, head_length: float) -> None:
+    """Draw a load of the head at the disc, which is at its rear; e_z is to the right, e_x up."""
+    at = disc if place.is_term else disc + np.array([head_length / 2, 0.0])  # coefficients act at the centre
+    kind = place.wrench or {"Ct": "Fz", "Cr": "Mz", "Cyr": "Fx"}[place.name]
+    angles = np.linspace(-0.4 * math.pi, 1.1 * math.pi, 40)
+    if kind == "Fx":
+        arrow(axes, at, at + np.array([0.0, _LONG]), RED, 2.6)
+    elif kind == "Fz":
+        along = -_LONG if place.name == "Ct" else _LONG
+        arrow(axes, at, at + np.array([along, 0.0]), RED, 2.6)
+    elif kind == "My":
+        curved_arrow(axes, at + 0.6 * _LONG * np.stack([np.cos(angles), np.sin(angles)], -1), RED, 2.6)
+    else:
+        curved_arrow(axes, at + _LONG * np.stack([0.25 * np.cos(angles), 0.7 * np.sin(angles)], -1), RED, 2.6)
+
+
+def draw_dependences(curves: list[Dependence]) -> Figure:
+    """Draw the factor of a law against every input, with its band and what the runs ask for."""
+    figure = Figure(figsize=(_WIDTH, 1.75 * len(curves) + 0.2))
+    panels = figure.subplots(len(curves), 1, squeeze=False)[:, 0]
+    for axes, curve in zip(panels, curves, strict=True):
+        scale, label = _SCALES[curve.symbol]
+        axes.fill_between(scale * curve.inputs, curve.low, curve.high, color=PALE, lw=0)
+        axes.plot(scale * curve.inputs, curve.factor, color=BLUE)
+        axes.errorbar(scale * curve.groups, curve.by_runs, curve.errors, fmt="o", ms=4, color=RED, lw=1.2)
+        if curve.curve is not None:
+            _draw_asked(axes, curve.curve, scale)
+        axes.set_xlabel(label, fontsize=9)
+        axes.set_ylabel("factor", fontsize=9)
+        axes.tick_params(labelsize=8)
+        if curve.symbol == "N":
+            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    figure.tight_layout(h_pad=0.5)
+    return figure
+
+
+def _draw_asked(axes: Any, asked: Curve, scale: float) -> None:
+    """Draw the smooth curve that the runs ask for in place of a power law, with its band and a legend."""
+    axes.fill_between(scale * asked.inputs, asked.low, asked.high, color=RED, alpha=0.15, lw=0)
+    label = f"the runs' own curve, 95 %; power law: p = {asked.p_value:.2g}"
+    axes.plot(scale * asked.inputs, asked.factor, "--", color=RED, lw=1.2, label=label)
+    axes.legend(frameon=False, fontsize=7)

@@ -108,7 +108,7 @@ class PathError:
         """Return the content for verdict.json."""
         record: dict[str, Any] = dict.fromkeys(WORDS)
         record |= {name: each.record(self.tail_length) for name, each in self.carried_out.items()}
-        return record | {"refused": list(self.refusals)}
+        return record | {"refused": list(self.refusals), "tail_length_m": self.tail_length}
 
 
 def wanted_paths(words: Sequence[str], robot: Robot, unit: str | None = None) -> tuple[WantedPath, ...]:

@@ -18,7 +18,7 @@ from calibration.report.path_error import PathError, path_errors, wanted_paths
 from calibration.report.report import write_report
 from calibration.statistics.exclusions import count_of_rows, summary_of_excluded
 from calibration.swimmer.head_correction import learn_head_correction
-from calibration.swimmer.measured_table import Measurements, read_measurements
+from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.possible_runs import Owned
 from calibration.swimmer.protocols import PROTOCOLS
 from calibration.swimmer.swimmer import SwimmerModel
@@ -48,7 +48,6 @@ class RobotVerdict(Verdict):
     """
 
     robot: Robot  # as it was given
-    runs: Measurements  # of the table
     table: str  # name of the table
     paths: tuple[PathError, ...] = ()  # the error on paths, where it was asked for
 
@@ -81,7 +80,7 @@ class RobotVerdict(Verdict):
         from calibration.report.figures import plot_summary  # loads matplotlib
 
         ax = given_axes(ax)
-        plot_summary(ax, self, self.runs)
+        plot_summary(ax, self)
         ax.legend(frameon=False, fontsize=8)
         return ax
 
@@ -103,7 +102,7 @@ class RobotVerdict(Verdict):
         """
         corrected = as_toml(*self._handed_on)
         with files_together(folder, FILES) as temporary:
-            write_report(self, self.runs, temporary / "report.html", title=self.table, paths=self.paths)
+            write_report(self, temporary / "report.html", title=self.table, paths=self.paths)
             write_text(temporary / "corrected.toml", corrected)
             write_text(temporary / "verdict.json", json.dumps(self.to_dict(), indent=1) + "\n")
         return [Path(folder, name) for name in FILES]
@@ -159,5 +158,5 @@ def calibrate_robot(
         progress=progress,
     )
     name = "table" if isinstance(table, pd.DataFrame) else Path(table).name
-    result = RobotVerdict(**vars(verdict), robot=robot, runs=data, table=name)
+    result = RobotVerdict(**vars(verdict), robot=robot, table=name)
     return replace(result, paths=path_errors(wanted, robot, result.corrected, result.knowledge))

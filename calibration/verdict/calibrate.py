@@ -166,6 +166,7 @@ def calibrate(
         nearest=explained.nearest,
         moves=tuple(StatedMove(move.words(with_moves), move.record(with_moves)) for move in moves),
         corrections=corrections,
+        runs=model.runs,
         conditions=Conditions(
             split=split,
             sessions=model.runs.session_names,

@@ -5,12 +5,16 @@ Its keys are a format, and older than the names here. `calibration.words` has th
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from calibration.attribution.halved_tolerances import notable_gains, overall_gains
-from calibration.attribution.refits import Candidate
+from calibration.attribution.refits import UNSEEN, Candidate
 from calibration.attribution.wrong_numbers import notable_pull
-from calibration.statistics.exclusions import count_of_rows
+from calibration.statistics.exclusions import count_of_rows, summary_of_excluded
+from calibration.statistics.fit import Fit, least_determined
 from calibration.statistics.pull import Pull
 from calibration.statistics.statistical_model import Parameter
 from calibration.words.render import next_steps, sentence
@@ -53,7 +57,7 @@ def facts(result: Verdict) -> dict[str, Any]:
     }
 
 
-def _shown(parameter: Parameter) -> dict[str, Any]:
+def shown(parameter: Parameter) -> dict[str, Any]:
     """Write what a reader needs with a number: its title, unit, and value as given (of an effect its null)."""
     return {
         "title": parameter.title,
@@ -71,7 +75,7 @@ def _fitted(result: Verdict) -> dict[str, Any]:
     return {
         "parameters": {
             name: {
-                **_shown(fitted[name]),
+                **shown(fitted[name]),
                 "value": final.parameters[name],
                 "interval": list(intervals[name]),
                 "value_all_runs": refit[name],
@@ -83,8 +87,17 @@ def _fitted(result: Verdict) -> dict[str, Any]:
             name: {"value": result.base.parameters[name], "interval": list(interval)}
             for name, interval in result.fits.base_intervals.items()
         },
+        "least_determined": _least_determined(final),
         "hands_on_a_robot": set(COEFFICIENTS) <= set(result.base.names),
     }
+
+
+def _least_determined(final: Fit) -> dict[str, Any] | None:
+    """Write the direction in the coefficients that the runs determine worst, and its standard deviation."""
+    if not any(p.logarithmic and p.sigma is None for p in final.fitted):
+        return None
+    direction, error = least_determined(final)
+    return {"direction": direction, "error": error}
 
 
 def _claims(result: Verdict) -> dict[str, Any]:
@@ -99,7 +112,7 @@ def _claims(result: Verdict) -> dict[str, Any]:
         "imitable": any(c.uncertain for c in result.explaining),
         "effects_instead": [[e.name for e in c.claimed] for c in evidence.rival_effects],
         "claims_instead": [c.title for c in evidence.rival_effects],
-        "nearest": {**_shown(nearest.effect), **nearest.record()} if nearest else None,
+        "nearest": {**shown(nearest.effect), **nearest.record()} if nearest else None,
         "nearest_candidate": _nearest_candidate(result),
         "candidates": [_candidate(c) for c in evidence.candidates],
         "untestable": evidence.untestable,
@@ -109,8 +122,9 @@ def _claims(result: Verdict) -> dict[str, Any]:
 def _candidate(c: Candidate) -> dict[str, Any]:
     return {
         "effect": c.effect.name,
-        **_shown(c.effect),
+        **shown(c.effect),
         "bounds": list(c.effect.bounds),
+        "shows": c.detectable < UNSEEN,
         "z": c.z,
         "survived_share": c.survived,
         "smallest_detectable": c.detectable,
@@ -161,7 +175,7 @@ def _numbers(result: Verdict) -> dict[str, Any]:
 def _number(pull: Pull) -> dict[str, Any]:
     return {
         "name": pull.parameter.name,
-        **_shown(pull.parameter),
+        **shown(pull.parameter),
         "sigma": pull.parameter.sigma,
         "change": pull.change,
         "change_error": pull.error,
@@ -223,13 +237,23 @@ def _next(result: Verdict) -> dict[str, Any]:
 
 
 def _data(result: Verdict) -> dict[str, Any]:
-    conditions = result.conditions
+    conditions, runs = result.conditions, result.runs
+    scatter = np.sqrt(np.diag(result.base.noise.run)).tolist()
+    settings = runs.settings.items()
     return {
+        "outputs": list(runs.outputs),
+        "number_of_runs": len(runs),
+        "number_of_held_out_runs": int(conditions.split.test.sum()),
+        "settings": {name: [float(v.min()), float(v.max()), unit] for name, (v, unit) in settings},
+        "drawn_against": [runs.drawn[0], runs.drawn[1][0]],
+        "scatter_of_a_run": dict(zip(runs.outputs, scatter, strict=True)),
+        "scatter_of_sessions": math.sqrt(result.final.noise.share),
         "sessions": list(conditions.sessions),
         "fixed_before": conditions.hash,
         "rows": conditions.rows,
         "rows_set_aside": list(conditions.excluded),
         "number_of_rows_set_aside": count_of_rows(conditions.excluded),
+        "summary_of_rows_set_aside": summary_of_excluded(conditions.excluded, conditions.rows),
         "rows_of_little_weight": list(conditions.little_weight),
         "limits": list(conditions.caveats),
     }

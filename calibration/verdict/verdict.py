@@ -18,10 +18,12 @@ from calibration.attribution.refits import Candidate
 from calibration.attribution.wrong_numbers import wrong_number
 from calibration.statistics.fit import Fit
 from calibration.statistics.pull import Pull
+from calibration.statistics.statistical_model import Runs
 from calibration.verdict.contents import Conditions, Corrections, Evidence, Fits, HeldOutErrors, Next
 from calibration.verdict.next_runs import NextRun
 from calibration.verdict.record import facts
-from calibration.words.render import percent, sentence
+from calibration.words.quantities import percent
+from calibration.words.render import sentence
 
 _DISAGREES = 0.01  # p of the held-out runs below which they do not agree with the final model
 
@@ -68,6 +70,7 @@ class Verdict:
     conditions: Conditions  # what was fixed before the fit
     nearest: Nearest | None  # the form that is adopted, of a partial verdict
     moves: tuple[StatedMove, ...]  # numbers that differ in some runs
+    runs: Runs  # that were calibrated with
 
     def __repr__(self) -> str:
         said = self.sentence

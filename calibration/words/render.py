@@ -1,23 +1,39 @@
 """Render what a verdict says: each text is a template over the content of verdict.json, and over nothing else.
 
 So a stored verdict.json says again what it said. `sentence.j2` is the verdict with its certainty, `next_steps.j2`
-what a lab does next.
+what a lab does next, `report.j2` the sections of the report.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from calibration.words.quantities import (
+    Record,
+    detectable,
+    digits,
+    direction_in_words,
+    feature_in_words,
+    final_model,
+    fitted_value,
+    given,
+    output_error,
+    output_label,
+    p_in_words,
+    percent,
+    plain,
+    ranges_in_words,
+    size,
+    tolerance,
+)
+from planner.paths.units import length_in_lab
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-
-Record = Mapping[str, Any]  # content of verdict.json
-
-_RESOLVED = 2.01  # over the number of draws and one more: the bootstrap resolves no smaller p
 
 
 def sentence(record: Record) -> str:
@@ -25,7 +41,7 @@ def sentence(record: Record) -> str:
 
     The first sentence says so if the claim does not lower the error on the held-out runs.
     """
-    return _one_line(_rendered("sentence.j2", record))
+    return _one_line(rendered("sentence.j2", record))
 
 
 def next_steps(record: Record) -> list[str]:
@@ -34,12 +50,13 @@ def next_steps(record: Record) -> list[str]:
     A verdict that the held-out runs contradict comes before all others: more runs, and no use of it until then. A
     corrected robot that does not lower their error is not advised.
     """
-    steps = re.split(r"^\* ", _rendered("next_steps.j2", record), flags=re.MULTILINE)
+    steps = re.split(r"^\* ", rendered("next_steps.j2", record), flags=re.MULTILINE)
     return [_one_line(step) for step in steps[1:]]
 
 
-def _rendered(template: str, record: Record) -> str:
-    return _environment().get_template(template).render(record)
+def rendered(template: str, context: Record) -> str:
+    """Fill a template; a name that the context lacks is an error."""
+    return _environment().get_template(template).render(context)
 
 
 def _one_line(text: str) -> str:
@@ -52,23 +69,21 @@ def _environment() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent), undefined=StrictUndefined, trim_blocks=True,
+        loader=FileSystemLoader(Path(__file__).parent),
+        undefined=StrictUndefined,
+        trim_blocks=True,
         lstrip_blocks=True,
-    )  # fmt: skip
-    environment.filters |= {"percent": percent, "digits": digits, "p": p_in_words}
+        autoescape=lambda name: name == "report.j2",
+        extensions=["jinja2.ext.do"],
+    )
+    environment.filters |= _FILTERS
+    environment.globals["final_model"] = final_model
     return environment
 
 
-def percent(value: float, decimals: int = 2) -> str:
-    """Write a share in per cent."""
-    return f"{100 * value:.{decimals}f} %"
-
-
-def digits(value: float, count: int = 3) -> str:
-    """Write a number with so many significant digits."""
-    return f"{value:.{count}g}"
-
-
-def p_in_words(p_value: float, draws: int) -> str:
-    """Write a p-value of a bootstrap."""
-    return f"p {'≤' if p_value <= _RESOLVED / (draws + 1) else '='} {p_value:.2g}"
+_FILTERS: dict[str, Callable[..., str]] = {
+    "percent": percent, "digits": digits, "p": p_in_words, "plain": plain, "size": size, "detectable": detectable,
+    "given": given, "tolerance": tolerance, "fitted_value": fitted_value, "output": output_label,
+    "output_error": output_error, "feature": feature_in_words, "direction": direction_in_words,
+    "ranges": ranges_in_words, "in_lab": length_in_lab,
+}  # fmt: skip

@@ -21,6 +21,7 @@ from sim.io.page_figures import figure_markup, variables
 
 _WRAPS = 18  # characters at which the first column of a table may wrap
 _WIDE = 48  # characters of a table's row beyond which the table becomes a list on a narrow screen
+_NUMBER, _TOGETHER = re.compile(r"(?<=\d) (?=[^\W\d]|[%°±])"), "\u00a0"
 _LONG = 5  # sections beyond which a page begins with a list of them
 _STYLE = f"""
 :root {{ color-scheme: light dark; --page: #f6f8fa; --card: #fff; --good: #1c7c43; --bad: #b3391f;
@@ -71,7 +72,7 @@ class Page:
 
     def __init__(self, title: str, lead: str):
         self._title = html.escape(title)
-        self._lead = _inline(lead)
+        self._lead = inline(lead)
         self._parts: list[str] = []
         self._sections: list[str] = []
         self._figures = 0
@@ -84,12 +85,12 @@ class Page:
 
     def text(self, words: str, *, tone: str = "") -> None:
         """Add a paragraph; tone "good" or "bad" colours it."""
-        self._parts.append(f'<p class="{tone}">{_inline(words)}</p>')
+        self._parts.append(f'<p class="{tone}">{inline(words)}</p>')
 
     def steps(self, steps: Sequence[str], *, numbered: bool = False) -> None:
         """Add a list of sentences."""
         kind = "ol" if numbered else "ul"
-        self._parts.append(f"<{kind}>" + "".join(f"<li>{_inline(step)}</li>" for step in steps) + f"</{kind}>")
+        self._parts.append(f"<{kind}>" + "".join(f"<li>{inline(step)}</li>" for step in steps) + f"</{kind}>")
 
     def commands(self, lines: Sequence[str]) -> None:
         """Add commands to type, one a line."""
@@ -98,7 +99,7 @@ class Page:
     def links(self, links: Sequence[tuple[str, str, str]]) -> None:
         """Add a list of links to files: path relative to the page, name, and what it is."""
         items = (
-            f'<li><a href="{html.escape(quote(path))}">{html.escape(name)}</a>: {_inline(words)}</li>'
+            f'<li><a href="{html.escape(quote(path))}">{html.escape(name)}</a>: {inline(words)}</li>'
             for path, name, words in links
         )
         self._parts.append(f"<ul>{''.join(items)}</ul>")
@@ -106,22 +107,20 @@ class Page:
     def link_line(self, words: str, links: Sequence[tuple[str, str]]) -> None:
         """Add a line of links to files behind some words: path relative to the page, and name."""
         anchors = (f'<a href="{html.escape(quote(path))}">{html.escape(name)}</a>' for path, name in links)
-        self._parts.append(f"<p>{_inline(words)}: {', '.join(anchors)}</p>")
+        self._parts.append(f"<p>{inline(words)}: {', '.join(anchors)}</p>")
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
         """Add a table; the first column is left-aligned."""
-        head = "".join(f"<th>{_inline(h)}</th>" for h in header)
-        body = "".join(
-            "<tr>"
-            + "".join(
-                f'<td data-column="{html.escape(column)}">{_cell(cell)}</td>'
-                for column, cell in zip(header, row, strict=True)
-            )
-            + "</tr>"
-            for row in rows
+        self._parts.append(
+            _table(list(map(inline, header)), [[inline(str(cell)) for cell in row] for row in rows])
         )
-        kind = ' class="cards"' if _row_width(header, rows) > _WIDE else ""
-        self._parts.append(f'<div class="wide"><table{kind}><tr>{head}</tr>{body}</table></div>')
+
+    def add(self, sections: str) -> None:
+        """Add sections of HTML, each from its heading `<h2>` on; their plain tables become tables of the page."""
+        for section in sections.split("<h2>")[1:]:
+            heading, _, content = section.partition("</h2>")
+            self.section(html.unescape(heading))
+            self._parts.append(re.sub(r"<table>(.*?)</table>", _finished, content, flags=re.DOTALL))
 
     def figure(self, figure: Figure, description: str) -> None:
         """Add a figure, with a description for people who cannot see it."""
@@ -133,14 +132,8 @@ class Page:
         Args:
             figures: each with its description and a caption.
         """
-        self._parts.append('<div class="figures">')
-        for figure, description, caption in figures:
-            self._figures += 1
-            below = f"<figcaption>{_inline(caption)}</figcaption>" if caption else ""
-            self._parts.append(
-                f"<figure>{figure_markup(figure, description, number=self._figures)}{below}</figure>"
-            )
-        self._parts.append("</div>")
+        self._parts.append(figures_markup(figures, self._figures + 1))
+        self._figures += len(figures)
 
     def picture(self, png: bytes, description: str) -> None:
         """Add a picture, with a description for people who cannot see it."""
@@ -164,20 +157,51 @@ class Page:
         )
 
 
-def _cell(content: object) -> str:
-    """Escape the content of a cell; a number and its unit stay on one line."""
-    return re.sub(r"(?<=\d) (?=[^\W\d]|[%°±])", "\u00a0", _inline(str(content)))
+def figures_markup(figures: Sequence[tuple[Figure, str, str]], first: int) -> str:
+    """Write figures beside each other, see `Page.figures`; `first` is the number of the first one on its page."""
+    written = []
+    for number, (figure, description, caption) in enumerate(figures, first):
+        below = f"<figcaption>{inline(caption)}</figcaption>" if caption else ""
+        written.append(f"<figure>{figure_markup(figure, description, number=number)}{below}</figure>")
+    return f'<div class="figures">{"".join(written)}</div>'
 
 
-def _row_width(header: Sequence[str], rows: Sequence[Sequence[object]]) -> int:
+def _finished(table: re.Match[str]) -> str:
+    """Write a table of the page from a plain one, whose first row has the headings."""
+    header, *rows = (
+        [" ".join(cell.split()) for cell in re.findall(r"<t[hd]>(.*?)</t[hd]>", row, re.DOTALL)]
+        for row in re.findall(r"<tr>(.*?)</tr>", table[1], re.DOTALL)
+    )
+    return _table(header, rows)
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Write a table from cells of HTML; a number and its unit stay on one line."""
+    head = "".join(f"<th>{heading}</th>" for heading in header)
+    names = [html.escape(html.unescape(re.sub("<.*?>", "", heading))) for heading in header]
+    body = "".join(
+        "<tr>"
+        + "".join(
+            f'<td data-column="{name}">{_NUMBER.sub(_TOGETHER, cell)}</td>'
+            for name, cell in zip(names, row, strict=True)
+        )
+        + "</tr>"
+        for row in rows
+    )
+    kind = ' class="cards"' if _row_width(header, rows) > _WIDE else ""
+    return f'<div class="wide"><table{kind}><tr>{head}</tr>{body}</table></div>'
+
+
+def _row_width(header: Sequence[str], rows: Sequence[Sequence[str]]) -> int:
     """Estimate the width of a table in characters; headings and the first column wrap between words."""
     width = 0
     for place, heading in enumerate(header):
-        cells = [len(str(row[place])) if place else min(len(str(row[place])), _WRAPS) for row in rows]
+        cells = [len(html.unescape(row[place])) for row in rows]
+        cells = cells if place else [min(cell, _WRAPS) for cell in cells]
         width += 2 + max([*map(len, heading.split()), *cells], default=0)
     return width
 
 
-def _inline(words: str) -> str:
+def inline(words: str) -> str:
     """Escape words, and set what is between backticks as code."""
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(words))

@@ -19,7 +19,7 @@ from calibration.report.robot_laws import RobotLaws, find_robot_laws
 from calibration.report.robot_verdict import RobotVerdict
 from calibration.swimmer.candidate_effects import influences
 from calibration.swimmer.head_correction import learn_head_correction
-from calibration.swimmer.measured_table import Measurements, read_measurements
+from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.possible_runs import Owned
 from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
@@ -130,10 +130,9 @@ def number() -> Verdict:
     return calibrated(wrong_scale(), few=True)
 
 
-def verdict_of(verdict: Verdict, runs: Measurements | pd.DataFrame) -> RobotVerdict:
-    """The verdict with its runs and its robot."""
-    runs = read_measurements(runs) if isinstance(runs, pd.DataFrame) else runs
-    return RobotVerdict(**vars(verdict), robot=START, runs=runs, table="runs.csv")
+def verdict_of(verdict: Verdict) -> RobotVerdict:
+    """The verdict with its robot."""
+    return RobotVerdict(**vars(verdict), robot=START, table="runs.csv")
 
 
 @contextmanager

@@ -6,7 +6,6 @@ import json
 import math
 from dataclasses import replace
 from functools import cache
-from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -19,7 +18,8 @@ from calibration.laws.law_model import SIZE, LawModel
 from calibration.laws.named_curves import chosen, named_curves
 from calibration.laws.partial_residuals import dependences
 from calibration.laws.places import place_named
-from calibration.report.law_card import _add_curved, draw_dependences
+from calibration.report.figures import draw_dependences
+from calibration.report.report import figures_of_laws
 from calibration.report.robot_laws import find_robot_laws
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.statistical_model import (
@@ -31,7 +31,6 @@ from calibration.statistics.statistical_model import (
 )
 from calibration.statistics.study import Study, middle_session
 from sim.arrays import Floats
-from sim.io.pages import Page
 from sim.model.power_law import Powers
 from tests.calibration.toy_tables import START, on_the_toy, toy_swimmer, toy_table
 from tests.shared import shared
@@ -149,13 +148,11 @@ def test_a_law_with_a_curve_stands_in_the_sentence_the_record_and_the_picture(
     axes = draw_dependences(shown).axes
     assert [one.get_legend() is not None for one in axes] == [curve.curve is not None for curve in shown]
     assert "--" in [line.get_linestyle() for line in axes[0].lines]
-    page = Mock(spec=Page)
-    _add_curved(page, described.laws, described.study.split.fitted)
-    page.figures.assert_not_called()  # it is the best law, which is shown anyway
+    used = described.study.split.fitted
+    assert set(figures_of_laws(described.laws, used)) == {"law"}  # it is the best law, which is shown anyway
     none_kept = replace(described.laws, fitted=(replace(law, reason="a number is at the end of its range"),))
     assert "With a curve in place of a power law, it is described by a couple on the head" in none_kept.sentence
-    _add_curved(page, none_kept, described.study.split.fitted)
-    page.figures.assert_called_once()
+    assert set(figures_of_laws(none_kept, used)) == {"curved"}
 
 
 def test_the_gain_is_that_of_dense_least_squares() -> None:

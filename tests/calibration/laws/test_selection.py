@@ -15,11 +15,12 @@ from calibration.laws.linear_models import LinearModels
 from calibration.laws.places import places
 from calibration.laws.search import Search
 from calibration.laws.selection import Selection, examine_selection
-from calibration.report.law_card import _row, _simultaneous
-from calibration.report.quantities import plain
+from calibration.report.report import sections
 from calibration.report.robot_laws import RobotLaws
+from calibration.verdict.record import facts
+from calibration.words.quantities import plain
 from sim.arrays import Floats
-from tests.calibration.toy_tables import laws_of_toy
+from tests.calibration.toy_tables import laws_of_toy, none
 
 SESSION = np.repeat(np.arange(4), 16)
 CONDITION = np.arange(len(SESSION)) // 2
@@ -110,6 +111,12 @@ def described() -> tuple[RobotLaws, Laws, Selection]:
     return found, found.laws, found.laws.selection
 
 
+def in_report(laws: Laws) -> str:
+    """The sections of a report with laws."""
+    record = facts(none()) | {"next_steps": [], "laws": {**laws.to_dict(), "beside": ""}, "path": None}
+    return " ".join(sections(record, {}).split())
+
+
 @pytest.mark.slow
 def test_the_record_has_what_the_choice_costs() -> None:
     found, laws, selection = described()
@@ -124,8 +131,7 @@ def test_the_record_has_what_the_choice_costs() -> None:
     ):
         assert one["gain"] - one["ebic_gain"] == pytest.approx(2 * math.log(selection.models[columns]))
     assert "(with the choice among all places counted, p ≤ 0.001)" in found.sentence
-    first = laws.fitted[0]  # the report shows in how many tables its place is first
-    assert f"{100 * selection.first[first.place.name]:.0f} %" in _row(first, laws)
+    assert record["laws"][0]["first"] == selection.first[laws.fitted[0].place.name]
 
 
 def test_a_law_is_claimed_only_if_noise_hardly_ever_gains_as_much() -> None:
@@ -139,8 +145,8 @@ def test_a_law_is_claimed_only_if_noise_hardly_ever_gains_as_much() -> None:
     assert "No law is claimed: noise alone can gain as much" in other.sentence
     assert f"The nearest is {laws.kept[0].words}." in other.sentence
     assert other.rivals == ()
-    assert _row(laws.kept[0], other)[-1] == "noise alone can gain as much"
-    assert _row(laws.kept[0], laws)[-1] == "describes the runs"
+    assert "<td>noise alone can gain as much</td>" in in_report(other)
+    assert "<td>describes the runs</td>" in in_report(laws)
 
 
 def test_simultaneous_intervals_contain_those_of_the_place() -> None:
@@ -154,4 +160,4 @@ def test_simultaneous_intervals_contain_those_of_the_place() -> None:
     at = best.fit.names.index("law_speed")
     deviation = math.sqrt(best.fit.covariance[at, at] / best.fit.inflation)
     assert high == pytest.approx(best.fit.parameters["law_speed"] + selection.widest * deviation)
-    assert f"ω {plain(low, 2)} to {plain(high, 2)}" in _simultaneous(laws)
+    assert f"ω {plain(low, 2)} to {plain(high, 2)}" in in_report(laws)

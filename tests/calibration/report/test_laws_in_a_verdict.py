@@ -17,7 +17,7 @@ from calibration.laws.law_model import SIZE, LawModel, with_law
 from calibration.laws.partial_residuals import dependences
 from calibration.laws.places import place_named
 from calibration.report.corrected_robot import check_given
-from calibration.report.law_card import draw_dependences, draw_place
+from calibration.report.figures import draw_dependences, draw_place
 from calibration.report.law_robot import _slopes, robot_with_law
 from calibration.report.robot_verdict import RobotVerdict
 from calibration.statistics.held_out import refit_to_all
@@ -55,7 +55,7 @@ HIDDEN = {
 def described(place: str) -> RobotVerdict:
     table = toy_table(4, lengths_cm=FOUR, **HIDDEN[place])
     with few_places((*FEW_PLACES, "Cr")):
-        return verdict_of(calibrated(table, few=True, describe=find_laws), table)
+        return verdict_of(calibrated(table, few=True, describe=find_laws))
 
 
 @shared
@@ -63,7 +63,7 @@ def claimed_beside_laws() -> RobotVerdict:
     """A weak effect, which something outside the catalogue could imitate."""
     table = toy_table(3, **{DRAG: 0.6})
     with few_places(("My_wyr", "My_vz", "Fx_vz", "Fx_wyr", "Fx_wh", "Cyr")):
-        return verdict_of(calibrated(table, few=True, describe=find_laws), table)
+        return verdict_of(calibrated(table, few=True, describe=find_laws))
 
 
 def laws_of(verdict: RobotVerdict) -> Laws:

@@ -144,7 +144,7 @@ def test_paths_are_read_with_their_sizes_and_what_is_none_is_refused_at_once(tmp
 
 @pytest.mark.slow
 def test_a_verdict_and_its_report_have_the_error_on_a_path(tmp_path: Path) -> None:
-    verdict = verdict_of(effect(), toy_table(5, **{DRAG: 5.0}))
+    verdict = verdict_of(effect())
     assert verdict.to_dict()["path"] is None
     small = path_errors(wanted_paths(["circle:0.001l"], GIVEN), GIVEN, CORRECTED, KNOWN)
     paths = replace(verdict, paths=(error_of(), *small)).save(tmp_path)

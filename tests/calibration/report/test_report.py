@@ -10,35 +10,26 @@ from pathlib import Path
 import pytest
 
 from calibration.attribution.halved_tolerances import notable_gains
-from calibration.report.quantities import detectable, direction_in_words, plain, size, with_error
 from calibration.report.report import write_report
 from calibration.statistics.pull import Pull
-from calibration.statistics.statistical_model import Parameter
-from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.nuisance_numbers import nuisance_parameters
 from calibration.verdict.contents import Next
-from calibration.verdict.record import facts, verdict_record
+from calibration.verdict.record import facts, shown, verdict_record
 from calibration.verdict.verdict import Verdict
+from calibration.words.quantities import detectable, direction_in_words, plain, size, with_error
 from calibration.words.render import next_steps
 from tests.calibration.toy_tables import (
-    DRAG,
     START,
     ambiguous,
     calibrated_toy,
     none,
     number,
-    toy_table,
-    wrong_scale,
 )
 from tests.page_text import PageText
 
 
-def runs_of_one_length() -> Measurements:
-    return read_measurements(toy_table(1, lengths_cm=(8.0,), **{DRAG: 4.0}))
-
-
-def page(result: Verdict, runs: Measurements, folder: Path) -> PageText:
-    write_report(result, runs, folder / "report.html", title="t.csv")
+def page(result: Verdict, folder: Path) -> PageText:
+    write_report(result, folder / "report.html", title="t.csv")
     return PageText(folder / "report.html")
 
 
@@ -51,7 +42,7 @@ def with_errors(result: Verdict, *, before: float, after: float, p_value: float 
 def test_a_report_is_in_the_words_and_units_of_a_lab_with_what_to_do_next_first(tmp_path: Path) -> None:
     """verdict.json stays in SI units; only what is shown has others."""
     result = number()
-    seen = page(result, read_measurements(wrong_scale()), tmp_path)
+    seen = page(result, tmp_path)
     assert "SI" not in seen.text
     for value in ("1.2 MPa", "1.49 Pa s", "3.2 mm", "1.6 cm", "6 cm", "± 1 mm", "± 1°", "1.600 ± 0.016 cm"):
         assert value in seen.text, value
@@ -84,7 +75,7 @@ def test_a_corrected_robot_that_does_not_lower_the_error_is_not_advised() -> Non
 @pytest.mark.slow
 def test_a_claim_that_does_not_lower_the_error_says_so_first(tmp_path: Path) -> None:
     """In the verdict's first sentence, which verdict.json and the report have, too, and in what to do next."""
-    result, runs = ambiguous(), runs_of_one_length()
+    result = ambiguous()
     fallen, risen = (with_errors(result, before=0.03, after=after) for after in (0.02, 0.031))
     assert fallen.held_out_error_falls is True
     assert "does not fall" not in fallen.sentence
@@ -95,7 +86,7 @@ def test_a_claim_that_does_not_lower_the_error_says_so_first(tmp_path: Path) -> 
     record = verdict_record(risen, table="t")
     assert record["sentence"] == risen.sentence
     assert record["held_out_error_falls"] is False
-    seen = page(risen, runs, tmp_path)
+    seen = page(risen, tmp_path)
     assert words in seen.text
     assert [c.effect.name for c in risen.evidence.candidates if f"({c.effect.name})" not in seen.text] == []
     assert f"({risen.explaining[0].effect.name})" in risen.sentence  # as one types it
@@ -124,7 +115,7 @@ def test_where_nothing_is_claimed_nothing_can_fall() -> None:
 
 @pytest.mark.slow
 def test_rivals_are_told_apart_by_runs_that_are_worth_making_and_a_command(tmp_path: Path) -> None:
-    result, runs = ambiguous(), runs_of_one_length()
+    result = ambiguous()
     batch, run = result.next.batch, result.next.runs[0]
     assert batch is not None
 
@@ -139,14 +130,14 @@ def test_rivals_are_told_apart_by_runs_that_are_worth_making_and_a_command(tmp_p
     assert next_steps(facts(seldom))[0].startswith("Do not make runs with these settings")
     assert "--own" in next_steps(facts(seldom))[0]
     poor = proposing(0.14, 0.14)
-    seen = page(poor, runs, tmp_path)
+    seen = page(poor, tmp_path)
     assert "decide in 14 % of cases only" in seen.text
     assert "Runs to make next" not in seen.text
     assert "Single settings" not in seen.text
     record = verdict_record(poor, table="t")
     assert record["next_batch"]["worth_making"] is False
     assert [entry["worth_making"] for entry in record["next_runs"]] == [False]
-    seen = page(proposing(0.95, 0.93, 0.14), runs, tmp_path)
+    seen = page(proposing(0.95, 0.93, 0.14), tmp_path)
     assert "Runs to make next" in seen.text
     assert "`" not in seen.text
     assert "93 %" in seen.text
@@ -156,14 +147,14 @@ def test_rivals_are_told_apart_by_runs_that_are_worth_making_and_a_command(tmp_p
 @pytest.mark.slow
 def test_a_pull_that_is_not_taken_to_be_wrong_has_its_reason(tmp_path: Path) -> None:
     """And a report without a claim compares no model with itself."""
-    runs, plain = read_measurements(toy_table(3)), none()
+    plain = none()
     first, *others = plain.fits.pulls
     pulled = (replace(first, z=19.0), *others)
     for verdict, words in (
         ("unexplained", f"pull beyond 3: {first.parameter.title}. Nothing explains the residual, so none of them"),
         ("none", f"Taken to be wrong: {first.parameter.title}."),
     ):
-        seen = page(replace(plain, verdict=verdict, fits=replace(plain.fits, pulls=pulled)), runs, tmp_path)
+        seen = page(replace(plain, verdict=verdict, fits=replace(plain.fits, pulls=pulled)), tmp_path)
         assert "+19.0 (beyond 3)" in seen.text
         assert words in seen.text
         assert "None is taken to be wrong" not in seen.text
@@ -176,12 +167,13 @@ def test_a_pull_that_is_not_taken_to_be_wrong_has_its_reason(tmp_path: Path) -> 
 @pytest.mark.slow
 def test_the_number_to_measure_better_is_listed_with_what_it_would_show(tmp_path: Path) -> None:
     result = calibrated_toy(2)
-    seen = page(result, read_measurements(toy_table(2)), tmp_path).text
+    seen = page(result, tmp_path).text
     title = "Which number, measured better, would show what"
     best = next(p.title for p in result.base.fitted if p.name == facts(result)["halved_tolerances"][0]["name"])
     assert f"by: {best} (" in seen[seen.index(title) :]
     halved = notable_gains(result.evidence.candidates)[0]
-    assert detectable(halved.effect.effect, halved.halved) in seen[seen.index(title) :]
+    effect = shown(halved.effect.effect) | {"bounds": halved.effect.effect.bounds}
+    assert detectable(halved.halved, effect) in seen[seen.index(title) :]
 
 
 def test_numbers_are_written_without_exponents_and_changes_in_words() -> None:
@@ -214,7 +206,7 @@ def test_numbers_are_written_without_exponents_and_changes_in_words() -> None:
     ],
 )
 def test_the_size_of_an_effect_has_its_unit(unit: str, shown: float, words: str) -> None:
-    effect = Parameter("e", "an effect", 0.0, (-1.0, 2.0), 0.1, unit=unit, shown=shown)
-    assert size(effect, 0.05) == words
-    assert detectable(effect, 1e150) == "–"
-    assert detectable(effect, 6.2e6) == "beyond its range"  # it used to be "6.2e+06"
+    effect = {"given": 0.0, "bounds": [-1.0, 2.0], "unit": unit, "shown": shown}
+    assert size(0.05, effect) == words
+    assert detectable(1e150, effect) == "–"
+    assert detectable(6.2e6, effect) == "beyond its range"

@@ -31,16 +31,16 @@ from sim.model.schedule import Schedule, load_schedule
 from sim.motion.replay import replay
 from surrogate.__main__ import main as surrogate
 from surrogate.table.model_file import load_table
-from tests.calibration.toy_tables import DRAG, START, effect, none, toy_table, verdict_of
+from tests.calibration.toy_tables import DRAG, START, effect, none, verdict_of
 
 
 def with_effect() -> RobotVerdict:
-    return verdict_of(effect(), toy_table(5, **{DRAG: 5.0}))
+    return verdict_of(effect())
 
 
 @pytest.mark.slow
 def test_a_verdict_says_what_it_found_in_a_few_lines() -> None:
-    for verdict in (with_effect(), verdict_of(none(), toy_table(3))):
+    for verdict in (with_effect(), verdict_of(none())):
         text = repr(verdict)
         assert len(text.encode()) < 1000
         assert text.startswith(f"Verdict {verdict.verdict!r}")

@@ -79,7 +79,7 @@ def test_what_comes_nearest_is_adopted_where_nothing_explains() -> None:
     assert (result.verdict, result.effects) == ("partial", ())
     assert "The nearest form, head's end-over-end drag (end_over_end_drag), is adopted" in result.sentence
     assert result.error_after < 0.7 * result.error_before
-    robot = verdict_of(result, table)
+    robot = verdict_of(result)
     assert 2.0 < robot.corrected.effects[DRAG] < 8.0
     assert robot.knowledge.names.count(DRAG) == 1
 
@@ -182,11 +182,10 @@ def test_a_tracked_point_off_the_centre_changes_radius_and_angle_alone() -> None
 @pytest.mark.slow
 def test_an_effect_that_changes_nothing_says_so(tmp_path: Path) -> None:
     """The toy's tails cannot touch: no size of contact shows, and the report has no size for it."""
-    model = toy_swimmer(toy_table(1, lengths_cm=(8.0,), **{DRAG: 4.0}))
     result = ambiguous()
     contact = next(c for c in result.evidence.candidates if c.effect.name == "tail_contact")
     assert contact.verdict == "it changes nothing in these runs"
-    write_report(result, model.runs, tmp_path / "report.html", title="t")
+    write_report(result, tmp_path / "report.html", title="t")
     text = (tmp_path / "report.html").read_text()
     assert "–</td>" in text
     assert "e+150" not in text

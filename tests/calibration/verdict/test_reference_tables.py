@@ -87,7 +87,7 @@ def test_rivals_are_all_named_with_the_runs_that_would_tell_them_apart(tmp_path:
     assert len(result.effects) > 1
     assert result.next_runs
     page = tmp_path / "report.html"
-    write_report(result, data, page, title="t")
+    write_report(result, page, title="t")
     text = page.read_text()
     assert "Runs to make next" in text
     for run in result.next_runs:

@@ -1,21 +1,21 @@
 """Numbers of a calibration as people read them: outputs, nuisance parameters and sizes, in the lab's units.
 
 Inside a calibration outputs are logarithms, so their residuals are relative; θ is in rad, so its residuals are
-shown in degrees. Nuisance parameters and effects know the unit in which they are shown
-(`calibration.statistics.statistical_model.Parameter`).
+shown in degrees. The record of a nuisance parameter or of an effect has the `unit` in which it is shown, and the
+factor to it, `shown` (`calibration.verdict.record`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from calibration.attribution.refits import UNSEEN
-from calibration.statistics.pull import Pull
-from calibration.statistics.statistical_model import Parameter
-from sim.arrays import Floats
+
+Record = Mapping[str, Any]  # a part of verdict.json, or all of it
 
 _OUTPUTS = {
     "omega_h": "head spin",
@@ -27,6 +27,7 @@ _OUTPUTS = {
 }
 _FEATURES = {"omega": "ω", "direction": "motor's direction"}  # what words of a feature's name read as
 _IN_DEGREES = "theta"
+_RESOLVED = 2.01  # over the number of draws and one more: the bootstrap resolves no smaller p
 
 
 def output_label(output: str) -> str:
@@ -39,7 +40,7 @@ def output_scale(output: str) -> tuple[float, str]:
     return (math.degrees(1.0), "°") if output == _IN_DEGREES else (100.0, "%")
 
 
-def output_error(output: str, error: float) -> str:
+def output_error(error: float, output: str) -> str:
     """Write an error of an output: in per cent, of the slip angle in degrees."""
     scale, unit = output_scale(output)
     return f"{scale * error:.1f}{_after_number(unit)}"
@@ -68,19 +69,33 @@ def with_error(value: float, error: float, unit: str, *, signed: bool = False) -
     return f"{number} ± {error:.{decimals}f}{_after_number(unit)}"
 
 
-def given(nuisance: Parameter) -> str:
+def percent(value: float, decimals: int = 2) -> str:
+    """Write a share in per cent."""
+    return f"{100 * value:.{decimals}f} %"
+
+
+def digits(value: float, count: int = 3) -> str:
+    """Write a number with so many significant digits, large ones with an exponent."""
+    return f"{value:.{count}g}"
+
+
+def p_in_words(p_value: float, draws: int) -> str:
+    """Write a p-value of a bootstrap."""
+    return f"p {'≤' if p_value <= _RESOLVED / (draws + 1) else '='} {p_value:.2g}"
+
+
+def given(number: Record) -> str:
     """Write the value of a nuisance parameter that was given; that of an offset or a scale is in the table."""
-    if nuisance.start in (0.0, 1.0) and (nuisance.unit == "1" or not nuisance.logarithmic):
+    if number["given"] in (0.0, 1.0) and (number["unit"] == "1" or number["scale"] != "logarithm"):
         return "as in the table"
-    return f"{plain(nuisance.start * nuisance.shown, 4)} {nuisance.unit}"
+    return f"{plain(number['given'] * number['shown'], 4)} {number['unit']}"
 
 
-def tolerance(nuisance: Parameter) -> str:
+def tolerance(number: Record) -> str:
     """Write the standard deviation that was stated for a nuisance parameter."""
-    assert nuisance.sigma is not None
-    if nuisance.logarithmic:
-        return f"± {plain(100 * nuisance.sigma, 2)} %"
-    return f"± {plain(nuisance.shown * nuisance.sigma, 2)}{_after_number(nuisance.unit)}"
+    if number["scale"] == "logarithm":
+        return f"± {plain(100 * number['sigma'], 2)} %"
+    return f"± {plain(number['shown'] * number['sigma'], 2)}{_after_number(number['unit'])}"
 
 
 def _after_number(unit: str) -> str:
@@ -88,21 +103,20 @@ def _after_number(unit: str) -> str:
     return unit if unit == "°" else f" {unit}"
 
 
-def fitted_value(pull: Pull, *, alone: bool = False) -> str:
-    """Write what a nuisance parameter is with its prior, or by the runs `alone`."""
-    nuisance = pull.parameter
-    change, error = (pull.alone, pull.alone_error) if alone else (pull.change, pull.error)
-    if not nuisance.logarithmic:
-        return with_error(change * nuisance.shown, error * nuisance.shown, nuisance.unit, signed=True)
-    if nuisance.unit == "1":
+def fitted_value(number: Record, by: str = "") -> str:
+    """Write what a nuisance parameter is with its prior, or `by` the runs alone."""
+    change, error, unit = number[f"change{by}"], number[f"change{by}_error"], number["unit"]
+    if number["scale"] != "logarithm":
+        return with_error(change * number["shown"], error * number["shown"], unit, signed=True)
+    if unit == "1":
         return with_error(100 * math.expm1(change), 100 * error * math.exp(change), "%", signed=True)
-    value = nuisance.start * math.exp(change) * nuisance.shown
-    return with_error(value, error * value, nuisance.unit)
+    value = number["given"] * math.exp(change) * number["shown"]
+    return with_error(value, error * value, unit)
 
 
-def size(effect: Parameter, value: float, digits: int = 3) -> str:
-    """Write the size of an effect in its unit."""
-    number, unit = plain(value * effect.shown, digits), effect.unit
+def size(value: float, of: Record, count: int = 3) -> str:
+    """Write the size of an effect in its unit, with so many significant digits."""
+    number, unit = plain(value * of["shown"], count), of["unit"]
     if unit == "1" or unit.startswith("1:"):
         return number
     if unit.startswith("1/"):
@@ -113,26 +127,34 @@ def size(effect: Parameter, value: float, digits: int = 3) -> str:
     return f"{number} × {unit}" if is_product else f"{number} {unit}"
 
 
-def detectable(effect: Parameter, value: float) -> str:
+def detectable(value: float, of: Record) -> str:
     """Write a smallest detectable size; a dash where no size shows in these runs."""
     if value >= UNSEEN:
         return "–"
-    if value > max(abs(bound - effect.start) for bound in effect.bounds):
+    if value > max(abs(bound - of["given"]) for bound in of["bounds"]):
         return "beyond its range"
-    return size(effect, value, 2)
+    return size(value, of, 2)
 
 
-def direction_in_words(direction: dict[str, float], error: float) -> str:
+def direction_in_words(direction: Mapping[str, float], error: float) -> str:
     """Say how coefficients change together along a direction in their logarithms, by one standard deviation."""
     changes = {name: 100 * math.expm1(part * error) for name, part in direction.items() if abs(part) > 0.1}
     words = [f"{name} {plain(abs(c), 2)} % {'larger' if c > 0 else 'smaller'}" for name, c in changes.items()]
     return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
 
 
-def ranges_in_words(settings: Mapping[str, tuple[Floats, str]]) -> str:
-    """Say between which values each of the settings of runs lies (`Runs.settings`)."""
-    ends = [(name, float(values.min()), float(values.max()), unit) for name, (values, unit) in settings.items()]
+def ranges_in_words(settings: Mapping[str, tuple[float, float, str]]) -> str:
+    """Say between which values each setting of runs lies: name -> its ends and its unit."""
     return ", ".join(
         f"{name} = {plain(low)}{unit}" if low == high else f"{name} from {plain(low)} to {plain(high)}{unit}"
-        for name, low, high, unit in ends
+        for name, (low, high, unit) in settings.items()
     )
+
+
+def final_model(verdict: str, nearest: object, effects: Sequence[str]) -> str:
+    """Name the final model of a verdict, in words for a column or a caption; empty if it is the calibrated one."""
+    if verdict == "number":
+        return "with the wrong value corrected"
+    if nearest:
+        return "with the adopted form"
+    return "with the verdict's effects" if effects else ""
