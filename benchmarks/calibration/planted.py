@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from calibration.statistics.gls import Noise
 from calibration.statistics.statistical_model import (
-    Noise,
     Parameter,
     Parameters,
     Runs,
     Value,
-    prior_rows,
+    precisions,
     start_values,
 )
 from calibration.statistics.study import middle_session
@@ -163,7 +163,7 @@ class Signals:
         white = Noise(NOISE**2 * np.eye(k), (SESSION / NOISE) ** 2)
         self.white = white.whitener(model.runs.session[self.used])
         fitted = (*model.coefficients, *model.nuisances)
-        rows = prior_rows(fitted, start_values(model))[0]
+        rows = np.diag(np.sqrt(precisions(fitted)))
         J = np.concatenate([model.J, model.G], -1)
         self.priors = len(rows)
         self.absorbed = np.linalg.qr(np.concatenate([self.white(J[self.used]), rows]))[0]

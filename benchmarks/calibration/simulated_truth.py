@@ -13,7 +13,14 @@ from typing import Any
 import numpy as np
 
 from benchmarks.calibration.planted import ROBOT, Signals, design, scatter
-from calibration.statistics.statistical_model import Experiment, Parameter, prior_rows, start_values, stepped
+from calibration.statistics.statistical_model import (
+    Experiment,
+    Parameter,
+    changes,
+    precisions,
+    start_values,
+    stepped,
+)
 from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from sim.arrays import Floats
 from sim.motion.batches import stepped_columns
@@ -68,8 +75,9 @@ def _strength(outputs: Floats, model: SwimmerModel, signals: Signals) -> float:
     parameters, unabsorbed = start_values(model), np.zeros(0)
     for _ in range(_PASSES):
         prediction, J = model.derivatives(parameters, names)
-        rows, pull = prior_rows(fitted, parameters)
-        columns = np.concatenate([signals.white(J[used]), rows])
+        root = np.sqrt(precisions(fitted))
+        columns = np.concatenate([signals.white(J[used]), np.diag(root)])
+        pull = -root * changes(fitted, parameters)
         values = np.concatenate([signals.white((outputs - prediction)[used]), pull])
         step = np.linalg.lstsq(columns, values, rcond=None)[0]
         unabsorbed = values - columns @ step

@@ -27,8 +27,9 @@ import numpy as np
 
 from calibration.attribution.refits import Candidate
 from calibration.statistics.fit import Fit
-from calibration.statistics.held_out import held_out_p_value, one_step
-from calibration.statistics.statistical_model import Runs, prior_rows, stepped
+from calibration.statistics.gls import eliminated
+from calibration.statistics.held_out import held_out_p_value
+from calibration.statistics.statistical_model import Runs, regression, stepped
 from calibration.statistics.study import Study
 from sim.arrays import Flags, Floats
 
@@ -59,19 +60,16 @@ def with_checks(study: Study, claims: Sequence[Candidate], base: Fit) -> list[Ca
 
 def absorbable_shares(study: Study, fitted: Fit, names: Sequence[str]) -> Floats:
     """Draw signals from outside, made from each of the effects `names` of a fit in turn, and return their a."""
-    runs, used = study.model.runs, study.split.fitted
-    white = fitted.noise.whitener(runs.session[used], runs.scale[used])
-    rows = prior_rows(fitted.fitted, fitted.parameters)[0]
-    J = np.concatenate([white(fitted.jacobian[used]), rows])
+    runs, used, noise = study.model.runs, study.split.fitted, fitted.noise
     claimed = [fitted.names.index(name) for name in names]
-    others = [i for i in range(J.shape[1]) if i not in claimed]
-    without, with_claim = (np.linalg.qr(_scaled(J[:, columns]))[0] for columns in (others, [*others, *claimed]))
+    order = [*(i for i in range(len(fitted.names)) if i not in claimed), *claimed]
     factors = deformations(runs, used, _DRAWS, study.seed)
-    signals = np.concatenate([fitted.jacobian[used][..., [p]] * factors[:, None] for p in claimed], -1)
-    signals = np.concatenate([white(signals), np.zeros((len(rows), signals.shape[-1]))])
-    before = signals - without @ (without.T @ signals)
-    after = signals - with_claim @ (with_claim.T @ signals)
-    return np.asarray(1 - (after**2).sum(0) / np.maximum((before**2).sum(0), 1e-300))
+    signals = np.concatenate([fitted.jacobian[used, :, p] * factors.T[..., None] for p in claimed])  # (B, n, k)
+    linear = regression(runs, used, fitted.jacobian[..., order], [fitted.fitted[i] for i in order])
+    normal = linear.products(signals, noise.run).at(np.full(len(signals), noise.share))
+    before = eliminated(normal, len(order) - len(claimed))
+    after = eliminated(before, len(claimed))
+    return np.asarray(1 - after[:, -1, -1] / np.maximum(before[:, -1, -1], 1e-300))
 
 
 def imitability(shares: Floats, strength: float) -> float:
@@ -92,10 +90,6 @@ def deformations(runs: Runs, used: Flags, count: int, seed: int) -> Floats:
     return np.asarray(np.exp(_SPREAD * g)[place.reshape(-1)])
 
 
-def _scaled(J: Floats) -> Floats:
-    return J / np.maximum(np.linalg.norm(J, axis=0), 1e-300)
-
-
 def transfer_p(study: Study, fitted: Fit) -> float:
     """Estimate the probability that noise alone puts the other runs as far from a model with the claim.
 
@@ -107,7 +101,7 @@ def transfer_p(study: Study, fitted: Fit) -> float:
     values = near.sum() * runs.y.shape[1]
     if not others.any() or values < _ENOUGH * len(fitted.names):
         return 1.0
-    refit = one_step(runs, fitted, near)
+    refit = fitted.products(runs, near).solve(passes=3)
     moved = replace(
         fitted,
         parameters=stepped(fitted.fitted, fitted.parameters, refit.step),

@@ -42,6 +42,7 @@ from scipy.stats import t as student
 
 from calibration.attribution.refits import FIRST, Candidate, left_out_residuals
 from calibration.statistics.fit import Fit, UnsolvedError, birge, fit
+from calibration.statistics.gls import solved
 from calibration.statistics.held_out import FinalRefit
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, examine_residual
 from calibration.statistics.shifted import Shift, Shifted
@@ -51,7 +52,8 @@ from calibration.statistics.statistical_model import (
     Parameter,
     Parameters,
     Runs,
-    prior_rows,
+    changes,
+    regression,
 )
 from calibration.statistics.study import Study
 from sim.arrays import Floats, Integers
@@ -262,14 +264,10 @@ def _restricted(study: Study, fitted: Fit, b: float) -> float:
 
     Priors of its parameters are in units of S, as those of the study are.
     """
-    runs, used = study.model.runs, study.split.fitted
-    white = fitted.noise.whitener(runs.session[used], runs.scale[used])
-    rows, prior = prior_rows(fitted.fitted, fitted.parameters)
-    J = np.concatenate([white(fitted.jacobian[used]), rows])
-    residual = np.concatenate([white((runs.y - fitted.prediction)[used]), prior])
+    normal = fitted.normal(study.model.runs, study.split.fitted) / b
     sigmas = [p.sigma for p in fitted.fitted if p.sigma is not None]
-    curvature = np.linalg.slogdet(J.T @ J / b)[1]
-    return float(residual @ residual / b + curvature + sum(math.log(b * s**2) for s in sigmas))
+    curvature = np.linalg.slogdet(normal[:-1, :-1])[1]
+    return float(normal[-1, -1] + curvature + sum(math.log(b * s**2) for s in sigmas))
 
 
 def _judged(
@@ -318,15 +316,13 @@ def _differs_from_null(study: Study, model: Shifted, fitted: Fit, seen: Integers
     own = {effect.name, *(s.parameter.name for s in model.shifts)}
     kept = [i for i, name in enumerate(fitted.names) if name not in own]
     sizes = sizes_of(model, fitted.parameters)[seen]
-    along = model.inner.derivatives(model.of_runs(fitted.parameters), [effect.name])[1][used]
-    along = along * (specimens(runs)[0][used][:, None] == seen)[:, None, :]
-    white = fitted.noise.whitener(runs.session[used], runs.scale[used])
-    rows, prior = prior_rows([fitted.fitted[i] for i in kept], fitted.parameters)
-    J = np.block(
-        [[white(fitted.jacobian[used][..., kept]), white(along)], [rows, np.zeros((len(rows), len(seen)))]]
-    )
-    residual = np.concatenate([white((runs.y - fitted.prediction)[used]), prior])
-    asked = sizes - effect.start + np.linalg.lstsq(J, residual, rcond=None)[0][len(kept) :]
+    along = model.inner.derivatives(model.of_runs(fitted.parameters), [effect.name])[1]
+    along = along * (specimens(runs)[0][:, None] == seen)[:, None, :]
+    others = [fitted.fitted[i] for i in kept]
+    linear = regression(runs, used, np.concatenate([fitted.jacobian[..., kept], along], -1), others)
+    residual, noise = (runs.y - fitted.prediction)[used], fitted.noise
+    normal = linear.products(residual, noise.run, changes(others, fitted.parameters)).at(noise.share)
+    asked = sizes - effect.start + solved(normal)[0][len(kept) :]
     error = asked.std(ddof=1) / math.sqrt(len(seen))
     return bool(abs(asked.mean()) > student.ppf(0.975, len(seen) - 1) * error)
 

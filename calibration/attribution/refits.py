@@ -27,8 +27,9 @@ import numpy as np
 from tqdm import tqdm
 
 from calibration.statistics.fit import Fit, UnsolvedError, fit, noise_at_most
+from calibration.statistics.gls import solved
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
-from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, prior_rows, start_values
+from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, start_values
 from calibration.statistics.study import Study, groups, leave_one_group_out
 from sim.arrays import Flags, Floats
 
@@ -301,10 +302,6 @@ def left_out_residuals(study: Study, base: Fit, refit: Fit) -> tuple[Floats, Flo
 def _left_out_residual(study: Study, fitted: Fit, refit: Fit, learn: Flags, out: Flags) -> Floats:
     """Whiten the residuals of a left-out session, for a model fitted to the others, in the noise of `refit`."""
     data = study.model.runs
-    white = refit.noise.whitener(data.session[learn], data.scale[learn])
-    residual = data.y - fitted.prediction
-    rows, prior = prior_rows(fitted.fitted, fitted.parameters)
-    derivative = np.concatenate([white(fitted.jacobian[learn]), rows])
-    step = np.linalg.lstsq(derivative, np.concatenate([white(residual[learn]), prior]), rcond=None)[0]
-    predicted = residual[out] - fitted.jacobian[out] @ step
+    step = solved(fitted.normal(data, learn, refit.noise))[0]
+    predicted = (data.y - fitted.prediction)[out] - fitted.jacobian[out] @ step
     return np.asarray(refit.noise.whitener(data.session[out], data.scale[out])(predicted))

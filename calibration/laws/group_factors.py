@@ -35,18 +35,8 @@ from calibration.laws.inputs import EXPONENTS, logarithms
 from calibration.laws.law_model import SIZE, LawModel
 from calibration.laws.readings import INPUTS
 from calibration.statistics.fit import Fit
-from calibration.statistics.residual_tests import FixedColumns
-from calibration.statistics.statistical_model import (
-    Parameter,
-    Sums,
-    changes,
-    inverse_root,
-    precisions,
-    repeat_covariance,
-    session_share,
-    solved,
-    stepped,
-)
+from calibration.statistics.gls import Gls, eliminated
+from calibration.statistics.statistical_model import Parameter, changes, precisions, regression, stepped
 from sim.arrays import Flags, Floats, Integers
 
 DRAWS = 999  # of the bootstrap
@@ -147,32 +137,28 @@ def with_shifts(model: LawModel, fitted: Fit, used: Flags, symbol: str) -> Fit:
         symbol: the input, of those that `group_factors` returns.
     """
     (linear,) = [one for one in _linear_models(model, fitted, used) if INPUTS[one.place] == symbol]
-    count = linear.contrasts.shape[1]
+    count, data = linear.contrasts.shape[1], model.runs
     columns = np.zeros((*fitted.prediction.shape, count))
     columns[used] = linear.load[..., None] * (linear.members @ linear.contrasts)[:, None]
     jacobian = np.concatenate([fitted.jacobian, columns], -1)
     shifts = tuple(Parameter(f"shift_{i}", "a shift", 0.0, (-np.inf, np.inf), 1.0) for i in range(count))
-    design = linear.design(jacobian[used])
     shift = changes(fitted.fitted, fitted.parameters)
-    as_given = (model.runs.y - fitted.prediction)[used] + fitted.jacobian[used] @ shift
-    root = inverse_root(fitted.noise.run)[None]
-    products = _products(
-        design, as_given[None] * linear.scale[:, None], root, precisions((*fitted.fitted, *shifts))
+    products = regression(data, used, jacobian, (*fitted.fitted, *shifts)).products(
+        (data.y - fitted.prediction)[used], fitted.noise.run, np.r_[shift, np.zeros(count)]
     )
-    share = session_share(products, passes=_PASSES)
-    step, covariance = (part[0] for part in solved(products.at(share)))
-    step[: len(shift)] -= shift
+    refit = products.solve(passes=_PASSES)
+    step = refit.step
     moved = stepped(fitted.fitted, fitted.parameters, step[: len(shift)])
     return replace(
         fitted,
         parameters={**moved, **dict(zip((p.name for p in shifts), step[len(shift) :].tolist(), strict=True))},
         fitted=(*fitted.fitted, *shifts),
         names=(*fitted.names, *(p.name for p in shifts)),
-        covariance=fitted.inflation * covariance,
+        covariance=fitted.inflation * refit.covariance,
         freedom=np.r_[fitted.freedom, np.full(count, np.inf)],
         prediction=fitted.prediction + jacobian @ step,
         jacobian=jacobian,
-        noise=replace(fitted.noise, share=float(share[0])),
+        noise=replace(fitted.noise, share=float(refit.share)),
     )
 
 
@@ -195,44 +181,28 @@ class _LinearModel:
     scale: Floats  # (n,) roots of the weights of the runs
 
     @cached_property
-    def precision(self) -> Floats:
-        """Of the priors, (p,)."""
-        return precisions([self.fitted.fitted[i] for i in self.others])
-
-    @cached_property
     def middle(self) -> Floats:
         """Mean of x in each group, (G,)."""
         return (self.x @ self.members) / self.members.sum(0)
 
     @cached_property
-    def tested(self) -> FixedColumns:
+    def tested(self) -> Gls:
         """The other parameters, the power law, and the contrasts."""
-        power = self.load[..., None] * np.stack([np.ones_like(self.x), self.x], 1)[:, None]
-        free = self.load[..., None] * (self.members @ self.contrasts)[:, None]
-        return self.design(np.concatenate([self.J, power, free], -1))
+        return self.with_load(np.stack([np.ones_like(self.x), self.x], 1), self.members @ self.contrasts)
 
-    def design(self, columns: Floats) -> FixedColumns:
-        """Multiply columns (n, k, m) with each other, by the weights of their runs."""
-        return FixedColumns(columns * self.scale[:, None, None], self.session, self.scale)
+    def with_load(self, *factors: Floats) -> Gls:
+        """Regress on the other parameters and on the load times factors (n, m) of the runs."""
+        columns = [self.J, *(self.load[..., None] * each[:, None] for each in factors)]
+        precision = precisions([self.fitted.fitted[i] for i in self.others])
+        return Gls(np.concatenate(columns, -1), precision, self.session, self.scale, self.repeated)
 
     def gain(self, residual: Floats) -> Floats:
         """Compute T (B,) of residuals (B, n, k), each in its own S and ρ."""
-        root = inverse_root(repeat_covariance(residual, self.repeated, self.scale))
-        products = _products(self.tested, residual * self.scale[:, None], root, self.precision)
-        normal = products.at(session_share(products, passes=_PASSES))
-        information, score = _eliminated(normal, normal.shape[-1] - 1 - self.contrasts.shape[1])
-        return (score * np.linalg.solve(information, score[..., None])[..., 0]).sum(-1)
-
-    def drawn(self, rng: np.random.Generator, count: int) -> Floats:
-        """Draw residuals (B, n, k) for which the law is right."""
-        n, k = self.as_given.shape
-        kinds, of_run = np.unique(self.session, return_inverse=True)
-        noise = rng.normal(size=(count, n, k)) / self.scale[:, None]
-        noise += math.sqrt(self.fitted.noise.share) * rng.normal(size=(count, len(kinds), k))[:, of_run]
-        sigma = np.where(self.precision > 0, np.maximum(self.precision, 1e-300) ** -0.5, 0.0)
-        nuisances = rng.normal(size=(count, len(sigma))) * sigma
-        root = np.linalg.cholesky(self.fitted.noise.run)
-        return np.asarray(noise @ root.T + np.einsum("nkp,bp->bnk", self.J, nuisances))
+        products = self.tested.products(residual)
+        normal = products.at(products.share(passes=_PASSES))
+        left = eliminated(normal, normal.shape[-1] - 1 - self.contrasts.shape[1])
+        score = left[..., :-1, -1]
+        return (score * np.linalg.solve(left[..., :-1, :-1], score[..., None])[..., 0]).sum(-1)
 
 
 def _linear_models(model: LawModel, fitted: Fit, used: Flags) -> list[_LinearModel]:
@@ -274,7 +244,10 @@ def _estimated(linear: _LinearModel, rng: np.random.Generator, draws: int) -> Gr
     """Estimate the shifts along an input, and test the power law."""
     observed = float(linear.gain(linear.as_given[None])[0])
     batches = [min(_AT_ONCE, draws - first) for first in range(0, draws, _AT_ONCE)]
-    null = np.concatenate([linear.gain(linear.drawn(rng, count)) for count in batches])
+    noise = linear.fitted.noise
+    null = np.concatenate(
+        [linear.gain(linear.tested.draw(rng, noise.run, np.full(count, noise.share))) for count in batches]
+    )
     shifts, information = _shifts(linear)
     name = EXPONENTS[linear.place]
     return GroupFactors(
@@ -292,13 +265,9 @@ def _estimated(linear: _LinearModel, rng: np.random.Generator, draws: int) -> Gr
 
 def _shifts(linear: _LinearModel) -> tuple[Floats, Floats]:
     """Estimate the shifts (G,), with their information W (G, G)."""
-    free = linear.load[..., None] * linear.members[:, None]
-    design = linear.design(np.concatenate([linear.J, free], -1))
-    root = inverse_root(linear.fitted.noise.run)[None]
-    as_given = linear.as_given[None] * linear.scale[:, None]
-    products = _products(design, as_given, root, linear.precision)
-    normal = products.at(session_share(products, passes=_PASSES))[0]
-    information, score = _eliminated(normal, len(linear.precision))
+    products = linear.with_load(linear.members).products(linear.as_given, linear.fitted.noise.run)
+    left = eliminated(products.at(products.share(passes=_PASSES)), len(linear.others))
+    information, score = left[:-1, :-1], left[:-1, -1]
     if not linear.model.place.is_term:  # a factor that all groups have in common is free
         common = information.sum(1)
         whole = max(float(common.sum()), _SEEN * float(np.trace(information)))
@@ -306,21 +275,3 @@ def _shifts(linear: _LinearModel) -> tuple[Floats, Floats]:
         information = information - np.outer(common, common) / whole
     shifts = np.linalg.pinv(information, rcond=_SEEN, hermitian=True) @ score
     return shifts, information / linear.fitted.inflation
-
-
-def _products(design: FixedColumns, residual: Floats, root: Floats, precision: Floats) -> Sums:
-    """Multiply the columns and residuals (B, n, k) that L⁻¹ (B, k, k) makes white, with the priors."""
-    products = design.sums(np.swapaxes(root, -1, -2) @ root, residual)
-    diagonal = range(len(precision))
-    products.within[..., diagonal, diagonal] += precision
-    return products
-
-
-def _eliminated(normal: Floats, first: int) -> tuple[Floats, Floats]:
-    """Eliminate the `first` columns; return what is left of the others and of their products with the last."""
-    corner = np.concatenate([normal[..., :first, :first], normal[..., :first, -1:]], -1)
-    square = np.concatenate([corner, np.concatenate([normal[..., -1:, :first], normal[..., -1:, -1:]], -1)], -2)
-    covariance = solved(square)[1]
-    across = normal[..., :first, first:]
-    left = normal[..., first:, first:] - np.swapaxes(across, -1, -2) @ covariance @ across
-    return left[..., :-1, :-1], left[..., :-1, -1]

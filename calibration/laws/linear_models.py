@@ -25,12 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.statistics.statistical_model import (
-    SESSION_SHARE,
-    averaging_rows,
-    inverse_root,
-    repeat_covariance,
-)
+from calibration.statistics.gls import SESSION_SHARE, Gls, inverse_root
 from sim.arrays import Floats, Integers
 
 _SHARES = 9  # values of ρ at which the deviance is computed
@@ -79,16 +74,15 @@ class LinearModels:
             further: parameters that a model has beside its columns; default none.
         """
         n, k, self.p = absorbed.shape
-        self.absorbed, self.precision, self.columns = absorbed, precision, columns
-        self.models, self.session, self.repeated = tuple(models), session, repeated
+        self.absorbed, self.columns, self.models = absorbed, columns, tuple(models)
+        self.without = Gls(absorbed, precision, session, scale, repeated)
         self._further = np.array(further if len(further) else [0] * len(self.models))
         self._places, self._count = columns.shape[2:]
-        self.scale = np.ones(n) if scale is None else scale
-        self._picks, self._sizes = averaging_rows(session, self.scale)
+        self._picks, self._sizes = self.without.picks, self.without.sizes
         whole = math.log1p(SESSION_SHARE * self._sizes.mean())
         self._levels = np.linspace(0.0, whole, _SHARES) if len(self._sizes) > 1 else np.array([whole])
         shares = np.expm1(self._levels) / self._sizes.mean()
-        table = np.concatenate([absorbed, columns.reshape(n, k, -1)], -1) * self.scale[:, None, None]
+        table = np.concatenate([absorbed, columns.reshape(n, k, -1)], -1) * self.without.scale[:, None, None]
         less = 1 / (1 + shares[:, None] * self._sizes) - 1  # (g, s)
         self._less = less
         means = np.tensordot(self._picks, table, 1)
@@ -156,12 +150,12 @@ class LinearModels:
         """
         count, _, k = residual.shape
         p, places, columns = self.p, self._places, self._count
-        root = inverse_root(repeat_covariance(residual, self.repeated, self.scale))
-        residual = residual * self.scale[:, None]
+        root = inverse_root(self.without.noise(residual))
+        residual = residual * self.without.scale[:, None]
         inverse = np.swapaxes(root, -1, -2) @ root
         flat = inverse.reshape(count, k * k)
         of_absorbed, across, own = (flat @ part for part in self._products)  # (g, b, ...)
-        A = of_absorbed.reshape(-1, count, p, p) + np.diag(self.precision)
+        A = of_absorbed.reshape(-1, count, p, p) + np.diag(self.without.precision)
         across = across.reshape(-1, count, p, places * columns)
         weighted = residual @ inverse
         toward = weighted.reshape(count, -1) @ self._weighted  # (g, b, p + P v)

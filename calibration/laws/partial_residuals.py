@@ -23,7 +23,7 @@ from calibration.laws.group_factors import along_load, grouped
 from calibration.laws.inputs import EXPONENTS, logarithms
 from calibration.laws.law import Law
 from calibration.laws.readings import INPUTS
-from calibration.statistics.statistical_model import inverse_root
+from calibration.statistics.gls import inverse_root
 from sim.arrays import Flags, Floats
 
 _LARGEST = 20.0  # logarithm of a factor

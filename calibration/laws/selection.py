@@ -34,7 +34,6 @@ import numpy as np
 
 from calibration.attribution.refits import INDISTINGUISHABLE
 from calibration.laws.search import Search
-from calibration.statistics.statistical_model import repeat_covariance
 from sim.arrays import Floats, Integers
 
 _NULL_DRAWS = 999  # tables without a law
@@ -101,21 +100,11 @@ class _Draws:
 
     def __init__(self, search: Search, rng: np.random.Generator):
         self._search, self._rng = search, rng
-        models = search.models
-        self._root = np.linalg.cholesky(repeat_covariance(search.residual, models.repeated, models.scale))
-        self._session = np.unique(models.session, return_inverse=True)[1].reshape(-1)
-        known = models.precision > 0
-        self._sigma = np.where(known, 1 / np.sqrt(np.where(known, models.precision, 1.0)), 0.0)
+        self._run = search.models.without.noise(search.residual)
 
     def noise(self, share: Floats) -> Floats:
-        """Draw noise of runs and sessions, and nuisance parameters, (B, n, k), with ρ of each table (B,)."""
-        count, shape = len(share), self._search.residual.shape
-        noise = self._rng.normal(size=(count, *shape)) / self._search.models.scale[:, None]
-        sessions = self._rng.normal(size=(count, self._session.max() + 1, shape[1]))[:, self._session]
-        noise += np.sqrt(share)[:, None, None] * sessions
-        nuisances = self._rng.normal(size=(count, len(self._sigma))) * self._sigma
-        absorbed = self._search.models.absorbed
-        return np.asarray(noise @ self._root.T + np.tensordot(nuisances, absorbed, (1, 2)))
+        """Draw tables without a law, (B, n, k), with ρ of each (B,)."""
+        return self._search.models.without.draw(self._rng, self._run, share)
 
     def with_laws(self, count: int) -> Floats:
         """Draw tables with the best law of a place, which is drawn by its probability, (B, n, k)."""

@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from calibration.statistics.statistical_model import inverse_root
+from calibration.statistics.gls import inverse_root
 from sim.arrays import Floats, Integers
 
 _RATIOS = (9.0, 25.0, 100.0)  # c²

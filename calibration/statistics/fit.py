@@ -27,24 +27,18 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import t as student
 
+from calibration.statistics.gls import Noise, Products, eliminated, repeat_count, repeat_covariance
 from calibration.statistics.pull import Pull
 from calibration.statistics.statistical_model import (
     ForwardModel,
-    Noise,
     Parameter,
     Parameters,
     Runs,
-    Sums,
-    inverse_root,
-    least_squares,
+    changes,
     moved,
     parameter,
-    prior_rows,
-    repeat_count,
-    repeat_covariance,
+    regression,
     stepped,
-    sums,
-    with_prior,
 )
 from sim.arrays import Flags, Floats
 
@@ -97,6 +91,18 @@ class Fit:
             return value * math.exp(-half), value * math.exp(half)
         return value - half, value + half
 
+    def products(self, runs: Runs, rows: Flags, run: Floats | None = None) -> Products:
+        """Multiply the derivatives and the residual of the runs in `rows` (n,), with the priors, in an S."""
+        residual = (runs.y - self.prediction)[rows]
+        linear = regression(runs, rows, self.jacobian, self.fitted)
+        run = self.noise.run if run is None else run
+        return linear.products(residual, run, changes(self.fitted, self.parameters))
+
+    def normal(self, runs: Runs, rows: Flags, noise: Noise | None = None) -> Floats:
+        """Return them at ρ, (p + 1, p + 1); default: in the noise of the fit."""
+        noise = noise or self.noise
+        return self.products(runs, rows, noise.run).at(noise.share)
+
 
 def fit(
     model: ForwardModel,
@@ -124,9 +130,9 @@ def fit(
     fitted = tuple(replace(p, sigma=None) if p.name in freed else p for p in fitted)
     repeats = data.repeats(used)
     run = repeat_covariance(data.y[used], repeats, data.scale[used])
-    problem = _Problem(model, fitted, used, inverse_root(run), title)
+    problem = _Problem(model, fitted, used, run, title)
     point = _descend(problem, problem.first(dict(start)), target)
-    linear = least_squares(point.products, passes=_PASSES)
+    linear = point.products.solve(passes=_PASSES)
     share = float(linear.share)
     normal = point.products.at(linear.share)
     inflation = _inflation(repeat_count(repeats), len(run))
@@ -153,7 +159,7 @@ class _Point:
     parameters: dict[str, float]
     prediction: Floats  # (n, k)
     derivative: Floats  # (n, k, p), at these parameters or near them
-    products: Sums  # of the derivatives and the residual
+    products: Products  # of the derivatives and the residual
 
     @property
     def solved(self) -> bool:
@@ -167,7 +173,7 @@ class _Problem:
     model: ForwardModel
     fitted: tuple[Parameter, ...]
     used: Flags
-    root: Floats
+    run: Floats
     title: str
 
     def first(self, parameters: dict[str, float]) -> _Point:
@@ -198,10 +204,10 @@ class _Problem:
             )
         else:
             prediction = self.model.derivatives(parameters, [], title=title, quick=quick)[0]
-        data = self.model.runs
-        table = np.concatenate([derivative, (data.y - prediction)[..., None]], -1)[self.used]
-        products = sums(self.root @ table, data.session[self.used], len(self.root), data.scale[self.used])
-        return _Point(parameters, prediction, derivative, with_prior(products, self.fitted, parameters))
+        linear = regression(self.model.runs, self.used, derivative, self.fitted)
+        residual = (self.model.runs.y - prediction)[self.used]
+        products = linear.products(residual, self.run, changes(self.fitted, parameters))
+        return _Point(parameters, prediction, derivative, products)
 
 
 class _Step(NamedTuple):
@@ -222,7 +228,7 @@ def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
     for count in range(1, _MOST_STEPS + 1):
         # The scatter of the sessions comes from the residuals of the fit, but only near the solution. Far from it
         # every session looks shifted, and with a large ρ the search would stop there.
-        share = least_squares(point.products, passes=0 if count == 1 else _PASSES).share
+        share = point.products.share(passes=0 if count == 1 else _PASSES)
         step = _step(fitted, point.parameters, point.products.at(share), least)
         if step.promise < _SMALL and count > 1:
             break
@@ -264,10 +270,9 @@ def birge(runs: Runs, fitted: Fit, used: Flags) -> float:
 
     Source: Birge (1932).
     """
-    white = fitted.noise.whitener(runs.session[used], runs.scale[used])((runs.y - fitted.prediction)[used])
-    prior = prior_rows(fitted.fitted, fitted.parameters)[1]
-    freedom = len(white) + len(prior) - len(fitted.names)
-    return max(1.0, float(white @ white + prior @ prior) / max(freedom, 1))
+    priors = sum(p.sigma is not None for p in fitted.fitted)
+    freedom = int(used.sum()) * runs.y.shape[1] + priors - len(fitted.names)
+    return max(1.0, float(fitted.normal(runs, used)[-1, -1]) / max(freedom, 1))
 
 
 def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, least: int) -> _Step:
@@ -317,12 +322,10 @@ def _inflation(repeats: int, outputs: int) -> float:
     return repeats / (repeats - outputs - 1) * (1 + (outputs - 1) / (repeats - outputs))
 
 
-def _freedom(products: Sums, share: float, count: int) -> Floats:
+def _freedom(products: Products, share: float, count: int) -> Floats:
     """Estimate the degrees of freedom of the parameters' variances, (p,)."""
     step = 0.01 * share + 1e-3 / products.sizes.mean()
-    inverse = [
-        np.linalg.pinv(products.at(np.array(s))[:count, :count], hermitian=True) for s in (share, share + step)
-    ]
+    inverse = [np.linalg.pinv(products.at(s)[:count, :count], hermitian=True) for s in (share, share + step)]
     V, near = (np.maximum(np.diag(i), 1e-100) for i in inverse)
     sessions = len(products.sizes)
     spread = 2 * (share + 1 / products.sizes.mean()) ** 2 / (products.outputs * max(sessions - 1, 1))
@@ -350,11 +353,12 @@ def profile_intervals(
             sets.append(stepped(fitted.fitted, fitted.parameters, step))
             ends.append((i, change))
     predictions = model.predict(sets, title=title)
-    least = _deviance(fitted, fitted.parameters, data, fitted.prediction, used, list(range(count)))
+    least = _deviance(fitted, data, used, list(range(count)))
     intervals: dict[str, list[float]] = {p.name: [] for p in fitted.fitted if p.sigma is None}
     for (i, change), parameters, prediction in zip(ends, sets, predictions, strict=True):
         others = [j for j in range(count) if j != i]
-        rise = _deviance(fitted, parameters, data, prediction, used, others) - least
+        end_of = replace(fitted, parameters=parameters, prediction=prediction)
+        rise = _deviance(end_of, data, used, others) - least
         expected = change**2 / (fitted.covariance[i, i] / fitted.inflation)
         scale = math.sqrt(expected / rise) if _FLAT * expected < rise < _STEEP * expected else 1.0
         p = fitted.fitted[i]
@@ -363,19 +367,10 @@ def profile_intervals(
     return {**{name: (low, high) for name, (low, high) in intervals.items()}, **given}
 
 
-def _deviance(
-    fitted: Fit, parameters: Parameters, data: Runs, prediction: Floats, used: Flags, others: list[int]
-) -> float:
-    """Compute rᵀ Σ⁻¹ r at `parameters` with those of `others` refitted (linearised), in the noise of the fit."""
-    root = inverse_root(fitted.noise.run)
-    table = np.concatenate([fitted.jacobian, (data.y - prediction)[..., None]], -1)[used]
-    products = sums(root @ table, data.session[used], len(root), data.scale[used])
-    products = with_prior(products, fitted.fitted, parameters)
-    columns = [*others, len(fitted.fitted)]
-    normal = products.at(np.array(fitted.noise.share))[np.ix_(columns, columns)]
-    p = len(others)
-    absorbed = normal[:p, p] @ np.linalg.pinv(normal[:p, :p], hermitian=True) @ normal[:p, p] if p else 0.0
-    return float(normal[p, p] - absorbed)
+def _deviance(fitted: Fit, data: Runs, used: Flags, others: list[int]) -> float:
+    """Compute rᵀ Σ⁻¹ r with those parameters of `others` refitted (linearised), in the noise of the fit."""
+    normal = fitted.normal(data, used)[np.ix_([*others, -1], [*others, -1])]
+    return float(eliminated(normal, len(others))[0, 0])
 
 
 def least_determined(fitted: Fit) -> tuple[dict[str, float], float]:

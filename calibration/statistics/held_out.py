@@ -9,21 +9,11 @@ from scipy.stats import norm as normal
 from scipy.stats import t as student
 
 from calibration.statistics.fit import Fit
-from calibration.statistics.statistical_model import (
-    ForwardModel,
-    Linear,
-    Parameter,
-    Runs,
-    inverse_root,
-    least_squares,
-    repeat_count,
-    stepped,
-    sums,
-    with_prior,
-)
+from calibration.statistics.gls import Gls, inverse_root, repeat_count
+from calibration.statistics.statistical_model import ForwardModel, Parameter, Runs, stepped
 from sim.arrays import Flags, Floats
 
-_DRAWS = 2000
+_DRAWS, _AT_ONCE = 2000, 50
 
 
 def errors(data: Runs, prediction: Floats, rows: Flags) -> tuple[float, dict[str, float]]:
@@ -58,32 +48,19 @@ def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> floa
     The statistic is the sum of squares of the residual, whitened by S. Its null distribution is drawn with the
     noise of runs and sessions, the error of the fitted parameters, and the uncertainty of S.
     """
-    root = inverse_root(fitted.noise.run)
-    scale = data.scale[rows, None]
+    root, scale, rng = inverse_root(fitted.noise.run), data.scale[rows, None], np.random.default_rng(seed)
     residual = scale * (data.y - fitted.prediction)[rows] @ root.T
-    J = scale[..., None] * (root @ fitted.jacobian[rows])
-    rng = np.random.default_rng(seed)
-    sessions = np.unique(data.session[rows], return_inverse=True)[1].reshape(-1)
-    n, k = residual.shape
-    freedom = max(repeat_count(data.repeats(~rows)), k + 1)
-    spread = np.linalg.cholesky(fitted.covariance + 1e-15 * np.diag(np.diag(fitted.covariance)))
-    count = 0
-    for _ in range(_DRAWS):
-        drawn = rng.normal(size=(n, k))
-        drawn += scale * np.sqrt(fitted.noise.share) * rng.normal(size=(sessions.max() + 1, k))[sessions]
-        drawn += J @ (spread @ rng.normal(size=len(spread)))
-        repeats = rng.normal(size=(freedom, k))
-        drawn = drawn @ inverse_root(repeats.T @ repeats / freedom).T
-        count += float((drawn**2).sum()) >= float((residual**2).sum())
-    return (1 + count) / (1 + _DRAWS)
-
-
-def one_step(data: Runs, fitted: Fit, rows: Flags) -> Linear:
-    """Compute the linear step that fits a fitted model to other runs, those in `rows` (n,), with its priors."""
-    table = np.concatenate([fitted.jacobian, (data.y - fitted.prediction)[..., None]], -1)
-    root = inverse_root(fitted.noise.run)
-    products = sums(root @ table[rows], data.session[rows], len(root), data.scale[rows])
-    return least_squares(with_prior(products, fitted.fitted, fitted.parameters), passes=3)
+    freedom = max(repeat_count(data.repeats(~rows)), len(root) + 1)
+    linear = Gls(fitted.jacobian[rows], np.zeros(len(fitted.names)), data.session[rows], data.scale[rows])
+    spread = np.asarray(np.linalg.cholesky(fitted.covariance + 1e-15 * np.diag(np.diag(fitted.covariance))))
+    as_far = 0
+    for _ in range(_DRAWS // _AT_ONCE):
+        drawn = linear.draw(rng, fitted.noise.run, np.full(_AT_ONCE, fitted.noise.share), spread)
+        repeats = rng.normal(size=(_AT_ONCE, freedom, len(root)))
+        of_repeats = inverse_root(np.swapaxes(repeats, -1, -2) @ repeats / freedom)
+        white = scale * drawn @ root.T @ np.swapaxes(of_repeats, -1, -2)
+        as_far += int(np.count_nonzero((white**2).sum((-1, -2)) >= (residual**2).sum()))
+    return (1 + as_far) / (1 + _DRAWS)
 
 
 @dataclass(frozen=True)
@@ -100,7 +77,7 @@ def refit_to_all(model: ForwardModel, fitted: Fit, rows: Flags, *, moved: bool =
 
     The covariance allows for the estimates of S and ρ, as the intervals of the fit do.
     """
-    refit = one_step(model.runs, fitted, rows)
+    refit = fitted.products(model.runs, rows).solve(passes=3)
     step = refit.step if moved else np.zeros_like(refit.step)
     at = replace(
         fitted,

@@ -13,7 +13,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from calibration.statistics.statistical_model import Runs, features, repeat_covariance
+from calibration.statistics.gls import repeat_covariance
+from calibration.statistics.statistical_model import Runs, features
 from calibration.statistics.study import groups, leave_one_group_out
 from sim.arrays import Flags, Floats, Integers
 

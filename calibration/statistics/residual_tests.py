@@ -39,21 +39,15 @@ import numpy as np
 from scipy.stats import rankdata
 
 from calibration.statistics.fit import Fit
+from calibration.statistics.gls import Products, averaging_rows, eliminated, inverse_root, solved
 from calibration.statistics.statistical_model import (
     ForwardModel,
     Parameter,
     Parameters,
     Runs,
-    Sums,
-    averaging_rows,
     changes,
     features,
-    inverse_root,
-    least_squares,
-    precisions,
-    repeat_covariance,
-    session_share,
-    solved,
+    regression,
 )
 from calibration.statistics.study import Study
 from sim.arrays import Flags, Floats, Integers
@@ -148,86 +142,41 @@ class Misfit:
     second: Floats  # (e,) value of each effect's second number at its largest score; NaN where there is none
 
 
-class FixedColumns:
-    """Columns (n, k, m) that stay the same for many residuals, each of which has its own S.
-
-    Products of two columns are linear in S⁻¹, so they are made once for every pair of outputs.
-    """
-
-    def __init__(self, columns: Floats, session: Integers, scale: Floats | None = None):
-        n, k, m = columns.shape
-        self.picks, self.sizes = averaging_rows(session, scale)
-        self._flat = columns.reshape(n * k, m)
-        self.means = self.average(columns)  # (s, k, m)
-        self._whole = np.einsum("nim,njl->ijml", columns, columns, optimize=True).reshape(k * k, m * m)
-        between = np.einsum("sim,sjl->ijsml", self.means, self.means, optimize=True)
-        self._between = between.reshape(k * k, -1)
-
-    def average(self, table: Floats) -> Floats:
-        """Average each session, times the root of its size, (s, ...), of (n, ...)."""
-        return np.asarray(np.tensordot(self.picks, table, 1))
-
-    def sums(self, precision: Floats, residual: Floats) -> Sums:
-        """Compute the same as `sums` of these columns and a residual behind them.
-
-        Args:
-            precision: S⁻¹, (b, k, k).
-            residual: (b, n, k).
-        """
-        b, n, k = residual.shape
-        s, _, m = self.means.shape
-        weighted = residual @ precision
-        means, weighted_means = self.picks @ residual, self.picks @ weighted  # (b, s, k)
-        flat = precision.reshape(b, k * k)
-        total, between = np.empty((b, m + 1, m + 1)), np.empty((b, s, m + 1, m + 1))
-        total[:, :m, :m] = (flat @ self._whole).reshape(b, m, m)
-        between[:, :, :m, :m] = (flat @ self._between).reshape(b, s, m, m)
-        total[:, m, :m] = total[:, :m, m] = weighted.reshape(b, n * k) @ self._flat
-        across = np.einsum("bsk,skm->bsm", weighted_means, self.means, optimize=True)
-        between[..., m, :m] = between[..., :m, m] = across
-        total[:, m, m] = (weighted * residual).sum((-1, -2))
-        between[..., m, m] = (weighted_means * means).sum(-1)
-        return Sums(total - between.sum(-3), between, self.sizes, k)
-
-
 class _Tester:
     """The columns of the fitted runs, which stay the same, and the statistics of any residual.
 
     Rows are multiplied by the roots of the weights of their runs.
     """
 
-    def __init__(self, data: Runs, used: Flags, J: Floats, D: Floats, precision: Floats):
-        self.session, self.condition = data.session[used], data.condition[used]
-        self.repeated, self.scale = data.repeats(used), data.scale[used]
-        self.J, self.D, self.precision = J * self.scale[:, None, None], D * self.scale[:, None, None], precision
-        self.design = FixedColumns(np.concatenate([self.J, self.D], -1), self.session, self.scale)
+    def __init__(self, data: Runs, used: Flags, fitted: Fit, D: Floats):
+        self.p = len(fitted.names)
+        repeated = data.repeats(used)
+        self.design = regression(data, used, np.concatenate([fitted.jacobian, D], -1), fitted.fitted, repeated)
+        self.J, scale = self.design.columns[..., : self.p], self.design.scale
         inputs = data.inputs[used]
         spread = inputs.std(0)
         inputs = (inputs - inputs.mean(0)) / np.where(spread > 0, spread, 1.0)
         self.places, self.K = _kernel(inputs)
-        self.places = self.places * self.scale
+        self.places = self.places * scale
         self.names, self.F = features(data, used)
-        self.F = self.F[used] * self.scale[:, None]
-        self.means = averaging_rows(self.condition, self.scale)[0]  # (c, n)
+        self.F = self.F[used] * scale[:, None]
+        self.means = averaging_rows(data.condition[used], scale)[0]  # (c, n)
         self.F_means = self.design.average(self.F)  # (s, f)
         self.FJ = np.einsum("nf,nkp->fkp", self.F, self.J, optimize=True)
-        self.FJ_means = np.einsum("sf,skp->sfkp", self.F_means, self.design.average(self.J))
+        self.FJ_means = np.einsum("sf,skp->sfkp", self.F_means, self.design.means[..., : self.p])
 
     def scores(self, residual: Floats) -> Scores:
         """Compute the statistics of residuals (B, n, k) from the parameters as given, after a linear refit.
 
         Each residual is judged in its own noise.
         """
-        p, e = self.J.shape[-1], self.D.shape[-1]
-        root = inverse_root(repeat_covariance(residual, self.repeated, self.scale))  # (B, k, k)
-        residual = residual * self.scale[:, None]
-        products = self.design.sums(np.swapaxes(root, -1, -2) @ root, residual)
-        products.within[..., range(p), range(p)] += self.precision
-        base = least_squares(products.take(np.r_[np.arange(p), p + e][None]), passes=_PASSES)
-        projected = projected_scores(products, p)
+        run = self.design.noise(residual)
+        products, root = self.design.products(residual, run), inverse_root(run)  # (B, k, k)
+        base = products.take(np.array([[*range(self.p), -1]])).solve(passes=_PASSES)
+        projected = projected_scores(products, self.p)
         share, step = base.share[:, 0], base.step[:, 0]
-        white = residual - np.einsum("nkp,bp->bnk", self.J, step, optimize=True)
-        white = self._shrunk(white @ np.swapaxes(root, -1, -2), share)
+        white = residual * self.design.scale[:, None] - np.einsum("nkp,bp->bnk", self.J, step, optimize=True)
+        white = self.design.shrink(white @ np.swapaxes(root, -1, -2), share)
         lack = ((self.means @ white) ** 2).sum((-1, -2))
         at_places = self.places @ white
         kernel = np.einsum("bik,ij,bjk->b", at_places, self.K, at_places, optimize=True)
@@ -245,17 +194,12 @@ class _Tester:
         Args:
             residual: (n, k), as `scores` takes it.
         """
-        p, e = self.J.shape[-1], self.D.shape[-1]
-        root = inverse_root(repeat_covariance(residual, self.repeated, self.scale))
-        products = self.design.sums((root.T @ root)[None], residual[None] * self.scale[:, None])
-        products.within[..., range(p), range(p)] += self.precision
-        normal = _score_equations(products, p)[0]  # (e, p + 2, p + 2)
-        weights, covariance = solved(normal[:, : p + 1, : p + 1])
-        square = normal[:, p, p] - (weights * normal[:, :p, p]).sum(-1)
-        further = 3 * self.precision
+        normal = _score_equations(self.design.products(residual), self.p)[..., :-1, :-1]  # (e, p + 1, p + 1)
+        weights, covariance = solved(normal)
+        further = 3 * self.design.precision
         variance = np.diagonal(covariance, axis1=-2, axis2=-1)
-        grown = square[:, None] + further * weights**2 / (1 + further * variance)
-        return np.sqrt(np.maximum(grown, 1e-300)).reshape(e, p)
+        grown = eliminated(normal, self.p)[..., 0] + further * weights**2 / (1 + further * variance)
+        return np.sqrt(np.maximum(grown, 1e-300))
 
     def _shapes(self, covariance: Floats, white: Floats, root: Floats, share: Floats) -> Floats:
         """Compute z of every output along every feature, (B, k, f).
@@ -264,7 +208,7 @@ class _Tester:
             white: residuals, white in Σ.
         """
         count, k = len(white), white.shape[-1]
-        score = np.einsum("nf,bnk,bka->baf", self.F, self._shrunk(white, share), root, optimize=True)
+        score = np.einsum("nf,bnk,bka->baf", self.F, self.design.shrink(white, share), root, optimize=True)
         less = 1 / (1 + share[:, None] * self.design.sizes) - 1  # Σ⁻¹ of the sessions' means
         followed = np.einsum("bs,sfkp->bfkp", less, self.FJ_means, optimize=True) + self.FJ
         absorbed = np.einsum("bik,bia,bfkp->bafp", root, root, followed, optimize=True)
@@ -273,12 +217,6 @@ class _Tester:
         seen = projected > TESTABLE**2 * square
         z = np.where(seen, score / np.sqrt(np.where(seen, projected, 1.0)), 0.0)
         return np.asarray(z).reshape(count, k, -1)
-
-    def _shrunk(self, table: Floats, share: Floats) -> Floats:
-        """Whiten runs (B, n, c) in Σ that are white in S."""
-        less = 1 / np.sqrt(1 + share[:, None] * self.design.sizes) - 1  # (B, s)
-        picks = self.design.picks
-        return np.asarray(table + picks.T @ (less[..., None] * (picks @ table)))
 
 
 def _kernel(inputs: Floats) -> tuple[Floats, Floats]:
@@ -293,7 +231,7 @@ def _kernel(inputs: Floats) -> tuple[Floats, Floats]:
     return (np.arange(len(kinds))[:, None] == place.reshape(-1)).astype(float), np.exp(-distance / 2)
 
 
-def projected_scores(products: Sums, p: int) -> tuple[Floats, Floats, Floats]:
+def projected_scores(products: Products, p: int) -> tuple[Floats, Floats, Floats]:
     """Score each column after the first `p`, and before the last, without the part that the first `p` can absorb.
 
     Each column has the scatter of sessions that remains with it in the fit.
@@ -302,20 +240,18 @@ def projected_scores(products: Sums, p: int) -> tuple[Floats, Floats, Floats]:
         z of the last column along it, the share of it that survives the projection, and the length of the rest.
     """
     normal = _score_equations(products, p)
-    weights = solved(normal[..., : p + 1, : p + 1])[0]  # of the first p columns in the one that is scored
-    score = normal[..., p, p + 1] - (weights * normal[..., :p, p + 1]).sum(-1)
-    square = normal[..., p, p] - (weights * normal[..., :p, p]).sum(-1)
-    length = np.sqrt(np.maximum(square, 1e-300))
+    left = eliminated(normal, p)
+    length = np.sqrt(np.maximum(left[..., 0, 0], 1e-300))
     survived = length / np.sqrt(np.maximum(normal[..., p, p], 1e-300))
-    return np.where(survived > 1e-6, score / length, 0.0), survived, length
+    return np.where(survived > 1e-6, left[..., 0, 1] / length, 0.0), survived, length
 
 
-def _score_equations(products: Sums, p: int) -> Floats:
-    """Multiply the first `p` columns, one more and the last with each other, (B, e, p + 2, p + 2)."""
+def _score_equations(products: Products, p: int) -> Floats:
+    """Multiply the first `p` columns, one more and the last with each other, (..., e, p + 2, p + 2)."""
     e = products.within.shape[-1] - p - 1
     columns = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
     part = products.take(columns)
-    return part.at(session_share(part, passes=_PASSES_OF_A_SCORE))
+    return part.at(part.share(passes=_PASSES_OF_A_SCORE))
 
 
 def examine_residual(
@@ -332,34 +268,28 @@ def examine_residual(
         decide: stop drawing as soon as it is clear whether the p-value is below this.
     """
     data, used = study.model.runs, study.split.fitted
-    precision, J, D = precisions(fitted.fitted), fitted.jacobian[used], directions.table[used]
-    tester = _Tester(data, used, J, D, precision)
+    tester = _Tester(data, used, fitted, directions.table)
     residual = (data.y - fitted.prediction)[used]
-    residual_as_given = residual + J @ changes(fitted.fitted, fitted.parameters)
-    observed = tester.scores(residual_as_given[None])
-    free = precision == 0
-    exact = _Tester(data, used, J[..., free], D, precision[free]).scores(residual[None])
+    shift = fitted.jacobian[used] @ changes(fitted.fitted, fitted.parameters)
+    observed = tester.scores(residual[None] + shift)
+    free = tester.design.precision == 0
+    columns = np.concatenate([fitted.jacobian[..., free], directions.table], -1)
+    exact = regression(data, used, columns, (), tester.design.repeated).products(residual)
     testable = observed.survived[0] >= TESTABLE
     rng = np.random.default_rng(study.seed)
-    root = np.linalg.cholesky(repeat_covariance(residual, tester.repeated, tester.scale))
-    scatter = float(np.sqrt(observed.share[0]))
-    session = np.unique(tester.session, return_inverse=True)[1].reshape(-1)
-    sigma = np.where(precision > 0, 1 / np.sqrt(np.where(precision > 0, precision, 1.0)), 0.0)
+    run = tester.design.noise(residual)
     statistics = np.append(observed.general[0], _largest(observed.z, testable))
     batches: list[Floats] = []
     while (drawn := sum(map(len, batches))) < (draws or study.draws):
         count = min(_AT_ONCE, max(1, _VALUES // residual.size), (draws or study.draws) - drawn)
-        noise = rng.normal(size=(count, *residual.shape)) / tester.scale[:, None]
-        noise += scatter * rng.normal(size=(count, session.max() + 1, residual.shape[-1]))[:, session]
-        nuisances = rng.normal(size=(count, len(sigma))) * sigma
-        null = tester.scores(noise @ root.T + np.einsum("nkp,bp->bnk", J, nuisances))
+        null = tester.scores(tester.design.draw(rng, run, np.full(count, observed.share[0])))
         batches.append(np.column_stack([null.general, _largest(null.z, testable)]))
         if decide is not None and _decided(np.concatenate(batches), statistics, decide):
             break
     null_table = np.concatenate(batches)
     scores = Scores(*(getattr(observed, name)[0] for name in Scores.__dataclass_fields__))
     best = _best(scores.z, testable, directions)
-    halved = tester.lengths_if_halved(residual_as_given)[best]
+    halved = tester.lengths_if_halved(residual + shift)[best]
     return Misfit(
         scores=replace(scores, z=scores.z[best], survived=scores.survived[best], length=scores.length[best]),
         p={name: _p_value(null_table[:, [i]], statistics[[i]]) for i, name in enumerate((*GENERAL, "score"))},
@@ -369,8 +299,8 @@ def examine_residual(
         else _p_value(null_table[:, :-1], statistics[:-1]),
         critical_z=float(np.quantile(null_table[:, -1], 1 - study.level)),
         features=tester.names,
-        exact_length=exact.length[0][best],
-        halved_length={fitted.names[i]: halved[:, i] for i in np.flatnonzero(precision).tolist()},
+        exact_length=projected_scores(exact, int(free.sum()))[2][best],
+        halved_length={fitted.names[i]: halved[:, i] for i in np.flatnonzero(~free).tolist()},
         second=directions.second[best],
     )
 

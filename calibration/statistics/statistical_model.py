@@ -3,29 +3,7 @@
 **Forward model.** Nothing in this room knows robots. The swimmer (`calibration.swimmer.swimmer`) is one forward
 model; a sphere that settles in a vessel is another one (`calibration/examples/spheres.py`).
 
-**Noise.** Runs under the same condition give the covariance S (k, k) of the outputs of one run. All outputs
-together are needed, because R_yr and θ are not independent of the spins and the yaw rate. A session may shift all
-its runs together, with a variance that is a share ρ of that of a run. Repeats within a session do not average this
-shift out. So the covariance of a session's n runs is
-
-    Σ = (I_n + ρ 1 1ᵀ) ⊗ S.
-
-There is one ρ for all outputs. With three sessions and five outputs it has about a dozen degrees of freedom; a ρ
-for each output would have two. ρ comes from the residuals of the fitted model, so a missing effect makes it
-larger. Therefore it is at most `SESSION_SHARE`: sessions are assumed to scatter no more than single runs do, and a
-larger shift of a whole session must be explained by the model. With a single session nothing is known about ρ.
-Then ρ is that limit, and a shift that is equal in all runs has almost no weight.
-
-**Weights.** A run of weight w has the covariance S/w (`calibration.statistics.contaminated_normal`):
-
-    Σ = (W⁻¹ + ρ 1 1ᵀ) ⊗ S = W^−½ (I_n + ρ √w √wᵀ) W^−½ ⊗ S,   W = diag w.
-
-So rows are multiplied by √w, and means over a session are taken along √w. Σ w takes the place of n.
-
-**Priors.** A nuisance parameter with σ was given before the runs were made. It counts as one more measurement of
-itself: a row with derivative 1/σ and residual −x/σ, where x is its change from the value as given, on its own
-scale. With such rows in every least-squares fit, the covariance of the runs is Σ + J P Jᵀ in every test
-(P = diag σ²), without being formed. Source: priors as rows, e.g. Gelman et al. (2013), section 14.8.
+The noise, weights of runs and priors are those of `calibration.statistics.gls`.
 """
 
 from __future__ import annotations
@@ -38,15 +16,14 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.special import fdtrc
 
+from calibration.statistics.gls import Gls, repeat_count, repeat_covariance
 from sim.arrays import Flags, Floats, Integers
 
 Value = float | Floats  # one number, or one for each run (n,)
 Parameters = Mapping[str, Any]  # name -> Value
 
-SESSION_SHARE = 1.0  # largest ρ
 _LOG_STEP, _STEP = 0.01, 0.02  # finite-difference steps: in ln C, in units of a typical size
 _LARGEST = 100.0  # change of ln C, so that C stays a number
-_RIDGE = 1e-11  # so that columns without any signal get a large variance
 _DIFFER = 0.001  # p-value below which repeats differ with sessions or notes
 _CUBIC = 0.2  # share of a cube that lower powers must leave
 
@@ -251,183 +228,6 @@ def by_differences(
     return predictions[0], np.moveaxis(slopes, 0, -1)
 
 
-@dataclass(frozen=True)
-class Noise:
-    """S (k, k) of a run and ρ of a session."""
-
-    run: Floats  # S: covariance (k, k) of a run
-    share: float  # ρ: variance of a session over that of a run
-
-    def whitener(self, session: Integers, scale: Floats | None = None) -> Whitener:
-        """Make Σ^−½ for runs of `session` (n,) with `scale` (n,), the roots of their weights."""
-        return Whitener(self, session, np.ones(len(session)) if scale is None else scale)
-
-    def covariance(self, session: Integers) -> Floats:
-        """Compute Σ of the runs of `session` (n,), (n k, n k)."""
-        together = session[:, None] == session
-        return np.asarray(np.kron(np.eye(len(session)) + self.share * together, self.run))
-
-
-class Whitener:
-    """Σ^−½ for the runs of `session`; applies to residuals (n, k, ...) and flattens them."""
-
-    def __init__(self, noise: Noise, session: Integers, scale: Floats):
-        self._inverse = inverse_root(noise.run)
-        self._share, self._scale = noise.share, scale
-        self._groups = [np.flatnonzero(session == s) for s in np.unique(session)]
-
-    def __call__(self, table: Floats) -> Floats:
-        """Whiten (n, k, ...) to (n k, ...)."""
-        white = np.einsum("n,ab,nb...->na...", self._scale, self._inverse, table, optimize=True)
-        for rows in self._groups:
-            along, size = self._scale[rows], float((self._scale[rows] ** 2).sum())
-            mean = np.tensordot(along, white[rows], 1) / size
-            white[rows] += (1 / np.sqrt(1 + size * self._share) - 1) * np.multiply.outer(along, mean)
-        return np.asarray(white.reshape(-1, *table.shape[2:]))
-
-
-@dataclass(frozen=True)
-class Sums:
-    """Products of columns, within sessions and of the sessions' means, for any ρ; `...` stands for batches."""
-
-    within: Floats  # (..., m, m)
-    between: Floats  # (..., s, m, m)
-    sizes: Floats  # (s,) runs of a session, or their weights
-    outputs: int
-
-    def at(self, share: Floats) -> Floats:
-        """Compute columnᵀ Σ⁻¹ column, (..., m, m), for ρ (...)."""
-        weight = 1 / (1 + share[..., None] * self.sizes)
-        columns = self.between.shape[-1]
-        flat = self.between.reshape(*self.between.shape[:-2], columns * columns)
-        between = (weight[..., None, :] @ flat).reshape(*weight.shape[:-1], *self.between.shape[-2:])
-        return np.asarray(self.within + between)
-
-    def take(self, columns: Integers) -> Sums:
-        """Choose columns (c, q), (..., c, q, q)."""
-        rows, cols = columns[:, :, None], columns[:, None, :]
-        between = np.swapaxes(self.between[..., rows, cols], -4, -3)
-        return Sums(self.within[..., rows, cols], between, self.sizes, self.outputs)
-
-
-@dataclass(frozen=True)
-class Linear:
-    """Generalised least squares of the last column by the others; `...` stands for batches."""
-
-    step: Floats  # (..., p)
-    covariance: Floats  # (..., p, p)
-    share: Floats  # (...) ρ
-
-
-def inverse_root(run: Floats) -> Floats:
-    """Return L⁻¹ of S = L Lᵀ, (..., k, k)."""
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(run)))
-
-
-def sums(columns: Floats, session: Integers, outputs: int, scale: Floats | None = None) -> Sums:
-    """Multiply columns (..., n, k, m) that are white in S with each other; `scale`: (n,) roots of the weights."""
-    *batch, n, k, m = columns.shape
-    if scale is not None:
-        columns = columns * scale[:, None, None]
-    flat = columns.reshape(*batch, n * k, m)
-    total = np.swapaxes(flat, -1, -2) @ flat
-    picks, count = averaging_rows(session, scale)
-    means = np.einsum("sn,...nkm->...skm", picks, columns)
-    between = np.swapaxes(means, -1, -2) @ means
-    return Sums(total - between.sum(-3), between, count, outputs)
-
-
-def averaging_rows(session: Integers, scale: Floats | None = None) -> tuple[Floats, Floats]:
-    """Make rows (s, n) that take the mean of each session times the root of its size; the sizes (s,).
-
-    Args:
-        scale: (n,) roots of the weights, by which the runs were multiplied; their squares are the sizes.
-    """
-    kinds, place = np.unique(session, return_inverse=True)
-    along = np.ones(len(session)) if scale is None else scale
-    rows = (np.arange(len(kinds))[:, None] == place.reshape(-1)) * along
-    sizes = (rows**2).sum(1)
-    return rows / np.sqrt(sizes)[:, None], sizes
-
-
-def least_squares(products: Sums, *, passes: int) -> Linear:
-    """Fit the last of the columns, with ρ from its own residuals after `passes` iterations (0: ρ = 0)."""
-    share = session_share(products, passes=passes)
-    return Linear(*solved(products.at(share)), share)
-
-
-def session_share(products: Sums, *, passes: int) -> Floats:
-    """Estimate ρ (...) from the residuals of a fit of the last of the columns, after `passes` iterations from 0.
-
-    The expected scatter of the sessions' means is Σ_s n_s |m_s|² = (k − h/s) Σ_s (1 + ρ n_s), where h of their k s
-    degrees of freedom are used by the fit.
-    """
-    count, p = len(products.sizes), products.within.shape[-1] - 1
-    share = np.zeros(products.within.shape[:-2])
-    if count == 1 and passes:
-        return np.full_like(share, SESSION_SHARE)
-    for _ in range(passes):
-        normal = products.at(share)
-        step, covariance = solved(normal)
-        combination = np.concatenate([-step, np.ones((*share.shape, 1))], -1)
-        each = products.between @ combination[..., None, :, None]
-        between = (each[..., 0] * combination[..., None, :]).sum((-1, -2))
-        means = normal[..., :p, :p] - products.within[..., :p, :p]
-        freedom = products.outputs - (covariance * np.swapaxes(means, -1, -2)).sum((-1, -2)) / count
-        excess = between / np.maximum(freedom, 0.1 * products.outputs) - count
-        share = np.clip(excess / products.sizes.sum(), 0.0, SESSION_SHARE)
-    return share
-
-
-def solved(normal: Floats) -> tuple[Floats, Floats]:
-    """Solve for the coefficients (..., p) of the last of the columns; with their covariance (..., p, p)."""
-    p = normal.shape[-1] - 1
-    diagonal = np.diagonal(normal[..., :p, :p], axis1=-2, axis2=-1)
-    scale = np.where(diagonal > 1e-280, np.sqrt(np.maximum(diagonal, 1e-280)), 1.0)
-    scaled = normal[..., :p, :p] / scale[..., :, None] / scale[..., None, :]
-    covariance = np.linalg.inv(scaled + _RIDGE * np.eye(p)) / scale[..., :, None] / scale[..., None, :]
-    return (covariance @ normal[..., :p, p, None])[..., 0], covariance
-
-
-def repeat_covariance(y: Floats, repeated: Integers | Floats, scale: Floats | None = None) -> Floats:
-    """Estimate S (..., k, k) from the scatter of (..., n, k) between repeats, pooled.
-
-    Args:
-        repeated: see `Runs.repeats`; each level, and each column of a design, has its own effect on y.
-        scale: (n,) roots of the weights of the runs.
-    """
-    basis = _same_in_repeats(repeated, scale)
-    y = y if scale is None else y * scale[:, None]
-    centred = y - basis @ (basis.T @ y)
-    return np.asarray(np.swapaxes(centred, -1, -2) @ centred / (len(basis) - basis.shape[1]))
-
-
-def _differ_more(y: Floats, condition: Integers, design: Floats) -> bool:
-    """Tell by F-tests of the outputs (n, k) whether a design of repeats takes more from them than noise allows."""
-    plain, further = repeat_count(condition), repeat_count(design)
-    if further < 1 or plain == further:
-        return False
-    with_design = np.diag(repeat_covariance(y, design)) * further
-    taken = np.diag(repeat_covariance(y, condition)) * plain - with_design
-    ratio = taken / (plain - further) / np.maximum(with_design / further, 1e-300)
-    return bool(fdtrc(plain - further, further, ratio).min() < _DIFFER / len(ratio))
-
-
-def repeat_count(repeated: Integers | Floats) -> int:
-    """Count the degrees of freedom of `repeat_covariance`."""
-    basis = _same_in_repeats(repeated, None)
-    return len(basis) - basis.shape[1]
-
-
-def _same_in_repeats(repeated: Integers | Floats, scale: Floats | None) -> Floats:
-    """Return an orthonormal basis (n, r) of what is no noise, times the roots of the weights."""
-    if repeated.ndim == 1:
-        return averaging_rows(repeated.astype(np.int64), scale)[0].T
-    design = repeated if scale is None else repeated * scale[:, None]
-    left, values, _ = np.linalg.svd(design, full_matrices=False)
-    return np.asarray(left[:, values > 1e-9 * values[0]])
-
-
 def precisions(fitted: Sequence[Parameter]) -> Floats:
     """Return 1/σ² of each parameter, 0 for those that are free, (p,)."""
     return np.array([0.0 if p.sigma is None else p.sigma**-2 for p in fitted])
@@ -443,18 +243,26 @@ def change(given: Parameter, value: float) -> float:
     return math.log(value / given.start) if given.logarithmic else value - given.start
 
 
-def prior_rows(fitted: Sequence[Parameter], parameters: Parameters) -> tuple[Floats, Floats]:
-    """Write the priors as measurements: derivatives (q, p) and residuals (q,)."""
-    root = np.sqrt(precisions(fitted))
-    rows = np.flatnonzero(root)
-    return np.diag(root)[rows], -(root * changes(fitted, parameters))[rows]
+def regression(
+    runs: Runs,
+    rows: Flags,
+    columns: Floats,
+    fitted: Sequence[Parameter],
+    repeated: Integers | Floats | None = None,
+) -> Gls:
+    """Regress the runs in `rows` (n,) on columns (n, k, m) of all runs, the first those of `fitted`."""
+    return Gls(columns[rows], precisions(fitted), runs.session[rows], runs.scale[rows], repeated)
 
 
-def with_prior(products: Sums, fitted: Sequence[Parameter], parameters: Parameters) -> Sums:
-    """Add the priors to `products` of the derivatives and the residual (p + 1 columns)."""
-    rows, residual = prior_rows(fitted, parameters)
-    table = np.column_stack([rows, residual])
-    return replace(products, within=products.within + table.T @ table)
+def _differ_more(y: Floats, condition: Integers, design: Floats) -> bool:
+    """Tell by F-tests of the outputs (n, k) whether a design of repeats takes more from them than noise allows."""
+    plain, further = repeat_count(condition), repeat_count(design)
+    if further < 1 or plain == further:
+        return False
+    with_design = np.diag(repeat_covariance(y, design)) * further
+    taken = np.diag(repeat_covariance(y, condition)) * plain - with_design
+    ratio = taken / (plain - further) / np.maximum(with_design / further, 1e-300)
+    return bool(fdtrc(plain - further, further, ratio).min() < _DIFFER / len(ratio))
 
 
 def features(runs: Runs, used: Flags) -> tuple[tuple[str, ...], Floats]:

@@ -16,7 +16,8 @@ import numpy as np
 
 from calibration.statistics.contaminated_normal import estimate
 from calibration.statistics.fit import Fit, fit
-from calibration.statistics.statistical_model import ForwardModel, Noise, Runs
+from calibration.statistics.gls import Noise
+from calibration.statistics.statistical_model import ForwardModel, Runs
 from calibration.statistics.study import Study
 from sim.arrays import Floats
 

@@ -19,12 +19,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.statistics.fit import Fit
+from calibration.statistics.gls import Gls, Noise, solved
 from calibration.statistics.held_out import errors
 from calibration.statistics.residual_regression import select_forward
-from calibration.statistics.statistical_model import inverse_root
 from calibration.statistics.study import Split, groups, leave_one_group_out
 from calibration.swimmer.swimmer import SwimmerModel
-from sim.arrays import Flags, Floats, Integers
+from sim.arrays import Flags, Floats
 from sim.io.errors import InputError
 from sim.model.correction import Correction, monomials
 from sim.model.learnt_range import inputs_of
@@ -70,52 +70,27 @@ class HeadCorrection:
 
 @dataclass(frozen=True)
 class _Problem:
-    """The calibrated model, and whitened residuals, derivatives and inputs of all runs."""
+    """The calibrated model, and derivatives and inputs of all runs; in the noise of runs, without sessions."""
 
     model: SwimmerModel
     base: Fit
     knobs: tuple[str, ...]
-    root: Floats  # (k, k) whitens outputs
     slopes: Floats  # (n, k, q) of the outputs in the knobs
     inputs: Floats  # (n, 3)
     centre: Floats  # (3,)
     scale: Floats
-    group: Integers
 
-    def white(self, prediction: Floats) -> Floats:
-        """Whiten the residual (n, k) of a prediction."""
-        runs = self.model.runs
-        return np.asarray(runs.scale[:, None] * (runs.y - prediction) @ self.root.T)
-
-    def design(self, powers: Powers) -> Floats:
-        """Compute the derivatives of the whitened outputs in the weights, (n, k, q t)."""
+    def regression(self, powers: Powers, rows: Flags, *, priors: bool = True) -> Gls:
+        """Regress the runs in `rows` on the weights, (n, k, q t)."""
         phi = monomials((self.inputs - self.centre) / self.scale, powers)
-        slopes = self.model.runs.scale[:, None, None] * self.slopes
-        A = np.einsum("ab,nbq,nt->naqt", self.root, slopes, phi, optimize=True)
-        return np.asarray(A.reshape(*A.shape[:2], -1))
+        columns = np.einsum("nkq,nt->nkqt", self.slopes, phi).reshape(*self.slopes.shape[:2], -1)
+        precision = np.repeat([_SIGMA[name] ** -2 for name in self.knobs], len(powers)) * priors
+        runs = self.model.runs
+        return Gls(columns[rows], precision, runs.session[rows], runs.scale[rows])
 
-    def precision(self, count: int) -> Floats:
-        """Return 1/σ² of `count` weights."""
-        sigma = np.array([_SIGMA[name] for name in self.knobs])
-        return np.asarray(np.repeat(sigma**-2, count // len(sigma)))
-
-    def step(self, A: Floats, residual: Floats, rows: Flags, weights: Floats) -> tuple[Floats, Floats]:
-        """Compute the change of the weights, and their covariance."""
-        flat, precision = A[rows].reshape(-1, A.shape[-1]), self.precision(A.shape[-1])
-        covariance = np.linalg.inv(flat.T @ flat + np.diag(precision))
-        change = covariance @ (flat.T @ residual[rows].ravel() - precision * weights)
-        return np.asarray(change), np.asarray(covariance)
-
-    def left_out_error(self, powers: Powers, used: Flags) -> float:
-        """Compute the mean square on groups that the weights have not seen; without terms, of the residual."""
-        residual = self.white(self.base.prediction)
-        if not powers:
-            return float((residual[used] ** 2).mean())
-        A, errors = self.design(powers), []
-        for learn, out in leave_one_group_out(self.group, used):
-            weights = self.step(A, residual, learn, np.zeros(A.shape[-1]))[0]
-            errors.append(residual[out] - A[out] @ weights)
-        return float((np.concatenate(errors) ** 2).mean())
+    def normal(self, linear: Gls, prediction: Floats, rows: Flags, weights: Floats | None = None) -> Floats:
+        """Multiply the columns and the residual of a prediction (n, k) with these weights; default: 0."""
+        return linear.products((self.model.runs.y - prediction)[rows], self.base.noise.run, weights).at(0.0)
 
     def correction(self, powers: Powers, weights: Floats, rows: Flags) -> Correction:
         """Make the correction with these weights, whose range is that of the runs in `rows`; without errors."""
@@ -137,16 +112,11 @@ class _Problem:
         Returns:
             The weights, the prediction with them, and their covariance.
         """
-        A, every = self.design(powers), np.ones(len(self.inputs), bool)
-        covariance = self.step(A, self.white(prediction), rows, weights)[1]
-
-        def cost(w: Floats, predicted: Floats) -> float:
-            return float((self.white(predicted)[rows] ** 2).sum() + (self.precision(len(w)) * w**2).sum())
-
-        best = cost(weights, prediction)
+        linear, every = self.regression(powers, rows), np.ones(len(self.inputs), bool)
+        normal = self.normal(linear, prediction, rows, weights)
+        covariance = solved(normal)[1]
         for _ in range(_CORRECTIONS):
-            change = self.step(A, self.white(prediction), rows, weights)[0]
-            before = best
+            change, before = solved(normal)[0], normal[-1, -1]
             for share in (1.0, 0.5, 0.25):
                 tried = weights + share * change
                 robot = replace(self.model.robot, correction=self.correction(powers, tried, every))
@@ -154,10 +124,11 @@ class _Problem:
                     predicted = replace(self.model, robot=robot).predict([self.base.parameters])[0]
                 except InputError:  # no motion with these weights
                     continue
-                if cost(tried, predicted) < best:
-                    weights, prediction, best = tried, predicted, cost(tried, predicted)
+                there = self.normal(linear, predicted, rows, tried)
+                if there[-1, -1] < before:
+                    weights, prediction, normal = tried, predicted, there
                     break
-            if before - best < _SETTLED * before:
+            if before - normal[-1, -1] < _SETTLED * before:
                 break
         return weights, prediction, covariance
 
@@ -178,12 +149,10 @@ def learn_head_correction(model: SwimmerModel, base: Fit, split: Split) -> HeadC
         model=model,
         base=base,
         knobs=knobs,
-        root=inverse_root(base.noise.run),
         slopes=model.derivatives(base.parameters, knobs)[1],
         inputs=inputs,
         centre=inputs[used].mean(0),
         scale=np.where(spread > 1e-6, spread, 1.0),
-        group=groups(model.runs)[0],
     )
     powers = _choose_terms(problem, used)
     if not powers:
@@ -194,11 +163,13 @@ def learn_head_correction(model: SwimmerModel, base: Fit, split: Split) -> HeadC
     error, without = (errors(model.runs, p, split.test)[0] for p in (prediction, base.prediction))
     noise = float(np.trace(base.noise.run) / len(base.noise.run))
     correction = problem.correction(powers, last, split.kept)
+    white = Noise(base.noise.run, 0.0).whitener(model.runs.session[split.kept], model.runs.scale[split.kept])
+    left = white((model.runs.y - fitted)[split.kept])
     return HeadCorrection(
         prediction=prediction,
         terms=tuple(_name_term(term) for term in powers),
         correction=replace(correction, error=error, error_without=without),
-        covariance=covariance * max(1.0, float((problem.white(fitted)[split.kept] ** 2).mean())),
+        covariance=covariance * max(1.0, float((left**2).mean())),
         slopes=problem.slopes,
         inputs=inputs,
         beyond=math.sqrt(max(error**2 - noise, 0.0)),
@@ -208,15 +179,33 @@ def learn_head_correction(model: SwimmerModel, base: Fit, split: Split) -> HeadC
 def _choose_terms(problem: _Problem, used: Flags) -> Powers:
     """Choose the powers of the terms, the constant first; none if they do not predict better."""
     levels = [len(np.unique(column[used].round(6))) for column in problem.inputs.T]
-    possible = [
+    possible = tuple(
         p for p in itertools.product(range(4), repeat=3)
         if (sum(p) <= 2 or max(p) == sum(p)) and all(q < m for q, m in zip(p, levels, strict=True))
-    ]  # fmt: skip
+    )  # fmt: skip
     start: Powers = ()
+    pairs = leave_one_group_out(groups(problem.model.runs)[0], used)
+
+    def normal(rows: Flags, *, priors: bool) -> Floats:
+        linear = problem.regression(possible, rows, priors=priors)
+        return problem.normal(linear, problem.base.prediction, rows)
+
+    normals = [(normal(learn, priors=True), normal(out, priors=False)) for learn, out in pairs]
+
+    def left_out_error(powers: Powers) -> float:
+        """Compute the sum of squares on groups that the weights have not seen; without terms, of the residual."""
+        terms = [possible.index(p) for p in powers]
+        places = [len(possible) * knob + term for knob in range(len(problem.knobs)) for term in terms]
+        chosen, total = np.ix_([*places, -1], [*places, -1]), 0.0
+        for learnt, left_out in normals:
+            combination = np.append(-solved(learnt[chosen])[0], 1.0)
+            total += float(combination @ left_out[chosen] @ combination)
+        return total
+
     return select_forward(
         start,
         lambda chosen: [tuple(dict.fromkeys((_CONSTANT, *chosen, p))) for p in possible if p not in chosen],
-        lambda powers: problem.left_out_error(powers, used),
+        left_out_error,
         most=_MOST,
         gain=_GAIN,
     )

@@ -31,7 +31,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.statistical_model import Runs, repeat_covariance
+from calibration.statistics.gls import repeat_covariance
+from calibration.statistics.statistical_model import Runs
 from calibration.swimmer.copied_rows import find_copies
 from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, TACHOMETER
 from sim.arrays import Floats, Integers

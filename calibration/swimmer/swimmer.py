@@ -16,14 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from calibration.statistics.statistical_model import (
-    Noise,
-    Parameter,
-    Parameters,
-    Value,
-    by_differences,
-    repeat_covariance,
-)
+from calibration.statistics.gls import Noise, repeat_covariance
+from calibration.statistics.statistical_model import Parameter, Parameters, Value, by_differences
 from calibration.swimmer.candidate_effects import (
     CURRENT,
     SLIP,

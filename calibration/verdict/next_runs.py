@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.special import ndtr
 
-from calibration.statistics.statistical_model import Noise
+from calibration.statistics.gls import Noise
 from calibration.verdict.experiment import Rival
 from sim.arrays import Floats
 

@@ -16,7 +16,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from calibration.statistics.statistical_model import ForwardModel, Noise, Runs, start_values
+from calibration.statistics.gls import Noise
+from calibration.statistics.statistical_model import ForwardModel, Runs, start_values
 from calibration.verdict.experiment import Rival
 from calibration.verdict.next_runs import GIVEN_UP
 from sim.arrays import Flags, Floats

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.statistical_model import Noise
+from calibration.statistics.gls import Noise
 from calibration.verdict.sequential_test import Explanation
 from dataset.build.sweep_folder import sweep_key
 from dataset.rows.schema import arrow_table, schema

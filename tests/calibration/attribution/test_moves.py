@@ -12,8 +12,9 @@ import pytest
 
 from calibration.attribution.moves import groups_that_may_differ
 from calibration.report.robot_verdict import RobotVerdict, calibrate_robot
+from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.statistics.shifted import Shift, Shifted
-from calibration.statistics.statistical_model import by_differences, repeat_count, repeat_covariance, start_values
+from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.statistics.weighted_fit import alike
 from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.record import facts, verdict_record

@@ -11,7 +11,8 @@ import pytest
 
 from calibration.examples.spheres import Spheres, law_of_diameter
 from calibration.statistics.fit import fit, profile_intervals
-from calibration.statistics.statistical_model import Noise, Runs, start_values
+from calibration.statistics.gls import Noise
+from calibration.statistics.statistical_model import Runs, start_values
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict

@@ -22,13 +22,8 @@ from calibration.report.figures import draw_dependences
 from calibration.report.report import figures_of_laws
 from calibration.report.robot_laws import find_robot_laws
 from calibration.statistics.fit import Fit, fit
-from calibration.statistics.statistical_model import (
-    SESSION_SHARE,
-    Noise,
-    precisions,
-    repeat_covariance,
-    start_values,
-)
+from calibration.statistics.gls import SESSION_SHARE, Noise, repeat_covariance
+from calibration.statistics.statistical_model import precisions, start_values
 from calibration.statistics.study import Study, middle_session
 from sim.arrays import Floats
 from sim.model.power_law import Powers
@@ -175,7 +170,8 @@ def test_the_gain_is_that_of_dense_least_squares() -> None:
     dense = least(columns.shape[-1] - free.shape[-1]) - least(columns.shape[-1])
     assert float(linear.gain(linear.as_given[None])[0]) == pytest.approx(dense, rel=1e-3)
     power = linear_model("power")
-    null = power.gain(power.drawn(np.random.default_rng(3), 400))
+    noise = power.fitted.noise
+    null = power.gain(power.tested.draw(np.random.default_rng(3), noise.run, np.full(400, noise.share)))
     freedom = len(SPEEDS) - 2
     assert null.mean() == pytest.approx(freedom, abs=4 * math.sqrt(2 * freedom / 400) + 0.5)
     study, fit_of_law = fitted("power")  # curves are looked for in a law alone

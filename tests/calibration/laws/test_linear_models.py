@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from calibration.laws.linear_models import LinearModels
-from calibration.statistics.statistical_model import SESSION_SHARE, Noise, repeat_covariance
+from calibration.statistics.gls import SESSION_SHARE, Noise, repeat_covariance
 from sim.arrays import Floats
 
 SESSION = np.repeat([0, 1, 2, 3], [6, 8, 6, 4])

@@ -6,20 +6,10 @@ import numpy as np
 import pytest
 
 from calibration.statistics.fit import fit
+from calibration.statistics.gls import Noise, repeat_covariance
 from calibration.statistics.residual_tests import Directions, _kernel, examine_residual
-from calibration.statistics.statistical_model import (
-    Noise,
-    changes,
-    features,
-    inverse_root,
-    least_squares,
-    precisions,
-    repeat_covariance,
-    start_values,
-    sums,
-)
+from calibration.statistics.statistical_model import changes, features, precisions, start_values
 from calibration.statistics.study import Study, middle_session
-from sim.arrays import Floats
 from tests.calibration.toy_tables import toy_swimmer, toy_table
 
 
@@ -59,37 +49,3 @@ def test_the_kernel_of_repeats_is_that_of_all_runs() -> None:
     assert places.shape == (20, 200)
     added = places @ white
     assert np.einsum("bik,ij,bjk->b", added, kernel, added) == pytest.approx(expected, rel=1e-12)
-
-
-@pytest.mark.parametrize("scale", [None, np.sqrt([1.0, 0.1, 1.0, 0.4, 0.02])], ids=["equal", "weighted"])
-def test_whitener_is_the_inverse_root_of_the_block_covariance(scale: Floats | None) -> None:
-    rng = np.random.default_rng(0)
-    root = rng.normal(size=(3, 3))
-    noise = Noise(root @ root.T + np.eye(3), 0.7)
-    session = np.array([0, 0, 1, 1, 1])
-    same = (session[:, None] == session[None]).astype(float)
-    factors = np.eye(5) if scale is None else np.diag(scale**-2)
-    covariance = np.kron(factors + noise.share * same, noise.run)
-    whiten = noise.whitener(session, scale)
-    W = whiten(np.eye(15).reshape(5, 3, 15))
-    assert W @ covariance @ W.T == pytest.approx(np.eye(15), abs=1e-10)
-
-
-def test_noise_is_recovered_from_repeats_and_sessions() -> None:
-    """Without bias, though the fit takes degrees of freedom from the means of the sessions; with weights, too."""
-    rng = np.random.default_rng(1)
-    session = np.repeat(np.arange(4), 30)
-    condition = np.arange(120) // 2
-    J = rng.normal(size=(120, 2, 1)) + 1.0
-    scale = np.where(np.arange(120) % 7 == 0, 0.2, 1.0)
-    shares, covariances = [], []
-    for _ in range(300):
-        scatter = rng.normal(scale=[0.03, 0.05], size=(120, 2)) / scale[:, None]
-        shift = np.sqrt(0.1) * rng.normal(scale=[0.03, 0.05], size=(4, 2))[session]
-        y = rng.normal(size=(60, 2))[condition] + scatter + shift
-        covariances.append(repeat_covariance(y, condition, scale))
-        root = inverse_root(covariances[-1])
-        columns = root @ np.concatenate([J, (scatter + shift)[..., None]], -1)
-        shares.append(least_squares(sums(columns, session, 2, scale), passes=3).share)
-    assert np.sqrt(np.diag(np.mean(covariances, 0))) == pytest.approx([0.03, 0.05], rel=0.02)
-    assert np.mean(shares) == pytest.approx(0.1, rel=0.1)

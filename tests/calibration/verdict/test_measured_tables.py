@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from calibration.examples.spheres import median_error, read_spheres
-from calibration.statistics.statistical_model import repeat_covariance
+from calibration.statistics.gls import repeat_covariance
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate

@@ -15,7 +15,8 @@ import pytest
 from scipy.stats import binom
 
 from calibration.statistics.fit import fit
-from calibration.statistics.statistical_model import Noise, start_values
+from calibration.statistics.gls import Noise
+from calibration.statistics.statistical_model import start_values
 from calibration.verdict.experiment import Rival
 from calibration.verdict.next_runs import BATCH, GIVEN_UP, STOP, Pair, _greedy, _together, next_runs
 from calibration.verdict.record import verdict_record

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from calibration.__main__ import main
-from calibration.statistics.statistical_model import SESSION_SHARE
+from calibration.statistics.gls import SESSION_SHARE
 from calibration.statistics.study import middle_session
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.protocols import PROTOCOLS
