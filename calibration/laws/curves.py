@@ -22,7 +22,6 @@ Source: Green and Silverman (1994), chapter 2.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -173,11 +172,6 @@ def _left(study: Study, model: LawModel, fitted: Fit, curve: Curve) -> float:
     refit = with_shifts(model, fitted, study.split.fitted, curve.symbol)
     none = Directions.plain(np.empty((*model.runs.y.shape, 0)))
     return examine_residual(study, refit, none, draws=_DRAWS).general_p
-
-
-def said_of(curves: Sequence[Curve], subject: str = "it") -> str:
-    """Say along which inputs a law, the subject, is no power law; empty if along none."""
-    return " ".join(f"Along {curve.symbol} {subject} is {curve.words}." for curve in curves if curve.rejected)
 
 
 def factors(groups: GroupFactors) -> Floats:

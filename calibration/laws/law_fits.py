@@ -25,7 +25,7 @@ import numpy as np
 from tqdm import tqdm
 
 from calibration.attribution.refits import INDISTINGUISHABLE
-from calibration.laws.curves import find_curves, said_of
+from calibration.laws.curves import find_curves
 from calibration.laws.group_factors import gain_of_a_curve
 from calibration.laws.inputs import EXPONENTS
 from calibration.laws.law import NO_LEVER, NO_SESSIONS, UNDETERMINED, Law, fitted_law, with_a_lever
@@ -37,11 +37,11 @@ from calibration.statistics.fit import Fit
 from calibration.statistics.study import LEVEL, Study
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.experiment import Rival
+from calibration.words.render import say_laws
 from sim.arrays import Floats
 
 _FITTED = 6  # places that are fitted first
 _CURVED = 0.3  # share of the best gain below which a place is not among them
-_NAMED = 2  # laws beside a claim that are named
 _SAME = 0.1  # of the noise of a run
 
 
@@ -83,11 +83,6 @@ class Laws:
         return self.selection is not None and self.selection.p_value < self.level
 
     @property
-    def _search(self) -> str:
-        """The p-value of the search in words."""
-        return f"with the choice among all places counted, {self.selection.words}" if self.selection else ""
-
-    @property
     def curved(self) -> Law | None:
         """The law that describes best with a curve in place of a power law, where one is rejected."""
         curved = [law for law in self.fitted if any(curve.rejected for curve in law.curves)]
@@ -96,46 +91,7 @@ class Laws:
     @property
     def sentence(self) -> str:
         """What the runs say, without a claim about the cause."""
-        return f"{self._of_places}{self._of_curves}"
-
-    @property
-    def _of_curves(self) -> str:
-        """Say where a power law is contradicted, with a space before; empty if it is not."""
-        said, curved = "", self.curved
-        subject = "it" if len(self.kept) == 1 else "the first law"
-        if self.kept and (of_best := said_of(self.kept[0].curves, subject)):
-            said = f" {of_best}"
-        if curved is None or (self.kept and curved.place == self.kept[0].place):
-            return said
-        return (
-            f"{said} With a curve in place of a power law, it is described by {curved.place.words}. "
-            f"{said_of(curved.curves, 'this law')}"
-        )
-
-    @property
-    def _of_places(self) -> str:
-        """Say which laws describe the residual."""
-        if not self.kept:
-            return "No law of the places that were searched describes the residual."
-        best = self.kept[0]
-        if not self.significant:
-            return (
-                "No law is claimed: noise alone can gain as much in a search over all places "
-                f"({self._search}). The nearest is {best.words}."
-            )
-        if not self.complete:
-            return (
-                "No law of the places that were searched describes the whole residual. The nearest is "
-                f"{best.words}; it leaves more than noise (p = {best.p_value:.2g})."
-            )
-        if len(self.kept) == 1:
-            return (
-                f"The residual is described by {best.words}, and less well by all other places that were searched "
-                f"({self._search})."
-            )
-        rivals = "; or ".join(map(_in_a_set, self.kept))
-        apart = f"these runs cannot tell them apart ({self._search})"
-        return f"The residual is described by {rivals}: {apart}.{_agreement(self.kept)}"
+        return say_laws(self._facts(None))
 
     @property
     def prediction(self) -> Floats:
@@ -160,26 +116,29 @@ class Laws:
         scatter = np.sqrt(np.diag(claim.noise.run))
         return [law for law in good if np.abs((law.fit.prediction - claim.prediction) / scatter).max() > _SAME]
 
-    def beside(self, claim: Fit) -> str:
-        """Say which laws fit as well as a claimed effect, and what they have in common."""
-        laws = self._as_good_as(claim)
-        if not laws:
-            return "No law of the places that were searched describes it as well."
-        named = "; or by ".join(map(_in_a_set, laws[:_NAMED]))
-        others = len(laws) - _NAMED
-        more = f"; or by laws at {others} other place{'s' if others > 1 else ''}" if others > 0 else ""
-        return f"It is described as well by {named}{more}.{_agreement(laws)}"
+    def to_dict(self, claim: Fit | None = None) -> dict[str, Any]:
+        """Return the record for laws.json and verdict.json.
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the record for laws.json and verdict.json."""
+        Args:
+            claim: an effect that is claimed, with which laws are compared.
+        """
+        facts = self._facts(claim)
+        beside = say_laws(facts) if claim else ""
+        return {"sentence": say_laws({**facts, "as_good": None}), "beside": beside, **facts}
+
+    def _facts(self, claim: Fit | None) -> dict[str, Any]:
+        as_good = self._as_good_as(claim) if claim else []
         return {
-            "sentence": self.sentence,
             "complete": self.complete,
             "significant": self.significant,
             **(self.selection.to_dict() if self.selection else {}),
             "places": [self._place_record(one) for one in self.ranked],
             "laws": [self._law_record(law) for law in self.fitted],
             "kept": [law.place.name for law in self.kept],
+            "curved": self.curved.place.name if self.curved else None,
+            "in_common": _in_common(self.kept),
+            "as_good": [law.place.name for law in as_good] if claim else None,
+            "in_common_of_as_good": _in_common(as_good),
         }
 
     def simultaneous_interval(self, law: Law, name: str) -> tuple[float, float]:
@@ -196,6 +155,7 @@ class Laws:
             "ebic_gain": self._ebic_gain(law.gain, law.numbers),
             "first": self.selection.first[law.place.name] if self.selection else None,
             "leaves_noise": law.p_value >= self.level / 2,
+            "undetermined": law.reason in UNDETERMINED,
         }
         for name in (SIZE, *EXPONENTS):
             if self.selection and name in law.fit.names:
@@ -299,15 +259,9 @@ def _with_curves(study: Study, laws: Sequence[Law]) -> list[Law]:
     ]
 
 
-def _in_a_set(law: Law) -> str:
-    """Say a law among others, and whether the runs do not determine its numbers."""
-    return f"{law.words} ({law.reason})" if law.reason in UNDETERMINED else law.words
-
-
-def _agreement(laws: Sequence[Law]) -> str:
-    """Say what several laws have in common, wherever they may act, with a space before; empty if nothing."""
-    shared = in_common([one.place for law in laws for one in (law, *law.elsewhere)]) if len(laws) > 1 else ""
-    return f" All of them {shared}." if shared else ""
+def _in_common(laws: Sequence[Law]) -> str:
+    """Say what several laws have in common, wherever they may act; empty if nothing."""
+    return in_common([one.place for law in laws for one in (law, *law.elsewhere)]) if len(laws) > 1 else ""
 
 
 def _rival(law: Law) -> Rival:

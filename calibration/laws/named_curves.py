@@ -11,7 +11,8 @@ With u the input, each family has a scale A, and one to three numbers:
 
 u0 of a threshold, a kink or a resonance lies between the values of the input. A curve is fitted by weighted least
 squares in the information W of the shifts (`calibration.laws.group_factors`), from a grid of starts; A, which is
-linear, is eliminated. It is acceptable if χ² leaves p ≥ 5 %, which needs a value more than it has numbers.
+linear, is eliminated. It is acceptable if χ² leaves p ≥ 5 %, which needs a value more than it has numbers. The
+interval of a resonance's u0 must be inside the range of the input: at an end nothing shows that the factor falls.
 Curves are compared by χ² + q ln(n k), BIC with q numbers for n runs of k outputs.
 
 Source: variable projection, Golub and Pereyra (1973); Schwarz (1978) for BIC.
@@ -55,6 +56,7 @@ class NamedCurve:
     chi2: float
     freedom: int  # degrees of freedom of χ²
     bic: float
+    at_an_end: bool = False  # of a resonance: the interval of u0 reaches an end of the input's range
 
     @property
     def p_value(self) -> float:
@@ -63,8 +65,8 @@ class NamedCurve:
 
     @property
     def acceptable(self) -> bool:
-        """Whether the runs agree with it."""
-        return self.p_value >= _ACCEPTED
+        """Whether the runs agree with it, and show it."""
+        return self.p_value >= _ACCEPTED and not self.at_an_end
 
 
 @dataclass(frozen=True)
@@ -157,6 +159,7 @@ def _fitted(family: _Family, groups: GroupFactors, values: int) -> NamedCurve:
         chi2=chi2,
         freedom=_freedom(family, groups),
         bic=chi2 + numbers * math.log(values),
+        at_an_end=family.name == "resonance" and not low[0] < ends["u0"][0] < ends["u0"][1] < high[0],
     )
 
 

@@ -38,7 +38,6 @@ from sim.arrays import Floats, Integers
 
 _NULL_DRAWS = 999  # tables without a law
 _LAW_DRAWS = 400  # tables with one
-_LEAST = 1 / (1 + _NULL_DRAWS)  # p-value
 _COVERED = 0.95
 _GAMMA = 1.0  # of EBIC
 
@@ -52,11 +51,6 @@ class Selection:
     near: dict[str, float]  # place -> share in which it is within INDISTINGUISHABLE of the first
     widest: float  # K: standard errors that cover all weights of all models in 95 %
     models: dict[int, int]  # number of columns -> number of models
-
-    @property
-    def words(self) -> str:
-        """The p-value in words."""
-        return f"p {'≤' if self.p_value <= _LEAST else '='} {self.p_value:.2g}"
 
     def ebic_gain(self, gain: float, columns: int) -> float:
         """Compute the gain in EBIC of a law with so many columns, by its gain in BIC."""

@@ -48,11 +48,6 @@ class Description(Protocol):
     """Laws that describe runs which no effect explains, or only one that something else could imitate."""
 
     @property
-    def sentence(self) -> str:
-        """What the laws say, without a claim about the cause."""
-        ...
-
-    @property
     def complete(self) -> bool:
         """Whether the best law leaves no more than noise."""
         ...
@@ -71,10 +66,6 @@ class Description(Protocol):
         """Laws that leave no more than noise and fit as well as a claimed effect, best first."""
         ...
 
-    def beside(self, claim: Fit) -> str:
-        """What the laws say about a claimed effect."""
-        ...
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the record for verdict.json."""
+    def to_dict(self, claim: Fit | None = None) -> dict[str, Any]:
+        """Return the record for verdict.json; beside a claimed effect it has the laws that fit as well."""
         ...

@@ -222,7 +222,7 @@ def _descriptions(result: Verdict) -> dict[str, Any]:
     return {
         "generic_features": list(result.corrections.regression.features),
         "correction_terms": list(learnt.terms) if learnt else [],
-        "laws": {**law.to_dict(), "beside": law.beside(result.final)} if law else None,
+        "laws": law.to_dict(result.final if result.explaining else None) if law else None,
         "described": result.described,
     }
 

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from calibration.laws import law_fits
-from calibration.laws.curves import Curve, _curve, find_curves, said_of
+from calibration.laws.curves import Curve, _curve, find_curves
 from calibration.laws.group_factors import GroupFactors, _linear_models, _LinearModel
 from calibration.laws.law_model import SIZE, LawModel
 from calibration.laws.named_curves import chosen, named_curves
@@ -96,7 +96,6 @@ def test_a_true_power_law_is_not_rejected() -> None:
         assert not curve.contradicted
         assert curve.fits == ()
         assert curve.words == ""
-    assert said_of(asked) == ""
 
 
 @pytest.mark.parametrize(("kind", "at"), [("resonance", 112.0), ("threshold", 95.0)])
@@ -106,9 +105,8 @@ def test_a_curve_is_found_and_named(kind: str, at: float) -> None:
     first = curve.named[0]
     assert first.name == kind
     assert 30 / math.pi * first.numbers["u0"] == pytest.approx(at, abs=4)
-    said = said_of(curves(kind))
-    assert f"Along ω it is no power law (p = {curve.p_value:.2g})" in said
-    assert f"like {first.words} at" in said
+    assert curve.words.startswith(f"no power law (p = {curve.p_value:.2g})")
+    assert f"like {first.words} at" in curve.words
     record = json.loads(json.dumps(curve.to_dict()))
     assert record["input"] == "omega_rpm"
     assert record["power_law_rejected"]
@@ -222,6 +220,17 @@ def test_a_power_law_gets_no_other_name_and_its_spline_is_a_power_law(is_term: b
     slope = np.polyfit(np.log(curve.inputs), np.log(curve.factor), 1)[0]
     assert slope == pytest.approx(1.25, abs=0.02)
     assert ((curve.low < curve.factor) & (curve.factor < curve.high)).all()
+
+
+def test_no_resonance_is_claimed_at_the_end_of_the_range() -> None:
+    """There a factor that rises to the last value is no less like one of many others."""
+    for is_term in (True, False):
+        factor = 3 * 64 / ((U - U[-1]) ** 2 + 64) + (not is_term)
+        fits = named_curves(groups(factor / factor.mean(), is_term=is_term), VALUES)
+        resonance = next(one for one in fits if one.name == "resonance")
+        assert resonance.p_value > 0.05
+        assert resonance.at_an_end
+        assert resonance not in chosen(fits)
 
 
 def test_what_no_family_can_say_gets_no_name() -> None:

@@ -147,7 +147,7 @@ def test_what_is_no_rival_does_not_weaken_a_claim() -> None:
         assert set(law.fit.names) & set(EXPONENTS) == set(law.ranked.chosen)
     better = replace(verdict.final, deviance=verdict.final.deviance - 100)
     assert laws.as_good_as(better) == ()
-    assert laws.beside(better) == "No law of the places that were searched describes it as well."
+    assert laws.to_dict(better)["beside"] == "No law of the places that were searched describes it as well."
 
 
 @pytest.mark.slow
