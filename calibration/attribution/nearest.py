@@ -108,13 +108,9 @@ class Nearest:
 
     @property
     def largest_along(self) -> str:
-        """The output and the feature of the inputs along which most is left, in words."""
+        """The output and the feature of the inputs along which most is left."""
         assert self.misfit is not None
-        shapes = np.abs(self.misfit.scores.shapes)
-        if not shapes.size:
-            return ""
-        output, feature = np.unravel_index(np.argmax(shapes), shapes.shape)
-        return f"{self.model.runs.outputs[output]} along {self.misfit.features[feature]}"
+        return largest_along(self.misfit, self.model.runs)
 
     def record(self) -> dict[str, Any]:
         """Return the record for verdict.json."""
@@ -157,6 +153,15 @@ def specimens(runs: Runs) -> tuple[Integers, tuple[str, ...]]:
     if runs.specimen is None:
         return runs.session, runs.session_names
     return runs.specimen, runs.specimen_names
+
+
+def largest_along(misfit: Misfit, runs: Runs) -> str:
+    """Name the output and the feature of the inputs along which a residual is largest; empty without inputs."""
+    shapes = np.abs(misfit.scores.shapes)
+    if not shapes.size:
+        return ""
+    output, feature = np.unravel_index(np.argmax(shapes), shapes.shape)
+    return f"{runs.outputs[output]} along {misfit.features[feature]}"
 
 
 def varying(model: ForwardModel, effect: Parameter, spread: float) -> Shifted:

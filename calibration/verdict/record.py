@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calibration.attribution.halved_tolerances import notable_gains, overall_gains
+from calibration.attribution.nearest import largest_along
 from calibration.attribution.refits import UNSEEN, Candidate
 from calibration.attribution.wrong_numbers import notable_pull
 from calibration.statistics.exclusions import count_of_rows, summary_of_excluded
 from calibration.statistics.fit import Fit, least_determined
+from calibration.statistics.gls import inverse_root
 from calibration.statistics.pull import Pull
 from calibration.statistics.statistical_model import Parameter
 from calibration.words.render import next_steps, sentence
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from calibration.verdict.verdict import Verdict
 
 MODELS = ("uncalibrated", "before", "after", "generic", "predictive", "law", "new_specimen")  # with stated errors
+_REPEATED = 5  # settings that are proposed for repeats where nothing explains the residual
 _NEAR = 0.5  # share of the residual that the best effect must remove to be named where none explains it
 
 
@@ -139,13 +142,13 @@ def _candidate(c: Candidate) -> dict[str, Any]:
 
 def _nearest_candidate(result: Verdict) -> dict[str, Any] | None:
     """Find the single effect that removes most of the residual, if one was refitted and removes much."""
-    refits = [(c.refit.deviance, c.effect.title) for c in result.evidence.candidates if c.refit]
+    refits = [(c.refit.deviance, c.effect.title, c.verdict) for c in result.evidence.candidates if c.refit]
     if not refits:
         return None
-    (deviance, title), before = min(refits), result.base.deviance
+    (deviance, title, reason), before = min(refits), result.base.deviance
     expected = int(result.conditions.split.fitted.sum()) * result.base.prediction.shape[1]
     share = (before - deviance) / max(before - expected, 1e-9)
-    return {"title": title, "removed_share": share} if share >= _NEAR else None
+    return {"title": title, "removed_share": share, "reason": reason} if share >= _NEAR else None
 
 
 def _numbers(result: Verdict) -> dict[str, Any]:
@@ -214,7 +217,26 @@ def _tests(result: Verdict) -> dict[str, Any]:
         "p_of_each_test": misfit.p,
         "critical_z": misfit.critical_z,
         "draws": result.evidence.draws,
+        "largest_along": largest_along(misfit, result.runs),
+        "largest_departures": _largest_departures(result),
     }
+
+
+def _largest_departures(result: Verdict) -> list[dict[str, Any]]:
+    """List the settings at which fitted runs depart most from the calibrated model, the farthest first.
+
+    A departure is the root mean square, over the outputs, of the mean over repeats in its standard deviations.
+    """
+    runs, used = result.runs, result.conditions.split.fitted
+    white = runs.scale[:, None] * (runs.y - result.base.prediction) @ inverse_root(result.base.noise.run).T
+    found: dict[tuple[str, ...], float] = {}
+    for condition in np.unique(runs.condition[used]):
+        rows = used & (runs.condition == condition)
+        mean = white[rows].sum(0) / math.sqrt(rows.sum())
+        at = tuple(f"{name} = {v[rows][0]:.4g}{unit}" for name, (v, unit) in runs.settings.items())
+        found[at] = max(found.get(at, 0.0), float(np.sqrt((mean**2).mean())))
+    ranked = sorted(found.items(), key=lambda item: -item[1])[:_REPEATED]
+    return [{"at": list(at), "departure": departure} for at, departure in ranked]
 
 
 def _descriptions(result: Verdict) -> dict[str, Any]:

@@ -53,6 +53,12 @@ def feature_in_words(name: str) -> str:
     return name
 
 
+def along_in_words(largest: str) -> str:
+    """Write along which output and feature a residual is largest."""
+    output, _, feature = largest.partition(" along ")
+    return f"{output_label(output)} along {feature_in_words(feature)}" if feature else largest
+
+
 def plain(value: float, digits: int = 3) -> str:
     """Write a number with so many significant digits and without an exponent."""
     if value == 0 or not math.isfinite(value):

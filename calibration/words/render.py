@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from calibration.words.quantities import (
     Record,
+    along_in_words,
     detectable,
     digits,
     direction_in_words,
@@ -90,5 +91,5 @@ _FILTERS: dict[str, Callable[..., str]] = {
     "percent": percent, "digits": digits, "p": p_in_words, "plain": plain, "size": size, "detectable": detectable,
     "given": given, "tolerance": tolerance, "fitted_value": fitted_value, "output": output_label,
     "output_error": output_error, "feature": feature_in_words, "direction": direction_in_words,
-    "ranges": ranges_in_words, "in_lab": length_in_lab,
+    "along": along_in_words, "ranges": ranges_in_words, "in_lab": length_in_lab,
 }  # fmt: skip

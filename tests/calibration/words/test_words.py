@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
 from jinja2 import UndefinedError
 
-from calibration.verdict.record import verdict_record
-from calibration.words.render import next_steps, sentence
+from calibration.verdict.record import facts, verdict_record
+from calibration.words.render import next_steps, say_laws, sentence
 from tests.calibration.toy_tables import ambiguous, effect, none, number
 
 VERDICTS = {"none": none, "number": number, "effect": effect, "ambiguous": ambiguous}
@@ -30,7 +31,7 @@ def test_a_stored_verdict_says_again_what_it_said(name: str) -> None:
     assert next_steps(record) == record["next_steps"] != []
 
 
-NEAREST = {"title": "a wall", "removed_share": 0.8}
+NEAREST = {"title": "a wall", "removed_share": 0.999, "reason": "its interval includes the null"}
 HEAD = {"title": "L (head length)", "departure": "9 % above what was given", "tolerances": 9.4}
 UNEXPLAINED = {"verdict": "unexplained", "p_value": 0.001, "held_out_error_falls": None}
 SPREAD = {
@@ -45,7 +46,9 @@ PARTIAL = {"verdict": "partial", "nearest": SPREAD, "held_out_error_falls": True
     ("name", "changes", "said"),
     [
         ("none", UNEXPLAINED, "There is a residual (p ≤ 0.001) that no effect and no pair of"),
-        ("none", UNEXPLAINED | {"nearest_candidate": NEAREST}, "; the nearest, a wall, removes 80 % of it and"),
+        ("none", UNEXPLAINED | {"nearest_candidate": NEAREST}, "; the nearest, a wall, removes nearly all of it, but"),
+        ("none", UNEXPLAINED | {"largest_along": "omega_h along N"}, ". Most of it is in head spin along N."),
+        ("none", PARTIAL | {"held_out_error_falls": False}, "not fitted to, but the error on the held-out"),
         ("none", UNEXPLAINED | {"harmless": True}, ". It is smaller than the noise of a run, and harmless for"),
         ("none", UNEXPLAINED | {"error_predictive": 0.03}, "a correction that describes it: 3.0"),
         ("none", {"held_out_runs_agree": False, "locked_p_value": 5e-4}, "The held-out runs (N=4) do not"),
@@ -71,6 +74,9 @@ def test_every_branch_of_the_sentence(name: str, changes: dict[str, Any], said: 
         ("effect", {"in_form_only": ["drag"]}, "Take the effect as a description of the runs"),
         ("none", PARTIAL | {"held_out_error_falls": False}, "Do not use a wall: it does"),
         ("none", PARTIAL, "Find out what differs between"),
+        ("none", UNEXPLAINED | {"largest_along": "theta along (ln l)²"}, "slip angle along (ln l)², so check first"),
+        ("none", UNEXPLAINED | {"largest_along": "v along time"}, "so check first the camera: its scale"),
+        ("none", UNEXPLAINED | {"largest_departures": [{"at": ["N = 2", "l = 5 cm"]}]}, "): N = 2, l = 5 cm."),
         ("none", UNEXPLAINED | {"untestable": {"drift": "needs elapsed_min"}}, "Note more in the table, so"),
         ("none", UNEXPLAINED | {"described": True}, "When the cause is known, make the law an effect"),
         ("none", UNEXPLAINED | {"error_predictive": 0.03}, "It has a correction of the residual, which"),
@@ -80,6 +86,33 @@ def test_every_branch_of_the_next_steps(name: str, changes: dict[str, Any], said
     assert any(said in step for step in next_steps(stored(name, **changes)))
     without_robot = next_steps(stored(name, **changes, hands_on_a_robot=False))
     assert not [step for step in without_robot if "corrected.toml" in step or "`softflagella" in step]
+
+
+def test_of_many_laws_the_best_two_are_named_and_the_others_counted() -> None:
+    plain = {"undetermined": False, "reason": "", "curves": [], "p_value": 0.3}
+    laws = {
+        "complete": True, "significant": True, "search_p_value": 0.001, "tables_without_law": 999, "curved": None,
+        "in_common": "act on the head", "kept": list("abcde"), "as_good": None, "in_common_of_as_good": "",
+        "laws": [{"place": place, "words": f"law {place}", "acts": place, **plain} for place in "abcde"],
+    }  # fmt: skip
+    said = say_laws(laws)
+    assert said.startswith(
+        "The residual is described by law a; or law b; or laws at 3 other places: these runs cannot"
+    )
+    assert said.endswith("(with the choice among all places counted, p ≤ 0.001). All of them act on the head.")
+    beside = say_laws(laws | {"as_good": list("abc")})
+    assert beside == "It is described as well by law a; or by law b; or by laws at 1 other place."
+
+
+def test_the_settings_to_repeat_are_those_of_the_largest_departures() -> None:
+    result = none()
+    runs, used = result.runs, result.conditions.split.fitted
+    off = used & (runs.condition == runs.condition[used][0])
+    moved = replace(result, runs=replace(runs, y=runs.y + 0.5 * off[:, None]))
+    first, *others = facts(moved)["largest_departures"]
+    assert first["at"] == [f"{name} = {v[off][0]:.4g}{unit}" for name, (v, unit) in runs.settings.items()]
+    assert first["departure"] > 5 * others[0]["departure"]
+    assert len(others) == 4
 
 
 def test_an_entry_that_is_missing_is_no_empty_text() -> None:
