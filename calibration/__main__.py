@@ -76,15 +76,7 @@ def _calibrate(arguments: Namespace) -> None:
     )
     paths = result.save(arguments.out)
     print(result.sentence)
-    held_out_runs = result.conditions.split.names
-    with_what, with_it = "with effects", result.error_after
-    if result.described:
-        with_what, with_it = "with the law", result.errors.rms["law"]
-    print(
-        f"error on the held-out runs ({held_out_runs}): as given {100 * result.error_uncalibrated:.2f} %, "
-        f"calibrated {100 * result.error_before:.2f} %, {with_what} {100 * with_it:.2f} %, "
-        f"noise {100 * result.noise_ceiling:.2f} %"
-    )
+    print(result.errors_in_words)
     for error in result.paths:
         print(error.sentence)
     for limit in result.conditions.caveats:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from calibration.words.render import rendered
 from sim.effects import catalogue, check_size
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_text
@@ -31,64 +32,6 @@ _WIDTH = 110  # of lines
 _WIDER = 10.0  # bounds over the size
 _LAWS = (ForceLaw, FactorLaw, ScaledEffect)
 _TAILS = (2, 3)  # of the robots of the test
-
-_EFFECT = '''"""The effect "{title}", a law of measured runs.
-
-    {equation}
-
-{words}
-"""
-
-from __future__ import annotations
-
-from dataclasses import replace
-
-{imports}
-
-EFFECT = replace(
-    {law},
-    name="{name}",
-    title="{title}",
-    source="{source}",
-    bounds=({low!r}, {high!r}),
-    typical={size!r},
-)
-'''
-
-_TEST = '''"""The effect {name}: the law that it was adopted from, and the motion of the control robot with it."""
-
-from __future__ import annotations
-
-import numpy as np
-import pytest
-
-from sim.effects import effect_named
-from sim.model.groups import Groups
-from sim.model.presets import PRESETS
-from sim.motion.steady import steady
-
-SIZE = {size!r}
-
-
-def motion(tails: int, effects: dict[str, float]) -> list[float]:
-    values = {{**PRESETS["paper-control"].group_values(), "N": float(tails), **effects}}
-    solved = steady(Groups.from_columns({{key: np.array([value]) for key, value in values.items()}}))
-    return [float(getattr(solved, output)[0]) for output in ("omega_yr", "v_x", "v_z")]
-
-
-@pytest.mark.parametrize(
-    ("tails", "expected"),
-    [
-        {expected},
-    ],
-)
-def test_the_motion_is_that_of_the_law(tails: int, expected: list[float]) -> None:
-    assert effect_named("{name}").typical == SIZE
-    moved = motion(tails, {{"{name}": SIZE}})
-    assert moved == pytest.approx(expected, rel=1e-4, abs=1e-9)
-    law = "{law}"
-    assert moved == pytest.approx(motion(tails, {{law: SIZE}}), rel=1e-9)
-'''
 
 
 def adopt_law(source: str | Path, name: str, folder: str | Path, *, place: str = "") -> list[Path]:
@@ -180,18 +123,9 @@ def _runs_in_words(runs: dict[str, Any]) -> str:
 def _effect_file(effect: Effect, name: str, size: float, words: str, table: str) -> str:
     imports, law = _source_of(effect)
     low, high = effect.bounds if isinstance(effect, FactorLaw) else (-_WIDER * abs(size), _WIDER * abs(size))
-    return _EFFECT.format(
-        title=name.replace("_", " "),
-        equation=effect.equation,
-        words=words,
-        imports="\n".join(imports),
-        law=law,
-        name=name,
-        source=f"a law of measured runs, {table}",
-        low=low,
-        high=high,
-        size=size,
-    )
+    described = {"title": name.replace("_", " "), "equation": effect.equation, "words": words, "table": table}
+    source = {"imports": "\n".join(imports), "law": law, "name": name, "low": low, "high": high, "size": size}
+    return rendered("effect.j2", described | source) + "\n"
 
 
 def _source_of(effect: Effect) -> tuple[list[str], str]:
@@ -227,4 +161,5 @@ def _test_file(effect: Effect, name: str, size: float) -> str:
         if not np.isfinite(outputs).all():
             raise InputError(f"{effect.name} = {size:g}: the control robot cannot be simulated with this law")
         expected.append(f"({tails}, {outputs})")
-    return _TEST.format(name=name, law=effect.name, size=size, expected=",\n        ".join(expected))
+    values = {"name": name, "law": effect.name, "size": size, "expected": ",\n        ".join(expected)}
+    return rendered("effect_test.j2", values) + "\n"

@@ -1,7 +1,7 @@
 """Laws that describe what a measured table has beyond the model, whether an effect explains it or not.
 
 laws.json has every place that was ranked and every law that was fitted. law.toml is the corrected robot with the
-best law (`calibration.report.law_robot`). It is written if this law leaves no more than noise.
+best law (`calibration.report.corrected_robot`). It is written if this law leaves no more than noise.
 """
 
 from __future__ import annotations
@@ -19,17 +19,15 @@ import pandas as pd
 from calibration.laws.inputs import EXPONENTS
 from calibration.laws.law_fits import Laws, find_laws
 from calibration.laws.law_model import LEVER, SIZE
-from calibration.report.corrected_robot import as_toml, check_given
-from calibration.report.law_robot import law_handed_on
-from calibration.statistics.exclusions import count_of_rows, summary_of_excluded
+from calibration.report.corrected_robot import as_toml, check_given, law_handed_on
+from calibration.report.robot_verdict import read_runs
 from calibration.statistics.fit import Fit
 from calibration.statistics.held_out import errors
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import Study, find_outliers, split_runs
 from calibration.statistics.weighted_fit import fit_weighted
-from calibration.swimmer.measured_table import Measurements, read_measurements
-from calibration.swimmer.protocols import PROTOCOLS
+from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from sim.io.files import files_together, write_text
 from sim.io.provenance import provenance
@@ -143,11 +141,7 @@ def find_robot_laws(
         InputError: the table cannot be used.
     """
     check_given(robot)
-    data = read_measurements(table)
-    excluded = summary_of_excluded(data.excluded, len(data) + count_of_rows(data.excluded))
-    for line in (*data.converted, *(f"excluded: {line}" for line in excluded)):
-        tell(line)
-    data, held_out = PROTOCOLS["session"](data)
+    data, held_out, name = read_runs(table, "session", tell)
     model = SwimmerModel(robot, data, jobs)
     start = start_values(model)
     given = model.predict([start], title="as given" if progress else "")[0]
@@ -157,5 +151,4 @@ def find_robot_laws(
     none = Directions.plain(np.empty((*data.y.shape, 0)))
     p_value = examine_residual(study, base, none).general_p
     laws = find_laws(study, base) if p_value < study.level else None
-    name = "table" if isinstance(table, pd.DataFrame) else Path(table).name
     return RobotLaws(robot, data, study, base, p_value, laws, name)

@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import pandas as pd
 
 from calibration.laws.law_fits import Laws, find_laws
-from calibration.report.corrected_robot import as_toml, check_given, handed_on
-from calibration.report.law_robot import law_handed_on
+from calibration.report.corrected_robot import as_toml, check_given, handed_on, law_handed_on
 from calibration.report.path_error import PathError, path_errors, wanted_paths
 from calibration.report.report import write_report
 from calibration.statistics.exclusions import count_of_rows, summary_of_excluded
 from calibration.swimmer.head_correction import learn_head_correction
-from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.possible_runs import Owned
 from calibration.swimmer.protocols import PROTOCOLS
 from calibration.swimmer.swimmer import SwimmerModel
@@ -26,6 +25,7 @@ from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
 from planner.vehicle.calibration_table import CalibrationKnowledge
+from sim.arrays import Flags
 from sim.io.files import files_together, write_text
 from sim.io.notebook import as_html, given_axes
 from sim.model.robot import Robot
@@ -108,6 +108,17 @@ class RobotVerdict(Verdict):
         return [Path(folder, name) for name in FILES]
 
 
+def read_runs(
+    table: str | Path | pd.DataFrame, protocol: Literal["session", "paper"], tell: Callable[[str], object]
+) -> tuple[Measurements, Flags | None, str]:
+    """Read the runs of a table, those that its protocol holds out, and its name; see `calibrate_robot`."""
+    data = read_measurements(table)
+    excluded = summary_of_excluded(data.excluded, len(data) + count_of_rows(data.excluded))
+    for line in (*data.converted, *(f"excluded: {line}" for line in excluded)):
+        tell(line)
+    return *PROTOCOLS[protocol](data), "table" if isinstance(table, pd.DataFrame) else Path(table).name
+
+
 def calibrate_robot(
     table: str | Path | pd.DataFrame,
     robot: Robot,
@@ -142,12 +153,7 @@ def calibrate_robot(
     """
     check_given(robot)
     wanted = wanted_paths(paths, robot, unit)
-    data = read_measurements(table)
-    for line in data.converted:
-        tell(line)
-    for line in summary_of_excluded(data.excluded, len(data) + count_of_rows(data.excluded)):
-        tell(f"excluded: {line}")
-    data, held_out = PROTOCOLS[protocol](data)
+    data, held_out, name = read_runs(table, protocol, tell)
     model = SwimmerModel(robot, data, jobs, own=own or {})
     verdict = calibrate(
         model,
@@ -157,6 +163,5 @@ def calibrate_robot(
         seed=seed,
         progress=progress,
     )
-    name = "table" if isinstance(table, pd.DataFrame) else Path(table).name
     result = RobotVerdict(**vars(verdict), robot=robot, table=name)
     return replace(result, paths=path_errors(wanted, robot, result.corrected, result.knowledge))

@@ -74,11 +74,19 @@ from calibration.statistics.weighted_fit import (
     noise_of_any_run,
     rows_of_little_weight,
 )
-from calibration.verdict.contents import Conditions, Corrections, Evidence, Fits, HeldOutErrors, Next
 from calibration.verdict.experiment import Describe, LearntCorrection, Rival
 from calibration.verdict.next_runs import next_runs
 from calibration.verdict.sequential_test import Explanation
-from calibration.verdict.verdict import Verdict, reach_verdict
+from calibration.verdict.verdict import (
+    Conditions,
+    Corrections,
+    Evidence,
+    Fits,
+    HeldOutErrors,
+    Next,
+    Verdict,
+    reach_verdict,
+)
 from sim.arrays import Flags, Floats
 from sim.io.provenance import fingerprint
 

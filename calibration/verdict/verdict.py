@@ -1,4 +1,4 @@
-"""The verdict on a table of runs: its rule and its sentence.
+"""The verdict on a table of runs: its rule, and what it contains.
 
 "none": no departure beyond noise. "number": a nuisance parameter is wrong, and explains it. "effect": one effect,
 or one pair, explains it. "ambiguous": several do, and the runs cannot tell them apart. "unexplained": there is a
@@ -16,18 +16,102 @@ from calibration.attribution.moves import StatedMove
 from calibration.attribution.nearest import Nearest
 from calibration.attribution.refits import Candidate
 from calibration.attribution.wrong_numbers import wrong_number
+from calibration.statistics.exclusions import summary_of_excluded
 from calibration.statistics.fit import Fit
+from calibration.statistics.held_out import FinalRefit
 from calibration.statistics.pull import Pull
+from calibration.statistics.residual_regression import Regression
+from calibration.statistics.residual_tests import Misfit
 from calibration.statistics.statistical_model import Runs
-from calibration.verdict.contents import Conditions, Corrections, Evidence, Fits, HeldOutErrors, Next
-from calibration.verdict.next_runs import NextRun
+from calibration.statistics.study import Split
+from calibration.verdict.experiment import Description, LearntCorrection
+from calibration.verdict.next_runs import Batch, NextRun
 from calibration.verdict.record import facts
+from calibration.verdict.sequential_test import Explanation
 from calibration.words.quantities import percent
 from calibration.words.render import sentence
+from sim.arrays import Floats
 
 _DISAGREES = 0.01  # p of the held-out runs below which they do not agree with the final model
-
 _LONGEST = 500  # letters of a sentence in a repr
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The residual of the calibrated model, and what every effect makes of it."""
+
+    misfit: Misfit  # tests of the residual
+    draws: int  # of its bootstrap
+    candidates: tuple[Candidate, ...]  # all effects of the catalogue
+    explaining: tuple[Candidate, ...]  # what explains the residual, best first; more than one: not told apart
+    rival_effects: tuple[Candidate, ...]  # effects that explain as much as the number that is wrong
+    untestable: dict[str, str]  # effects that these runs cannot test: what is missing
+    rival_numbers: tuple[Pull, ...] = ()  # numbers that explain as much, but would be too far off to come first
+
+
+@dataclass(frozen=True)
+class Fits:
+    """The calibrated model (base), that with the effects of the verdict (final), and its refit to all runs."""
+
+    uncalibrated: Floats  # (n, k) prediction of the model as given
+    base: Fit  # the calibrated model
+    base_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
+    final: Fit  # that with the effects of the verdict
+    final_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
+    final_refit: FinalRefit  # the final model, fitted to all runs
+    pulls: tuple[Pull, ...]  # of every nuisance parameter in the final model, the farthest first
+
+
+@dataclass(frozen=True)
+class HeldOutErrors:
+    """How far each model is from the held-out runs, relative rms, and how far noise alone would be.
+
+    The models are "uncalibrated", "before" (calibrated), "after" (with the effects of the verdict), "generic"
+    (with a regression of the residual), and, if there are such, "law" (with the best law), "predictive" (with a
+    learnt correction) and "new_specimen" (the adopted form with its mean size for every specimen).
+    """
+
+    rms: dict[str, float]  # of each model, over all outputs
+    by_output: dict[str, dict[str, float]]  # model -> output -> relative rms
+    after_interval: tuple[float, float]  # 95 %
+    noise: float  # of a run, from the repeats
+    p_value: float  # agreement of the held-out runs with the final model
+
+
+@dataclass(frozen=True)
+class Corrections:
+    """Descriptions of the residual that do not explain it."""
+
+    regression: Regression  # of the calibrated model's outputs
+    learnt: LearntCorrection | None  # what is handed on where nothing explains or describes the residual
+    law: Description | None = None  # laws, where they were looked for
+
+
+@dataclass(frozen=True)
+class Next:
+    """Explanations that the runs cannot tell apart, and the runs that would; none if there are not two."""
+
+    explanations: tuple[Explanation, ...] = ()  # best first
+    runs: tuple[NextRun, ...] = ()  # single settings, the best first
+    batch: Batch | None = None  # the same, for several runs together
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What was fixed before the runs were looked at, and what weakens the conclusion."""
+
+    split: Split  # fitted and held-out runs
+    sessions: tuple[str, ...]  # names of all sessions
+    hash: str  # of everything that was fixed
+    excluded: tuple[str, ...]  # rows and columns that were not used, and why
+    rows: int  # of the table, used or not
+    caveats: tuple[str, ...]  # what weakens the conclusion, in words
+    little_weight: tuple[int, ...] = ()  # rows of the table whose runs have less than half of the usual weight
+
+    @property
+    def summary_of_excluded(self) -> list[str]:
+        """What was excluded, by reason, with the number of rows."""
+        return summary_of_excluded(self.excluded, self.rows)
 
 
 def reach_verdict(evidence: Evidence, level: float, *, number_explains: bool) -> str:
@@ -75,15 +159,21 @@ class Verdict:
     def __repr__(self) -> str:
         said = self.sentence
         said = said if len(said) <= _LONGEST else f"{said[:_LONGEST]} …"
-        errors = f"as given {percent(self.error_uncalibrated)}, calibrated {percent(self.error_before)}"
-        if self.effects or self.nearest:
-            errors += f", with the {'effects' if self.effects else 'adopted form'} {percent(self.error_after)}"
         names = ", ".join(self.effects)
+        return f"Verdict {self.verdict!r}{f': {names}' if names else ''}\n  {said}\n  {self.errors_in_words}"
+
+    @property
+    def errors_in_words(self) -> str:
+        """The errors on the held-out runs, in a line."""
+        added = ""
+        if self.described:
+            added = f", with the law {percent(self.errors.rms['law'])}"
+        elif self.effects or self.nearest:
+            added = f", with the {'effects' if self.effects else 'adopted form'} {percent(self.error_after)}"
         return (
-            f"Verdict {self.verdict!r}{f': {names}' if names else ''}\n"
-            f"  {said}\n"
-            f"  error on the held-out runs ({self.conditions.split.names}): {errors}; "
-            f"noise of a run {percent(self.noise_ceiling)}"
+            f"error on the held-out runs ({self.conditions.split.names}): as given "
+            f"{percent(self.error_uncalibrated)}, calibrated {percent(self.error_before)}{added}; noise of a run "
+            f"{percent(self.noise_ceiling)}"
         )
 
     @property

@@ -16,7 +16,7 @@ from calibration.laws.law import NO_LEVER, NO_SESSIONS, UNDETERMINED, Law
 from calibration.laws.law_fits import Laws
 from calibration.laws.law_model import LEVER, SIZE, LawModel, with_law
 from calibration.laws.places import in_common, place_named, places
-from calibration.report.law_robot import law_handed_on, robot_with_law
+from calibration.report.corrected_robot import law_handed_on, robot_with_law
 from calibration.report.robot_laws import RobotLaws, find_robot_laws
 from calibration.statistics.statistical_model import by_differences, start_values
 from sim.effects import catalogue

@@ -16,9 +16,8 @@ from calibration.laws.law_fits import Laws, find_laws
 from calibration.laws.law_model import SIZE, LawModel, with_law
 from calibration.laws.partial_residuals import dependences
 from calibration.laws.places import place_named
-from calibration.report.corrected_robot import check_given
+from calibration.report.corrected_robot import _slopes, check_given, robot_with_law
 from calibration.report.figures import draw_dependences, draw_place
-from calibration.report.law_robot import _slopes, robot_with_law
 from calibration.report.robot_verdict import RobotVerdict
 from calibration.statistics.held_out import refit_to_all
 from calibration.verdict.experiment import Rival

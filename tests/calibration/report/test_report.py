@@ -13,9 +13,8 @@ from calibration.attribution.halved_tolerances import notable_gains
 from calibration.report.report import write_report
 from calibration.statistics.pull import Pull
 from calibration.swimmer.nuisance_numbers import nuisance_parameters
-from calibration.verdict.contents import Next
 from calibration.verdict.record import facts, shown, verdict_record
-from calibration.verdict.verdict import Verdict
+from calibration.verdict.verdict import Next, Verdict
 from calibration.words.quantities import detectable, direction_in_words, plain, size, with_error
 from calibration.words.render import next_steps
 from tests.calibration.toy_tables import (

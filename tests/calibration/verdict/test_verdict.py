@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
-from calibration.verdict.contents import HeldOutErrors
 from calibration.verdict.record import facts
-from calibration.verdict.verdict import Verdict, reach_verdict
+from calibration.verdict.verdict import HeldOutErrors, Verdict, reach_verdict
 from calibration.words.render import next_steps
 from tests.calibration.toy_tables import none
 

@@ -46,7 +46,7 @@ PARTIAL = {"verdict": "partial", "nearest": SPREAD, "held_out_error_falls": True
     ("name", "changes", "said"),
     [
         ("none", UNEXPLAINED, "There is a residual (p ≤ 0.001) that no effect and no pair of"),
-        ("none", UNEXPLAINED | {"nearest_candidate": NEAREST}, "; the nearest, a wall, removes nearly all of it, but"),
+        ("none", UNEXPLAINED | {"nearest_candidate": NEAREST}, "; the nearest, a wall, removes nearly all of it,"),
         ("none", UNEXPLAINED | {"largest_along": "omega_h along N"}, ". Most of it is in head spin along N."),
         ("none", PARTIAL | {"held_out_error_falls": False}, "not fitted to, but the error on the held-out"),
         ("none", UNEXPLAINED | {"harmless": True}, ". It is smaller than the noise of a run, and harmless for"),
@@ -74,7 +74,7 @@ def test_every_branch_of_the_sentence(name: str, changes: dict[str, Any], said: 
         ("effect", {"in_form_only": ["drag"]}, "Take the effect as a description of the runs"),
         ("none", PARTIAL | {"held_out_error_falls": False}, "Do not use a wall: it does"),
         ("none", PARTIAL, "Find out what differs between"),
-        ("none", UNEXPLAINED | {"largest_along": "theta along (ln l)²"}, "slip angle along (ln l)², so check first"),
+        ("none", UNEXPLAINED | {"largest_along": "theta along (ln l)²"}, "slip angle along (ln l)², so"),
         ("none", UNEXPLAINED | {"largest_along": "v along time"}, "so check first the camera: its scale"),
         ("none", UNEXPLAINED | {"largest_departures": [{"at": ["N = 2", "l = 5 cm"]}]}, "): N = 2, l = 5 cm."),
         ("none", UNEXPLAINED | {"untestable": {"drift": "needs elapsed_min"}}, "Note more in the table, so"),
