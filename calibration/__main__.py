@@ -10,6 +10,7 @@ from sim.io.errors import InputError
 
 program = Program("calibration", "Find from measured runs what the model of a robot lacks, and correct it.")
 main = program.main
+_LISTED = 8  # laws
 
 
 def _refuse_early(*tables: str) -> None:
@@ -139,9 +140,12 @@ def _laws(arguments: Namespace) -> None:
         f"error on the held-out runs ({described.study.split.names}): calibrated "
         f"{100 * described.error_without:.2f} %, noise {100 * described.noise:.2f} %"
     )
-    for law in described.laws.fitted if described.laws else ():
+    fitted = described.laws.fitted if described.laws else ()
+    for law in fitted[:_LISTED]:
         reason = law.reason or f"error {100 * law.error:.2f} %"
         print(f"  {law.place.name}: {reason}; gain in BIC {law.gain:.0f}")
+    if len(fitted) > _LISTED:
+        print(f"  and {len(fitted) - _LISTED} others, in laws.json")
     print(f"-> {', '.join(map(str, paths))}")
 
 

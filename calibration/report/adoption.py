@@ -161,5 +161,5 @@ def _test_file(effect: Effect, name: str, size: float) -> str:
         if not np.isfinite(outputs).all():
             raise InputError(f"{effect.name} = {size:g}: the control robot cannot be simulated with this law")
         expected.append(f"({tails}, {outputs})")
-    values = {"name": name, "law": effect.name, "size": size, "expected": ",\n        ".join(expected)}
-    return rendered("effect_test.j2", values) + "\n"
+    filled = {"name": name, "law": effect.name, "size": size, "expected": ",\n        ".join(expected)}
+    return rendered("effect_test.j2", filled) + "\n"

@@ -59,18 +59,6 @@ def test_a_report_is_in_the_words_and_units_of_a_lab_with_what_to_do_next_first(
     assert record["next_steps"] == next_steps(facts(result))
 
 
-def test_a_corrected_robot_that_does_not_lower_the_error_is_not_advised() -> None:
-    given = number().error_uncalibrated
-    for result in (with_errors(number(), before=given, after=given), replace(number(), verdict="none")):
-        worse = with_errors(result, before=given, after=1.1 * given)
-        first, *others = next_steps(facts(worse))
-        assert first.startswith("Plan with the robot as given: the corrected one does not lower the error")
-        assert not [step for step in others if "corrected" in step]
-        assert "corrected.toml" in " ".join(
-            next_steps(facts(with_errors(result, before=given, after=0.9 * given)))
-        )
-
-
 @pytest.mark.slow
 def test_a_claim_that_does_not_lower_the_error_says_so_first(tmp_path: Path) -> None:
     """In the verdict's first sentence, which verdict.json and the report have, too, and in what to do next."""
@@ -91,25 +79,6 @@ def test_a_claim_that_does_not_lower_the_error_says_so_first(tmp_path: Path) -> 
     assert f"({risen.explaining[0].effect.name})" in risen.sentence  # as one types it
     assert next_steps(facts(risen))[0].startswith("Do not rely on this claim yet")
     assert not next_steps(facts(fallen))[0].startswith("Do not rely")
-
-
-def test_a_wrong_number_that_does_not_lower_the_error_says_so_first() -> None:
-    risen = with_errors(number(), before=0.03, after=0.031)
-    first = risen.sentence.split(" No effect is claimed.")[0]
-    assert first.startswith("A nuisance parameter is wrong: ")
-    assert first.endswith("does not fall with it (3.00 % without, 3.10 % with it).")
-    assert "without measuring it" in next_steps(facts(risen))[0]
-    assert next_steps(facts(risen))[-1].startswith("Until then, plan with the robot as given")
-
-
-def test_where_nothing_is_claimed_nothing_can_fall() -> None:
-    nothing = with_errors(none(), before=0.03, after=0.03)
-    assert nothing.held_out_error_falls is None
-    assert "does not fall" not in nothing.sentence
-    assert verdict_record(nothing, table="t")["held_out_error_falls"] is None
-    assert next_steps(facts(nothing))[0].startswith("Plan with the corrected robot: `softflagella plan ")
-    odd = with_errors(nothing, before=0.03, after=0.03, p_value=0.001)
-    assert next_steps(facts(odd))[0].startswith("Find out what is different about the held-out runs")
 
 
 @pytest.mark.slow

@@ -42,9 +42,14 @@ SPREAD = {
 PARTIAL = {"verdict": "partial", "nearest": SPREAD, "held_out_error_falls": True}
 
 
+RISEN = {"held_out_error_falls": False, "error_before": 0.03, "error_after": 0.031}
+
+
 @pytest.mark.parametrize(
     ("name", "changes", "said"),
     [
+        ("number", RISEN, "does not fall with it (3.00 % without, 3.10 % with it). No effect is claimed."),
+        ("effect", RISEN, "of the catalogue, but the error on the held-out runs does not fall with it (3.00 %"),
         ("none", UNEXPLAINED, "There is a residual (p ≤ 0.001) that no effect and no pair of"),
         ("none", UNEXPLAINED | {"nearest_candidate": NEAREST}, "; the nearest, a wall, removes nearly all of it,"),
         ("none", UNEXPLAINED | {"largest_along": "omega_h along N"}, ". Most of it is in head spin along N."),
@@ -69,6 +74,9 @@ def test_every_branch_of_the_sentence(name: str, changes: dict[str, Any], said: 
 @pytest.mark.parametrize(
     ("name", "changes", "said"),
     [
+        ("number", RISEN, "Do not take over the fitted value without measuring it"),
+        ("number", RISEN, "Until then, plan with the robot as given"),
+        ("none", {"held_out_runs_agree": False}, "Find out what is different about the held-out runs (N=4)"),
         ("none", {"moves": [{"where": "on day 2"}]}, "Find out what changed on day 2: look at the set-up"),
         ("ambiguous", {"rival_numbers": [HEAD]}, "Measure L (head length) again, to rule out"),
         ("effect", {"in_form_only": ["drag"]}, "Take the effect as a description of the runs"),
@@ -86,6 +94,14 @@ def test_every_branch_of_the_next_steps(name: str, changes: dict[str, Any], said
     assert any(said in step for step in next_steps(stored(name, **changes)))
     without_robot = next_steps(stored(name, **changes, hands_on_a_robot=False))
     assert not [step for step in without_robot if "corrected.toml" in step or "`softflagella" in step]
+
+
+@pytest.mark.parametrize("name", VERDICTS)
+def test_a_corrected_robot_that_does_not_lower_the_error_is_not_advised(name: str) -> None:
+    first, *others = next_steps(stored(name, error_uncalibrated=0.03, error_corrected=0.033))
+    assert first.startswith("Plan with the robot as given: the corrected one does not lower the error")
+    assert "(3.00 % as given, 3.30 % corrected)" in first
+    assert not [step for step in others if "corrected" in step]
 
 
 def test_of_many_laws_the_best_two_are_named_and_the_others_counted() -> None:
