@@ -61,8 +61,8 @@ def test_statistics_and_networks_know_no_robot() -> None:
     assert not any("reference" in rooms for rooms in rooms_imported("sim").values())
 
 
-LIBRARIES = {"joblib", "matplotlib", "numba", "numpy", "pandas", "pyarrow", "safetensors", "scipy", "svgelements",
-             "torch", "tqdm"}  # fmt: skip
+LIBRARIES = {"jinja2", "joblib", "matplotlib", "numba", "numpy", "pandas", "pyarrow", "safetensors", "scipy",
+             "svgelements", "torch", "tqdm"}  # fmt: skip
 SOLVERS = {"sim.linear", "sim.motion", "sim.reference", "sim.solve"}
 TRAINING = {"surrogate.training", "surrogate.networks.training_loop", "surrogate.networks.checkpoints"}
 CODE = """

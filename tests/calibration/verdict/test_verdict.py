@@ -57,3 +57,9 @@ def test_a_residual_that_the_held_out_runs_do_not_show_is_harmless() -> None:
         assert not shown.harmless
         assert "harmless" not in shown.sentence
         assert "Look where the residual is large" in next_steps(facts(shown))[0]
+
+
+def test_what_is_claimed_must_lower_the_error() -> None:
+    for verdict, after, falls in (("none", 0.02, None), ("number", 0.02, True), ("effect", 0.031, False)):
+        errors = HeldOutErrors({"uncalibrated": 0.2, "before": 0.03, "after": after}, {}, (0.0, 1.0), 0.02, 0.5)
+        assert replace(none(), verdict=verdict, errors=errors).held_out_error_falls is falls

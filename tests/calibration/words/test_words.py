@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
+from html import unescape
 from typing import Any
 
 import pytest
 from jinja2 import UndefinedError
 
+from calibration.report.report import sections
+from calibration.verdict.next_runs import SELDOM
 from calibration.verdict.record import facts, verdict_record
 from calibration.words.render import next_steps, say_laws, sentence
 from tests.calibration.toy_tables import ambiguous, effect, none, number
@@ -19,6 +23,7 @@ VERDICTS = {"none": none, "number": number, "effect": effect, "ambiguous": ambig
 def stored(name: str, **changes: Any) -> dict[str, Any]:
     """Return the content of a verdict.json, with some of its entries changed."""
     record: dict[str, Any] = json.loads(json.dumps(verdict_record(VERDICTS[name](), table="t.csv")))
+    record["path"] = None
     assert not changes.keys() - record.keys()
     return record | changes
 
@@ -94,6 +99,57 @@ def test_every_branch_of_the_next_steps(name: str, changes: dict[str, Any], said
     assert any(said in step for step in next_steps(stored(name, **changes)))
     without_robot = next_steps(stored(name, **changes, hands_on_a_robot=False))
     assert not [step for step in without_robot if "corrected.toml" in step or "`softflagella" in step]
+
+
+def in_report(record: dict[str, Any]) -> str:
+    """What a reader sees of the sections of a report."""
+    return " ".join(unescape(re.sub("<[^>]*>", " ", sections(record, {}))).split())
+
+
+def test_rivals_are_told_apart_by_runs_that_are_worth_making_and_a_command() -> None:
+    batch, (run, *_) = (stored("ambiguous")[key] for key in ("next_batch", "next_runs"))
+
+    def proposing(batch_decides: float, *runs_decide: float) -> dict[str, Any]:
+        """A verdict with a batch and single runs that decide in these shares of cases."""
+        return stored(
+            "ambiguous",
+            next_batch=batch | {"decides": batch_decides, "worth_making": batch_decides >= SELDOM},
+            next_runs=[run | {"decides": share, "worth_making": share >= SELDOM} for share in runs_decide],
+        )
+
+    often, seldom = proposing(0.95, 0.93, 0.14), proposing(0.14, 0.14)
+    assert next_steps(often)[0].startswith("Make the 8 runs of the table below")
+    assert "`softflagella calibration decide " in next_steps(often)[1]
+    assert next_steps(seldom)[0].startswith("Do not make runs with these settings")
+    assert "decide in 14 % of cases only" in next_steps(seldom)[0]
+    assert "Runs to make next" not in in_report(seldom)
+    assert "Single settings" not in in_report(seldom)
+    seen = in_report(often)
+    assert "Runs to make next: N l [cm]" in seen
+    assert "93 %" in seen
+    assert "14 %" not in seen
+    assert "`" not in seen
+
+
+def test_a_pull_that_is_not_taken_to_be_wrong_has_its_reason() -> None:
+    """And a report without a claim compares no model with itself."""
+    first, *others = stored("none")["numbers_as_given"]
+    pulled = [first | {"pull": 19.0, "wrong": True, "learnt": True}, *others]
+    reason = f"pull beyond 3: {first['title']}. Nothing explains the residual, so none of them"
+    for wrong, words in (([], reason), ([[first]], f"Taken to be wrong: {first['title']}.")):
+        seen = in_report(stored("none", numbers_as_given=pulled, wrong_number_records=wrong))
+        assert "+19.0 (beyond 3)" in seen
+        assert words in seen
+        assert "None is taken to be wrong" not in seen
+        assert seen.count("(beyond 3)") == 1
+    assert "On a path" not in seen
+    assert "with the verdict's effects" not in seen
+
+
+def test_what_users_write_is_text_in_the_report() -> None:
+    seen = sections(stored("none", locked_test="<b>day</b> & night", limits=["a <i>"]), {})
+    assert "&lt;b&gt;day&lt;/b&gt; &amp; night" in seen
+    assert "a &lt;i&gt;." in seen
 
 
 @pytest.mark.parametrize("name", VERDICTS)
