@@ -46,6 +46,13 @@ def _refuse_early(*tables: str) -> None:
     ),
     UNIT,
     argument(
+        "--max-seconds",
+        type=float,
+        metavar="S",
+        help="of processor time for the search; then, or at Ctrl-C, the verdict is provisional and says what was "
+        "not tried (default: 90, with laws 180)",
+    ),
+    argument(
         "--no-path",
         action="store_true",
         help="state no error on a path, which takes some seconds, up to two minutes where the parts of the robot "
@@ -57,24 +64,27 @@ def _calibrate(arguments: Namespace) -> None:
     _refuse_early(arguments.table)
     from calibration.report.path_error import DEFAULT_PATHS
     from calibration.report.robot_verdict import calibrate_robot
+    from calibration.statistics.budget import stopped_by_interrupt
     from calibration.swimmer.possible_runs import owned
     from sim.inputs import load_robot
 
     own = owned(arguments.own)
     if arguments.no_path and arguments.path:
         raise InputError("--path and --no-path exclude each other")
-    result = calibrate_robot(
-        arguments.table,
-        load_robot(arguments.robot),
-        protocol=arguments.protocol,
-        own=own,
-        laws=not arguments.no_laws,
-        paths=() if arguments.no_path else arguments.path or DEFAULT_PATHS,
-        unit=arguments.unit,
-        seed=arguments.seed,
-        jobs=arguments.jobs,
-        tell=lambda line: print(line, file=sys.stderr),
-    )
+    with stopped_by_interrupt():
+        result = calibrate_robot(
+            arguments.table,
+            load_robot(arguments.robot),
+            protocol=arguments.protocol,
+            own=own,
+            laws=not arguments.no_laws,
+            paths=() if arguments.no_path else arguments.path or DEFAULT_PATHS,
+            unit=arguments.unit,
+            seed=arguments.seed,
+            max_seconds=arguments.max_seconds,
+            jobs=arguments.jobs,
+            tell=lambda line: print(line, file=sys.stderr),
+        )
     paths = result.save(arguments.out)
     print(result.sentence)
     print(result.errors_in_words)

@@ -21,11 +21,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.attribution.refits import Candidate
+from calibration.attribution.refits import IMITABLE, SURE, Candidate
+from calibration.attribution.wrong_numbers import IMPLAUSIBLE, pulls
 from calibration.statistics.fit import Fit
 from calibration.statistics.gls import eliminated
 from calibration.statistics.held_out import held_out_p_value
@@ -39,6 +40,29 @@ _DRAWS = 200
 _SPREAD = 0.5  # of ln of a signal
 _INPUTS = ("N", "ln l")
 _ENOUGH = 2  # values a parameter
+
+
+@dataclass(frozen=True)
+class NumberCheck:
+    """What speaks against a wrong nuisance parameter as the explanation."""
+
+    imitable: float  # imitability index
+    transfer: float  # p-value that the fit with it carries over to other runs
+    tolerances: float  # by how many of its tolerances it is off
+
+    @property
+    def implausible(self) -> bool:
+        """Whether it is off by more of its tolerances than an error of measurement makes credible."""
+        return self.tolerances > IMPLAUSIBLE
+
+    @property
+    def uncertain(self) -> bool:
+        """Whether it may be something outside the catalogue that looks like it."""
+        return self.imitable > IMITABLE or self.transfer < SURE or self.implausible
+
+    def record(self) -> dict[str, float | bool]:
+        """Return the record for verdict.json."""
+        return {**vars(self), "implausible": self.implausible, "uncertain": self.uncertain}
 
 
 def with_checks(study: Study, claims: Sequence[Candidate], base: Fit) -> list[Candidate]:
@@ -56,6 +80,15 @@ def with_checks(study: Study, claims: Sequence[Candidate], base: Fit) -> list[Ca
         transfer = transfer_p(replace(study, seed=study.seed + 4), claim.refit)
         checked.append(replace(claim, imitable=imitability(shares, strength), transfer=transfer))
     return checked
+
+
+def check_number(study: Study, number: Fit, base: Fit) -> NumberCheck:
+    """Check the claim that nuisance parameters are wrong, as claims of effects are."""
+    strength = math.sqrt(max(base.deviance - number.deviance, 0.0))
+    shares = absorbable_shares(study, number, [alike[0].parameter.name for alike in number.wrong_numbers])
+    off = [pull for pull in pulls(number, study.model.nuisances) if pull.freed]
+    transfer = transfer_p(replace(study, seed=study.seed + 4), number)
+    return NumberCheck(imitability(shares, strength), transfer, max(pull.tolerances for pull in off))
 
 
 def absorbable_shares(study: Study, fitted: Fit, names: Sequence[str]) -> Floats:

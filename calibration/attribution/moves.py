@@ -25,7 +25,8 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from calibration.attribution.refits import INDISTINGUISHABLE
-from calibration.statistics.fit import Fit, birge, fit
+from calibration.statistics.budget import skipped
+from calibration.statistics.fit import Fit, UnsolvedError, birge, fit
 from calibration.statistics.residual_tests import TESTABLE, Directions, examine_residual
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import Experiment, Parameter, Runs
@@ -135,7 +136,12 @@ def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[Move, ...]]:
             shifts = (*(m.shift for m in moves), move.shift)
             moved = replace(study, model=Shifted(plain, shifts))
             start, names = {**base.parameters, move.name: 0.0}, (*base.names, move.name)
-            fits.append((move, moved, fit(moved.model, start, names, used, title="")))
+            if skipped(move.shift.parameter.title):
+                continue
+            try:
+                fits.append((move, moved, fit(moved.model, start, names, used, title="")))
+            except UnsolvedError:  # with an effect at work
+                continue
         fits = [each for each in fits if _is_real(plain.runs, used, each[0], each[2])]
         if not fits:
             break

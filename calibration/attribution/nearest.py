@@ -41,6 +41,7 @@ from scipy.stats import norm as normal
 from scipy.stats import t as student
 
 from calibration.attribution.refits import FIRST, Candidate, left_out_residuals
+from calibration.statistics.budget import skipped, spent
 from calibration.statistics.fit import Fit, UnsolvedError, birge, fit
 from calibration.statistics.gls import solved
 from calibration.statistics.held_out import FinalRefit
@@ -191,6 +192,8 @@ def adopt_nearest(
     """
     adopted: list[Nearest] = []
     for candidate in _promising(base, misfit, candidates):
+        if skipped(f"{candidate.title} as the nearest form"):
+            continue
         try:
             constant = _converged(study, base, candidate)
             forms = [(study.model, constant, 0.0)]
@@ -259,7 +262,7 @@ def _with_spread(study: Study, constant: Fit, effect: Parameter) -> tuple[Shifte
         new_b, start = _birge(study, fitted), fitted.parameters
         settled = abs(new / spread - 1) < _SETTLED and abs(new_b / b - 1) < _SETTLED
         spread, b = new, new_b
-        if settled or spread == least:
+        if settled or spread == least or spent():
             break
     return model, fitted, spread
 

@@ -26,6 +26,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from tqdm import tqdm
 
+from calibration.statistics.budget import skipped
 from calibration.statistics.fit import Fit, UnsolvedError, fit, noise_at_most
 from calibration.statistics.gls import solved
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
@@ -37,6 +38,7 @@ IMITABLE = 0.05  # imitability index above which a claim needs a reservation
 SURE = 0.01  # p-value of the transfer test below which it is
 INDISTINGUISHABLE = 6.63  # χ² with one degree of freedom, 99 %
 UNSEEN = 1e9  # smallest detectable size of an effect that changes nothing
+NO_TIME = "no time was left for its fit"
 FIRST = 3  # number of single effects to which a second one is added
 _CURVED = 0.3  # share of the best score's z² below which an effect is not refitted if it leaves too much
 _DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
@@ -160,6 +162,9 @@ def examine(
             if reason:
                 examined.append(replace(candidate, verdict=reason))
                 continue
+        if skipped(f"a second effect beside {beside[0].title}" if beside else effect.title):
+            examined.append(replace(candidate, verdict=NO_TIME))
+            continue
         size = {effect.name: min(max(guess, effect.bounds[0]), effect.bounds[1])}
         if effect.second is not None:
             size[effect.second.name] = float(misfit.second[j]) if local else effect.second.start
@@ -210,6 +215,8 @@ def pairs(study: Study, candidates: Sequence[Candidate]) -> list[Candidate]:
     second: list[Candidate] = []
     for first in refitted[:FIRST]:
         assert first.refit is not None
+        if skipped(f"a second effect beside {first.title}"):
+            continue
         others = [e for e in study.model.effects if e.name != first.effect.name]
         tangents = directions(study.model, first.refit.parameters, others, title=title, quick=True)
         misfit = examine_residual(again, first.refit, tangents)
@@ -252,7 +259,9 @@ def judge(study: Study, candidate: Candidate, base: Fit, refit: Fit, others: Dir
     gain, error = session_gain(study, base, refit)
     low, high = interval_at_second(refit, candidate.effect)
     verdict = "kept"
-    if not refit.converged:
+    if refit.stopped:
+        verdict = NO_TIME
+    elif not refit.converged:
         verdict = "its fit did not converge"
     elif after.p_value < study.level / 2:
         verdict = f"leaves a residual (p ≤ {after.p_value:.1g})"

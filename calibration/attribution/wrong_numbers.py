@@ -27,7 +27,8 @@ from collections.abc import Sequence
 from scipy.stats import norm as normal
 
 from calibration.attribution.refits import INDISTINGUISHABLE, Candidate, ebic, judge, lowest_ebic
-from calibration.statistics.fit import Fit, fit, noise_at_most
+from calibration.statistics.budget import skipped
+from calibration.statistics.fit import Fit, UnsolvedError, fit, noise_at_most
 from calibration.statistics.pull import Pull
 from calibration.statistics.residual_tests import Directions
 from calibration.statistics.statistical_model import Parameter, change
@@ -119,15 +120,20 @@ def beside_wrong_numbers(
     names = [e.name for e in study.model.effects]
     promising = []
     for candidate in candidates:
-        if candidate.refit is not None:
+        if candidate.refit is not None and not candidate.refit.stopped:
             alike = wrong_number(pulls(candidate.refit, study.model.nuisances))
             if alike:
                 promising.append((candidate.refit.deviance - alike[0].z ** 2, candidate.effect.name, candidate))
     judged = []
     for _, name, candidate in sorted(promising, key=lambda p: p[:2])[:_TRIED]:
         assert candidate.refit is not None
+        if skipped(f"{candidate.title} beside a wrong number"):
+            continue
         target = noise_at_most(study.values, len(candidate.refit.names))
-        refit = without_wrong_priors(study, candidate.refit, target=target)
+        try:
+            refit = without_wrong_priors(study, candidate.refit, target=target)
+        except UnsolvedError:
+            continue
         judged.append(judge(study, candidate, base, refit, directions.without(names.index(name))))
     single = lowest_ebic(study, candidates)
     return [c for c in judged if c.refit and ebic(study, c.refit, len(c.refit.wrong_numbers) + 1) < single]

@@ -33,6 +33,7 @@ from calibration.laws.law_model import SIZE
 from calibration.laws.places import in_common, places
 from calibration.laws.search import Ranked, search
 from calibration.laws.selection import Selection, examine_selection
+from calibration.statistics.budget import skipped
 from calibration.statistics.fit import Fit
 from calibration.statistics.study import LEVEL, Study
 from calibration.swimmer.swimmer import SwimmerModel
@@ -212,7 +213,8 @@ def _fit_all(
         chosen_alone: whether only the exponents of the linear model are fitted.
     """
     bar = tqdm(likely, desc="laws", unit="law", delay=1.0, disable=not study.progress)
-    return [law for one in bar if (law := fitted_law(study, model, base, one, chosen_alone=chosen_alone))]
+    tried = (one for one in bar if not skipped("some laws"))
+    return [law for one in tried if (law := fitted_law(study, model, base, one, chosen_alone=chosen_alone))]
 
 
 def _with_levers(

@@ -26,6 +26,7 @@ from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.arrays import Flags
+from sim.io.errors import InputError
 from sim.io.files import files_together, write_text
 from sim.io.notebook import as_html, given_axes
 from sim.model.robot import Robot
@@ -33,6 +34,7 @@ from sim.model.robot import Robot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+MAX_SECONDS = 90.0  # of processor time for the search, without laws
 FILES = ("verdict.json", "report.html", "corrected.toml")
 
 
@@ -129,6 +131,7 @@ def calibrate_robot(
     paths: Sequence[str] = (),
     unit: str | None = None,
     seed: int = 0,
+    max_seconds: float | None = None,
     jobs: int | None = None,
     progress: bool = True,
     tell: Callable[[str], object] = lambda line: None,
@@ -144,6 +147,7 @@ def calibrate_robot(
         paths: files or shapes, such as square:24cm, on which the error is stated before and after.
         unit: of paths that do not say theirs.
         seed: of the bootstrap.
+        max_seconds: of processor time for the search; default `MAX_SECONDS`, twice that with laws.
         jobs: threads; default all processors.
         progress: show progress bars.
         tell: is told, before the fit, what was converted and what was excluded, a line at a time.
@@ -152,6 +156,9 @@ def calibrate_robot(
         InputError: the table or a path cannot be used.
     """
     check_given(robot)
+    limit = MAX_SECONDS * (1 + laws) if max_seconds is None else max_seconds
+    if not limit > 0:
+        raise InputError(f"max_seconds: {limit:g}; give a positive number of seconds")
     wanted = wanted_paths(paths, robot, unit)
     data, held_out, name = read_runs(table, protocol, tell)
     model = SwimmerModel(robot, data, jobs, own=own or {})
@@ -161,6 +168,7 @@ def calibrate_robot(
         describe=find_laws if laws else None,
         correction=learn_head_correction,
         seed=seed,
+        max_seconds=limit,
         progress=progress,
     )
     result = RobotVerdict(**vars(verdict), robot=robot, table=name)

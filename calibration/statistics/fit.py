@@ -27,6 +27,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import t as student
 
+from calibration.statistics.budget import limited_as_one, skipped, spent
 from calibration.statistics.gls import Noise, Products, eliminated, repeat_count, repeat_covariance
 from calibration.statistics.pull import Pull
 from calibration.statistics.statistical_model import (
@@ -77,6 +78,7 @@ class Fit:
     deviance: float  # rᵀ Σ⁻¹ r + ln |Σ|/|S ⊗ I| over the fitted runs
     converged: bool  # the fit is at a minimum, or at one within the bounds
     wrong_numbers: tuple[tuple[Pull, ...], ...] = ()  # the first of each has lost its prior; see `fit`
+    stopped: bool = False  # the search ended because no time was left
 
     def half_width(self, place: int) -> float:
         """Compute half of the 95 % interval of a parameter, on its own scale."""
@@ -131,7 +133,9 @@ def fit(
     repeats = data.repeats(used)
     run = repeat_covariance(data.y[used], repeats, data.scale[used])
     problem = _Problem(model, fitted, used, run, title)
-    point = _descend(problem, problem.first(dict(start)), target)
+    with limited_as_one():
+        point = _descend(problem, problem.first(dict(start)), target)
+        stopped = spent()
     linear = point.products.solve(passes=_PASSES)
     share = float(linear.share)
     normal = point.products.at(linear.share)
@@ -149,6 +153,7 @@ def fit(
         deviance=float(normal[-1, -1] + len(run) * np.log1p(share * point.products.sizes).sum()),
         converged=_step(fitted, point.parameters, normal, 0).promise < _UNSETTLED,
         wrong_numbers=wrong_numbers,
+        stopped=stopped,
     )
 
 
@@ -183,6 +188,8 @@ class _Problem:
             point = self.at(tried, None, 1)
             if point.solved:
                 return point
+            if spent():
+                break
             tried.update({p.name: (tried[p.name] + p.start) / 2 for p in effects})
         if effects:
             raise UnsolvedError
@@ -234,6 +241,8 @@ def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
             break
         above = float(point.products.at(share)[-1, -1]) - target
         if count > _TRIED and (_MOST_STEPS - count) * step.promise < above:
+            break
+        if skipped("more steps of some fits"):
             break
         tried = problem.at(step.parameters, None if step.size > _SHORT else point.derivative, count + 1)
         fall = float((point.products.at(share) - tried.products.at(share))[-1, -1])

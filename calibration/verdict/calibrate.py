@@ -25,12 +25,13 @@ import math
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TypeVar, cast
 
 import numpy as np
 
-from calibration.attribution.claim_checks import with_checks
+from calibration.attribution.claim_checks import NumberCheck, check_number, with_checks
 from calibration.attribution.moves import Move, StatedMove, find_moves, groups_that_may_differ
 from calibration.attribution.nearest import Nearest, adopt_nearest
 from calibration.attribution.refits import (
@@ -51,6 +52,7 @@ from calibration.attribution.wrong_numbers import (
     pulls,
     without_wrong_priors,
 )
+from calibration.statistics.budget import Budget, limited
 from calibration.statistics.exclusions import caveat_of_excluded, count_of_rows
 from calibration.statistics.fit import Fit, fit, profile_intervals
 from calibration.statistics.held_out import (
@@ -88,8 +90,10 @@ from calibration.verdict.verdict import (
     reach_verdict,
 )
 from sim.arrays import Flags, Floats
+from sim.io.errors import InputError
 from sim.io.provenance import fingerprint
 
+_SEARCH, _DESCRIBED = 0.6, 0.85  # shares of the time after which effects and descriptions are no longer looked for
 _LAWS_TOLD_APART = 3  # beside a claim; the more there are, the fewer runs tell all of them apart
 
 Subject = TypeVar("Subject", bound=Experiment)
@@ -104,6 +108,7 @@ def calibrate(
     level: float = LEVEL,
     seed: int = 0,
     draws: int = DRAWS,
+    max_seconds: float = math.inf,
     progress: bool = True,
 ) -> Verdict:
     """Calibrate a model with its runs, and find what it lacks.
@@ -118,38 +123,47 @@ def calibrate(
         level: α of every claim.
         seed: of the bootstrap; the same seed gives the same result.
         draws: of the bootstrap. It resolves no smaller p-value than 2/(draws + 1).
+        max_seconds: of processor time for the search for explanations and descriptions; then the verdict is
+            provisional, and says what was not tried.
         progress: show progress bars.
     """
-    start = start_values(model)
+    began, start = time.process_time(), start_values(model)
     uncalibrated = model.predict([start], title="as given" if progress else "")[0]
     model.check(uncalibrated)
     split = split_runs(model.runs, held_out, find_outliers(model.runs, uncalibrated))
     study = Study(model, split, level, seed, draws, progress)
-    guess, began = model.guess(start, split.fitted), time.monotonic()
+    guess, fitted = model.guess(start, split.fitted), time.monotonic()
     study, base = fit_weighted(study, guess)
-    model = cast(Subject, study.model)
-    study, explained, moves = _explain_with_moves(study, base, time.monotonic() - began)
-    evidence = Evidence(
-        misfit=explained.misfit,
-        draws=draws,
-        candidates=explained.candidates,
-        explaining=explained.best,
-        rival_effects=explained.rival_effects,
-        rival_numbers=explained.rival_numbers,
-        untestable=dict(model.untestable),
-    )
-    verdict = reach_verdict(evidence, level, number_explains=explained.number is not None)
-    unexplained, uncertain = verdict == "unexplained", any(c.uncertain for c in explained.best)
-    description = None
-    if describe and study.model is model and (unexplained or uncertain):
-        description = describe(study, explained.base, beside_claim=uncertain)
-    described = unexplained and description is not None and description.complete
-    steered = unexplained and not described
-    if steered:
-        nearest = adopt_nearest(study, explained.base, explained.misfit, explained.candidates, explained.tangents)
-        explained = replace(explained, nearest=nearest)
-        verdict = "partial" if nearest else verdict
-    learnt = correction(model, _of_runs(study, explained), split) if correction and steered else None
+    model, seconds_of_fit = cast(Subject, study.model), time.monotonic() - fitted
+    used = time.process_time() - began
+    with limited(_DESCRIBED * max_seconds - used) as budget:
+        with limited(_SEARCH * max_seconds - used):
+            study, explained, moves = _explain_with_moves(study, base, seconds_of_fit)
+        evidence = Evidence(
+            misfit=explained.misfit,
+            draws=draws,
+            candidates=explained.candidates,
+            explaining=explained.best,
+            rival_effects=explained.rival_effects,
+            rival_numbers=explained.rival_numbers,
+            number_check=explained.number_check,
+            untestable=dict(model.untestable),
+        )
+        verdict = reach_verdict(evidence, level, number_explains=explained.number is not None)
+        unexplained, uncertain = verdict == "unexplained", any(c.uncertain for c in explained.best)
+        description = None
+        if describe and study.model is model and (unexplained or uncertain):
+            description = describe(study, explained.base, beside_claim=uncertain)
+        described = unexplained and description is not None and description.complete
+        steered = unexplained and not described
+        if steered:
+            nearest = adopt_nearest(
+                study, explained.base, explained.misfit, explained.candidates, explained.tangents
+            )
+            explained = replace(explained, nearest=nearest)
+            verdict = "partial" if nearest else verdict
+        learnt = correction(model, _of_runs(study, explained), split) if correction and steered else None
+        of_all, moves_of_all = _fit_moves(study, model, explained)
     fixed = {"level": level, "seed": seed, "catalogue": [e.name for e in model.effects], "locked": split.names}
     regression = regress_residual(model.runs, explained.base.prediction, split.fitted)
     corrections = Corrections(regression, learnt, description)
@@ -161,7 +175,6 @@ def calibrate(
     little = rows_of_little_weight(study)
     excluded = (*model.runs.excluded, *split.reasons)
     rows = len(model.runs) + count_of_rows(model.runs.excluded)
-    of_all, moves_of_all = _fit_moves(study, model, explained)
     moves, with_moves = (moves_of_all, of_all) if of_all else (moves, explained.base)
     held_out_errors = _errors(study, explained, uncalibrated, corrections)
     falls = held_out_errors.rms["after"] < held_out_errors.rms["before"]
@@ -178,6 +191,7 @@ def calibrate(
         conditions=Conditions(
             split=split,
             sessions=model.runs.session_names,
+            not_tried=tuple(budget.not_tried),
             hash=fingerprint(fixed),
             excluded=excluded,
             little_weight=little,
@@ -186,6 +200,7 @@ def calibrate(
                 *model.runs.caveats,
                 *caveat_of_excluded(excluded, rows),
                 *split.caveats,
+                *_caveat_of_time(budget, max_seconds),
                 *caveat_of_weights(little, int(split.kept.sum()), alike(model.runs, little)),
                 *_caveats(model, explained),
             ),
@@ -206,6 +221,7 @@ class Explained:
     number: Fit | None = None  # the fit with a wrong nuisance parameter freed, if that explains the residual
     rival_effects: tuple[Candidate, ...] = ()  # effects that explain as much as the wrong number does
     rival_numbers: tuple[Pull, ...] = ()  # the wrong numbers, where effects come ahead of them
+    number_check: NumberCheck | None = None  # of the wrong number, where it comes ahead of effects
     nearest: Nearest | None = None  # the form that is adopted where nothing explains the residual
 
     @property
@@ -240,11 +256,12 @@ def _explain_with_moves(
     Such numbers are looked for before the effects, and again beside those that are named.
     """
     moved, with_moves, moves = find_moves(study, base)
+    beside_moves = explain(moved, with_moves, seconds_of_fit) if moves else None
     explained = explain(study, base, seconds_of_fit)
-    if moves:
+    if beside_moves:
         if explained.best and explained.final.deviance < with_moves.deviance + INDISTINGUISHABLE:
             return study, explained, ()
-        return moved, explain(moved, with_moves, seconds_of_fit), moves
+        return moved, beside_moves, moves
     if explained.best:
         moved, _, moves = find_moves(study, explained.final)
         if moves:
@@ -312,7 +329,10 @@ def explain(study: Study, base: Fit, seconds_of_fit: float) -> Explained:
         if claims and misfit.p_value < level and implausible(off):
             checked = tuple(with_checks(study, claims, base))
             return Explained(base, misfit, tangents, tuple(candidates), checked, freed, rival_numbers=off)
-        return Explained(base, misfit, tangents, tuple(candidates), (), freed, rival_effects)
+        checked_number = check_number(study, freed, base)
+        return Explained(
+            base, misfit, tangents, tuple(candidates), (), freed, rival_effects, number_check=checked_number
+        )
     best = (
         best
         or explaining(beside_wrong_numbers(study, base, candidates, tangents))
@@ -341,11 +361,11 @@ def _fits(study: Study, explained: Explained, uncalibrated: Floats, refit: Final
     """Add intervals to the fits, and the `refit` to all runs that is handed on."""
     base, final, used = explained.base, explained.final, study.split.fitted
     title = "intervals" if study.progress else ""
-    base_intervals = profile_intervals(study.model, base, used, title=title)
+    base_intervals = _intervals(study.model, base, used, title)
     final_intervals = base_intervals
     if final is not base:
         model = explained.nearest.model if explained.nearest else study.model
-        final_intervals = profile_intervals(model, final, used, title=title)
+        final_intervals = _intervals(model, final, used, title)
     if explained.nearest:
         final_intervals[explained.nearest.effect.name] = explained.nearest.interval
     return Fits(
@@ -357,6 +377,14 @@ def _fits(study: Study, explained: Explained, uncalibrated: Floats, refit: Final
         final_refit=refit,
         pulls=pulls(final, study.model.nuisances),
     )
+
+
+def _intervals(model: ForwardModel, fitted: Fit, used: Flags, title: str) -> dict[str, tuple[float, float]]:
+    """Compute 95 % intervals by profile deviance; by the covariance where the model breaks down at their ends."""
+    try:
+        return profile_intervals(model, fitted, used, title=title)
+    except InputError:
+        return {name: fitted.interval(name) for name in fitted.names}
 
 
 def _handed_on(study: Study, explained: Explained, *, falls: bool, moved: bool) -> FinalRefit:
@@ -372,8 +400,11 @@ def _next_runs(rivals: tuple[Rival, ...], seed: int) -> Next:
     """Plan the runs that would tell rivals apart; none if there are no rivals."""
     if not rivals:
         return Next()
-    runs, batch = next_runs(rivals, seed=seed)
-    return Next(tuple(map(Explanation.from_rival, rivals)), runs, batch)
+    explanations = tuple(map(Explanation.from_rival, rivals))
+    try:
+        return Next(explanations, *next_runs(rivals, seed=seed))
+    except InputError:  # a rival breaks down at runs that could be made
+        return Next(explanations)
 
 
 def _errors(study: Study, explained: Explained, uncalibrated: Floats, corrections: Corrections) -> HeldOutErrors:
@@ -391,7 +422,8 @@ def _errors(study: Study, explained: Explained, uncalibrated: Floats, correction
     if corrections.law is not None:
         predictions["law"] = corrections.law.prediction
     if explained.nearest and explained.nearest.sizes:
-        predictions["new_specimen"] = explained.nearest.of_new_specimen()
+        with suppress(InputError):  # the simulation may break down at the mean size
+            predictions["new_specimen"] = explained.nearest.of_new_specimen()
     stated = {name: errors(runs, prediction, test) for name, prediction in predictions.items()}
     noise = base.noise.run
     return HeldOutErrors(
@@ -403,11 +435,26 @@ def _errors(study: Study, explained: Explained, uncalibrated: Floats, correction
     )
 
 
+def _caveat_of_time(budget: Budget, max_seconds: float) -> tuple[str, ...]:
+    """Say what was not tried because no time was left."""
+    if not budget.not_tried:
+        return ()
+    ended = f"after {max_seconds:.0f} s of processor time" if budget.left > -math.inf else "at Ctrl-C"
+    return (f"provisional: the search ended {ended}, and did not try {', '.join(budget.not_tried)}",)
+
+
 def _caveats(model: ForwardModel, explained: Explained) -> tuple[str, ...]:
     """Say why a fit may not be the best one."""
     base, final = explained.base, explained.final
     at_bounds = [p.name for p in final.fitted if final.parameters[p.name] in p.bounds]
     caveats = [f"{name} is at the end of its range: these runs do not determine it" for name in at_bounds]
+    vague = [
+        p.name
+        for place, p in enumerate(final.fitted)
+        if p.logarithmic and p.sigma is None and final.half_width(place) > math.log(2) and p.name not in at_bounds
+    ]
+    if vague:
+        caveats.append(f"these runs determine {' and '.join(vague)} to no better than a factor of two")
     if not coefficients_within_range(model, base.parameters):
         caveats.append(
             "without effects the coefficients run to the end of their range, so every effect was refitted from "

@@ -158,6 +158,7 @@ def _numbers(result: Verdict) -> dict[str, Any]:
     explained = result.verdict not in ("partial", "unexplained")
     notable = explained and learnt and abs(learnt[0].z) > notable_pull(len(learnt))
     return {
+        "number_check": result.evidence.number_check and result.evidence.number_check.record(),
         "numbers_instead": [p.parameter.name for p in result.evidence.rival_numbers],
         "rival_numbers": [_number(p) for p in result.evidence.rival_numbers],
         "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
@@ -277,5 +278,6 @@ def _data(result: Verdict) -> dict[str, Any]:
         "number_of_rows_set_aside": count_of_rows(conditions.excluded),
         "summary_of_rows_set_aside": summary_of_excluded(conditions.excluded, conditions.rows),
         "rows_of_little_weight": list(conditions.little_weight),
+        "not_tried": list(conditions.not_tried),
         "limits": list(conditions.caveats),
     }

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from calibration.attribution.claim_checks import NumberCheck
 from calibration.attribution.moves import StatedMove
 from calibration.attribution.nearest import Nearest
 from calibration.attribution.refits import Candidate
@@ -47,6 +48,7 @@ class Evidence:
     rival_effects: tuple[Candidate, ...]  # effects that explain as much as the number that is wrong
     untestable: dict[str, str]  # effects that these runs cannot test: what is missing
     rival_numbers: tuple[Pull, ...] = ()  # numbers that explain as much, but would be too far off to come first
+    number_check: NumberCheck | None = None  # of the wrong number, where it comes ahead of effects
 
 
 @dataclass(frozen=True)
@@ -106,6 +108,7 @@ class Conditions:
     excluded: tuple[str, ...]  # rows and columns that were not used, and why
     rows: int  # of the table, used or not
     caveats: tuple[str, ...]  # what weakens the conclusion, in words
+    not_tried: tuple[str, ...] = ()  # because no time was left; such a verdict is provisional
     little_weight: tuple[int, ...] = ()  # rows of the table whose runs have less than half of the usual weight
 
     @property

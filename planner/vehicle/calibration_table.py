@@ -15,6 +15,7 @@ fields of `Robot`: E, μ0, r0, l, R, L and a. Their errors are correlated with t
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -115,7 +116,15 @@ def read_knowledge(path: str | Path) -> CalibrationKnowledge:
 def knowledge_toml(knowledge: CalibrationKnowledge) -> str:
     """Write the table [calibration] that `read_knowledge` reads back."""
     rows = ",\n".join(f"    {[float(f'{value:.12g}') for value in row]}" for row in knowledge.covariance.tolist())
-    lines = ["[calibration]", f"names = {json.dumps(knowledge.names)}", f"covariance = [\n{rows},\n]"]
+    known = zip(knowledge.names, knowledge.covariance.diagonal().tolist(), strict=True)
+    vague = " and ".join(name for name, variance in known if name in COEFFICIENTS and variance > math.log(2) ** 2)
+    notes = [f"# The runs do not determine {vague}, but what they have in common with the others."] * bool(vague)
+    lines = [
+        "[calibration]",
+        *notes,
+        f"names = {json.dumps(knowledge.names)}",
+        f"covariance = [\n{rows},\n]",
+    ]
     if any((*knowledge.current, *knowledge.current_error)):
         lines += [
             f"current_m_s = {list(knowledge.current)}",

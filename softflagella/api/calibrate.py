@@ -33,6 +33,7 @@ def calibrate(
     laws: bool = True,
     paths: Sequence[str] = (),
     unit: str | None = None,
+    max_seconds: float | None = None,
     jobs: int | None = None,
     progress: bool = True,
 ) -> RobotVerdict:
@@ -46,10 +47,12 @@ def calibrate(
         seed: of the bootstrap; the same seed gives the same result.
         own: what the lab can set in its next runs, such as `{"l_cm": (5, 7, 9)}`; for `N`, `l_cm` and `omega_rpm`
             (both directions). Default: the table's range.
-        laws: whether laws are looked for where no effect explains the runs; it takes up to two minutes.
+        laws: whether laws are looked for where no effect explains the runs.
         paths: files or shapes, such as `("square:24cm",)`, on which the error with the robot as given and with the
             corrected one is stated; `verdict.paths` has it.
         unit: "m", "cm", "mm" or "l", of paths that do not say theirs.
+        max_seconds: of processor time for the search; default 90, with laws 180. The verdict then is provisional,
+            and says what was not tried.
         jobs: threads; default all processors.
         progress: show progress bars.
 
@@ -74,7 +77,9 @@ def calibrate(
         own=own,
         laws=laws,
         paths=paths,
+        unit=unit,
         seed=seed,
+        max_seconds=max_seconds,
         jobs=jobs,
         progress=progress,
     )

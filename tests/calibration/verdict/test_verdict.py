@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
+from calibration.attribution.claim_checks import NumberCheck
 from calibration.verdict.record import facts
 from calibration.verdict.verdict import HeldOutErrors, Verdict, reach_verdict
 from calibration.words.render import next_steps
-from tests.calibration.toy_tables import none
+from tests.calibration.toy_tables import none, number
 
 
 @pytest.mark.parametrize(
@@ -63,3 +64,13 @@ def test_what_is_claimed_must_lower_the_error() -> None:
     for verdict, after, falls in (("none", 0.02, None), ("number", 0.02, True), ("effect", 0.031, False)):
         errors = HeldOutErrors({"uncalibrated": 0.2, "before": 0.03, "after": after}, {}, (0.0, 1.0), 0.02, 0.5)
         assert replace(none(), verdict=verdict, errors=errors).held_out_error_falls is falls
+
+
+@pytest.mark.parametrize(("tolerances", "hedged"), [(8.3, True), (4.0, False)])
+def test_a_number_that_is_hardly_an_error_of_measurement_is_hedged(tolerances: float, hedged: bool) -> None:
+    said = number()
+    assert said.evidence.number_check is not None
+    check = NumberCheck(imitable=0.0, transfer=0.5, tolerances=tolerances)
+    sentence = replace(said, evidence=replace(said.evidence, number_check=check)).sentence
+    assert ("or something outside the catalogue looks like it" in sentence) == hedged
+    assert ("off by 8 of its tolerances" in sentence) == hedged

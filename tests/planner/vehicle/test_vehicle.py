@@ -213,6 +213,9 @@ def test_wrong_tables_are_refused(tmp_path: Path, line: str, expected: str) -> N
 def test_the_table_is_written_as_it_is_read(tmp_path: Path) -> None:
     V = np.array([[2e-3, -1e-4], [-1e-4, 0.04]])
     known = CalibrationKnowledge(("viscosity", "end_over_end_drag"), V, (1e-5, 0.0), (2e-6, 3e-6))
+    assert "do not determine" not in knowledge_toml(known)
+    vague = CalibrationKnowledge(("C_t", "C_r"), np.diag([50.0, 0.1]))
+    assert "do not determine C_t, but" in knowledge_toml(vague)
     (tmp_path / "robot.toml").write_text(robot_toml(CONTROL) + knowledge_toml(known))
     found = read_knowledge(tmp_path / "robot.toml")
     assert found.names == known.names

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 import softflagella as sf
+from sim.io.errors import InputError
 from tests.calibration.toy_tables import DRAG, START, ambiguous, on_the_toy, toy_table
 
 
@@ -40,3 +41,12 @@ def test_new_runs_decide_a_verdict_that_is_at_hand() -> None:
     assert decision.decided == "head's end-over-end drag"
     assert decision.sentence.startswith("Decided: head's end-over-end drag.")
     assert not sf.Decision(decision.standings[:1] * 2, 8).decided
+
+
+def test_lengths_of_paths_have_the_unit_that_is_given() -> None:
+    with pytest.raises(InputError, match=r"missing\.csv"):
+        sf.calibrate("missing.csv", "paper-control", paths=("square:24",), unit="cm")
+    with pytest.raises(InputError, match="unit"):
+        sf.calibrate("missing.csv", "paper-control", paths=("square:24",))
+    with pytest.raises(InputError, match="max_seconds"):
+        sf.calibrate("missing.csv", "paper-control", max_seconds=0.0)
