@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.calibration.planted import ROBOT
-from calibration.laws.inputs import EXPONENTS
 from calibration.laws.law_model import LEVER, lever_arms
 from calibration.laws.places import Place, places
+from calibration.laws.readings import EXPONENTS
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import start_values

@@ -9,7 +9,7 @@ which is standard normal if its value was drawn from the prior. Parameters that 
 x σ²/(σ² − V), with variance V σ²/(σ² − V). Source: pulls of nuisance parameters as in particle physics, e.g.
 Demortier and Lyons (2002).
 
-If the runs pull a nuisance parameter beyond WRONG (`calibration.statistics.pull`), the fit is made again without
+If the runs pull a nuisance parameter beyond WRONG (`calibration.statistics.fit`), the fit is made again without
 its prior. Of several that the runs cannot tell apart, the one is freed that is off by the fewest of its own
 standard deviations. If the fit then leaves no more than noise, the wrong number explains the residual, and no
 effect is claimed for it. An effect is claimed only if it fits better than the freed number by more than one
@@ -28,8 +28,7 @@ from scipy.stats import norm as normal
 
 from calibration.attribution.refits import INDISTINGUISHABLE, Candidate, ebic, judge, lowest_ebic
 from calibration.statistics.budget import skipped
-from calibration.statistics.fit import Fit, UnsolvedError, fit, noise_at_most
-from calibration.statistics.pull import Pull
+from calibration.statistics.fit import Fit, Pull, UnsolvedError, fit, noise_at_most
 from calibration.statistics.residual_tests import Directions
 from calibration.statistics.statistical_model import Parameter, change
 from calibration.statistics.study import Study

@@ -31,9 +31,8 @@ from functools import cached_property
 
 import numpy as np
 
-from calibration.laws.inputs import EXPONENTS, logarithms
 from calibration.laws.law_model import SIZE, LawModel
-from calibration.laws.readings import INPUTS
+from calibration.laws.readings import EXPONENTS, INPUTS, logarithms
 from calibration.statistics.fit import Fit
 from calibration.statistics.gls import Gls, eliminated
 from calibration.statistics.statistical_model import Parameter, changes, precisions, regression, stepped

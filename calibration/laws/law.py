@@ -22,11 +22,17 @@ import numpy as np
 
 from calibration.attribution.refits import session_gain
 from calibration.laws.curves import Curve
-from calibration.laws.inputs import EXPONENTS, logarithms, noted_in_words, parameter_of
 from calibration.laws.law_model import LEVER, SIZE, LawModel
-from calibration.laws.motion_readings import motion_patterns
 from calibration.laws.places import Place
-from calibration.laws.readings import INPUTS, in_words
+from calibration.laws.readings import (
+    EXPONENTS,
+    INPUTS,
+    in_words,
+    logarithms,
+    motion_patterns,
+    noted_in_words,
+    parameter_of,
+)
 from calibration.laws.search import Ranked
 from calibration.statistics.fit import Fit, fit, noise_at_most
 from calibration.statistics.held_out import error_interval, errors

@@ -10,7 +10,7 @@ leaves no more than noise and its deviance is not larger by what one parameter c
 Kept laws cannot be told apart if their BIC differ by less than one parameter can gain by chance (6.63). The place
 that is true need not be among the places of the search: a law describes the runs, and is no claim about their
 cause. Laws are claimed only if tables without a law, searched in the same way, hardly ever gain as much
-(`calibration.laws.selection`). Intervals do not count the choice among the places; those of
+(`calibration.laws.search`). Intervals do not count the choice among the places; those of
 `Laws.simultaneous_interval` do.
 """
 
@@ -27,12 +27,11 @@ from tqdm import tqdm
 from calibration.attribution.refits import INDISTINGUISHABLE
 from calibration.laws.curves import find_curves
 from calibration.laws.group_factors import gain_of_a_curve
-from calibration.laws.inputs import EXPONENTS
 from calibration.laws.law import NO_LEVER, NO_SESSIONS, UNDETERMINED, Law, fitted_law, with_a_lever
 from calibration.laws.law_model import SIZE
 from calibration.laws.places import in_common, places
-from calibration.laws.search import Ranked, search
-from calibration.laws.selection import Selection, examine_selection
+from calibration.laws.readings import EXPONENTS
+from calibration.laws.search import Ranked, Selection, examine_selection, search
 from calibration.statistics.budget import skipped
 from calibration.statistics.fit import Fit
 from calibration.statistics.study import LEVEL, Study

@@ -8,7 +8,7 @@ follow from those along the term, or along the logarithm of the coefficient:
     side force with M_y = λ z F_x, z = l or L:   ∂f/∂F = ∂f/∂F_x + λ z ∂f/∂M_y,   ∂f/∂λ = ε m z ∂f/∂M_y,
 
 with x = (ln ω/ω_m, ln l/l_m, ln N/N_m) and the noted inputs of the law less their means
-(`calibration.laws.inputs`). The disc is at J.
+(`calibration.laws.readings`). The disc is at J.
 """
 
 from __future__ import annotations
@@ -21,15 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from calibration.laws.inputs import (
-    EXPONENTS,
-    NOTED,
-    logarithms,
-    noted_values,
-    parameter_of,
-)
 from calibration.laws.places import Place, place_named
-from calibration.laws.readings import INPUTS
+from calibration.laws.readings import EXPONENTS, INPUTS, NOTED, logarithms, noted_values, parameter_of
 from calibration.statistics.statistical_model import Parameter, Parameters, by_differences
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.swimmer import SwimmerModel, _Run

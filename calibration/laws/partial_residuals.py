@@ -20,9 +20,8 @@ import numpy as np
 
 from calibration.laws.curves import Curve, error_bars, factors
 from calibration.laws.group_factors import along_load, grouped
-from calibration.laws.inputs import EXPONENTS, logarithms
 from calibration.laws.law import Law
-from calibration.laws.readings import INPUTS
+from calibration.laws.readings import EXPONENTS, INPUTS, logarithms
 from calibration.statistics.gls import inverse_root
 from sim.arrays import Flags, Floats
 

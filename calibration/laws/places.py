@@ -11,7 +11,7 @@ A `Place` is one of
 - a coefficient of the head, the drag of the tails, or their stiffness: a factor, which is 1 without a law.
 
 The first three are terms of a size ε. Each is multiplied by m = (ω/ω_m)^p (l/l_m)^q (N/N_m)^r, with ω_m, l_m and
-N_m the geometric means of the runs, and by factors of noted inputs (`calibration.laws.inputs`).
+N_m the geometric means of the runs, and by factors of noted inputs (`calibration.laws.readings`).
 
 The drag of the tails is that of a more viscous fluid around the tails alone: the viscosity times m, and the
 coefficients of the head divided by m. The stiffness stands for the viscosity of the whole fluid, too: the motion

@@ -33,9 +33,9 @@ from typing import Any
 
 import numpy as np
 
-from calibration.laws.inputs import EXPONENTS
 from calibration.laws.law import Law
 from calibration.laws.law_model import LEVER, SIZE
+from calibration.laws.readings import EXPONENTS
 from calibration.statistics.held_out import FinalRefit, refit_to_all
 from calibration.statistics.statistical_model import Parameters
 from calibration.swimmer.candidate_effects import CURRENT

@@ -25,7 +25,7 @@ from calibration.report.figures import (
     draw_summary,
 )
 from calibration.report.path_error import PathError
-from calibration.statistics.pull import WRONG
+from calibration.statistics.fit import WRONG
 from calibration.verdict.next_runs import STOP
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from calibration.laws.inputs import EXPONENTS
 from calibration.laws.law_fits import Laws, find_laws
 from calibration.laws.law_model import LEVER, SIZE
+from calibration.laws.readings import EXPONENTS
 from calibration.report.corrected_robot import as_toml, check_given, law_handed_on
 from calibration.report.robot_verdict import read_runs
 from calibration.statistics.fit import Fit
@@ -26,7 +26,7 @@ from calibration.statistics.held_out import errors
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import Study, find_outliers, split_runs
-from calibration.statistics.weighted_fit import fit_weighted
+from calibration.statistics.weights import fit_weighted
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from sim.io.files import files_together, write_text

@@ -15,7 +15,7 @@ from calibration.laws.law_fits import Laws, find_laws
 from calibration.report.corrected_robot import as_toml, check_given, handed_on, law_handed_on
 from calibration.report.path_error import PathError, path_errors, wanted_paths
 from calibration.report.report import write_report
-from calibration.statistics.exclusions import count_of_rows, summary_of_excluded
+from calibration.statistics.study import count_of_rows, summary_of_excluded
 from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.possible_runs import Owned

@@ -6,16 +6,17 @@ Steps of Levenberg (1944) with the model's own derivatives:
 
 D is 1 for ln C and a typical size for ε. λ is 0, unless the step is too long or does not improve the fit. A
 parameter at a bound stays there if the step would lead out. The covariance of the parameters is V = A⁻¹, times a
-factor because S is estimated (`_inflation`). Nuisance parameters have priors, which are rows of their own
-: they are in A, in the residual and in the deviance. Intervals are 95 %, by
-Student's t. The scatter ρ of a few sessions is uncertain, which limits the degrees of freedom (Satterthwaite
-1946):
+factor because S is estimated (`_inflation`). Nuisance parameters have priors, which are rows of their own in
+A, in the residual and in the deviance. Intervals are 95 %, by Student's t. The scatter ρ of a few sessions is
+uncertain, which limits the degrees of freedom (Satterthwaite 1946):
 
     ν = 2 V² / (V′² Var ρ),   Var ρ ≈ 2 (ρ + 1/n)² / (k (s − 1)),   n runs in each of s sessions.
 
 The deviance along one parameter, with the others refitted, may differ from a parabola. So `profile_intervals` runs
 the model at both ends of the interval that the covariance gives. Each end moves to where the deviance, as a
 parabola on its side, has risen by t². Here t is the quantile of `Fit.interval`.
+
+The pull of a nuisance parameter says how far the runs move it from its stated value.
 """
 
 from __future__ import annotations
@@ -29,7 +30,6 @@ from scipy.stats import t as student
 
 from calibration.statistics.budget import limited_as_one, skipped, spent
 from calibration.statistics.gls import Noise, Products, eliminated, repeat_count, repeat_covariance
-from calibration.statistics.pull import Pull
 from calibration.statistics.statistical_model import (
     ForwardModel,
     Parameter,
@@ -43,6 +43,10 @@ from calibration.statistics.statistical_model import (
 )
 from sim.arrays import Flags, Floats
 
+WRONG = 3.0  # pull beyond which a nuisance parameter is taken to be wrong
+_LEARNT = 0.02  # share of the prior's variance that the runs must remove before a pull means anything
+_NOTHING = 0.01  # change in per cent, or in the unit in which it is shown, that is not stated
+_LARGEST = 100.0  # change of a logarithm that is stated
 _MOST_STEPS = 25
 _TRIED = 4  # steps before a search is given up
 _SHORT = 0.1  # after a shorter step, in ln C or ε, the Jacobian is used once more
@@ -56,6 +60,51 @@ _UNSETTLED = 1.0  # a fit has not converged if one more step is expected to redu
 _FAR = 6.0  # standard deviations of χ²
 _FLAT = 0.05  # share of the expected rise; if the rise is smaller, the deviance is flat and the end stays
 _STEEP = 5.0  # if it is larger, the others were not refitted along a bent valley, and the end stays
+
+
+@dataclass(frozen=True)
+class Pull:
+    """What the runs say about one nuisance parameter, on its own scale."""
+
+    parameter: Parameter  # the nuisance parameter
+    change: float  # fitted, with its prior
+    error: float  # standard error of `change`
+    alone: float  # from the runs alone, with the other nuisance parameters as far as their priors allow
+    alone_error: float  # standard error of `alone`
+    z: float  # `change` over its standard deviation under noise
+    freed: bool  # its prior was taken away
+
+    @property
+    def learnt(self) -> bool:
+        """Whether the runs say anything about it."""
+        assert self.parameter.sigma is not None
+        return self.freed or self.error**2 < (1 - _LEARNT) * self.parameter.sigma**2
+
+    @property
+    def wrong(self) -> bool:
+        return self.learnt and abs(self.z) > WRONG
+
+    @property
+    def tolerances(self) -> float:
+        """How many of its stated standard deviations it is off, by the runs alone."""
+        assert self.parameter.sigma is not None
+        return abs(self.alone) / self.parameter.sigma
+
+    @property
+    def words(self) -> str:
+        """What the runs alone say, as in "E is 40 % below what was given (3.7 σ)"."""
+        return f"{self.parameter.title} is {self.departure} ({abs(self.z):.1f} σ)"
+
+    @property
+    def departure(self) -> str:
+        """How far it is from its value, by the runs alone, as in "40 % below what was given"."""
+        given, change = self.parameter, self.alone
+        size = abs(math.expm1(min(change, _LARGEST))) * 100 if given.logarithmic else abs(change) * given.shown
+        if size < _NOTHING:
+            return "what was given"
+        unit, side = "%" if given.logarithmic else given.unit, "below" if change < 0 else "above"
+        digits = f"{size:.2g}" if size < 99.5 else f"{size:.0f}"
+        return f"{digits} {unit} {side} what was given"
 
 
 class UnsolvedError(Exception):

@@ -13,7 +13,7 @@ larger. Therefore it is at most `SESSION_SHARE`: sessions are assumed to scatter
 larger shift of a whole session must be explained by the model. With a single session nothing is known about ρ.
 Then ρ is that limit, and a shift that is equal in all runs has almost no weight.
 
-**Weights.** A run of weight w has the covariance S/w (`calibration.statistics.contaminated_normal`):
+**Weights.** A run of weight w has the covariance S/w (`calibration.statistics.weights`):
 
     Σ = (W⁻¹ + ρ 1 1ᵀ) ⊗ S = W^−½ (I_n + ρ √w √wᵀ) W^−½ ⊗ S,   W = diag w.
 

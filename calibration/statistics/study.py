@@ -7,17 +7,21 @@ estimated. Its variance is taken to be `SESSION_SHARE`, so a shift of all its ru
 **Outliers** are runs that are far from their own repeats, for example because of a misplaced decimal point. If, in
 one output, the runs of a condition are more than `FAR` robust standard deviations apart, the run that is farthest
 from the model as given is excluded. A missing effect does not cause this: it changes all repeats alike.
+
+**Excluded rows.** A reader of tables and the search for outliers say for each row why it was not used, as in "row
+7: omega_h_rpm = 3 has the wrong sign for its omega_rpm". These lines are grouped by reason, without what is
+particular to a row.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from calibration.statistics.contaminated_normal import ContaminatedNormal
 from calibration.statistics.statistical_model import ForwardModel, Runs
 from sim.arrays import Flags, Floats, Integers
 
@@ -28,6 +32,11 @@ _MAD = 1.4826  # median absolute deviation to standard deviation
 _FEWEST = 3  # sessions that are held out as a whole
 _BLOCKS = 4  # in all
 _HELD_OUT = 1 / 12  # least share of the runs that are held out
+MANY = 0.2  # share of the rows; if more are excluded, the rest may not be a fair sample
+_ROW = re.compile(r"row (\d+)(?: \(line \d+\))?: (.*)", re.DOTALL)
+# A value (" = 3"), the row that was copied, the size of a deviation.
+_PARTICULAR = re.compile(r" = .*?(?= is | has )| \(row \d+\)$|(?<= is )\d+ (?=standard deviations )", re.DOTALL)
+_LISTED = 3  # rows of a reason
 
 
 @dataclass(frozen=True)
@@ -52,7 +61,7 @@ class Study:
     seed: int = 0  # of the bootstrap
     draws: int = DRAWS  # of the bootstrap
     progress: bool = False  # show progress bars
-    noise: ContaminatedNormal | None = None  # that weighs the model's runs; None: no weights
+    spread: float = 1.0  # variance of any run over that of a run of S, where runs have weights
 
     @property
     def values(self) -> int:
@@ -155,3 +164,45 @@ def find_outliers(data: Runs, prediction: Floats) -> tuple[Flags, tuple[str, ...
             reasons.append(f"row {data.rows[out]}: {data.outputs[worst]} is {far}")
             group = group[group != out]
     return bad, tuple(reasons)
+
+
+def summary_of_excluded(excluded: Sequence[str], total: int) -> list[str]:
+    """Group lines such as "row 7: …" by their reason, the most frequent first; other lines follow as they are.
+
+    Args:
+        total: rows of the table.
+    """
+    rows: dict[str, list[tuple[str, str]]] = {}
+    others = []
+    for line in excluded:
+        match = _ROW.fullmatch(line)
+        if match:
+            rows.setdefault(_PARTICULAR.sub("", match[2]), []).append((match[1], line))
+        else:
+            others.append(line)
+    groups = sorted(rows.items(), key=lambda group: -len(group[1]))
+    return [_words(reason, members, total) for reason, members in groups] + others
+
+
+def _words(reason: str, members: list[tuple[str, str]], total: int) -> str:
+    if len(members) == 1:
+        return members[0][1]
+    numbers = ", ".join(number for number, _ in members[:_LISTED])
+    more = f" and {len(members) - _LISTED} more" if len(members) > _LISTED else ""
+    return f"{len(members)} of {total} rows (rows {numbers}{more}): {reason}"
+
+
+def count_of_rows(excluded: Sequence[str]) -> int:
+    """Count the rows among excluded rows and columns."""
+    return sum(_ROW.fullmatch(line) is not None for line in excluded)
+
+
+def caveat_of_excluded(excluded: Sequence[str], total: int) -> tuple[str, ...]:
+    """Warn where many of the `total` rows are excluded."""
+    count = count_of_rows(excluded)
+    if count <= MANY * total:
+        return ()
+    return (
+        f"{count} of {total} rows ({100 * count / total:.0f} %) were excluded: see why, and whether the rest is a "
+        "fair sample of the runs",
+    )

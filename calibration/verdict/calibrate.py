@@ -3,7 +3,7 @@
 1. Whole sessions are held out before anything is looked at (by default the middle one).
    Outliers are excluded (`calibration.statistics.study`).
 2. The coefficients and the nuisance parameters are fitted to the other sessions, with weights of the runs if
-   some were tracked worse than others (`calibration.statistics.weighted_fit`), and the residual is tested.
+   some were tracked worse than others (`calibration.statistics.weights`), and the residual is tested.
 3. What explains it is looked for (`explain`). A nuisance parameter that leaves its prior is freed, and comes ahead
    of every effect unless it would be far outside its prior (`calibration.attribution.wrong_numbers`). Single
    effects (`calibration.attribution.refits`), effects beside a wrong number, and pairs follow, each only if
@@ -53,8 +53,7 @@ from calibration.attribution.wrong_numbers import (
     without_wrong_priors,
 )
 from calibration.statistics.budget import Budget, limited
-from calibration.statistics.exclusions import caveat_of_excluded, count_of_rows
-from calibration.statistics.fit import Fit, fit, profile_intervals
+from calibration.statistics.fit import Fit, Pull, fit, profile_intervals
 from calibration.statistics.held_out import (
     FinalRefit,
     error_interval,
@@ -63,13 +62,21 @@ from calibration.statistics.held_out import (
     held_out_p_value,
     refit_to_all,
 )
-from calibration.statistics.pull import Pull
 from calibration.statistics.residual_regression import regress_residual
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
 from calibration.statistics.shifted import Shifted
 from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values
-from calibration.statistics.study import DRAWS, LEVEL, Split, Study, find_outliers, split_runs
-from calibration.statistics.weighted_fit import (
+from calibration.statistics.study import (
+    DRAWS,
+    LEVEL,
+    Split,
+    Study,
+    caveat_of_excluded,
+    count_of_rows,
+    find_outliers,
+    split_runs,
+)
+from calibration.statistics.weights import (
     alike,
     caveat_of_weights,
     fit_weighted,

@@ -14,11 +14,10 @@ from calibration.attribution.halved_tolerances import notable_gains, overall_gai
 from calibration.attribution.nearest import largest_along
 from calibration.attribution.refits import UNSEEN, Candidate
 from calibration.attribution.wrong_numbers import notable_pull
-from calibration.statistics.exclusions import count_of_rows, summary_of_excluded
-from calibration.statistics.fit import Fit, least_determined
+from calibration.statistics.fit import Fit, Pull, least_determined
 from calibration.statistics.gls import inverse_root
-from calibration.statistics.pull import Pull
 from calibration.statistics.statistical_model import Parameter
+from calibration.statistics.study import count_of_rows, summary_of_excluded
 from calibration.words.render import next_steps, sentence
 from sim.io.provenance import provenance
 from surrogate.input_ranges import COEFFICIENTS

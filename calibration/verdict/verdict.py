@@ -17,14 +17,12 @@ from calibration.attribution.moves import StatedMove
 from calibration.attribution.nearest import Nearest
 from calibration.attribution.refits import Candidate
 from calibration.attribution.wrong_numbers import wrong_number
-from calibration.statistics.exclusions import summary_of_excluded
-from calibration.statistics.fit import Fit
+from calibration.statistics.fit import Fit, Pull
 from calibration.statistics.held_out import FinalRefit
-from calibration.statistics.pull import Pull
 from calibration.statistics.residual_regression import Regression
 from calibration.statistics.residual_tests import Misfit
 from calibration.statistics.statistical_model import Runs
-from calibration.statistics.study import Split
+from calibration.statistics.study import Split, summary_of_excluded
 from calibration.verdict.experiment import Description, LearntCorrection
 from calibration.verdict.next_runs import Batch, NextRun
 from calibration.verdict.record import facts

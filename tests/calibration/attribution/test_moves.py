@@ -15,7 +15,7 @@ from calibration.report.robot_verdict import RobotVerdict, calibrate_robot
 from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import by_differences, start_values
-from calibration.statistics.weighted_fit import alike
+from calibration.statistics.weights import alike
 from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.record import facts, verdict_record
 from calibration.words.render import next_steps

@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.laws.inputs import EXPONENTS
 from calibration.laws.law import NO_LEVER, NO_SESSIONS, UNDETERMINED, Law
 from calibration.laws.law_fits import Laws
 from calibration.laws.law_model import LEVER, SIZE, LawModel, with_law
 from calibration.laws.places import in_common, place_named, places
+from calibration.laws.readings import EXPONENTS
 from calibration.report.corrected_robot import law_handed_on, robot_with_law
 from calibration.report.robot_laws import RobotLaws, find_robot_laws
 from calibration.statistics.statistical_model import by_differences, start_values

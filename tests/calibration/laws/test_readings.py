@@ -7,9 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibration.laws.inputs import logarithms
-from calibration.laws.motion_readings import motion_patterns
-from calibration.laws.readings import in_words, readings
+from calibration.laws.readings import in_words, logarithms, motion_patterns, readings
 from calibration.swimmer.measured_table import read_measurements
 from sim.arrays import Floats
 from tests.calibration.toy_tables import toy_table

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, norm
 
-import calibration.laws.selection
+import calibration.laws.search
 from calibration.laws.law_fits import Laws
 from calibration.laws.linear_models import LinearModels
 from calibration.laws.places import places
-from calibration.laws.search import Search
-from calibration.laws.selection import Selection, examine_selection
+from calibration.laws.search import Search, Selection, examine_selection
 from calibration.report.report import sections
 from calibration.report.robot_laws import RobotLaws
 from calibration.verdict.record import facts
@@ -49,8 +48,8 @@ def noise(seed: int) -> Floats:
 
 @pytest.fixture
 def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(calibration.laws.selection, "_NULL_DRAWS", 199)
-    monkeypatch.setattr(calibration.laws.selection, "_LAW_DRAWS", 100)
+    monkeypatch.setattr(calibration.laws.search, "_NULL_DRAWS", 199)
+    monkeypatch.setattr(calibration.laws.search, "_LAW_DRAWS", 100)
 
 
 @pytest.mark.slow
@@ -97,7 +96,7 @@ def test_places_with_the_same_columns_share_the_first_rank(monkeypatch: pytest.M
 def test_simultaneous_intervals_are_those_of_one_weight_where_there_is_one_model(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(calibration.laws.selection, "_NULL_DRAWS", 1999)
+    monkeypatch.setattr(calibration.laws.search, "_NULL_DRAWS", 1999)
     one = examine_selection(searched(noise(1), [(0, (0,))]), seed=2).widest
     assert one == pytest.approx(norm.ppf(0.975), rel=0.1)  # S is known but for its 32 degrees of freedom
     every = examine_selection(searched(noise(1)), seed=2).widest

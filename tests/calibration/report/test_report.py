@@ -10,7 +10,7 @@ import pytest
 
 from calibration.attribution.halved_tolerances import notable_gains
 from calibration.report.report import write_report
-from calibration.statistics.pull import Pull
+from calibration.statistics.fit import Pull
 from calibration.swimmer.nuisance_numbers import nuisance_parameters
 from calibration.verdict.record import facts, shown, verdict_record
 from calibration.verdict.verdict import Verdict

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from calibration.statistics.contaminated_normal import estimate
 from calibration.statistics.fit import Fit, fit, noise_at_most
 from calibration.statistics.held_out import error_interval, errors
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import Parameter, Parameters, Runs, start_values
 from calibration.statistics.study import Study, middle_session
-from calibration.statistics.weighted_fit import (
+from calibration.statistics.weights import (
     caveat_of_weights,
+    estimate,
     fit_weighted,
     noise_of_any_run,
     rows_of_little_weight,

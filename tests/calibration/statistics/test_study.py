@@ -8,8 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibration.statistics.exclusions import caveat_of_excluded, count_of_rows, summary_of_excluded
-from calibration.statistics.study import find_outliers, middle_session
+from calibration.statistics.study import (
+    caveat_of_excluded,
+    count_of_rows,
+    find_outliers,
+    middle_session,
+    summary_of_excluded,
+)
 
 SIGN = "has the wrong sign for its omega_rpm: the head turns against the motor"
 EXCLUDED = (
