@@ -6,7 +6,6 @@ import os
 import shlex
 from argparse import Namespace
 
-from dataset.workers import BACKENDS
 from sim.io.commands import JOBS, Program, argument, out
 
 program = Program("dataset", "Simulate sweeps of robots into data sets.")
@@ -25,8 +24,9 @@ _FORCE = argument("--force", action="store_true", help="take over a URL whose wr
     JOBS,
     argument(
         "--backend",
-        choices=BACKENDS,
-        help="where to run: loky, this machine's processes; dask; ray (default: loky, or dask with a scheduler)",
+        type=lambda name: "local" if name == "loky" else name,  # its name when joblib's processes ran the chunks
+        choices=("local", "dask", "ray"),
+        help="where to run: local, this machine's processes; dask; ray (default: local, or dask with a scheduler)",
     ),
     argument(
         "--scheduler",
@@ -35,24 +35,14 @@ _FORCE = argument("--force", action="store_true", help="take over a URL whose wr
     _FORCE,
 )
 def _build(arguments: Namespace) -> None:
-    from dataset.build.build import build
-    from dataset.build.signals import run_long_command
-    from dataset.rows.design import SWEEP_TOML, load_design
+    from dataset.build import build
+    from dataset.design import SWEEP_TOML, load_design
 
     design = load_design(arguments.config or SWEEP_TOML).with_rows(arguments.rows)
     known = arguments.scheduler or os.environ.get(_SCHEDULER)
-    backend = arguments.backend or ("dask" if known else "loky")
-    manifest = run_long_command(
-        lambda: build(
-            design,
-            arguments.out,
-            jobs=arguments.jobs,
-            backend=backend,
-            address=arguments.scheduler,
-            resume=_command(arguments),
-            force=arguments.force,
-        )
-    )
+    backend = arguments.backend or ("dask" if known else "local")
+    where = {"jobs": arguments.jobs, "backend": backend, "address": arguments.scheduler}
+    manifest = build(design, arguments.out, resume=_command(arguments), force=arguments.force, **where)
     print(
         f"{manifest['rows']} rows: {manifest['converged']} converged, {manifest['failed']} failed, "
         f"tails touch in {manifest['touching']} -> {arguments.out}"
@@ -70,7 +60,7 @@ def _command(arguments: Namespace) -> str:
 
 @program.command("report", "the sweep at a glance, one page", _DATA, out("page", default="reports/dataset.html"))
 def _report(arguments: Namespace) -> None:
-    from dataset.report.report import write_report
+    from dataset.report import write_report
 
     write_report(arguments.data, arguments.out)
     print(f"-> {arguments.out}")
@@ -91,14 +81,12 @@ def _report(arguments: Namespace) -> None:
     _FORCE,
 )
 def _verify(arguments: Namespace) -> None:
-    from dataset.build.build import imported_function, mend
-    from dataset.build.signals import run_long_command
-    from dataset.build.verify import verify
+    from dataset.build import imported_function, mend
+    from dataset.verify import verify
 
     if arguments.mend:
         named = imported_function(arguments.rows_by) if arguments.rows_by else None
-        options = {"jobs": arguments.jobs, "simulate": named, "force": arguments.force}
-        print(run_long_command(lambda: mend(arguments.data, **options)))
+        print(mend(arguments.data, jobs=arguments.jobs, simulate=named, force=arguments.force))
     print(verify(arguments.data, rows=arguments.rows))
 
 
@@ -110,8 +98,8 @@ def _verify(arguments: Namespace) -> None:
     out("sweep.toml"),
 )  # fmt: skip
 def _config(arguments: Namespace) -> None:
-    from dataset.rows.design import SWEEP_TOML
-    from dataset.rows.robot_inputs import sweep_toml
+    from dataset.design import SWEEP_TOML
+    from dataset.robot_inputs import sweep_toml
     from sim.inputs import load_robot
     from sim.io.files import write_text
     from sim.model.presets import PRESETS

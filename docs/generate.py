@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import softflagella
-from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS
+from dataset.schema import FLAGS, INPUTS, OUTPUTS
 from sim.effects import catalogue
 from sim.model.effect import Effect
 from softflagella.__main__ import PACKAGES, WORDS, command

@@ -38,7 +38,7 @@ from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
-from dataset.storage.data_set import read
+from dataset.data_set import read
 from planner.files.plan_json import load_plan
 from planner.files.tracking_error import TrackingError, tracking_error
 from planner.paths.path import polygon

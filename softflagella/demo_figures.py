@@ -11,7 +11,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dataset.report.figures import plain_logarithms
+from dataset.figures import plain_logarithms
 from planner.files.tracking_error import TrackingError, draw_overlay
 from sim.arrays import Floats
 from sim.io.page_figures import BLUE, GREEN, INK, ORANGE, PALE, RED, SOFT, VIOLET

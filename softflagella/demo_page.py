@@ -18,7 +18,7 @@ from calibration.report.figures import draw_summary
 from calibration.swimmer.measured_table import Measurements
 from calibration.verdict.verdict import Verdict
 from calibration.words.quantities import plain
-from dataset.report.report import usable_rows
+from dataset.report import usable_rows
 from planner.files.tracking_error import TrackingError
 from sim.arrays import Floats
 from sim.io.pages import Page

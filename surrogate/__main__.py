@@ -29,7 +29,7 @@ main = program.main
 def _train(arguments: Namespace) -> None:
     from dataclasses import replace
 
-    from dataset.storage.data_set import read_manifest
+    from dataset.data_set import read_manifest
     from sim.io.files import write_text
 
     if arguments.epochs is not None and arguments.epochs < 1:

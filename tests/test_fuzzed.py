@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 import calibration.verdict.calibrate
 import sim.motion.run
-from dataset.rows.simulate import simulate
+from dataset.simulate import simulate
 from sim.effects import catalogue
 from sim.inputs import load_robot
 from sim.io.errors import InputError, run_command

@@ -1,9 +1,7 @@
 """Data sets: overhead of the engine, bytes a row, speed of reading.
 
 1. Processor time of a row, and of a build beside its rows.
-2. A million synthetic rows: bytes a row; stored, joined, opened, scanned, read.
-3. What long sweeps take on n cores, by what was measured: start-up, rounds of chunks to the end of the last one,
-   and joining. Compiling, once a machine, is not in it.
+2. A hundred thousand synthetic rows: bytes a row; stored, opened, scanned, read.
 
 Usage: python -m benchmarks data_sets [--rows N]
 
@@ -24,23 +22,20 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from benchmarks.common import processor_time
-from dataset.build.build import build, chunks
-from dataset.storage import shards
-from dataset.storage.data_set import batches, read, read_manifest
-from dataset.storage.shards import SEGMENT
-from dataset.storage.storage import open_storage
+from dataset.build import build
+from dataset.data_set import batches, read, read_manifest
 from tests.dataset import sweeps
 
-ROWS = 2048
+ROWS, SYNTHETIC = 2048, 100_000
 _ENGINE = """
 import sys
-from dataset.rows.design import load_design
-from dataset.build.build import build
+from dataset.design import load_design
+from dataset.build import build
 build(load_design().with_rows(int(sys.argv[1])), sys.argv[2], jobs=int(sys.argv[3]), title="")
 """
 _SYNTHETIC = """
 import sys
-from dataset.build.build import build
+from dataset.build import build
 from tests.dataset import sweeps
 build(sweeps.design(int(sys.argv[1])), sys.argv[2], title="", simulate=sweeps.invented)
 """
@@ -77,19 +72,18 @@ os.register_at_fork(after_in_child=_start)
 """
 
 
-def overhead(rows: int) -> tuple[float, float]:
-    """Print and return processor seconds a row, and those of one worker beside its rows."""
+def overhead(rows: int) -> None:
+    """Print processor seconds a row, and those of a build beside its rows."""
     for jobs in (2, 1):
         with TemporaryDirectory() as folder:
             engine = processor_seconds(_ENGINE, str(rows), f"{folder}/out", str(jobs))
             cost = float(read_manifest(f"{folder}/out")["cost_s"])
         print(f"{rows} rows of sweep.toml, workers: {jobs}: {1e3 * cost / rows:.2f} ms a row, "
               f"{engine - cost:.1f} s beside the rows")  # fmt: skip
-    return cost / rows, engine - cost
 
 
-def reading(rows: int) -> float:
-    """Print the times of storing and reading many synthetic rows; return the seconds of joining them, a row."""
+def reading(rows: int) -> None:
+    """Print the times of storing and reading many synthetic rows."""
     with TemporaryDirectory() as folder:
         out = f"{folder}/out"
         spent = processor_seconds(_SYNTHETIC, str(rows), out)
@@ -99,16 +93,13 @@ def reading(rows: int) -> float:
         plain = [field.name for field in form if not pa.types.is_fixed_size_list(field.type)]
         print(f"\n{rows} synthetic rows with all curves: {len(files)} files, {size / rows:.0f} bytes a row; "
               "processor seconds")  # fmt: skip
-        print(f"  made, stored and joined                  {spent:6.1f}")
-        joining = processor_time(lambda: _joined(out, form))
-        print(f"  of that, joined                          {joining:6.1f}")
+        print(f"  made and stored                          {spent:6.1f}")
         print(f"  manifest opened and checked              {processor_time(lambda: read_manifest(out)):6.2f}")
         two = ["omega_bar", "omega_yr_bar"]
         print(f"  two columns scanned, all checked         {processor_time(lambda: _scanned(out, two)):6.2f}")
         print(f"  all columns scanned in batches           {processor_time(lambda: _scanned(out, None)):6.2f}")
         print(f"  all columns but curves read into pandas  {processor_time(lambda: read(out, plain)):6.2f}")
         print(f"  unchanged build                          {processor_time(lambda: _again(rows, out)):6.2f}")
-    return joining / rows
 
 
 def _again(rows: int, out: str) -> None:
@@ -120,46 +111,8 @@ def _scanned(out: str, columns: list[str] | None) -> None:
         pass
 
 
-def _joined(out: str, form: pa.Schema) -> None:
-    """Join the files again, elsewhere."""
-    storage, key = open_storage(out), read_manifest(out)["config_hash"]
-    parts = shards.shards_in(storage, "rows")
-    name = shards.shard_name("../again", parts[0].start, parts[-1].stop)
-    shards.join(storage, parts, name, form.remove_metadata(), key)
-
-
-def projected(rows: int, cores: int, cost: float, start_up: float) -> float:
-    """Compute the seconds of a sweep until its last chunk ends; every core has a worker.
-
-    Args:
-        cost: seconds a row.
-        start_up: seconds of a worker beside its rows.
-    """
-    sizes = [stop - start for start, stop in chunks([(0, rows)], cores, cost)]
-    return start_up + -(-len(sizes) // cores) * max(sizes) * cost
-
-
-def projection(cost: float, start_up: float, joining: float) -> None:
-    """Print what long sweeps take.
-
-    Args:
-        cost: seconds a row.
-        start_up: seconds of a worker beside its rows.
-        joining: seconds a row, of one core for each segment.
-    """
-    print(f"\nProjected from {1e3 * cost:.1f} ms a row; minutes until the last chunk ends, and of joining")
-    for rows in (10**5, 10**6, 10**8):
-        files = -(-rows // SEGMENT)
-        for cores in (2, 64, 1024):
-            ends = projected(rows, cores, cost, start_up)
-            joined = -(-files // cores) * min(rows, SEGMENT) * joining
-            print(f"  {rows:.0e} rows, {cores:4d} cores, {files:2d} files {ends / 60:9.2f} {joined / 60:6.2f}")
-
-
 def main(*words: str) -> None:
     parser = argparse.ArgumentParser(description="Benchmarks of data sets.")
     parser.add_argument("--rows", type=int, default=ROWS, help=f"rows that are simulated (default: {ROWS})")
-    rows = parser.parse_args(words).rows
-    cost, start_up = overhead(rows)
-    joining = reading(SEGMENT)
-    projection(cost, start_up, joining)
+    overhead(parser.parse_args(words).rows)
+    reading(SYNTHETIC)

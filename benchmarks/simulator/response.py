@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.common import processor_time
-from dataset.rows.design import load_design
+from dataset.design import load_design
 from sim.inputs import check_columns
 from sim.model.groups import Groups
 from sim.motion.batches import one_thread, split

@@ -19,7 +19,7 @@ from collections import Counter
 import numpy as np
 from scipy.stats import qmc
 
-from dataset.rows.design import load_design
+from dataset.design import load_design
 from sim.model.groups import GROUP_COLUMNS
 from sim.motion.batches import steady_columns
 

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.common import timed
 from benchmarks.simulator.bdf_solver import settle_plainly
-from dataset.rows.design import load_design
+from dataset.design import load_design
 from sim.model.groups import Groups
 from sim.motion.batches import available_jobs, steady_columns
 from sim.motion.steady import steady

@@ -32,7 +32,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dataset.storage.data_set import read_manifest
+from dataset.data_set import read_manifest
 from sim.arrays import Floats
 from sim.io.files import write_text
 from sim.motion.batches import steady_columns

@@ -76,7 +76,7 @@ def run_command(main: Callable[[list[str] | None], None], argv: list[str] | None
     except RecursionError:
         return _end("the input is nested too deeply; give a simpler one", 2)
     except KeyboardInterrupt as stop:
-        print("interrupted", file=sys.stderr)
+        print(str(stop) or "interrupted", file=sys.stderr)
         return getattr(stop, "status", INTERRUPTED)
     except Exception as error:
         refused = _refused(error)

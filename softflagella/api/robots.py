@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dataset.rows.schema import INPUTS, OUTPUTS
+from dataset.schema import INPUTS, OUTPUTS
 from sim.arrays import Floats
 from sim.inputs import check_columns, group_columns, load_robot, run_columns
 from sim.io.errors import InputError

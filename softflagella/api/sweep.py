@@ -8,9 +8,9 @@ from typing import Any
 
 import pandas as pd
 
-from dataset.build.build import build
-from dataset.rows.design import design_around, load_design
-from dataset.storage.data_set import read
+from dataset.build import build
+from dataset.data_set import read
+from dataset.design import design_around, load_design
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.model.robot import Robot

@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import qmc
 
-from dataset.storage.data_set import read, read_manifest, usable
+from dataset.data_set import read, read_manifest, usable
 from sim.arrays import Flags, Floats, Integers
 from sim.effects import catalogue
 from sim.model.groups import Groups

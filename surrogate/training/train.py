@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from dataset.storage.data_set import read_manifest
+from dataset.data_set import read_manifest
 from sim.arrays import Flags, Floats, Integers
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords

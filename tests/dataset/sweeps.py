@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import time
 from collections.abc import Callable
@@ -12,13 +13,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dataset.rows.design import Axis, SweepDesign
-from dataset.rows.schema import COST, arrow_table, schema
-from dataset.storage.data_set import ROWS, manifest_content, write_manifest
-from dataset.storage.shards import shard_name, write_shard
-from dataset.storage.storage import open_storage
-from dataset.workers.backend import Lost
-from dataset.workers.tasks import Join, Outcome, Task, run_task
+from dataset.data_set import SWEEP, sweep_key, write_manifest
+from dataset.design import Axis, SweepDesign
+from dataset.folder import Folder
+from dataset.schema import COST, arrow_table, schema
+from dataset.shards import Part, checked_part, file_name, packed
+from dataset.workers import Chunk, Ended
 from sim.model.response import BEFORE, DWELLS
 from tests.shared import FOLDER
 
@@ -35,6 +35,7 @@ l_over_r0 = { range = [20.0, 45.0] }
 omega_bar = { range = [6.0, 12.0], scale = "log" }
 N = { range = [2, 3], scale = "integer" }
 """
+DANGER = True  # of some rows that are made by `poisonous` or `raising`
 Rows = Callable[[dict[str, np.ndarray]], dict[str, Any]]
 ROOT = Path(__file__).parents[2]
 # Where workers of tests leave marks; set before any worker starts.
@@ -45,15 +46,15 @@ class InThisProcess:
     """A backend in this process."""
 
     def __init__(self) -> None:
-        self._ended: list[tuple[int, Outcome | Lost]] = []
+        self._ended: Ended = []
 
     def slots(self) -> int:
         return 1
 
-    def submit(self, number: int, task: Task | Join) -> None:
-        self._ended.append((number, run_task(task)))
+    def submit(self, chunk: Chunk) -> None:
+        self._ended.append((chunk, chunk.run()))
 
-    def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:
+    def collect(self, seconds: float) -> Ended:
         ended, self._ended = self._ended, []
         return ended
 
@@ -98,6 +99,11 @@ def invented(p: dict[str, np.ndarray]) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def part(start: int, stop: int) -> Part:
+    """Describe a file of rows."""
+    return Part(start, stop, 0, "", stop - start, 0, 0, {}, 0.0)
+
+
 def _mark(p: dict[str, np.ndarray], word: str) -> int:
     """Leave a mark for this chunk; how many there are now."""
     name = f"{word}-{float(p['C_t'][0]).hex()}"
@@ -113,9 +119,13 @@ def killing_once(p: dict[str, np.ndarray]) -> dict[str, Any]:
     return invented(p)
 
 
+def _dangerous(p: dict[str, np.ndarray]) -> bool:
+    return DANGER and bool((p["C_t"] == design(101).points(100, 101)["C_t"][0]).any())
+
+
 def poisonous(p: dict[str, np.ndarray]) -> dict[str, Any]:
     """Make rows of which some kill their worker every time: the chunk with the robot of row 100 of seed 5."""
-    if (p["C_t"] == design(101).points(100, 101)["C_t"][0]).any():
+    if _dangerous(p):
         _mark(p, "poison")
         os.kill(os.getpid(), 9)
     return invented(p)
@@ -123,7 +133,7 @@ def poisonous(p: dict[str, np.ndarray]) -> dict[str, Any]:
 
 def raising(p: dict[str, np.ndarray]) -> dict[str, Any]:
     """Make rows of which some raise an error: the chunk with the robot of row 100 of seed 5."""
-    if (p["C_t"] == design(101).points(100, 101)["C_t"][0]).any():
+    if _dangerous(p):
         raise ZeroDivisionError("a robot that nobody foresaw")
     return invented(p)
 
@@ -142,13 +152,17 @@ def endless(p: dict[str, np.ndarray]) -> dict[str, Any]:
     return invented(p)
 
 
-def write_rows(folder: Path, manifest: dict[str, Any], columns: dict[str, Any]) -> None:
-    """Store rows as a finished data set with the configuration and version of another one."""
-    config, effects, code = manifest["config"], manifest["effects"], manifest["code_version"]
-    storage, key = open_storage(folder), manifest["config_hash"]
-    table = arrow_table(columns, schema(effects, config["sensitivities"]))
-    contents = write_shard(storage, shard_name(ROWS, 0, len(table)), table, key)
-    write_manifest(storage, manifest_content(config, key, code, effects, [contents]))
+def write_rows(
+    folder: Path, sweep: SweepDesign, columns: dict[str, Any], code: str, source: str = "dataset.simulate.simulate"
+) -> None:
+    """Store rows as a finished data set of one file."""
+    key, form, there = sweep_key(sweep.config(), code, source), schema(sweep.effects), Folder(folder)
+    table = arrow_table(columns, form)
+    data = packed(table, key)
+    there.write(file_name(0, len(table)), data)
+    content = {"config": sweep.config(), "code": code, "rows_by": source, "key": key}
+    there.write(SWEEP, json.dumps(content).encode())
+    write_manifest(there, sweep, key, code, [checked_part(data, 0, len(table), form, key)])
 
 
 def without_cost(rows: pd.DataFrame) -> pd.DataFrame:

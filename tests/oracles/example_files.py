@@ -16,12 +16,8 @@ import pandas as pd
 
 from calibration.statistics.gls import Noise
 from calibration.verdict.sequential_test import Explanation
-from dataset.build.sweep_folder import sweep_key
-from dataset.rows.schema import arrow_table, schema
-from dataset.rows.version import rows_version
-from dataset.storage.data_set import ROWS, SWEEP, manifest_content, write_manifest
-from dataset.storage.shards import shard_name, write_shard
-from dataset.storage.storage import open_storage
+from dataset.data_set import sweep_key
+from dataset.schema import rows_version
 from planner.files.goal_files import write_goal_plan
 from planner.goal.to_goal import to_goal
 from planner.paths.obstacles import Circle
@@ -39,7 +35,7 @@ from surrogate.table import tensor_file
 from surrogate.table.lookup import FORMAT
 from surrogate.table.model_file import SHIPPED, load
 from tests.calibration.track import track
-from tests.dataset.sweeps import design, invented
+from tests.dataset.sweeps import design, invented, write_rows
 from tests.shared import shared
 
 ROBOT = PRESETS["paper-control"]
@@ -85,15 +81,9 @@ def spreadsheet() -> bytes:
 def data_set() -> dict[str, bytes]:
     """Make a finished data set of 16 synthetic rows."""
     sweep = design(16)
-    config, code, by = sweep.config(), rows_version(), "dataset.rows.simulate.simulate"
-    key = sweep_key(config, code, by)
     points = {**sweep.points(), "history": sweep.history()}
     with tempfile.TemporaryDirectory() as folder:
-        storage = open_storage(folder)
-        rows = arrow_table({**invented(points), "row": sweep.indices()}, schema())
-        contents = write_shard(storage, shard_name(ROWS, 0, 16), rows, key)
-        write_manifest(storage, manifest_content(config, key, code, [], [contents]))
-        storage.write(SWEEP, json.dumps({"config": config, "code": code, "rows_by": by, "key": key}) + "\n")
+        write_rows(Path(folder), sweep, {**invented(points), "row": sweep.indices()}, rows_version())
         files = [path for path in Path(folder).rglob("*") if path.is_file()]
         return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 

@@ -21,12 +21,11 @@ import numpy as np
 from calibration.swimmer.camera_tracks import measure_tracks
 from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.sequential_test import read_explanations
-from dataset.build.sweep_folder import load_sweep
-from dataset.rows.design import SWEEP_TOML, load_design
-from dataset.rows.schema import schema
-from dataset.storage.data_set import MANIFEST, ROWS, SWEEP, batches
-from dataset.storage.shards import BadShardError, Shard, check_shard, shard_name
-from dataset.storage.storage import open_storage
+from dataset.data_set import MANIFEST, SWEEP, batches, read_sweep
+from dataset.design import SWEEP_TOML, load_design
+from dataset.folder import Folder
+from dataset.schema import schema
+from dataset.shards import BadFileError, checked_part, file_name
 from planner.files.goal_files import read_region
 from planner.files.goal_json import load_goal
 from planner.files.plan_json import load_plan
@@ -151,16 +150,14 @@ def _read_rows(path: Path) -> None:
 
 
 def _read_sweep(path: Path) -> None:
-    sweep, function = load_sweep(open_storage(path.parent))
-    _finite(*sweep.with_rows(4).points().values())
-    assert isinstance(function, str)
+    _, design = read_sweep(Folder(path.parent))
+    _finite(*design.with_rows(4).points().values())
 
 
 def _read_shard(path: Path) -> None:
-    storage, key = open_storage(path.parents[1]), json_of(SWEEP)["key"]
     try:
-        check_shard(storage, Shard(f"{ROWS}/{path.name}", 0, 16), schema(), key)
-    except BadShardError as bad:  # such a shard is removed, and its rows are simulated again
+        checked_part(path.read_bytes(), 0, 16, schema(), json_of(SWEEP)["key"])
+    except BadFileError as bad:  # such a file is removed, and its rows are simulated again
         raise InputError(f"{path}: {bad}") from None
 
 
@@ -238,7 +235,7 @@ FORMATS: dict[str, FileFormat] = {
     "manifest, sealed": FileFormat(
         partial(of_data_set, MANIFEST), _read_rows, JSON, sealed_manifest, partial(json_of, MANIFEST, "digest")
     ),
-    "shard of rows": FileFormat(partial(of_data_set, shard_name(ROWS, 0, 16)), _read_shard),
+    "file of rows": FileFormat(partial(of_data_set, file_name(0, 16)), _read_shard),
     "table of robots": FileFormat(file("robots.csv", lambda: text(robots())), _read_robots, TABLE),
     "table of robots, Parquet": FileFormat(file("robots.parquet", parquet), _read_robots),
     "table of robots, xlsx": FileFormat(file("robots.xlsx", spreadsheet), _read_robots),

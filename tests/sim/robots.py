@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from dataset.rows.design import load_design
+from dataset.design import load_design
 from sim.mechanics.balance import head_drag
 from sim.model.body import Body
 from sim.model.groups import Groups

@@ -41,7 +41,7 @@ def test_a_file_or_a_package_beside_a_script_is_named(tmp_path: Path) -> None:
 def test_a_folder_without_code_hides_nothing(tmp_path: Path) -> None:
     (tmp_path / "dataset").mkdir()
     done = run_script(
-        tmp_path, "import softflagella as sf, dataset.storage; print(sf.load_robot('paper-control').tails)"
+        tmp_path, "import softflagella as sf, dataset.folder; print(sf.load_robot('paper-control').tails)"
     )
     assert (done.stdout, done.returncode) == ("2\n", 0), done.stderr
 

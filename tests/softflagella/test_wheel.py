@@ -57,7 +57,7 @@ def test_the_demo_s_sweep_runs_from_the_wheel(wheel: Path, tmp_path: Path) -> No
         f"assert demo.__file__.startswith({str(wheel)!r}), demo.__file__\n"
         "robot, motions = demo._look(pathlib.Path('.'))\n"
         "assert len(motions) == 2 and sf.load_robot('robot.toml').tails == 2\n"
-        "from dataset.rows.design import load_design\n"
+        "from dataset.design import load_design\n"
         "assert load_design().rows > load_design(demo.SWEEP_TOML).rows > 0\n"
     )
     cache = next((ROOT / "sim" / "__pycache__").glob("compiled-*"), None)

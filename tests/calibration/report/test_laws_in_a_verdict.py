@@ -23,7 +23,7 @@ from calibration.statistics.held_out import refit_to_all
 from calibration.verdict.experiment import Rival
 from calibration.verdict.next_runs import BATCH, next_runs
 from calibration.verdict.sequential_test import Explanation, standings
-from dataset.rows.robot_inputs import robot_fields
+from dataset.robot_inputs import robot_fields
 from planner.vehicle.calibration_table import read_knowledge
 from sim.effects import effect_named
 from sim.inputs import group_columns, load_robot, save_robot

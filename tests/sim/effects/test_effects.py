@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import sim.effects
-from dataset.rows.simulate import simulate
+from dataset.simulate import simulate
 from sim.effects import catalogue, effect_named
 from sim.effects.tail_contact import least_gap
 from sim.io.errors import InputError

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from dataset.rows.design import load_design
+from dataset.design import load_design
 from sim.inputs import load_robot
 from sim.io import tables
 from sim.io.errors import InputError

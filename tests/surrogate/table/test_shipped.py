@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dataset.rows.design import load_design
+from dataset.design import load_design
 from sim.io.errors import InputError, run_command
 from sim.motion.batches import steady_columns
 from sim.reference.control_example import INDEPENDENT

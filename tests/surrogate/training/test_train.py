@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import surrogate.training.train as training
-from dataset.build.build import build
+from dataset.build import build
 from sim.io.errors import InputError
 from surrogate.table.errors import relative_errors
 from surrogate.training.fit_wrench import learnable, wrench_samples

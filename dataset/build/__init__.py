@@ -1,1 +1,0 @@
-"""A sweep, from its design to a finished data set."""

@@ -1,1 +1,0 @@
-"""What a row of a sweep is."""

@@ -1,3 +1,0 @@
-"""Workers: what they do, and the backends that run them."""
-
-BACKENDS = ("loky", "dask", "ray")
