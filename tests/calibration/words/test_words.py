@@ -174,6 +174,9 @@ def test_of_many_laws_the_best_two_are_named_and_the_others_counted() -> None:
     assert said.endswith("(with the choice among all places counted, p ≤ 0.001). All of them act on the head.")
     beside = say_laws(laws | {"as_good": list("abc")})
     assert beside == "It is described as well by law a; or by law b; or by laws at 1 other place."
+    judged = laws["laws"][0] | {"gain": 9.0, "error": 0.02, "first": None, "leaves_noise": True}
+    fitted = laws | {"sentence": said, "laws": 15 * [judged]}
+    assert "3 others, with smaller gains, are in verdict.json." in in_report(stored("none", laws=fitted))
 
 
 def test_the_settings_to_repeat_are_those_of_the_largest_departures() -> None:
