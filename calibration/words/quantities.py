@@ -25,7 +25,10 @@ _OUTPUTS = {
     "theta": "slip angle",
     "v": "speed",
 }
-_FEATURES = {"omega": "ω", "direction": "motor's direction"}  # what words of a feature's name read as
+_FEATURES = {  # what words of a feature's name read as
+    "omega": "ω", "direction": "motor's direction", "elapsed_h": "time", "temperature_K": "temperature",
+    "tank_diameter": "diameter of the tank", "course_x": "x of the course", "course_y": "y of the course",
+}  # fmt: skip
 _IN_DEGREES = "theta"
 _RESOLVED = 2.01  # over the number of draws and one more: the bootstrap resolves no smaller p
 

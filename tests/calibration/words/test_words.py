@@ -89,6 +89,11 @@ def test_every_branch_of_the_sentence(name: str, changes: dict[str, Any], said: 
         ("none", PARTIAL, "Find out what differs between"),
         ("none", UNEXPLAINED | {"largest_along": "theta along (ln l)²"}, "slip angle along (ln l)², so"),
         ("none", UNEXPLAINED | {"largest_along": "v along time"}, "so check first the camera: its scale"),
+        (
+            "none",
+            UNEXPLAINED | {"harmless": True, "largest_along": "v along course_x"},
+            "Most of it is in speed along x of the course, so check first whether the tank has a current",
+        ),
         ("none", UNEXPLAINED | {"largest_departures": [{"at": ["N = 2", "l = 5 cm"]}]}, "): N = 2, l = 5 cm."),
         ("none", UNEXPLAINED | {"untestable": {"drift": "needs elapsed_min"}}, "Note more in the table, so"),
         ("none", UNEXPLAINED | {"described": True}, "When the cause is known, make the law an effect"),
