@@ -45,14 +45,15 @@ def check_columns(columns: Mapping[str, Any]) -> dict[str, Floats]:
     Raises:
         InputError: a column is missing or unknown, or a number is not finite or out of its range.
     """
-    known = {*GROUP_COLUMNS, *OPTIONAL_COLUMNS, *catalogue()}
+    groups = {*GROUP_COLUMNS, *OPTIONAL_COLUMNS}
+    known = {*groups, *catalogue()}
     unknown = sorted(name for name in set(columns) - known if name not in catalogue())
     if unknown:
         raise InputError(
             f"unknown column {unknown[0]!r}; allowed are {', '.join(sorted(known))}: rename or drop it"
         )
     values = checked_values(columns)
-    for name in [name for name in values if name in catalogue()]:
+    for name in [name for name in values if name not in groups]:
         for size in (values[name].min(), values[name].max()):
             check_size(name, float(size))
     return values

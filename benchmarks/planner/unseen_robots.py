@@ -54,7 +54,7 @@ def outcome(seed: int, in_time_steps: bool) -> Outcome | str:
     except InputError as refused:
         return f"{seed}: {refused}"
     columns = {name: np.array([value]) for name, value in result.robot.group_values().items()}
-    features = lookup.width_features(lookup.motions(columns))
+    features = lookup.width_features(lookup.solve(columns))
     replayed = error = float("nan")
     schedule = result.schedule()
     if in_time_steps and schedule.dwells.sum() * schedule.robot["omega_bar"] * result.robot.tails < _LITTLE:

@@ -20,18 +20,12 @@ from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.groups import DWELL
-from sim.model.response import DWELLS
 from sim.motion.net_speed import twists
 from surrogate.input_ranges import ROBOT
 from surrogate.networks.ensemble import Ensemble
 from surrogate.table.errors import COMPARED, RESPONSE_OUTPUTS, error_scale, relative_errors
-from surrogate.table.lookup import NeuralTable, steady_outputs
-from surrogate.table.response_table import (
-    between_dwells,
-    curve_speeds,
-    memory_at_equal_dwells,
-    response_inputs,
-)
+from surrogate.table.lookup import NeuralTable
+from surrogate.table.response_table import Basis, lags_at_equal_dwells, memory_at_equal_dwells
 from surrogate.table.wrench_table import WrenchTable
 from surrogate.training.simulated import draw_robots
 
@@ -70,14 +64,12 @@ class SmallCopy:
             columns: robots without effects, each (M,).
         """
         values = check_columns({name: array for name, array in columns.items() if name != DWELL})
-        motions = self.table.motions(values, flag=True)
-        result = steady_outputs(motions, self.table.tails)
+        motions = self.table.solve(values)
+        result = dict(motions.steady)
         if DWELL in columns and self.has_response:
-            inputs = response_inputs(motions.tails, motions.motion)
-            parts = [_network(self.arrays, name)(inputs) for name in NETWORKS[4:]]
-            mean, basis = (self.arrays[f"curves.{name}"].astype(float) for name in ("mean", "basis"))
-            flat = (mean + np.concatenate(parts, -1) @ basis).reshape(-1, len(DWELLS), 3)
-            lag = between_dwells(flat * curve_speeds(motions.heads, motions.motion)[:, None, :], columns[DWELL])
+            parts = [_network(self.arrays, name) for name in NETWORKS[4:]]
+            basis = Basis(*(self.arrays[f"curves.{name}"].astype(float) for name in ("mean", "basis")))
+            lag = lags_at_equal_dwells(parts, basis, *motions[:4], columns[DWELL])
             twist = twists(result["v_z"], result["v_x"], result["omega_yr_bar"], motions.heads.sense)
             speed = planar.net_speed(twist, lag, columns[DWELL])
             answers = zip(RESPONSE_OUTPUTS, (speed, *lag.T[::-1]), strict=True)

@@ -6,40 +6,25 @@ K members are evaluated side by side; their mean is the answer. Inputs are shift
 larger than the spread says that the output changes slowly along this input; the first weights are then small.
 This is prior knowledge of the problem, and training gains much from it (docs/explanation/lookup.md).
 
-`surrogate.networks.compiled` evaluates the mean, one robot at a time. Here are all members at once, also for
-inputs that carry a derivative (`sim.linear.complex_step`). `surrogate.networks.trainable` trains.
+`surrogate.networks.loops` evaluates, `surrogate.networks.trainable` trains.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sim.arrays import Floats
-from surrogate.networks.compiled import Packed
+
+if TYPE_CHECKING:
+    from surrogate.networks.loops import Layers
 
 SHARED = ("shift", "scale", "mean", "spread")  # what the members have in common
-
-
-def perceptrons(
-    x: Any, weights: Sequence[Any], biases: Sequence[Any], bypass: Any, tanh: Callable[[Any], Any]
-) -> Any:
-    """Return y of the module's head for every member, (K, M, O), at inputs (K, M, F) or (M, F).
-
-    Args:
-        weights, biases: layer by layer, (K, I, O) and (K, 1, O), arrays or tensors.
-        bypass: A, (K, F, O).
-        tanh: of such arrays or tensors.
-    """
-    hidden = x
-    for weight, bias in zip(weights[:-1], biases[:-1], strict=True):
-        hidden = tanh(hidden @ weight + bias)
-    return hidden @ weights[-1] + biases[-1] + x @ bypass
 
 
 @dataclass(frozen=True)
@@ -82,25 +67,45 @@ class Ensemble:
 
     def members_at(self, inputs: Floats) -> Floats:
         """Return outputs of every member, (K, M, O)."""
-        x = (inputs - self.shift) / self.scale
-        y = perceptrons(x, self.weights, self.biases, self.bypass, _tanh)
-        return np.asarray(y * self.spread + self.mean)
+        return np.stack([self.member(k)(inputs) for k in range(self.shape["members"])])
 
     def __call__(self, inputs: Floats) -> Floats:
         """Return the mean of the members, (M, O)."""
-        return np.asarray(self.members_at(inputs).mean(0))
+        from surrogate.networks.loops import evaluate_all
+
+        y: Floats = evaluate_all(*self.layers, np.ascontiguousarray(inputs, dtype=float))
+        return y[:, : self.shape["outputs"]]
 
     @cached_property
-    def packed(self) -> Packed:
+    def layers(self) -> Layers:
         """The same numbers for the compiled loops."""
-        shape = self.shape
-        parts = [self.shift, self.scale, self.mean, self.spread]
-        for k in range(shape["members"]):
-            for weight, bias in zip(self.weights, self.biases, strict=True):
-                parts += [weight[k].ravel(), bias[k].ravel()]
-            parts.append(self.bypass[k].ravel())
-        sizes = (0, *(shape[name] for name in ("inputs", "outputs", "width", "depth", "members")))
-        return Packed(np.concatenate(parts), np.array(sizes))
+        from surrogate.networks.loops import Layers
+
+        def turned(weight: Floats) -> Floats:
+            """Return (K, O, I) for an even number of outputs."""
+            return np.ascontiguousarray(_even(weight).swapaxes(1, 2))
+
+        share, last = self.spread / self.shape["members"], len(self.weights) - 1
+        bypass = self.bypass / self.scale[:, None] * share
+        first = self.weights[0] / self.scale[:, None]
+        rest = self.biases[last][:, 0] * share + self.mean / self.shape["members"]
+        inner = [turned(_even(weight.swapaxes(1, 2)).swapaxes(1, 2)) for weight in self.weights[1:last]]
+        out = _even((self.weights[last] * share).swapaxes(1, 2)).swapaxes(1, 2)
+        none = np.empty((len(first), 0, *2 * [turned(first).shape[1]]))
+        return Layers(
+            np.ascontiguousarray(self.shift),
+            turned(first),
+            np.ascontiguousarray(np.stack(inner, 1)) if inner else none,
+            turned(np.concatenate([out, bypass], 1)),
+            np.ascontiguousarray(np.stack([_even(bias)[:, 0] for bias in self.biases[:last]], 1)),
+            np.ascontiguousarray(_even(rest)),
+        )
+
+
+def _even(array: Floats) -> Floats:
+    """Return an array with an even last axis, zeros added."""
+    odd = array.shape[-1] % 2
+    return np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, odd)])
 
 
 def state_shapes(*, inputs: int, outputs: int, width: int, depth: int, members: int) -> dict[str, tuple[int, ...]]:
@@ -115,10 +120,3 @@ def state_shapes(*, inputs: int, outputs: int, width: int, depth: int, members: 
         "mean": (outputs,),
         "spread": (outputs,),
     }
-
-
-def _tanh(x: Any) -> Any:
-    if np.isrealobj(x):
-        return np.tanh(x)
-    value = np.tanh(x.real)
-    return value + 1j * (1 - value * value) * x.imag

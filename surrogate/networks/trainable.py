@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from surrogate.networks.ensemble import SHARED, Ensemble, perceptrons, state_shapes
+from surrogate.networks.ensemble import SHARED, Ensemble, state_shapes
 
 
 class TrainableEnsemble(nn.Module):
@@ -55,6 +55,7 @@ class TrainableEnsemble(nn.Module):
 
     def standardised(self, x: Tensor) -> Tensor:
         """Return outputs of every member before `mean` and `spread`, (K, M, O), for standardised inputs (M, F)."""
-        first = x.expand(self.bypass.shape[0], -1, -1)
-        y: Tensor = perceptrons(first, list(self.weights), list(self.biases), self.bypass, torch.tanh)
-        return y
+        hidden = x = x.expand(self.bypass.shape[0], -1, -1)
+        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+            hidden = torch.tanh(hidden @ weight + bias)
+        return hidden @ self.weights[-1] + self.biases[-1] + x @ self.bypass

@@ -83,4 +83,4 @@ def _named(sizes: Floats) -> dict[str, Floats]:
 
 def _sizes(widths: Intervals, features: Floats) -> Floats:
     """Return one standard deviation of the errors of each axis, (M, 3)."""
-    return np.stack([widths.half_widths(name, features, 1.0) for name in SIZES], -1) / NORMAL_90
+    return widths.half_widths(SIZES, features).T / NORMAL_90

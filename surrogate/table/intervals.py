@@ -16,8 +16,9 @@ a Random World (2005), section 4.5, for the parts.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -45,28 +46,39 @@ class Intervals:
     middle: Floats  # (3,), the halves meet here
     factor: Mapping[str, Floats]  # output -> q of each part, (PARTS,) for all robots or (GROUPS PARTS,)
 
-    def half_widths(
-        self, name: str, features: Floats, sizes: Floats | float, couples: Flags | bool = False
-    ) -> Floats:
-        """Return half of the width of the interval of one output, (M,).
+    def half_widths(self, names: Sequence[str], features: Floats, couples: Flags | bool = False) -> Floats:
+        """Return half-widths of the intervals of some outputs, (O, M), over what errors are relative to.
 
         Args:
+            names: of the outputs.
             features: (M, F), see `surrogate.table.lookup`.
-            sizes: (M,) or one number, what errors of this output are relative to.
             couples: (M,), which robots have a couple in yaw from the spin of their tails.
         """
-        factor = self.factor[name]
-        part = (self.part(features) + PARTS * np.asarray(couples)) % len(factor)
-        return factor[part] * self._local(name, features) * sizes
+        _, factors = self._stacked
+        parts = self.part(features) + PARTS * np.asarray(couples)
+        return factors[self._places(names)][:, parts] * self._local(names, features)
 
     def part(self, features: Floats) -> Integers:
         """Return which part each robot belongs to, (M,): 0 to 7 for octants, 8 for one tail."""
         octant = (features[:, _HALVED] > self.middle) @ 2 ** np.arange(len(_HALVED))
         return np.where(features[:, _ONE_TAIL] > 0.5, PARTS - 1, octant)
 
-    def _local(self, name: str, features: Floats) -> Floats:
-        low, high = self.bounds[name]
-        return np.exp(np.clip(_design((features - self.shift) / self.scale) @ self.weights[name], low, high))
+    def _local(self, names: Sequence[str], features: Floats) -> Floats:
+        """Return s of some outputs, (O, M)."""
+        weights, _ = self._stacked
+        weights, (low, high) = weights[self._places(names)], np.array([self.bounds[n] for n in names]).T[..., None]
+        return np.exp(np.clip(weights @ _design((features - self.shift) / self.scale).T, low, high))
+
+    def _places(self, names: Sequence[str]) -> list[int]:
+        """Return the rows of outputs in what is stacked."""
+        all_names = list(self.weights)
+        return [all_names.index(name) for name in names]
+
+    @cached_property
+    def _stacked(self) -> tuple[Floats, Floats]:
+        """Weights (O, P) and factors (O, GROUPS PARTS) of all outputs; NaN where there are none."""
+        factors = [np.resize(self.factor.get(name, math.nan), GROUPS * PARTS) for name in self.weights]
+        return np.array(list(self.weights.values())), np.array(factors)
 
     @staticmethod
     def learned(
@@ -112,7 +124,7 @@ class Intervals:
         if min(map(np.count_nonzero, groups)) < _FEWEST:
             groups = [~couples | couples]
         for name, error in errors.items():
-            known, scores = np.isfinite(error), np.abs(error) / self._local(name, features)
+            known, scores = np.isfinite(error), np.abs(error) / self._local([name], features)[0]
             cells = [[group & (part == k) & known, group & known, known] for group in groups for k in range(PARTS)]
             pools = [next((c for c in cell if c.sum() >= _FEWEST), known) for cell in cells]
             factor[name] = np.array([_conformal_quantile(scores[pool]) for pool in pools])
@@ -121,9 +133,12 @@ class Intervals:
 
 def _design(x: Floats) -> Floats:
     """Assemble 1, x and all products of two, (M, P), with x held to five standard deviations."""
-    x = np.clip(x, -5, 5)
-    first, second = np.triu_indices(x.shape[1])
-    return np.concatenate([np.ones((len(x), 1)), x, x[:, first] * x[:, second]], 1)
+    x = np.clip(x.T, -5, 5)
+    first, second = _pairs(len(x))
+    return np.concatenate([np.ones((1, x.shape[1])), x, x[first] * x[second]]).T
+
+
+_pairs = cache(np.triu_indices)
 
 
 def _conformal_quantile(scores: Floats) -> float:

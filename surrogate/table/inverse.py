@@ -20,8 +20,7 @@ from sim.io.errors import InputError
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.input_ranges import BOUNDS
 from surrogate.table.errors import error_scale
-from surrogate.table.lookup import NeuralTable
-from surrogate.table.quick_query import OUTSIDE
+from surrogate.table.lookup import OUTSIDE, NeuralTable
 
 Bounds = Mapping[str, tuple[float, float]]
 
@@ -74,7 +73,7 @@ def inverse(
     def misfits(p: Floats) -> tuple[Floats, Floats, Floats]:
         columns = {**fixed, **{name: np.exp(p[:, i]) for i, name in enumerate(names)}}
         outputs = lookup.query(columns, flag=True)
-        slopes = lookup.jacobian(columns, names, flag=True)
+        slopes = lookup.derivatives(columns, names, flag=True)
         residual = np.stack([(outputs[name] - target_values[name]) / size[name] for name in wanted], -1)
         J = np.stack(
             [np.stack([slopes[o][n] * columns[n] for n in names], -1) / size[o][:, None] for o in wanted], 1

@@ -13,39 +13,36 @@ on the tails themselves are always rejected. The table does not extrapolate.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
+from sim.arrays import Floats, Integers
 from sim.effects import catalogue
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.io.notebook import as_html, given_axes
-from sim.model.groups import DWELL
-from sim.model.response import Responses
+from sim.mechanics import planar
+from sim.model.groups import DWELL, checked_values
+from sim.model.response import DWELLS, Responses
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.error_modes import STEADY, error_modes, joined
 from surrogate.input_ranges import ROBOT
 from surrogate.interface import ErrorModes, OutsideError
 from surrogate.networks.ensemble import Ensemble
-from surrogate.table.compiled_query import INPUT, MOTION
 from surrogate.table.curve_errors import CURVE_ERRORS, NORMAL_90, CurveErrors
-from surrogate.table.errors import RELATIVE, error_scale
-from surrogate.table.flat_table import flat_table
+from surrogate.table.errors import RELATIVE, RESPONSE_OUTPUTS, error_scale
 from surrogate.table.intervals import Intervals
-from surrogate.table.jacobian import slopes
-from surrogate.table.outside_reasons import reason_of
-from surrogate.table.quick_query import OUTSIDE, SHORTEST, QuickQuery, outside
+from surrogate.table.outside import INSIDE, NO_RESPONSE, NOT_LEARNED, reason_of
 from surrogate.table.response_table import ResponseTable, curve_speeds
 from surrogate.table.support import Support
 from surrogate.table.tensor_file import digest, write
 from surrogate.table.wrench_table import WrenchTable, motion_sensitivity, network_index, rows_by_network
-from surrogate.wrench.heads import Heads, heads_and_tails, needs_no_learning, pack_robots
+from surrogate.wrench.heads import Heads, needs_no_learning, packed_robots, unpack_robots
 from surrogate.wrench.tails import Tails, network_inputs, wrench_slopes
 
 if TYPE_CHECKING:
@@ -53,8 +50,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FORMAT = 7  # of model files
-CERTIFIED = "certified_error"
-_MOTION, _INPUTS = slice(MOTION, MOTION + 5), slice(INPUT, INPUT + 7)  # rows of the compiled loop's answer
+OUTSIDE, CERTIFIED = "outside", "certified_error"  # columns of an answer
+_MIN_DWELL = DWELLS[0] * (1 - 1e-9)
+_DIFFERENCE = 1e-4  # of an input, relative, for derivatives
 _NOT_OF_HEAD = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
 
 
@@ -65,7 +63,9 @@ class Motions(NamedTuple):
     tails: Tails
     motion: Floats  # (M, 5): (v_x of J, v_z, ω_yr, ω_h, ω_t), for a positive motor
     inputs: Floats  # (M, 7) of the networks, see `surrogate.wrench.tails.tail_inputs`
-    reason: list[str]  # why a robot is outside; else empty
+    novelty: Floats  # (M,), see `surrogate.table.support`
+    outside: Integers  # (M,), see `surrogate.table.outside`
+    steady: dict[str, Any]  # STEADY_OUTPUTS, (M,) each
 
 
 @dataclass(frozen=True, repr=False)
@@ -110,29 +110,28 @@ class NeuralTable:
         Raises:
             InputError: a robot that cannot be, or one outside the domain.
         """
-        if not certify and (intervals is False or self._quick_widths):
-            answer = self._quick.one(columns, intervals=intervals, flag=flag)
-            if answer is not None:
-                return answer
         values = check_columns({name: array for name, array in columns.items() if name != DWELL})
+        motions = self.solve(values)
+        result = dict(motions.steady)
         if DWELL in columns:
             _check_flips(values)
-        robots = None if _without_effects(values) else pack_robots(*heads_and_tails(values))
-        dwells = self._dwells(columns, values, flag=flag)
-        widths = intervals and self._quick_widths
-        answers = self._quick.rows(values, robots, dwells, widths=widths)
-        self._check_known(values, answers, flag=flag)
-        result = self._quick.named(answers, with_dwell=dwells is not None, widths=widths)
-        if intervals and not widths:
-            result |= self._intervals(self.motions(values, flag=flag), result)
+            dwells, wrong = _checked_dwells(columns[DWELL])
+            if wrong:
+                self._check_known(values, motions, flag=flag)  # a robot outside is refused before a dwell is
+                raise InputError(wrong)
+            result |= self._flips(motions, np.broadcast_to(dwells, values["N"].shape))
+        self._check_known(values, motions, flag=flag)
+        if intervals:
+            result |= self._intervals(motions, result)
         if flag:
-            result[OUTSIDE] = outside(answers)
+            result[OUTSIDE] = motions.outside != INSIDE
         if certify:
             from surrogate.table.certify import certified_error
 
             result[CERTIFIED] = certified_error(values, result)
         return result
 
+    @np.errstate(all="ignore")
     def response(self, columns: Mapping[str, Floats], *, flag: bool = False) -> Responses:
         """Return the response to a flip of the motor, see `surrogate.interface.LookupTable.response`.
 
@@ -141,41 +140,73 @@ class NeuralTable:
         """
         values = check_columns(columns)
         _check_flips(values)
-        motions = self.motions(values, flag=flag)
-        return self._responses(motions, steady_outputs(motions, self.tails))
+        motions = self.solve(values)
+        curves = self.curves.curves(motions.heads, motions.tails, motions.motion, motions.inputs)
+        self._mark_unlearned(motions, curves["lag"])
+        self._check_known(values, motions, flag=flag)
+        speed = net_speeds(_twists(motions), curves["lag"], curves["memory"])
+        none = np.zeros(len(speed), dtype=bool)
+        return Responses(**curves, net_speed=speed, failed=none, stepped=none)
 
     def error_modes(self, columns: Mapping[str, Floats]) -> ErrorModes:
         """Return the errors of motion and response at one robot; see `LookupTable.error_modes`."""
         values = check_columns({name: np.asarray(values)[:1] for name, values in columns.items()})
-        motions = self.motions(values)
-        steady = steady_outputs(motions, self.tails)
-        motion = {name: float(values[0]) for name, values in steady.items()}
+        motions = self.solve(values)
+        self._check_known(values, motions)
+        motion = {name: float(values[0]) for name, values in motions.steady.items()}
         if self.intervals is None or self.curve_errors is None:
             return error_modes(self.errors, motion)
-        ends = self._intervals(motions, steady)
+        ends = self._intervals(motions, motions.steady)
         sizes = [float(ends[f"{name}_high"][0] - ends[f"{name}_low"][0]) / (2 * NORMAL_90) for name in STEADY]
         speeds = curve_speeds(motions.heads, motions.motion)
         curves = self.curve_errors.modes(self.width_features(motions), speeds)
         own = [self.curve_errors.simulator * float(error_scale(name, motion)) for name in STEADY]
         return joined(np.diag(np.hypot(sizes, own)), curves)
 
-    def jacobian(
-        self, columns: Mapping[str, Floats], parameters: Sequence[str], *, flag: bool = False
+    def derivatives(
+        self, columns: Mapping[str, Floats], parameters: Sequence[str] = (), *, flag: bool = False
     ) -> dict[str, dict[str, Floats]]:
-        """Return ∂(output)/∂(parameter) of STEADY_OUTPUTS, by output and parameter, each (M,).
+        """Return ∂(output)/∂(parameter) of the outputs of `query`, by output and parameter, each (M,).
 
-        Exact derivatives of the table: those of one more step of Newton's method at the solution.
+        By central differences of the table, with an error of about 1e-7 of the derivative.
 
         Args:
-            columns: robots by column name, each (M,).
-            parameters: names of groups, without N, or of effects on the head.
+            columns: robots by column name, each (M,), with `dwell_bar` or without.
+            parameters: names of groups, without N, of effects on the head, or `dwell_bar`; by default all groups.
             flag: answer outside the domain as well.
 
         Raises:
-            InputError: a robot that cannot be, or one outside the domain.
+            InputError: a robot that cannot be, one outside the domain, or a parameter without derivatives.
         """
-        values = check_columns({**columns, **{n: columns.get(n, 0.0 * columns["N"]) for n in parameters}})
-        return slopes(self.tails, values, self.motions(values, flag=flag).motion, parameters)
+        parameters = list(parameters) or [name for name in ROBOT if name != "N"]
+        for name in parameters:
+            if (
+                name == "N"
+                or name not in (*ROBOT, DWELL, *catalogue())
+                or (name == DWELL and DWELL not in columns)
+            ):
+                raise InputError(f"{name} is no input with derivatives; give groups without N, or effects")
+        given = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
+        if not flag:
+            self.query(given)  # refuses what is outside
+        count = len(given["N"])
+        nulls = {name: np.full(count, 1.0 if name == "a_over_R" else 0.0) for name in parameters}
+        repeated = {name: np.tile(values, 2 * len(parameters)) for name, values in {**nulls, **given}.items()}
+        widths = {}
+        for k, name in enumerate(parameters):
+            value = repeated[name][:count]
+            widths[name] = _DIFFERENCE * np.where(value == 0, 1.0, np.abs(value))
+            repeated[name][2 * k * count : (2 * k + 1) * count] += widths[name]
+            repeated[name][(2 * k + 1) * count : (2 * k + 2) * count] -= widths[name]
+        values = checked_values({name: array for name, array in repeated.items() if name != DWELL})
+        motions = self.solve(values)
+        answers = {**motions.steady, **(self._flips(motions, repeated[DWELL]) if DWELL in repeated else {})}
+        slopes: dict[str, dict[str, Floats]] = {}
+        for output, values in answers.items():
+            pairs = values.reshape(len(parameters), 2, count)
+            changes = zip(parameters, pairs[:, 0] - pairs[:, 1], strict=True)
+            slopes[output] = {name: change / (2 * widths[name]) for name, change in changes}
+        return slopes
 
     def save(self, path: str | Path) -> None:
         """Write the model file completely or not at all."""
@@ -217,75 +248,77 @@ class NeuralTable:
 
         return pd.DataFrame.from_dict(self.errors, orient="index")
 
-    def motions(self, values: Mapping[str, Floats], *, flag: bool = False) -> Motions:
-        """Return the motion of checked robots (`sim.inputs.check_columns`); see `query` for `flag`."""
-        heads, tails = heads_and_tails(values)
-        answers = self._quick.rows(values, pack_robots(heads, tails), None)
-        self._check_known(values, answers, flag=flag)
-        motion, inputs = (np.ascontiguousarray(answers[place].T) for place in (_MOTION, _INPUTS))
-        return Motions(heads, tails, motion, inputs, list(map(reason_of, answers.T, tails.number)))
+    def solve(self, values: Mapping[str, Floats]) -> Motions:
+        """Return the motion of checked robots (`sim.inputs.check_columns`), known to the table or not."""
+        from surrogate.table.loops import motions_of
+
+        robots, sizes = packed_robots(values), np.array([values[name] for name in _NOT_OF_HEAD]).T.copy()
+        parts = []
+        for k, rows in rows_by_network(network_index(values["N"])):
+            network, support, own = self.tails.wrench[k], self.support[k], robots[rows]
+            if network is None or support is None:
+                unknown, none = np.full(len(own), NOT_LEARNED), np.full((len(own), 8), np.nan)
+                parts.append((rows, none[:, :5], none[:, :7], none[:, 0], unknown, none))
+            else:
+                numbers = (*network.layers, *self.tails.gap.layers, *support.numbers, self._limits)
+                parts.append((rows, *motions_of(*numbers, sizes[rows], own)))
+        motion, inputs, novelty, outside, outputs = parts[0][1:] if len(parts) == 1 else _joined(parts)
+        steady = dict(zip(STEADY_OUTPUTS, outputs.T, strict=True))
+        return Motions(*unpack_robots(robots), motion, inputs, novelty, outside, steady)
 
     @cached_property
-    def _quick(self) -> QuickQuery:
-        ranges = [self.ranges[name] for name in _NOT_OF_HEAD]
-        widths = self.intervals if self._quick_widths else None
-        flat = flat_table(self.tails, self.curves, self.support, ranges, widths)
-        return QuickQuery(flat, () if widths is None else list(widths.factor))
+    def _limits(self) -> Floats:
+        """Least and greatest ω̄, l/R, l/r0 and a/R, (2, 4)."""
+        return np.ascontiguousarray(
+            np.array([self.ranges[name] for name in _NOT_OF_HEAD]).T * [[1 - 1e-9], [1 + 1e-9]]
+        )
 
-    @cached_property
-    def _quick_widths(self) -> bool:
-        """Whether the compiled loop knows the intervals: networks of several members have a spread as well."""
-        members = [network.shape["members"] for network in self.tails.wrench if network is not None]
-        return self.intervals is not None and set(members) == {1}
+    @np.errstate(all="ignore")
+    def _flips(self, motions: Motions, dwells: Floats) -> dict[str, Floats]:
+        """Return RESPONSE_OUTPUTS at equal dwells (M,); mark robots whose response was not learned."""
+        lag = self.curves.lags(motions.heads, motions.tails, motions.motion, motions.inputs, dwells)
+        self._mark_unlearned(motions, lag)
+        speed = planar.net_speed(_twists(motions), lag, dwells)
+        return dict(zip(RESPONSE_OUTPUTS, (speed, *lag.T[::-1]), strict=True))
 
-    def _dwells(self, columns: Mapping[str, Floats], values: Mapping[str, Floats], *, flag: bool) -> Floats | None:
-        """Return the checked dwells of a query, (M,); a robot outside is refused before a dwell is."""
-        if DWELL not in columns:
-            return None
-        try:
-            return np.broadcast_to(_checked_dwells(columns[DWELL]), values["N"].shape)
-        except InputError:
-            self.motions(values, flag=flag)
-            raise
+    @staticmethod
+    def _mark_unlearned(motions: Motions, lag: Floats) -> None:
+        unknown = ~np.isfinite(lag).reshape(len(lag), -1).all(1) & (motions.outside == INSIDE)
+        motions.outside[unknown] = NO_RESPONSE
 
-    def _check_known(self, values: Mapping[str, Floats], answers: Floats, *, flag: bool) -> None:
+    def _check_known(self, values: Mapping[str, Floats], motions: Motions, *, flag: bool = False) -> None:
         """Refuse the first robot that is outside, unless such robots are flagged."""
-        if not flag:
-            for row in np.flatnonzero(outside(answers))[:1].tolist():
-                raise self._refusal(values, row, reason_of(answers[:, row], values["N"][row]))
+        if not flag and motions.outside.any():
+            row = int(np.flatnonzero(motions.outside)[0])
+            reason = reason_of(motions.outside[row], motions.tails.number[row], motions.motion[row, 2])
+            raise self._refusal(values, row, reason)
 
     def width_features(self, motions: Motions) -> Floats:
         """Return what the width of an interval may depend on, (M, 11)."""
-        heads, tails, motion = motions.heads, motions.tails, motions.motion
-        novelty, spread = np.zeros(len(motion)), np.zeros(len(motion))
-        weight = motion_sensitivity(heads, tails, motion) @ wrench_slopes(tails, motion)
+        tails, spread = motions.tails, np.zeros(len(motions.motion))
         kind = network_index(tails.number)
         for k, rows in rows_by_network(kind):
-            network, support = self.tails.wrench[k], self.support[k]
-            if network is not None and support is not None:
-                own = network_inputs(tails.at(rows), motion[rows], network.shape["inputs"])
-                novelty[rows] = support.novelty(own)
-                members = network.members_at(own)
-                apart = (weight[rows] @ (members - members.mean(0))[..., None])[..., 0]
+            network = self.tails.wrench[k]
+            if network is not None and network.shape["members"] > 1:
+                own, motion = tails.at(rows), motions.motion[rows]
+                weight = motion_sensitivity(motions.heads.at(rows), own, motion) @ wrench_slopes(own, motion)
+                members = network.members_at(network_inputs(own, motion, network.shape["inputs"]))
+                apart = (weight @ (members - members.mean(0))[..., None])[..., 0]
                 spread[rows] = np.linalg.norm(apart, axis=-1).mean(0)
-        extra = [
-            np.log(novelty + 1e-12),
-            np.log(spread + 1e-9),
-            np.log(tails.number),
-            kind == 0,
-        ]
+        extra = [np.log(motions.novelty + 1e-12), np.log(spread + 1e-9), np.log(tails.number), kind == 0]
         return np.nan_to_num(np.column_stack([motions.inputs, *extra]))
 
+    @np.errstate(all="ignore")
     def _intervals(self, motions: Motions, result: Mapping[str, Floats]) -> dict[str, Floats]:
         if self.intervals is None:
             raise InputError("this look-up table has no intervals; train it again")
-        features, added = self.width_features(motions), {}
-        for name in [name for name in result if name in self.intervals.factor]:
-            size = error_scale(name, result)
-            half = self.intervals.half_widths(name, features, size, motions.heads.couples)
-            half = np.where(np.isfinite(result[name]), half, 0.0)
-            added[f"{name}_low"], added[f"{name}_high"] = result[name] - half, result[name] + half
-        return added
+        names = [name for name in result if name in self.intervals.factor]
+        half = self.intervals.half_widths(names, self.width_features(motions), motions.heads.couples)
+        values = np.array([result[name] for name in names])
+        scales = np.array([np.broadcast_to(error_scale(name, result), values.shape[1:]) for name in names])
+        half = np.where(np.isfinite(values), half * scales, 0.0)
+        low = zip([f"{name}_low" for name in names], values - half, strict=True)
+        return {**dict(low), **dict(zip([f"{name}_high" for name in names], values + half, strict=True))}
 
     def _refusal(self, values: Mapping[str, Floats], row: int, reason: str) -> OutsideError:
         words = ""
@@ -301,13 +334,16 @@ class NeuralTable:
         )
         return OutsideError(message, row, reason)
 
-    def _responses(self, motions: Motions, steady: Mapping[str, Floats]) -> Responses:
-        curves = self.curves.curves(motions.heads, motions.tails, motions.motion)
-        sense = motions.heads.sense
-        twist = twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], sense)
-        speed = net_speeds(twist, curves["lag"], curves["memory"])
-        none = np.zeros(len(sense), dtype=bool)
-        return Responses(**curves, net_speed=speed, failed=none, stepped=none)
+
+def _joined(parts: Sequence[tuple[Any, ...]]) -> list[Any]:
+    """Join parts of M robots, each with its rows first, in the order of the rows."""
+    order = np.argsort(np.concatenate([rows for rows, *_ in parts]))
+    return [np.concatenate(own)[order] for own in list(zip(*parts, strict=True))[1:]]
+
+
+def _twists(motions: Motions) -> Floats:
+    steady = motions.steady
+    return twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], motions.heads.sense)
 
 
 def _medians(errors: Mapping[str, Mapping[str, float]]) -> str:
@@ -316,11 +352,6 @@ def _medians(errors: Mapping[str, Mapping[str, float]]) -> str:
     return ", ".join(
         f"{what} {100 * errors[name]['median']:.2g} %" for name, what in shown.items() if name in errors
     )
-
-
-def _without_effects(values: Mapping[str, Floats]) -> bool:
-    """Return whether no robot has an effect."""
-    return not any(size.any() for name, size in values.items() if name not in ROBOT)
 
 
 def _check_flips(values: Mapping[str, Floats]) -> None:
@@ -338,20 +369,14 @@ def _check_flips(values: Mapping[str, Floats]) -> None:
         )
 
 
-def steady_outputs(motions: Motions, tails: WrenchTable) -> dict[str, Floats]:
-    """Return STEADY_OUTPUTS of motions."""
-    values = tails.outputs(motions.heads, motions.motion, tails.quick_gap(motions.tails, motions.inputs))
-    return dict(zip(STEADY_OUTPUTS, values, strict=True))
-
-
-def _checked_dwells(dwells: Floats) -> Floats:
+def _checked_dwells(given: Any) -> tuple[Floats, str]:
+    """Return dwells (M,), and what is wrong with them in words."""
     try:
-        dwells = np.asarray(dwells, dtype=float)
+        dwells = np.asarray(given, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(f"{DWELL} has a value that is no number; give numbers") from None
-    for value in dwells[~(np.isfinite(dwells) & (dwells >= SHORTEST))][:1]:
-        raise InputError(f"{DWELL} = {value:g}; give a dwell from {SHORTEST:g} on")
-    return dwells
+        return np.empty(0), f"{DWELL} has a value that is no number; give numbers"
+    wrong = dwells[~(np.isfinite(dwells) & (dwells >= _MIN_DWELL))]
+    return dwells, f"{DWELL} = {wrong.flat[0]:g}; give a dwell from {DWELLS[0]:g} on" if wrong.size else ""
 
 
 def table_content(lookup: NeuralTable) -> dict[str, Any]:
@@ -361,7 +386,7 @@ def table_content(lookup: NeuralTable) -> dict[str, Any]:
         "gap": _stored(lookup.tails.gap),
         "curves": [_stored(network) for network in lookup.curves.networks],
         "bases": {name: {"mean": b.mean, "vectors": b.vectors} for name, b in lookup.curves.bases.items()},
-        "support": [None if support is None else vars(support) for support in lookup.support],
+        "support": [None if support is None else _fields(support) for support in lookup.support],
         "intervals": None if lookup.intervals is None else _widths(lookup.intervals),
         "ranges": {name: list(ends) for name, ends in lookup.ranges.items()},
         "errors": lookup.errors,
@@ -378,7 +403,11 @@ def table_content(lookup: NeuralTable) -> dict[str, Any]:
 
 
 def _widths(intervals: Intervals) -> dict[str, Any]:
-    return {name: _plain(value) for name, value in vars(intervals).items()}
+    return {name: _plain(value) for name, value in _fields(intervals).items()}
+
+
+def _fields(part: Support | Intervals) -> dict[str, Any]:
+    return {field.name: getattr(part, field.name) for field in fields(part)}
 
 
 def _stored(network: Ensemble) -> dict[str, Any]:

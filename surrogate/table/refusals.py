@@ -20,8 +20,7 @@ from sim.io.units import from_si
 from sim.model.groups import MOST_TAILS
 from sim.model.robot import Robot
 from surrogate.interface import LookupTable, OutsideError
-from surrogate.table.lookup import NeuralTable
-from surrogate.table.quick_query import OUTSIDE
+from surrogate.table.lookup import OUTSIDE, NeuralTable
 
 _FACTOR, _STEPS = 1000.0, 600  # values up to this many times as large or as small are asked about, on either side
 _REMEDY = "change the robot, or simulate it (softflagella steady, softflagella surrogate robot)"

@@ -17,7 +17,7 @@ Left out: robots with one tail, and robots whose left and right turns differ. Un
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -28,7 +28,7 @@ from sim.arrays import Floats
 from sim.model.response import BEFORE, DWELLS, at_equal_dwells
 from surrogate.networks.ensemble import Ensemble
 from surrogate.wrench.heads import Heads
-from surrogate.wrench.tails import Tails, tail_inputs
+from surrogate.wrench.tails import Tails
 
 SHAPES = {
     "lag": (len(DWELLS), 3),
@@ -55,16 +55,20 @@ class ResponseTable:
     networks: tuple[Ensemble, ...]  # one for each of PARTS
     bases: Mapping[str, Basis]
 
-    def curves(self, heads: Heads, tails: Tails, motion: Floats) -> dict[str, Floats]:
+    def curves(self, heads: Heads, tails: Tails, motion: Floats, inputs: Floats) -> dict[str, Floats]:
         """Return lag, memory, rest and spread, each (M, …, 3) as in SHAPES, in l, l, rad, for a positive motor."""
         speeds, curves = curve_speeds(heads, motion), {}
-        for name, components in self._components(tails, motion).items():
+        for name, components in self._components(tails, inputs).items():
             curve = self.bases[name].mean + components @ self.bases[name].vectors
             if name == "spread":  # its logarithm was learned, of robots with two tails
                 curve = np.exp(np.where((tails.number == 2)[:, None], np.minimum(curve, 0.0), -np.inf))
             curves[name] = curve.reshape(-1, *SHAPES[name]) * along_axes(speeds, SHAPES[name])
         curves["spread"] = np.abs(curves["spread"])
         return curves
+
+    def lags(self, heads: Heads, tails: Tails, motion: Floats, inputs: Floats, dwells: Floats) -> Floats:
+        """Return lags at equal dwells (M,), for a positive motor, (M, 3); NaN where none was learned."""
+        return lags_at_equal_dwells(self.networks[:2], self.equal_dwells, heads, tails, motion, inputs, dwells)
 
     @cached_property
     def equal_dwells(self) -> Basis:
@@ -73,11 +77,11 @@ class ResponseTable:
         mean = lag.mean + memory_at_equal_dwells(memory.mean[None])[0]
         return Basis(mean, np.concatenate([lag.vectors, memory_at_equal_dwells(memory.vectors)]))
 
-    def _components(self, tails: Tails, motion: Floats) -> dict[str, Floats]:
+    def _components(self, tails: Tails, inputs: Floats) -> dict[str, Floats]:
         """Return the components of each kind of curve, (M, C)."""
-        inputs, components = response_inputs(tails, motion), {}
+        inputs, components = response_inputs(tails, inputs), {}
         for names, network in zip(PARTS, self.networks, strict=True):
-            answer, first = network.packed.evaluate(inputs), 0
+            answer, first = network(inputs), 0
             for name in names:
                 end = first + len(self.bases[name].vectors)
                 components[name], first = answer[:, first:end], end
@@ -89,10 +93,10 @@ def memory_at_equal_dwells(flat: Floats) -> Floats:
     return at_equal_dwells(flat.reshape(-1, *SHAPES["memory"])).reshape(len(flat), -1)
 
 
-def response_inputs(tails: Tails, motion: Floats) -> Floats:
-    """Return inputs of the network, (M, 15)."""
+def response_inputs(tails: Tails, inputs: Floats) -> Floats:
+    """Return inputs of the network, (M, 15), from `surrogate.wrench.tails.INPUTS` (M, 7)."""
     two = (tails.number == 2).astype(float)
-    return np.column_stack([tail_inputs(tails, motion), tails.head[:, _OF_HEAD], np.log(tails.number), two])
+    return np.column_stack([inputs, tails.head[:, _OF_HEAD], np.log(tails.number), two])
 
 
 def curve_speeds(heads: Heads, motion: Floats) -> Floats:
@@ -107,16 +111,43 @@ def along_axes(speeds: Floats, shape: tuple[int, ...]) -> Floats:
     return speeds.reshape(len(speeds), *[1] * (len(shape) - 1), 3)
 
 
+def lags_at_equal_dwells(
+    networks: Sequence[Ensemble],
+    basis: Basis,
+    heads: Heads,
+    tails: Tails,
+    motion: Floats,
+    inputs: Floats,
+    dwells: Floats,
+) -> Floats:
+    """Return lags at equal dwells, one a robot (M,), for a positive motor, (M, 3).
+
+    Args:
+        networks: of lag and memory, the memory without or with what else its network gives.
+        basis: of the lag, then of the memory where the dwell before is as long.
+        heads, tails, motion, inputs: M robots, their motions (M, 5), and `surrogate.wrench.tails.INPUTS` (M, 7).
+        dwells: (M,).
+    """
+    inputs = response_inputs(tails, inputs)
+    components = np.concatenate([network(inputs) for network in networks], 1)[:, : len(basis.vectors)]
+    curves = (basis.mean + components @ basis.vectors).reshape(-1, *SHAPES["lag"])
+    return between_dwells(curves, dwells) * curve_speeds(heads, motion)
+
+
+_KNOTS = np.log(DWELLS)
+_NEAR = np.arange(4)
+_APART = [
+    np.prod([_KNOTS[i + k] - _KNOTS[i + j] for j in range(4) if j != k])
+    for i in range(len(DWELLS) - 3)
+    for k in range(4)
+]
+
+
 def between_dwells(curves: Floats, dwells: Floats) -> Floats:
     """Interpolate curves (M, D, 3), one dwell a row (M,): cubic in ln T̄ through four knots, then constant."""
-    knots = np.log(DWELLS)
     place = np.log(np.minimum(dwells, DWELLS[-1]))
-    first = np.clip(np.searchsorted(knots, place) - 2, 0, len(knots) - 4)
-    rows, total = np.arange(len(dwells)), np.zeros((len(dwells), 3))
-    for i in range(4):
-        weight = np.ones(len(dwells))
-        for j in range(4):
-            if j != i:
-                weight *= (place - knots[first + j]) / (knots[first + i] - knots[first + j])
-        total += weight[:, None] * curves[rows, first + i]
-    return total
+    first = np.clip(np.searchsorted(_KNOTS, place) - 2, 0, len(_KNOTS) - 4)
+    near = first[:, None] + _NEAR
+    a, b, c, d = (place[:, None] - _KNOTS[near]).T
+    weights = np.array([b * c * d, a * c * d, a * b * d, a * b * c]).T / np.reshape(_APART, (-1, 4))[first]
+    return np.einsum("mk,mka->ma", weights, curves[np.arange(len(near))[:, None], near])

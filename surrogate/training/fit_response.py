@@ -23,7 +23,7 @@ from surrogate.table.response_table import (
     response_inputs,
 )
 from surrogate.wrench.heads import Heads
-from surrogate.wrench.tails import Tails
+from surrogate.wrench.tails import Tails, tail_inputs
 
 COMPONENTS = {"lag": 32, "memory": 32, "rest": 32, "spread": 8}
 SETTINGS = Settings(width=48, depth=2, members=2, epochs=200, iterations=150)
@@ -55,7 +55,7 @@ def fit_part(
     work: TrainingContext,
 ) -> tuple[Ensemble, dict[str, Basis]]:
     """Fit the network of some curves, one of PARTS, and their bases; see `fit_response`."""
-    inputs, speeds = response_inputs(tails, motion), curve_speeds(heads, motion)
+    inputs, speeds = response_inputs(tails, tail_inputs(tails, motion)), curve_speeds(heads, motion)
     known = np.all([np.isfinite(curves[n]).reshape(len(inputs), -1).all(1) for n in names], axis=0)
     if "spread" in names and (known & (tails.number == 2)).any():
         known &= tails.number == 2

@@ -29,8 +29,6 @@ from surrogate.table.wrench_table import (
     CLASSES,
     INPUT_COUNTS,
     WrenchTable,
-    clamp_distance,
-    gap_inputs,
     motion_sensitivity,
     network_index,
 )
@@ -42,6 +40,7 @@ from surrogate.wrench.tails import (
     Tails,
     network_inputs,
     straight_wrench,
+    tail_inputs,
     wrench_slopes,
 )
 
@@ -156,8 +155,8 @@ def _new(settings: Settings, inputs: Floats, outputs: int) -> TrainableEnsemble:
 
 
 def _learn_gap(rows: WrenchSamples, settings: Settings, work: TrainingContext) -> Ensemble:
-    inputs = gap_inputs(rows.tails, rows.motion)
-    share = rows.gap * 2 * rows.tails.radius / clamp_distance(rows.tails)
+    inputs = np.column_stack([tail_inputs(rows.tails, rows.motion), np.log(rows.tails.number)])
+    share = rows.gap * rows.tails.radius / (rows.tails.offset * np.sin(np.pi / rows.tails.number))
     network = _new(settings, inputs, outputs=1)
     network.mean.fill_(0.5)
     network.spread.fill_(0.3)

@@ -13,6 +13,7 @@ import numpy as np
 from surrogate.one_robot.tabulate import TOLERANCE
 from surrogate.table.curve_errors import KINDS, CurveErrors
 from surrogate.table.lookup import NeuralTable
+from surrogate.table.outside import INSIDE
 from surrogate.table.response_table import SHAPES, along_axes, curve_speeds
 from surrogate.training.simulated import SimulatedRobots, draw_robots, simulate_robots
 
@@ -27,8 +28,8 @@ def held_out_curve_errors(lookup: NeuralTable, flips: SimulatedRobots) -> CurveE
         lookup: the table.
         flips: held-out robots with curves.
     """
-    motions = lookup.motions(flips.robots, flag=True)
-    known = np.array([not reason for reason in motions.reason]) & (flips.motion["tail_gap"] >= 1)
+    motions = lookup.solve(flips.robots)
+    known = (motions.outside == INSIDE) & (flips.motion["tail_gap"] >= 1)
     if known.sum() < _FEWEST_FLIPS:
         return None
     response = lookup.response(flips.robots, flag=True)
@@ -56,7 +57,7 @@ def with_response_errors(
     robots = draw_robots(_DRAWN * count, seed, wide=False)
     several = robots["N"] > 1
     robots = {name: values[several] for name, values in robots.items()}
-    inside = [row for row, reason in enumerate(lookup.motions(robots, flag=True).reason) if not reason][:count]
+    inside = np.flatnonzero(lookup.solve(robots).outside == INSIDE)[:count]
     chosen = {name: values[inside] for name, values in robots.items()}
     flips = simulate_robots(chosen, curves=True, tolerance=TOLERANCE, title=title)
     source = {"robots": len(flips), "seed": seed, "tolerance": TOLERANCE}

@@ -22,14 +22,13 @@ from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.io.provenance import fingerprint, provenance
 from surrogate.input_ranges import ROBOT
-from surrogate.loops import compile_once
 from surrogate.networks.checkpoints import TrainingContext, device_named
 from surrogate.networks.ensemble import Ensemble
 from surrogate.networks.training_loop import Settings
-from surrogate.table.compiled_query import BRANCHES
 from surrogate.table.errors import curve_errors, relative_errors, summary
 from surrogate.table.intervals import Intervals
-from surrogate.table.lookup import NeuralTable, steady_outputs
+from surrogate.table.lookup import NeuralTable
+from surrogate.table.outside import INSIDE, MAX_YAW_SHARE
 from surrogate.table.response_table import PARTS, Basis
 from surrogate.table.support import Support
 from surrogate.table.wrench_table import CLASSES, INPUT_COUNTS, network_index
@@ -146,7 +145,6 @@ def learn(
         source: more provenance.
         work: device, progress bars, and where states are kept.
     """
-    compile_once()
     wrench_settings, response_settings = settings or Settings(), curve_settings or SETTINGS
     if flips_held_out is None:
         tenth = np.arange(len(flipped)) % 10 == 9
@@ -206,7 +204,6 @@ def learn_tails_again(
         source: more provenance.
         work: device, progress bars, and where states are kept.
     """
-    compile_once()
     wrench_settings, rows = settings or Settings(), _learnable(learned)
     created = _created(wrench_settings, single_settings, lookup.provenance["config"]["curves"], work)
     counts = {"train": len(rows.motion), "widths": len(width_rows), "held_out": len(held_out)}
@@ -262,7 +259,7 @@ def _judged(
 ) -> NeuralTable:
     """Add intervals and held-out errors to a table."""
     lookup = _with_intervals(lookup, width_rows, held_out)
-    flips = flips.at(np.abs(flips.motion["omega_yr_bar"]) < BRANCHES * np.abs(flips.motion["omega_t_bar"]))
+    flips = flips.at(np.abs(flips.motion["omega_yr_bar"]) < MAX_YAW_SHARE * np.abs(flips.motion["omega_t_bar"]))
     response = lookup.response(flips.robots, flag=True)
     truth = {**flips.motion, **flips.curves}
     report = summary(curve_errors(response, truth), flips.motion["tail_gap"] >= 1)
@@ -289,12 +286,12 @@ def _with_intervals(lookup: NeuralTable, width_rows: SimulatedRobots, held_out: 
 
 def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[Floats, dict[str, Floats], Flags, Flags]:
     """Return features, relative errors and couples of rows inside the domain, and which those are."""
-    motions = lookup.motions(rows.robots, flag=True)
-    inside = np.array([not reason for reason in motions.reason])
+    motions = lookup.solve(rows.robots)
+    inside = motions.outside == INSIDE
     if inside.sum() < _FEWEST_INSIDE:  # a table of few rows has a domain that holds hardly any others: all count
         inside[:] = True
     truth = with_radius(rows.motion)
-    errors = relative_errors(steady_outputs(motions, lookup.tails), truth)
+    errors = relative_errors(motions.steady, truth)
     return (
         lookup.width_features(motions)[inside],
         {name: error[inside] for name, error in errors.items()},

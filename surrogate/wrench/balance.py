@@ -1,205 +1,259 @@
-"""Motions in balance as compiled loops, one robot at a time.
+"""Motions in balance, as compiled loops.
 
 The equations are those of `surrogate.wrench.heads` and `surrogate.wrench.tails`. They are solved by Broyden's
-method. Its first derivative holds the network's numbers y fixed, so it needs no evaluation of the network; five or
-six evaluations are enough. Units: l, μ0 l⁴/EI, EI/l².
+method. Its first derivative holds the network's numbers y fixed, so it needs no evaluation of the network; six or
+seven evaluations are enough. The robots that have not converged go on together, a block at a time, since a network
+takes many robots more quickly than one. Units: l, μ0 l⁴/EI, EI/l².
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from sim.arrays import Floats, Integers
-from sim.compiling import compiled
-from sim.linear.dense import solve_dense
-from sim.object_code import COUNT, FLOATS, array_at, kept
-from surrogate.networks.compiled import evaluate, room_of
-from surrogate.wrench.heads import HEAD_NUMBERS, RESISTANCE
-from surrogate.wrench.tails import (
-    SINGLE_INPUTS,
-    inputs_of_single,
-    inputs_of_tail,
-    linear_thrust,
-    linear_torque,
-    wrench_terms,
-)
+from sim.arrays import Flags, Floats
+from sim.mechanics.drag import head_resistance, tail_coefficients
+from surrogate.networks.loops import BLOCK, Layers, evaluate, inner, kernel
+from surrogate.wrench import tails
+from surrogate.wrench.heads import HEAD_LENGTH, HEAD_NUMBERS, RESISTANCE, ROBOT_NUMBERS, SENSE
+from surrogate.wrench.tails import SINGLE_INPUTS
 
 STEPS, CORRECTION = 60, 2e-12  # of Broyden's method; the correction is relative
 ACCEPTED = 1e-9  # the last of all corrections, where rounding keeps them above CORRECTION
-DIFFERENCE, LEAST_SHARE = 1e-6, 1e-3  # steps of finite differences, relative
+DIFFERENCE, MIN_SHARE = 1e-6, 1e-3  # steps of finite differences, relative
 FIRST_SPIN = 0.6  # ω_t/ω in the first guess
-LONGEST = 0.5  # largest relative change of ω_t in one step
-SINGLE = len(SINGLE_INPUTS)
-_VECTORS = 49  # numbers for the vectors of one robot, before the room of the network
-LEFT_OVER, FOUND = 0, 1  # what a solution ends with
-MATRICES = 4  # 4×4 matrices that a solution works in
+MAX_TURN = 0.5  # largest relative change of ω_t in one step
+_CHUNK = 1024  # robots whose states are in use at a time
+_SINGLE = len(SINGLE_INPUTS)
+_inputs_of_tail, _inputs_of_single = inner(tails.inputs_of_tail), inner(tails.inputs_of_single)
+_inputs_of_head, _wrench_terms = inner(tails.inputs_of_head), inner(tails.wrench_terms)
+_thrust, _torque = inner(tails.linear_thrust), inner(tails.linear_torque)
+_head_resistance, _tail_coefficients = inner(head_resistance), inner(tail_coefficients)
 
 
-def solution_room(sizes: Integers) -> int:
-    """Return how many numbers `solve` works in with a network."""
-    return _VECTORS + room_of(sizes)
+@kernel
+def robots_of_groups(groups: Floats) -> Floats:
+    """Return robots without effects as `surrogate.wrench.heads.pack_robots` packs them, (M, 39).
+
+    Args:
+        groups: (M, 9), in the order of `surrogate.input_ranges.ROBOT`.
+    """
+    robots = np.empty((len(groups), ROBOT_NUMBERS))
+    for row in range(len(groups)):
+        C_t, C_r, C_yr, l_over_R, L_over_R, l_over_r0, speed, number, a_over_R = groups[row]
+        radius, robot = 1 / l_over_R, robots[row]
+        length, offset = L_over_R * radius, a_over_R * radius
+        parallel, perp = _tail_coefficients(l_over_r0)
+        resistance, tail = robot[RESISTANCE:HEAD_LENGTH], robot[HEAD_NUMBERS:]
+        robot[0], robot[1] = abs(speed), 1.0
+        for i, numbers in enumerate(_head_resistance(C_t, C_r, C_yr, radius, length)):
+            for j, value in enumerate(numbers):
+                resistance[5 * i + j] = value
+        robot[HEAD_LENGTH], robot[SENSE] = length, 1.0 if speed > 0 else -1.0
+        tail[0], tail[1], tail[2], tail[3], tail[4], tail[5] = (
+            perp,
+            parallel,
+            offset,
+            1 / l_over_r0,
+            number,
+            resistance[18],
+        )
+        around = _inputs_of_head(
+            resistance[0], resistance[6], resistance[12], resistance[18], resistance[2], resistance[3],
+            resistance[19], resistance[14], length, 1.0, number * perp, offset,
+        )  # fmt: skip
+        for i, value in enumerate(around):
+            tail[6 + i] = value
+    return robots
 
 
-def inverses_of(matrices: Floats) -> Floats:
-    """Invert matrices (M, n, n); numbers that are not finite where there is no inverse."""
-    size = matrices.shape[1]
-    inverses = np.empty_like(matrices, order="C")
-    inverse_rows(len(matrices), size, np.array(matrices, order="C"), inverses)
-    return inverses
-
-
-@kept(COUNT, COUNT, FLOATS, FLOATS)
-def inverse_rows(count: int, size: int, matrices: Any, inverses: Any) -> None:
-    """Write the inverses of matrices (M, n, n), which are overwritten."""
-    matrix, inverse = array_at(matrices, (count, size, size)), array_at(inverses, (count, size, size))
-    for row in range(count):
-        for i in range(size):
-            for j in range(size):
-                inverse[row, i, j] = 1.0 if i == j else 0.0
-        solve_dense(matrix[row], inverse[row])
-
-
-@compiled
+@inner
 def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
     """Write `surrogate.wrench.tails.INPUTS` of one robot to x (7,)."""
     beta = np.arctan2(motion[0], motion[2])
-    x[0], x[1], x[2], x[3], x[4], x[5], x[6] = inputs_of_tail(
-        tail[0], tail[2], tail[3], tail[4], tail[5], motion, beta
-    )
+    for i, value in enumerate(_inputs_of_tail(tail[0], tail[2], tail[3], tail[4], tail[5], motion, beta)):
+        x[i] = value
 
 
-@compiled
+@inner
 def network_inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
     """Write the inputs of the network of one robot to x: SINGLE_INPUTS to x (13,), else INPUTS to x (7,)."""
-    if len(x) == SINGLE:
-        x[0], x[1], x[2], x[3] = inputs_of_single(tail[0], tail[2], tail[3], tail[5], motion[4])
-        for i in range(4, SINGLE):
-            x[i] = tail[i + 2]
+    if len(x) == _SINGLE:
+        x[0], x[1], x[2], x[3] = _inputs_of_single(tail[0], tail[2], tail[3], tail[5], motion[4])
+        x[4:] = tail[6:]
     else:
         inputs_at(tail, motion, x)
 
 
-@compiled
-def _unbalanced(robot: Floats, motion: Floats, y: Floats, residual: Floats) -> None:
-    """Write `surrogate.wrench.heads.unbalanced` for numbers y of the tails to residual (4,)."""
+@inner
+def _residual(robot: Floats, motion: Floats, y: Floats, left: Floats) -> None:
+    """Write what is left of the balance of forces for numbers y of the tails to left (4,)."""
     tail = robot[HEAD_NUMBERS:]
-    side, along, turn, force, thrust, torque, squared = wrench_terms(tail[0], tail[1], tail[2], tail[4], motion)
-    residual[0] = side + force * y[0]
-    residual[1] = along + thrust * (y[1] + squared * y[4])
-    residual[2] = turn + force * y[2]
-    residual[3] = torque * (y[3] + squared * y[5])
+    side, along, turn, force, thrust, torque, squared = _wrench_terms(tail[0], tail[1], tail[2], tail[4], motion)
+    left[0] = side + force * y[0]
+    left[1] = along + thrust * (y[1] + squared * y[4])
+    left[2] = turn + force * y[2]
+    left[3] = torque * (y[3] + squared * y[5])
     for i in range(4):
         for j in range(5):
-            residual[i] -= robot[RESISTANCE + 5 * i + j] * motion[j]
+            left[i] -= robot[RESISTANCE + 5 * i + j] * motion[j]
 
 
-@compiled
-def first_guess(robot: Floats, motion: Floats, matrices: Floats) -> None:
+@inner
+def _eliminate(rows: Floats) -> None:
+    """Turn the left square of rows (n, m) into the identity, by Gauss and Jordan's method."""
+    count = len(rows)
+    for i in range(count):
+        pivot = i
+        for k in range(i + 1, count):
+            if abs(rows[k, i]) > abs(rows[pivot, i]):
+                pivot = k
+        for j in range(rows.shape[1]):
+            rows[i, j], rows[pivot, j] = rows[pivot, j], rows[i, j]
+        scale = 1 / rows[i, i]
+        for j in range(rows.shape[1]):
+            rows[i, j] *= scale
+        for k in range(count):
+            factor = rows[k, i]
+            if k != i:
+                for j in range(rows.shape[1]):
+                    rows[k, j] -= factor * rows[i, j]
+
+
+@kernel
+def inverses_of(matrices: Floats) -> Floats:
+    """Invert matrices (M, n, n); numbers that are not finite where there is no inverse."""
+    count, size = matrices.shape[:2]
+    inverses = np.empty((count, size, size))
+    for row in range(count):
+        rows = np.concatenate((matrices[row], np.eye(size)), 1)
+        _eliminate(rows)
+        inverses[row] = rows[:, size:]
+    return inverses
+
+
+@inner
+def _first_guess(robot: Floats, motion: Floats, rows: Floats) -> None:
     """Write the motion with the torque and thrust of linear theory and the side forces of straight tails."""
     speed, gain, tail = robot[0], robot[1], robot[HEAD_NUMBERS:]
     resistance = robot[RESISTANCE : RESISTANCE + 20]  # four rows of five
     perp, parallel, a, number = tail[0], tail[1], tail[2], tail[4]
-    spin = FIRST_SPIN * speed
+    spin, own, disc = FIRST_SPIN * speed, resistance[18], resistance[19]
     for _ in range(3):
-        torque = number * perp * a**2 * linear_torque(perp * spin)
-        spin = speed * resistance[18] / (resistance[18] + gain * (torque + resistance[19]))
-    head_spin = (spin - speed) / gain
-    matrix, push = matrices[0, :3, :3], matrices[1, :3, :1]
+        spin = speed * own / (own + gain * (number * perp * a**2 * _torque(perp * spin) + disc))
+    motion[3], motion[4] = (spin - speed) / gain, spin
+    equations = rows[:3, :4]
     for i in range(3):
         for j in range(3):
-            matrix[i, j] = resistance[5 * i + j]
-        push[i, 0] = -resistance[5 * i + 3] * head_spin - resistance[5 * i + 4] * spin
-    matrix[0, 0] += number * perp
-    matrix[1, 1] += number * parallel
-    matrix[2, 2] += number * perp / 3
-    matrix[0, 2] -= number * perp / 2
-    matrix[2, 0] -= number * perp / 2
-    push[1, 0] += number * (perp - parallel) * spin * a**2 * linear_thrust(perp * spin)
-    solve_dense(matrix, push)
-    for i in range(3):
-        motion[i] = push[i, 0]
-    motion[3], motion[4] = head_spin, spin
+            equations[i, j] = resistance[5 * i + j]
+        equations[i, 3] = -resistance[5 * i + 3] * motion[3] - resistance[5 * i + 4] * spin
+    equations[0, 0] += number * perp
+    equations[1, 1] += number * parallel
+    equations[2, 2] += number * perp / 3
+    equations[0, 2] -= number * perp / 2
+    equations[2, 0] -= number * perp / 2
+    equations[1, 3] += number * (perp - parallel) * spin * a**2 * _thrust(perp * spin)
+    _eliminate(equations)
+    motion[:3] = equations[:, 3]
 
 
-@compiled
-def solve(numbers: Floats, sizes: Integers, robot: Floats, motion: Floats, room: Floats, matrices: Floats) -> bool:
-    """Write the motion (5,) of one robot (39,); return whether the method converged.
-
-    Args:
-        numbers, sizes: network of the tails, see `surrogate.networks.compiled.Packed`.
-        room: to work in, see `solution_room`.
-        matrices: to work in, (MATRICES, 4, 4).
-    """
-    speed, gain, tail = robot[0], robot[1], robot[HEAD_NUMBERS:]
-    x, y, residual, before = room[: sizes[1]], room[14:20], room[20:24], room[24:28]
-    step, change, moved, work = room[28:32], room[32:36], room[36:41], room[_VECTORS:]
-    slope, inverse = matrices[2], matrices[3]
-    first_guess(robot, motion, matrices)
-    network_inputs_at(tail, motion, x)
-    evaluate(numbers, sizes, x, y, work)
-    _unbalanced(robot, motion, y, residual)
-    largest = 0.0
+@inner
+def _first_inverse(robot: Floats, motion: Floats, y: Floats, left: Floats, inverse: Floats, room: Floats) -> None:
+    """Write the inverse of the derivative of the balance with y fixed, by differences; `room` is (6, 8)."""
+    rows, moved, after, largest = room[:4], room[4, :5], room[5, :4], 0.0
     for j in range(4):
         largest = max(largest, abs(motion[j]))
     for j in range(4):
-        width = DIFFERENCE * (abs(motion[j]) + LEAST_SHARE * largest)
-        for i in range(5):
-            moved[i] = motion[i]
+        width = DIFFERENCE * (abs(motion[j]) + MIN_SHARE * largest)
+        moved[:] = motion
         moved[j] += width
-        moved[4] = speed + gain * moved[3]
-        _unbalanced(robot, moved, y, before)
+        moved[4] = robot[0] + robot[1] * moved[3]
+        _residual(robot, moved, y, after)
         for i in range(4):
-            slope[i, j] = (before[i] - residual[i]) / width
-            inverse[i, j] = 1.0 if i == j else 0.0
-    solve_dense(slope, inverse)
-    size = np.inf
-    for _ in range(STEPS):
-        share = 1.0
-        for i in range(4):
-            step[i] = 0.0
-            for j in range(4):
-                step[i] -= inverse[i, j] * residual[j]
-        turned = abs(gain * step[3]) / motion[4]
-        if turned > LONGEST:
-            share = LONGEST / turned
-        for i in range(4):
-            step[i] *= share
-            motion[i] += step[i]
-            before[i] = residual[i]
-        motion[4] = speed + gain * motion[3]
-        if not motion[4] > 0:
-            return False
-        size = max(abs(step[0]), abs(step[1])) / (np.hypot(motion[0], motion[1]) + abs(motion[2]))
-        size = max(size, max(abs(step[2] / motion[2]), abs(step[3] / motion[3])))
-        if size < CORRECTION:
-            return True
-        if not np.isfinite(size):
-            return False
-        network_inputs_at(tail, motion, x)
-        evaluate(numbers, sizes, x, y, work)
-        _unbalanced(robot, motion, y, residual)
-        for i in range(4):
-            change[i] = residual[i] - before[i]
-        _update(inverse, step, change, room[41:49])
-    return size < ACCEPTED
+            rows[i, j] = (after[i] - left[i]) / width
+            rows[i, 4 + j] = 1.0 if i == j else 0.0
+    _eliminate(rows)
+    inverse[:] = rows[:, 4:]
 
 
-@compiled
-def _update(inverse: Floats, step: Floats, change: Floats, room: Floats) -> None:
-    """Update the inverse of the derivative after a step that changed the balance so (Broyden's good update)."""
-    predicted, along = room[:4], room[4:8]
+@inner
+def _update(inverse: Floats, step: Floats, before: Floats, left: Floats, room: Floats) -> None:
+    """Update the inverse of the derivative after a step (Broyden's good update); `room` is (6, 8)."""
+    change, predicted, along, size = room[0], room[1], room[2], 0.0
     for i in range(4):
-        predicted[i] = along[i] = 0.0
+        change[i], predicted[i], along[i] = left[i] - before[i], 0.0, 0.0
     for i in range(4):
         for j in range(4):
             predicted[i] += inverse[i, j] * change[j]
             along[j] += step[i] * inverse[i, j]
-    size = 0.0
     for i in range(4):
         size += along[i] * change[i]
     if size != 0:
         for i in range(4):
             for j in range(4):
                 inverse[i, j] += (step[i] - predicted[i]) * along[j] / size
+
+
+@inner
+def _take_step(robot: Floats, motion: Floats, left: Floats, inverse: Floats, step: Floats) -> float:
+    """Take a step, and return the size of the correction; NaN if the tails no longer turn with the motor."""
+    for i in range(4):
+        step[i] = 0.0
+        for j in range(4):
+            step[i] -= inverse[i, j] * left[j]
+    turned = abs(robot[1] * step[3]) / motion[4]
+    share = MAX_TURN / turned if turned > MAX_TURN else 1.0
+    for i in range(4):
+        step[i] *= share
+        motion[i] += step[i]
+    motion[4] = robot[0] + robot[1] * motion[3]
+    size = max(abs(step[0]), abs(step[1])) / (np.hypot(motion[0], motion[1]) + abs(motion[2]))
+    size = max(size, max(abs(step[2] / motion[2]), abs(step[3] / motion[3])))
+    return size if motion[4] > 0 else np.nan
+
+
+@inner
+def _solve(network: Layers, robots: Floats, motion: Floats, found: Flags) -> None:
+    """Write the motions of robots, and which were found."""
+    count, inputs = len(robots), network.first.shape[2]
+    left, step, inverse = np.empty((count, 4)), np.empty((count, 4)), np.empty((count, 4, 4))
+    x, y, room, before = np.empty((BLOCK, inputs)), np.empty((BLOCK, 6)), np.empty((6, 8)), np.empty(4)
+    going = np.arange(count)
+    for row in range(count):
+        _first_guess(robots[row], motion[row], room)
+    for turn in range(STEPS):
+        remaining = 0
+        for begin in range(0, len(going), BLOCK):
+            block = going[begin : begin + BLOCK]  # robots that go on are put in front, so not before they are read
+            for k, row in enumerate(block):
+                network_inputs_at(robots[row, HEAD_NUMBERS:], motion[row], x[k])
+            evaluate(network, x[: len(block)], y[: len(block)])
+            for k, row in enumerate(block):
+                before[:] = left[row]
+                _residual(robots[row], motion[row], y[k], left[row])
+                if turn == 0:
+                    _first_inverse(robots[row], motion[row], y[k], left[row], inverse[row], room)
+                else:
+                    _update(inverse[row], step[row], before, left[row], room)
+                size = _take_step(robots[row], motion[row], left[row], inverse[row], step[row])
+                found[row] = size < ACCEPTED
+                if size >= CORRECTION and np.isfinite(size):
+                    going[remaining] = row
+                    remaining += 1
+        going = going[:remaining]
+        if remaining == 0:
+            break
+
+
+@inner
+def solve(network: Layers, robots: Floats) -> tuple[Floats, Flags]:
+    """Return (v_x, v_z, ω_yr, ω_h, ω_t) for a positive motor, (M, 5), and which were found, (M,).
+
+    Args:
+        network: of the tails.
+        robots: (M, 39), see `surrogate.wrench.heads.pack_robots`.
+    """
+    motion, found = np.empty((len(robots), 5)), np.empty(len(robots), dtype=np.bool_)
+    for begin in range(0, len(robots), _CHUNK):
+        end = begin + _CHUNK
+        _solve(network, robots[begin:end], motion[begin:end], found[begin:end])
+    return motion, found

@@ -14,7 +14,7 @@ is found. Units: l, μ0 l⁴/EI, EI/l².
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,16 +22,15 @@ import numpy as np
 from sim.arrays import Flags, Floats, Integers
 from sim.effects import catalogue
 from sim.io.errors import InputError
-from sim.linear.complex_step import derivative, magnitude, sign
 from sim.model.groups import Groups
 from sim.solve.assembly import assemble
-from surrogate.wrench.tails import TAIL_NUMBERS, Tails, head_inputs, pack_tails, total_wrench
+from surrogate.input_ranges import ROBOT
+from surrogate.wrench.tails import TAIL_NUMBERS, Tails, head_inputs, total_wrench
 
 Numbers = Callable[[Tails, Floats], Floats]  # tails and motion (M, 5) -> y (M, 6) of `surrogate.wrench.tails`
 
 # A robot for the compiled loops: |ω|, gain, resistance (20), L and sense of the head; then the tails, as packed.
 RESISTANCE, HEAD_LENGTH, SENSE, HEAD_NUMBERS = 2, 22, 23, 24
-YAW_COUPLE = RESISTANCE + 14  # that the tails' spin exerts
 ROBOT_NUMBERS = HEAD_NUMBERS + TAIL_NUMBERS
 
 _ON_TAILS = ("tail_sag",)  # local, but on the tails
@@ -52,29 +51,44 @@ class Heads(NamedTuple):
         """Which robots have a couple in yaw from the spin of their tails, (M,)."""
         return np.asarray(self.resistance[:, 2, 4] != 0)
 
-    def at(self, rows: Integers | Flags) -> Heads:
-        """Return the heads of the robots at indices or flags (M',)."""
+    def at(self, rows: Integers | Flags | slice) -> Heads:
+        """Return the heads of the robots at indices, flags or a slice (M',)."""
         return Heads(*[part[rows] for part in self])
 
 
 def pack_robots(heads: Heads, tails: Tails) -> Floats:
     """Return heads and tails for the compiled loops, (M, ROBOT_NUMBERS)."""
-    robots = np.empty((len(heads.speed), ROBOT_NUMBERS))
-    robots[:, 0], robots[:, 1] = heads.speed, heads.gain
-    robots[:, RESISTANCE:HEAD_LENGTH] = heads.resistance.reshape(len(robots), 20)
-    robots[:, HEAD_LENGTH], robots[:, SENSE] = heads.length, heads.sense
-    robots[:, HEAD_NUMBERS:] = pack_tails(tails)
+    resistance = heads.resistance.reshape(-1, 20).T
+    return np.ascontiguousarray(
+        np.vstack(
+            [*heads[:2], resistance, *heads[3:], *tails[:-1], tails.head.T]
+        ).T  # in the order of the constants
+    )
+
+
+def unpack_robots(robots: Floats) -> tuple[Heads, Tails]:
+    """Return heads and tails of packed robots (M, ROBOT_NUMBERS), without copying them."""
+    head, tail = robots[:, :HEAD_NUMBERS].T, robots[:, HEAD_NUMBERS:].T
+    resistance = robots[:, RESISTANCE:HEAD_LENGTH].reshape(-1, 4, 5)
+    return Heads(head[0], head[1], resistance, head[HEAD_LENGTH], head[SENSE]), Tails(*[*tail[:6], tail[6:].T])
+
+
+def packed_robots(columns: Mapping[str, Floats]) -> Floats:
+    """Return robots by column name, each (M,), for the compiled loops, (M, ROBOT_NUMBERS).
+
+    Raises:
+        InputError: an effect changes the tails themselves.
+    """
+    if any(size.any() for name, size in columns.items() if name not in ROBOT):
+        return pack_robots(*heads_and_tails(columns))
+    from surrogate.wrench.balance import robots_of_groups
+
+    robots: Floats = robots_of_groups(np.array([columns[name] for name in ROBOT]).T.copy())
     return robots
 
 
-def heads_and_tails(columns: Mapping[str, Floats], keep: Collection[str] = ()) -> tuple[Heads, Tails]:
+def heads_and_tails(columns: Mapping[str, Floats]) -> tuple[Heads, Tails]:
     """Return heads and tails of robots by column name, each (M,), a_over_R and effects included.
-
-    Columns may carry a derivative (`sim.linear.complex_step`).
-
-    Args:
-        columns: robots.
-        keep: effects to keep even if no robot has them.
 
     Raises:
         InputError: an effect changes the tails themselves.
@@ -82,7 +96,7 @@ def heads_and_tails(columns: Mapping[str, Floats], keep: Collection[str] = ()) -
     sizes = dict(columns)
     count = sizes.pop("N")
     groups = {name: sizes.pop(name) for name in Groups.__dataclass_fields__ if name in sizes}
-    effects = {name: size for name, size in sizes.items() if name in keep or size.any()}
+    effects = {name: size for name, size in sizes.items() if size.any()}
     for name in effects:
         if not needs_no_learning(name):
             raise InputError(
@@ -91,13 +105,13 @@ def heads_and_tails(columns: Mapping[str, Floats], keep: Collection[str] = ()) -
             )
     tails_of_each: Any = count  # a batch of the simulator has one N, formulas take N by row as well
     body = assemble(Groups(**groups, N=tails_of_each, effects=effects))
-    sense = sign(body.omega)
+    sense = np.sign(body.omega)
     mirror = np.where(sense[:, None] < 0, _SENSES, 1.0)
     resistance = np.ascontiguousarray(
         body.resistance.transpose(2, 0, 1) * mirror[:, :4, None] * mirror[:, None, :]
     )
     gain = 1 + body.droop * resistance[:, 3, 3]
-    heads = Heads(magnitude(body.omega), gain, resistance, body.head_length, sense)
+    heads = Heads(np.abs(body.omega), gain, resistance, body.head_length, sense)
     around = head_inputs(resistance, body.head_length, gain, count * body.zeta_perp, body.offset)
     tails = Tails(
         body.zeta_perp, body.zeta_parallel, body.offset, body.tail_radius, count, resistance[:, 3, 3], around
@@ -129,8 +143,3 @@ def straight_resistance(tails: Tails) -> Floats:
     none = np.zeros(len(across))
     rows = [[across, none, -across / 2], [none, along, none], [-across / 2, none, across / 3]]
     return np.stack([np.stack(row, -1) for row in rows], -2)
-
-
-def slope_at(function: Callable[[Floats], Floats], u: Floats) -> Floats:
-    """Return ∂f/∂u (M, 4, 4) at u (M, 4) of a function that takes every row alone."""
-    return np.stack([derivative(function, u, unit) for unit in np.eye(u.shape[1])], -1)

@@ -41,7 +41,6 @@ import numpy as np
 
 from sim.arrays import Flags, Floats, Integers
 from sim.compiling import formula
-from sim.linear.complex_step import angle
 
 INPUTS = ("ln S", "ln a", "ln 1/r0", "asinh δ", "β", "asinh v_z", "ln spin drag of head over tails")
 HEAD_INPUTS = (
@@ -76,15 +75,6 @@ class Tails(NamedTuple):
 
 
 TAIL_NUMBERS = len(Tails._fields) - 1 + len(HEAD_INPUTS)  # of a robot
-
-
-def pack_tails(tails: Tails) -> Floats:
-    """Return the fields as columns, (M, 15)."""
-    packed = np.empty((len(tails.number), TAIL_NUMBERS))
-    for i, part in enumerate(tails[:-1]):
-        packed[:, i] = part
-    packed[:, -len(HEAD_INPUTS) :] = tails.head
-    return packed
 
 
 @np.errstate(all="ignore")  # a robot that cannot be has no motion, and is refused for that
@@ -143,15 +133,6 @@ def linear_torque(S: Any) -> Any:
 
 
 @formula
-def ratios_of_tail(perp: Any, offset: Any, motion: Any) -> tuple[Any, ...]:
-    """Return S, and δ and v_z over their small values."""
-    v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
-    drag_number = perp * spin
-    deflection = np.sqrt(v_x**2 + yaw**2 + TINY) / spin * drag_number / (drag_number + SOFT)
-    return drag_number, deflection / SMALL_DEFLECTION, v_z / (offset * spin) / SMALL_SURGE
-
-
-@formula
 def inputs_of_tail(
     perp: Any, offset: Any, radius: Any, number: Any, spin_drag: Any, motion: Any, beta: Any
 ) -> tuple[Any, ...]:
@@ -162,14 +143,16 @@ def inputs_of_tail(
         motion: (v_x of J, v_z, ω_yr, ω_h, ω_t), for a positive motor.
         beta: the angle β.
     """
-    drag_number, deflection, surge = ratios_of_tail(perp, offset, motion)
+    v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
+    drag_number = perp * spin
+    deflection = np.sqrt(v_x**2 + yaw**2 + TINY) / spin * drag_number / (drag_number + SOFT)
     return (
         np.log(drag_number),
         np.log(offset),
         -np.log(radius),
-        np.arcsinh(deflection),
+        np.arcsinh(deflection / SMALL_DEFLECTION),
         beta,
-        np.arcsinh(surge),
+        np.arcsinh(v_z / (offset * spin) / SMALL_SURGE),
         np.log(spin_drag / (number * perp * offset**2)),
     )
 
@@ -193,17 +176,6 @@ def wrench_terms(perp: Any, parallel: Any, offset: Any, number: Any, motion: Any
         F_x, F_z and M_y of straight tails; then what y multiplies: the side force (F_x and M_y), thrust and torque
         at small m, and m².
     """
-    drag_number = perp * motion[4]
-    return scaled_terms(
-        perp, parallel, offset, number, motion, linear_thrust(drag_number), linear_torque(drag_number)
-    )
-
-
-@formula
-def scaled_terms(
-    perp: Any, parallel: Any, offset: Any, number: Any, motion: Any, thrust: Any, torque: Any
-) -> tuple[Any, ...]:
-    """Return `wrench_terms` for T and Q, which are given."""
     v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
     across = number * perp
     sideways = np.sqrt(v_x**2 + yaw**2 + TINY)
@@ -213,8 +185,8 @@ def scaled_terms(
         -number * parallel * v_z,
         across * (v_x / 2 - yaw / 3),
         across * sideways,
-        (perp - parallel) * couple * thrust,
-        -perp * couple * torque,
+        (perp - parallel) * couple * linear_thrust(perp * spin),
+        -perp * couple * linear_torque(perp * spin),
         (sideways / (offset * spin)) ** 2,
     )
 
@@ -222,7 +194,7 @@ def scaled_terms(
 def tail_inputs(tails: Tails, motion: Floats) -> Floats:
     """Return INPUTS, (M, 7), for motions (v_x of J, v_z, ω_yr, ω_h, ω_t), (M, 5), of a positive motor."""
     perp, _, offset, radius, number, spin_drag, _ = tails
-    beta = angle(motion[:, 0], motion[:, 2])
+    beta = np.arctan2(motion[:, 0], motion[:, 2])
     return np.stack(inputs_of_tail(perp, offset, radius, number, spin_drag, motion.T, beta), -1)
 
 

@@ -1,76 +1,231 @@
-"""A query of the look-up table with arrays, step by step: reference for `surrogate.table.compiled_query`."""
+"""A query of the look-up table with arrays: reference for its compiled loops. Robots are the last axis.
+
+Networks, balance by Broyden's method, support, outputs, response at equal dwells, intervals and domain, written
+from the formulas. Only heads and tails come from the package (`surrogate.wrench.heads.heads_and_tails`).
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Flags, Floats
 from sim.inputs import check_columns
 from sim.mechanics import planar
 from sim.model.groups import DWELL
-from sim.motion.net_speed import twists
+from sim.model.response import DWELLS
 from sim.motion.steady_motion import STEADY_OUTPUTS
-from surrogate.table.compiled_query import BRANCHES
+from surrogate.networks.ensemble import Ensemble
 from surrogate.table.errors import RESPONSE_OUTPUTS, error_scale
-from surrogate.table.lookup import Motions, NeuralTable
-from surrogate.table.response_table import SHAPES, between_dwells, curve_speeds
-from surrogate.table.wrench_table import network_index, rows_by_network
-from surrogate.wrench.heads import heads_and_tails
-from surrogate.wrench.tails import network_inputs, tail_inputs
+from surrogate.table.intervals import PARTS
+from surrogate.table.lookup import NeuralTable
+from surrogate.table.support import Support, products_of
+from surrogate.table.wrench_table import motion_sensitivity
+from surrogate.wrench.heads import Heads, heads_and_tails
+from surrogate.wrench.tails import Tails, wrench_slopes
 
-_RANGES = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
-
-
-def answer(table: NeuralTable, columns: dict[str, Floats]) -> dict[str, Any]:
-    """Return outputs of robots (M,), with DWELL among the columns also those of the response."""
-    motions, outside = _motions(table, columns)
-    gap = table.tails.tail_gap(motions.tails, motions.motion)
-    values = table.tails.outputs(motions.heads, motions.motion, gap)
-    steady: dict[str, Any] = dict(zip(STEADY_OUTPUTS, values, strict=True))
-    if DWELL not in columns:
-        return {**steady, "outside": outside}
-    lag = between_dwells(_lags(table, motions), columns[DWELL])
-    twist = twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], motions.heads.sense)
-    speed = planar.net_speed(twist, lag, columns[DWELL])
-    return {**steady, **dict(zip(RESPONSE_OUTPUTS, (speed, *lag.T[::-1]), strict=True)), "outside": outside}
+STEPS, CORRECTION, ACCEPTED = 60, 2e-12, 1e-9
+RANGES = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
 
 
-def half_widths(table: NeuralTable, columns: dict[str, Floats], found: dict[str, Any]) -> dict[str, Floats]:
-    """Return half-widths of the intervals of outputs, (M,) each."""
-    motions, _ = _motions(table, columns)
-    features = table.width_features(motions)
-    assert table.intervals is not None
-    widths = {}
-    for name in [name for name in found if name in table.intervals.factor]:
-        half = table.intervals.half_widths(name, features, error_scale(name, found), motions.heads.couples)
-        widths[name] = np.where(np.isfinite(found[name]), half, 0.0)
-    return widths
+class Robots(NamedTuple):
+    """Numbers of M robots, seen with a positive motor."""
+
+    heads: Heads
+    tails: Tails
+    R: Any  # (4, 5, M)
+    drag: Any  # (4, 5, M), with straight tails
+    head: Any  # (9, M)
+
+    def at(self, rows: Any) -> Robots:
+        parts = (self.R[..., rows], self.drag[..., rows], self.head[:, rows])
+        return Robots(self.heads.at(rows), self.tails.at(rows), *parts)
 
 
-def _motions(table: NeuralTable, columns: dict[str, Floats]) -> tuple[Motions, Flags]:
-    values = check_columns({name: array for name, array in columns.items() if name != DWELL})
+def robots_of(values: dict[str, Any]) -> Robots:
     heads, tails = heads_and_tails(values)
-    motion, converged = table.tails.solve(heads, tails)
-    inputs = tail_inputs(tails, motion)
-    inside = np.zeros(len(motion), dtype=bool)
-    for k, rows in rows_by_network(network_index(tails.number)):
-        support = table.support[k]
-        if support is not None:
-            own = network_inputs(tails.at(rows), motion[rows], len(support.shift))
-            inside[rows] = support.novelty(own) <= 1
-    for name in _RANGES:
-        low, high = table.ranges[name]
-        inside &= (low * (1 - 1e-9) <= np.abs(values[name])) & (np.abs(values[name]) <= high * (1 + 1e-9))
-    inside &= converged & (np.abs(motion[:, 2]) <= BRANCHES * np.abs(motion[:, 4]))
-    return Motions(heads, tails, motion, inputs, [""] * len(motion)), ~inside
+    R, straight, across = (
+        heads.resistance.transpose(1, 2, 0),
+        np.zeros((4, 5, len(tails.number))),
+        tails.number * tails.zeta_perp,
+    )
+    straight[0, 0], straight[1, 1], straight[2, 2] = across, tails.number * tails.zeta_parallel, across / 3
+    straight[0, 2] = straight[2, 0] = -across / 2
+    return Robots(heads, tails, R, R + straight, tails.head.T)
 
 
-def _lags(table: NeuralTable, motions: Motions) -> Floats:
-    """Return lags with the memory of a dwell before of the same length, (M, D, 3)."""
-    components = table.curves._components(motions.tails, motions.motion)
-    both = np.concatenate([components["lag"], components["memory"]], 1)
+def members(network: Ensemble, x: Any) -> Any:
+    """Return what each member answers, (K, O, M), at inputs (F, M)."""
+    h = x = (x.T - network.shift) / network.scale
+    for weight, bias in zip(network.weights[:-1], network.biases[:-1], strict=True):
+        h = np.tanh(h @ weight + bias)
+    y = (h @ network.weights[-1] + network.biases[-1] + x @ network.bypass) * network.spread + network.mean
+    return y.transpose(0, 2, 1)
+
+
+def thrust(S: Any) -> Any:
+    return 0.125 * S / (1 + (S / 8.0) ** 1.35)
+
+
+def torque(S: Any) -> Any:
+    return (1 + (S / 6.0) ** 2) ** -0.125
+
+
+def side_speed(u: Any) -> Any:
+    return np.sqrt(u[0] ** 2 + u[2] ** 2 + 1e-30)
+
+
+def tail_inputs(r: Robots, u: Any) -> Any:
+    """Return the inputs of networks, (7, M), at motions u (5, M)."""
+    t, S = r.tails, r.tails.zeta_perp * u[4]
+    deflection = side_speed(u) / u[4] * S / (S + 12.0)
+    own = np.log(t.head_spin_drag / (t.number * t.zeta_perp * t.offset**2))
+    bent, ahead = np.arcsinh(20.0 * deflection), np.arcsinh(20.0 * u[1] / (t.offset * u[4]))
+    return np.array([np.log(S), np.log(t.offset), -np.log(t.radius), bent, np.arctan2(u[0], u[2]), ahead, own])
+
+
+def single_inputs(r: Robots, u: Any) -> Any:
+    """Return the inputs of the network of one tail, (13, M)."""
+    return np.concatenate([tail_inputs(r, u)[[0, 1, 2, 6]], r.head])
+
+
+def residual(r: Robots, u: Any, y: Any) -> Any:
+    """Return the wrench of the tails less that on the head, (4, ..., M), at motions u (5, ..., M)."""
+    t, S, side = r.tails, r.tails.zeta_perp * u[4], side_speed(u)
+    force, couple, m2 = (
+        t.number * t.zeta_perp * side,
+        t.number * u[4] * t.offset**2,
+        (side / (t.offset * u[4])) ** 2,
+    )
+    along = (t.zeta_perp - t.zeta_parallel) * couple * thrust(S) * (y[1] + m2 * y[4])
+    push = np.array([force * y[0], along, force * y[2], -t.zeta_perp * couple * torque(S) * (y[3] + m2 * y[5])])
+    return push - np.einsum("ijm,j...m->i...m", r.drag, u)
+
+
+def first_guess(r: Robots) -> Any:
+    """Return motions (5, M) of linear theory."""
+    t, gain, speed, spin = r.tails, r.heads.gain, r.heads.speed, 0.6 * r.heads.speed
+    for _ in range(3):
+        pull = t.number * t.zeta_perp * t.offset**2 * torque(t.zeta_perp * spin)
+        spin = speed * r.R[3, 3] / (r.R[3, 3] + gain * (pull + r.R[3, 4]))
+    head = (spin - speed) / gain
+    push = -r.R[:3, 3] * head - r.R[:3, 4] * spin
+    push[1] += t.number * (t.zeta_perp - t.zeta_parallel) * t.offset**2 * spin * thrust(t.zeta_perp * spin)
+    return np.array([*np.linalg.solve(r.drag[:3, :3].transpose(2, 0, 1), push.T[..., None])[..., 0].T, head, spin])
+
+
+def solve(network: Ensemble, r: Robots) -> tuple[Any, Any]:
+    """Return motions (5, M) in balance, and which were found."""
+    inputs = single_inputs if network.shape["inputs"] == 13 else tail_inputs
+    u, rows = first_guess(r), np.arange(len(r.heads.speed))
+    motion, size, y = np.empty_like(u), np.empty(len(rows)), members(network, inputs(r, u)).mean(0)
+    width = 1e-6 * (np.abs(u[:4]) + 1e-3 * np.abs(u[:4]).max(0))
+    moved = np.repeat(u[:, None], 5, 1)
+    for j in range(4):
+        moved[j, j] += width[j]
+    moved[4] = r.heads.speed + r.heads.gain * moved[3]
+    at = residual(r, moved, y)
+    left, slope = at[:, 4], ((at[:, :4] - at[:, 4:]) / width).transpose(2, 0, 1)
+    slope = np.where(np.isfinite(slope), slope, np.eye(4))  # a robot that cannot be: it fails below
+    inverse = np.linalg.inv(slope).transpose(1, 2, 0)
+    for count in range(STEPS):
+        step = -np.einsum("ijm,jm->im", inverse, left)
+        step *= np.minimum(0.5 * u[4] / np.abs(r.heads.gain * step[3]), 1.0)
+        u[:4] += step
+        u[4] = r.heads.speed + r.heads.gain * u[3]
+        speed = np.hypot(u[0], u[1]) + np.abs(u[2])
+        now = np.abs(step / np.array([speed, speed, u[2], u[3]])).max(0)
+        some = np.flatnonzero((now >= CORRECTION) & np.isfinite(now) & (u[4] > 0))
+        motion[:, rows], size[rows] = u, np.where(u[4] > 0, now, np.nan)
+        if count + 1 == STEPS or not len(some):
+            break
+        rows, r, u, left, inverse, step = rows[some], r.at(some), *(p[..., some] for p in (u, left, inverse, step))
+        before, left = left, residual(r, u, members(network, inputs(r, u)).mean(0))
+        change, along = left - before, np.einsum("im,ijm->jm", step, inverse)
+        missed = step - np.einsum("ijm,jm->im", inverse, change)
+        inverse = inverse + (missed / (np.einsum("im,im->m", along, change) + 1e-300))[:, None] * along
+    return motion, size < ACCEPTED
+
+
+def novelty_of(support: Support, inputs: Any) -> Any:
+    """Return the novelty, (M,), at inputs (F, M)."""
+    x, features = (inputs.T - support.shift) / support.scale, [np.ones(inputs.shape[1])]
+    for parent, factor in products_of(len(support.shift)).T[1:]:
+        features.append(features[parent] * x[:, factor])
+    q = (np.linalg.solve(support.factor, np.array(features)) ** 2).mean(0) / support.limit
+    away = np.abs(x).max(1)
+    return np.where(away > 1.02, np.fmax(q, away), q)
+
+
+@np.errstate(all="ignore")
+def answer(table: NeuralTable, columns: dict[str, Any]) -> dict[str, Any]:
+    """Return outputs of robots (M,), their half-widths, and who is outside; with a dwell also the response."""
+    values = check_columns({name: array for name, array in columns.items() if name != DWELL})
+    kind, parts = np.minimum(values["N"], 3).astype(int) - 1, []
+    box = np.array([table.ranges[name] for name in RANGES])
+    sizes = np.abs([values[name] for name in RANGES])
+    within = ((sizes >= box[:, :1] * (1 - 1e-9)) & (sizes <= box[:, 1:] * (1 + 1e-9))).all(0)
+    for k in sorted(set(kind.tolist())):
+        rows = np.flatnonzero(kind == k)
+        dwells = columns[DWELL][rows] if DWELL in columns else None
+        parts.append(_part(table, k, robots_of({n: v[rows] for n, v in values.items()}), within[rows], dwells))
+    order = np.argsort(np.argsort(kind, kind="stable"), kind="stable")
+    return {name: np.concatenate([part[name] for part in parts])[order] for name in parts[0]}
+
+
+def _part(table: NeuralTable, k: int, r: Robots, within: Any, dwells: Any) -> dict[str, Any]:
+    """Answer for robots with one network."""
+    network, support, sense = table.tails.wrench[k], table.support[k], r.heads.sense
+    assert network is not None
+    assert support is not None
+    u, found = solve(network, r)
+    x, own = tail_inputs(r, u), single_inputs(r, u) if k == 0 else tail_inputs(r, u)
+    novelty, number = novelty_of(support, own), r.tails.number
+    outside = ~(found & within & (novelty <= 1) & (np.abs(u[2]) <= 0.6 * np.abs(u[4])))
+    sway, surge, yaw = u[0] + u[2] * r.heads.length / 2, u[1], u[2]
+    share = members(table.tails.gap, np.array([*x, np.log(number)]))[:, 0].mean(0)
+    gap = np.where(number > 1, share * r.tails.offset * np.sin(np.pi / number) / r.tails.radius, np.inf)
+    radius, slip = np.hypot(sway, surge) / np.abs(yaw), np.degrees(np.arctan2(np.abs(sway), surge))
+    steady = (sense * u[4], sense * u[3], sense * yaw, sense * sway, surge, radius, slip, gap)
+    result: dict[str, Any] = dict(zip(STEADY_OUTPUTS, steady, strict=True))
+    if dwells is not None:
+        result |= _response(table, np.array([surge, sway, yaw]), x, r, dwells)
+    members_of = members(network, own)
+    apart = (members_of - members_of.mean(0)).transpose(0, 2, 1)[..., None]
+    weight = motion_sensitivity(r.heads, r.tails, u.T) @ wrench_slopes(r.tails, u.T)
+    spread = np.linalg.norm((weight @ apart)[..., 0], axis=-1).mean(0)
+    extra = [np.log(novelty + 1e-12), np.log(spread + 1e-9), np.log(number), np.full(len(number), k == 0)]
+    widths = _half_widths(table, np.nan_to_num(np.array([*x, *extra])), r.R[2, 4] != 0, result)
+    return {**result, **{f"{name}_half": half for name, half in widths.items()}, "outside": outside}
+
+
+def _response(table: NeuralTable, twist: Any, x: Any, r: Robots, T: Any) -> dict[str, Any]:
+    """Return RESPONSE_OUTPUTS at equal dwells T (M,); the twist is (surge, sway, yaw rate), (3, M)."""
+    own = np.array([*x, *r.head[[0, 1, 2, 3, 5, 6]], np.log(r.tails.number), r.tails.number == 2])
+    lag, memory = (members(network, own).mean(0).T for network in table.curves.networks[:2])
     basis = table.curves.equal_dwells
-    curve = (basis.mean + both @ basis.vectors).reshape(-1, *SHAPES["lag"])
-    return np.asarray(curve * curve_speeds(motions.heads, motions.motion)[:, None])
+    curves = basis.mean + np.concatenate([lag, memory], 1)[:, : len(basis.vectors)] @ basis.vectors
+    at, knots = np.log(np.minimum(T, DWELLS[-1])), np.log(DWELLS)
+    z = np.empty((3, len(T)))
+    for row, curve in enumerate(curves.reshape(len(T), len(DWELLS), 3)):
+        first = int(np.clip(np.searchsorted(knots, at[row]) - 2, 0, len(knots) - 4))
+        near = slice(first, first + 4)
+        z[:, row] = np.linalg.solve(np.vander(knots[near] - at[row], 4), curve[near])[-1]  # of the cubic, at zero
+    z *= [np.hypot(twist[0], 0.1 * twist[1]), twist[1], twist[2]]
+    speed = planar.net_speed(twist.T, z.T, T)
+    return dict(zip(RESPONSE_OUTPUTS, (speed, *z[::-1]), strict=True))
+
+
+def _half_widths(table: NeuralTable, features: Any, couples: Any, result: dict[str, Any]) -> dict[str, Any]:
+    """Return half of the widths of the intervals by output, (M,) each, from features (11, M)."""
+    w, widths = table.intervals, {}
+    assert w is not None
+    octant = [1, 2, 4] @ (features[[0, 3, 5]] > w.middle[:, None])
+    part = np.where(features[-1] > 0.5, PARTS - 1, octant) + PARTS * couples
+    z, pairs = np.clip((features.T - w.shift) / w.scale, -5, 5), np.triu_indices(len(features))
+    design = np.column_stack([np.ones(len(z)), z, z[:, pairs[0]] * z[:, pairs[1]]])
+    for name in [name for name in result if name in w.factor]:
+        local = np.exp(np.clip(design @ w.weights[name], *w.bounds[name]))
+        half = np.resize(w.factor[name], 2 * PARTS)[part] * local * error_scale(name, result)
+        widths[name] = np.where(np.isfinite(result[name]), half, 0.0)
+    return widths

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from sim import compiling, object_code
-from sim.object_code import COUNT, FLOATS, Kept, array_at, kept
-from surrogate.table.support import novelty_rows
+from sim.object_code import COUNT, FLOATS, INTEGERS, Kept, array_at, kept
 from tests.processes import LIMIT
 
 LINES = "\n".join(f"    y = (y * {1 + i / 128} + x) / (1.0 + y * y) - {i / 3}" for i in range(60))
@@ -167,6 +166,11 @@ def _raises(count: int, x: object) -> None:
     values[:count] = values[: count // 2]
 
 
+@kept(COUNT, FLOATS, INTEGERS)
+def _reads(count: int, x: object, places: object) -> None:
+    """Do nothing."""
+
+
 @pytest.mark.parametrize("function", [_allocates, _raises])
 def test_what_allocates_or_raises_is_refused(function: Kept) -> None:
     with pytest.raises(TypeError, match="may neither allocate nor raise"):
@@ -179,18 +183,18 @@ def test_what_allocates_or_raises_is_refused(function: Kept) -> None:
 def test_arrays_of_another_kind_are_refused(array: np.ndarray) -> None:
     """Compiled functions do not look at the type of what they read."""
     with pytest.raises(TypeError, match="where floats are needed"):
-        novelty_rows(1, 7, 120, np.zeros(240, dtype=np.int64), array, np.zeros(7), np.zeros(1), np.zeros(200))
+        _reads(8, array, np.zeros(8, dtype=np.int64))
     with pytest.raises(TypeError, match="where integers are needed"):
-        novelty_rows(1, 7, 120, np.zeros(240), np.zeros(9), np.zeros(7), np.zeros(1), np.zeros(200))
+        _reads(8, np.zeros(8), np.zeros(8))
     with pytest.raises(ValueError, match="zip"):
-        novelty_rows(1, 7)
+        _reads(1, 7)
     with pytest.raises(TypeError, match="kept functions alone"):
         array_at(0, 3)
 
 
 def test_the_file_belongs_to_code_processor_and_library(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert novelty_rows.path.name.startswith("surrogate.table.support.novelty_rows-")
-    assert novelty_rows.path.is_relative_to(compiling.CACHE)
+    assert _reads.path.name.startswith(f"{__name__}._reads-")
+    assert _reads.path.is_relative_to(compiling.CACHE)
     before = object_code._machine()
     object_code._machine.cache_clear()
     monkeypatch.setattr("llvmlite.binding.get_host_cpu_name", lambda: "another")

@@ -31,7 +31,7 @@ columns = {{name: np.array([value]) for name, value in robot.group_values().item
 table = sf.load_table()
 table.query(columns | {{"dwell_bar": np.array([1.0])}}, intervals=True)
 table.response(columns)
-table.jacobian(columns, ["C_t", "disc_drag"])
+table.derivatives(columns, ["C_t", "disc_drag"])
 sf.Tracker(sf.restore_plan(folder + "/plan.json")).update(0.0)
 check("torch", "scipy.stats", "scipy.interpolate", "scipy.optimize", "joblib")
 """

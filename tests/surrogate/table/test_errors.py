@@ -58,7 +58,7 @@ def covered(size: Callable[[Floats], Floats]) -> tuple[Intervals, Floats, Flags]
     random = np.random.default_rng(2)
     (x, error), (more, other), (test, last) = (sampled(n, random, size) for n in (3000, 3000, 20000))
     found = Intervals.learned(x, {"v": error}, more, {"v": other})
-    return found, test, np.abs(last) <= found.half_widths("v", test, 1.0)
+    return found, test, np.abs(last) <= found.half_widths(["v"], test)[0]
 
 
 def test_intervals_cover_as_they_say() -> None:
@@ -87,7 +87,7 @@ def test_intervals_cover_with_and_without_couples(with_couples: float, groups: i
     )
     couples, tested = (random.uniform(size=size) < with_couples for size in (3000, 20000))
     found = Intervals.learned(x, {"v": error}, more, {"v": other * (1 + 4 * couples)}, couples)
-    inside = np.abs(last * (1 + 4 * tested)) <= found.half_widths("v", test, 1.0, tested)
+    inside = np.abs(last * (1 + 4 * tested)) <= found.half_widths(["v"], test, tested)[0]
     assert len(found.factor["v"]) == groups * PARTS
     assert inside[~tested].mean() == pytest.approx(0.9, abs=0.02)
     assert (0.88 < inside[tested].mean() < 0.92) == (groups == 2)

@@ -1,13 +1,10 @@
-"""A query: against the same formulas with arrays, symmetry, derivatives, refusals, and what it loads."""
+"""A query: against golden answers and the same formulas with arrays, symmetry, derivatives, refusals."""
 
 from __future__ import annotations
 
 import copy
 import pickle
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,27 +20,14 @@ from surrogate.table.certify import certified_error
 from surrogate.table.intervals import PARTS
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
-from surrogate.table.quick_query import MANY
 from surrogate.table.response_table import between_dwells
 from surrogate.training.simulated import draw_robots
 from surrogate.wrench.heads import needs_no_learning
-from tests.oracles.query import answer, half_widths
-from tests.processes import LIMIT
+from tests.oracles.query import answer
 from tests.surrogate.small import robots_inside, table
 
 ONE = {"C_t": 3.0, "C_r": 2.8, "C_yr": 2.0, "l_over_R": 6.875, "L_over_R": 3.75, "l_over_r0": 34.375,
        "omega_bar": 10.0, "N": 3.0, "a_over_R": 1.0}  # fmt: skip
-FIRST_ANSWER = """
-import sys
-import numpy as np
-from sim.inputs import load_robot
-from surrogate.table.model_file import load_table
-groups = {name: np.array([value]) for name, value in load_robot("paper-control").group_values().items()}
-load_table().query(groups)
-load_table().query({**groups, "dwell_bar": np.array([1.0])}, intervals=True)
-load_table().query({**groups, "motor_droop": np.array([1.0])})
-print(*sys.modules)
-"""
 KNOWN = [name for name in catalogue() if needs_no_learning(name)]
 OF_SPEED = ("v_x", "v_z", "lag_x", "lag_z", "net_speed_bar")  # differences of numbers of this size
 FLAT = ("R_yr_over_l", "theta_deg")  # ill-conditioned where a robot moves straight ahead, or hardly at all
@@ -57,14 +41,14 @@ def robots(count: int = 400, seed: int = 5) -> dict[str, np.ndarray]:
     return drawn | {"N": 2.0 + rows % 7, "omega_bar": speed}
 
 
-def check_same(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray], tolerance: float = 1e-12) -> None:
+def check_same(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray], tolerance: float = 1e-10) -> None:
     """Compare outputs, velocities and lags relative to their size."""
     assert (found["outside"] == wanted["outside"]).all()
     known = ~wanted["outside"]
     assert known.mean() > 0.3
     speed = np.hypot(wanted["v_x"], wanted["v_z"])
     for name in wanted:
-        if name != "outside":
+        if name != "outside" and not name.endswith("_half"):
             size = speed if name in OF_SPEED else np.abs(wanted[name])
             size = size + np.abs(wanted["omega_yr_bar"]) if name == "lag_psi_rad" else size
             finite = known & np.isfinite(wanted[name])
@@ -97,26 +81,28 @@ def test_robots_with_one_tail(case: str) -> None:
     drawn = {name: values for name, values in robots().items() if name in ROBOT}
     drawn |= {"N": np.ones(400)} | SINGLE[case]
     found = load().query(drawn, flag=True)
-    check_same(found, answer(load(), drawn), 1e-11)
+    check_same(found, answer(load(), drawn))
     assert np.isinf(found["tail_gap"]).all()
 
 
 def check_widths(lookup: NeuralTable, drawn: dict[str, np.ndarray], found: dict[str, np.ndarray]) -> None:
     """Compare the widths of intervals."""
-    known, wanted = ~found["outside"], half_widths(lookup, drawn, answer(lookup, drawn))
-    assert wanted
-    for name, half in wanted.items():
+    wanted, known = answer(lookup, drawn), ~found["outside"]
+    names = [name for name in found if f"{name}_half" in wanted]
+    assert len(names) >= 8
+    for name in names:
+        half = wanted[f"{name}_half"]
         rows = known & np.isfinite(found[name])  # a single tail has no gap
         width = (found[f"{name}_high"][rows] - found[f"{name}_low"][rows]) / 2
         size = np.abs(found[name][rows]) + half[rows]
-        assert (np.abs(width - half[rows]) <= 1e-9 * half[rows] + 1e-14 * size).all(), name
+        assert (np.abs(width - half[rows]) <= 1e-8 * half[rows] + 1e-13 * size).all(), name
 
 
-@pytest.mark.parametrize("at_once", [1, MANY - 1, 4000])
+@pytest.mark.parametrize("at_once", [1, 7, 2000])
 @pytest.mark.parametrize("with_dwell", [False, True])
 def test_any_number_of_robots_at_once(with_dwell: bool, at_once: int) -> None:
     """Short, long and very long dwells, knots among them; one to eight tails where there are none."""
-    count = {1: 100, MANY - 1: 400, 4000: 4000}[at_once]
+    count = {1: 100, 7: 400, 2000: 2000}[at_once]
     drawn = robots(count)
     if with_dwell:
         drawn[DWELL] = np.concatenate([np.geomspace(0.2, 80.0, count - 3), [0.2, 4.0, 1.0]])
@@ -125,7 +111,7 @@ def test_any_number_of_robots_at_once(with_dwell: bool, at_once: int) -> None:
     parts = [slice(start, start + at_once) for start in range(0, count, at_once)]
     answers = [load().query({k: v[part] for k, v in drawn.items()}, flag=True, intervals=True) for part in parts]
     found = {name: np.concatenate([one[name] for one in answers]) for name in answers[0]}
-    check_same(found, answer(load(), drawn), 1e-11)
+    check_same(found, answer(load(), drawn))
     check_widths(load(), drawn, found)
 
 
@@ -136,20 +122,19 @@ def test_widths_of_intervals_with_a_spread_of_the_members() -> None:
 
 
 @pytest.mark.parametrize("effect", ["", "surface_couple", "left_right_bias"])
-@pytest.mark.parametrize("count", [MANY - 1, MANY])
-def test_robots_with_couples_in_yaw_have_factors_of_their_own(effect: str, count: int) -> None:
-    """By the loop, by blocks and with arrays; files of earlier versions have one group for all robots."""
-    drawn = {name: values for name, values in robots(count).items() if name in ROBOT}
-    drawn |= {effect: np.full(count, 0.05)} if effect else {}
+def test_robots_with_couples_in_yaw_have_factors_of_their_own(effect: str) -> None:
+    """Files of earlier versions have one group for all robots."""
+    drawn = {name: values for name, values in robots(8).items() if name in ROBOT}
+    drawn |= {effect: np.full(8, 0.05)} if effect else {}
     factors = np.ones(PARTS), np.repeat([1.0, 3.0], PARTS)
     one, two = (with_factor(load(), factor) for factor in factors)
     before, after = (lookup.query(drawn, flag=True, intervals=True) for lookup in (one, two))
-    wanted, known = half_widths(two, drawn, answer(two, drawn)), ~after["outside"]
+    known = ~after["outside"]
     assert known.sum() > 2
-    for name, half in wanted.items():
+    assert two.intervals is not None
+    for name in [name for name in before if name in two.intervals.factor]:
         narrow, wide = ((found[f"{name}_high"] - found[f"{name}_low"])[known] for found in (before, after))
         assert wide == pytest.approx((3 if effect else 1) * narrow, rel=1e-6), name
-        assert wide / 2 == pytest.approx(half[known], rel=1e-6), name
 
 
 def with_factor(lookup: NeuralTable, factor: np.ndarray) -> NeuralTable:
@@ -185,15 +170,26 @@ def test_lists_and_integers_are_answered_alike_and_answers_do_not_change() -> No
         assert load().query(columns) == wanted
 
 
-def test_a_copy_of_a_table_has_numbers_of_its_own() -> None:
-    """Compiled loops get addresses, which belong to one table in one process."""
+def test_a_table_can_be_copied_and_pickled_after_a_query() -> None:
     lookup = load()
-    wanted = lookup.query(one())
-    copies = [copy.deepcopy(lookup), pickle.loads(pickle.dumps(lookup))]
-    lookup._quick._table.numbers[:] = np.nan
-    del lookup
-    for copied in copies:
-        assert copied.query(one()) == wanted
+    wanted, before = lookup.query(one(), intervals=True), lookup.identity
+    for copied in (copy.deepcopy(lookup), pickle.loads(pickle.dumps(lookup))):
+        assert copied.query(one(), intervals=True) == wanted
+        assert copied.identity == before
+
+
+def test_a_head_without_side_force_has_no_learned_response() -> None:
+    """Its steady motion has; so does one that an effect turns around."""
+    straight = one(C_yr=0.0)
+    assert load().query(straight)["v_z"] > 0
+    for ask in (
+        lambda **options: load().query({**straight, DWELL: np.ones(1)}, **options),
+        lambda **options: load().response(straight, **options),
+    ):
+        with pytest.raises(OutsideError, match="no side force"):
+            ask()
+        ask(flag=True)
+    assert load().query({**straight, DWELL: np.ones(1)}, flag=True)["outside"].all()
 
 
 REFUSED: list[tuple[dict[str, float], str]] = [
@@ -225,14 +221,6 @@ def test_words_missing_columns_and_one_robot_of_several_are_refused() -> None:
     assert refused.value.row == 2
 
 
-def test_a_query_loads_neither_compiler_nor_frames_nor_tensors() -> None:
-    words, place = [sys.executable, "-c", FIRST_ANSWER], Path(__file__).parents[3]
-    done = subprocess.run(words, capture_output=True, text=True, check=True, cwd=place, timeout=LIMIT)
-    loaded = set(done.stdout.split())
-    assert "surrogate.table.compiled_query" in loaded
-    assert not loaded & {"numba", "torch", "pandas", "scipy", "matplotlib", "sim.machine_code"}
-
-
 def test_a_reversed_motor_mirrors_the_answer() -> None:
     robots = robots_inside()
     forward = table().query(robots)
@@ -246,18 +234,31 @@ def test_a_reversed_motor_mirrors_the_answer() -> None:
     assert np.allclose(table().query(robots)["net_speed_bar"], table().query(other)["net_speed_bar"])
 
 
-def test_the_jacobian_is_that_of_differences() -> None:
-    robots = robots_inside()
-    slopes = table().jacobian(robots, ["C_t", "omega_bar", "end_over_end_drag"])
-    for name in ("C_t", "omega_bar"):
-        width = 1e-4 * robots[name]
-        high, low = (table().query({**robots, name: robots[name] + s * width}) for s in (1, -1))
-        for output in ("omega_yr_bar", "v_z", "theta_deg", "tail_gap"):
-            wanted = (high[output] - low[output]) / (2 * width)
-            assert np.allclose(slopes[output][name], wanted, rtol=1e-3, atol=1e-6 * np.abs(wanted).max())
-    drag = table().query({**robots, "end_over_end_drag": np.full(len(robots["N"]), 1e-4)})
-    wanted = (drag["omega_yr_bar"] - table().query(robots)["omega_yr_bar"]) / 1e-4
-    assert np.allclose(slopes["omega_yr_bar"]["end_over_end_drag"], wanted, rtol=1e-2)
+def test_derivatives_are_those_of_wider_differences() -> None:
+    """Of groups, of an effect, and of the dwell; negative motor speeds among them."""
+    drawn = {name: values for name, values in robots(12).items() if name in ROBOT}
+    drawn |= {DWELL: np.geomspace(0.6, 5.0, 12), "end_over_end_drag": np.full(12, 0.5)}
+    inside = np.flatnonzero(~load().query(drawn, flag=True)["outside"])
+    drawn = {name: values[inside] for name, values in drawn.items()}
+    names = ["C_t", "omega_bar", "a_over_R", "end_over_end_drag", DWELL]
+    slopes = load().derivatives(drawn, names)
+    for name in names:
+        value = drawn[name]
+        width = 2e-3 * np.abs(value)
+        one, two = (
+            [load().query({**drawn, name: value + s * k * width}, flag=True) for s in (1, -1)] for k in (1, 2)
+        )
+        for output in ("omega_yr_bar", "v_z", "theta_deg", "net_speed_bar"):
+            near, far = (high[output] - low[output] for high, low in (one, two))
+            wanted = (8 * near - far) / (12 * width)  # of fourth order
+            allowed = 2e-5 * np.abs(wanted).max() + 1e-9
+            assert slopes[output][name] == pytest.approx(wanted, rel=2e-4, abs=allowed), (name, output)
+
+
+@pytest.mark.parametrize("name", ["N", "v_z", DWELL])
+def test_what_has_no_derivatives_is_refused(name: str) -> None:
+    with pytest.raises(InputError, match="no input with derivatives"):
+        load().derivatives(one(), [name])
 
 
 def test_a_certified_error_is_the_difference_from_the_simulator() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,6 @@ from dataset.design import load_design
 from sim.io.errors import InputError, run_command
 from sim.motion.batches import steady_columns
 from sim.reference.control_example import INDEPENDENT
-from surrogate import loops
 from surrogate.__main__ import main
 from surrogate.input_ranges import BOUNDS, DOMAIN, MOST_TAILS, WIDE
 from surrogate.table.errors import coverage, relative_errors
@@ -20,11 +21,19 @@ from surrogate.table.inverse import inverse
 from surrogate.table.model_file import SHIPPED, load
 from surrogate.training.simulated import draw_robots
 from surrogate.training.train import with_radius
+from tests.processes import LIMIT
 from tests.reference.cases import STEADY_INPUTS, STEADY_POINTS
 from tests.sim.robots import CONTROL_VALUES
 
 pytestmark = pytest.mark.slow
 
+NEW_PROCESS = """
+from sim.inputs import group_columns, load_robot
+from surrogate.table.model_file import load
+load().query(group_columns([load_robot("paper-control")]))
+from surrogate.table.loops import motions_of
+print(sum(motions_of.stats.cache_misses.values()))
+"""
 counts = pytest.mark.parametrize("count", [128, pytest.param(512, marks=pytest.mark.rates)])
 
 
@@ -184,16 +193,7 @@ def test_the_sweep_of_the_domain_and_the_bounds_of_the_inverse_are_those_of_the_
         assert DOMAIN[name][1] <= high <= WIDE[name][1]
 
 
-def test_the_first_query_compiles_apart_and_once(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    apart: list[str] = []
-    monkeypatch.setattr(loops, "all_compiled", lambda folder: folder != loops.FOLDER)
-    monkeypatch.setattr(loops, "compile_apart", apart.append)
-    loops.compile_once.cache_clear()
-    robots = draw_robots(4, 0, wide=False)
-    for _ in range(2):
-        load().query(robots, flag=True)
-    loops.compile_once.cache_clear()
-    assert apart == ["surrogate.compile_loops"]
-    assert "first use" in capsys.readouterr().err
+def test_a_new_process_reads_the_loops_that_another_has_compiled() -> None:
+    load().query(draw_robots(4, 0, wide=False), flag=True)
+    done = subprocess.run([sys.executable, "-c", NEW_PROCESS], capture_output=True, text=True, timeout=LIMIT)
+    assert (done.stdout, done.stderr) == ("0\n", "")
