@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from calibration.laws.law_fits import Laws
-from calibration.laws.partial_residuals import dependences
+from calibration.laws.law import dependences
 from calibration.report.figures import draw_dependences, draw_place
 from calibration.report.robot_verdict import calibrate_robot
 from calibration.swimmer.synthetic_table import make_table

@@ -104,18 +104,19 @@ def grouped(values: Floats) -> list[Flags]:
 
 
 def group_factors(
-    model: LawModel, fitted: Fit, used: Flags, *, seed: int, draws: int = DRAWS
+    model: LawModel, fitted: Fit, used: Flags, *, seed: int = 0, draws: int = DRAWS, fewest: int = _FEWEST
 ) -> list[GroupFactors]:
-    """Estimate the factors along each input whose exponent is fitted and which has three values or more.
+    """Estimate the factors along each input whose exponent is fitted and which has enough values.
 
     Args:
         model: with a law.
         fitted: to the runs in `used`.
         used: (n,) runs.
         seed: of the bootstrap.
-        draws: of the bootstrap.
+        draws: of the bootstrap; with 0 of them p is 1.
+        fewest: values.
     """
-    along = _linear_models(model, fitted, used)
+    along = _linear_models(model, fitted, used, fewest)
     return [_estimated(linear, np.random.default_rng(seed), draws) for linear in along]
 
 
@@ -204,13 +205,13 @@ class _LinearModel:
         return (score * np.linalg.solve(left[..., :-1, :-1], score[..., None])[..., 0]).sum(-1)
 
 
-def _linear_models(model: LawModel, fitted: Fit, used: Flags) -> list[_LinearModel]:
+def _linear_models(model: LawModel, fitted: Fit, used: Flags, fewest: int = _FEWEST) -> list[_LinearModel]:
     """Make the linear model with free shifts along each input that can be tested."""
     x = logarithms(model.runs) - np.array(model.centre[: len(EXPONENTS)])
     return [
         _linear_model(model, fitted, used, place, x[used, place])
         for place, name in enumerate(EXPONENTS)
-        if name in fitted.names and len(grouped(x[used, place])) >= _FEWEST
+        if name in fitted.names and len(grouped(x[used, place])) >= fewest
     ]
 
 
@@ -242,11 +243,11 @@ def _linear_model(model: LawModel, fitted: Fit, used: Flags, place: int, x: Floa
 def _estimated(linear: _LinearModel, rng: np.random.Generator, draws: int) -> GroupFactors:
     """Estimate the shifts along an input, and test the power law."""
     observed = float(linear.gain(linear.as_given[None])[0])
-    batches = [min(_AT_ONCE, draws - first) for first in range(0, draws, _AT_ONCE)]
-    noise = linear.fitted.noise
-    null = np.concatenate(
-        [linear.gain(linear.tested.draw(rng, noise.run, np.full(count, noise.share))) for count in batches]
-    )
+    null = np.empty(0)
+    for first in range(0, draws, _AT_ONCE):
+        share = np.full(min(_AT_ONCE, draws - first), linear.fitted.noise.share)
+        drawn = linear.tested.draw(rng, linear.fitted.noise.run, share)
+        null = np.append(null, linear.gain(drawn))
     shifts, information = _shifts(linear)
     name = EXPONENTS[linear.place]
     return GroupFactors(

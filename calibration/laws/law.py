@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 
 from calibration.attribution.refits import session_gain
-from calibration.laws.curves import Curve
+from calibration.laws.curves import Curve, error_bars, factors
+from calibration.laws.group_factors import group_factors
 from calibration.laws.law_model import LEVER, SIZE, LawModel
 from calibration.laws.places import Place
 from calibration.laws.readings import (
@@ -39,6 +40,7 @@ from calibration.statistics.held_out import error_interval, errors
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.study import Study
 from calibration.swimmer.swimmer import SwimmerModel
+from sim.arrays import Flags, Floats
 from sim.io.errors import InputError
 
 NO_SESSIONS = "does not predict left-out sessions better"
@@ -49,6 +51,8 @@ NO_LEVER = "its lever is not told from none: a side force at the disc"  # unless
 _LARGEST_AT_START = 50.0  # size of a term
 _RPM = 30 / math.pi
 _DRAWS = 400  # of the bootstrap, for the residual that a law leaves
+_POINTS = 60  # of a curve
+_LARGEST = 20.0  # logarithm of a factor: what the runs do not determine may be of any size
 
 
 @dataclass(frozen=True)
@@ -146,6 +150,36 @@ class Law:
             "reason": self.reason,
             "curves": [curve.to_dict() for curve in self.curves],
         }
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """The load of a law along one input, over that at the mean of the runs, the other inputs at their means."""
+
+    symbol: str  # of INPUTS
+    inputs: Floats  # (m,) along the curve: rad/s, m, or a number of tails
+    factor: Floats  # (m,) of the law
+    low: Floats  # (m,) 95 % band of the law
+    high: Floats
+    groups: Floats  # (g,) inputs at which there are runs
+    by_runs: Floats  # (g,) the factor that these runs ask for, everything else fitted anew
+    errors: Floats  # (2, g) one standard error of it, below and above
+    curve: Curve | None  # what the runs ask for where they contradict the power law
+
+
+def dependences(law: Law, used: Flags) -> list[Dependence]:
+    """Compute how a law depends on each input that differs between the runs in `used` (n,)."""
+    results = []
+    for asked in group_factors(law.model, law.fit, used, draws=0, fewest=1):
+        at = law.fit.names.index(EXPONENTS[INPUTS.index(asked.symbol)])
+        curve = next((one for one in law.curves if one.symbol == asked.symbol and one.rejected), None)
+        groups = curve.groups if curve else asked.levelled()
+        x = np.linspace(asked.x[0], asked.x[-1], _POINTS)
+        half = law.fit.half_width(at) * np.abs(x)
+        factor, low, high = np.exp(np.clip(asked.exponent * x + np.outer((0, -1, 1), half), -_LARGEST, _LARGEST))
+        law_itself = (asked.symbol, np.exp(x + asked.centre), factor, low, high)
+        results.append(Dependence(*law_itself, groups.inputs, factors(groups), error_bars(groups), curve))
+    return results
 
 
 def fitted_law(

@@ -14,7 +14,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLoca
 from calibration.attribution.nearest import Nearest
 from calibration.attribution.refits import UNSEEN
 from calibration.laws.curves import Curve
-from calibration.laws.partial_residuals import Dependence
+from calibration.laws.law import Dependence
 from calibration.laws.places import Place
 from calibration.report.path_error import WORDS, Model, PathError
 from calibration.statistics.residual_tests import Misfit

@@ -11,9 +11,9 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from calibration.attribution.refits import IMITABLE, SURE
+from calibration.laws.law import dependences
 from calibration.laws.law_fits import Laws
 from calibration.laws.law_model import LEVER
-from calibration.laws.partial_residuals import dependences
 from calibration.report.figures import (
     draw_dependences,
     draw_evidence,
@@ -35,9 +35,9 @@ from sim.io.pages import Page, figures_markup, inline
 from sim.io.provenance import code_version
 
 _LAW = (
-    "On what it depends. Line and band: the law. Points: the factor that the runs at this input ask for, with one "
-    "standard error, everything else as fitted. Dashed: where they contradict a power law, a smooth curve through "
-    "points for which everything else was fitted anew."
+    "On what it depends. Line and band: the law. Points: the factor that the runs at this input ask for, "
+    "everything else fitted anew, with one standard error. Dashed: where they contradict a power law, a smooth "
+    "curve through them."
 )
 
 Drawn = tuple[Figure, str, str]  # with a description and a caption

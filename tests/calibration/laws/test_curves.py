@@ -14,8 +14,8 @@ import pytest
 from calibration.laws import law_fits
 from calibration.laws.curves import Curve, _curve, chosen, find_curves, named_curves
 from calibration.laws.group_factors import GroupFactors, _linear_models, _LinearModel
+from calibration.laws.law import dependences
 from calibration.laws.law_model import SIZE, LawModel
-from calibration.laws.partial_residuals import dependences
 from calibration.laws.places import place_named
 from calibration.report.figures import draw_dependences
 from calibration.report.report import figures_of_laws

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from calibration.attribution.refits import INDISTINGUISHABLE
+from calibration.laws.law import dependences
 from calibration.laws.law_fits import Laws, find_laws
 from calibration.laws.law_model import SIZE, LawModel, with_law
-from calibration.laws.partial_residuals import dependences
 from calibration.laws.places import place_named
 from calibration.laws.readings import EXPONENTS
 from calibration.report.corrected_robot import _slopes, check_given, robot_with_law
