@@ -16,8 +16,8 @@ import matplotlib.image as image
 import numpy as np
 from matplotlib.figure import Figure
 
-from calibration.laws.law_fits import Laws
 from calibration.laws.law import dependences
+from calibration.laws.law_fits import Laws
 from calibration.report.figures import draw_dependences, draw_place
 from calibration.report.robot_verdict import calibrate_robot
 from calibration.swimmer.synthetic_table import make_table

@@ -78,8 +78,7 @@ class Setting:
     def slope(self, place: Place, lever: float = 0.0) -> Floats:
         """Compute the derivative (n, k) along the term, or the logarithm of the factor, of a place."""
         moved = [name for name, _ in place.moves]
-        parameters = {**self.base.parameters, **(dict.fromkeys(moved, 1.0) if place.is_term else {})}
-        slopes = self.model.derivatives(parameters, moved)[1]
+        slopes = self.model.derivatives(self.base.parameters, moved)[1]
         if place.lever_unit:
             arms = lever_arms(self.model.robot, self.model.runs, place.lever_unit)
             return np.asarray(slopes[..., 0] + lever * arms[:, None] * slopes[..., 1])

@@ -25,7 +25,8 @@ from calibration.laws.places import Place, place_named
 from calibration.laws.readings import EXPONENTS, INPUTS, NOTED, logarithms, noted_values, parameter_of
 from calibration.statistics.statistical_model import Parameter, Parameters, by_differences
 from calibration.swimmer.measured_table import Measurements
-from calibration.swimmer.swimmer import SwimmerModel, _Run
+from calibration.swimmer.nuisance_numbers import robot_number
+from calibration.swimmer.swimmer import SwimmerModel
 from sim.arrays import Floats, Integers
 from sim.effects import effect_named
 from sim.inputs import group_columns
@@ -34,6 +35,7 @@ from sim.model.effect import Effect
 from sim.model.groups import Groups
 from sim.model.power_law import STEEPEST, Powers
 from sim.model.robot import Robot
+from surrogate.table.lookup import NeuralTable
 
 SIZE, LEVER = "law_size", "law_lever"
 _LARGEST = 2000.0  # size of a term
@@ -147,24 +149,41 @@ class LawModel(SwimmerModel):
         logs = np.array([powers.logarithm(Groups.from_columns(group_columns([run])))[0] for run in robots])
         return math.exp(-float(logs[place].mean()))
 
+    def of_runs(self, parameters: Parameters) -> dict[str, Any]:
+        """Return the parameters of the model without the law, with what it moves for every run, (n,)."""
+        inner = {name: value for name, value in parameters.items() if name not in (SIZE, LEVER, *self.exponents)}
+        m = self.factor(parameters)
+        if self.place.is_term:
+            loads = [parameters.get(SIZE, 0.0) * m]
+            if self.place.lever_unit:
+                loads.append(loads[0] * parameters.get(LEVER, 0.0) * self._arms)
+            for (name, _), load in zip(self.place.moves, loads, strict=True):
+                inner[name] = np.clip(load, *effect_named(name).bounds)
+        else:
+            for name, power in self.place.moves:
+                inner[name] = inner.get(name, robot_number(self.robot, name)) * m**power
+        return inner
+
+    def predict(self, sets: Sequence[Parameters], *, title: str = "", lookup: NeuralTable | None = None) -> Floats:
+        """Predict (P, n, k), see `SwimmerModel.predict`."""
+        return super().predict([self.of_runs(p) for p in sets], title=title, lookup=lookup)
+
+    def robots(self, parameters: Parameters) -> tuple[list[Robot], Integers]:
+        """Return the robots that are simulated, see `SwimmerModel.robots`."""
+        return super().robots(self.of_runs(parameters))
+
     def derivatives(
         self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
     ) -> tuple[Floats, Floats]:
         """Compute the prediction (n, k) and derivatives (n, k, p), see `SwimmerModel.derivatives`."""
-        of_law = {SIZE, LEVER, *self.exponents}
-        others = [name for name in names if name not in of_law]
         moved = [name for name, _ in self.place.moves]
-        known = {name: 1.0 for name in moved if self.place.is_term} | dict(parameters)
+        others = [name for name in names if name not in (SIZE, LEVER, *self.exponents)]
         wanted = list(dict.fromkeys([*others, *moved]))
-        seen, table = super().derivatives(known, wanted, title=title, quick=True)
+        seen, table = super().derivatives(self.of_runs(parameters), wanted, title=title, quick=True)
         if not quick and not (np.isfinite(table).all() and np.isfinite(seen).all()):
             return by_differences(self, parameters, names, title=title)
         m = self.factor(parameters)
         slopes = {name: table[..., j] for j, name in enumerate(wanted)}
-        for name, power in self.place.moves:
-            # The derivative along the logarithm of a coefficient is scaled by its value without m.
-            if name in {p.name for p in self.coefficients}:
-                slopes[name] = slopes[name] * (m**power)[:, None]
         along = self._along([slopes[name] for name in moved], parameters.get(LEVER, 0.0))
         if self.place.is_term:
             slopes[SIZE] = along * m[:, None]
@@ -181,32 +200,6 @@ class LawModel(SwimmerModel):
             force, couple = slopes
             return np.asarray(force + lever * self._arms[:, None] * couple)
         return np.asarray(sum(power * slope for (_, power), slope in zip(self.place.moves, slopes, strict=True)))
-
-    def _conditions(self, parameters: Parameters, *, signed: bool = False) -> tuple[list[_Run], Integers]:
-        return super()._conditions(parameters, signed=signed or self.place.odd)
-
-    def _noted_at_work(self, parameters: Parameters) -> list[Floats]:
-        return [*super()._noted_at_work(parameters), *self._inputs[:, len(EXPONENTS) :].T]
-
-    def _is_at_null(self, parameters: Parameters) -> bool:
-        return super()._is_at_null(parameters) and not (self.place.is_term and parameters.get(SIZE, 0.0))
-
-    def _run(self, parameters: Parameters, row: int, omega: float) -> _Run:
-        run = super()._run(parameters, row, omega)
-        m = math.exp(float(self._inputs[row] @ [parameters.get(name, 0.0) for name in self.exponents]))
-        robot = run.robot
-        size = parameters.get(SIZE, 0.0) * m
-        ahead = [1.0]
-        if unit := self.place.lever_unit:
-            ahead.append(parameters.get(LEVER, 0.0) * lever_arm(robot, unit))
-        for i, (name, power) in enumerate(self.place.moves):
-            if self.place.is_term:
-                low, high = effect_named(name).bounds
-                load = min(max(size * ahead[i], low), high)
-                robot = replace(robot, effects={**robot.effects, name: load})
-            else:
-                robot = replace(robot, **{name: getattr(robot, name) * m**power})
-        return run._replace(robot=robot)
 
 
 def with_law(model: SwimmerModel, record: Mapping[str, Any]) -> LawModel:

@@ -190,12 +190,10 @@ def _directions(
         These, and the place and the lever of each variant.
     """
     names = tuple(dict.fromkeys(name for place in candidates for name, _ in place.moves))
-    terms = {name for place in candidates if place.is_term for name, _ in place.moves}
-    start = {**base.parameters, **dict.fromkeys(terms, 1.0)}
     slopes: dict[str, Floats] = {}
     # What is odd needs both directions simulated, and what is not local more phases: each on its own.
     for group in _by_cost(names):
-        table = model.derivatives(start, group, title=title)[1]
+        table = model.derivatives(base.parameters, group, title=title)[1]
         slopes.update({name: table[..., j] for j, name in enumerate(group)})
     columns, variants = [], []
     for place in candidates:

@@ -46,7 +46,7 @@ from sim.arrays import Flags, Floats
 WRONG = 3.0  # pull beyond which a nuisance parameter is taken to be wrong
 _LEARNT = 0.02  # share of the prior's variance that the runs must remove before a pull means anything
 _NOTHING = 0.01  # change in per cent, or in the unit in which it is shown, that is not stated
-_LARGEST = 100.0  # change of a logarithm that is stated
+_STATED = 100.0  # change of a logarithm that is stated
 _MOST_STEPS = 25
 _TRIED = 4  # steps before a search is given up
 _SHORT = 0.1  # after a shorter step, in ln C or ε, the Jacobian is used once more
@@ -99,7 +99,7 @@ class Pull:
     def departure(self) -> str:
         """How far it is from its value, by the runs alone, as in "40 % below what was given"."""
         given, change = self.parameter, self.alone
-        size = abs(math.expm1(min(change, _LARGEST))) * 100 if given.logarithmic else abs(change) * given.shown
+        size = abs(math.expm1(min(change, _STATED))) * 100 if given.logarithmic else abs(change) * given.shown
         if size < _NOTHING:
             return "what was given"
         unit, side = "%" if given.logarithmic else given.unit, "below" if change < 0 else "above"

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 from calibration.statistics.statistical_model import Parameter
 from sim.effects import Effect, catalogue
@@ -62,6 +63,13 @@ def influences() -> dict[str, Influence]:
     known[SLIP] = Influence(slip, None, None, False)
     known[TRACKED_POINT] = Influence(point, None, None, False)
     return dict(sorted(known.items()))
+
+
+@cache
+def stated_influence(name: str) -> Influence | None:
+    """Find an effect that states itself in its name, such as the term of a law; None if it is none."""
+    known = catalogue()
+    return _plain(known[name]) if name in known and name not in list(known) else None
 
 
 def _plain(effect: Effect) -> Influence:

@@ -26,6 +26,7 @@ from calibration.swimmer.candidate_effects import (
     influences,
     is_odd,
     reason_untestable,
+    stated_influence,
 )
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.nuisance_numbers import (
@@ -162,7 +163,7 @@ class SwimmerModel:
 
         If a run has no direct solution: by differences of motions that are stepped in time, or NaN if `quick`.
         """
-        influences = {name: self._influences.get(name) or self._seconds.get(name) for name in names}
+        influences = {name: self._seconds.get(name) or self._influence(name) for name in names}
         odd = any(is_odd(name, influence) for name, influence in influences.items())
         runs, place = self._conditions(parameters, signed=odd)
         columns = self._columns(runs, [parameters])
@@ -297,10 +298,13 @@ class SwimmerModel:
 
     def _at_work(self, parameters: Parameters) -> list[Influence]:
         """List influences that are not at their null."""
+        known = ((value, self._influence(name)) for name, value in parameters.items())
         return [
-            influence for name, influence in self._influences.items()
-            if name in parameters and np.any(parameters[name] != influence.parameter.start)
-        ]  # fmt: skip
+            influence for value, influence in known if influence and np.any(value != influence.parameter.start)
+        ]
+
+    def _influence(self, name: str) -> Influence | None:
+        return self._influences.get(name) or stated_influence(name)
 
     @cached_property
     def _drivers(self) -> dict[str, Floats]:
