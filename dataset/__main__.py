@@ -22,18 +22,13 @@ _FORCE = argument("--force", action="store_true", help="take over a URL whose wr
     out("folder, or a URL that fsspec knows (s3://…),"),
     argument("--rows", type=int, help="number of rows (default: the configuration's); more than before adds rows"),
     JOBS,
-    argument(
-        "--backend",
-        type=lambda name: "local" if name == "loky" else name,  # its name when joblib's processes ran the chunks
-        choices=("local", "dask", "ray"),
-        help="where to run: local, this machine's processes; dask; ray (default: local, or dask with a scheduler)",
-    ),
-    argument(
-        "--scheduler",
-        help="address of a dask scheduler (default: DASK_SCHEDULER_ADDRESS) or ray head (default: RAY_ADDRESS)",
-    ),
+    argument("--backend", choices=("local", "dask", "ray"),
+             type=lambda name: "local" if name == "loky" else name,  # its name of the last release
+             help="where to run: processes here, dask or ray (default: local, or dask with a scheduler)"),
+    argument("--scheduler", help="address of a dask scheduler (default: DASK_SCHEDULER_ADDRESS) or ray head "
+             "(default: RAY_ADDRESS)"),
     _FORCE,
-)
+)  # fmt: skip
 def _build(arguments: Namespace) -> None:
     from dataset.build import build
     from dataset.design import SWEEP_TOML, load_design
@@ -72,11 +67,7 @@ def _report(arguments: Namespace) -> None:
     _DATA,
     argument("--rows", type=int, default=8, help="rows to simulate again (default: 8)"),
     argument("--mend", action="store_true", help="repair first: remove damaged files, simulate missing rows"),
-    argument(
-        "--rows-by",
-        metavar="MODULE.FUNCTION",
-        help="with --mend: the function of yours that made the rows",
-    ),
+    argument("--rows-by", metavar="MODULE.FUNCTION", help="with --mend: the function of yours that made the rows"),
     JOBS,
     _FORCE,
 )

@@ -27,8 +27,16 @@ from tqdm import tqdm
 
 from dataset.card import write_card
 from dataset.clusters import check_backend, open_backend
-from dataset.data_set import CARD, MANIFEST, SWEEP, check_version, read_manifest, read_sweep, sweep_key
-from dataset.data_set import write_manifest as _write_manifest
+from dataset.data_set import (
+    CARD,
+    MANIFEST,
+    SWEEP,
+    check_version,
+    read_manifest,
+    read_sweep,
+    sweep_key,
+    write_manifest,
+)
 from dataset.design import SweepDesign
 from dataset.folder import UNFINISHED, Folder
 from dataset.schema import rows_version, schema
@@ -62,21 +70,17 @@ def build(
     address: str | None = None, title: str = "sweep", resume: str = "run the same build again",
     simulate: Simulate | None = None, force: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
-    """Simulate a design into a folder; a build that stopped continues.
+    """Simulate a design into a folder and return its manifest; a build that stopped continues.
 
     Args:
         design: which robots.
         folder: a folder, or a URL that fsspec knows.
         jobs: processes on this machine; default all processors.
-        backend: "local", "dask" or "ray".
-        address: of a dask scheduler or ray cluster.
+        backend: "local", "dask" or "ray"; the latter may have the `address` of a scheduler or head.
         title: of the progress line; empty for none.
         resume: what the last line of an interrupted build tells the user to do.
         simulate: makes the rows; default `dataset.simulate.simulate`. Workers must be able to import it.
         force: take over a folder behind a URL that another build has claimed.
-
-    Returns:
-        The manifest.
 
     Raises:
         InputError: the folder holds something else or refuses, another process writes there, no such back end.
@@ -94,13 +98,8 @@ def mend(
 ) -> str:  # fmt: skip
     """Remove damaged and duplicate files, simulate missing rows, write the manifest anew; return a line on it.
 
-    Args:
-        folder: a folder, or a URL that fsspec knows.
-        jobs: processes on this machine; default all processors.
-        title: of the progress line; empty for none.
-        simulate: made the rows, where it is not `dataset.simulate.simulate`. The folder only has its name, and no
-            function is imported because a file names it.
-        force: take over a folder behind a URL that another build has claimed.
+    Arguments are those of `build`; `simulate` made the rows. The folder only has its name, and no function is
+    imported because a file names it.
 
     Raises:
         InputError: no data set there, or its rows were made by another version of the code or another function.
@@ -254,7 +253,7 @@ class _Build:
         if parts == list(self._listed().values()):
             manifest = read_manifest(self.folder.address)
         else:
-            manifest = _write_manifest(self.folder, self._design, self._key, self._sweep["code"], parts)
+            manifest = write_manifest(self.folder, self._design, self._key, self._sweep["code"], parts)
         for name in self.folder.names():
             if name.startswith(UNFINISHED):
                 self.folder.delete(name)

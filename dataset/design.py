@@ -174,7 +174,7 @@ def load_design(path: str | Path = SWEEP_TOML) -> SweepDesign:
     with naming(path):
         content = read_toml(path)
         if not isinstance(content.get("robot", ""), str):
-            raise InputError(f"{path}: robot = {content['robot']!r}; give the name of a robot.toml or of a preset")
+            raise InputError(f"robot = {content['robot']!r}; give the name of a robot.toml or of a preset")
         return checked_design(content, str(path))
 
 
@@ -210,25 +210,27 @@ def checked_design(content: Mapping[str, Any], path: str) -> SweepDesign:
     Raises:
         InputError: an entry is missing, unknown or impossible.
     """
+    with naming(path):
+        return _design(content, Path(path).parent)
+
+
+def _design(content: Mapping[str, Any], folder: Path) -> SweepDesign:
     for name in set(content) - set(_ENTRIES):
-        raise InputError(f"{path}: unknown entry {name!r}; allowed are {', '.join(_ENTRIES)}")
+        raise InputError(f"unknown entry {name!r}; allowed are {', '.join(_ENTRIES)}")
     inputs = content.get("inputs", {})
     if not isinstance(inputs, dict):
-        raise InputError(f"{path}: inputs = {inputs!r}; write a table [inputs]")
-    try:
-        robot = robot_of_sweep(content["robot"], Path(path).parent) if "robot" in content else None
-        read = _inputs(inputs) if robot is None else _inputs_of_robot(inputs, isinstance(content["robot"], dict))
-    except InputError as refusal:
-        raise InputError(f"{path}: {refusal}") from None
-    axes = {name: _axis(path, *read[name]) for name in _order() if name in read}
-    _check_ends(path, axes, robot)
+        raise InputError(f"inputs = {inputs!r}; write a table [inputs]")
+    robot = robot_of_sweep(content["robot"], folder) if "robot" in content else None
+    read = _inputs(inputs) if robot is None else _inputs_of_robot(inputs, isinstance(content["robot"], dict))
+    axes = {name: _axis(*read[name]) for name in _order() if name in read}
+    _check_ends(axes, robot)
     seed, every, slopes = (content.get(name, value) for name, value in _SETTINGS.items())
     if type(seed) is not int or seed < 0:
-        raise InputError(f"{path}: seed = {seed!r}; give a whole number from 0")
+        raise InputError(f"seed = {seed!r}; give a whole number from 0")
     if type(every) is not int or not 0 <= every <= MOST_ROWS:
-        raise InputError(f"{path}: history_every = {every!r}; give a whole number to {MOST_ROWS}, 0 for none")
+        raise InputError(f"history_every = {every!r}; give a whole number to {MOST_ROWS}, 0 for none")
     if type(slopes) is not bool:
-        raise InputError(f"{path}: sensitivities = {slopes!r}; give true or false")
+        raise InputError(f"sensitivities = {slopes!r}; give true or false")
     return SweepDesign(axes, _check_rows(content.get("rows", 1024)), seed, every, slopes, robot)
 
 
@@ -262,35 +264,33 @@ def _inputs_of_robot(inputs: Mapping[str, Any], fields_in_si: bool) -> dict[str,
     return fields
 
 
-def _axis(path: str, name: str, spec: Any) -> Axis:
+def _axis(name: str, spec: Any) -> Axis:
     try:
         low, high = (float(v) for v in [*spec["range"]] if not isinstance(spec["range"], str))
         scale, mirrored = spec.get("scale", "linear"), spec.get("both_directions", False)
         unknown = set(spec) - {"range", "scale", "both_directions"}
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
         raise InputError(
-            f'{path}: {name} = {spec!r}; write {name} = {{ range = [low, high], scale = "linear" }}'
+            f'{name} = {spec!r}; write {name} = {{ range = [low, high], scale = "linear" }}'
         ) from None
     for key in sorted(unknown):
-        raise InputError(f"{path}: {name} has an entry {key!r}; allowed are range, scale and both_directions")
+        raise InputError(f"{name} has an entry {key!r}; allowed are range, scale and both_directions")
     if scale not in _SCALES:
-        raise InputError(f"{path}: {name} has scale {scale!r}; allowed are {', '.join(_SCALES)}")
+        raise InputError(f"{name} has scale {scale!r}; allowed are {', '.join(_SCALES)}")
     if not isinstance(mirrored, bool) or (mirrored and not name.startswith(("omega_bar", "motor_speed"))):
-        raise InputError(
-            f"{path}: {name} has both_directions = {mirrored!r}; only the motor speed takes true or false"
-        )
+        raise InputError(f"{name} has both_directions = {mirrored!r}; only the motor speed takes true or false")
     if not (math.isfinite(low) and math.isfinite(high) and low <= high):
-        raise InputError(f"{path}: {name} has range [{low:g}, {high:g}]; it must be finite and ordered")
+        raise InputError(f"{name} has range [{low:g}, {high:g}]; it must be finite and ordered")
     if low <= 0 and name not in catalogue():
-        raise InputError(f"{path}: {name} starts at {low:g}; it must be above 0")
+        raise InputError(f"{name} starts at {low:g}; it must be above 0")
     if scale == "log" and low <= 0:
-        raise InputError(f"{path}: {name} starts at {low:g}; a log scale needs a low end above 0")
+        raise InputError(f"{name} starts at {low:g}; a log scale needs a low end above 0")
     if (name in _COUNTS or scale == "integer") and (low != int(low) or high != int(high)):
-        raise InputError(f"{path}: {name} has range [{low:g}, {high:g}]; give whole numbers")
+        raise InputError(f"{name} has range [{low:g}, {high:g}]; give whole numbers")
     return Axis(low, high, "integer" if name in _COUNTS else scale, mirrored)
 
 
-def _check_ends(path: str, axes: dict[str, Axis], robot: dict[str, Any] | None) -> None:
+def _check_ends(axes: dict[str, Axis], robot: dict[str, Any] | None) -> None:
     """Reject ranges with robots that cannot be simulated; each number is smallest and largest at some ends."""
     try:
         if robot is None:
@@ -303,7 +303,7 @@ def _check_ends(path: str, axes: dict[str, Axis], robot: dict[str, Any] | None) 
                 raise InputError(f"{name} from {low:.3g} to {high:.3g}; a sweep takes {least:g} to {most:g}")
         check_columns(columns)
     except InputError as refusal:
-        raise InputError(f"{path}: the ends of the ranges make an impossible robot: {refusal}") from None
+        raise InputError(f"the ends of the ranges make an impossible robot: {refusal}") from None
 
 
 def _corners(axes: dict[str, Axis], robot: dict[str, Any]) -> dict[str, Floats]:

@@ -39,10 +39,14 @@ def robot_of_sweep(source: object, folder: Path) -> dict[str, Any]:
         folder: of the sweep.toml.
 
     Raises:
-        InputError: there is no such robot, or it has a correction.
+        InputError: there is no such robot, it has a correction, or its fields are damaged.
     """
     if isinstance(source, dict):
-        return _checked_fields(source)
+        try:
+            check_effects(Robot(name="", **source).effects)
+        except (TypeError, AttributeError):
+            raise InputError("the fields of its robot are damaged") from None
+        return source
     if not isinstance(source, str):
         raise InputError(f"robot = {source!r}; give the name of a robot.toml or of a preset")
     return robot_fields(load_robot(source if source in PRESETS else folder / source))
@@ -62,20 +66,6 @@ def robot_fields(robot: Robot) -> dict[str, Any]:
         for field in fields(robot)
         if field.name not in _UNUSED
     }
-
-
-def _checked_fields(stored: dict[str, Any]) -> dict[str, Any]:
-    """Check the fields of a robot that were stored.
-
-    Raises:
-        InputError: they are not those of a robot.
-    """
-    try:
-        robot = Robot(name="", **stored)
-        check_effects(robot.effects)
-    except (TypeError, AttributeError):
-        raise InputError("the fields of its robot are damaged") from None
-    return stored
 
 
 def input_of_robot(name: str) -> tuple[str, str]:

@@ -57,6 +57,7 @@ class Column(NamedTuple):
 
 
 _real, _whole, _flag = pa.float64(), pa.int32(), pa.bool_()
+_slopes = pa.list_(_real, len(SLOPE_INPUTS))
 _LAG = (("z", "l", "forward"), ("x", "l", "to the new turn's side"), ("psi_rad", "radian", "of the heading"))
 _ROW_CODE = ("design.py", "robot_inputs.py", "schema.py", "simulate.py")  # what a row depends on, beside sim/
 COST = "cost_s"  # the one column that differs when a row is simulated again
@@ -107,13 +108,7 @@ OUTPUTS = (
     *_curves("memory", "what a short dwell before adds to the lag; NaN without history", tuple(BEFORE)),
 )  # fmt: skip
 SLOPES = tuple(
-    Column(
-        f"d_{name}",
-        pa.list_(_real, len(SLOPE_INPUTS)),
-        "1",
-        f"derivatives of {name} in the inputs",
-        inputs=SLOPE_INPUTS,
-    )
+    Column(f"d_{name}", _slopes, "1", f"derivatives of {name} in the inputs", inputs=SLOPE_INPUTS)
     for name in SLOPE_OUTPUTS
 )
 FLAGS = (
