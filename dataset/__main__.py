@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import threading
 from argparse import Namespace
 
 from sim.io.commands import JOBS, Program, argument, out
@@ -30,14 +31,20 @@ _FORCE = argument("--force", action="store_true", help="take over a URL whose wr
     _FORCE,
 )  # fmt: skip
 def _build(arguments: Namespace) -> None:
-    from dataset.build import build
+    from dataset.build import Interrupted, build
     from dataset.design import SWEEP_TOML, load_design
 
     design = load_design(arguments.config or SWEEP_TOML).with_rows(arguments.rows)
     known = arguments.scheduler or os.environ.get(_SCHEDULER)
     backend = arguments.backend or ("dask" if known else "local")
     where = {"jobs": arguments.jobs, "backend": backend, "address": arguments.scheduler}
-    manifest = build(design, arguments.out, resume=_command(arguments), force=arguments.force, **where)
+    try:
+        manifest = build(design, arguments.out, resume=_command(arguments), force=arguments.force, **where)
+    except Interrupted as stop:
+        emergency = threading.Timer(1.0, os._exit, (stop.status,))  # clusters wait at an ordinary one
+        emergency.daemon = True
+        emergency.start()
+        raise
     print(
         f"{manifest['rows']} rows: {manifest['converged']} converged, {manifest['failed']} failed, "
         f"tails touch in {manifest['touching']} -> {arguments.out}"
