@@ -22,14 +22,14 @@ OWN = {"arrays", "format"}  # they stand for NumPy and for Python itself
 PAGE = {*IN_PAGE, "open_file", "compared_track", "compared_runs", "page_shapes", "advice"}  # of the page alone
 TESTED_IN = {
     "test_core": "advice",
-    "test_numbers": "arrays close_match draws format lab_units sha256 si_units units",
+    "test_numbers": "arrays close_match draws format lab_units si_units units",
     "test_paths": "distance nearest_feasible page_shapes path pose_equations tractrix",
     "test_lookup": "cubic_spline curve_errors dense dwell_choice ensemble from_table groups heads intervals "
                    "lookup planar refusals response response_table support table_data tails tracked_point vehicle "
                    "wrench_balance wrench_table",
     "test_plans": "declared_path error_growth errors feasible feedback_error fillets line_of_sight plan progress "
                   "remedy request rollout schedule stated_error zigzag",
-    "test_plan_files": "compared_track plan_files planned tracker_header tracking_error",
+    "test_plan_files": "compared_track plan_files planned sha256 tracker_header tracking_error",
     "test_robot_files": "input_error robot robot_toml toml",
     "test_drawings": "style_sheet svg_drawing svg_names svg_segments svg_shapes svg_tree xml",
     "test_tables": "file_kinds number_words open_file path_files quantities seals text_tables times",
