@@ -106,10 +106,10 @@ def sim_robot(made: Path, out: Path) -> str:
 
 
 def sim_branches(made: Path, out: Path) -> str:
-    done("sim", "branches", "paper-control", "--speed", "40:80", "--steps", 3, "--out", out / "b.html")
+    done("sim", "branches", "paper-control", "--speed", "60:80", "--steps", 2, "--out", out / "b.html")
     table = pd.read_csv(out / "b.csv")
     assert (table["origin"] == "continuation").sum() > 5
-    assert table["speed_rpm"].between(39.999, 80.001).all()
+    assert table["speed_rpm"].between(59.999, 80.001).all()
     assert (out / "b.png").read_bytes()[:4] == b"\x89PNG"
     return "1 branch, 0 folds"
 
@@ -246,13 +246,12 @@ def planner_track(made: Path, out: Path) -> str:
 
 
 def planner_goal(made: Path, out: Path) -> str:
-    words = ["--robot", made / "robot.toml", "--goal", "2l", "0.5l", 90, "--keep-out", "circle:1.5l,3l,0.5l"]
+    words = ["--robot", made / "robot.toml", "--goal", "0.8l", "0.2l", 30, "--keep-out", "circle:1.5l,3l,0.5l"]
     done("planner", "goal", *words, "--out", out / "trip")
     assert names(out / "trip") == FILES | {"goal.json", "goal.svg"}
     end = load_plan(out / "trip" / "plan.json")["predicted_poses"][-1]
-    assert end[:2] == pytest.approx([2, 0.5], abs=1e-3)
-    assert np.sin(end[2]) > 1 - 1e-6
-    return "end: (22.00, 5.50) cm = (2.000, 0.500) l, heading 90.0 degrees"
+    assert end == pytest.approx([0.8, 0.2, np.pi / 6], abs=1e-3)
+    return "end: (8.80, 2.20) cm = (0.800, 0.200) l, heading 30.0 degrees"
 
 
 def planner_tour(made: Path, out: Path) -> str:
@@ -264,21 +263,32 @@ def planner_tour(made: Path, out: Path) -> str:
 
 def planner_cover(made: Path, out: Path) -> str:
     (out / "tank.csv").write_text("x,y\n0,0\n3,0\n3,2\n0,2\n")
-    words = [out / "tank.csv", "--unit", "l", "--width", "0.6", "--robot", made / "robot.toml"]
+    words = [
+        out / "tank.csv",
+        "--unit",
+        "l",
+        "--width",
+        "0.6",
+        "--robot",
+        made / "robot.toml",
+        "--objective",
+        "flips",
+    ]
     done("planner", "cover", *words, "--out", out / "swept")
     assert names(out / "swept") > FILES
     return "covers 100.0 %"
 
 
 def planner_hold(made: Path, out: Path) -> str:
-    done("planner", "hold", "2l,1l", "--for", "3min", "--robot", made / "robot.toml", "--out", out / "held")
+    words = ["--for", "3min", "--robot", made / "robot.toml", "--objective", "flips"]
+    done("planner", "hold", "2l,1l", *words, "--out", out / "held")
     assert names(out / "held") == FILES | {"hold.json", "hold.svg"}
     return "no schedule stays nearer"
 
 
 def planner_fleet(made: Path, out: Path) -> str:
     robot = f'[[member]]\nrobot = "{made / "robot.toml"}"\nunit = "l"\n'
-    goals = [f"goal = [2, {y}, 0]\nstart = [0, {y}, 0]\n" for y in (0, 2)]
+    goals = [f"goal = [0.8, {y}, 0]\nstart = [0, {y}, 0]\n" for y in (0, 2)]
     (out / "fleet.toml").write_text("".join(robot + goal for goal in goals))
     done("planner", "fleet", out / "fleet.toml", "--apart", "5cm", "--out", out / "fleet")
     assert json.loads((out / "fleet" / "fleet.json").read_text())["sure_distance_m"] > 0.05

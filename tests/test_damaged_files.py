@@ -25,7 +25,7 @@ pytestmark = pytest.mark.slow
 CASES, FEW = 40, 5  # mutations of a format; of one whose reader takes more than 10 ms
 COSTLY = (
     "camera tracks", "runs of camera tracks", "replayed track", "plan to track", "table of one robot, sealed",
-    "model, sealed",
+    "model, sealed", "measured runs", "sweep", "plan",
 )  # fmt: skip
 FILES = {name: form for name, form in FORMATS.items() if form.seal is None}
 TEXTS = {name: form for name, form in FILES.items() if form.tokens and name not in {"model", "plan to track"}}

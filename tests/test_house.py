@@ -6,6 +6,7 @@ import ast
 import json
 import subprocess
 import sys
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -18,6 +19,7 @@ ORDER = ("sim", "dataset", "surrogate", "planner", "calibration", "softflagella"
 ROBOTS = {"model", "effects", "inputs", "mechanics", "solve", "motion"}  # rooms of `sim` that know robots
 
 
+@cache
 def imported(file: Path) -> set[str]:
     """List by full names what a file imports of the packages, wherever in it; `from a import b` counts as a.b."""
     names = set()
@@ -64,6 +66,7 @@ def test_statistics_and_networks_know_no_robot() -> None:
 LIBRARIES = {"jinja2", "joblib", "matplotlib", "numba", "numpy", "pandas", "pyarrow", "safetensors", "scipy",
              "svgelements", "torch", "tqdm"}  # fmt: skip
 SOLVERS = {"sim.linear", "sim.motion", "sim.reference", "sim.solve"}
+SIMULATOR = {"sim.solve.newton", "sim.solve.orbit", "sim.motion.steady", "sim.motion.replay", "sim.motion.run"}
 TRAINING = {"surrogate.training", "surrogate.networks.training_loop", "surrogate.networks.checkpoints"}
 CODE = """
 import json, sys
@@ -85,7 +88,7 @@ print(json.dumps([loaded, sorted(sys.modules)]))
 
 
 def test_importing_loads_only_what_is_used() -> None:
-    """A package loads no library and no package but `sim`; a query and a plan no training code."""
+    """A package loads no library and no package but `sim`; a query and a plan no simulator and no training."""
     names = [name for package in reversed(ORDER) for name in (package, f"{package}.__main__")]
     command = [sys.executable, "-c", CODE, *names]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT, timeout=LIMIT)
@@ -96,4 +99,4 @@ def test_importing_loads_only_what_is_used() -> None:
         others = set(ORDER) - {"sim", name.split(".")[0]}
         assert not set(modules) & (LIBRARIES | SOLVERS | others), name
     assert "surrogate.table.wrench_table" in after_a_plan
-    assert not set(after_a_plan) & (TRAINING | {"joblib", "pandas", "torch"})
+    assert not set(after_a_plan) & (SIMULATOR | TRAINING | {"joblib", "pandas", "torch"})

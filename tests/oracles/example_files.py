@@ -19,8 +19,6 @@ from calibration.verdict.sequential_test import Explanation
 from dataset.data_set import sweep_key
 from dataset.schema import rows_version
 from planner.files.goal_files import write_goal_plan
-from planner.goal.to_goal import to_goal
-from planner.paths.obstacles import Circle
 from planner.paths.path import circle
 from planner.planning.plan import plan
 from planner.vehicle.calibration_table import CalibrationKnowledge, knowledge_toml
@@ -36,6 +34,7 @@ from surrogate.table.lookup import FORMAT
 from surrogate.table.model_file import SHIPPED, load
 from tests.calibration.track import track
 from tests.dataset.sweeps import design, invented, write_rows
+from tests.planner.plans import hindered_trip
 from tests.shared import shared
 
 ROBOT = PRESETS["paper-control"]
@@ -161,8 +160,7 @@ def plan_file() -> bytes:
 @shared
 def goal_file() -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        trip = to_goal((0, 0, 0), (2.5, 0.5, 0.3), ROBOT, keep_out=[Circle(1.0, -1.5, 0.3)])
-        write_goal_plan(trip, folder)
+        write_goal_plan(hindered_trip(), folder)
         return Path(folder, "goal.json").read_bytes()
 
 

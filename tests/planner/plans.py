@@ -69,7 +69,7 @@ def around(dwell: float | None = None, *, feedback: bool = False) -> Plan:
 
 
 @shared
-def trip(goal: tuple[float, float, float] = (2.0, 0.7, 0.8)) -> GoalPlan:
+def trip(goal: tuple[float, float, float] = (1.2, 0.5, 0.8)) -> GoalPlan:
     """Plan from rest at the origin to a pose."""
     return to_goal((0.0, 0.0, 0.0), goal, CONTROL, objective="flips")
 

@@ -88,8 +88,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
          "boxx:0,0,1,1: no such file or region; is it box:0,0,1,1? regions are circle:X,Y,RADIUS, box:"),
         ("plan line.csv --unit l --keep-out ring:0,1 R", "ring:0,1: no such file or region; regions are circle:X"),
         ("plan line.csv --unit l --keep-out circle:0,0.2,0.4 R", "the path begins at"),
-        ("plan line.csv --unit l --keep-out box:1.8,-1,2.2,1 --walls box:-2,-1,6,1 R",
-         "there is no way around that leaves"),
+        ("plan line.csv --unit l --keep-out box:1.8,-1,2.2,1 --walls box:-1,-0.8,5,0.8 R",
+         "where the robot has 0 cm (0 l) around it; it needs"),
         ("plan circle:1l --camera 0.02l 0.03 1.5 0.5 1.1 R", "camera: lost is 1.1"),
         ("plan circle:1l --camera 0.02 0.03 1.5 0.5 0.1 R", "0.02 has no unit"),
         ("plan circle:1l --camera 0.02l 0.03cm 1.5 0.5 0.1 R", "--camera 0.02l 0.03cm 1.5 0.5 0.1: RAD"),
@@ -178,12 +178,12 @@ def test_one_square_in_many_words(words: str, tmp_path: Path, monkeypatch: pytes
 def test_a_goal_in_centimetres(tmp_path: Path) -> None:
     box = [[-2, -3], [5, -3], [5, 3], [-2, 3]]
     (tmp_path / "outline.csv").write_text("".join(f"{x * CM},{y * CM}\n" for x, y in box))
-    words = ["goal", "--robot", "paper-control", "--unit", "cm", "--goal", str(2 * CM), str(0.5 * CM), "-30"]
+    words = ["goal", "--robot", "paper-control", "--unit", "cm", "--goal", str(0.8 * CM), str(0.2 * CM), "-30"]
     words += ["--objective", "flips"]
     words += ["--walls", str(tmp_path / "outline.csv"), "--keep-out", f"circle:0,{3 * CM},{CM}"]
     assert run_command(main, [*words, "--out", str(tmp_path / "out")]) == 0
     content = json.loads((tmp_path / "out" / "goal.json").read_text())
-    assert content["goal"] == pytest.approx([2, 0.5, -math.pi / 6])
+    assert content["goal"] == pytest.approx([0.8, 0.2, -math.pi / 6])
     assert np.array(content["walls"]) == pytest.approx(np.array(box))
     assert content["keep_out"][0]["circle"] == pytest.approx([0, 3, 1])
     assert content["margin_over_l"] > 0

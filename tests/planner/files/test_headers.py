@@ -175,7 +175,9 @@ def slower() -> Vehicle:
         PROMPT,
         replace(PROMPT, lost=1.0),
         replace(PROMPT, delay_s=2.0, lost=0.2, wrong=0.1),
-        replace(PROMPT, every_s=0.21, delay_s=0.9, lost=0.5, wrong=0.3, seed=1),
+        pytest.param(
+            replace(PROMPT, every_s=0.21, delay_s=0.9, lost=0.5, wrong=0.3, seed=1), marks=pytest.mark.rest
+        ),
     ],
     ids=["good", "none at all", "late, gaps, wrong", "often and bad"],
 )

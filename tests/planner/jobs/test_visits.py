@@ -149,10 +149,10 @@ def test_among_obstacles_it_keeps_clear() -> None:
 
 
 def test_the_simulator_visits_all_places() -> None:
-    result = tour(PLACES[:4], tracked(), QUICK)
+    result = tour(PLACES[:3], tracked(), QUICK)
     track = replay([result.plan.schedule()])[0]
     points = track[["x_over_l", "y_over_l"]].to_numpy(float)
-    assert distance_to(points, np.array(PLACES[:4])).max() < result.plan.stated_error + 0.05
+    assert distance_to(points, np.array(PLACES[:3])).max() < result.plan.stated_error + 0.05
 
 
 def test_the_command_reads_places_from_words_and_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

