@@ -14,11 +14,11 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.common import timed
-from benchmarks.simulator.bdf_solver import settle_plainly
 from dataset.design import load_design
 from sim.model.groups import Groups
 from sim.motion.batches import available_jobs, steady_columns
 from sim.motion.steady import steady
+from tests.oracles.plain_swimmer import settle_plainly
 
 ROBOTS = 5
 POINTS = 2048

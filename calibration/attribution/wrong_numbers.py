@@ -145,11 +145,16 @@ def beats_number(best: Sequence[Candidate], number: Fit) -> bool:
 
 
 def as_good_as_number(candidates: Sequence[Candidate], number: Fit, level: float) -> list[Candidate]:
-    """Return the effects that leave no more than noise and fit as well as a wrong number, best first."""
-    near = [
+    """Return the effects that leave no more than noise and fit as well as a wrong number, best first.
+
+    If the best of them does, so do those that cannot be told from it.
+    """
+    near = sorted(
         (c.refit.deviance, place)
         for place, c in enumerate(candidates)
-        if c.refit and c.refit.converged and c.refit.deviance < number.deviance + INDISTINGUISHABLE
-        if c.refit_misfit and c.refit_misfit.p_value >= level / 2
-    ]
-    return [candidates[place] for _, place in sorted(near)]
+        if c.refit and c.refit.converged and c.refit_misfit and c.refit_misfit.p_value >= level / 2
+    )
+    if not near or near[0][0] >= number.deviance + INDISTINGUISHABLE:
+        return []
+    most = max(number.deviance, near[0][0]) + INDISTINGUISHABLE
+    return [candidates[place] for deviance, place in near if deviance < most]

@@ -4,12 +4,16 @@ Most influences change the robot of a run: an effect of `sim.effects` gets the s
 column of the table (hours since the first run, kelvin above the mean). Others change the observation only: the
 true speed of the motor, the tracked point of the axis, a current in the lab. Some influences need a column. If the
 table does not have it, they cannot be tested, and the report says so.
+
+A fault of one tail of N changes the tails' wrench, averaged over a turn, as a change of all tails by 1/N of it, to
+first order. So in runs with N tails a number of the robot is multiplied by a power of 1 − x/N: the length of the
+tails or E; for a missing tail, the head's coefficients.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 from calibration.statistics.statistical_model import Parameter
@@ -17,6 +21,13 @@ from sim.effects import Effect, catalogue
 
 SLIP, TRACKED_POINT = "motor_slip", "tracked_point"
 CURRENT = ("current_along_x", "current_along_y")
+_ONE_TAIL = {  # name: title, unit, bounds, typical, plausible, powers of the robot's numbers in 1 - x/N
+    "one_tail_shorter": ("one tail shorter", "l", (-0.5, 0.6), 0.1, (0.02, 0.5), {"tail_length": 1}),
+    "one_tail_softer": ("one tail softer", "E", (-0.9, 0.8), 0.2, (0.05, 0.7), {"youngs_modulus": 1}),
+    "one_tail_missing": (
+        "one tail missing", "tails", (0.0, 1.5), 1.0, (0.7, 1.3), {"C_t": -1, "C_r": -1, "C_yr": -1}
+    ),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -27,6 +38,7 @@ class Influence:
     effect: str | None  # of `sim.effects`; None: acts on the observation
     needs: str | None  # column of the table that it needs
     odd: bool  # left and right turns differ with it
+    one_tail: Mapping[str, int] = field(default_factory=dict)  # powers of the robot's numbers in 1 − x/N
 
 
 def influences() -> dict[str, Influence]:
@@ -60,6 +72,9 @@ def influences() -> dict[str, Influence]:
             shown=100.0,
         )
         known[name] = Influence(current, None, f"course_{axis}", False)
+    for name, (title, unit, bounds, typical, plausible, numbers) in _ONE_TAIL.items():
+        fault = Parameter(name, title, 0.0, bounds, typical, unit=unit, plausible=plausible)
+        known[name] = Influence(fault, None, None, False, numbers)
     known[SLIP] = Influence(slip, None, None, False)
     known[TRACKED_POINT] = Influence(point, None, None, False)
     return dict(sorted(known.items()))

@@ -35,7 +35,7 @@ POWERS: dict[str, dict[str, float]] = {
     CAMERA: {},
     HEADING: {},
 }
-GROUPS = ("omega_bar", "l_over_r0", "l_over_R", "L_over_R", "a_over_R")
+GROUPS = ("omega_bar", "l_over_r0", "l_over_R", "L_over_R", "a_over_R", "C_t", "C_r", "C_yr")
 _TITLES = {
     "youngs_modulus": "E (Young's modulus)",
     "viscosity": "μ0 (viscosity)",

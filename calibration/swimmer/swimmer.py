@@ -179,8 +179,13 @@ class SwimmerModel:
         view = self._observation(runs)
         J = np.empty((*self.runs.y.shape, len(names)))
         for j, (name, influence) in enumerate(influences.items()):
-            if name in POWERS:
-                J[..., j] = self._slope_of_number(name, runs, columns, sensitivities, view)[place]
+            powers = _powers(name, influence)
+            if powers is not None:
+                by = np.array([1 / run.robot.tail_length if name == LENGTH else 1.0 for run in runs])
+                camera = float(name == CAMERA)
+                J[..., j] = self._slope_of_number(powers, by, columns, sensitivities, view, camera)[place]
+                if name not in POWERS:
+                    J[..., j] /= np.reshape(parameters[name] - self.runs.tails, (-1, 1))
                 if name == HEADING:
                     J[..., j] += self._turned(1.0)
                 continue
@@ -200,22 +205,21 @@ class SwimmerModel:
 
     def _slope_of_number(
         self,
-        name: str,
-        runs: list[_Run],
+        powers: Mapping[str, float],
+        by: Floats,
         columns: dict[str, Floats],
         sensitivities: Sensitivities,
         view: Observation,
+        camera: float,
     ) -> Floats:
-        """Compute the derivatives (m, k) along a nuisance parameter, on its own scale."""
-        by = np.array([1 / run.robot.tail_length if name == LENGTH else 1.0 for run in runs])
-        powers = POWERS[name]
-        motion = {key: np.zeros(len(runs)) for key in sensitivities.derivatives}
+        """Compute the derivatives (m, k) along a number by its groups' powers; `by` (m,): of its ln."""
+        motion = {key: np.zeros(len(by)) for key in sensitivities.derivatives}
         for group in (group for group in powers if group in GROUPS):
             at = sensitivities.parameters.index(group)
             for key, table in sensitivities.derivatives.items():
                 motion[key] += powers[group] * by * columns[group] * table[:, at]
         scales: dict[str, Floats] = {k: powers[k] * by for k in ("time", "length", "ahead") if k in powers}
-        return view.slopes(sensitivities.values, motion, camera=float(name == CAMERA), scales=scales)
+        return view.slopes(sensitivities.values, motion, camera=camera, scales=scales)
 
     def _turned(self, zero: Value) -> Floats:
         """Change (n, k) of the outputs if the zero of the heading is off: θ grows in one direction of the
@@ -352,9 +356,14 @@ class SwimmerModel:
                     effects[second.name] = parameters.get(second.name, second.start)
             elif influence.parameter.name in CURRENT:
                 current += by
+        numbers = robot_numbers(self.robot, parameters)
+        numbers["tail_length"] = float(self.runs.length[row]) + parameters.get(LENGTH, 0.0)
+        tails = int(self.runs.tails[row])
+        for influence in self._at_work(parameters):
+            for name, power in influence.one_tail.items():
+                numbers[name] *= (1 - parameters[influence.parameter.name] / tails) ** power
         robot = replace(
-            self.robot, **robot_numbers(self.robot, parameters), tails=int(self.runs.tails[row]),
-            tail_length=float(self.runs.length[row]) + parameters.get(LENGTH, 0.0),
+            self.robot, **numbers, tails=tails,
             motor_speed=abs(omega) * parameters.get(TACHOMETER, 1.0) * (1 - parameters.get(SLIP, 0.0)),
             effects=effects,
         )  # fmt: skip
@@ -384,10 +393,22 @@ class SwimmerModel:
         )
 
 
+def _powers(name: str, influence: Influence | None) -> Mapping[str, float] | None:
+    """Return the powers of the groups in a nuisance parameter, or in 1 − x/N for a fault of one tail."""
+    if influence is None or not influence.one_tail:
+        return POWERS.get(name)
+    return {
+        group: power * exponent
+        for number, power in influence.one_tail.items()
+        for group, exponent in POWERS.get(LENGTH if number == "tail_length" else number, {number: 1}).items()
+    }
+
+
 def _moves(name: str, influence: Influence | None) -> tuple[str, ...]:
     """Name the simulator's parameters that a parameter changes; none if it acts on what is seen."""
-    if name in POWERS:
-        return tuple(group for group in POWERS[name] if group in GROUPS)
+    powers = _powers(name, influence)
+    if powers is not None:
+        return tuple(group for group in powers if group in GROUPS)
     if influence is None:
         return (name,)
     if name == SLIP:

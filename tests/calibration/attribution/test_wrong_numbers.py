@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from scipy.stats import binom
 
 from calibration.attribution import wrong_numbers
 from calibration.attribution.refits import examine
-from calibration.attribution.wrong_numbers import beside_wrong_numbers, notable_pull, pulls
+from calibration.attribution.wrong_numbers import as_good_as_number, beside_wrong_numbers, notable_pull, pulls
 from calibration.report.corrected_robot import corrected_robot
 from calibration.statistics.fit import fit
 from calibration.statistics.residual_tests import directions, examine_residual
@@ -239,3 +241,17 @@ def test_exact_numbers_are_not_fitted_and_the_table_states_its_own() -> None:
     for bad in (-1.0, np.arange(len(table), dtype=float)):
         with pytest.raises(InputError, match="camera_scale_sigma_percent"):
             read_measurements(table.assign(camera_scale_sigma_percent=bad))
+
+
+@pytest.mark.parametrize(
+    ("deviances", "expected"), [((12.0, 6.0), [6.0, 12.0]), ((13.0, 6.0), [6.0]), ((7.0,), [])]
+)
+def test_effects_that_cannot_be_told_from_the_best_rival_of_a_number_are_rivals(
+    deviances: tuple[float, ...], expected: list[float]
+) -> None:
+    """The number leaves 0; an effect is as good up to 6.63, and so is what cannot be told from the best effect."""
+    passed = SimpleNamespace(p_value=0.5)
+    fits: list[Any] = [SimpleNamespace(deviance=d, converged=True) for d in deviances]
+    candidates: list[Any] = [SimpleNamespace(refit=each, refit_misfit=passed) for each in fits]
+    number: Any = SimpleNamespace(deviance=0.0)
+    assert [c.refit.deviance for c in as_good_as_number(candidates, number, 0.04)] == expected

@@ -147,3 +147,12 @@ def test_a_motion_that_does_not_settle_is_refused_and_named() -> None:
     thins = replace(PRESETS["paper-control"], effects={"shear_thinning": 0.8})
     with pytest.raises(InputError, match=r"1 of 1 motions .* example N = 2, l = 11 cm"):
         make_table(thins, seed=0, tails=(2,), lengths_cm=(11.0,), motor_rpm=(100.0,), trials=1, title="")
+
+
+def test_faults_of_one_tail_have_the_derivatives_of_the_prediction(table: pd.DataFrame) -> None:
+    model = SwimmerModel(START, read_measurements(table), solver=toy.SOLVER)
+    sizes = {"one_tail_shorter": 0.2, "one_tail_softer": 0.3, "one_tail_missing": 0.5}
+    at = {**start_values(model), **sizes}
+    _, J = model.derivatives(at, list(sizes))
+    assert pytest.approx(by_differences(model, at, list(sizes))[1], abs=2e-3, rel=0.02) == J
+    assert (np.abs(J).max((0, 1)) > 0.02).all()
