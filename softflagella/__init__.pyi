@@ -59,6 +59,8 @@ from softflagella.api.sweep import sweep as sweep
 from surrogate.interface import LookupTable as LookupTable
 from surrogate.one_robot.tabulate import tabulate as tabulate
 from surrogate.table.model_file import load_table as load_table
+from surrogate.tensors import torch_query as torch_query
+from surrogate.tensors import torch_steady as torch_steady
 from surrogate.training.train import train as train
 
 effects = catalogue

@@ -30,6 +30,7 @@ def query(
     lookup: LookupTable | str | Path | None = None,
     flag: bool = False,
     certify: bool = False,
+    derivatives: bool | Sequence[str] = False,
 ) -> pd.DataFrame:
     """Ask a look-up table for the mean motion at constant motor speed, without simulating.
 
@@ -38,6 +39,8 @@ def query(
         lookup: the table, or its file; default: the one that comes with the package.
         flag: answer for robots outside the domain as well; the column `outside` says which.
         certify: simulate each robot as well; the column `certified_error` is the actual error of its answer.
+        derivatives: add the Jacobian, in all dimensionless inputs but N, or in those named; effects may be named,
+            too. A column `omega_yr_bar_per_C_yr` is ∂ω̄_yr/∂C_yr. For torch there is `torch_query`.
 
     Returns:
         A table with M rows and the columns of `steady`, without those that say how a row was simulated. `error` is
@@ -45,7 +48,7 @@ def query(
         `<column>_low` and `<column>_high` are the intervals of the dimensionless columns.
 
     Raises:
-        InputError: a robot cannot be, or is outside the domain of the table.
+        InputError: a robot cannot be, or is outside the domain of the table, or an input has no derivatives.
 
     Example:
         >>> import softflagella as sf
@@ -56,6 +59,10 @@ def query(
     rows, table = robot_rows(robots, robot), _table(lookup)
     with refusing_robots(rows.robots, table) if rows.robots else nullcontext():
         answer = answer_with_error(table, rows.columns, flag=flag, certify=certify)
+    if derivatives is not False:
+        names = () if derivatives is True else derivatives
+        slopes = _trained(table).derivatives(rows.columns, names, flag=True)
+        answer |= {f"{output}_per_{name}": s for output, part in slopes.items() for name, s in part.items()}
     return rows.frame(lab_motion(rows.robots, answer) if rows.robots else {}, answer)
 
 

@@ -163,6 +163,7 @@ class NeuralTable:
         own = [self.curve_errors.simulator * float(error_scale(name, motion)) for name in STEADY]
         return joined(np.diag(np.hypot(sizes, own)), curves)
 
+    @np.errstate(all="ignore")  # the gap of one tail is infinite
     def derivatives(
         self, columns: Mapping[str, Floats], parameters: Sequence[str] = (), *, flag: bool = False
     ) -> dict[str, dict[str, Floats]]:
