@@ -1,4 +1,4 @@
-"""What moved: a coefficient or a nuisance parameter that differs in a session, since one, or on a specimen.
+"""What moved: a coefficient, nuisance parameter or effect that differs in a session, since one, or on a specimen.
 
 Bubbles, another batch of fluid, a camera that was bumped: the model is right, and one of its numbers is not the
 same in all runs. So before an effect is looked for, each number may differ in each group of runs. Groups are
@@ -128,7 +128,7 @@ def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[Move, ...]]:
         for words, rows in groups_that_may_differ(plain.runs)
         if min((rows & used).sum(), (~rows & used).sum()) >= _FEWEST
     ]
-    numbers = (*plain.coefficients, *plain.nuisances)
+    numbers = (*plain.coefficients, *plain.nuisances, *(e for e in plain.effects if e.name in base.names))
     moves: tuple[Move, ...] = ()
     while groups and len(moves) < _MOST:
         fits: list[tuple[Move, Study, Fit]] = []

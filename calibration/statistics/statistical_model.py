@@ -91,8 +91,13 @@ class Runs:
         levels = [
             (f[:, None] == np.unique(f)).astype(float) for f in ((condition, session) if crossed else (condition,))
         ]
+        plain: Integers | Floats = condition
         design = np.column_stack([*levels, noted])
-        return design if _differ_more(self.y[rows], condition, design) else condition
+        each = [np.where(level[:, None], noted, 0.0) for level in levels[-1].T.astype(bool)] if crossed else []
+        for further in (design, np.column_stack([design, *each])):  # what is noted may act otherwise in a session
+            if _differ_more(self.y[rows], plain, further):
+                plain = further
+        return plain
 
     @property
     def noted_of_repeats(self) -> Floats:
@@ -254,7 +259,7 @@ def regression(
     return Gls(columns[rows], precisions(fitted), runs.session[rows], runs.scale[rows], repeated)
 
 
-def _differ_more(y: Floats, condition: Integers, design: Floats) -> bool:
+def _differ_more(y: Floats, condition: Integers | Floats, design: Floats) -> bool:
     """Tell by F-tests of the outputs (n, k) whether a design of repeats takes more from them than noise allows."""
     plain, further = repeat_count(condition), repeat_count(design)
     if further < 1 or plain == further:

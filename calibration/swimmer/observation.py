@@ -1,8 +1,9 @@
 """What a camera measures of a steady motion: the outputs of a table and their derivatives.
 
-    v = v_head + ω_yr × (p L ahead),   R = |v|/|ω_yr|,   θ = ∠(v, axis),   |v + U| along the path,
+    v = v_head + ω_yr × (p L ahead),   θ = ∠(v, axis),   |v + U| along the path,   R = |v + U|/|ω_yr|,
 
-with the tracked point p head lengths L ahead of the head's centre, and a current U of the fluid in the lab.
+with the tracked point p head lengths L ahead of the head's centre, and a current U of the fluid in the lab, along
+the path. A path that covers a part of a circle, followed at the rate of the heading, has this radius.
 Outputs are ln |output|, θ in radians.
 """
 
@@ -32,15 +33,15 @@ class Observation:
         """Compute outputs (m, k) of motions (m,) in the simulator's units."""
         yaw, surge = motion["omega_yr_bar"], motion["v_z"]
         sway = motion["v_x"] + yaw * self.point * self.ahead
-        speed = np.hypot(sway, surge)
+        seen = np.hypot(sway, surge) * self.length / self.time + self.current
         with np.errstate(divide="ignore", invalid="ignore"):
             values = {
                 "omega_h": np.log(np.abs(motion["omega_h_bar"]) / self.time),
                 "omega_t": np.log(np.abs(motion["omega_t_bar"]) / self.time),
                 "omega_yr": np.log(np.abs(yaw) / self.time),
-                "R_yr": np.log(self.camera * speed / np.abs(yaw) * self.length),
+                "R_yr": np.log(self.camera * seen * self.time / np.abs(yaw)),
                 "theta": np.arctan2(np.abs(sway), surge),
-                "v": np.log(self.camera * (speed * self.length / self.time + self.current)),
+                "v": np.log(self.camera * seen),
             }
         return np.stack([values[name] for name in self.outputs], 1)
 
@@ -69,12 +70,13 @@ class Observation:
         speed = np.hypot(sway, surge)
         faster = (sway * side + surge * rise) / speed
         seen = speed * self.length / self.time + self.current
+        along = ((faster + speed * (longer - slower)) * self.length / self.time + current) / seen + camera
         values = {
             "omega_h": change.get("omega_h_bar", none) / motion["omega_h_bar"] - slower,
             "omega_t": change.get("omega_t_bar", none) / motion["omega_t_bar"] - slower,
             "omega_yr": turn / yaw - slower,
-            "R_yr": faster / speed - turn / yaw + longer + camera,
+            "R_yr": along + slower - turn / yaw,
             "theta": np.sign(sway) * (surge * side - sway * rise) / speed**2,
-            "v": ((faster + speed * (longer - slower)) * self.length / self.time + current) / seen + camera,
+            "v": along,
         }
         return np.stack([values[name] for name in self.outputs], 1)

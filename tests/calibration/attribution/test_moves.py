@@ -16,6 +16,7 @@ from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.statistics.weights import alike
+from calibration.swimmer.candidate_effects import CURRENT
 from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.record import facts, verdict_record
 from calibration.words.render import next_steps
@@ -138,18 +139,33 @@ def test_another_robot_is_named() -> None:
     assert "C_yr on robot" in move.words
 
 
+def test_a_current_that_turns_with_the_camera_on_the_held_out_day_is_named_with_that_day() -> None:
+    table = in_days(toy_table(3))
+    course = np.random.default_rng(0).uniform(0, 360, len(table))
+    along = 0.6 * np.cos(np.radians(course - 30))  # of the current [cm/s]
+    table["R_yr_cm"] += along / table["omega_yr_rad_s"].abs()
+    table["course_deg"] = course + 90 * (table["session"] == "day 3")
+    with on_the_toy(few=(*CURRENT, DRAG)):
+        result = calibrate_robot(table, START, laws=False, progress=False)
+    assert result.effects == CURRENT
+    assert {move.record["number"] for move in result.moves} == set(CURRENT)
+    assert {move.record["where"] for move in result.moves} == {"in session day 3"}
+
+
 @pytest.mark.rest
 @pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured tables are not on this machine")
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("name", "effects", "said"),
     [
-        ("bench-c.csv", ["C_r in session day3 is 20 %"]),
-        ("bench-d.csv", ["C_yr since session B1", "E (Young's modulus) since session B1"]),
+        ("bench-c.csv", (), ["C_r in session day3 is 20 %"]),
+        ("bench-d.csv", (), ["C_yr since session B1", "E (Young's modulus) since session B1"]),
+        ("bench-e.csv", CURRENT, [f"Current in the tank along {axis} in session day3 is" for axis in "xy"]),
     ],
 )
-def test_what_moved_on_a_bench_is_named(name: str, said: list[str]) -> None:
-    """Bubbles on day 3 (C_r 20 % lower); two robots (E 25 % higher, C_yr 15 % lower)."""
+def test_what_moved_on_a_bench_is_named(name: str, effects: tuple[str, ...], said: list[str]) -> None:
+    """Bubbles on day 3 (C_r 20 % lower); two robots (E 25 % higher, C_yr 15 % lower); a current, and the camera
+    turned on day 3."""
     robot = load_robot(MEASURED / "bench-robot.toml")
     result = calibrate_robot(MEASURED / name, robot, laws=False, progress=False)
-    assert result.effects == ()
+    assert result.effects == effects
     assert all(words in result.sentence for words in said)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -82,14 +83,19 @@ def test_an_odd_effect_of_the_robot_itself_tells_left_from_right(table: pd.DataF
     assert np.abs(left_turns[1] - right_turns)[:, yaw].min() > 1e-4
 
 
-def test_a_current_shows_in_the_speed_along_its_heading(table: pd.DataFrame) -> None:
+def test_a_current_shows_in_the_speed_along_its_heading_and_in_the_radius(table: pd.DataFrame) -> None:
     model = toy_swimmer(table)
     at = start_values(model)
     still, moving = model.predict([at, {**at, "current_along_x": 0.001}])
-    speed = model.runs.outputs.index("v")
+    speed, radius = (model.runs.outputs.index(name) for name in ("v", "R_yr"))
     gained = np.exp(moving[:, speed]) - np.exp(still[:, speed])
     assert gained == pytest.approx(0.001 * np.cos(np.radians(table["course_deg"])))
-    assert np.delete(moving - still, speed, 1) == pytest.approx(0)
+    assert (moving - still)[:, radius] == pytest.approx((moving - still)[:, speed])  # R = v/|ω_yr|, as seen
+    assert np.delete(moving - still, [speed, radius], 1) == pytest.approx(0)
+    names = ("current_along_x", "camera_scale", "C_t", "tail_length_offset", "viscosity")
+    at = {**at, "current_along_x": 0.001}
+    exact, difference = (f(at, names)[1] for f in (model.derivatives, partial(by_differences, model)))
+    assert exact == pytest.approx(difference, rel=0.02, abs=0.02 * np.abs(difference).max())
     without = toy_swimmer(table.drop(columns="course_deg"))
     assert "current in the tank along x" in without.untestable
 
