@@ -107,13 +107,12 @@ class _Ending:
 
 def flips_after(vehicle: Vehicle, switches: Switches, kept: int, last: Floats) -> Floats:
     """Predict the poses (B, K, 3) at the flips where dwells (B, K) follow the first `kept` ones of a schedule."""
-    pose = np.repeat(switches.poses[None, kept], len(last), 0)
-    before = None if kept == 0 else np.full(len(last), switches.dwells[kept - 1])
-    sense = switches.first_direction * (-1) ** kept
-    poses = np.empty((*last.shape, 3))
-    for k, dwell in enumerate(last.T):
-        pose = planar.compose(pose, vehicle.motion(sense, before, dwell))
-        pose[:, :2] += vehicle.current * dwell[:, None]
-        poses[:, k] = pose
-        sense, before = -sense, dwell
-    return poses
+    sense, changes = switches.first_direction * (-1) ** kept, np.empty((*last.shape, 3))
+    before = np.concatenate([np.full((len(last), 1), switches.dwells[kept - 1]), last[:, :-1]], 1)
+    for first, direction in enumerate((sense, -sense)):
+        changes[:, first::2] = vehicle.motion(direction, before[:, first::2], last[:, first::2])
+    if kept == 0:
+        changes[:, 0] = vehicle.motion(sense, None, last[:, 0])
+    heading = switches.poses[kept, 2] + np.cumsum(changes[..., 2], 1)
+    moved = planar.turn(changes[..., :2], heading - changes[..., 2]) + vehicle.current * last[..., None]
+    return np.concatenate([switches.poses[kept, :2] + np.cumsum(moved, 1), heading[..., None]], -1)
