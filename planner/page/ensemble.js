@@ -1,6 +1,6 @@
 /* Networks of the look-up table: small perceptrons in double precision, each plus a linear map.
  *
- * Mirrors surrogate/networks/ensemble.py and surrogate/networks/compiled.py, one robot at a time. */
+ * Mirrors surrogate/networks/ensemble.py and surrogate/networks/loops.py, one robot at a time. */
 
 /* Prepare a network {shift, scale, mean, spread, members} from the arrays of a model file. Ensemble.from_state */
 function networkOf({ shape, state }) {
