@@ -23,7 +23,7 @@ from tests.processes import LIMIT
 RUN = ("sh", "python")
 LONG = {"tutorial/schedule.md", "howto/sweep.md", "howto/goal.md", "howto/jobs.md", "howto/page.md",
         "howto/query.md", "howto/tracker.md"}  # fmt: skip
-LONGEST = {"tutorial/calibration.md"}
+LONGEST = {"tutorial/calibration.md", "tutorial/bad-day.md"}
 NAMED = re.compile(r"# (?P<name>[\w-]+\.toml)$", re.MULTILINE)
 SHOWN = {*RUN, "toml", "text", "c", "js"}
 
