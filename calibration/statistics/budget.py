@@ -57,9 +57,14 @@ def limited_as_one() -> AbstractContextManager[object]:
     return limited(_SHARE_OF_ONE * outer[-1].seconds) if outer else nullcontext()
 
 
+def seconds_left() -> float:
+    """Return the processor time that is left; infinite without a limit."""
+    return min((budget.left for budget in _BUDGETS.get()), default=math.inf)
+
+
 def spent() -> bool:
     """Tell whether no processor time is left."""
-    return any(budget.left <= 0 for budget in _BUDGETS.get())
+    return seconds_left() <= 0
 
 
 def skipped(what: str) -> bool:

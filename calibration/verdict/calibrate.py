@@ -52,7 +52,7 @@ from calibration.attribution.wrong_numbers import (
     pulls,
     without_wrong_priors,
 )
-from calibration.statistics.budget import Budget, limited
+from calibration.statistics.budget import Budget, limited, seconds_left
 from calibration.statistics.fit import Fit, Pull, fit, profile_intervals
 from calibration.statistics.held_out import (
     FinalRefit,
@@ -354,9 +354,10 @@ def _forecast(misfit: Misfit, threshold: float, seconds_of_fit: float, seconds_o
     count = int(((np.abs(scores.z) >= threshold) & (scores.survived >= TESTABLE)).sum())
     single = count * seconds_of_fit
     pairs_at_most = FIRST * (seconds_of_directions + single)
+    ends = f"; the search ends after {_duration(seconds_left())} of processor time" * (seconds_left() < math.inf)
     return (
         f"there is more than noise: {count} effects to fit, about {_duration(single)}; if none of them explains "
-        f"the runs, pairs follow, {_duration(pairs_at_most)} at most, mostly much less"
+        f"the runs, pairs follow, {_duration(pairs_at_most)} at most, mostly much less{ends}"
     )
 
 
