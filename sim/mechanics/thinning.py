@@ -1,8 +1,9 @@
-"""Drag of a tail that differs from segment to segment: a shear-thinning fluid, and laws of local drag.
+"""Drag of a tail that differs from segment to segment: thinning and stratified fluids, and laws of local drag.
 
-    q → f q,   f = (1 + (λ |v|/r0)²)^(−ε/2) × (λ_c |v|/r0)^p × e^(g (2 s/l − 1))
+    q → f q,   f = (1 + (λ |v|/r0)²)^(−ε/2) × (λ_c |v|/r0)^p × e^(g (2 s/l − 1)) × e^(γ y)
 
-v is the velocity of the node through the fluid, s its distance from the clamp. ε is the size of
+v is the velocity of the node through the fluid, s its distance from the clamp, y its height over the axis; γ is of
+`sim.effects.stratified_viscosity`. ε is the size of
 `sim.effects.shear_thinning`; p and g are those of `sim.model.scaled_effect`. λ is e^time in units of the time that
 makes λ γ̇ = 1 at the clamps of the paper's control example; λ_c is λ for time = 0. It is the same number of seconds
 for robots of one material and fluid, so in units of μ0 l⁴/EI it is proportional to r0⁴. Source: Carreau (1972).
@@ -29,15 +30,17 @@ UNIT_OF_TIME = _SLENDERNESS**4 / _RATE  # λ_1 (l/r0)⁴
 def thins(body: Body) -> bool:
     """Tell whether the drag differs from segment to segment."""
     terms = body.nonlocal_terms
-    return bool(terms.shear_thinning != 0 or terms.tail_drag_by_speed != 0 or terms.tail_drag_along != 0)
+    local = terms.tail_drag_by_speed != 0 or terms.tail_drag_along != 0
+    return bool(terms.shear_thinning != 0 or local or terms.stratified_viscosity != 0)
 
 
 @compiled
-def thinned(geometry: Geometry, body: Body, k: int, m: int, velocity: Vector) -> Vector:
+def thinned(geometry: Geometry, body: Body, k: int, m: int, velocity: Vector, height: float) -> Vector:
     """Compute what this changes in the drag on node k of tail m (0: the half cell at the clamp).
 
     Args:
         velocity: of the node through the fluid.
+        height: y of the node.
     """
     n = geometry.length.shape[0]
     voronoi = 0.5 / n if k == 0 or k == n else 1.0 / n
@@ -45,6 +48,6 @@ def thinned(geometry: Geometry, body: Body, k: int, m: int, velocity: Vector) ->
     terms = body.nonlocal_terms
     square = dot(velocity, velocity) * (UNIT_OF_TIME * body.tail_radius**3) ** 2  # of λ_c |v|/r0
     factor = (1 + square * np.exp(2 * terms.shear_thinning_time)) ** (-0.5 * terms.shear_thinning)
-    along = terms.tail_drag_along * (2 * k / n - 1)
+    along = terms.tail_drag_along * (2 * k / n - 1) + terms.stratified_viscosity * height
     factor = factor * np.exp(0.5 * terms.tail_drag_by_speed * np.log(square + _STILL) + along)
     return times(factor - 1, node_drag(node_tangent(geometry, k, m)[0], velocity, perp, excess))

@@ -22,12 +22,13 @@ from sim.arrays import Floats
 from sim.compiling import compiled_exactly
 from sim.lanes import zeros
 from sim.linear.blocks import put, vector, vector_at
-from sim.linear.vectors import ZERO, cross, minus, plus
+from sim.linear.vectors import ZERO, cross, dot, minus, plus
 from sim.mechanics.balance import body_wrench, clamp_balance, head_drag, motion_at, node_balance
 from sim.mechanics.contact_line import add_contact_line
 from sim.mechanics.flow import add_flow, has_flow
 from sim.mechanics.frames import add_frames, has_frames
 from sim.mechanics.geometry import Geometry, measure, new_geometry
+from sim.mechanics.root_spring import add_root_spring
 from sim.mechanics.tail_contact import add_contact, has_contact
 from sim.mechanics.thinning import thinned, thins
 from sim.model.body import Body
@@ -99,7 +100,8 @@ def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r:
             velocity = minus(velocity, vector(room.around.flow, k + 1, m))
             residual = node_balance(room.geometry, body, motion, k, m, velocity)[0]
             if thins(body):
-                residual = plus(residual, thinned(room.geometry, body, k + 1, m, velocity))
+                height = dot(motion.e_y, vector(x, k, m))
+                residual = plus(residual, thinned(room.geometry, body, k + 1, m, velocity, height))
             put(r, k, m, residual)
         flow, moment = vector(room.around.flow, 0, m), vector_at(room.around.moment, m)
         clamp = clamp_balance(room.geometry, body, m, motion, flow, moment)
@@ -107,7 +109,7 @@ def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r:
         if thins(body):
             root = (body.offset, 0.0, 0.0)
             velocity = minus(plus(motion.linear, cross(motion.spin, root)), flow)
-            change = thinned(room.geometry, body, 0, m, velocity)
+            change = thinned(room.geometry, body, 0, m, velocity, dot(motion.e_y, root))
             force, torque = plus(force, change), plus(torque, cross(root, change))
         wrench = body_wrench(motion, force, torque)
         for a in range(4):
@@ -144,6 +146,9 @@ def _surround(body: Body, x: Floats, u: Floats, phase: float, p: int, tails: int
         for m in range(p, columns, columns // tails):
             motion = motion_at(body, u, phase + 2 * np.pi * (m - p) / columns)
             add_frames(body, geometry, motion, m, room.x_dot, around.moment)
+    if body.nonlocal_terms.root_compliance != 0:
+        for m in range(p, columns, columns // tails):
+            add_root_spring(body, geometry, m, around.moment)
     if has_contact(body):
         add_contact(body, geometry, x, u, phase, p, tails, around.wrench[p])
     if has_flow(body):

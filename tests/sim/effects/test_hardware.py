@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -33,6 +34,29 @@ def independent(groups: Groups, hardware: Hardware = NOMINAL) -> Floats:
 def test_equal_tails_move_as_in_the_simulator(N: int, omega_bar: float) -> None:
     groups = control(N=N, omega_bar=omega_bar)
     assert here(groups) == pytest.approx(independent(groups), rel=WITHIN)
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "hardware", "within"),
+    [
+        ("root_compliance", 0.1, Hardware(compliance=0.1), 3e-3),
+        ("stratified_viscosity", 0.05, Hardware(stratification=0.05 * 6.875), WITHIN),
+    ],
+)
+def test_an_effect_on_the_tails_changes_the_motion_as_in_the_independent_solver(
+    name: str, size: float, hardware: Hardware, within: float
+) -> None:
+    groups = control(N=2, omega_bar=10.0)
+    changed = here(replace(groups, effects={name: np.array([size])}))
+    assert changed[:3] == pytest.approx(independent(groups, hardware)[:3], rel=WITHIN)
+    assert changed[3] == pytest.approx(independent(groups, hardware)[3], rel=within)
+    assert np.abs(changed / here(groups) - 1).max() > 20 * WITHIN
+
+
+def test_the_same_clamps_give_less_to_shorter_tails_in_their_units() -> None:
+    """α/M in rad/(N m) is the same for tails of 11 and 5.5 cm; l/EI is half as large for the shorter."""
+    lengths = control(2, l_over_R=[6.875, 6.875 / 2], l_over_r0=[34.375, 34.375 / 2], root_compliance=0.1)
+    assert assemble(lengths).nonlocal_terms.root_compliance == pytest.approx([0.1, 0.2])
 
 
 @pytest.mark.parametrize("size", [-0.1, 0.1])

@@ -1,0 +1,41 @@
+"""Viscosity that falls with depth (or rises), at the tails.
+
+    ζ∥, ζ⊥ × e^(ε y/R),   y: height over the axis
+
+Glycerol takes up water, cools at the surface, and settles in layers. Tails that drag more on top than below push
+the robot sideways. Left out: layers at the head, which change its coefficients only, and those in the flow that
+forces make.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from sim.arrays import Floats
+from sim.model.effect import Effect
+
+if TYPE_CHECKING:
+    from sim.model.groups import Groups
+
+
+@dataclass(frozen=True)
+class StratifiedViscosity(Effect):
+    def number(self, size: Floats, groups: Groups) -> Floats:
+        return size * groups.l_over_R
+
+
+EFFECT = StratifiedViscosity(
+    name="stratified_viscosity",
+    title="viscosity falling with depth at the tails",
+    equation="ζ∥, ζ⊥ × e^(ε y/R)",
+    source="resistive force theory with the viscosity at the node",
+    unit="1/R",
+    null=0.0,
+    bounds=(-0.5, 0.5),
+    typical=0.05,
+    plausible=(-0.3, 0.3),
+    symmetry="even",
+    dissipative=False,
+    reach="nonlocal",
+)
