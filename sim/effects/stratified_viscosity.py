@@ -1,4 +1,4 @@
-"""Viscosity that falls with depth (or rises), at the tails.
+"""Viscosity that falls with depth (ε > 0) or rises, at the tails.
 
     ζ∥, ζ⊥ × e^(ε y/R),   y: height over the axis
 
@@ -27,7 +27,7 @@ class StratifiedViscosity(Effect):
 
 EFFECT = StratifiedViscosity(
     name="stratified_viscosity",
-    title="viscosity falling with depth at the tails",
+    title="viscosity that differs with depth at the tails",
     equation="ζ∥, ζ⊥ × e^(ε y/R)",
     source="resistive force theory with the viscosity at the node",
     unit="1/R",
