@@ -10,7 +10,7 @@ code of what a loop calls must be in memory before its own. So beside each cache
 that it calls (`Needed`), which are read or compiled first.
 
 Only loops that are `compiled_exactly` are called: the last digits of others depend on how often LLVM optimises
-them. Loops of other packages are linked, since `sim.object_code` needs whole ones; so are loops that are `copied`.
+them. Loops of other packages are linked.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def _may_be_called(function: Callable[..., Any]) -> bool:
     module = sys.modules.get(function.__module__)
     here = Path(function.__code__.co_filename).is_relative_to(_HERE)
     loop = getattr(module, function.__name__, None)
-    return here and isinstance(loop, Loop) and loop.exact and not loop.is_copied
+    return here and isinstance(loop, Loop) and loop.exact
 
 
 def _is_large(result: Any) -> bool:

@@ -44,7 +44,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _HERE = Path(__file__).parent
 _SOURCES = (
-    "arrays.py", "called_code.py", "compiling.py", "lane*.py", "machine_code.py", "object_code.py",
+    "arrays.py", "called_code.py", "compiling.py", "lane*.py", "machine_code.py",
     "model/body.py", "linear/*.py", "mechanics/*.py", "solve/*.py",
 )  # fmt: skip
 _KEPT = 3  # folders of other versions
@@ -209,7 +209,7 @@ class Loop:
 
     def __init__(self, function: Callable[..., Any], exact: bool = False):
         update_wrapper(self, function)
-        self.py_func, self.exact, self.is_copied = function, exact, False
+        self.py_func, self.exact = function, exact
 
     @cached_property
     def dispatcher(self) -> Any:
@@ -231,12 +231,6 @@ def compiled(function: F) -> F:
 def compiled_exactly(function: F) -> F:
     """Compile a function as `compiled` does, but never reorder its sums nor fuse its products."""
     return cast(F, Loop(function, exact=True))
-
-
-def copied(function: F) -> F:
-    """Let callers of a compiled function have copies of it, however large, for `sim.object_code`."""
-    cast(Loop, function).is_copied = True
-    return function
 
 
 _formulas: list[Callable[..., Any]] = []  # that numba has not been told of

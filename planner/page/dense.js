@@ -2,7 +2,7 @@
  *
  * Mirrors sim/linear/dense.py. */
 
-/* Solve a x = b in place by Gaussian elimination with pivoting: b becomes x, a is overwritten. solve_dense */
+/* Solve a x = b in place by Gaussian elimination with pivoting: b becomes x, a is overwritten. factor_dense, solve_factored */
 function solveDense(a, b) {
   const count = b.length, columns = b[0].length;
   for (let k = 0; k < count; k++) {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from sim.arrays import Floats
-from sim.compiling import compiled_exactly, copied
+from sim.compiling import compiled_exactly
 from sim.lanes import choose, fma, less, somewhere
 from sim.linear.blocks import block_at
 from sim.linear.products import add_block_product, multiply_block
@@ -29,28 +29,6 @@ def invert(a: Floats) -> None:
                     for j in range(k, k + 3):
                         a[row, j] = 0.0
                 add_block_product(negative(factor), a, k, 0, a, i, 0, m)
-
-
-@copied
-@compiled_exactly
-def solve_dense(a: Floats, b: Floats) -> None:
-    """Solve b = a⁻¹ b (n, K) in place by Gaussian elimination with pivoting; a is overwritten. NaN in, NaN out.
-
-    It needs no room for factors, and so can be in an object file (`sim.object_code`).
-    """
-    n = len(a)
-    for k in range(n):
-        for i in range(k + 1, n):
-            exchanged = less(abs(a[k, k]), abs(a[i, k]))
-            if somewhere(exchanged):
-                _exchange(a, k, i, k, exchanged)
-                _exchange(b, k, i, 0, exchanged)
-        scale = 1.0 / a[k, k]
-        for i in range(k + 1, n):
-            factor = a[i, k] * scale
-            _subtract(a, k, i, k + 1, factor)
-            _subtract(b, k, i, 0, factor)
-    _substitute(a, b)
 
 
 @compiled_exactly
@@ -85,7 +63,6 @@ def solve_factored(a: Floats, exchanged: Floats, b: Floats) -> None:
     _substitute(a, b)
 
 
-@copied
 @compiled_exactly
 def _exchange(a: Floats, k: int, i: int, first: int, where: Any) -> None:
     """Exchange rows k and i from column `first` on, in the lanes where a condition holds."""
@@ -94,7 +71,6 @@ def _exchange(a: Floats, k: int, i: int, first: int, where: Any) -> None:
         a[k, j], a[i, j] = choose(where, lower, upper), choose(where, upper, lower)
 
 
-@copied
 @compiled_exactly
 def _subtract(a: Floats, k: int, i: int, first: int, factor: Any) -> None:
     """Subtract a multiple of row k from row i, from column `first` on."""
@@ -102,7 +78,6 @@ def _subtract(a: Floats, k: int, i: int, first: int, factor: Any) -> None:
         a[i, j] = fma(-factor, a[k, j], a[i, j])
 
 
-@copied
 @compiled_exactly
 def _substitute(a: Floats, b: Floats) -> None:
     """Solve b = u⁻¹ b (n, K) in place, with u the upper triangle of a."""

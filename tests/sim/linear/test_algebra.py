@@ -12,7 +12,7 @@ import pytest
 from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.linear.complex_step import angle, derivative, length, magnitude, sign
-from sim.linear.dense import solve_dense
+from sim.linear.dense import factor_dense, solve_factored
 from sim.linear.gmres import combine, extend, new_krylov, start
 from sim.linear.spectral import differentiation, interpolation, with_phases
 from sim.model.slopes import SLOPE_INPUTS
@@ -58,8 +58,9 @@ def test_nothing_to_solve_for() -> None:
 def test_dense_equations_need_row_exchanges() -> None:
     matrix = np.array([[0.0, 2.0, 1.0], [1.0, 1.0, 0.0], [3.0, 0.0, 1.0]])
     right = np.array([[1.0, 2.0], [2.0, 0.0], [3.0, 1.0]])
-    found = right.copy()
-    solve_dense(matrix.copy(), found)
+    found, factors, exchanged = right.copy(), matrix.copy(), np.zeros((3, 3))
+    factor_dense(factors, exchanged)
+    solve_factored(factors, exchanged, found)
     assert matrix @ found == pytest.approx(right, abs=1e-14)
 
 
