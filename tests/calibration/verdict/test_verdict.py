@@ -9,10 +9,12 @@ from typing import Any
 import pytest
 
 from calibration.attribution.claim_checks import NumberCheck
+from calibration.verdict import calibrate
 from calibration.verdict.record import facts
 from calibration.verdict.verdict import HeldOutErrors, Verdict, reach_verdict
 from calibration.words.render import next_steps
-from tests.calibration.toy_tables import none, number
+from sim.io.errors import InputError
+from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, ambiguous, calibrated, none, number, toy_table
 
 
 @pytest.mark.parametrize(
@@ -74,3 +76,25 @@ def test_a_number_that_is_hardly_an_error_of_measurement_is_hedged(tolerances: f
     sentence = replace(said, evidence=replace(said.evidence, number_check=check)).sentence
     assert ("or something outside the catalogue looks like it" in sentence) == hedged
     assert ("off by 8 of its tolerances" in sentence) == hedged
+
+
+def test_what_breaks_down_at_its_ends_loses_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A rival that cannot be simulated at the next runs, and a model that cannot at the ends of its intervals."""
+
+    def breaks(*_: object, **__: object) -> Any:
+        raise InputError("the simulation of a run broke down")
+
+    few = (DRAG, "surface_couple", "tail_contact", "left_right_bias")
+    for name in ("next_runs", "profile_intervals"):
+        monkeypatch.setattr(calibrate, name, breaks)
+    broken, whole = calibrated(toy_table(1, lengths_cm=(8.0,), **{DRAG: 4.0}), few=few), ambiguous()
+    assert broken.verdict == "ambiguous"
+    assert (len(broken.next.explanations), broken.next.runs) == (len(whole.next.explanations), ())
+    assert broken.fits.base_intervals == {name: broken.base.interval(name) for name in broken.base.names}
+
+
+def test_coefficients_that_the_runs_do_not_determine_are_named() -> None:
+    two_tails = toy_table(3, lengths_cm=(10.0, 10.5, 11.0, 11.5), design={"tails": (2,)})
+    said = "these runs determine C_t and C_yr to no better than a factor of two"
+    assert said in calibrated(two_tails, few=FEW_CANDIDATES).conditions.caveats
+    assert not any("factor of two" in limit for limit in none().conditions.caveats)
