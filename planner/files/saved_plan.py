@@ -2,8 +2,7 @@
 
 The file has the schedule, the declared path with the pivot's headings, the guidance, the errors, and the robot's
 groups, scales and calibration. The vehicle is asked for again of a look-up table: that of the package, or the
-robot's own, simulated where the plan was made with one and kept beside plan.json. A file from before the headings
-and the guidance were written gets them computed again, from the declared path and the start.
+robot's own, simulated where the plan was made with one and kept beside plan.json.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from planner.files.own_table import table_for
 from planner.files.plan_json import check_numbers, load_plan
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D, arc_length
-from planner.paths.tractrix import Reference, reference_along
+from planner.paths.tractrix import Reference
 from planner.planning.arrival import Arrival
 from planner.planning.camera import Camera
 from planner.planning.declared_path import Declared
@@ -29,15 +28,13 @@ from planner.planning.errors import PlanErrors
 from planner.planning.kept_clear import Detour, KeptClear
 from planner.planning.lap import Lap
 from planner.planning.line_of_sight import Guidance
-from planner.planning.plan import choose_guidance, zigzag_drift
 from planner.planning.planned import GUARANTEE, Plan
 from planner.planning.stated_error import predicted_error
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.dwell_choice import Objective
 from planner.vehicle.rollout import Switches, trace
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
-from planner.vehicle.zigzag import Zigzag, zigzag
-from sim.arrays import Floats
+from planner.vehicle.zigzag import Zigzag
 from sim.io.errors import InputError, naming
 from sim.io.keywords import checks_keywords
 from sim.io.reading import ContentError, read_json
@@ -173,7 +170,7 @@ def _plan(content: Mapping[str, Any], tracked: TrackedVehicle) -> Plan:
         raise ValueError(f"objective = {objective}")
     raw, closed = np.array(content["raw_path"], dtype=float), bool(content["closed"])
     drawn = Path2D(raw[:-1] if closed else raw, closed)
-    declared, straight, guidance = _guidance(content, tracked, switches)
+    declared, straight, guidance = _guidance(content, tracked)
     errors = _errors(content, tracked, drawn, declared, switches)
     kept_clear = _kept_clear(content["kept_clear"]) if "kept_clear" in content else None
     arrival = None
@@ -189,44 +186,23 @@ def _plan(content: Mapping[str, Any], tracked: TrackedVehicle) -> Plan:
     return replace(plan, declared=replace(declared, warnings=said))
 
 
-def _guidance(
-    content: Mapping[str, Any], tracked: TrackedVehicle, switches: Switches
-) -> tuple[Declared, Zigzag, Guidance]:
-    """Read the reference and the numbers of the guidance, or compute them again."""
-    p, dwell = np.array(content["reference"], dtype=float), float(content["minimum_dwell_bar"])
-    off_drawn, missed = float(content["off_drawn_over_l"]), float(content["missed_over_l"])
-    saved = content.get("guidance")
-    if saved is None:
-        straight = zigzag(tracked.vehicle, dwell, tracked.offset)
-        reference = _dragged(p, tracked, switches.poses[0], straight, dwell, closed=bool(content["closed"]))
-    else:
-        straight = Zigzag.from_dict(saved["straight"])
-        heading = np.array(saved["heading_rad"], dtype=float)
-        q = p - tracked.rod * np.stack([np.cos(heading), np.sin(heading)], 1)
-        reference = Reference(p, q, heading, arc_length(q), bool(content["closed"]))
+def _guidance(content: Mapping[str, Any], tracked: TrackedVehicle) -> tuple[Declared, Zigzag, Guidance]:
+    """Read the reference and the numbers of the guidance."""
+    saved, p = content["guidance"], np.array(content["reference"], dtype=float)
+    straight, heading = Zigzag.from_dict(saved["straight"]), np.array(saved["heading_rad"], dtype=float)
+    q = p - tracked.rod * np.stack([np.cos(heading), np.sin(heading)], 1)
+    reference = Reference(p, q, heading, arc_length(q), bool(content["closed"]))
     to_pose = content[GUARANTEE] is None  # its arcs turn as much as the robot can, which asks for no look-ahead
     curvature = 0.0 if to_pose else float(np.abs(reference.curvature).max())
-    declared = Declared(reference, curvature, off_drawn, missed, ())
-    if saved is None:
-        return declared, straight, choose_guidance(tracked.vehicle, declared, straight, dwell)
-    guidance = Guidance(dwell, float(saved["look_ahead_over_l"]), float(saved["swing_rad"]))
+    declared = Declared(
+        reference, curvature, float(content["off_drawn_over_l"]), float(content["missed_over_l"]), ()
+    )
+    dwell, ahead, swing = content["minimum_dwell_bar"], saved["look_ahead_over_l"], saved["swing_rad"]
+    guidance = Guidance(float(dwell), float(ahead), float(swing))
     finite = np.isfinite(guidance).all() and np.isfinite(heading).all()
     if not (finite and min(guidance) > 0 and straight.speed > 0):
         raise ValueError("a number of the guidance is not above 0, or not finite")
     return declared, straight, guidance
-
-
-def _dragged(
-    p: Floats, tracked: TrackedVehicle, start: Floats, straight: Zigzag, dwell: float, *, closed: bool
-) -> Reference:
-    """Compute the pivot's reference of a declared path (m, 2) from where the pivot starts."""
-    a = tracked.vehicle.pivot_distance
-    x, y, heading = start.tolist()
-    ahead_x, ahead_y = (p[0] - [x - a * math.cos(heading), y - a * math.sin(heading)]).tolist()
-    drift = zigzag_drift(tracked, straight, dwell)
-    reference = reference_along(p, tracked.rod, math.atan2(ahead_y, ahead_x), closed=closed, drift=drift)
-    turns = round((heading - float(reference.heading[0])) / (2 * math.pi))
-    return replace(reference, heading=reference.heading + 2 * math.pi * turns)
 
 
 def _errors(

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.units import heading_in_degrees, in_lab, place_in_lab
 from planner.planning.planned import Plan
-from sim.io.deprecated import old_attributes
 from sim.io.notebook import as_html
 
 if TYPE_CHECKING:
@@ -108,6 +107,3 @@ class GoalPlan:
             "margin_over_l": self.margin,
             "predicted_clearance_over_l": finite,
         }
-
-    if not TYPE_CHECKING:
-        __getattr__ = old_attributes({"room": "free_space"})

@@ -1,12 +1,9 @@
-"""Distances between points and polylines: circles around runs of segments find the candidates, or a tree does.
-
-The tree takes time linear in the numbers of points and segments. Up to a few million pairs of a point and a run of
-segments, the circles take less time than importing the tree of scipy.
-"""
+"""Distances between points and polylines: a tree finds the segments that may be the nearest."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from planner.paths.path import steps_of
 from sim.arrays import Floats, Integers
@@ -16,9 +13,6 @@ _FINE = 4  # candidates a point
 _LEAST_POINTS = 1_000  # of the refined polyline
 _MOST_POINTS = 400_000
 _BLOCK = 16_384  # points at a time, which bounds the memory
-_RUN = 16  # segments in a circle
-_FEW_PAIRS = 8_000_000  # of points and circles
-_PAIRS = 20_000  # at a time, which bounds the memory
 
 
 def distance_to(polyline: Floats, points: Floats) -> Floats:
@@ -31,52 +25,11 @@ def nearest(polyline: Floats, points: Floats) -> tuple[Floats, Integers, Floats]
 
     Of segments whose distances differ by less than TIE the lowest number counts. At a vertex two are equally near:
     without a rule, rounding and the order of the points in the tree would choose the side of the path.
-    """
-    runs = -(-(len(polyline) - 1) // _RUN)
-    find = _nearest_by_circles if runs * len(points) <= _FEW_PAIRS else _nearest_by_tree
-    return find(polyline, points)
-
-
-def _nearest_by_circles(polyline: Floats, points: Floats) -> tuple[Floats, Integers, Floats]:
-    """Find what `nearest` finds with a circle around each run of segments.
-
-    A run is at least as far away as its circle, and at most as far as the vertex in its middle. So the nearest
-    segments are in the runs whose circles are no farther than the nearest of these vertices.
-    """
-    start, direction = polyline[:-1], np.diff(polyline, axis=0)
-    runs = -(-len(start) // _RUN)
-    members = np.minimum(_RUN * np.arange(runs)[:, None] + np.arange(_RUN + 1), len(start))
-    middle = polyline[members[:, _RUN // 2]]
-    radius = np.hypot(*np.moveaxis(polyline[members] - middle[:, None], -1, 0)).max(1)
-    segments = np.minimum(members[:, :-1], len(start) - 1)
-    distance, segment, place = np.empty(len(points)), np.empty(len(points), dtype=int), np.empty(len(points))
-    rows = max(1, _PAIRS // runs)
-    for first in range(0, len(points), rows):
-        block = slice(first, first + rows)
-        some = points[block]
-        gap = np.hypot(some[:, None, 0] - middle[:, 0], some[:, None, 1] - middle[:, 1])
-        reach = (gap.min(1) + TIE) * (1 + 1e-9)
-        point, run = np.nonzero(gap - radius * (1 + 1e-9) <= reach[:, None])
-        closest = _closest(start, direction, some[point], segments[run])
-        firsts = np.flatnonzero(np.diff(point, prepend=-1))
-        least = np.minimum.reduceat(closest[0], firsts)
-        tied = closest[0] <= least[point] + TIE
-        lowest = np.minimum.reduceat(np.where(tied, closest[1], len(start)), firsts)
-        chosen = np.flatnonzero(closest[1] == lowest[point])
-        chosen = chosen[np.unique(point[chosen], return_index=True)[1]]
-        distance[block], segment[block], place[block] = (part[chosen] for part in closest)
-    return distance, segment, place
-
-
-def _nearest_by_tree(polyline: Floats, points: Floats) -> tuple[Floats, Integers, Floats]:
-    """Find what `nearest` finds with a tree.
 
     The tree holds the polyline's points, and points between them at most s apart. The nearest place is one
     of the former, or it is within s/2 of one of the latter, along its segment: so that point's distance
     is at most √(d² + s²/4). All segments with points that near are tried.
     """
-    from scipy.spatial import cKDTree
-
     start, direction = polyline[:-1], np.diff(polyline, axis=0)
     length = np.hypot(direction[:, 0], direction[:, 1])
     total = float(length.sum())

@@ -88,31 +88,6 @@ def reference(path: Path2D, pivot_distance: float, spacing: float, drift: Drift 
     return Reference(p, q, heading, arc_length(q), path.closed)
 
 
-def reference_along(
-    p: Floats, pivot_distance: float, heading: float, *, closed: bool, drift: Drift = STILL
-) -> Reference:
-    """Compute the tractrix of a polyline from a first heading.
-
-    Args:
-        p: points (m, 2) of the tracked point; those of a closed path end where they begin.
-        pivot_distance: length of the rod; 0: the pivot itself is tracked, and the first heading does not count.
-        heading: at the first point.
-        closed: whether the path is closed.
-        drift: what carries the robot off its heading.
-
-    Raises:
-        InputError: the drift is as fast as the robot.
-    """
-    moves = np.diff(p, axis=0)
-    tangent = np.unwrap(np.arctan2(moves[:, 1], moves[:, 0]))
-    if pivot_distance <= 0:
-        headings = _pivot_headings(tangent, drift, closed=closed)
-    else:
-        headings = _drag(tangent, np.linalg.norm(moves, axis=1), pivot_distance, heading, drift)
-    q = p - pivot_distance * np.stack([np.cos(headings), np.sin(headings)], 1)
-    return Reference(p, q, headings, arc_length(q), closed)
-
-
 def _pivot_headings(tangent: Floats, drift: Drift, *, closed: bool) -> Floats:
     """Compute the headings at the points of the pivot's own path: between those of its steps."""
     before = tangent[:1] if not closed else tangent[-1:] - _turning(tangent)

@@ -26,7 +26,6 @@ from planner.vehicle.rollout import Switches, trace_smoothly
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.zigzag import Zigzag
 from sim.arrays import Floats
-from sim.io.deprecated import old_attributes
 from sim.io.errors import InputError
 from sim.io.notebook import as_html, given_axes
 from sim.io.units import column_units, format_time
@@ -41,27 +40,6 @@ if TYPE_CHECKING:
 GUARANTEE = "guaranteed_error_over_l"  # of plan.json; null where it is not known
 WIDE = 0.25  # turn radii; a predicted track that is further from the declared path gets a warning
 _OWN_TABLE_FROM = 1.7  # stated error over predicted error, from which a table of its own is proposed
-# Attributes of a plan by their old names, for one release.
-_MOVED = {
-    "point": "tracked.point",
-    "offset": "tracked.offset",
-    "vehicle": "tracked.vehicle",
-    "model": "tracked.model",
-    "pivot_distance": "tracked.rod",
-    "raw": "drawn.polyline()",
-    "closed": "drawn.closed",
-    "guide": "declared.reference",
-    "off_drawn": "declared.off_drawn",
-    "missed": "declared.missed",
-    "zigzag_rms": "straight.rms",
-    "net_speed": "straight.net_speed",
-    "ahead": "guidance.ahead",
-    "swing": "guidance.swing",
-    "drawn_rms": "errors.drawn_rms",
-    "drawn_max": "errors.drawn_max",
-    "guaranteed": "errors.guaranteed",
-    "closure": "errors.closure",
-}
 
 
 @dataclass(frozen=True, repr=False)
@@ -382,6 +360,3 @@ class Plan:
             **({} if self.arrival is None else {"arrival": self.arrival.to_dict(self.declared.swing, robot)}),
             **({} if self.lap is None else {"lap": self.lap.to_dict()}),
         }
-
-    if not TYPE_CHECKING:
-        __getattr__ = old_attributes(_MOVED)

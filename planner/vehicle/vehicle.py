@@ -20,8 +20,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
 
-from planner.vehicle.cubic_spline import spline_at
 from sim.arrays import Floats, Integers
 from sim.mechanics import planar
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED
@@ -139,7 +139,7 @@ def resampled(curve: Floats) -> Floats:
     Below the shortest dwell the curve is a straight line to zero; after SETTLED it is constant.
     """
     places = np.log(np.maximum(TIMES, DWELLS[0]))
-    spline = np.moveaxis(spline_at(np.log(DWELLS), np.moveaxis(curve, -2, 0), places), 0, -2)
+    spline = CubicSpline(np.log(DWELLS), curve, axis=-2)(places)
     return np.asarray(spline * np.minimum(TIMES / DWELLS[0], 1.0)[:, None])
 
 
@@ -152,6 +152,6 @@ def lag_table(lag: Floats, memory: Floats, before: Floats = BEFORE) -> Floats:
         before: (B,).
     """
     knots = np.log(np.append(before, FORGOTTEN))
-    known = np.moveaxis(np.concatenate([memory, np.zeros_like(memory[..., :1, :, :])], -3), -3, 0)
-    fine = np.moveaxis(spline_at(knots, known, np.log(BEFORE_KNOTS), flat_end=True), 0, -3)
+    known = np.concatenate([memory, np.zeros_like(memory[..., :1, :, :])], -3)
+    fine = CubicSpline(knots, known, axis=-3, bc_type=("not-a-knot", "clamped"))(np.log(BEFORE_KNOTS))
     return resampled(lag[..., None, :, :] + fine)

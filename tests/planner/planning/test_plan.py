@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any, get_type_hints
@@ -16,7 +15,6 @@ from planner.files.plan_files import controller_header
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import plan
-from planner.planning.planned import _MOVED
 from planner.planning.request import PlanRequest, RequestOptions
 from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
 from planner.vehicle.dwell_choice import dwells_for, longest_dwell
@@ -79,17 +77,7 @@ def test_other_points_of_the_axis(point: str) -> None:
     assert result.tracked.offset != 0
 
 
-def test_old_attributes_of_a_plan_warn_and_work() -> None:
-    result = planned()
-    for name, path in _MOVED.items():
-        with pytest.warns(DeprecationWarning, match=f"Plan.{name} is deprecated; use Plan.{re.escape(path)}"):
-            value = getattr(result, name)
-        new: Any = result
-        for part in path.removesuffix("()").split("."):
-            new = getattr(new, part)
-        assert np.array_equal(value, new()) if path.endswith("()") else value == new or value is new
-    with pytest.raises(AttributeError, match="'Plan' object has no attribute 'dwell'"):
-        result.dwell  # type: ignore[attr-defined]  # noqa: B018
+def test_options_are_the_fields_of_a_request() -> None:
     assert get_type_hints(RequestOptions) == get_type_hints(PlanRequest)
 
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
 
 from planner.paths.path import circle
 from planner.planning.plan import plan
@@ -19,7 +18,6 @@ from planner.vehicle.calibration_table import (
     knowledge_toml,
     read_knowledge,
 )
-from planner.vehicle.cubic_spline import spline_at
 from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.rollout import Switches, trace
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, interpolated, lag_table
@@ -98,19 +96,6 @@ def test_the_zigzag_is_that_of_arcs() -> None:
     pair = Switches(1, np.array([2.0, 2.0]), np.array([[0.0, 0.0, -angle]]))
     across = trace(car, pair, 0.0, samples=400)[:-1, 1]
     assert found.rms == pytest.approx(across.std(), rel=0.02)
-
-
-@pytest.mark.parametrize("count", [4, 5, 26])
-@pytest.mark.parametrize("flat_end", [False, True])
-def test_splines_are_those_of_scipy(count: int, flat_end: bool) -> None:
-    """Between the knots, at them, and beyond them."""
-    random = np.random.default_rng(count)
-    knots = np.cumsum(random.uniform(0.1, 1.0, count))
-    values = random.standard_normal((count, 3, 2))
-    places = np.concatenate([np.linspace(knots[0] - 0.05, knots[-1] + 0.05, 301), knots])
-    ends = ("not-a-knot", "clamped") if flat_end else "not-a-knot"
-    wanted = CubicSpline(knots, values, bc_type=ends)(places)
-    assert spline_at(knots, values, places, flat_end=flat_end) == pytest.approx(wanted, rel=1e-12, abs=1e-12)
 
 
 def test_vehicle_of_the_shipped_table_matches_the_reference_robot() -> None:
