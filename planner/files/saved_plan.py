@@ -19,7 +19,7 @@ import numpy as np
 from planner.files.own_table import table_for
 from planner.files.plan_json import check_numbers, load_plan
 from planner.paths.obstacles import FreeSpace
-from planner.paths.path import Path2D, arc_length
+from planner.paths.path import Path2D
 from planner.paths.tractrix import Reference
 from planner.planning.arrival import Arrival
 from planner.planning.camera import Camera
@@ -190,8 +190,7 @@ def _guidance(content: Mapping[str, Any], tracked: TrackedVehicle) -> tuple[Decl
     """Read the reference and the numbers of the guidance."""
     saved, p = content["guidance"], np.array(content["reference"], dtype=float)
     straight, heading = Zigzag.from_dict(saved["straight"]), np.array(saved["heading_rad"], dtype=float)
-    q = p - tracked.rod * np.stack([np.cos(heading), np.sin(heading)], 1)
-    reference = Reference(p, q, heading, arc_length(q), bool(content["closed"]))
+    reference = Reference.of_path(p, heading, tracked.rod, closed=bool(content["closed"]))
     to_pose = content[GUARANTEE] is None  # its arcs turn as much as the robot can, which asks for no look-ahead
     curvature = 0.0 if to_pose else float(np.abs(reference.curvature).max())
     declared = Declared(

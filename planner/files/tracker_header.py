@@ -16,9 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.goal.dubins import ROUNDING
-from planner.paths.path import arc_length
 from planner.planning import feedback_error, line_of_sight
-from planner.planning.lap import turning
 from planner.planning.planned import Plan
 from planner.tracking import clock, displacement, guidance, kalman_filter, tracker, way_back
 from planner.tracking.guidance import tracked_reference
@@ -71,7 +69,7 @@ def rounded(result: Plan) -> Plan:
     once = replace(result, lap=None)
     rows = np.array([[float(_nine(value)) for value in row] for row in _path(once)])
     q, heading = rows[:, :2], rows[:, 2]
-    guide = replace(result.declared.reference, q=q, heading=heading, arc=arc_length(q))
+    guide = replace(result.declared.reference, q=q, heading=heading)
     tracked = result.tracked._replace(vehicle=replace(result.tracked.vehicle, lag=lag, rest=rest))
     return replace(result, tracked=tracked, declared=replace(result.declared, reference=guide))
 
@@ -203,7 +201,7 @@ def _numbers(result: Plan) -> dict[str, str]:
         "AHEAD": result.guidance.ahead,
         "ROD": result.tracked.rod,
         "OFFSET": result.tracked.offset,
-        "LAP_TURN": turning(result.declared.reference) if result.lap else 0.0,
+        "LAP_TURN": result.declared.reference.turn if result.lap else 0.0,
         "SWING": result.guidance.swing,
         "PIVOT_RADIUS": vehicle.pivot_radius,
         "NET_SPEED": float(straight.speed),

@@ -17,8 +17,7 @@ import numpy as np
 
 from planner.goal.dubins import DubinsPaths, three_arcs
 from planner.paths.obstacles import Footprint, FreeSpace
-from planner.paths.path import arc_length
-from planner.paths.tractrix import Drift, Reference, slips, slips_at_heading
+from planner.paths.tractrix import Drift, Reference, slips
 from planner.planning.arrival import Swing
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.arrays import Floats
@@ -110,8 +109,7 @@ class _Track:
 
     def __init__(self, reference: Reference, rod: float, drift: Drift):
         self._reference, self._rod, self._drift = reference, rod, drift
-        course = reference.heading + slips_at_heading(reference.heading, drift)
-        self._poses = np.column_stack([reference.q, course])
+        self._poses = reference.courses(drift)
         self._arc = reference.arc
 
     def at(self, way: float) -> Floats:
@@ -151,22 +149,13 @@ class _Track:
 
     def joined(self, candidate: _Candidate) -> tuple[Reference, Swing]:
         """Put a candidate into the track."""
-        before, after = np.searchsorted(self._arc, [candidate.leaves, candidate.joins])
+        before, after = np.searchsorted(self._arc, [candidate.leaves, candidate.joins]).tolist()
         old = self._reference
-        start = np.array([np.interp(candidate.leaves, self._arc, column) for column in (*old.p.T, *old.q.T)])
-        headings = self.headed(candidate.poses)[:, 2]
-        first = float(np.interp(candidate.leaves, self._arc, old.heading))
-        headings += 2 * math.pi * round((first - headings[0]) / (2 * math.pi))
-        places = candidate.poses[:, :2]
-        points = places + self._rod * np.stack([np.cos(headings), np.sin(headings)], 1)
-        joined = float(np.interp(candidate.joins, self._arc, old.heading))
-        turned = 2 * math.pi * round((headings[-1] - joined) / (2 * math.pi))
-        q = np.concatenate([old.q[:before], places, old.q[after + 1 :]])
-        p = np.concatenate([old.p[:before], points, old.p[after + 1 :]])
-        heading = np.concatenate([old.heading[:before], headings, old.heading[after + 1 :] + turned])
-        longer = float(arc_length(places)[-1] - (candidate.joins - candidate.leaves))
-        swing = Swing(float(start[0]), float(start[1]), longer, candidate.circles)
-        return Reference(p, q, heading, arc_length(q), old.closed), swing
+        x, y, first = (np.interp(candidate.leaves, self._arc, column) for column in (*old.p.T, old.heading))
+        part = Reference.of_pivot(candidate.poses, self._rod, self._drift, first)
+        longer = float(part.arc[-1] - (candidate.joins - candidate.leaves))
+        swing = Swing(float(x), float(y), longer, candidate.circles)
+        return Reference.joined(old.part(0, before), part, old.part(after + 1), closed=old.closed), swing
 
     def _places(self, radius: float) -> list[float]:
         """List ways along the track, the last one first."""

@@ -27,7 +27,7 @@ from planner.goal.route import COURSES, Lattices, NoWayError, Route, route
 from planner.goal.swings import swung_clear
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.path import Path2D
-from planner.paths.tractrix import Drift, Reference, slips, slips_at_heading
+from planner.paths.tractrix import Drift, Reference, slips_at_heading
 from planner.paths.units import LONGEST, in_lab, time_in_lab
 from planner.planning.camera import DOCUMENTED, Camera
 from planner.planning.declared_path import Declared
@@ -290,12 +290,5 @@ class _Task:
         poses = track.poses(_SPACING)
         if len(poses) < 2:
             raise InputError("start and goal are the same; nothing to do")
-        heading = poses[:, 2] - slips(poses[:, 2], drift)
-        heading += self.start[2] - heading[0]
-        q = poses[:, :2]
-        p = q + self.tracked.rod * np.stack([np.cos(heading), np.sin(heading)], 1)
-        arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(q, axis=0).T))])
-        turns = np.diff(heading)
-        turning = np.flatnonzero(np.abs(turns) > 1e-9)
-        sense = 1 if not len(turning) or turns[turning[0]] > 0 else -1
-        return Declared(Reference(p, q, heading, arc, False), 0.0, 0.0, 0.0, ()), sense
+        reference = Reference.of_pivot(poses, self.tracked.rod, drift, self.start[2])
+        return Declared(reference, 0.0, 0.0, 0.0, ()), reference.first_turn

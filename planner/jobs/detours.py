@@ -14,7 +14,6 @@ turns are wider than the robot's narrowest one, as those of a path that is follo
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -23,12 +22,11 @@ from planner.goal.dubins import shortest_paths
 from planner.goal.lattice import Lattice, RouteLimits
 from planner.goal.route import AROUND, LEVELS, Route, shortened
 from planner.jobs.hindered import Hindered
-from planner.jobs.pivot_track import pivot_reference
 from planner.paths.distance import nearest
 from planner.paths.nearest_feasible import nearest_poses, tracked_points
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D, arc_length
-from planner.paths.tractrix import Drift, Reference, slips_at_heading
+from planner.paths.tractrix import Drift, Reference
 from planner.paths.tractrix import reference as follow_path
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.feasible import AS_DRAWN, TIGHTEST
@@ -89,7 +87,7 @@ class Detours:
 
     def clearance(self, reference: Reference) -> Floats:
         """Compute the distance (m,) of the body from what is not free, at the points of a reference."""
-        return self.limits.body.clearance(_poses(reference), self.limits.space)
+        return self.limits.body.clearance(reference.poses, self.limits.space)
 
     def around(self, reference: Reference, margin: float) -> tuple[Reference, tuple[Detour, ...]]:
         """Replace the blocked stretches of a reference by ways around.
@@ -126,12 +124,8 @@ class Detours:
             first = max(stretch.leave_from, int(np.searchsorted(reference.arc, reference.arc[way.leave] - beside)))
             last = min(stretch.join_until, int(np.searchsorted(reference.arc, reference.arc[way.join] + beside)))
             rows = (slice(first, way.leave), slice(way.join + 1, last + 1))
-            q, heading = (
-                np.concatenate([getattr(reference, name)[rows[0]], getattr(way.part, name),
-                                getattr(reference, name)[rows[1]]])
-                for name in ("q", "heading")
-            )  # fmt: skip
-            heading = np.unwrap(heading)
+            before, behind = (reference.part(each.start, each.stop) for each in rows)
+            moved = Reference.joined(before, way.part, behind)
             progress = np.concatenate(
                 [
                     reference.arc[rows[0]],
@@ -139,9 +133,9 @@ class Detours:
                     reference.arc[rows[1]],
                 ]
             )
-            arc = arc_length(q)
-            at = np.linspace(0, arc[-1], max(3, math.ceil(arc[-1] / (_POSES * self.limits.radius)) + 1))
-            x, y, angle, place = (np.interp(at, arc, values) for values in (*q.T, heading, progress))
+            length = float(moved.arc[-1])
+            at = np.linspace(0, length, max(3, math.ceil(length / (_POSES * self.limits.radius)) + 1))
+            x, y, angle, place = (np.interp(at, moved.arc, values) for values in (*moved.poses.T, progress))
             target = np.stack([np.interp(place, reference.arc, reference.p[:, i]) for i in (0, 1)], 1)
             inside = (place > reference.arc[stretch.first]) & (place < reference.arc[stretch.last])
             shares = np.where(inside, _BLOCKED, 1.0)
@@ -158,7 +152,7 @@ class Detours:
     def _check_ends(self, reference: Reference, stretches: list[Stretch], margin: float) -> None:
         for index, at, name in ((0, 0, "begins"), (-1, len(reference.q) - 1, "ends")):
             if at in (stretches[index].first, stretches[index].last):
-                room = float(self.clearance(_cut(reference, at, at + 1))[0])
+                room = float(self.clearance(reference.part(at, at + 1))[0])
                 robot = self.tracked.robot
                 place, free = place_in_lab(*_place(reference.p[at]), robot), in_lab(max(room, 0.0), robot)
                 raise BlockedError(
@@ -174,10 +168,11 @@ class Detours:
         """
         leaves = _places(reference.arc, stretch.first - 1, stretch.leave_from, _STEP * self.limits.radius)
         joins = _places(reference.arc, stretch.last + 1, stretch.join_until, _STEP * self.limits.radius)
-        starts, ends = (self._courses(_poses(reference)[rows]) for rows in (leaves, joins))
+        poses = reference.courses(self.drift)
+        starts, ends = poses[leaves], poses[joins]
         before = reference.arc[stretch.first] - reference.arc[leaves]
         behind = reference.arc[joins] - reference.arc[stretch.last]
-        near = np.concatenate([starts, ends, self._courses(_poses(reference)[stretch.first : stretch.last + 1])])
+        near = np.concatenate([starts, ends, poses[stretch.first : stretch.last + 1]])
         tried: list[Lattice] = []
         for whole in (False, True):
             for spacing, courses in LEVELS:
@@ -188,11 +183,11 @@ class Detours:
                 costs, ways = lattice.ways(starts, before, ends, margin)
                 if np.isfinite(costs).any():
                     best = int((costs + behind).argmin())
-                    poses = ways[best]
-                    leave = int(leaves[np.abs(starts - poses[0]).sum(1).argmin()])
-                    tracks = shortest_paths(poses[:-1], poses[1:], self.limits.radius)
+                    way = ways[best]
+                    leave = int(leaves[np.abs(starts - way[0]).sum(1).argmin()])
+                    tracks = shortest_paths(way[:-1], way[1:], self.limits.radius)
                     route = Route(shortened(tracks, lattice, margin), self.limits.radius)
-                    part = pivot_reference(
+                    part = Reference.of_pivot(
                         route.poses(_SPACING), self.tracked.rod, self.drift, float(reference.heading[leave])
                     )
                     return Way(leave, int(joins[best]), part)
@@ -224,15 +219,6 @@ class Detours:
             self._lattices[key] = Lattice(limits, low, high, spacing * limits.radius, courses)
         return self._lattices[key]
 
-    def _courses(self, poses: Floats) -> Floats:
-        """Turn headings into courses: the directions of the pivot's motion."""
-        course = poses[:, 2] + slips_at_heading(poses[:, 2], self.drift)
-        return np.stack([poses[:, 0], poses[:, 1], course], 1)
-
-
-def _poses(reference: Reference) -> Floats:
-    return np.concatenate([reference.q, reference.heading[:, None]], 1)
-
 
 def _place(point: Floats) -> tuple[float, float]:
     x, y = point.tolist()
@@ -252,11 +238,7 @@ def _turned(reference: Reference, blocked: Flags) -> Reference:
     if gaps[longest] < 2:
         raise BlockedError("the path is blocked everywhere; draw it elsewhere")
     begin = (int(at[longest]) + int(gaps[longest]) // 2) % count
-    order = np.concatenate([np.arange(begin, count), np.arange(begin + 1)])
-    lap = reference.heading[-1] - reference.heading[0]
-    heading = reference.heading[order] + np.where(np.arange(count + 1) < count - begin, 0.0, lap)
-    q = reference.q[order]
-    return Reference(reference.p[order], q, heading, arc_length(q), True)
+    return reference.begun_at(begin)
 
 
 def _stretches(blocked: Flags, arc: Floats, radius: float) -> list[Stretch]:
@@ -288,24 +270,13 @@ def _places(arc: Floats, near: int, far: int, step: float) -> Floats:
     return np.unique(np.clip(rows, min(near, far), max(near, far)))
 
 
-def _cut(reference: Reference, first: int, end: int) -> Reference:
-    """Return the points first, …, end − 1 of a reference."""
-    part = slice(first, end)
-    return Reference(reference.p[part], reference.q[part], reference.heading[part], reference.arc[part], False)
-
-
 def _with_ways(reference: Reference, ways: list[Way]) -> Reference:
     """Replace parts of a reference by ways around."""
-    parts, done, turned = [], 0, 0.0
+    parts, done = [], 0
     for way in ways:
-        before, part = _cut(reference, done, way.leave), way.part
-        parts += [replace(before, heading=before.heading + turned), replace(part, heading=part.heading + turned)]
-        turned += 2 * math.pi * round((part.heading[-1] - reference.heading[way.join]) / (2 * math.pi))
+        parts += [reference.part(done, way.leave), way.part]
         done = way.join + 1
-    rest = _cut(reference, done, len(reference.q))
-    parts.append(replace(rest, heading=rest.heading + turned))
-    p, q, heading = (np.concatenate([getattr(part, name) for part in parts]) for name in ("p", "q", "heading"))
-    return Reference(p, q, heading, arc_length(q), reference.closed)
+    return Reference.joined(*parts, reference.part(done), closed=reference.closed)
 
 
 def _compared(reference: Reference, changed: Reference) -> tuple[Detour, ...]:

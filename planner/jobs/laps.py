@@ -15,9 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from planner.goal.final_dwells import flips_after
-from planner.paths.tractrix import Reference
 from planner.planning.errors import plan_errors
-from planner.planning.lap import Lap, drift_of_a_lap, overlapped, turning
+from planner.planning.lap import OVERLAP, Lap, drift_of_a_lap
 from planner.planning.planned import Plan
 from planner.planning.schedule import follow
 from planner.vehicle.rollout import Switches, poses_at_flips
@@ -45,9 +44,9 @@ def looped(plan: Plan, seed: int = 0, progress: Callable[[float], object] | None
         InputError: no schedule closes.
     """
     tracked, reference = plan.tracked, plan.declared.reference
-    long = follow(_twice(reference, tracked.vehicle), tracked.vehicle, plan.guidance, tracked.offset,
-                  progress=progress)  # fmt: skip
-    turn = turning(reference)
+    twice = reference.laps(2, OVERLAP * tracked.vehicle.pivot_radius)
+    long = follow(twice, tracked.vehicle, plan.guidance, tracked.offset, progress=progress)
+    turn = reference.turn
     tried = [_closed(long, first, last, turn, plan) for first, last in _ends(long, len(plan.dwells), turn)]
     laps = [lap for lap in tried if lap is not None]
     if not laps:
@@ -59,20 +58,6 @@ def looped(plan: Plan, seed: int = 0, progress: Callable[[float], object] | None
     closes, closes_turn = _closure(tracked.vehicle, switches, turn)
     lap = Lap(closes, closes_turn, *drift_of_a_lap(tracked, switches, seed))
     return replace(plan, switches=switches, errors=errors, lap=lap)
-
-
-def _twice(reference: Reference, vehicle: Vehicle) -> Reference:
-    """Put two laps one after the other, and some of a third."""
-    turn = turning(reference)
-    third = overlapped(reference, vehicle.pivot_radius)
-    length = reference.arc[-1]
-    return Reference(
-        np.concatenate([reference.p, third.p[1:]]),
-        np.concatenate([reference.q, third.q[1:]]),
-        np.concatenate([reference.heading, third.heading[1:] + turn]),
-        np.concatenate([reference.arc, third.arc[1:] + length]),
-        False,
-    )
 
 
 def _ends(long: Switches, count: int, turn: float) -> list[tuple[int, int]]:

@@ -8,10 +8,9 @@ import numpy as np
 
 from planner.goal.route import Route
 from planner.jobs.clear_plan import Clearing, plan_redirected
-from planner.jobs.pivot_track import pivot_reference
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
-from planner.paths.tractrix import Drift, slips
+from planner.paths.tractrix import Drift, Reference, slips
 from planner.paths.units import LONGEST, in_lab
 from planner.planning.declared_path import Declared
 from planner.planning.planned import Plan
@@ -56,7 +55,7 @@ def plan_track(
     """
 
     def declared(drift: Drift) -> Declared:
-        reference = pivot_reference(track(drift).poses(_SPACING), tracked.rod, drift)
+        reference = Reference.of_pivot(track(drift).poses(_SPACING), tracked.rod, drift)
         return Declared(reference, float(np.abs(reference.curvature).max()), 0.0, 0.0, ())
 
     drawn = Path2D(declared(drift).reference.p, False)

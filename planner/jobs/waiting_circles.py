@@ -18,8 +18,7 @@ import numpy as np
 from planner.goal.final_dwells import end_at_goal
 from planner.goal.goal_plan import Pose
 from planner.jobs.clear_plan import redeclared
-from planner.paths.path import arc_length
-from planner.paths.tractrix import Reference, slips, slips_at_heading
+from planner.paths.tractrix import Reference
 from planner.planning.errors import plan_errors
 from planner.planning.plan import choose_guidance, zigzag_drift
 from planner.planning.planned import Plan
@@ -43,17 +42,12 @@ def circle_reference(plan: Plan, circle: WaitingCircle) -> Reference:
     drift = zigzag_drift(tracked, plan.straight, plan.minimum_dwell)
     radius = tracked.vehicle.pivot_radius / ROOM
     count = math.ceil(2 * math.pi * radius / _SPACING)
-    turned = circle.side * 2 * math.pi * np.arange(count + 1) / count
-    heading = float(reference.heading[circle.place])
-    course = heading + float(slips_at_heading(np.array(heading), drift))
-    courses = course + turned
+    ((x, y, course),) = reference.part(circle.place, circle.place + 1).courses(drift).tolist()
+    courses = course + circle.side * 2 * math.pi * np.arange(count + 1) / count
     left = circle.side * radius * np.array([-math.sin(course), math.cos(course)])
     arms = circle.side * radius * np.stack([np.sin(courses), -np.cos(courses)], 1)
-    q = reference.q[circle.place] + left + arms
-    headings = courses - slips(courses, drift)
-    headings += heading - headings[0]
-    p = q + tracked.rod * np.stack([np.cos(headings), np.sin(headings)], 1)
-    return Reference(p, q, headings, arc_length(q), False)
+    poses = np.column_stack([np.array([x, y]) + left + arms, courses])
+    return Reference.of_pivot(poses, tracked.rod, drift, float(reference.heading[circle.place]))
 
 
 def with_circles(plan: Plan, circles: Sequence[WaitingCircle], goal: Pose | None = None) -> Plan:
@@ -88,17 +82,8 @@ def with_circles(plan: Plan, circles: Sequence[WaitingCircle], goal: Pose | None
 def _inserted(plan: Plan, circles: Sequence[WaitingCircle]) -> Reference:
     """Insert circles into the reference of a plan."""
     reference = plan.declared.reference
-    p, q, headings = [], [], []
-    begin, turned = 0, 0.0
+    parts, begin = [], 0
     for circle in sorted(circles):
-        around = circle_reference(plan, circle)
-        rows = slice(begin, circle.place)
-        p += [reference.p[rows], around.p[:-1]]
-        q += [reference.q[rows], around.q[:-1]]
-        headings += [reference.heading[rows] + turned, around.heading[:-1] + turned]
-        begin, turned = circle.place, turned + circle.side * 2 * math.pi
-    p.append(reference.p[begin:])
-    q.append(reference.q[begin:])
-    headings.append(reference.heading[begin:] + turned)
-    pivot = np.concatenate(q)
-    return Reference(np.concatenate(p), pivot, np.concatenate(headings), arc_length(pivot), reference.closed)
+        parts += [reference.part(begin, circle.place), circle_reference(plan, circle).part(0, -1)]
+        begin = circle.place
+    return Reference.joined(*parts, reference.part(begin), closed=reference.closed)

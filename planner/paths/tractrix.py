@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from sim.io.errors import InputError
 
 _LAPS = 6
 _MOST_SLIP = 3.0  # sideways by forward motion
+_STRAIGHT = 1e-6  # rad; smaller turns are rounding
 
 
 @dataclass(frozen=True)
@@ -51,14 +53,83 @@ class Reference:
     p: Floats  # (m, 2), closed paths end where they begin
     q: Floats  # (m, 2)
     heading: Floats  # (m,), unwrapped [rad]
-    arc: Floats  # (m,), arc length of q
-    closed: bool  # the path ends where it begins
+    closed: bool = False  # the path ends where it begins
+
+    @staticmethod
+    def of_path(p: Floats, heading: Floats, rod: float, *, closed: bool) -> Reference:
+        """Place the pivot a rod behind the points (m, 2) of a path."""
+        return Reference(p, p - rod * _axis(heading), heading, closed)
+
+    @staticmethod
+    def of_pivot(poses: Floats, rod: float, drift: Drift, heading: float | None = None) -> Reference:
+        """Place the path a rod ahead of a track of the pivot.
+
+        Args:
+            poses: (m, 3), places of the pivot and its courses, without jumps.
+            rod: distance from the pivot to the tracked point.
+            drift: what carries the robot off its heading.
+            heading: the first one, whole turns included.
+        """
+        headings = poses[:, 2] - slips(poses[:, 2], drift)
+        if heading is not None:
+            headings = headings + _whole_turns(heading - headings[0])
+        return Reference(poses[:, :2] + rod * _axis(headings), poses[:, :2], headings)
+
+    @staticmethod
+    def joined(*parts: Reference, closed: bool = False) -> Reference:
+        """Put parts one after the other, with headings that differ by whole turns from their own."""
+        parts = tuple(part for part in parts if len(part.q))
+        headings = [parts[0].heading]
+        for part in parts[1:]:
+            headings.append(part.heading + _whole_turns(headings[-1][-1] - part.heading[0]))
+        p, q = (np.concatenate([getattr(part, name) for part in parts]) for name in ("p", "q"))
+        return Reference(p, q, np.concatenate(headings), closed)
+
+    def part(self, first: int, end: int | None = None) -> Reference:
+        """Return the points first, …, end − 1."""
+        rows = slice(first, end)
+        return Reference(self.p[rows], self.q[rows], self.heading[rows])
+
+    def begun_at(self, index: int) -> Reference:
+        """Begin a closed reference at another point."""
+        return Reference.joined(self.part(index, -1), self.part(0, index + 1), closed=True)
+
+    def laps(self, count: int, further: float) -> Reference:
+        """Repeat a closed reference, and go on by a length, at most a lap more."""
+        last = int(np.searchsorted(self.arc, min(further, float(self.arc[-1])), side="right"))
+        return Reference.joined(self, *[self.part(1)] * (count - 1), self.part(1, max(last, 2)))
+
+    @cached_property
+    def arc(self) -> Floats:
+        """Arc length of q, (m,)."""
+        return arc_length(self.q)
 
     @property
     def curvature(self) -> Floats:
         """Turn of the heading per length of q at the middle of its steps, (m − 1,)."""
         step = np.maximum(np.diff(self.arc), 1e-9)
         return np.diff(self.heading) / step
+
+    @property
+    def poses(self) -> Floats:
+        """Places of the pivot, and headings, (m, 3)."""
+        return np.column_stack([self.q, self.heading])
+
+    def courses(self, drift: Drift) -> Floats:
+        """Return places and courses of the pivot (m, 3): the directions in which it moves."""
+        return np.column_stack([self.q, self.heading + slips_at_heading(self.heading, drift)])
+
+    @property
+    def turn(self) -> float:
+        """Turn of the heading in a lap, a multiple of 2π."""
+        return _whole_turns(self.heading[-1] - self.heading[0])
+
+    @property
+    def first_turn(self) -> int:
+        """Side to which the heading turns first: 1 to the left, or straight on; −1 to the right."""
+        turned = self.heading - self.heading[0]
+        turning = np.flatnonzero(np.abs(turned) > _STRAIGHT)
+        return 1 if not len(turning) or turned[turning[0]] > 0 else -1
 
 
 def reference(path: Path2D, pivot_distance: float, spacing: float, drift: Drift = STILL) -> Reference:
@@ -84,8 +155,16 @@ def reference(path: Path2D, pivot_distance: float, spacing: float, drift: Drift 
         for _ in range(_LAPS if path.closed else 1):
             heading = _drag(tangent, length, pivot_distance, start, drift)
             start = heading[-1] - _turning(tangent) if path.closed else start
-    q = p - pivot_distance * np.stack([np.cos(heading), np.sin(heading)], 1)
-    return Reference(p, q, heading, arc_length(q), path.closed)
+    return Reference.of_path(p, heading, pivot_distance, closed=path.closed)
+
+
+def _axis(heading: Floats) -> Floats:
+    """Return unit vectors (m, 2) along headings (m,)."""
+    return np.stack([np.cos(heading), np.sin(heading)], 1)
+
+
+def _whole_turns(angle: float) -> float:
+    return 2 * math.pi * round(angle / (2 * math.pi))
 
 
 def _pivot_headings(tangent: Floats, drift: Drift, *, closed: bool) -> Floats:

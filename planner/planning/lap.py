@@ -1,4 +1,4 @@
-"""A schedule that repeats: how well a lap closes, how far robots drift in a lap, and the reference of a tracker.
+"""A schedule that repeats: how well a lap closes, and how far robots drift in a lap.
 
 A lap has an even number of dwells, so each begins in the same direction of the motor. Lengths in l, angles in rad.
 """
@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planner.draws import normals
-from planner.paths.tractrix import Reference
 from planner.paths.units import in_lab
 from planner.planning.error_growth import error_growth
 from planner.planning.stated_error import LEVEL, flips_between
@@ -22,7 +21,7 @@ from sim.model.robot import Robot
 
 _DRAWS = 1000
 _SHOWN = 1e-5  # l and rad; smaller differences are rounding
-_OVERLAP = 10.0  # radii of the pivot's circle, of the next lap that a tracker sees
+OVERLAP = 10.0  # radii of the pivot's circle, of the next lap that a tracker sees
 
 
 class Lap(NamedTuple):
@@ -56,25 +55,6 @@ class Lap(NamedTuple):
         """Read the content of a plan.json."""
         names = ("closes_over_l", "closes_rad", "drift_over_l", "drift_rad")
         return Lap(*(float(content[name]) for name in names))
-
-
-def turning(reference: Reference) -> float:
-    """Return the turn of the heading in a lap, a multiple of 2π."""
-    return 2 * math.pi * round((reference.heading[-1] - reference.heading[0]) / (2 * math.pi))
-
-
-def overlapped(reference: Reference, pivot_radius: float) -> Reference:
-    """Continue a closed reference into the next lap, so that a tracker sees no end."""
-    arc = reference.arc
-    count = int(np.searchsorted(arc, min(_OVERLAP * pivot_radius, float(arc[-1])), side="right"))
-    rows = slice(1, max(count, 2))
-    return Reference(
-        np.concatenate([reference.p, reference.p[rows]]),
-        np.concatenate([reference.q, reference.q[rows]]),
-        np.concatenate([reference.heading, reference.heading[rows] + turning(reference)]),
-        np.concatenate([arc, arc[-1] + arc[rows]]),
-        False,
-    )
 
 
 def drift_of_a_lap(tracked: TrackedVehicle, switches: Switches, seed: int) -> tuple[float, float]:

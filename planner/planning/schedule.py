@@ -110,9 +110,7 @@ def start_at_rest(reference: Reference, vehicle: Vehicle, guidance: Guidance, of
     that the robot can only turn, it begins on the reference. Its tails are bent. From rest they are straight, and
     the robot moves further, so the start is where the shortest dwell from rest leads to the same pose.
     """
-    turn = reference.heading - reference.heading[0]
-    turning = np.flatnonzero(np.abs(turn) > 1e-6)
-    sense = 1 if not len(turning) or turn[turning[0]] > 0 else -1
+    sense = reference.first_turn
     straight = zigzag(vehicle, guidance.dwell, offset)
     outside = straight.swing * (1 - hysteresis(reference, vehicle, 1.0)[0])
     heading = float(reference.heading[0]) - sense * outside

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.paths.tractrix import Reference
-from planner.planning.lap import overlapped, turning
+from planner.planning.lap import OVERLAP
 from planner.planning.line_of_sight import LineOfSight
 from planner.planning.planned import Plan
 from planner.planning.stated_error import look_ahead
@@ -62,7 +62,7 @@ class TrackerGuidance(LineOfSight):
         tracked, straight = plan.tracked, plan.straight
         super().__init__(tracked_reference(plan), tracked.vehicle, plan.guidance, tracked.offset)
         self._lap = lap_points(plan)  # points of the reference in a lap; 0: the path is followed once
-        self._lap_turn = turning(plan.declared.reference)
+        self._lap_turn = plan.declared.reference.turn
         self._around, self._stopping = self._lap > 0, False
         x, y = (tracked.vehicle.current / straight.speed).tolist()
         self._planned = self._drift = LearnedDrift(straight.drift / straight.speed, x, y)
@@ -248,7 +248,7 @@ class TrackerGuidance(LineOfSight):
 def tracked_reference(plan: Plan) -> Reference:
     """Return the reference of a plan, continued into the next lap where it repeats."""
     reference = plan.declared.reference
-    return reference if plan.lap is None else overlapped(reference, plan.tracked.vehicle.pivot_radius)
+    return reference if plan.lap is None else reference.laps(1, OVERLAP * plan.tracked.vehicle.pivot_radius)
 
 
 def lap_points(plan: Plan) -> int:

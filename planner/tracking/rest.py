@@ -18,7 +18,6 @@ import numpy as np
 from planner.goal.dubins import words
 from planner.goal.lattice import RouteLimits
 from planner.goal.route import Lattices, NoWayError, route
-from planner.jobs.pivot_track import pivot_reference
 from planner.paths.distance import two_sided
 from planner.paths.obstacles import Footprint
 from planner.paths.path import Path2D, arc_length, resample
@@ -86,14 +85,9 @@ def rest_of(plan: Plan, times: Floats, poses: Floats) -> Rest:
     heading += 2 * math.pi * round((float(reference.heading[place]) - heading) / (2 * math.pi))
     drift = zigzag_drift(plan.tracked, plan.straight, max(plan.straight.dwells))
     way, join = _way(plan, (x, y, heading), place, drift)
-    path = _cut(reference, join)
+    path = reference.part(join)
     if way is not None:
-        turns = 2 * math.pi * round((float(way.heading[-1]) - float(path.heading[0])) / (2 * math.pi))
-        parts = _cut_end(way), replace(path, heading=path.heading + turns)
-        p, q, headings = (
-            np.concatenate([getattr(part, name) for part in parts]) for name in ("p", "q", "heading")
-        )
-        path = Reference(p, q, headings, arc_length(q), False)
+        path = Reference.joined(way.part(0, -1), path)
     joins_x, joins_y = reference.p[join].tolist()
     return Rest(
         _planned(plan, path, (x, y, heading), 0 if way is None else len(way.q) - 1, join),
@@ -131,14 +125,13 @@ def _way(plan: Plan, pose: POSE, place: int, drift: Drift) -> tuple[Reference | 
             poses, join = _around(plan, start, place, limits, margin)
     if len(poses) < 2:
         return None, join
-    return pivot_reference(poses, plan.tracked.rod, drift, heading), join
+    return Reference.of_pivot(poses, plan.tracked.rod, drift, heading), join
 
 
 def _shortest(plan: Plan, start: POSE, place: int, drift: Drift) -> tuple[Floats, int]:
     """Find the shortest way from a pose of the pivot; return its poses (m, 3), and the point where it ends."""
     reference = plan.declared.reference
-    headings = reference.heading[place:-1]
-    targets = np.column_stack([reference.q[place:-1], headings + slips_at_heading(headings, drift)])
+    targets = reference.part(place, -1).courses(drift)
     left_out = reference.arc[place:-1] - reference.arc[place]
     way = shortest_way(start, targets, left_out, stride(plan), _radius(plan), _WORTH)
     return way.poses(_SPACING), place + way.target
@@ -165,8 +158,7 @@ def _around(plan: Plan, start: POSE, place: int, limits: RouteLimits, margin: fl
     reference = plan.declared.reference
     steps = reference.arc[place] + limits.radius * np.arange(_CANDIDATES)
     rows = np.unique(np.clip(np.searchsorted(reference.arc, steps), place, len(reference.q) - 2))
-    headings = reference.heading[rows]
-    targets = np.column_stack([reference.q[rows], headings + slips_at_heading(headings, limits.drift)])
+    targets = reference.courses(limits.drift)[rows]
     stop = np.array([start])
     lattices: Lattices = {}
     best = route([stop, targets], limits, margin, lattices, plan.robot)
@@ -194,11 +186,7 @@ def _planned(plan: Plan, path: Reference, pose: POSE, way: int, join: int) -> Pl
     off_drawn, missed = two_sided(path.p, drawn.polyline())
     declared = Declared(path, plan.declared.curvature, off_drawn, missed, plan.declared.warnings)
     turned = heading - float(path.heading[0])
-    if abs(turned) < 1e-6:
-        turns = path.heading - path.heading[0]
-        turning = np.flatnonzero(np.abs(turns) > 1e-6)
-        turned = -float(turns[turning[0]]) if len(turning) else -1.0
-    start = Start(pose, -1 if turned > 0 else 1)
+    start = Start(pose, path.first_turn if abs(turned) < 1e-6 else -1 if turned > 0 else 1)
     switches = follow(path, tracked.vehicle, plan.guidance, tracked.offset, start=start)
     errors = plan_errors(tracked, drawn, declared, switches, guaranteed=None, seed=0)
     rest = Plan(
@@ -226,15 +214,3 @@ def _drawn(plan: Plan, way: Floats, join: int) -> Path2D:
     apart = np.hypot(*(path - declared[join]).T) + _GUESS * np.abs(arc - guess)
     rest = path[int(apart.argmin()) :]
     return Path2D.of(np.concatenate([way[:-1], rest if len(rest) > 1 else path[-2:]]), closed=False)
-
-
-def _cut(reference: Reference, first: int) -> Reference:
-    """Return a reference from one of its points on."""
-    p, q, heading = reference.p[first:], reference.q[first:], reference.heading[first:]
-    return Reference(p, q, heading, arc_length(q), False)
-
-
-def _cut_end(reference: Reference) -> Reference:
-    """Return a reference without its last point."""
-    p, q, heading = reference.p[:-1], reference.q[:-1], reference.heading[:-1]
-    return Reference(p, q, heading, arc_length(q), False)
