@@ -22,7 +22,6 @@ from planner.files.saved_plan import is_plan, restore_plan
 from planner.paths.path import circle
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
-from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.inputs import save_robot
@@ -32,14 +31,12 @@ from sim.model.robot import Robot
 from surrogate.table.model_file import load
 from tests.planner.compiled import CompiledTracker
 from tests.planner.plans import BIASED, CONTROL, CORNER, around, hindered_trip, own_table, planned, trip
-from tests.planner.vehicles import PROMPT
 from tests.shared import shared
 
 pytestmark = pytest.mark.slow
 
 CM = 100 * CONTROL.tail_length
 KNOWN = CalibrationKnowledge(("C_t",), np.array([[1e-4]]), current=(2e-4, 1e-4), current_error=(1e-5, 0.0))
-NEW = ("guidance", "own_table", "calibration", "camera")  # entries that files from before do not have
 
 
 @shared
@@ -98,17 +95,6 @@ def test_the_microcontroller_gets_the_same_tracker(tmp_path: Path) -> None:
         command = compiled.update(now)
         assert (command.direction, command.flip_at) == (direction, pytest.approx(flip_at, abs=1e-3))
         now = command.flip_at
-
-
-@pytest.mark.parametrize("name", ["square", "head tip", "pivot", "goal", "obstacles"])
-def test_a_file_from_before_is_computed_again(name: str) -> None:
-    result = PLANS[name]()
-    same = restore_plan({key: value for key, value in saved(name).items() if key not in NEW})
-    heading = same.declared.reference.heading
-    assert heading == pytest.approx(result.declared.reference.heading, abs=1e-3)
-    if name == "obstacles":
-        far, near = (swim(Tracker(each), result, result.tracked.vehicle, PROMPT).rms() for each in (same, result))
-        assert far < 1.1 * near + 0.002
 
 
 def test_the_files_of_jobs_and_their_folder_lead_to_the_plan(tmp_path: Path) -> None:
