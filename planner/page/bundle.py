@@ -12,6 +12,8 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
+from planner.page.constants import constants_module
+
 FOLDER = Path(__file__).parent
 _NAMES = r"\{ (\w+(?:, \w+)*) \}"
 _IMPORT = re.compile(rf'^import {_NAMES} from "(\.\.?/[\w./]+\.js)";$', re.MULTILINE)
@@ -34,7 +36,7 @@ def read_module(path: Path) -> Module:
     Raises:
         ValueError: an import or an export is not in the form that can be joined.
     """
-    text = path.read_text()
+    text = constants_module() if path.name == "constants.js" else path.read_text()
     imports = tuple(
         (names, str((path.parent / source).resolve().relative_to(FOLDER)))
         for names, source in _IMPORT.findall(text)

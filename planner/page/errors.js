@@ -1,62 +1,249 @@
-/* The errors of a plan: distances of the predicted track from declared and drawn path, and the stated error.
+/* The errors of a plan: predicted, stated with its uncertainty, with feedback, and guaranteed for an exact vehicle.
  *
- * Mirrors planner/planning/errors.py. Lengths in l. */
-import { largest, sum } from "./arrays.js";
-import { distanceTo } from "./distance.js";
-import { errorGrowth } from "./error_growth.js";
-import { feedbackError } from "./feedback_error.js";
+ * Deviations from the predicted poses grow along a schedule to first order, and random vehicles are drawn from them;
+ * the normal numbers come from a counter and are those that Python draws. Lengths in l, times in μ0 l⁴/EI, angles in
+ * rad. */
+import { CONSTANTS } from "./constants.js";
+import { arc, compose, inversePose, largest, linspace, quantile, sum } from "./math.js";
 import { polyline } from "./path.js";
-import { rollOut } from "./rollout.js";
-import { flipsBetween, largestDistance, predictedError, rmsInTime, statedError } from "./stated_error.js";
-import { zigzagSpeed } from "./zigzag.js";
+import { distanceTo, nearest } from "./reference.js";
+import { BEFORE_KNOTS, COUNT, SHORTEST, STEP, lagAt, lagNoise, lagPlace, pivotRadius, rollOut } from "./vehicle.js";
+import { zigzagSpeed } from "./vehicle.js";
 
-/* Compute the errors of a schedule: {track, stated, feedback, guaranteed, closure, predictedRms, predictedMax,
- * drawnRms, drawnMax, tableShare}. plan_errors
+const { WEYL, FIRST, SECOND, MIDDLE, TAIL } = CONSTANTS.draws;
+const { LEVEL, WOBBLE, DRAWS, BLOCKS, TIGHTEST, PAIRS_AHEAD } = CONSTANTS.stated_error;
+const { WITHIN, KEPT, ZIGZAG, PLACE, COURSE, STRETCH, CAMERA } = CONSTANTS.feedback_error;
+const NOTHING = [0, 0, 0];
+const UNCHANGED = { twist: [NOTHING, NOTHING], current: [0, 0] };
+let drawn = { key: "" }; // the last numbers: plans ask for the same again and again
+
+/* Draw the first `count` numbers of a seed. */
+function normals(seed, count) {
+  const key = `${seed} ${count}`, start = mixed((seed + 1) % 2 ** 32);
+  if (drawn.key === key) return drawn.numbers;
+  const numbers = Float64Array.from({ length: count }, (_, i) => {
+    return normalQuantile((mixed(mixed(Math.imul(i + 1, WEYL)) ^ start) + 0.5) / 2 ** 32);
+  });
+  drawn = { key, numbers };
+  return numbers;
+}
+
+function mixed(x) {
+  let hash = x >>> 0;
+  hash = Math.imul(hash ^ (hash >>> 16), FIRST) >>> 0;
+  hash = Math.imul(hash ^ (hash >>> 15), SECOND) >>> 0;
+  return (hash ^ (hash >>> 15)) >>> 0;
+}
+
+/* Φ⁻¹(u) for e⁻²⁵ ≤ u ≤ 1 − e⁻²⁵. */
+function normalQuantile(u) {
+  const q = u - 0.5, middle = Math.abs(q) <= 0.425;
+  const r = middle ? 0.180625 - q * q : Math.sqrt(-Math.log(Math.min(u, 1 - u))) - 1.6;
+  const polynomial = (powers) => powers.reduceRight((total, power) => total * r + power, 0);
+  const [above, below] = (middle ? MIDDLE : TAIL).map(polynomial);
+  return ((middle ? q : Math.sign(q)) * above) / below;
+}
+
+/* Propagate the modes of a vehicle, and those of its disc's phase, to some flips of a schedule, given by rising
+ * numbers from 0 to that of all dwells: of each mode {x, y}, columns over the flips. */
+function errorGrowth(vehicle, { dwells, firstDirection }, { poses, changes }, flips) {
+  const from = firstDirection < 0 ? 1 : 0, sides = Array.from(dwells, (_, i) => (i + from) % 2);
+  const circles = sides.map((side, i) => arc(vehicle.twist[side], dwells[i]));
+  const places = sides.map((_, i) => lagPlace(i ? dwells[i - 1] : dwells[i], dwells[i]));
+  const lags = changes.map((change, i) => compose(change, inversePose(circles[i])));
+  const growth = (mode, added) => {
+    const twist = vehicle.twist.map((row, side) => row.map((value, k) => value + mode.twist[side][k]));
+    const turns = mode.twist.flat().some((value) => value !== 0), [currentX, currentY] = mode.current;
+    const grown = { x: [0], y: [0] };
+    let x = 0, y = 0, turned = 0;
+    for (let i = 0, next = 1; i < dwells.length; i++) {
+      const lag = added(i), circle = turns ? arc(twist[sides[i]], dwells[i]) : circles[i];
+      const moved = compose([lags[i][0] + lag[0], lags[i][1] + lag[1], lags[i][2] + lag[2]], circle);
+      const ahead = moved[0] - changes[i][0], left = moved[1] - changes[i][1];
+      const c = Math.cos(poses[i][2]), s = Math.sin(poses[i][2]);
+      x += c * ahead - s * left + currentX * dwells[i] - turned * (poses[i + 1][1] - poses[i][1]);
+      y += s * ahead + c * left + currentY * dwells[i] + turned * (poses[i + 1][0] - poses[i][0]);
+      turned += moved[2] - changes[i][2];
+      if (flips[next] !== i + 1) continue;
+      grown.x.push(x);
+      grown.y.push(y);
+      next += 1;
+    }
+    return grown;
+  };
+  const lagOf = ({ lag }) => (i) => (lag ? lagAt(lag[sides[i]], places[i]) : NOTHING);
+  const ofModes = vehicle.modes.map((mode) => growth(mode, lagOf(mode)));
+  const phases = phaseLags(vehicle, sides, dwells).map((lag) => growth(UNCHANGED, (i) => lag[i]));
+  return [...ofModes, ...phases];
+}
+
+/* What the four modes of the disc's phase add to the lags of the dwells. */
+function phaseLags(vehicle, sides, dwells) {
+  const spread = [1, -1].map((sense) => lagNoise(vehicle, sense, dwells));
+  let turned = 0;
+  const phase = Array.from(dwells, (dwell, i) => {
+    const before = turned;
+    turned += vehicle.phaseRate[sides[i]] * dwell;
+    return before;
+  });
+  return [0, 1].flatMap((side) => [Math.cos, Math.sin].map((wave) => sides.map((of, i) => {
+    return of === side ? spread[side].map((values) => values[i] * wave(phase[i])) : NOTHING;
+  })));
+}
+
+/* Δ = R′/(1 − κ̄ R′), at least the way that the robot makes in some pairs of dwells. */
+function lookAhead(vehicle, curvature, straight) {
+  const radius = pivotRadius(vehicle), least = radius / (1 - Math.min(curvature * radius, TIGHTEST));
+  return Math.max(least, PAIRS_AHEAD * zigzagSpeed(straight) * (straight.dwells[0] + straight.dwells[1]));
+}
+
+/* The bound on the distance from the reference for a vehicle without errors; rod: from the pivot to the tracked
+ * point. */
+function guaranteedError(vehicle, rod, swing, ahead) {
+  const first = Math.round(SHORTEST / STEP), lag = [0, 0, 0];
+  for (const table of vehicle.lag) {
+    for (let row = 0; row < BEFORE_KNOTS.length * COUNT; row++) {
+      if (row % COUNT < first) continue;
+      for (let axis = 0; axis < 3; axis++) lag[axis] = Math.max(lag[axis], Math.abs(table[3 * row + axis]));
+    }
+  }
+  return swing * (ahead + 2 * rod) + Math.hypot(lag[0], lag[1]) + (ahead + 2 * rod) * lag[2];
+}
+
+/* The rms over time of distances that are sampled equally often in each dwell. */
+function rmsInTime(distance, dwells) {
+  const samples = (distance.length - 1) / dwells.length;
+  const squares = distance.slice(1).map((value, i) => (value ** 2 * dwells[Math.floor(i / samples)]) / samples);
+  return Math.sqrt(sum(squares) / sum(dwells));
+}
+
+/* Distances of a track from the declared path: {distance, signed, normal, closed}; left is positive, and normals
+ * point to the left. */
+function predictedError(declared, track, closed) {
+  const { distance, segment, share } = nearest(declared, track), signed = new Float64Array(track.length);
+  const normal = track.map(([x, y], i) => {
+    const [x0, y0] = declared[segment[i]], [x1, y1] = declared[segment[i] + 1], dx = x1 - x0, dy = y1 - y0;
+    const length = Math.max(Math.hypot(dx, dy), 1e-300), aside = -dy / length, ahead = dx / length;
+    const side = (x - (x0 + share[i] * dx)) * aside + (y - (y0 + share[i] * dy)) * ahead;
+    signed[i] = side < 0 || Object.is(side, -0) ? -distance[i] : distance[i];
+    return [aside, ahead];
+  });
+  return { distance, signed, normal, closed };
+}
+
+/* Choose the flips of a schedule of `count` dwells between which deviations are drawn. */
+function flipsBetween(count) {
+  return [...new Set(Array.from(linspace(0, count, Math.min(count, BLOCKS) + 1), Math.trunc))];
+}
+
+/* The quantile LEVEL of the largest distance from the declared path over random vehicles. growth: at the flips. */
+function statedError(growth, flips, predicted, seed = 0) {
+  const { low, high, normal } = extremes(predicted, flips), last = low.length - 1, modes = growth.length;
+  const z = normals(seed, DRAWS * modes), across = new Float64Array(modes * (last + 1));
+  const onward = growth.map(({ x, y }) => x[last + 1] * normal[last][1] - y[last + 1] * normal[last][0]);
+  growth.forEach(({ x, y }, p) => {
+    normal.forEach(([aside, ahead], block) => {
+      across[block * modes + p] = x[block + 1] * aside + y[block + 1] * ahead;
+    });
+  });
+  const product = (draw, values, block) => {
+    let total = 0;
+    for (let p = 0; p < modes; p++) total += z[draw * modes + p] * values[block * modes + p];
+    return total;
+  };
+  const worst = new Float64Array(DRAWS).map((_, draw) => {
+    let off = 0, most = 0;
+    for (let block = 0; block <= last; block++) {
+      const aside = product(draw, across, block);
+      off = Math.max(Math.abs(high[block] + aside), Math.abs(low[block] + aside));
+      most = Math.max(most, off);
+    }
+    const beyond = predicted.closed ? 0 : Math.max(product(draw, onward, 0), 0); // past the end of an open path
+    return Math.max(most, Math.hypot(off, beyond));
+  });
+  return quantile(worst.sort(), LEVEL) + WOBBLE;
+}
+
+/* Lowest and highest signed distance in each block, and the normal at its end. */
+function extremes({ signed, normal }, flips) {
+  const last = flips.length - 1, samples = (signed.length - 1) / flips[last];
+  const blocks = flips.slice(1).map((end, block) => {
+    return signed.slice(flips[block] * samples, block === last - 1 ? undefined : end * samples);
+  });
+  return {
+    low: blocks.map((some) => Math.min(...some)), high: blocks.map((some) => Math.max(...some)),
+    normal: flips.slice(1).map((end) => normal[end * samples]),
+  };
+}
+
+/* The stated error with feedback, with the camera that is stated by default; from distances of the predicted track,
+ * dwells, net speed, the unit of time in seconds, and the error of the open loop. */
+function feedbackError(distance, dwells, netSpeed, timeScale, stated) {
+  const delay = CAMERA.delay_s / timeScale, gap = CAMERA.every_s / (timeScale * (1 - CAMERA.lost));
+  if (delay * dwells.length > KEPT * sum(dwells)) return stated;
+  const zigzag = inTime(distance, dwells), poses = STRETCH / (netSpeed * gap);
+  const place = (PLACE * CAMERA.noise[0]) / Math.sqrt(poses + 4), course = COURSE * netSpeed * (delay + gap);
+  return bound(zigzag / 0.95, Math.hypot(ZIGZAG * zigzag, place, course));
+}
+
+/* Bound in 95 % of all cases what is uniform between ±most, with a normal error of deviation `spread`. */
+function bound(most, spread) {
+  const uniform = (most * most) / 3, variance = uniform + spread * spread;
+  const share = (uniform / Math.max(variance, 1e-30)) ** 3;
+  return (WITHIN[0] + share * (WITHIN[1] - WITHIN[0])) * Math.sqrt(variance);
+}
+
+/* The distance within which a track is in 95 % of the time. */
+function inTime(distance, dwells) {
+  const samples = (distance.length - 1) / dwells.length, least = 0.95 * sum(dwells);
+  const order = Array.from({ length: distance.length - 1 }, (_, i) => i);
+  order.sort((one, other) => distance[one + 1] - distance[other + 1]);
+  let spent = 0;
+  const at = order.find((i) => (spent += dwells[Math.floor(i / samples)] / samples) >= least);
+  return distance[(at ?? order[order.length - 1]) + 1];
+}
+
+/* Compute the errors of a schedule: {track, motion, stated, feedback, guaranteed, closure, predictedRms,
+ * predictedMax, drawnRms, drawnMax, tableShare}.
  *
- * tracked: see tracked_point.js. drawn: the path as drawn. declared: see declared_path.js. switches: the schedule.
- * guaranteed: bound on the error without uncertainty. seed: of the random robots.
- * straight: straight motion with the shortest dwell, see zigzag.js. */
+ * drawn: the path as drawn. declared: see declare.js. switches: the schedule. guaranteed: bound on the error without
+ * uncertainty. seed: of the random robots. straight: straight motion with the shortest dwell. */
 function planErrors(tracked, drawn, declared, switches, guaranteed, seed, straight) {
   const { vehicle } = tracked, path = declared.reference.p, { dwells } = switches;
-  const { track, predicted, growth } = deviations(tracked, drawn, declared, switches);
-  const stated = statedError(growth, predicted, seed), fromDrawn = distanceTo(polyline(drawn), track);
+  const { rolled: { track, motion }, predicted, growth, flips } = deviations(tracked, drawn, declared, switches);
+  const stated = statedError(growth, flips, predicted, seed), fromDrawn = distanceTo(polyline(drawn), track);
   const [endX, endY] = track[track.length - 1], [startX, startY] = path[0];
+  const squares = growth.map(({ x, y }) => x.reduce((total, value, i) => total + value ** 2 + y[i] ** 2, 0));
+  const ofTable = squares.filter((_, p) => vehicle.modes[p]?.name.startsWith("table: "));
   return {
     track,
+    motion,
     stated,
     feedback: feedbackError(predicted.distance, dwells, zigzagSpeed(straight), tracked.robot.timeScale, stated),
     guaranteed,
     closure: drawn.closed ? Math.hypot(endX - startX, endY - startY) : null,
     predictedRms: rmsInTime(predicted.distance, dwells),
-    predictedMax: largestDistance(predicted),
+    predictedMax: largest(predicted.distance),
     drawnRms: rmsInTime(fromDrawn, dwells),
     drawnMax: largest(fromDrawn),
-    tableShare: tableShare(vehicle, growth),
+    tableShare: sum(ofTable) / Math.max(sum(squares), 1e-300),
   };
 }
 
 /* The predicted track, its distances from the declared path, and the growth of deviations along a schedule. */
 function deviations({ vehicle, offset }, drawn, declared, switches) {
-  const rollout = rollOut(vehicle, switches, offset), { track } = rollout;
-  const growth = errorGrowth(vehicle, switches, rollout, flipsBetween(switches.dwells.length));
-  return { track, predicted: predictedError(declared.reference.p, track, drawn.closed), growth };
+  const rolled = rollOut(vehicle, switches, offset), flips = flipsBetween(switches.dwells.length);
+  const predicted = predictedError(declared.reference.p, rolled.track, drawn.closed);
+  return { rolled, predicted, flips, growth: errorGrowth(vehicle, switches, rolled, flips) };
 }
 
-/* The stated error if the coefficients are those of another robot; null: calibrated, or not known.
- * Plan.unmeasured_error */
+/* The stated error if the coefficients are those of another robot; null: calibrated, or not known. */
 function unmeasuredError({ tracked, drawn, declared, switches }) {
   const { vehicle, unmeasured } = tracked;
   if (!unmeasured.length) return null;
   const guessed = { ...tracked, vehicle: { ...vehicle, modes: [...vehicle.modes, ...unmeasured] } };
-  const { predicted, growth } = deviations(guessed, drawn, declared, switches);
-  return statedError(growth, predicted);
+  const { predicted, growth, flips } = deviations(guessed, drawn, declared, switches);
+  return statedError(growth, flips, predicted);
 }
 
-/* The share of the look-up table's modes in the squared deviations along a schedule. _table_share */
-function tableShare(vehicle, growth) {
-  const squares = growth.modes.map(({ x, y }) => x.reduce((total, value, i) => total + value ** 2 + y[i] ** 2, 0));
-  const ofTable = squares.filter((_, p) => vehicle.modes[p]?.name.startsWith("table: "));
-  return sum(ofTable) / Math.max(sum(squares), 1e-300);
-}
-
-export { planErrors, unmeasuredError };
+export { lookAhead, guaranteedError, planErrors, unmeasuredError };

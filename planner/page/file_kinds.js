@@ -1,7 +1,7 @@
 /* Kinds of files that are neither tables nor drawings: their endings, and how they begin.
  *
  * planner/paths/file_kinds.py reads KINDS, too, so its value is JSON. */
-import { InputError } from "./input_error.js";
+import { InputError } from "./words.js";
 
 const KINDS = {
   "GeoJSON": ["geojson topojson",

@@ -13,7 +13,7 @@ from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 
-_CAMEL = {
+CAMEL = {
     "tails": "tails",
     "tail_length": "tailLength",
     "tail_radius": "tailRadius",
@@ -40,8 +40,8 @@ class NamedPath(NamedTuple):
 
 def robot_fields(robot: Robot) -> dict[str, Any]:
     """Return a robot's fields as the page has them."""
-    assert set(_CAMEL) <= {field.name for field in fields(Robot)}
-    return {"name": robot.name, **{name: getattr(robot, field) for field, name in _CAMEL.items()},
+    assert set(CAMEL) <= {field.name for field in fields(Robot)}
+    return {"name": robot.name, **{name: getattr(robot, field) for field, name in CAMEL.items()},
             "effects": dict(robot.effects)}  # fmt: skip
 
 

@@ -1,38 +1,43 @@
 /* The vehicle that a look-up table gives for a robot: both directions, what is uncertain, and the current.
  *
- * Mirrors planner/vehicle/from_table.py. Robots with effects, a correction or a calibration, and tables of one
- * robot, are asked by Python, which writes the parts of their vehicle. Lengths in l, times in μ0 l⁴/EI. */
-import { general, pythonText } from "./format.js";
-import { InputError } from "./input_error.js";
-import { query, response, tableErrorModes } from "./lookup.js";
-import { MIRROR } from "./planar.js";
-import { refusingRobot } from "./refusals.js";
-import { BEFORE } from "./response.js";
+ * Robots with effects, a correction or a calibration, and tables of one robot, are asked by Python, which writes the
+ * parts of their vehicle. Lengths in l, times in μ0 l⁴/EI. */
+import { CONSTANTS } from "./constants.js";
+import { MIRROR } from "./math.js";
 import { groupValues } from "./robot.js";
-import { lagTable, resampled } from "./vehicle.js";
+import { OutsideError, query, response, tableErrorModes, within } from "./table.js";
+import { fromSi } from "./units.js";
+import { BEFORE, lagTable, resampled, trackedPoint } from "./vehicle.js";
+import { InputError, general, quoted, refusing } from "./words.js";
 
-const ODD = 0.2; // share of a table's error that has opposite signs in the two directions
-const TIME_STEPS = 2.5e-4; // of the yaw rate, one standard deviation: error of time steps
-const STEP = 0.02; // of a coefficient, for derivatives
-const UNMEASURED = { C_t: 0.35, C_r: 0.22, C_yr: 0.48 }; // standard deviations of ln C, of another robot's
+const { ODD, TIME_STEPS } = CONSTANTS.from_table, { STEP: CHANGE } = CONSTANTS.coefficient_modes;
+const { UNMEASURED } = CONSTANTS.calibration_table; // standard deviations of ln C, of another robot's
 const SIDES = [[1, 1, 1], MIRROR];
+const NUMBERS = { // that decide a group: words, field, unit
+  l_over_R: ["tail length", "tailLength", "cm"], l_over_r0: ["tail radius", "tailRadius", "mm"],
+  L_over_R: ["head length", "headLength", "mm"], a_over_R: ["disc offset", "discOffset", "mm"],
+  N: ["number of tails", "tails", ""], omega_bar: ["motor speed", "motorSpeed", "rpm"],
+};
 
-/* Ask a table for the vehicle of a robot. table_vehicle */
-function tableVehicle(robot, table) {
-  const groups = groupValues(robot);
-  const senses = bothDirections(groups);
-  const motions = refusingRobot(robot, table, () => senses.map((values) => query(table, values)));
-  return vehicleOfParts({
+/* Ask a table for the vehicle of a robot, and add the tracked point. */
+function trackedVehicle(robot, table, point) {
+  const groups = groupValues(robot), senses = bothDirections(groups);
+  const motions = refusing(() => senses.map((values) => query(table, values)), (refusal) => {
+    throw refusal instanceof OutsideError ? new OutsideError(outside(refusal.message, robot, table)) : refusal;
+  });
+  const vehicle = vehicleOfParts({
     twist: motions.map(twistOf),
     curves: senses.map((values) => response(table, values)),
     before: BEFORE,
     phaseRate: motions.map((motion) => groups.N * motion.omega_t_bar),
-    errors: () => tableErrorModes(table, senses[0]),
+    errors: tableErrorModes(table, senses[0]),
     modes: [],
     current: [0, 0],
     tailGap: Math.min(...motions.map((motion) => motion.tail_gap)),
     leastGap: 1,
   }, robot.name);
+  const unmeasured = unmeasuredModes(groups, table, vehicle);
+  return trackedPoint(robot, { vehicle, unmeasured, calibrated: false, ownTable: false }, point, table.identity);
 }
 
 function bothDirections(groups) {
@@ -43,20 +48,34 @@ function twistOf({ v_z, v_x, omega_yr_bar }) {
   return [v_z, v_x, omega_yr_bar];
 }
 
-/* Modes of a robot whose coefficients are those of another. coefficient_modes of UNMEASURED */
-function unmeasuredModes(robot, table, vehicle) {
-  const groups = groupValues(robot);
+/* Say why a table does not know a robot: the number that was not learned, in the units of a laboratory, and its
+ * range. */
+function outside(reason, robot, table) {
+  const values = groupValues(robot);
+  const group = Object.keys(NUMBERS).find((name) => !within(table.ranges[name], values[name])) ?? "omega_bar";
+  const [words, field, unit] = NUMBERS[group], size = robot[field] ?? robot.headRadius; // of the disc offset
+  const written = (number, value) => {
+    return `${unit ? `${general(fromSi(number, unit), 4)} ${unit}` : number} (${group} = ${general(value, 3)})`;
+  };
+  const known = table.ranges[group].map((end) => {
+    return written(group === "l_over_r0" ? (size * values[group]) / end : (size * end) / values[group], end);
+  });
+  const alone = !within(table.ranges[group], values[group]);
+  const value = `${words} ${written(size, values[group])}`;
+  const why = alone ? `${value}, learned were ${known.join(" to ")}` : `${reason}; ${value}`;
+  return `robot ${quoted(robot.name)} is outside the look-up table: ${why}; change the robot, or `
+    + "simulate it (softflagella steady, softflagella surrogate robot)";
+}
+
+/* Modes of a robot whose coefficients are those of another. */
+function unmeasuredModes(groups, table, vehicle) {
   return Object.entries(UNMEASURED).map(([name, sigma], k) => {
-    const ends = [1, -1].map((sign) => {
-      try {
-        const values = { ...groups, [name]: groups[name] * Math.exp(sign * STEP) };
-        return { ...motionOfOther(table, values), step: sign * STEP };
-      } catch (refusal) {
-        if (!(refusal instanceof InputError)) throw refusal;
-        return { twist: vehicle.twist, lag: vehicle.lag, step: 0 }; // at the edge of the table
-      }
+    const [above, below] = [CHANGE, -CHANGE].map((step) => {
+      const values = { ...groups, [name]: groups[name] * Math.exp(step) };
+      const edge = { twist: vehicle.twist, lag: vehicle.lag, step: 0 }; // of the table
+      return refusing(() => ({ ...motionOfOther(table, values), step }), () => edge);
     });
-    const [above, below] = ends, scale = sigma / (above.step - below.step || Infinity);
+    const scale = sigma / (above.step - below.step || Infinity);
     const slope = (one, other) => Array.from(one, (value, i) => scale * (value - other[i]));
     return {
       name: `coefficients: ${k + 1}`,
@@ -67,7 +86,7 @@ function unmeasuredModes(robot, table, vehicle) {
   });
 }
 
-/* Ask a table for twists and lags of another robot. _other */
+/* Ask a table for twists and lags of another robot. */
 function motionOfOther(table, values) {
   const senses = bothDirections(values);
   return {
@@ -82,17 +101,15 @@ function motionOfOther(table, values) {
 /* Make a vehicle of a table's answers in both directions.
  *
  * twist: [forward, left, yaw rate] of each direction. curves: flat lag, memory, rest and spread of each, as for a
- * positive motor. before: dwells of the memory. phaseRate: N times the disc's spin of each. errors: gives the
- * table's errors, see curve_errors.js. modes: further ones. The rest is as in vehicle.js. */
+ * positive motor. before: dwells of the memory. phaseRate: N times the disc's spin of each. errors: of the table.
+ * modes: further ones. The rest is as in vehicle.js. */
 function vehicleOfParts({ twist, curves, before, phaseRate, errors, modes, current, tailGap, leastGap }, name) {
-  const speed = (twist[0][0] + twist[1][0]) / 2, robot = `robot ${pythonText(name)}`;
+  const speed = (twist[0][0] + twist[1][0]) / 2, robot = `robot ${quoted(name)}`;
   if (speed <= 0) {
     throw new InputError(`${robot} does not move forward (v_z = ${general(speed, 3)}); turn its motor slower`);
   }
   if (twist[0][2] <= 0 || -twist[1][2] <= 0) {
-    throw new InputError(
-      `${robot} turns to the same side in both directions of its motor; it cannot follow a path`,
-    );
+    throw new InputError(`${robot} turns to the same side in both directions of its motor; it cannot follow a path`);
   }
   return {
     twist,
@@ -100,13 +117,13 @@ function vehicleOfParts({ twist, curves, before, phaseRate, errors, modes, curre
     rest: curves.map(({ rest }, side) => mirrored(resampled(rest), SIDES[side])),
     spread: curves.map(({ spread }) => resampled(spread)),
     phaseRate,
-    modes: [...tableModes(twist, errors()), ...modes],
+    modes: [...tableModes(twist, errors), ...modes],
     current, tailGap, leastGap,
   };
 }
 
-/* Turn the errors of the table into modes. The two directions of a mirror-symmetric robot have the same errors;
- * those of other robots also have a part of opposite signs. The simulator turns a little less in time steps. */
+/* Turn the errors of the table into modes. The two directions of a mirror-symmetric robot have the same errors; those
+ * of other robots also have a part of opposite signs. The simulator turns a little less in time steps. */
 function tableModes(twist, errors) {
   const alike = twist[1].every((value, i) => {
     const image = twist[0][i] * MIRROR[i];
@@ -131,4 +148,4 @@ function mirrored(table, side) {
   return table.map((value, at) => value * side[at % 3]);
 }
 
-export { tableVehicle, unmeasuredModes, vehicleOfParts };
+export { trackedVehicle, vehicleOfParts };

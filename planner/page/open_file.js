@@ -1,92 +1,68 @@
 /* What a file is that the user opens, by its ending and its content: a robot, a path, a track, runs, or a plan.
  *
- * An opened path is {kind: "path", paths: [{points, closed, name}], unit}: unit is the size of its unit in cm,
- * null: the numbers have no unit. A track is {kind: "track", table}, a table of runs {kind: "runs", table}, a
- * robot {kind: "robot", fields}. */
+ * An opened path is {kind: "path", paths: [{points, closed, name}], unit}: unit is the size of its unit in cm, null:
+ * the numbers have no unit. A track is {kind: "track", table}, a table of runs {kind: "runs", table}, a robot {kind:
+ * "robot", fields}. */
 import { refuseOtherKinds } from "./file_kinds.js";
-import { InputError } from "./input_error.js";
-import { areOfRuns } from "./measured_table.js";
-import { numbersOf, textsOf } from "./number_words.js";
-import { readTablePath } from "./path_files.js";
-import { readRobot } from "./robot_toml.js";
+import { readRobot } from "./robot.js";
+import { areOfRuns } from "./runs.js";
 import { checkPlanId } from "./seals.js";
-import { splitName } from "./si_units.js";
-import { pathNames, readSvg } from "./svg_drawing.js";
-import { parseWords } from "./text_tables.js";
+import { readDrawing } from "./svg_drawing.js";
+import { numbersOf, parseWords, readTablePath, textsOf } from "./tables.js";
+import { splitName } from "./units.js";
+import { InputError } from "./words.js";
 
 const FORMAT = 2; // of plan.json
 const TRACK = ["heading", "time"]; // what a path does not have
 const PATH = ["x", "y"]; // what a table of runs does not have
-const TOML = /\.toml$/i,
-  SVG = /\.svg$/i,
-  JSON_FILE = /\.json$/i;
 
-/* Read a file. bytes: its content. */
-function openFile({ name, bytes }) {
-  const content = new Uint8Array(bytes);
-  if (TOML.test(name)) return { kind: "robot", fields: readRobot(textOf(content, name), name) };
-  if (SVG.test(name)) return pathsOfDrawing(textOf(content, name), name);
+/* Read a file. bytes: its content. tree: of a drawing, {tag, attributes, children, text} of its elements. */
+function openFile({ name, bytes, tree }) {
+  const content = new Uint8Array(bytes ?? []), stem = name.replace(/\.[^.]*$/, "");
+  if (/\.toml$/i.test(name)) return { kind: "robot", fields: readRobot(textOf(content, name), name) };
+  if (tree) {
+    const { paths, unit } = readDrawing(tree, name);
+    const named = paths.map((path) => ({ ...path, name: paths.length > 1 ? path.name : stem }));
+    return { kind: "path", unit: unit === null ? null : 100 * unit, paths: named };
+  }
   refuseOtherKinds(name, content);
-  if (JSON_FILE.test(name)) return pathOfPlan(textOf(content, name), name);
-  const { names, words, lines } = parseWords(content, name, false), columns = names.map(String);
-  const quantities = columns.map((column) => splitName(column).quantity.toLowerCase());
-  const table = () => ({ names, columns: words.map((column, i) => numbersOf(column, names[i])) });
-  if (TRACK.every((quantity) => quantities.some((each) => each.startsWith(quantity))))
-    return { kind: "track", table: { ...table(), plans: plansOf(names, words) } };
-  if (!PATH.every((quantity) => quantities.includes(quantity)) && areOfRuns(columns)) {
-    return { kind: "runs", table: { ...table(), texts: words.map(textsOf), lines } };
+  if (/\.json$/i.test(name)) return pathOfPlan(textOf(content, name), name, stem);
+  const { names, words, lines } = parseWords(content, name), texts = names.map(String);
+  const table = { names, columns: words.map((column, i) => numbersOf(column, names[i])), lines };
+  const quantities = texts.map((column) => splitName(column).quantity.toLowerCase());
+  if (TRACK.every((quantity) => quantities.some((each) => each.startsWith(quantity)))) {
+    const plans = [...new Set(words[names.indexOf("plan_id")])].filter(Boolean); // of which the track is
+    return { kind: "track", table: { ...table, plans } };
   }
-  const { path, unit } = readTablePath(content, name);
-  return { kind: "path", unit: unit === null ? null : 100 * unit, paths: [{ ...path, name: stem(name) }] };
-}
-
-/* The ids of the plans that a track is of. */
-function plansOf(names, words) {
-  return [...new Set(words[names.indexOf("plan_id")])].filter(Boolean);
-}
-
-/* The paths of an SVG, those that can be read; where there is none, the refusal of the first. */
-function pathsOfDrawing(text, name) {
-  const names = pathNames(text, name);
-  if (names.length < 2) {
-    const { path, unit } = readSvg(text, name);
-    return { kind: "path", unit: unit === null ? null : 100 * unit, paths: [{ ...path, name: stem(name) }] };
+  if (!PATH.every((quantity) => quantities.includes(quantity)) && areOfRuns(texts)) {
+    return { kind: "runs", table: { ...table, names: texts, texts: words.map(textsOf) } };
   }
-  const drawings = names.map((shape) => ({ shape, ...readSvg(text, name, null, shape) }));
-  const [{ unit }] = drawings;
-  return {
-    kind: "path",
-    unit: unit === null ? null : 100 * unit,
-    paths: drawings.map(({ shape, path }) => ({ ...path, name: shape })),
-  };
+  const { path, unit } = readTablePath(table, name);
+  return { kind: "path", unit: unit === null ? null : 100 * unit, paths: [{ ...path, name: stem }] };
 }
 
-/* The drawn path of a plan.json. */
-function pathOfPlan(text, name) {
+/* The drawn path of a plan.json, which may have more: walls, laps, an arrival. */
+function pathOfPlan(text, name, stem) {
+  const refused = (why) => new InputError(`${name} is not a plan.json of the planner (${why}); plan again`);
   let plan;
   try {
     plan = JSON.parse(text);
   } catch (broken) {
-    throw new InputError(`${name} is not a plan.json of the planner (${broken.message}); plan again`);
+    throw refused(broken.message);
   }
-  if (plan?.format === undefined)
-    throw new InputError(`${name} is not a plan.json of the planner (it has no format); plan again`);
-  if (plan.format !== FORMAT)
+  if (plan?.format === undefined) throw refused("it has no format");
+  if (plan.format !== FORMAT) {
     throw new InputError(`${name} has format ${plan.format}, this version reads ${FORMAT}: plan again`);
+  }
   checkPlanId(plan.id, text, name);
-  checkPlan(plan, name);
-  const cm = 100 * plan.robot.tail_length_m,
-    points = plan.closed ? plan.raw_path.slice(0, -1) : plan.raw_path;
-  return { kind: "path", unit: cm, paths: [{ points, closed: plan.closed, name: stem(name) }] };
-}
-
-/* Refuse a plan without a length or a path. It may have more than is read here: walls, laps, an arrival. */
-function checkPlan({ robot, raw_path: path }, name) {
+  const { robot, raw_path: path, closed } = plan;
   const isPoint = (point) => Array.isArray(point) && point.length === 2 && point.every(Number.isFinite);
-  if (!(robot?.tail_length_m > 0))
-    throw new InputError(`${name} is not a plan.json of the planner ('tail_length_m'); plan again`);
-  if (!(Array.isArray(path) && path.length >= 2 && path.every(isPoint)))
+  if (!(robot?.tail_length_m > 0)) throw refused("'tail_length_m'");
+  if (!(Array.isArray(path) && path.length >= 2 && path.every(isPoint))) {
     throw new InputError(`${name}: raw_path must have two or more rows of 2 finite numbers; plan again`);
+  }
+  const points = closed ? path.slice(0, -1) : path;
+  return { kind: "path", unit: 100 * robot.tail_length_m, paths: [{ points, closed, name: stem }] };
 }
 
 /* The text of a file, which must be text. */
@@ -96,10 +72,6 @@ function textOf(bytes, name) {
   } catch {
     throw new InputError(`${name} is no text in UTF-8`);
   }
-}
-
-function stem(name) {
-  return name.replace(/\.[^.]*$/, "");
 }
 
 export { openFile };

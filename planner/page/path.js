@@ -1,31 +1,63 @@
-/* Paths in the plane: polylines, circles, polygons, points at equal distances, smoothing.
+/* Paths in the plane: shapes, points at equal distances, smoothing, corners and arcs that round them.
  *
- * Mirrors planner/paths/path.py. A path is {points, closed}: rows [x, y], and whether the last point is joined to
- * the first. Lengths are in tail lengths l, but any unit works. */
-import { TAU, column, convolved, interp, largest, linspace, runningSum, sum } from "./arrays.js";
-import { InputError } from "./input_error.js";
-import { general, repr } from "./format.js";
+ * A path is {points, closed}: rows [x, y], and whether the last point is joined to the first. Lengths are in tail
+ * lengths l, but any unit works; angles in rad. */
+import { CONSTANTS } from "./constants.js";
+import { TAU, column, convolved, differences, halfTurn, interp, largest, linspace, runningSum } from "./math.js";
+import { smallest, sum } from "./math.js";
+import { formatLength, inLab, inTails } from "./units.js";
+import { InputError, general, repr } from "./words.js";
 
-const CIRCLE_POINTS = 720;
-const LARGEST = 1e100; // coordinate: squares of larger ones overflow
-const MOST_SMOOTHED = 200_000;
-const EVEN = 1e-9; // of a step, that rounding may add to a length
+const { CIRCLE_POINTS, LARGEST, MOST_SMOOTHED, EVEN } = CONSTANTS.path;
+const { LONGEST, SMALLEST } = CONSTANTS.paths_units;
+const { CORNER } = CONSTANTS.fillets;
+const FINE = 2 * (Math.PI / 180); // largest turn between two points of an arc
+const FEWEST = 8; // points of an arc
+const POINTS = 400, WAVES = 2, HEIGHT = 0.12; // of a wave: half of its height, over its length
+const SHAPES = {
+  circle: (radius) => curve(CIRCLE_POINTS, true, (angle) => [radius * Math.cos(angle), radius * Math.sin(angle)]),
+  eight: (width) => curve(POINTS, true, (angle) => {
+    return [(width / 2) * Math.sin(angle), (width / 2) * Math.sin(angle) * Math.cos(angle)];
+  }),
+  wave: (length) => curve(POINTS - 1, false, (angle) => {
+    return [(length * angle) / TAU, HEIGHT * length * Math.sin(WAVES * angle)];
+  }),
+  triangle: (side) => polygon(3, side),
+  square: (side) => polygon(4, side),
+  "polygon:6": (side) => polygon(6, side),
+};
 
-/* Make a path from points; by default it is closed if it ends where it begins. Path2D.of */
+/* Make the shape of a name and a size. */
+function pageShape(name, size) {
+  if (!(size > 0 && size < Infinity)) throw new InputError(`${name}: its size must be above 0`);
+  return SHAPES[name](size);
+}
+
+/* A curve over a whole turn, in so many steps. */
+function curve(steps, closed, at) {
+  return pathOf(Array.from({ length: steps + (closed ? 0 : 1) }, (_, i) => at((TAU * i) / steps)), closed);
+}
+
+/* Make a regular polygon about the origin, counter-clockwise; it starts in the middle of its lower side. */
+function polygon(corners, side) {
+  const reach = side / 2 / Math.sin(Math.PI / corners);
+  const ring = Array.from({ length: corners }, (_, i) => (TAU * (i + 0.5)) / corners - Math.PI / 2)
+    .map((angle) => [reach * Math.cos(angle), reach * Math.sin(angle)]);
+  return pathOf([[0, (ring[0][1] + ring[corners - 1][1]) / 2], ...ring], true);
+}
+
+/* Make a path from points; by default it is closed if it ends where it begins. */
 function pathOf(points, closed = null) {
-  if (points.length === 0) throw new InputError("the path is empty; give at least two points");
-  const rows = Array.from(points);
-  checkShape(rows);
+  const rows = Array.from(points), [first] = rows;
+  if (!rows.length) throw new InputError("the path is empty; give at least two points");
   const bad = rows.findIndex(([x, y]) => !(Math.abs(x) < LARGEST && Math.abs(y) < LARGEST));
   if (bad >= 0) {
-    const point = `[${rows[bad].map(repr).join(", ")}]`;
     throw new InputError(
-      `point ${bad + 1} of the path is ${point}; give finite numbers, smaller than ${general(LARGEST)}`,
+      `point ${bad + 1} of the path is [${rows[bad].map(repr).join(", ")}]; give finite numbers, smaller than `
+      + general(LARGEST),
     );
   }
-  const [first] = rows;
-  let size = 0;
-  for (const [x, y] of rows) size = Math.max(size, Math.abs(x - first[0]), Math.abs(y - first[1]));
+  const size = largest(rows.map(([x, y]) => Math.max(Math.abs(x - first[0]), Math.abs(y - first[1]))));
   const least = 1e-12 * Math.max(size, 1e-300);
   const kept = rows.filter((point, i) => i === 0 || distance(point, rows[i - 1]) > least);
   if (kept.length < 2 || size === 0) {
@@ -36,71 +68,54 @@ function pathOf(points, closed = null) {
   return { points: kept, closed: closed ?? meets };
 }
 
-/* Refuse what is no table of two columns. */
-function checkShape(rows) {
-  const width = Array.isArray(rows[0]) ? rows[0].length : 0;
-  const regular = width ? rows.every((row) => Array.isArray(row) && row.length === width) : true;
-  const numbers = rows.every((row) => [row].flat().every((value) => typeof value === "number"));
-  if (!regular || !numbers) throw new InputError("the path has an entry that is no number; give pairs x, y");
-  if (width === 2) return;
-  const shape = width ? `(${rows.length}, ${width})` : `(${rows.length},)`;
-  throw new InputError(`the path has shape ${shape}; give (n, 2): x and y of each point`);
+function distance([x, y], [toX, toY]) {
+  return Math.hypot(toX - x, toY - y);
 }
 
-function distance(first, second) {
-  const x = second[0] - first[0], y = second[1] - first[1];
-  return Math.sqrt(x * x + y * y);
-}
-
-/* Multiply the coordinates. Path2D.scaled */
+/* Multiply the coordinates. */
 function scaled(path, factor) {
   return { points: path.points.map(([x, y]) => [x * factor, y * factor]), closed: path.closed };
 }
 
-/* The points; those of a closed path with the first one repeated at the end. Path2D.polyline */
+/* The points; those of a closed path with the first one repeated at the end. */
 function polyline(path) {
   return path.closed ? [...path.points, path.points[0]] : path.points;
 }
 
 /* Lengths of the steps of a polyline. */
 function stepLengths(line) {
-  const lengths = new Float64Array(line.length - 1);
-  for (let i = 0; i < lengths.length; i++) lengths[i] = distance(line[i], line[i + 1]);
-  return lengths;
+  return Float64Array.from({ length: line.length - 1 }, (_, i) => distance(line[i], line[i + 1]));
 }
 
-/* Path2D.length */
 function pathLength(path) {
   return sum(stepLengths(polyline(path)));
 }
 
-/* Make a circle about the origin, counter-clockwise from (radius, 0). */
-function circle(radius) {
-  const angles = Array.from({ length: CIRCLE_POINTS }, (_, i) => (TAU * i) / CIRCLE_POINTS);
-  return pathOf(angles.map((angle) => [radius * Math.cos(angle), radius * Math.sin(angle)]), true);
-}
-
-/* Make a regular polygon about the origin, counter-clockwise; it starts in the middle of its lower side. */
-function polygon(corners, side) {
-  const reach = side / 2 / Math.sin(Math.PI / corners), ring = [];
-  for (let i = 0; i < corners; i++) {
-    const angle = (TAU * (i + 0.5)) / corners - Math.PI / 2;
-    ring.push([reach * Math.cos(angle), reach * Math.sin(angle)]);
-  }
-  const last = ring[corners - 1], middle = [(ring[0][0] + last[0]) / 2, (ring[0][1] + last[1]) / 2];
-  return pathOf([middle, ...ring], true);
-}
-
-/* The length of a polyline from its start to each of its points. arc_length */
+/* The length of a polyline from its start to each of its points. */
 function arcLength(line) {
   return runningSum(stepLengths(line));
+}
+
+/* Width and height of a path. */
+function extent({ points }) {
+  return [0, 1].map((axis) => largest(column(points, axis)) - smallest(column(points, axis)));
+}
+
+/* Refuse a path that no schedule can be meant for. turnRadius: of the robot's circle. */
+function checkSize(path, robot, turnRadius) {
+  const across = extent(path), long = pathLength(path) > LONGEST;
+  if (!long && Math.max(...across) >= SMALLEST * turnRadius) return;
+  const lab = across.map((value) => formatLength(value * robot.tailLength)).join(" by ");
+  const words = `${inLab(pathLength(path), robot)} long, ${lab} (${across.map(inTails).join(" by ")} l)`;
+  const why = long ? `; at most ${general(LONGEST)} l can be planned`
+    : `: too small, the robot's circle has a radius of ${inLab(turnRadius, robot)}`;
+  throw new InputError(`the path is ${words}${why}; scale it`);
 }
 
 /* Place points at equal arc length, at most `spacing` apart; the ends are kept. */
 function resample(line, spacing) {
   const lengths = arcLength(line), end = lengths[lengths.length - 1];
-  const count = Math.max(2, stepsOf(end, spacing) + 1);
-  return pointsAt(line, lengths, linspace(0, end, count));
+  return pointsAt(line, lengths, linspace(0, end, Math.max(2, stepsOf(end, spacing) + 1)));
 }
 
 /* Interpolate a polyline, whose points are at these lengths, at other lengths. */
@@ -118,29 +133,59 @@ function stepsOf(length, most) {
 function smoothed(path, length) {
   const whole = pathLength(path);
   if (!(length > 0 && length < whole / 2)) {
-    throw new InputError(
-      `smoothing over ${general(length)} l; give a length above 0 and below half the path's`,
-    );
+    throw new InputError(`smoothing over ${general(length)} l; give a length above 0 and below half the path's`);
   }
   const points = resample(polyline(path), Math.max(length / 20, whole / MOST_SMOOTHED)), last = points.length - 1;
-  const sigma = length / 2 / (whole / last), reach = Math.ceil(4 * sigma), around = [];
-  if (path.closed) {
-    const count = last; // without the first point's repetition
-    for (let i = -reach; i < count + reach; i++) around.push(points[((i % count) + count) % count]);
-  } else { // turned about the ends, which therefore stay
-    const [start, end] = [points[0], points[last]];
-    const turned = (about, [x, y]) => [2 * about[0] - x, 2 * about[1] - y];
-    for (let i = reach; i > 0; i--) around.push(turned(start, points[Math.min(i, last)]));
-    for (const point of points) around.push(point);
-    for (let i = 1; i <= reach; i++) around.push(turned(end, points[last - Math.min(i, last)]));
-  }
+  const sigma = length / 2 / (whole / last), reach = Math.ceil(4 * sigma);
+  const turned = ([aboutX, aboutY], [x, y]) => [2 * aboutX - x, 2 * aboutY - y]; // so that the ends stay
+  const at = (i) => {
+    if (path.closed) return points[((i % last) + last) % last];
+    if (i < 0) return turned(points[0], points[Math.min(-i, last)]);
+    return i <= last ? points[i] : turned(points[last], points[Math.max(2 * last - i, 0)]);
+  };
+  const around = Array.from({ length: last + 2 * reach + (path.closed ? 0 : 1) }, (_, i) => at(i - reach));
   const bell = Float64Array.from({ length: 2 * reach + 1 }, (_, i) => Math.exp(-0.5 * ((i - reach) / sigma) ** 2));
   const total = sum(bell), kernel = bell.map((value) => value / total);
   const x = convolved(column(around, 0), kernel), y = convolved(column(around, 1), kernel);
   const means = Array.from(x, (value, i) => [value, y[i]]);
-  const moved = largest(means.map((point, i) => distance(point, points[i])));
-  return { path: pathOf(means, path.closed), moved };
+  return { path: pathOf(means, path.closed), moved: largest(means.map((point, i) => distance(point, points[i]))) };
 }
 
-export { pathOf, scaled, polyline, stepLengths, pathLength, circle, polygon, arcLength, resample, stepsOf };
-export { smoothed };
+/* The signed turning angle [rad] at every point; zero at the ends of an open path. */
+function kinks(path) {
+  const line = polyline(path), dx = differences(column(line, 0)), dy = differences(column(line, 1));
+  const direction = dx.map((x, i) => Math.atan2(dy[i], x)), last = direction.length - 1;
+  const turns = path.closed ? direction.map((angle, i) => angle - direction[i ? i - 1 : last])
+    : Float64Array.from([0, ...differences(direction), 0]);
+  return turns.map(halfTurn);
+}
+
+/* The largest radius that fits all corners; infinite without corners. */
+function largestFillet(path) {
+  const reach = kinks(path).map((angle) => (Math.abs(angle) > CORNER ? Math.tan(Math.abs(angle) / 2) : 0));
+  const edges = stepLengths(polyline(path));
+  return smallest(edges.map((edge, i) => edge / (reach[i] + reach[(i + 1) % reach.length])));
+}
+
+/* Replace corners by arcs of `radius`, tangent to the edges; at most `largestFillet`. */
+function fillet(path, radius) {
+  const angles = kinks(path), line = polyline(path), lengths = stepLengths(line);
+  if (radius === 0) return path;
+  const points = path.points.flatMap((point, i) => {
+    const angle = angles[i], before = i ? i - 1 : lengths.length - 1;
+    if (!(Math.abs(angle) > CORNER)) return [point];
+    const reach = radius * Math.tan(Math.abs(angle) / 2), inward = Math.sign(angle) * radius;
+    const into = [0, 1].map((k) => (line[before + 1][k] - line[before][k]) / lengths[before]);
+    const start = point.map((value, k) => value - reach * into[k]);
+    const centre = [start[0] - inward * into[1], start[1] + inward * into[0]];
+    const x = start[0] - centre[0], y = start[1] - centre[1];
+    return Array.from(linspace(0, angle, Math.max(FEWEST, stepsOf(Math.abs(angle), FINE))), (turned) => {
+      const c = Math.cos(turned), s = Math.sin(turned);
+      return [centre[0] + (c * x - s * y), centre[1] + (s * x + c * y)];
+    });
+  });
+  return { points, closed: path.closed };
+}
+
+export { pageShape, pathOf, scaled, polyline, stepLengths, pathLength, arcLength, extent, checkSize, resample };
+export { pointsAt, stepsOf, smoothed, CORNER, kinks, largestFillet, fillet };

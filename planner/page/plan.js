@@ -1,35 +1,49 @@
 /* From a path and a robot to a plan, without simulating.
  *
- * Mirrors planner/planning/plan.py, which has the steps. A plan is {tracked, objective, drawn, declared, straight,
- * guidance, switches, errors}. Lengths in l, times in μ0 l⁴/EI, unless a name says its unit. */
-import { sum } from "./arrays.js";
-import { declare } from "./declared_path.js";
-import { checkLeast, dwellsFor, longerDwells, nearlyFastest } from "./dwell_choice.js";
-import { planErrors, unmeasuredError } from "./errors.js";
-import { InputError } from "./input_error.js";
-import { leastDwell, planRequest } from "./request.js";
-import { follow } from "./schedule.js";
-import { guaranteedError, lookAhead } from "./stated_error.js";
-import { rodOf, trackedVehicle } from "./tracked_point.js";
-import { checkSize, inLab, timeInLab } from "./units.js";
-import { turnRadius } from "./vehicle.js";
-import { zigzag, zigzagHysteresis } from "./zigzag.js";
+ * A plan is {tracked, objective, drawn, declared, straight, guidance, switches, errors}. Lengths in l, times in
+ * μ0 l⁴/EI, unless a name says its unit. */
+import { CONSTANTS } from "./constants.js";
+import { declare } from "./declare.js";
+import { guaranteedError, lookAhead, planErrors, unmeasuredError } from "./errors.js";
+import { trackedVehicle } from "./from_table.js";
+import { follow } from "./guidance.js";
+import { sum } from "./math.js";
+import { checkSize } from "./path.js";
+import { inLab, timeInLab } from "./units.js";
+import { QUICK, checkLeast, dwellsFor, longerDwells, nearlyFastest, rodOf, turnRadius, zigzag } from "./vehicle.js";
+import { zigzagHysteresis } from "./vehicle.js";
+import { InputError, general, refusing } from "./words.js";
 
-const WORTH = 0.8; // of the stated error: a longer dwell, which swings further, must leave at most this
-const SAVED = 3; // dwells that corners and the end of a path may save
-const LENGTHENED_FROM = 1.2; // stated error over predicted error, below which fewer flips gain nothing
+const { WORTH, SAVED, LENGTHENED_FROM } = CONSTANTS.plan;
 const OWN_TABLE = "softflagella surrogate robot"; // makes the table of one robot
+const { DEFAULTS } = CONSTANTS.request;
 
-/* Plan the motor's switching times for a path {points, closed} and a robot that a table knows. plan
- *
- * options: see request.js. progress: called now and then with the share of the path that is done. */
+/* Fill in the defaults of what is asked of a plan besides path and robot; refuse a tolerance that is none. */
+function planRequest(options = {}) {
+  const request = { ...DEFAULTS, ...options }, { tolerance } = request;
+  if (tolerance !== null && !(Number.isFinite(tolerance) && tolerance > 0)) {
+    throw new InputError(`tolerance ${general(tolerance)} l; give a number above 0`, "options");
+  }
+  return request;
+}
+
+/* The shortest dwell that the motor allows; null: the user gave none. */
+function leastDwell({ minimumSeconds, minimumDwell }, robot) {
+  if (minimumSeconds === null) return minimumDwell;
+  if (!(Number.isFinite(minimumSeconds) && minimumSeconds > 0)) {
+    throw new InputError(`minimum dwell ${general(minimumSeconds)} s; give a number above 0`, "options");
+  }
+  return Math.max(minimumSeconds / robot.timeScale, minimumDwell ?? QUICK);
+}
+
+/* Plan the motor's switching times for a path {points, closed} and a robot that a table knows. */
 function planPath(path, robot, table, options = {}, progress = null) {
   const request = planRequest(options);
   const plan = makePlan(path, trackedVehicle(robot, table, request.point), request, progress);
   return { ...plan, unmeasured: unmeasuredError(plan) };
 }
 
-/* Plan for a path, a vehicle (see tracked_point.js) and a request (see request.js). make_plan */
+/* Plan for a path, a vehicle with its tracked point and a request. progress: called now and then. */
 function makePlan(drawn, tracked, request, progress = null) {
   const { vehicle, robot } = tracked, declaredPaths = new Map();
   checkSize(drawn, robot, turnRadius(vehicle));
@@ -48,7 +62,7 @@ function makePlan(drawn, tracked, request, progress = null) {
     const straight = zigzag(vehicle, dwell, tracked.offset);
     const declared = declaredPath(driftOf(tracked, straight, dwell));
     const guidance = chooseGuidance(vehicle, declared, straight, dwell);
-    const switches = follow(declared.reference, vehicle, guidance, tracked.offset, { progress });
+    const switches = follow(declared.reference, vehicle, guidance, tracked.offset, progress);
     const bound = guaranteedError(vehicle, rodOf(tracked), straight.swing, guidance.ahead);
     const errors = planErrors(tracked, drawn, declared, switches, bound, seed, straight);
     return { tracked, objective, drawn, declared, straight, guidance, switches, errors };
@@ -66,52 +80,39 @@ function makePlan(drawn, tracked, request, progress = null) {
   return shortened(first, dwells, withDwell, tolerance);
 }
 
-/* The dwell with which a declared path takes the least time; straight motion is the fastest with `fastest`.
- * _quickest */
+/* The dwell with which a declared path takes the least time; straight motion is the fastest with `fastest`. */
 function quickest({ vehicle, offset }, declared, fastest, least) {
   let best = fastest, time = Infinity;
   for (const dwell of nearlyFastest(vehicle, least)) {
     const guidance = chooseGuidance(vehicle, declared, zigzag(vehicle, dwell, offset), dwell);
-    try {
-      const taken = sum(follow(declared.reference, vehicle, guidance, offset).dwells);
-      if (taken < time) [best, time] = [dwell, taken];
-      if (taken > time + SAVED * fastest) break;
-    } catch (refusal) { // too long for this path
-      if (!(refusal instanceof InputError)) throw refusal;
-    }
+    const follows = () => sum(follow(declared.reference, vehicle, guidance, offset).dwells);
+    const taken = refusing(follows, () => null); // null: too long for this path
+    if (taken !== null && taken > time + SAVED * fastest) break;
+    if (taken !== null && taken < time) [best, time] = [dwell, taken];
   }
   return best;
 }
 
-/* Lengthen the dwells where this makes the stated error smaller by a fifth or more. _least_stated */
+/* Lengthen the dwells where this makes the stated error smaller by a fifth or more. */
 function leastStated(first, longer, withDwell) {
   let best = first;
   if (first.errors.stated < LENGTHENED_FROM * first.errors.predictedMax) return best;
   for (const dwell of longer) {
-    let candidate;
-    try {
-      candidate = withDwell(dwell);
-    } catch (refusal) { // too long for this path
-      if (!(refusal instanceof InputError)) throw refusal;
-      break;
-    }
-    if (candidate.errors.predictedMax >= best.errors.stated) break;
+    const candidate = refusing(() => withDwell(dwell), () => null); // null: too long for this path
+    if (candidate === null || candidate.errors.predictedMax >= best.errors.stated) break;
     if (candidate.errors.stated < WORTH * best.errors.stated) best = candidate;
   }
   return best;
 }
 
-/* Halve between the first dwell, which is too long, and the shortest one, until the tolerance is kept.
- * _shortened */
+/* Halve between the first dwell, which is too long, and the shortest one, until the tolerance is kept. */
 function shortened(first, dwells, withDwell, tolerance) {
   let best = first, kept = null, low = 0, high = dwells.length;
   while (high - low > 1) {
     const middle = (low + high) >> 1, candidate = withDwell(dwells[middle]);
     if (candidate.errors.stated < best.errors.stated) best = candidate;
-    if (candidate.errors.stated <= tolerance) {
-      kept = candidate;
-      high = middle;
-    } else low = middle;
+    if (candidate.errors.stated <= tolerance) [kept, high] = [candidate, middle];
+    else low = middle;
   }
   if (kept !== null) return kept;
   const { robot } = first.tracked;
@@ -123,7 +124,7 @@ function shortened(first, dwells, withDwell, tolerance) {
   );
 }
 
-/* What carries the robot off its heading, with one shortest dwell, as shares of its net speed. zigzag_drift */
+/* What carries the robot off its heading, with one shortest dwell, as shares of its net speed. */
 function driftOf({ vehicle, robot }, straight, dwell) {
   if (straight.speed <= 0) {
     const turn = dwell * Math.max(...vehicle.twist.map((twist) => Math.abs(twist[2])));
@@ -133,18 +134,15 @@ function driftOf({ vehicle, robot }, straight, dwell) {
       "options",
     );
   }
-  const sideways = straight.drift / straight.speed;
-  // A mirror-symmetric robot has no drift: what is left is rounding.
-  return {
-    sideways: Math.abs(sideways) < 1e-9 ? 0 : sideways,
-    current: vehicle.current.map((speed) => speed / straight.speed),
-  };
+  const sideways = straight.drift / straight.speed; // of a mirror-symmetric robot it is rounding
+  const current = vehicle.current.map((speed) => speed / straight.speed);
+  return { sideways: Math.abs(sideways) < 1e-9 ? 0 : sideways, current };
 }
 
-/* Choose look-ahead and hysteresis for a declared path and a shortest dwell. choose_guidance */
+/* Choose look-ahead and hysteresis for a declared path and a shortest dwell. */
 function chooseGuidance(vehicle, declared, straight, dwell) {
   const ahead = lookAhead(vehicle, declared.curvature, straight);
   return { dwell, ahead, swing: zigzagHysteresis(straight, ahead) };
 }
 
-export { planPath, makePlan, driftOf, chooseGuidance };
+export { planRequest, planPath, makePlan };

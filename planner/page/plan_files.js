@@ -1,49 +1,162 @@
-/* The files of a plan: plan.json, plan.csv, and schedule.h and tracker.h for a microcontroller.
+/* The files of a plan: plan.json, plan.csv, and schedule.h and tracker.h for a microcontroller; and what it warns of.
  *
- * Mirrors planner/files/plan_files.py, which explains schedule.h. */
-import { differences, linspace, runningSum } from "./arrays.js";
-import { fixed, general, roundHalfEven } from "./format.js";
-import { InputError } from "./input_error.js";
-import { planColumns, planRecord, planSeconds } from "./planned.js";
-import { trackerHeader } from "./tracker_header.js";
-import { inLab } from "./units.js";
+ * A plan is as in plan.js, with `unmeasured`. Lengths in l, times in μ0 l⁴/EI, unless a name says its unit. */
+import { CONSTANTS } from "./constants.js";
+import { lookAhead } from "./errors.js";
+import { differences, largestSize, linspace, runningSum, sum } from "./math.js";
+import { polyline } from "./path.js";
+import { groupValues } from "./robot.js";
+import { planId } from "./seals.js";
+import { inLab, timeInLab } from "./units.js";
+import { COUNT, lagAt, lagPlace, pivotDistance, pivotRadius, rodOf, turnRadius } from "./vehicle.js";
+import { yawRate, zigzagSpeed } from "./vehicle.js";
+import { InputError, general, repr } from "./words.js";
 
-const MOST_MS = 65_535;
-const CHECKPOINTS = 32;
-const A_LINE = 12; // entries
+const { WIDE, OWN_TABLE_FROM } = CONSTANTS.planned, { CAMERA } = CONSTANTS.feedback_error;
+const { MOST_MS, CHECKPOINTS } = CONSTANTS.plan_files, { LARGEST } = CONSTANTS.tracker_header;
+const { PRIOR, MOST, CURRENT, MOST_CURRENT, MARKER, MOST_MARKER, STATES } = CONSTANTS.kalman_filter;
+const { NEAR, ERRORS } = CONSTANTS.guidance;
+const FORMAT = 2;
+const DEGREES = 180 / Math.PI;
+const A_LINE = 12; // numbers of a table
+const START = [0.02, 0.02, 0.03]; // standard deviations of the first pose [l, rad]
+const STRIDE = 0.5; // between two targets of a way back, in radii
 
-/* The files by name. parts: {codeVersion, directions, flash, schedule, tracker}, the version of the program, parts
- * of schedule.h that the planner's C code gives, and the template of tracker.h. write_plan_files */
+/* What the user should know, in words. */
+function planWarnings({ tracked, declared, errors, switches, guidance }) {
+  const { vehicle, robot } = tracked, own = [];
+  if (errors.predictedMax > WIDE * turnRadius(vehicle)) {
+    const turn = (guidance.dwell * yawRate(vehicle) * DEGREES).toFixed(0);
+    own.push(
+      `the predicted track is up to ${inLab(errors.predictedMax, robot)} from the declared path: in dwells of `
+      + `${timeInLab(guidance.dwell, robot)} the robot turns by ${turn} degrees; shorter ones keep it nearer`,
+    );
+  }
+  if (!tracked.ownTable && errors.stated >= OWN_TABLE_FROM * errors.predictedMax && errors.tableShare > 0.5) {
+    own.push(
+      `the stated error is mostly that of the look-up table, over ${switches.dwells.length} flips: simulate this robot's `
+      + "own table (--own-table, own_table=True), or measure poses on the way",
+    );
+  }
+  return [...declared.warnings, ...own, ...tracked.warnings];
+}
+
+/* Dwell times [s]. */
+function planSeconds({ switches, tracked }) {
+  return Float64Array.from(switches.dwells, (dwell) => dwell * tracked.robot.timeScale);
+}
+
+/* Time of the whole schedule. */
+function planDuration({ switches }) {
+  return sum(switches.dwells);
+}
+
+/* The content of plan.json as text: {id, text}; id is a digest of all the rest. codeVersion: added where it is
+ * given. */
+function planRecord(plan, codeVersion = null) {
+  const content = planContent(plan), id = planId(pythonJson(content));
+  return { id, text: pythonJson({ id, ...content, ...(codeVersion === null ? {} : { code_version: codeVersion }) }) };
+}
+
+function planContent(plan) {
+  const { tracked, declared, errors, switches, drawn, straight, guidance } = plan, { robot } = tracked;
+  const [x, y, heading] = switches.poses[0];
+  return {
+    format: new Whole(FORMAT),
+    robot: {
+      name: robot.name, groups: groupValues(robot), tail_length_m: robot.tailLength,
+      motor_speed_rad_s: robot.motorSpeed, time_scale_s: robot.timeScale,
+    },
+    point: tracked.point,
+    offset_over_l: tracked.offset,
+    first_direction: new Whole(switches.firstDirection),
+    start: { x_over_l: x, y_over_l: y, heading_rad: heading },
+    dwell_bar: switches.dwells,
+    dwell_s: planSeconds(plan),
+    predicted_poses: switches.poses,
+    reference: declared.reference.p,
+    raw_path: polyline(drawn),
+    closed: drawn.closed,
+    objective: plan.objective,
+    minimum_dwell_bar: guidance.dwell,
+    off_drawn_over_l: declared.offDrawn,
+    missed_over_l: declared.missed,
+    zigzag_rms_over_l: straight.rms,
+    guaranteed_error_over_l: errors.guaranteed,
+    stated_error_over_l: errors.stated,
+    stated_error_unmeasured_over_l: plan.unmeasured,
+    table_share: errors.tableShare,
+    feedback_error_over_l: errors.feedback,
+    camera: CAMERA,
+    predicted_rms_over_l: errors.predictedRms,
+    predicted_max_over_l: errors.predictedMax,
+    drawn_rms_over_l: errors.drawnRms,
+    drawn_max_over_l: errors.drawnMax,
+    closure_over_l: errors.closure,
+    guidance: {
+      heading_rad: declared.reference.heading,
+      look_ahead_over_l: guidance.ahead,
+      swing_rad: guidance.swing,
+      straight: {
+        dwells_bar: straight.dwells, speed_bar: straight.speed, swing_rad: straight.swing, sway_over_l: straight.sway,
+        drift_bar: straight.drift, rms_over_l: straight.rms, largest_over_l: straight.largest,
+      },
+    },
+    model: tracked.model,
+    own_table: tracked.ownTable,
+    warnings: planWarnings(plan),
+  };
+}
+
+/* A whole number, which Python writes without a point. */
+class Whole extends Number {}
+
+/* Write JSON as Python does; numbers are floats, but for `Whole`, and other signs than those of ASCII \uXXXX. */
+function pythonJson(value) {
+  const hidden = (unit) => `\\u${unit.charCodeAt(0).toString(16).padStart(4, "0")}`;
+  if (typeof value === "number") return repr(value).replace("inf", "Infinity").replace("nan", "NaN");
+  if (typeof value === "string") return JSON.stringify(value).replace(/[\x80-\uffff]/g, hidden);
+  if (value instanceof Whole || value === null || typeof value === "boolean") return String(value);
+  if (Array.isArray(value) || ArrayBuffer.isView(value)) return `[${Array.from(value, pythonJson).join(", ")}]`;
+  return `{${Object.entries(value).map(([name, entry]) => `${pythonJson(name)}: ${pythonJson(entry)}`).join(", ")}}`;
+}
+
+/* The files by name. parts: {codeVersion, directions, flash, schedule, tracker}, the version of the program, parts of
+ * schedule.h that the planner's C code gives, and the template of tracker.h, with @NAME@ in place of what a plan
+ * decides. */
 function planFiles(plan, parts) {
   const { id, text } = planRecord(plan, parts.codeVersion);
   return {
     "plan.json": `${text}\n`,
     "plan.csv": planTable(plan, id),
     "schedule.h": controllerHeader(plan, id, parts),
-    "tracker.h": trackerHeader(plan, id, safeName(plan.tracked.robot), parts.tracker),
+    "tracker.h": trackerHeader(plan, id, parts.tracker),
   };
 }
 
-/* plan.csv: eight digits, and the identity of the plan in each row. */
+/* plan.csv: eight digits, and the identity of the plan in each row; columns in lab units come first. */
 function planTable(plan, id) {
-  const columns = planColumns(plan), names = Object.keys(columns), { dwells } = plan.switches;
-  const written = (name, row) => {
-    const value = columns[name][row];
-    return name === "direction" ? String(value) : general(value, 8);
-  };
-  const rows = Array.from(dwells, (_, row) => [...names.map((name) => written(name, row)), id].join(","));
+  const { robot } = plan.tracked, { dwells, poses, firstDirection } = plan.switches, cm = 100 * robot.tailLength;
+  const starts = runningSum(dwells), names = [
+    "start_s", "direction", "dwell_s", "x_cm", "y_cm", "heading_deg", "dwell_bar", "x_over_l", "y_over_l", "heading_rad",
+  ];
+  const rows = Array.from(dwells, (dwell, i) => {
+    const [x, y, heading] = poses[i], direction = i % 2 ? -firstDirection : firstDirection, second = robot.timeScale;
+    const row = [starts[i] * second, direction, dwell * second, x * cm, y * cm, heading * DEGREES, dwell, x, y, heading];
+    return [...row.map((value) => general(value, 8)), id].join(",");
+  });
   return `${[[...names, "plan_id"].join(","), ...rows].join("\n")}\n`;
 }
 
 /* Round dwells [s] to whole ms, carry rounding errors over, and split long dwells by zeros. */
 function milliseconds(seconds) {
-  const edges = runningSum(seconds).map((time) => roundHalfEven(1000 * time)), entries = [];
+  const edges = runningSum(seconds).map((time) => Math.round(1000 * time)), entries = [];
   differences(edges).forEach((length, i) => {
     let count = length;
     if (count < 1) {
       throw new InputError(
-        `dwell ${i + 1} is ${general(1000 * seconds[i], 3)} ms; the header counts whole milliseconds: use a ` +
-          "longer minimum dwell",
+        `dwell ${i + 1} is ${general(1000 * seconds[i], 3)} ms; the header counts whole milliseconds: use a longer `
+        + "minimum dwell",
       );
     }
     for (; count > MOST_MS; count -= MOST_MS) entries.push(MOST_MS, 0);
@@ -54,10 +167,9 @@ function milliseconds(seconds) {
 
 /* Write schedule.h as text. */
 function controllerHeader(plan, id, { directions, flash, schedule }) {
-  const { robot, model } = plan.tracked, seconds = planSeconds(plan), entries = milliseconds(seconds), lines = [];
-  for (let i = 0; i < entries.length; i += A_LINE) lines.push(entries.slice(i, i + A_LINE).join(", "));
+  const { robot, model } = plan.tracked, seconds = planSeconds(plan), entries = milliseconds(seconds);
   const [x, y, heading] = plan.switches.poses[0], cm = 100 * robot.tailLength;
-  const places = checkpoints(plan, seconds), total = entries.reduce((some, entry) => some + entry, 0);
+  const places = checkpoints(plan, seconds), total = sum(entries);
   return `/* Plan ${id}.
  * Motor schedule for robot "${safeName(robot)}": turn in FIRST_DIRECTION for the first entry,
  * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
@@ -74,18 +186,18 @@ ${directions}
 #define SCHEDULE_FIRST_DIRECTION (${plan.switches.firstDirection})
 #define SCHEDULE_COUNT ${entries.length}
 #define SCHEDULE_TOTAL_MS ${total}UL
-#define SCHEDULE_MOTOR_RPM ${fixed((robot.motorSpeed * 30) / Math.PI, 3)}
-#define SCHEDULE_START_X_CM ${fixed(cm * x, 4)}
-#define SCHEDULE_START_Y_CM ${fixed(cm * y, 4)}
-#define SCHEDULE_START_HEADING_DEG ${fixed((180 / Math.PI) * heading, 3)}
-#define SCHEDULE_START_X ${fixed(x, 6)}
-#define SCHEDULE_START_Y ${fixed(y, 6)}
-#define SCHEDULE_START_HEADING ${fixed(heading, 6)}
+#define SCHEDULE_MOTOR_RPM ${((robot.motorSpeed * 30) / Math.PI).toFixed(3)}
+#define SCHEDULE_START_X_CM ${(cm * x).toFixed(4)}
+#define SCHEDULE_START_Y_CM ${(cm * y).toFixed(4)}
+#define SCHEDULE_START_HEADING_DEG ${(DEGREES * heading).toFixed(3)}
+#define SCHEDULE_START_X ${x.toFixed(6)}
+#define SCHEDULE_START_Y ${y.toFixed(6)}
+#define SCHEDULE_START_HEADING ${heading.toFixed(6)}
 #define SCHEDULE_CHECKPOINTS ${places.length}
 
 ${flash}
 static const uint16_t SCHEDULE_TABLE(schedule_ms)[SCHEDULE_COUNT] SCHEDULE_FLASH = {
-    ${lines.join(",\n    ")}
+    ${linesOf(entries).join(",\n    ")}
 };
 typedef struct { uint32_t ms; float x, y, heading; } schedule_checkpoint;
 static const schedule_checkpoint SCHEDULE_TABLE(schedule_checkpoints)[SCHEDULE_CHECKPOINTS] SCHEDULE_FLASH = {
@@ -108,8 +220,8 @@ function checkpoints(plan, seconds) {
   const ends = runningSum(seconds), count = ends.length;
   const places = new Set(Array.from(linspace(0, count - 1, Math.min(count, CHECKPOINTS)), Math.trunc));
   return Array.from(places, (i) => {
-    const pose = plan.switches.poses[i].map((value) => `${fixed(value, 5)}f`);
-    return `{${roundHalfEven(1000 * ends[i])}UL, ${pose.join(", ")}}`;
+    const pose = plan.switches.poses[i].map((value) => `${value.toFixed(5)}f`);
+    return `{${Math.round(1000 * ends[i])}UL, ${pose.join(", ")}}`;
   });
 }
 
@@ -118,4 +230,78 @@ function safeName({ name }) {
   return Array.from(name).filter((sign) => /[\p{L}\p{N} \-_.]/u.test(sign)).join("");
 }
 
-export { planFiles, milliseconds };
+function linesOf(texts) {
+  return texts.flatMap((_, i) => (i % A_LINE ? [] : [texts.slice(i, i + A_LINE).join(", ")]));
+}
+
+/* Write tracker.h as text. id: of the plan. */
+function trackerHeader(plan, id, template) {
+  const { tracked, straight, guidance, declared, switches, errors } = plan, { robot, vehicle, model } = tracked;
+  const { q, heading, arc } = declared.reference, spacing = arc[arc.length - 1] / (arc.length - 1);
+  const unit = lagUnit(vehicle), current = MOST_CURRENT * zigzagSpeed(straight), radius = pivotRadius(vehicle);
+  const rounded = (value) => Math.sign(value) * Math.round(Math.abs(value)) || 0; // both signs alike, no −0
+  const inUnits = (lags) => Array.from(lags, (value, at) => rounded(value / unit[at % 3]));
+  const lags = [...vehicle.lag, ...vehicle.rest].reduce((total, { length }) => total + length, 0);
+  const row = (values) => `{${Array.from(values, repr).join(", ")}}`;
+  const table = (values, write = String) => `{\n${linesOf(Array.from(values, write)).join(",\n")}}`;
+  const nine = (value) => general(value, 9);
+  const parts = {
+    IDENTITY: id, NAME: safeName(robot), MODEL: model, BYTES: 2 * lags + 12 * q.length,
+    FIRST_DIRECTION: switches.firstDirection, POINTS: q.length, LAP: 0, TIMES: COUNT,
+    STRIDE: Math.max(Math.round((STRIDE * radius) / Math.max(spacing, 1e-9)), 1), // points from one target to the next
+    ...mapped({
+      TIME_SCALE: robot.timeScale, TAIL_LENGTH_M: robot.tailLength, SHORTEST: guidance.dwell, AHEAD: guidance.ahead,
+      ROD: rodOf(tracked), OFFSET: tracked.offset, LAP_TURN: 0, SWING: guidance.swing, PIVOT_RADIUS: radius,
+      NET_SPEED: straight.speed, NET_DRIFT: straight.drift, PIVOT_DISTANCE: pivotDistance(vehicle),
+      WAY_AHEAD: lookAhead(vehicle, 0, straight),
+      LIMIT: Math.max(NEAR * radius, ERRORS * errors.predictedMax), // up to which the line of sight leads back
+    }, repr),
+    start: row(switches.poses[0]),
+    twist: `{${vehicle.twist.map(row).join(", ")}}`,
+    current: row(vehicle.current),
+    most: row([...MOST, current, current, ...MOST_MARKER]),
+    lag_unit: row(unit),
+    prior: table(prior(plan).flat(), repr),
+    path_x: table(q.map(([x]) => x), nine),
+    path_y: table(q.map(([, y]) => y), nine),
+    path_heading: table(heading, nine),
+    rest: table(vehicle.rest.flatMap(inUnits)),
+    lag_left: table(inUnits(vehicle.lag[0])),
+    lag_right: table(inUnits(vehicle.lag[1])),
+  };
+  return template.replace(/@(\w+)@/g, (_, mark) => parts[mark]);
+}
+
+function mapped(values, write) {
+  return Object.fromEntries(Object.entries(values).map(([name, value]) => [name, write(value)]));
+}
+
+/* The units of the lags, forward, left and heading. */
+function lagUnit({ lag, rest }) {
+  return [0, 1, 2].map((axis) => {
+    const size = (values) => largestSize(values.filter((_, at) => at % 3 === axis));
+    return Math.max(...[...lag, ...rest].map(size), 1e-12) / LARGEST;
+  });
+}
+
+/* The covariance before the first pose, from what is uncertain of the start and the plan. */
+function prior({ tracked: { vehicle }, straight, guidance: { dwell } }) {
+  const squares = (sigmas) => sigmas.map((sigma) => sigma * sigma), { twist } = vehicle;
+  const variances = [...squares(START), ...squares(PRIOR), 1e-6, 1e-12, 1e-12, ...squares(MARKER)];
+  for (const i of [8, 9]) variances[i] += (CURRENT * zigzagSpeed(straight)) ** 2;
+  const covariance = variances.map((variance, i) => variances.map((_, j) => (i === j ? variance : 0)));
+  const speed = Math.hypot(twist[0][0], twist[0][1]);
+  for (const mode of vehicle.modes) {
+    const direction = Array(STATES).fill(0);
+    for (const i of [0, 1]) {
+      direction[3 + i] = mode.twist[i][2] / twist[i][2];
+      direction[5 + i] = (mode.twist[0][i] * twist[0][i]) / Math.max(twist[0][i] ** 2, 1e-6 * speed ** 2);
+      direction[8 + i] = mode.current[i];
+    }
+    if (mode.lag) direction[7] = lagAt(mode.lag[0], lagPlace(dwell, dwell))[2];
+    covariance.forEach((row, i) => row.forEach((_, j) => (row[j] += direction[i] * direction[j])));
+  }
+  return covariance;
+}
+
+export { planWarnings, planSeconds, planDuration, planRecord, planFiles };

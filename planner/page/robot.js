@@ -1,27 +1,42 @@
-/* The robot in SI units, and its dimensionless groups.
+/* The robot in SI units, its dimensionless groups, and robot.toml: a robot in the units of a laboratory, with
+ * comments.
  *
- * Mirrors sim/model/robot.py. A robot is {name, tails, tailLength, tailRadius, youngsModulus, headRadius,
- * headLength, viscosity, motorSpeed, C_t, C_r, C_yr, discOffset, sigmas} and what follows from them: timeScale [s]
- * and omegaBar. Lengths in m, modulus in Pa, viscosity in Pa s, speed in rad/s. A robot whose groups Python has
- * written, with its effects and corrections, has them as `groups`. */
-import { general, repr } from "./format.js";
-import { checkTails } from "./groups.js";
-import { InputError } from "./input_error.js";
+ * A robot is {name, tails, tailLength, tailRadius, youngsModulus, headRadius, headLength, viscosity, motorSpeed, C_t,
+ * C_r, C_yr, discOffset, sigmas} and what follows from them: timeScale [s] and omegaBar. Lengths in m, modulus in Pa,
+ * viscosity in Pa s, speed in rad/s. A robot whose groups Python has written, with its effects and corrections, has
+ * them as `groups`; a file with effects, a correction or a calibration is refused: Python makes its vehicle. */
+import { CONSTANTS } from "./constants.js";
+import { isWhole } from "./seals.js";
+import { UNITS, fromSi, splitName, toSi, unitsOfKind } from "./units.js";
+import { InputError, closeMatch, general, naming, quoted, repr } from "./words.js";
 
-const LEAST_SLENDERNESS = 5;
+const { MOST_TAILS, LEAST_SLENDERNESS } = CONSTANTS.groups;
+const { ENTRIES, MEASURED, LARGEST, LARGEST_SIGMA, SIGMA, HEADER, NOTES, NO_EFFECTS, SI } = CONSTANTS.robot_toml;
 const POSITIVE = {
   tail_length: "tailLength", tail_radius: "tailRadius", youngs_modulus: "youngsModulus", head_radius: "headRadius",
   head_length: "headLength", viscosity: "viscosity", motor_speed: "motorSpeed", C_t: "C_t", C_r: "C_r",
 };
+const LOCKED = ["effects", "correction", "learnt_from", "calibration"];
+const MOST_SETTINGS = 2 ** 20; // characters of a robot
+const TOKENS = /"(?:[^"\\\n]|\\.)*"|'[^'\n]*'|\[|\]|,|[^\s,[\]"'#]+/g; // of a value, between blanks and comments
+const DECIMAL = /^[+-]?(?:0|[1-9](?:_?\d)*)(?:\.\d(?:_?\d)*)?(?:[eE][+-]?\d(?:_?\d)*)?$/;
+const DECIMAL_COMMA = /^[ \t]*[\w-]+[ \t]*=[ \t]*([+-]?\d{1,20}),(\d{1,20})[ \t]*(?:#.*)?$/m;
 
 /* Make a robot of its numbers; refuse numbers that no robot has. */
 function makeRobot(fields) {
-  const robot = { discOffset: null, sigmas: {}, ...fields };
-  checkTails(robot.tails);
-  for (const [name, field] of Object.entries(POSITIVE)) checkPositive(name, robot[field]);
-  if (robot.discOffset !== null) checkPositive("disc_offset", robot.discOffset);
-  checkFinite("C_yr", robot.C_yr);
-  const ratio = robot.tailLength / robot.tailRadius;
+  const robot = { discOffset: null, sigmas: {}, ...fields }, ratio = robot.tailLength / robot.tailRadius;
+  if (!(Number.isInteger(robot.tails) && robot.tails >= 1 && robot.tails <= MOST_TAILS)) {
+    throw new InputError(
+      `N = ${general(robot.tails)}; the number of tails is an integer from 1 to ${MOST_TAILS}`,
+    );
+  }
+  for (const [name, field] of Object.entries({ ...POSITIVE, disc_offset: "discOffset", C_yr: "C_yr" })) {
+    const value = robot[field];
+    if (name === "disc_offset" && value === null) continue;
+    const finite = Math.abs(value) < Number.MAX_VALUE;
+    if (!finite) throw new InputError(`${name} = ${repr(value)}; it must be a finite number`);
+    if (name !== "C_yr" && value <= 0) throw new InputError(`${name} = ${general(value)}; it must be above 0`);
+  }
   if (!(ratio > LEAST_SLENDERNESS)) {
     throw new InputError(
       `l/r0 = ${general(ratio)}; resistive force theory needs slender tails: above ${LEAST_SLENDERNESS}`,
@@ -37,7 +52,7 @@ function makeRobot(fields) {
   return robot;
 }
 
-/* The dimensionless groups by column name, for the positive direction of the motor. Robot.group_values */
+/* The dimensionless groups by column name, for the positive direction of the motor. */
 function groupValues(robot) {
   if (robot.groups) return robot.groups;
   return {
@@ -53,15 +68,206 @@ function groupValues(robot) {
   };
 }
 
-function checkFinite(name, value) {
-  if (!(Math.abs(value) < Number.MAX_VALUE)) {
-    throw new InputError(`${name} = ${repr(value)}; it must be a finite number`);
+/* Read a robot. where: the file's name, for messages. */
+function readRobot(text, where) {
+  if (text.length > MOST_SETTINGS) throw new InputError(`${where} has more than 1 MiB; such a file is not read`);
+  const { name = where.replace(/\.[^.]*$/, ""), ...tables } = readToml(text.replace(/^\ufeff/, ""), where);
+  const locked = LOCKED.find((table) => table in tables);
+  if (locked) {
+    throw new InputError(
+      `${where} has [${locked}], and the page has no simulator for it; make a page of this robot: softflagella `
+      + `page --robot ${where} --out page.html`,
+    );
+  }
+  if (!isWhole(text)) throw new InputError(`${where} was edited, damaged or cut short after it was written`);
+  return naming(where, () => makeRobot({ name: String(name), ...readFields(tables) }));
+}
+
+/* Read TOML as robots are written in it: tables, and keys with numbers, texts of one line, truth values and arrays. */
+function readToml(text, where) {
+  const root = {}, lines = text.split(/\r?\n/);
+  let table = root, pending = null;
+  const broken = (line, reason) => {
+    const comma = DECIMAL_COMMA.exec(text);
+    const advice = comma ? `; write ${comma[1]}.${comma[2]} for ${comma[1]},${comma[2]}` : "";
+    return new InputError(`${where} is not TOML: ${reason} (at line ${line + 1})${advice}`);
+  };
+  lines.forEach((whole, i) => {
+    const content = whole.replace(/^((?:[^#"']|"(?:[^"\\]|\\.)*"|'[^']*')*)#.*$/, "$1").trim();
+    const header = /^\[\s*([\w-]+)\s*\]$/.exec(content), pair = /^("[^"]*"|[\w-]+)\s*=\s*(.*)$/.exec(content);
+    if (!content) return;
+    if (pending) pending.text += ` ${content}`;
+    else if (header) {
+      if (Object.hasOwn(root, header[1])) throw broken(i, `a second [${header[1]}]`);
+      table = root[header[1]] = {};
+    } else if (pair) pending = { key: pair[1].replaceAll('"', ""), text: pair[2] };
+    else throw broken(i, "a table or key = value is expected");
+    if (!pending || unclosed(pending.text)) return;
+    const value = valueOf(pending.text);
+    if (value === undefined) throw broken(i, `invalid value of ${pending.key}`);
+    if (Object.hasOwn(table, pending.key)) throw broken(i, `a second ${pending.key}`);
+    table[pending.key] = value;
+    pending = null;
+  });
+  if (pending) throw broken(lines.length - 1, `unclosed value of ${pending.key}`);
+  return root;
+}
+
+/* Whether an array goes on in the next line. */
+function unclosed(text) {
+  const bare = text.replace(/"(?:[^"\\]|\\.)*"|'[^']*'/g, "");
+  return bare.split("[").length > bare.split("]").length;
+}
+
+/* A value of TOML; undefined: it is none. */
+function valueOf(text) {
+  const words = text.match(TOKENS) ?? [];
+  if (words.join("") !== text.replace(/("(?:[^"\\]|\\.)*"|'[^']*')|\s+/g, "$1")) return undefined;
+  if (words[0] === "[") {
+    const inner = words.slice(1, -1).join(" ").split(",").map((word) => word.trim());
+    if (inner[inner.length - 1] === "") inner.pop();
+    const values = inner.map(valueOf);
+    return words[words.length - 1] === "]" && !values.includes(undefined) ? values : undefined;
+  }
+  const [word] = words;
+  if (words.length !== 1) return undefined;
+  if (word[0] === "'") return word.slice(1, -1);
+  if (word[0] === '"') return textOf(word);
+  if (word === "true" || word === "false") return word === "true";
+  if (/^[+-]?(?:inf|nan)$/.test(word)) return Number(word.replace("inf", "Infinity").replace(/.?nan/, "NaN"));
+  return DECIMAL.test(word) ? Number(word.replaceAll("_", "")) : undefined;
+}
+
+/* A text in double quotes, whose escapes are those of JSON and \UXXXXXXXX. */
+function textOf(word) {
+  const wide = (_, hex) => JSON.stringify(String.fromCodePoint(Math.min(parseInt(hex, 16), 0x10ffff))).slice(1, -1);
+  try {
+    return JSON.parse(word.replace(/\\U([\da-fA-F]{8})/g, wide));
+  } catch {
+    return undefined;
   }
 }
 
-function checkPositive(name, value) {
-  checkFinite(name, value);
-  if (value <= 0) throw new InputError(`${name} = ${general(value)}; it must be above 0`);
+/* Read the fields of a robot in SI units, and `sigmas`, from its tables. */
+function readFields(tables) {
+  const fields = {}, keys = {}, stated = [];
+  for (const [table, content] of Object.entries(tables)) {
+    const isTable = typeof content === "object" && !Array.isArray(content);
+    for (const [key, value] of isTable ? Object.entries(content) : [["", content]]) {
+      const isSigma = key.endsWith(SIGMA), entry = entryOf(table, isSigma ? key.slice(0, -SIGMA.length) : key);
+      if (!entry || (isSigma && !MEASURED.includes(entry.field))) throw new InputError(unknown(table, key));
+      if (isSigma) stated.push({ entry, key, value });
+      else if (entry.field in fields) {
+        throw new InputError(`[${table}] ${keys[entry.field]} and ${key} are the same number; drop one`);
+      } else {
+        fields[entry.field] = numberOf(value, key, `[${table}] ${key}`);
+        keys[entry.field] = key;
+      }
+    }
+  }
+  const lacking = ENTRIES.find(({ field, optional }) => !(field in fields) && !optional);
+  if (lacking) throw new InputError(`missing entry [${lacking.table}] ${keyOf(lacking)}`);
+  const sigmas = {}, scales = { discOffset: fields.headRadius, ...fields };
+  for (const { entry, key, value } of stated) {
+    sigmas[entry.field] = readSigma(value, scales[entry.field], key, `[${entry.table}] ${key}`);
+  }
+  return { ...fields, sigmas };
 }
 
-export { makeRobot, groupValues };
+/* The entry that a key holds, in any unit of its kind. */
+function entryOf(table, key) {
+  const { quantity, unit } = splitName(key);
+  return ENTRIES.find((entry) => {
+    if (table !== entry.table) return false;
+    if (!entry.unit) return key === entry.quantity;
+    return quantity === entry.quantity && unit?.kind === UNITS.get(entry.unit).kind;
+  });
+}
+
+function keyOf({ quantity, unit }, other = unit) {
+  return other ? `${quantity}_${other}` : quantity;
+}
+
+/* Say what is wrong with a key: it has no unit, or there is no such number; name what may be meant. */
+function unknown(table, key) {
+  const bare = key.endsWith(SIGMA) ? key.slice(0, -SIGMA.length) : key, { quantity, unit } = splitName(bare);
+  const entries = ENTRIES.filter((entry) => entry.table === table);
+  const tables = [...new Set(ENTRIES.map((entry) => entry.table))];
+  const named = entries.find((entry) => entry.unit && entry.quantity === bare);
+  if (named) {
+    const units = unitsOfKind(UNITS.get(named.unit).kind).map((unit) => keyOf(named, unit));
+    return `[${table}] ${key} has no unit; give one of ${units.join(", ")}`;
+  }
+  if (!key) return `${table} is in no table; a robot has [${tables.join("], [")}]`;
+  if (!entries.length) return `unknown entry [${table}] ${key}; a robot has [${tables.join("], [")}]`;
+  if (key !== bare && entryOf(table, bare)) {
+    return `unknown entry [${table}] ${key}; this number takes no standard deviation`;
+  }
+  const near = closeMatch(quantity.replace("diameter", "radius"), entries.map((entry) => entry.quantity));
+  const entry = entries.find((each) => each.quantity === near), same = unit?.kind === UNITS.get(entry?.unit)?.kind;
+  const meant = entry && keyOf(entry, entry.unit && same ? unit.suffix : entry.unit);
+  const all = `[${table}] has ${entries.map((each) => keyOf(each)).join(", ")}, in any usual unit`;
+  const half = quantity.endsWith("diameter") ? `give ${meant}, half of it` : `is it ${meant}?`;
+  return `unknown entry [${table}] ${key}; ${entry ? half : all}`;
+}
+
+/* Convert a number of the file to SI units. */
+function numberOf(value, key, entry) {
+  if (typeof value !== "number") throw new InputError(`${entry} = ${shown(value)}; give a number`);
+  if (!(Math.abs(value) < LARGEST)) throw new InputError(`${entry} = ${shown(value)}; give a finite number`);
+  const { unit } = splitName(key);
+  return unit ? toSi(value, unit.suffix) : value;
+}
+
+/* Read a standard deviation: {size, relative}, a number in the unit of its key, or a text like "10 %". */
+function readSigma(given, value, key, entry) {
+  const { unit } = splitName(key.slice(0, -SIGMA.length)), share = /^\s*(.+?)\s*%\s*$/.exec(given)?.[1];
+  const number = typeof given === "number" ? given : Number(share ?? NaN);
+  if (Number.isNaN(number)) {
+    throw new InputError(`${entry} = ${shown(given)}; give a number in the unit of its key, or a text like "10 %"`);
+  }
+  const size = share !== undefined ? number / 100 : unit ? toSi(number, unit.suffix) : number;
+  const sigma = share !== undefined ? size * Math.abs(value) : size;
+  if (!(Number.isFinite(size) && sigma >= 0 && sigma <= LARGEST_SIGMA * Math.abs(value))) {
+    throw new InputError(`${entry} = ${shown(given)}; a standard deviation lies from 0 to half of the number itself`);
+  }
+  return { size, relative: share !== undefined };
+}
+
+function shown(value) {
+  if (typeof value === "string") return quoted(value);
+  return typeof value === "number" ? general(value, 12) : JSON.stringify(value);
+}
+
+/* Write the text of a robot.toml that is read back to the same robot, to the last bit. */
+function robotToml(robot) {
+  const tables = new Map();
+  for (const entry of ENTRIES) {
+    if (!tables.has(entry.table)) tables.set(entry.table, entry.table in NOTES ? [NOTES[entry.table]] : []);
+    const value = robot[entry.field], sigma = robot.sigmas[entry.field];
+    const { unit, number } = written(value ?? robot.headRadius, entry);
+    const line = `${value === null ? "# " : ""}${keyOf(entry, unit)} = ${number}`;
+    const comment = value === null ? `${entry.comment}; without it R` : entry.comment, lines = tables.get(entry.table);
+    lines.push(comment ? `${line.padEnd(33)} # ${comment}` : line);
+    if (sigma?.relative) lines.push(`${keyOf(entry, unit)}${SIGMA} = "${general(100 * sigma.size, 12)} %"`);
+    else if (sigma) {
+      const own = written(sigma.size, entry);
+      lines.push(`${keyOf(entry, own.unit)}${SIGMA} = ${own.number}`);
+    }
+  }
+  const blocks = Array.from(tables, ([table, lines]) => [`[${table}]`, ...lines].join("\n"));
+  const name = JSON.stringify(robot.name).replaceAll("\x7f", "\\u007f");
+  return `${[`${HEADER}name = ${name}`, ...blocks, NO_EFFECTS].join("\n\n")}\n`;
+}
+
+/* Write a number in its entry's unit, as short as it can be so that it is read back to the last bit; in SI units
+ * where no number in that unit is read back exactly. */
+function written(value, { unit, field }) {
+  if (!unit) return { unit, number: field === "tails" ? String(value) : repr(value) };
+  const guess = fromSi(value, unit), digits = Array.from({ length: 17 }, (_, i) => Number(guess.toPrecision(i + 1)));
+  const number = digits.find((short) => toSi(short, unit) === value);
+  if (number !== undefined) return { unit, number: repr(number).replace(/\.0$/, "") };
+  return { unit: SI[UNITS.get(unit).kind], number: repr(value) };
+}
+
+export { makeRobot, groupValues, readRobot, robotToml };

@@ -1,36 +1,26 @@
 /* What the page asks of the planner: questions and answers in plain data. Lengths in cm, times in s. */
-import { inPage } from "./advice.js";
-import { pathOf, pathLength, polyline, scaled, smoothed } from "./path.js";
-import { repr } from "./format.js";
-import { geomspace } from "./arrays.js";
-import { InputError } from "./input_error.js";
+import { inflated, readData } from "./data.js";
 import { unmeasuredError } from "./errors.js";
-import { makePlan } from "./plan.js";
-import { pageShape } from "./page_shapes.js";
-import { planDuration, planRecord, planSeconds, planWarnings } from "./planned.js";
-import { planRequest } from "./request.js";
-import { planFiles } from "./plan_files.js";
-import { makeRobot } from "./robot.js";
-import { robotToml } from "./robot_toml.js";
-import { vehicleOfParts } from "./from_table.js";
-import { readTable } from "./lookup.js";
-import { trackedPoint, trackedVehicle } from "./tracked_point.js";
-import { speedOf, turnRadius, yawRate } from "./vehicle.js";
-import { SAMPLES, predictedPoses } from "./rollout.js";
-import { QUICK, longestDwell } from "./dwell_choice.js";
-import { inflated, readData } from "./table_data.js";
+import { trackedVehicle, vehicleOfParts } from "./from_table.js";
+import { geomspace } from "./math.js";
 import { openFile } from "./open_file.js";
-import { comparedRuns } from "./compared_runs.js";
-import { comparedTrack } from "./compared_track.js";
+import { pageShape, pathLength, pathOf, polyline, scaled, smoothed } from "./path.js";
+import { makePlan, planRequest } from "./plan.js";
+import { planDuration, planFiles, planRecord, planSeconds, planWarnings } from "./plan_files.js";
+import { makeRobot, robotToml } from "./robot.js";
+import { comparedRuns } from "./runs.js";
+import { readTable } from "./table.js";
+import { comparedTrack } from "./track.js";
+import { QUICK, SAMPLES, longestDwell, speedOf, trackedPoint, turnRadius, yawRate } from "./vehicle.js";
+import { InputError, inPage, refusing, repr } from "./words.js";
 
 const STROKE = 60; // a drawn stroke is smoothed over this part of its length
 const TRADED = 10; // dwells of the trade-off
 
 /* Make the answers to the page's questions, by name. `data` is what Python has written: {table, files}. */
 async function service(data) {
-  const { locked, table } = data.table.vehicle
-    ? { locked: lockedVehicle(await readData(data.table), data.table.name), table: null }
-    : { locked: null, table: await readTable(data.table) };
+  const locked = data.table.vehicle ? lockedVehicle(await readData(data.table), data.table.name) : null;
+  const table = locked ? null : await readTable(data.table);
   const files = { ...data.files, tracker: await inflated(data.files.tracker).text() };
   let last = null; // {key, plan}: the plan that the page shows
   let asked = null; // {key, swims}: the vehicle that was asked for last
@@ -43,18 +33,17 @@ async function service(data) {
 
   function vehicleOf(fields, point) {
     if (!locked) return trackedVehicle(makeRobot(fields), table, point);
-    const robot = makeRobot({ ...fields, groups: locked.groups });
-    return trackedPoint(robot, locked, point, data.table.identity);
+    return trackedPoint(makeRobot({ ...fields, groups: locked.groups }), locked, point, data.table.identity);
   }
 
   function planOf(wish, progress = null) {
     const key = JSON.stringify(wish);
     if (last?.key === key) return last.plan;
-    const swims = about("robot", () => tracked(wish.robot, wish.options.point)),
-      cm = 100 * swims.robot.tailLength;
-    const drawn = inTails(drawnPath(wish.path), cm);
-    const request = requestOf(wish.options, cm);
-    const plan = makePlan(drawn, swims, request, progress);
+    const swims = refusing(() => tracked(wish.robot, wish.options.point), (refusal) => {
+      refusal.about ??= "robot";
+      throw refusal;
+    });
+    const { drawn, request } = wishIn(wish, swims), plan = makePlan(drawn, swims, request, progress);
     last = { key, plan: { ...plan, unmeasured: unmeasuredError(plan) } };
     return last.plan;
   }
@@ -77,7 +66,7 @@ async function service(data) {
       if (name === "robot.toml") return robotToml(makeRobot(wish.robot));
       return planFiles(planOf(wish), files)[name];
     },
-    open: (content) => openFile(content),
+    open: openFile,
     runs: ({ table: measured, name, robot }) => comparedRuns(measured, name, robot, table),
     compare: ({ table: track, how }) => {
       if (!last) throw new InputError("there is no plan with which the track can be compared; plan first");
@@ -86,44 +75,28 @@ async function service(data) {
   };
 }
 
-/* Do some work, and say of its refusals what they are about, unless they do. */
-function about(subject, work) {
-  try {
-    return work();
-  } catch (refusal) {
-    if (refusal instanceof InputError) refusal.about ??= subject;
-    throw refusal;
-  }
-}
-
 /* The vehicle of a robot that the page does not compute anew, of what Python has written. */
 function lockedVehicle({ vehicle, groups, ownTable, calibrated }, name) {
   const flat = (part) => part?.values ?? null;
-  const rows = ({ shape, values }) =>
-    Array.from({ length: shape[0] }, (_, i) => {
-      const size = values.length / shape[0];
-      return values.subarray(i * size, (i + 1) * size);
-    });
-  const curves = vehicle.curves.map((curve) => mapped(curve, flat));
-  const errors = vehicle.errors.map((error) => ({ lag: null, memory: null, ...mapped(error, flat) }));
-  const modeOf = ({ name: ofMode, twist, lag, current }) =>
-    ({ name: ofMode, twist: rows(twist), lag: lag && rows(lag), current: flat(current) });
+  const rows = ({ shape: [count], values }) => Array.from({ length: count }, (_, i) => {
+    return values.subarray((i * values.length) / count, ((i + 1) * values.length) / count);
+  });
+  const flattened = (parts) => Object.fromEntries(Object.entries(parts).map(([key, part]) => [key, flat(part)]));
+  const modeOf = ({ twist, lag, current, ...mode }) => {
+    return { ...mode, twist: rows(twist), lag: lag && rows(lag), current: flat(current) };
+  };
   const parts = {
     ...vehicle,
     twist: rows(vehicle.twist),
-    curves,
+    curves: vehicle.curves.map(flattened),
     before: flat(vehicle.before),
     phaseRate: Array.from(flat(vehicle.phaseRate)),
-    errors: () => errors,
+    errors: vehicle.errors.map((error) => ({ lag: null, memory: null, ...flattened(error) })),
     modes: vehicle.modes.map(modeOf),
     current: Array.from(flat(vehicle.current)),
   };
   const unmeasured = vehicle.unmeasured.map(modeOf);
   return { groups, ownTable, calibrated, unmeasured, vehicle: vehicleOfParts(parts, name) };
-}
-
-function mapped(parts, change) {
-  return Object.fromEntries(Object.entries(parts).map(([name, part]) => [name, change(part)]));
 }
 
 /* The path in cm that a state of the page describes. */
@@ -133,23 +106,18 @@ function drawnPath({ points, closed, words }) {
   return pageShape(words.slice(0, at), Number(words.slice(at + 1)));
 }
 
-function inTails(path, cm) {
-  return scaled(path, 0.01 / (cm / 100));
-}
-
-/* What is asked of a plan; options of the page are in s and cm. */
-function requestOf({ point, corner, timeWeight, objective, minimumSeconds, tolerance }, cm) {
-  const most = tolerance === null ? null : tolerance / cm;
-  return planRequest({ point, corner, timeWeight, objective, minimumSeconds, tolerance: most });
+/* The drawn path in tail lengths, and what is asked of a plan; options of the page are in s and cm. */
+function wishIn({ path, options: { smooth, ...options } }, { robot }) {
+  const cm = 100 * robot.tailLength, tolerance = options.tolerance === null ? null : options.tolerance / cm;
+  return { drawn: scaled(drawnPath(path), 1 / cm), request: planRequest({ ...options, tolerance }) };
 }
 
 /* Steady motion, in the units of a laboratory. */
 function steadyMotion({ robot, vehicle }) {
-  const cm = 100 * robot.tailLength,
-    [twist] = vehicle.twist;
+  const cm = 100 * robot.tailLength, [[forward, left]] = vehicle.twist;
   return {
     turnRadius: cm * turnRadius(vehicle),
-    slip: Math.atan2(Math.abs(twist[1]), twist[0]),
+    slip: Math.atan2(Math.abs(left), forward),
     yawRate: yawRate(vehicle) / robot.timeScale,
     speed: (cm * speedOf(vehicle)) / robot.timeScale,
     tailGap: vehicle.tailGap,
@@ -159,83 +127,57 @@ function steadyMotion({ robot, vehicle }) {
 
 /* The numbers of a plan that the page shows. */
 function pictured(plan) {
-  const { tracked, errors, switches, declared, drawn, guidance } = plan,
-    { robot } = tracked;
-  const cm = 100 * robot.tailLength,
-    place = ([x, y, ...heading]) => [x * cm, y * cm, ...heading];
-  const seconds = planSeconds(plan);
-  const radius = (cm * (robot.discOffset ?? robot.headRadius)) / robot.tailLength;
+  const { tracked, errors, switches, declared, drawn, guidance, straight, unmeasured } = plan, { robot } = tracked;
+  const cm = 100 * robot.tailLength, place = ([x, y, ...heading]) => [x * cm, y * cm, ...heading];
+  const inCm = (length) => (length === null ? null : length * cm);
   return {
     drawn: { points: drawn.points.map(place), closed: drawn.closed },
     reference: declared.reference.p.map(place),
     closed: drawn.closed,
     track: errors.track.map(place),
     samples: SAMPLES,
-    motion: motionOf(tracked.vehicle, switches).map(place),
+    motion: errors.motion.map(place),
     flips: errors.track.filter((_, i) => i % SAMPLES === 0).map(place),
     start: place(switches.poses[0]),
-    dwells: Array.from(seconds),
+    dwells: Array.from(planSeconds(plan)),
     firstDirection: switches.firstDirection,
     seconds: planDuration(plan) * robot.timeScale,
     minimumDwell: guidance.dwell * robot.timeScale,
-    stated: errors.stated * cm,
+    stated: inCm(errors.stated),
     calibrated: tracked.calibrated,
-    unmeasured: plan.unmeasured === null ? null : plan.unmeasured * cm,
-    feedback: errors.feedback * cm,
-    guaranteed: errors.guaranteed === null ? null : errors.guaranteed * cm,
-    predictedRms: errors.predictedRms * cm,
-    predictedMax: errors.predictedMax * cm,
-    offDrawn: declared.offDrawn * cm,
-    missed: declared.missed * cm,
-    netSpeed: (plan.straight.speed * cm) / robot.timeScale,
+    unmeasured: inCm(unmeasured),
+    feedback: inCm(errors.feedback),
+    guaranteed: inCm(errors.guaranteed),
+    predictedRms: inCm(errors.predictedRms),
+    predictedMax: inCm(errors.predictedMax),
+    offDrawn: inCm(declared.offDrawn),
+    missed: inCm(declared.missed),
+    netSpeed: inCm(straight.speed) / robot.timeScale,
     warnings: planWarnings(plan).map((words) => inPage(words, robot)),
     body: {
-      headLength: 100 * robot.headLength,
-      headRadius: 100 * robot.headRadius,
-      tailLength: cm,
-      tailRadius: 100 * robot.tailRadius,
-      discOffset: radius,
-      tails: robot.tails,
+      headLength: 100 * robot.headLength, headRadius: 100 * robot.headRadius, tailLength: cm,
+      tailRadius: 100 * robot.tailRadius, discOffset: 100 * (robot.discOffset ?? robot.headRadius), tails: robot.tails,
     },
     tailLength: cm,
     timeScale: robot.timeScale,
   };
 }
 
-/* Poses of the head's centre at the times of the track. */
-function motionOf(vehicle, switches) {
-  const poses = predictedPoses(vehicle, switches); // of each dwell both ends
-  return poses.filter((_, i) => i % (SAMPLES + 1) < SAMPLES || i === poses.length - 1);
-}
-
 /* Stated error and time of plans with several dwells, up to the longest that makes sense. */
 function tradedOff(wish, tracked) {
-  const cm = 100 * tracked.robot.tailLength,
-    drawn = inTails(drawnPath(wish.path), cm);
-  const request = { ...requestOf(wish.options, cm), tolerance: null, minimumSeconds: null };
-  const rows = [];
-  for (const dwell of geomspace(QUICK, longestDwell(tracked.vehicle, QUICK), TRADED)) {
-    try {
-      const plan = makePlan(drawn, tracked, { ...request, dwell }, null),
-        { timeScale } = tracked.robot;
-      rows.push({
-        dwell: dwell * timeScale,
-        seconds: planDuration(plan) * timeScale,
-        stated: plan.errors.stated * cm,
-      });
-    } catch (refusal) {
-      if (!(refusal instanceof InputError)) throw refusal; // such dwells do not get the robot around the path
-    }
-  }
+  const { drawn, request } = wishIn(wish, tracked), { robot: { tailLength, timeScale }, vehicle } = tracked;
+  const rows = Array.from(geomspace(QUICK, longestDwell(vehicle, QUICK), TRADED)).flatMap((dwell) => refusing(() => {
+    const plan = makePlan(drawn, tracked, { ...request, tolerance: null, minimumSeconds: null, dwell });
+    const stated = 100 * tailLength * plan.errors.stated;
+    return [{ dwell: dwell * timeScale, seconds: planDuration(plan) * timeScale, stated }];
+  }, () => [])); // such dwells do not get the robot around the path
   if (rows.length < 2) throw new InputError("no two dwells get the robot around this path");
   return rows;
 }
 
 /* path.csv: the path in cm, from which the command makes the same plan. */
 function pathTable(path) {
-  return `x_cm,y_cm\n${polyline(path)
-    .map((point) => point.map(repr).join(","))
-    .join("\n")}\n`;
+  return `x_cm,y_cm\n${polyline(path).map((point) => point.map(repr).join(",")).join("\n")}\n`;
 }
 
 export { service };

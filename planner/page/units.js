@@ -1,18 +1,94 @@
-/* Lengths in the units of a laboratory, and paths whose size makes no sense for a robot.
+/* Units of lengths, times, angles and other quantities; times as people write them; columns in wanted units.
  *
- * Mirrors planner/paths/units.py. Of a robot, tailLength [m] and timeScale [s] count. Lengths in l. */
-import { column, largest, smallest } from "./arrays.js";
-import { fixed, general } from "./format.js";
-import { InputError } from "./input_error.js";
-import { pathLength } from "./path.js";
-import { formatLength, formatTime } from "./si_units.js";
+ * A value v in a unit is (v + zero) · times / over in SI units. Of a robot, tailLength [m] and timeScale [s] count. */
+import { CONSTANTS } from "./constants.js";
+import { smallest } from "./math.js";
+import { InputError, fixed, general, quoted, repr } from "./words.js";
 
-const LONGEST = 12_000.0; // l
-const SMALLEST = 0.25; // of the radius of the robot's circle, largest extent of a path
+const { UNITS: KNOWN, TEXTS, SPELLINGS, SIGNS, MOST_PARTS } = CONSTANTS.units;
+const UNITS = new Map(Object.entries(KNOWN));
+const RPM = (2 * Math.PI) / 60; // rad/s
+const CASE_COUNTS = new Set(["l", "r"]); // L and R are the head's
+const CLOCK = /^(?:([0-9]+) days?,? )?([0-9]+):([0-5][0-9]):([0-5][0-9](?:[.,][0-9]*)?)$/;
+const DATE = new RegExp(
+  "^([0-9]{4})-([0-9]{2})-([0-9]{2})(?:[T ]([0-9]{2}):([0-9]{2})(?::([0-9]{2}(?:[.,][0-9]+)?))?)?" +
+    "(Z|[+-][0-9]{2}:?[0-9]{2})?$",
+);
+const EPOCH = 3e8, LATEST = 1e11; // s: what is longer is a date; beyond it no date, but another unit
+
+/* Find a unit by its suffix or another spelling ("deg/s", "°", "U/min"); null if it is no known unit. */
+function findUnit(text) {
+  const bare = text.trim().replace(/^[[\]()]+|[[\]()]+$/g, "").trim();
+  const word = Array.from(bare, (sign) => SIGNS[sign] ?? sign).join("").replace(/_+/g, "_");
+  return UNITS.get(Object.hasOwn(SPELLINGS, word) ? SPELLINGS[word] : word) ?? null;
+}
+
+/* Split the name of a column or key into {quantity, unit}; unit null if it has none or an unknown one.
+ *
+ * The unit is a suffix (R_yr_mm) or stands in brackets behind the name ("R_yr [mm]", "X (cm)"). */
+function splitName(name) {
+  const text = name.trim(), head = text.slice(0, -1), bracket = head.replaceAll("(", "[").lastIndexOf("[");
+  const inside = head.slice(bracket + 1);
+  if (bracket >= 0 && /[\])]$/.test(text) && !/[\])]/.test(inside)) {
+    return { quantity: text.slice(0, bracket).replace(/[_ \t]+$/, "").trim(), unit: findUnit(inside) };
+  }
+  const parts = text.split("_");
+  for (let first = Math.max(1, parts.length - MOST_PARTS); first < parts.length; first++) {
+    const unit = UNITS.get(parts.slice(first).join("_"));
+    if (unit && unit.suffix !== "1") return { quantity: parts.slice(0, first).join("_"), unit }; // x_1 is a name
+  }
+  return { quantity: text, unit: null };
+}
+
+/* A unit as people write it: rad/s. */
+function unitText({ suffix }) {
+  return TEXTS[suffix] ?? suffix;
+}
+
+/* List the suffixes of the units of a kind, such as "length". */
+function unitsOfKind(kind) {
+  return [...UNITS.values()].filter((unit) => unit.kind === kind).map((unit) => unit.suffix);
+}
+
+function toSi(value, suffix) {
+  const { times, over, zero } = UNITS.get(suffix);
+  return ((value + zero) * times) / over;
+}
+
+function fromSi(value, suffix) {
+  const { times, over, zero } = UNITS.get(suffix);
+  return (value * over) / times - zero;
+}
+
+/* Convert a number between units of one kind. */
+function convertUnit(value, given, wanted) {
+  return given === wanted ? value : fromSi(toSi(value, given), wanted);
+}
+
+/* Write a duration as people say it: 0.35 s, 48.2 s, 12.5 min, 3 h 20 min. */
+function formatTime(seconds) {
+  const size = Math.abs(seconds), minutes = Math.round(seconds / 60);
+  if (!Number.isFinite(seconds) || size < 90) return `${general(seconds, 3)} s`;
+  if (size < 5400) return `${general(seconds / 60, 3)} min`;
+  const hours = `${Math.floor(minutes / 60)} h`;
+  return minutes % 60 && minutes < 6000 ? `${hours} ${minutes % 60} min` : hours;
+}
+
+/* Write a length in metres as people say it: 3.2 mm, 12.4 cm, 3.1 m. */
+function formatLength(metres) {
+  const size = Math.abs(metres);
+  if (size && size < 0.01) return `${general(1000 * metres, 3)} mm`;
+  return size >= 2 ? `${general(metres, 3)} m` : `${general(100 * metres, 3)} cm`;
+}
 
 /* Write a length given in tail lengths: 3.52 cm (0.32 l). */
 function inLab(value, robot) {
-  return `${formatLength(value * robot.tailLength)} (${tails(value)} l)`;
+  return `${formatLength(value * robot.tailLength)} (${inTails(value)} l)`;
+}
+
+/* Write a length in tail lengths: 0.32, 12, 1200. */
+function inTails(value) {
+  return Math.abs(value) < 1000 ? general(value, 3) : fixed(value, 0);
 }
 
 /* Write a time given in units of μ0 l⁴/EI: 1.79 s (0.81 time units). */
@@ -22,47 +98,112 @@ function timeInLab(value, robot) {
 
 /* Write a place given in tail lengths: (3.52, 1.1) cm = (0.32, 0.1) l. */
 function placeInLab(x, y, robot) {
-  const written = (scale, places) => [x, y].map((value) => withoutSign(fixed(scale * value, places))).join(", ");
+  const written = (scale, places) => [x, y].map((value) => fixed(scale * value, places)).join(", ");
   return `(${written(100 * robot.tailLength, 2)}) cm = (${written(1, 3)}) l`;
 }
 
-/* Zero without a sign. */
-function withoutSign(text) {
-  return /^-0\.?0*$/.test(text) ? text.slice(1) : text;
+/* Convert the steady motion of a robot to the columns of a measured table. lengthCm: tail length [cm]. timeScale:
+ * unit of time [s]. */
+function labColumns(motion, lengthCm, timeScale) {
+  return {
+    omega_h_rpm: motion.omega_h_bar / (timeScale * RPM),
+    omega_t_rpm: motion.omega_t_bar / (timeScale * RPM),
+    omega_yr_rad_s: motion.omega_yr_bar / timeScale,
+    R_yr_cm: motion.R_yr_over_l * lengthCm,
+    theta_deg: motion.theta_deg,
+    v_cm_s: (Math.hypot(motion.v_x, motion.v_z) * lengthCm) / timeScale,
+  };
 }
 
-/* Write a length in tail lengths: 0.32, 12, 1200. */
-function tails(value) {
-  return Math.abs(value) < 1000 ? general(value, 3) : fixed(value, 0);
-}
-
-/* Describe length and extent of a path. */
-function describe(path, robot) {
-  const across = extent(path), lab = across.map((value) => formatLength(value * robot.tailLength));
-  return `${inLab(pathLength(path), robot)} long, ${lab.join(" by ")} (${across.map(tails).join(" by ")} l)`;
-}
-
-/* Width and height of a path. */
-function extent(path) {
-  return [0, 1].map((axis) => {
-    const values = column(path.points, axis);
-    return largest(values) - smallest(values);
-  });
-}
-
-/* Refuse a path that no schedule can be meant for. */
-function checkSize(path, robot, turnRadius) {
-  if (pathLength(path) > LONGEST) {
-    throw new InputError(
-      `the path is ${describe(path, robot)}; at most ${general(LONGEST)} l can be planned; scale it`,
-    );
+/* Convert a column of times, words and the numbers where they are, to numbers in a unit; NaN for what is none. */
+function timesOf(words, numbers, unit) {
+  if (numbers.some(Number.isNaN)) {
+    for (const kind of [dateOf, clockOf]) {
+      const seconds = Float64Array.from(words, (word) => (word === null ? NaN : kind(word)));
+      if (seconds.every(Number.isNaN)) continue;
+      const from = kind === dateOf ? earliest(seconds) : 0;
+      return seconds.map((value) => convertUnit(value - from, "s", unit));
+    }
   }
-  if (Math.max(...extent(path)) < SMALLEST * turnRadius) {
-    throw new InputError(
-      `the path is ${describe(path, robot)}: too small, the robot's circle has a radius of ` +
-        `${inLab(turnRadius, robot)}; scale it`,
-    );
+  const times = numbers.map((value) => (convertUnit(Math.abs(value), unit, "s") < LATEST ? value : NaN));
+  const first = earliest(times), size = convertUnit(first, unit, "s");
+  return EPOCH < size && size < LATEST ? times.map((value) => value - first) : times;
+}
+
+function earliest(values) {
+  return smallest(values.filter((value) => !Number.isNaN(value)));
+}
+
+function clockOf(word) {
+  const match = CLOCK.exec(word);
+  if (!match) return NaN;
+  const [days, hours, minutes, seconds] = match.slice(1).map((part) => Number((part ?? "0").replace(",", ".")));
+  return 86400 * days + 3600 * hours + 60 * minutes + seconds;
+}
+
+function dateOf(word) {
+  const match = DATE.exec(word);
+  if (!match) return NaN;
+  const [, year, month, day, hours = "00", minutes = "00", seconds = "00", zone = "Z"] = match;
+  const [whole, part = "0"] = seconds.split(/[.,]/), offset = zone.replace(/^(...)(\d\d)$/, "$1:$2");
+  const time = `${year}-${month}-${day}T${hours}:${minutes}`;
+  const exact = new Date(`${time}Z`), isDay = !Number.isNaN(exact.getTime()) && exact.toISOString().startsWith(time);
+  return isDay ? new Date(`${time}:00${offset}`).getTime() / 1000 + Number(`${whole}.${part}`) : NaN;
+}
+
+/* Rename and convert columns to those that are wanted: {table, notes}; all others stay as they are.
+ *
+ * A table is {names, columns}; it may have `texts`, values as they are shown. where: the table's name, for messages.
+ * synonyms: a map of other names of a quantity, in lower case, to its name without unit; a name may be a unit. */
+function convertColumns(table, wanted, where, synonyms = new Map()) {
+  const names = table.names.map(String), columns = [...table.columns], texts = table.texts && [...table.texts];
+  const notes = [];
+  for (const name of wanted) {
+    const candidates = names.filter((column) => column === name || isAlike(column, name, synonyms));
+    if (candidates.length > 1) {
+      throw new InputError(`${where}: ${candidates.join(" and ")} are the same quantity; drop all but one`);
+    }
+    if (!candidates.length) checkBare(names, name, where, synonyms);
+    if (!candidates.length || candidates[0] === name) continue;
+    const [column] = candidates, at = names.indexOf(column);
+    const given = unitOf(column, synonyms), target = splitName(name).unit;
+    if (given === null || target === null || given.suffix === target.suffix) {
+      notes.push(`column ${column} read as ${name}`);
+    } else {
+      columns[at] = columns[at].map((value) => convertUnit(value, given.suffix, target.suffix));
+      if (texts) texts[at] = Array.from(columns[at], repr);
+      notes.push(`column ${column} converted from ${unitText(given)} to ${unitText(target)} (${name})`);
+    }
+    names[at] = name;
+  }
+  return { table: { ...table, names, columns, ...(texts && { texts }) }, notes };
+}
+
+/* Whether a column of another name holds a quantity, in any unit of its kind. */
+function isAlike(column, wanted, synonyms) {
+  const { quantity, unit: target } = splitName(wanted), unit = unitOf(column, synonyms);
+  if (column === wanted || (unit?.kind ?? null) !== (target?.kind ?? null)) return false;
+  return isSame(target ? splitName(column).quantity : column, quantity, synonyms);
+}
+
+function isSame(given, quantity, synonyms) {
+  const name = synonyms.get(given.toLowerCase()) ?? given, low = name.toLowerCase();
+  return name === quantity || (low === quantity.toLowerCase() && !CASE_COUNTS.has(low));
+}
+
+function unitOf(column, synonyms) {
+  return splitName(column).unit ?? (synonyms.has(column.toLowerCase()) ? findUnit(column) : null);
+}
+
+/* Refuse a column that has the right name and no unit. */
+function checkBare(names, wanted, where, synonyms) {
+  const { quantity, unit } = splitName(wanted);
+  const bare = names.find((column) => findUnit(column) === null && isSame(column, quantity, synonyms));
+  if (unit && bare !== undefined) {
+    const choices = unitsOfKind(unit.kind).map((suffix) => `${quantity}_${suffix}`).join(", ");
+    throw new InputError(`${where}: column ${quoted(bare)} has no unit; name it one of ${choices}`);
   }
 }
 
-export { LONGEST, inLab, timeInLab, placeInLab, describe, extent, checkSize };
+export { UNITS, findUnit, splitName, unitsOfKind, toSi, fromSi, formatTime, formatLength, inLab, inTails, timeInLab };
+export { placeInLab, labColumns, timesOf, convertColumns };

@@ -1,10 +1,9 @@
-/* The planner in a worker: {id, what, content} comes in, and {id, answer}, {id, refusal, about} or
- * {id, progress} go out.
+/* The planner in a worker: {id, what, content} comes in, and {id, answer}, {id, refusal, about} or {id, progress} go
+ * out.
  *
  * The first message is {what: "start", content: the planner's data}. Errors of the program go out as `broken`. */
-import { inPage } from "./advice.js";
-import { InputError } from "./input_error.js";
 import { service } from "./service.js";
+import { InputError, inPage } from "./words.js";
 
 const PAUSE = 100; // ms between two words of progress
 
@@ -24,10 +23,10 @@ async function answerTo({ id, what, content }) {
   try {
     postMessage({ id, answer: await (await answers)[what](content, progress) });
   } catch (error) {
-    const refused = error instanceof InputError;
+    const refused = error instanceof InputError, robot = content.robot ?? content.wish?.robot;
     postMessage({
       id,
-      refusal: refused ? inPage(error.message, content.robot ?? content.wish?.robot) : "this cannot be planned",
+      refusal: refused ? inPage(error.message, robot) : "this cannot be planned",
       about: error.about ?? null,
       broken: refused ? null : String(error.stack ?? error),
     });

@@ -1,6 +1,7 @@
 /* The page's controls: what is in their lists, and what each of them changes. */
 
 import { byId, element, say } from "./dom.js";
+import { showResults } from "./results.js";
 import { transformed } from "./corner_table.js";
 import { labValues } from "./state.js";
 

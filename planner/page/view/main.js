@@ -1,7 +1,7 @@
 /* The page: what the user changes, what is planned for it, and what is shown. */
 
 import { byId, element, save, say } from "./dom.js";
-import { inflated } from "../table_data.js";
+import { inflated } from "../data.js";
 import { chart, marker, tradeOff } from "./charts.js";
 import { showCorners } from "./corner_table.js";
 import { connect } from "./controls.js";

@@ -1,7 +1,7 @@
 /* What the picture of a plan consists of, drawn in cm with y upwards; a transform puts it on the screen. */
 
 import { figure } from "./dom.js";
-import { pixelOf, tickStep, tickWords, ticks, transform } from "./viewport.js";
+import { pixelOf, tickStep, tickWords, ticks } from "./viewport.js";
 
 const LEAST_APART = 4; // pixels between flips that are drawn
 

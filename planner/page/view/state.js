@@ -7,7 +7,7 @@
  *   options  those of OPTIONS
  * The address holds, after #, a version and what differs from the page's own first state. */
 
-import { closeMatch } from "../close_match.js";
+import { closeMatch } from "../words.js";
 
 const VERSION = 1;
 const THOUSANDTHS = 1000; // of a centimetre: the grid of points

@@ -30,7 +30,7 @@ function typed(key, value) {
 }
 
 async function lookUpTable() {
-  return (table ??= await (await module("lookup.js")).readTable(JSON.parse(readFileSync(tableFile, "utf8"))));
+  return (table ??= await (await module("table.js")).readTable(JSON.parse(readFileSync(tableFile, "utf8"))));
 }
 
 async function called([file, name, given]) {

@@ -130,3 +130,28 @@ def followed(path: str, car: str, offset: float = 0.0, **options: Any) -> Plan:
 def planned(path: str, robot: str = "paper-control", **options: Any) -> Plan:
     """Plan for one of PATHS with the shipped look-up table."""
     return plan(PATHS[path], PRESETS[robot], lookup=shipped(), **options)
+
+
+def random_case(seed: int) -> tuple[Path2D, Robot, dict[str, Any]]:
+    """Draw a robot, a path and options."""
+    rng = np.random.default_rng(seed)
+    size = float(rng.uniform(1.5, 5))
+    turn = np.linspace(0, 2 * np.pi, int(rng.integers(40, 400)), endpoint=False)
+    kind = int(rng.integers(4))
+    if kind == 0:
+        path = polygon(int(rng.integers(3, 9)), size)
+    elif kind == 1:
+        waves = sum(rng.normal() * 0.12 / k * np.cos(k * turn + rng.uniform(0, 6)) for k in (2, 3, 4))
+        path = Path2D.of(size * np.stack([np.cos(turn), np.sin(turn)], 1) * (1 + waves)[:, None], closed=True)
+    elif kind == 2:
+        path = Path2D.of(np.cumsum(rng.normal(size=(int(rng.integers(3, 8)), 2)), 0) * size)
+    else:
+        x = np.linspace(0, 3 * size, 200)
+        path = Path2D.of(np.stack([x, 0.4 * size * np.sin(x * rng.uniform(0.5, 1.2))], 1))
+    options: dict[str, Any] = {"objective": ("error", "time", "flips")[int(rng.integers(3))]}
+    if rng.random() < 0.2:
+        options["corner"] = "minimax"
+    if rng.random() < 0.2:
+        options["time_weight"] = 0.03
+    number = seed % 40
+    return path, random_robots(40 if number > 1 else 2, seed=1)[number], options

@@ -14,10 +14,13 @@ from functools import cache
 from pathlib import Path
 from threading import Timer
 from typing import Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import numpy as np
 import pytest
 
+from planner.page.constants import constants_module
 from planner.page.first_state import robot_fields
 from planner.page.table_data import table_data
 from planner.paths.tractrix import Reference
@@ -56,10 +59,19 @@ def _table_file() -> Path:
     return path
 
 
+@shared
+def _core_folder() -> Path:
+    """Copy the core, with the constants that Python writes."""
+    folder = SESSION / "core"
+    shutil.copytree(FOLDER, folder, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+    (folder / "constants.js").write_text(constants_module())
+    return folder
+
+
 @cache
 def _core() -> subprocess.Popen[str]:
     """Start the core; it ends with its input."""
-    words = [node(), str(Path(__file__).with_name("call.mjs")), str(FOLDER), str(_table_file())]
+    words = [node(), str(Path(__file__).with_name("call.mjs")), str(_core_folder()), str(_table_file())]
     return subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8")
 
 
@@ -89,7 +101,8 @@ def answers(calls: Iterable[tuple[Any, ...]], left_out: Sequence[str] = ()) -> l
     line = process.stdout.readline()
     patience.cancel()
     entries = json.loads(line, object_hook=_number)
-    assert [entry["broken"] for entry in entries if "broken" in entry] == []
+    broken = [entry["broken"] for entry in entries if "broken" in entry]
+    assert broken == [], broken
     return [InputError(entry["refusal"]) if "refusal" in entry else entry.get("answer") for entry in entries]
 
 
@@ -101,6 +114,33 @@ def answer(file: str, name: str, *given: Any) -> Any:
 def call(file: str, name: str, *given: Any) -> dict[str, Any]:
     """Return what stands for the answer of another call, among arguments."""
     return {"call": [file, name, given]}
+
+
+def page_options(options: dict[str, Any]) -> dict[str, Any]:
+    """Return options of a request with the names that they have in the page."""
+    return _named(options)
+
+
+def opened(name: str, text: str | bytes) -> Any:
+    """Open a file in the page."""
+    content = text.encode() if isinstance(text, str) else text
+    tree = drawing_tree(content) if name.endswith(".svg") else None
+    return answer("open_file.js", "openFile", {"name": name, "bytes": content, "tree": tree})
+
+
+def drawing_tree(text: str | bytes) -> dict[str, Any]:
+    """Return the elements of a drawing as the page's view gives them to the core."""
+
+    def tree(element: Element) -> dict[str, Any]:
+        own = (element.text or "") + "".join(child.tail or "" for child in element)
+        return {
+            "tag": element.tag,
+            "attributes": dict(element.attrib),
+            "text": own,
+            "children": list(map(tree, element)),
+        }
+
+    return tree(ElementTree.fromstring(text))
 
 
 def _number(entry: dict[str, Any]) -> Any:
@@ -132,7 +172,7 @@ def to_page(value: Any) -> Any:
         more = {"warnings": value.warnings, "calibrated": value.calibrated}
         return to_page({**_named(value._asdict()), **more, "unmeasured": []})
     if isinstance(value, Reference):
-        return to_page({**_parts(value), "curvature": value.curvature})
+        return to_page({**_parts(value), "arc": value.arc, "curvature": value.curvature})
     if isinstance(value, Plan):
         errors = _named({name: getattr(value.errors, name) for name in ERRORS})
         own = {"errors": errors | {"feedback": value.feedback_error}, "unmeasured": value.unmeasured_error}

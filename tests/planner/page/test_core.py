@@ -1,4 +1,4 @@
-"""The core's files can be joined into one script; each names what it mirrors and has a test; advice fits."""
+"""The core's files can be joined into one script, with Python's constants; advice fits the page."""
 
 from __future__ import annotations
 
@@ -11,55 +11,25 @@ import pytest
 
 import planner.page.bundle
 from planner.page.bundle import joined, read_module
+from planner.page.constants import constants
 from tests.planner.page.page_core import FOLDER, answer, answers, node
 from tests.processes import LIMIT
 
-ROOT, TESTS = Path(__file__).parents[3], Path(__file__).parent
 FILES = {file.stem: file for file in sorted(FOLDER.glob("*.js"))}
-IMPORT = re.compile(r'import \{ (\w+(?:, \w+)*) \} from "\./(\w+)\.js";')
-IN_PAGE = {"service", "worker"}  # in a browser
-OWN = {"arrays", "format"}  # they stand for NumPy and for Python itself
-PAGE = {*IN_PAGE, "open_file", "compared_track", "compared_runs", "page_shapes", "advice"}  # of the page alone
-TESTED_IN = {
-    "test_core": "advice",
-    "test_numbers": "arrays close_match draws format lab_units si_units units",
-    "test_paths": "distance nearest_feasible page_shapes path pose_equations tractrix",
-    "test_lookup": "cubic_spline curve_errors dense dwell_choice ensemble from_table groups heads intervals "
-                   "lookup planar refusals response response_table support table_data tails tracked_point vehicle "
-                   "wrench_balance wrench_table",
-    "test_plans": "declared_path error_growth errors feasible feedback_error fillets line_of_sight plan progress "
-                  "remedy request rollout schedule stated_error zigzag",
-    "test_plan_files": "compared_track plan_files planned sha256 tracker_header tracking_error",
-    "test_robot_files": "input_error robot robot_toml toml",
-    "test_drawings": "style_sheet svg_drawing svg_names svg_segments svg_shapes svg_tree xml",
-    "test_tables": "file_kinds number_words open_file path_files quantities seals text_tables times",
-    "test_runs": "compared_runs copied_rows measured_table",
-}  # fmt: skip
-
-
-def imports_of(name: str) -> set[str]:
-    return {other for _, other in IMPORT.findall(FILES[name].read_text())}
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_file_can_be_joined_and_names_what_it_mirrors(name: str) -> None:
-    text = FILES[name].read_text()
+def test_a_file_can_be_joined_and_says_what_it_is(name: str) -> None:
     read_module(FILES[name])
-    assert text.startswith("/* ")
-    sources = re.findall(r"\b(?:planner|sim|surrogate|calibration)/[\w/]+\.py\b", text.split("*/")[0])
-    assert sources or name in OWN | PAGE
-    assert all((ROOT / source).exists() for source in sources)
+    assert FILES[name].read_text().startswith("/* ")
 
 
-def test_each_file_is_tested() -> None:
-    """A test calls the file, or one that imports it."""
-    assert sorted(" ".join(TESTED_IN.values()).split()) == sorted(set(FILES) - IN_PAGE)
-    for test, names in TESTED_IN.items():
-        text = (TESTS / f"{test}.py").read_text()
-        reached = {name for name in FILES if f'"{name}.js"' in text or f'("{name}", "' in text}
-        while more := set().union(*map(imports_of, reached)) - reached:
-            reached |= more
-        assert set(names.split()) <= reached, test
+def test_each_constant_of_python_is_used_and_each_that_is_used_is_pythons() -> None:
+    text = "\n".join(file.read_text() for file in FILES.values())
+    taken = {(group, word.split(":")[0].strip())
+             for names, group in re.findall(r"\{ ([^{}]*) \} = CONSTANTS\.(\w+)", text)
+             for word in names.split(",")}  # fmt: skip
+    assert taken == {(group, name) for group, names in constants().items() for name in names}
 
 
 @pytest.fixture
@@ -117,7 +87,7 @@ ADVICE = {
 
 
 def test_advice_names_controls_of_the_page() -> None:
-    told = answers([("advice.js", "inPage", said, SHORT) for said in ADVICE])
+    told = answers([("words.js", "inPage", said, SHORT) for said in ADVICE])
     assert told == list(ADVICE.values())
     html = (FOLDER / "view" / "page.html").read_text().replace("\n", " ")
     controls = re.findall(r'"([^"]+)"', " ".join(told))
@@ -126,10 +96,10 @@ def test_advice_names_controls_of_the_page() -> None:
 
 def test_no_message_of_the_planner_names_an_option_of_the_command() -> None:
     """Whoever adds a message with such advice adds the page's words for it."""
-    files = [file for name, file in FILES.items() if name not in ("advice", "robot_toml")]
+    files = [file for name, file in FILES.items() if name not in ("words", "robot")]
     texts = [re.sub(r'["`]\s*\+\s*["`]', "", file.read_text()) for file in files]
     option = r'"[^"\n]*--[a-z][^"\n]*"|`[^`\n]*--[a-z][^`\n]*`'
     literals = [literal for text in texts for literal in re.findall(option, text)]
     assert literals
-    told = [answer("advice.js", "inPage", literal, SHORT) for literal in literals]
+    told = [answer("words.js", "inPage", literal, SHORT) for literal in literals]
     assert [words for words in told if re.search(r"--[a-z]", words)] == []

@@ -1,17 +1,17 @@
-"""Paths of SVG drawings are Python's, and what is not read is refused in the same words."""
+"""Paths of SVG drawings are Python's, what is not read is refused, and a browser reads the same trees."""
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from planner.paths.svg_drawing import read_svg
 from sim.io.errors import InputError
-from tests.planner.page.page_core import EXACT, answer
-from tests.planner.page.parity import check_parity, without_digits
+from tests.planner.page.page_core import EXACT, FOLDER, check_near, drawing_tree, opened
+from tests.planner.page.view.browser import chromium
 from tests.planner.paths.svg_cases import ALIKE, REFUSED
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
@@ -36,58 +36,82 @@ BODIES = [
 ]  # fmt: skip
 ROOTS = ["width='5cm' height='5cm' viewBox='0 0 100 100'", "width='70mm' height='30mm' viewBox='1 2 100 100'",
          "viewBox='0 0 10 10' width='200' height='100' preserveAspectRatio='xMaxYMin slice'"]  # fmt: skip
-BEFORE = ["<?xml version='1.0'?><!-- c -->", "<!DOCTYPE svg [<!ENTITY e 'x'>]>", "\ufeff"]
 SEVERAL = (
     "<defs><clipPath id='c'><path d='M 0 0 L 9 9'/></clipPath></defs>"
     "<path id='outline' d='M 0 0 L 1 0 M 5 5 L 5 7'/><rect width='2' height='2'/><text>no path</text>"
 )
 BAD = [
-    "<svg", "", "<svg/>", "<svg><path d='M 0 0'/></svg>", "<svg><path d='nonsense'/></svg>", "no xml",
-    "<svg><path d='M 0 0 L 0 0'/></svg>", "<svg><text>hi</text></svg>", "<svg><g></svg>", "<svg></svg><svg/>",
-    "<svg><path d='M0 0L1 1' transform='matrix(1 2)'/></svg>", "<svg b='1' b='2'/>", "<svg b=1/>",
-    "<svg b='&x;'/>", "<svg><path d='M0 0L1 1' transform='rotate(a)'/></svg>",
+    "<svg/>", "<svg><path d='M 0 0'/></svg>", "<svg><path d='nonsense'/></svg>", "<svg><text>hi</text></svg>",
+    "<svg><path d='M 0 0 L 0 0'/></svg>", "<svg><path d='M0 0L1 1' transform='matrix(1 2)'/></svg>",
+    "<svg><path d='M0 0L1 1' transform='rotate(a)'/></svg>",
     "<svg xmlns:xlink='http://www.w3.org/1999/xlink'><g id='a'><use xlink:href='#a'/></g></svg>",
-    f"<svg><path d='M{'1 ' * 50_001}'/></svg>", f"<svg>{'<g>' * 120}{'</g>' * 120}</svg>", f"<svg>{SEVERAL}</svg>",
+    f"<svg><path d='M{'1 ' * 50_001}'/></svg>", f"<svg>{'<g>' * 120}{'</g>' * 120}</svg>",
 ]  # fmt: skip
+BROKEN = [
+    "<svg",
+    "",
+    "no xml",
+    "<svg><g></svg>",
+    "<svg></svg><svg/>",
+    "<svg b='1' b='2'/>",
+    "<svg b=1/>",
+    "<svg b='&x;'/>",
+]
 
 
 def svg(body: str, root: str = "", before: str = "") -> str:
     return f"{before}<svg xmlns='http://www.w3.org/2000/svg' {root}>{body}</svg>"
 
 
-def read(text: str, name: str, closed: bool | None = None, shape: str | None = None) -> dict[str, Any]:
-    """Read a drawing with Python; each refusal begins with the file's name, as the page's do."""
-    Path(name).write_text(text, encoding="utf-8")
-    try:
-        path, unit = read_svg(Path(name), closed, shape)
-    except InputError as refusal:
-        raise InputError(f"{name}: {str(refusal).removeprefix(f'{name}: ')}") from None
-    return {"path": path, "unit": unit}
+TEXTS = [svg(body) for body in BODIES]
+TEXTS += [svg(body, root) for root in ROOTS for body in (BODIES[5], BODIES[11], "<circle cx='5' r='3cm'/>")]
+TEXTS += [text for pair in ALIKE for text in pair]
 
 
-def without_name(message: object) -> str:
-    return re.sub(r": line #+, column #+", "", without_digits(str(message).removeprefix("a.svg: ")))
-
-
-def check(cases: list[tuple[Any, ...]]) -> int:
-    return check_parity("svg_drawing.js", "readSvg", read, cases, EXACT, without_name)
+def check_drawing(text: str, shape: str | None = None, index: int = 0) -> None:
+    Path("a.svg").write_text(text, encoding="utf-8")
+    (path, unit), found = read_svg(Path("a.svg"), None, shape), opened("a.svg", text)
+    assert not isinstance(found, InputError), (found, text)
+    drawn = found["paths"][index]
+    assert drawn["closed"] == path.closed
+    assert (found["unit"] is None) == (unit is None)
+    check_near(drawn["points"], path.points, EXACT * max(1.0, float(np.abs(path.points).max())))
+    if unit is not None:
+        assert found["unit"] == pytest.approx(100 * unit)
 
 
 def test_drawings() -> None:
-    texts = [svg(body) for body in BODIES]
-    texts += [svg(body, root) for root in ROOTS for body in (BODIES[5], BODIES[11], "<circle cx='5' r='3cm'/>")]
-    texts += [svg(BODIES[0], "", before) for before in BEFORE] + [text for pair in ALIKE for text in pair]
-    assert check([(text, "a.svg") for text in texts]) == 0
+    for text in TEXTS:
+        check_drawing(text)
+    for index, name in enumerate(("outline/1", "outline/2", "rect1")):
+        check_drawing(svg(SEVERAL), name, index)
+    assert [path["name"] for path in opened("a.svg", svg(SEVERAL))["paths"]] == ["outline/1", "outline/2", "rect1"]
 
 
-def test_names_of_several_paths() -> None:
-    names = ["outline/1", "outline/2", "rect1"]
-    assert answer("svg_drawing.js", "pathNames", svg(SEVERAL), "a.svg") == names
-    assert check([(svg(SEVERAL), "a.svg", None, name) for name in names]) == 0
-    assert check([(svg(BODIES[0]), "a.svg", True)]) == 0
+@pytest.mark.parametrize("text", [*BAD, *(text for text, _ in REFUSED if "<?xml-stylesheet" not in text)])
+def test_bad_drawings_are_refused(text: str) -> None:
+    refusal = opened("a.svg", text)
+    assert isinstance(refusal, InputError), text
+    assert str(refusal).startswith("a.svg")
+    assert "\n" not in str(refusal)
 
 
-def test_bad_drawings_are_refused() -> None:
-    texts = [*BAD, *(text for text, _ in REFUSED)]
-    assert check([(text, "a.svg") for text in texts]) == len(texts)
-    assert check([(text, "a.svg", None, "circle9") for text in BAD]) == len(BAD)
+def test_a_browser_reads_the_same_trees() -> None:
+    program = chromium()
+    from playwright.sync_api import sync_playwright
+
+    source = "\n".join((FOLDER / name).read_text() for name in ("words.js", "view/drawing.js"))
+    source = "\n".join(line for line in source.splitlines() if not line.startswith(("import ", "export ")))
+    read = f"""(texts) => {{ {source}
+      return texts.map((text) => refusing(() => drawingTree(text, "a.svg"), ({{ message }}) => message)); }}"""
+    entity = "<!DOCTYPE svg [<!ENTITY e 'M 0 0 L 9 9'>]>"
+    texts = [*TEXTS, svg("<path d='&e;'/>", "", entity), svg(BODIES[0], "", "<?xml version='1.0'?><!-- c -->")]
+    with sync_playwright() as control:
+        browser = control.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        found: list[Any] = browser.new_page().evaluate(
+            read, [*texts, *BROKEN, "<?xml-stylesheet href='a'?><svg/>"]
+        )
+        browser.close()
+    assert found[: len(texts)] == [drawing_tree(text) for text in texts]
+    assert all(words.startswith("a.svg is not SVG: ") and "\n" not in words for words in found[len(texts) : -1])
+    assert "save the drawing with its style" in found[-1]

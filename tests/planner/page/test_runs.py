@@ -15,7 +15,7 @@ from calibration.swimmer import measured_table
 from calibration.swimmer.copied_rows import find_copies
 from calibration.swimmer.measured_table import read_measurements
 from sim.arrays import Floats
-from tests.planner.page.page_core import FOLDER, TABLE, answer, answers, typed
+from tests.planner.page.page_core import FOLDER, TABLE, answer, answers, opened, typed
 from tests.planner.page.parity import refusal_of
 from tests.planner.page.runs import ROBOT, look_up, table_of_runs
 
@@ -33,10 +33,10 @@ def read(table: pd.DataFrame, **form: Any) -> Any:
     """Write a table for Python, and read it as the page does."""
     text = table.to_csv(index=False, **form).encode()
     Path(NAME).write_bytes(text)
-    found = answer("open_file.js", "openFile", {"name": NAME, "bytes": text})
+    found = opened(NAME, text)
     assert found["kind"] == "runs"
     columns = [typed(np.array(column)) for column in found["table"]["columns"]]
-    return answer("measured_table.js", "readMeasurements", {**found["table"], "columns": columns}, NAME)
+    return answer("runs.js", "readMeasurements", {**found["table"], "columns": columns}, NAME)
 
 
 def with_bad_rows(table: pd.DataFrame) -> pd.DataFrame:
@@ -115,7 +115,7 @@ def test_tables_are_refused_in_the_same_words(name: str) -> None:
 def test_the_numbers_of_the_rules_are_pythons() -> None:
     assert read(table_of_runs()[:20])["refusal"] is None
     assert "20 usable runs; a calibration needs at least 24" in refusal_of(read_measurements, NAME)
-    text = (FOLDER / "measured_table.js").read_text()
+    text = (FOLDER / "runs.js").read_text()
     assert f"const FEWEST_RUNS = {measured_table._FEWEST_RUNS};" in text
     assert f"const FEWEST_REPEATS = {measured_table._FEWEST_REPEATS};" in text
 
@@ -131,7 +131,7 @@ def with_copies(seed: int, digits: int) -> tuple[Floats, Floats]:
 @pytest.mark.parametrize("digits", [6, 1])
 def test_copied_rows_are_found(digits: int) -> None:
     tables = [with_copies(seed, digits) for seed in range(20)]
-    found = answers([("copied_rows.js", "findCopies", inputs.T, outputs.T) for inputs, outputs in tables])
+    found = answers([("runs.js", "findCopies", inputs.T, outputs.T) for inputs, outputs in tables])
     expected = [sorted(find_copies(*table).items()) for table in tables]
     assert [sorted(map(tuple, pairs)) for pairs in found] == expected
     assert any(expected) == (digits > 1)
@@ -141,7 +141,7 @@ def compared(table: pd.DataFrame) -> Any:
     texts = [[str(value) for value in table[name]] for name in table]
     numbers = [pd.to_numeric(table[name], errors="coerce").fillna(0).tolist() for name in table]
     content = {"names": list(table), "columns": numbers, "texts": texts, "lines": list(range(2, len(table) + 2))}
-    return answer("compared_runs.js", "comparedRuns", content, NAME, ROBOT, TABLE)
+    return answer("runs.js", "comparedRuns", content, NAME, ROBOT, TABLE)
 
 
 def test_answers_and_differences_are_those_of_the_look_up_table() -> None:

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 
-import softflagella as sf
-from planner.paths.path import circle
 from planner.paths.path_files import read_path
-from sim.io.errors import InputError
 from sim.io.quantities import numbers_of
-from sim.io.seals import sealed
 from sim.io.text_tables import parse_table
-from sim.model.plan_file import plan_id
-from sim.model.robot_toml import robot_toml
-from tests.planner.page.cases import CONTROL, planned
-from tests.planner.page.page_core import answer, check_near
-from tests.planner.page.parity import check_parity, refusal_of, without_digits
+from tests.planner.page.page_core import answer, check_near, opened
+from tests.planner.page.parity import refusal_of, without_digits
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
 
@@ -48,7 +41,7 @@ BAD_TABLES = [
     b"x,y,z\n1,2\n3,4\n", b'x,y\n"1,2\n3,4\n', b'x,y\n"1"2,3\n', b"x;y\n1,200;300\n",
     b"x;y;z\n1,200;1;0,5\n300;2;0,5\n",
     b"x;y\n1.200;1\n300;2\n", b"x;y\n1 200;1\n", b"x;y\n1.200.300;1\n", b'x,y\n"1,200",300\n',
-    "x;y\n1\u202f200,5;1\n".encode(), b"'=x,'=x\n1,2\n", b"x\ty\n1 2\n3 4\n", b"1,2\n3,4\n",
+    "x;y\n1\u202f200,5;1\n".encode(), b"'=x,'=x\n1,2\n", b"x\ty\n1 2\n3 4\n",
 ]  # fmt: skip
 PATHS = [
     b"x,y\n0,0\n3,0\n3,4\n", b"0 0\n1 2\n5 7\n", b"x_mm;y_mm\n1,5;2\n3;4,5\n9;1\n",
@@ -63,30 +56,33 @@ BAD_PATHS = [
 ]  # fmt: skip
 
 
-def numbers_in(data: bytes, name: str, names: bool) -> dict[str, Any]:
-    table = parse_table(data, name, names=names)
-    table = table.rename(columns=lambda name: name.strip() if isinstance(name, str) else name)
-    return {"names": list(table), "columns": [numbers_of(table[name]).to_list() for name in table]}
+def check_read(found: Any, wanted: pd.DataFrame) -> None:
+    """Assert that words of the page are those of a table, and its numbers Python's."""
+    assert [str(name).strip() for name in found["names"]] == [str(name).strip() for name in wanted]
+    for name, words in zip(wanted, found["words"], strict=True):
+        check_near(answer("tables.js", "numbersOf", words, str(name)), numbers_of(wanted[name]), 1e-12)
 
 
 def test_numbers_of_tables() -> None:
-    given = [(data, "table.csv", False) for data in TABLES]
-    assert check_parity("text_tables.js", "parseTable", numbers_in, given) == 0
-    bad = [(data, "table.csv", True) for data in BAD_TABLES]
-    assert check_parity("text_tables.js", "parseTable", numbers_in, bad, words=without_digits) == len(bad)
-
-
-def path_in(data: bytes, name: str, closed: bool | None = None) -> dict[str, Any]:
-    Path(name).write_bytes(data)
-    drawing = read_path(name, closed=closed)
-    return {"path": drawing.path, "unit": drawing.unit}
+    for data in TABLES:
+        check_read(answer("tables.js", "parseWords", data, "t.csv"), parse_table(data, "t.csv", names=False))
+    for data in BAD_TABLES:
+        found = answer("tables.js", "parseWords", data, "t.csv")
+        assert without_digits(found) == without_digits(refusal_of(parse_table, data, "t.csv", names=False)), data
 
 
 def test_paths_in_tables() -> None:
-    cases = [(data, "a.csv", closed) for data in PATHS for closed in (None, True)]
-    assert check_parity("path_files.js", "readTablePath", path_in, cases) == 0
-    bad = [(data, "a.csv") for data in BAD_PATHS]
-    assert check_parity("path_files.js", "readTablePath", path_in, bad, words=without_digits) == len(bad)
+    for data in PATHS:
+        Path("a.csv").write_bytes(data)
+        drawing, found = read_path("a.csv"), opened("a.csv", data)
+        path, unit = drawing.path, drawing.unit
+        (drawn,) = found["paths"]
+        check_near(drawn["points"], path.points)
+        assert (drawn["closed"], found["unit"] is None) == (path.closed, unit is None)
+        assert unit is None or found["unit"] == pytest.approx(100 * unit)
+    for data in BAD_PATHS:
+        Path("a.csv").write_bytes(data)
+        assert without_digits(opened("a.csv", data)) == without_digits(refusal_of(read_path, "a.csv")), data
 
 
 KINDS = {
@@ -106,11 +102,6 @@ ENDINGS = {"a.geojson": "GeoJSON", "a.gpx": "GPX", "a.GCODE": "G-code", "a.wkt":
            "a.svgz": "a drawing"}  # fmt: skip
 
 
-def opened(name: str, text: str | bytes) -> Any:
-    content = text.encode() if isinstance(text, str) else text
-    return answer("open_file.js", "openFile", {"name": name, "bytes": content})
-
-
 def test_files_of_other_kinds_are_refused_by_name() -> None:
     files = [(f"a.{ending}", text.encode("latin-1" if kind == "a picture" else "utf-8"), kind)
              for kind, texts in KINDS.items() for text in texts for ending in ("txt", "csv")]  # fmt: skip
@@ -121,66 +112,3 @@ def test_files_of_other_kinds_are_refused_by_name() -> None:
         assert kind in refusal, content
         assert "is not read; give a table with columns x and y, such as CSV, or an SVG drawing" in refusal
         assert str(opened(name, content)) == refusal
-
-
-def test_paths_tracks_robots_runs_and_drawings_are_told_apart() -> None:
-    path = opened("a.csv", "x_mm;y_mm\n0;0\n300,5;0\n")
-    assert (path["kind"], path["unit"]) == ("path", pytest.approx(0.1))
-    check_near(path["paths"][0]["points"], [[0, 0], [300.5, 0]])
-    assert opened("b.csv", "x,y\n0,0\n3,0\n")["unit"] is None
-    track = opened("t.csv", "time_s,x_cm,y_cm,heading_deg,plan_id\n0,0,0,0,p1\n1,0,0,0,\n2,0,0,0,p1\n")
-    assert (track["kind"], track["table"]["plans"]) == ("track", ["p1"])
-    runs = ("N,l_cm,omega_rpm,theta_deg\n3,9,100,20\n", "tails;rpm\n3;100\n", "theta_deg,R_yr_mm\n3,4\n")
-    assert [opened("runs.csv", text)["kind"] for text in runs] == ["runs"] * 3
-    assert opened("robot.toml", robot_toml(CONTROL))["fields"]["tailLength"] == CONTROL.tail_length
-    drawing = opened("two.svg", '<svg><path id="a" d="M0 0 h 9"/><path id="b" d="M0 0 v 9 h 3 z"/></svg>')
-    assert [(path["name"], path["closed"]) for path in drawing["paths"]] == [("a", False), ("b", True)]
-
-
-def check_plan_opened(content: dict[str, Any]) -> None:
-    found = opened("plan.json", json.dumps(content, indent=1))
-    (drawn,) = found["paths"]
-    assert (found["kind"], found["unit"], drawn["closed"]) == ("path", pytest.approx(11.0), content["closed"])
-    check_near(drawn["points"], content["raw_path"][:-1] if content["closed"] else content["raw_path"])
-
-
-def test_a_plan_with_more_than_a_path_gives_it() -> None:
-    content = {**planned("circle", objective="flips").to_dict(), "lap": {"period_s": 1.0}, "arrival": None}
-    check_plan_opened({**content, "id": plan_id(content)})
-
-
-@pytest.mark.rest
-def test_plans_with_laps_walls_or_an_arrival_give_their_paths() -> None:
-    walls = [sf.Circle(6.0, 0.0, 0.5)]
-    options: dict[str, dict[str, Any]] = {"lap": {"loop": True}, "arrival": {"arrive_seconds": 1800.0},
-                                          "kept_clear": {"keep_out": walls}}  # fmt: skip
-    for kind, option in options.items():
-        content = sf.plan(circle(2.0), CONTROL, objective="flips", **option).to_dict()
-        assert kind in content
-        check_plan_opened(content)
-
-
-def test_an_edited_plan_and_a_robot_that_was_cut_are_refused() -> None:
-    content = {**planned("circle", objective="flips").to_dict(), "code_version": "0"}
-    check_plan_opened(content)
-    content["raw_path"][1][0] += 0.1
-    assert "plan.json was edited or damaged after it was written" in str(opened("plan.json", json.dumps(content)))
-    whole = sealed(robot_toml(CONTROL))
-    assert opened("robot.toml", whole)["kind"] == "robot"
-    for text in (whole[:-30], whole.replace("C_t = 3.", "C_t = 4.")):
-        assert "robot.toml was edited, damaged or cut short" in str(opened("robot.toml", text))
-
-
-def test_other_files_are_refused_in_one_line() -> None:
-    for name, content in (
-        ("names.csv", b"a,b\n1,2\n2,3\n"), ("none.svg", b"<svg></svg>"), ("bad.svg", b"<svg><path d='M'"),
-        ("picture.png", b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"), ("robot.toml", b"tails = 2\nlenght_cm = 3\n"),
-        ("robot.toml", b"\xff\xfe\x00"), ("track.csv", b"time_s,x_cm,y_cm,heading_deg\n"), ("plan.json", b"{"),
-        ("plan.json", b"{}"), ("plan.json", b'{"format": 1}'), ("plan.json", b'{"format": 2}'),
-        ("plan.json", b"[1, 2]"),
-        ("plan.json", b'{"format": 2, "robot": {"tail_length_m": 0.1}, "raw_path": [[0, 1], [2]]}'),
-        ("plan.json", b'{"format": 2, "robot": {"tail_length_m": 0.1}, "raw_path": 3}'),
-    ):  # fmt: skip
-        refusal = opened(name, content)
-        assert isinstance(refusal, InputError), content
-        assert len(str(refusal).splitlines()) == 1

@@ -75,7 +75,7 @@ def test_a_file_is_refused_in_the_words_of_the_command(
     assert run_command(main, command) == 2
     theirs = capsys.readouterr().err.strip().removeprefix("error: ")
     if name == "tight.csv":  # there is no plan of it
-        assert without_digits(ours) == without_digits(answer("advice.js", "inPage", theirs, {"tailLength": 0.11}))
+        assert without_digits(ours) == without_digits(answer("words.js", "inPage", theirs, {"tailLength": 0.11}))
         assert text_of(page, "#message") == OLD
         assert page.locator("#scene .old").count() == 1
         assert page.get_by_role("button", name="schedule.h").is_disabled()

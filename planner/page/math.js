@@ -1,0 +1,224 @@
+/* Columns of numbers, angles, rigid motions of the plane, small matrices and splines.
+ *
+ * A column is an array or a Float64Array, rows are arrays of arrays. A pose is [x, y, ψ], a twist [forward, left,
+ * yaw rate]; lengths in any unit, angles in rad. */
+
+const TAU = 2 * Math.PI;
+const MIRROR = [1, -1, -1]; // reflection about the body's axis: what a reversed motor does
+
+/* The remainder with the sign of the divisor, as Python's %. */
+function mod(value, divisor) {
+  const rest = value % divisor;
+  return rest !== 0 && rest < 0 !== divisor < 0 ? rest + divisor : rest;
+}
+
+/* An angle within half a turn of zero. */
+function halfTurn(angle) {
+  return mod(angle + Math.PI, TAU) - Math.PI;
+}
+
+function clip(value, low, high) {
+  return Math.min(Math.max(value, low), high);
+}
+
+function sum(values) {
+  let total = 0;
+  for (const value of values) total += value;
+  return total;
+}
+
+function mean(values) {
+  return sum(values) / values.length;
+}
+
+/* The largest value; −∞ of none, NaN if there is one. */
+function largest(values) {
+  let most = -Infinity;
+  for (const value of values) if (!(value <= most)) most = value;
+  return most;
+}
+
+/* The smallest value; ∞ of none, NaN if there is one. */
+function smallest(values) {
+  return -largest(Array.from(values, (value) => -value));
+}
+
+/* The largest absolute value; 0 of none. */
+function largestSize(values) {
+  return Math.max(0, largest(Array.from(values, Math.abs)));
+}
+
+function median(values) {
+  const sorted = Float64Array.from(values).sort(), middle = sorted.length >> 1;
+  return sorted.length % 2 ? sorted[middle] : (sorted[middle - 1] + sorted[middle]) / 2;
+}
+
+/* The quantile of sorted values, between the two nearest. */
+function quantile(values, level) {
+  const place = level * (values.length - 1), below = Math.floor(place);
+  return values[below] + (place - below) * (values[Math.min(below + 1, values.length - 1)] - values[below]);
+}
+
+/* Sums of the first values, one more than there are values: 0, a, a + b, … */
+function runningSum(values) {
+  const totals = new Float64Array(values.length + 1);
+  for (let i = 0; i < values.length; i++) totals[i + 1] = totals[i] + values[i];
+  return totals;
+}
+
+/* Differences of neighbours. */
+function differences(values) {
+  return Float64Array.from({ length: Math.max(values.length - 1, 0) }, (_, i) => values[i + 1] - values[i]);
+}
+
+/* Equal steps from start to end, both included. */
+function linspace(start, end, count) {
+  const step = (end - start) / (count - 1);
+  return Float64Array.from({ length: count }, (_, i) => (i && i === count - 1 ? end : start + i * step));
+}
+
+/* Steps of equal ratio from start to end, both included. */
+function geomspace(start, end, count) {
+  return linspace(Math.log(start), Math.log(end), count).map((log, i) => {
+    return i === 0 ? start : i === count - 1 ? end : Math.exp(log);
+  });
+}
+
+/* A column of rows. */
+function column(rows, index) {
+  return Float64Array.from(rows, (row) => row[index]);
+}
+
+/* The last place of rising knots whose value is at most x; −1 if there is none. */
+function placeBelow(knots, x) {
+  let low = -1, high = knots.length;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (knots[middle] <= x) low = middle;
+    else high = middle;
+  }
+  return low;
+}
+
+/* Values at x between rising knots, constant beyond both ends. */
+function interp(x, knots, values) {
+  const last = knots.length - 1;
+  return Float64Array.from(x, (at) => {
+    const j = placeBelow(knots, at);
+    if (j < 0) return values[0];
+    if (j >= last) return values[last];
+    return ((values[j + 1] - values[j]) / (knots[j + 1] - knots[j])) * (at - knots[j]) + values[j];
+  });
+}
+
+/* Angles [rad] without jumps of more than half a turn. */
+function unwrap(angles) {
+  const smooth = Float64Array.from(angles);
+  for (let i = 1; i < smooth.length; i++) {
+    const step = angles[i] - angles[i - 1];
+    smooth[i] = smooth[i - 1] + (Math.abs(step) < Math.PI ? step : halfTurn(step) || step);
+  }
+  return smooth;
+}
+
+/* Sums of products with a symmetric kernel wherever it lies fully within the values. */
+function convolved(values, kernel) {
+  return Float64Array.from({ length: values.length - kernel.length + 1 }, (_, i) => {
+    let total = 0;
+    for (let k = 0; k < kernel.length; k++) total += values[i + k] * kernel[k];
+    return total;
+  });
+}
+
+/* The pose reached by `then`, given in the frame of `first`. */
+function compose(first, then) {
+  const c = Math.cos(first[2]), s = Math.sin(first[2]);
+  return [
+    first[0] + (c * then[0] - s * then[1]), first[1] + (s * then[0] + c * then[1]), first[2] + then[2],
+  ];
+}
+
+/* The pose that undoes a pose. */
+function inversePose([x, y, heading]) {
+  const c = Math.cos(heading), s = Math.sin(heading);
+  return [-(c * x + s * y), s * x - c * y, -heading];
+}
+
+/* The pose after holding a twist for a time. */
+function arc([forward, left, rate], time) {
+  const angle = rate * time, half = angle / 2, sinc = (x) => (x === 0 ? 1 : Math.sin(x) / x);
+  const along = time * sinc(angle), across = time * sinc(half) * Math.sin(half);
+  return [along * forward - across * left, across * forward + along * left, angle];
+}
+
+/* Solve a x = b in place by Gaussian elimination with pivoting: b becomes x, a is overwritten. */
+function solveDense(a, b) {
+  const count = b.length, columns = b[0].length;
+  for (let k = 0; k < count; k++) {
+    let best = k;
+    for (let i = k + 1; i < count; i++) if (Math.abs(a[i][k]) > Math.abs(a[best][k])) best = i;
+    [a[k], a[best]] = [a[best], a[k]];
+    [b[k], b[best]] = [b[best], b[k]];
+    for (let i = k + 1; i < count; i++) {
+      const factor = a[i][k] / a[k][k];
+      if (factor === 0) continue;
+      for (let j = k + 1; j < count; j++) a[i][j] -= factor * a[k][j];
+      for (let j = 0; j < columns; j++) b[i][j] -= factor * b[k][j];
+    }
+  }
+  for (let k = count - 1; k >= 0; k--) {
+    for (let i = 0; i < columns; i++) {
+      for (let j = k + 1; j < count; j++) b[k][i] -= a[k][j] * b[j][i];
+      b[k][i] /= a[k][k];
+    }
+  }
+}
+
+/* The inverse of a matrix; numbers that are not finite where there is none. */
+function inverse(matrix) {
+  const unit = matrix.map((_, i) => matrix.map((_, j) => (i === j ? 1 : 0)));
+  solveDense(matrix.map((row) => [...row]), unit);
+  return unit;
+}
+
+/* Evaluate the cubic spline through values at knots, at least four, at some places; both flat, one row of `width`
+ * numbers for each knot and place. flatEnd: the slope at the last knot is zero, rather than the third derivative
+ * continuous at the knot before, as it is at the second knot. */
+function splineAt(knots, values, width, places, flatEnd = false) {
+  const slopes = splineSlopes(knots, values, width, flatEnd), answer = new Float64Array(places.length * width);
+  places.forEach((place, row) => {
+    const segment = clip(placeBelow(knots, place), 0, knots.length - 2);
+    const h = knots[segment + 1] - knots[segment], t = (place - knots[segment]) / h;
+    const atFirst = (1 + 2 * t) * (1 - t) ** 2, atSecond = t ** 2 * (3 - 2 * t), bent = h * t * (1 - t);
+    for (let i = 0; i < width; i++) {
+      const at = segment * width + i, ends = atFirst * values[at] + atSecond * values[at + width];
+      answer[row * width + i] = ends + bent * ((1 - t) * slopes[segment][i] - t * slopes[segment + 1][i]);
+    }
+  });
+  return answer;
+}
+
+/* The slopes at the knots, one row for each. */
+function splineSlopes(knots, values, width, flatEnd) {
+  const h = differences(knots), last = h.length, columns = Array.from({ length: width }, (_, k) => k);
+  const secant = (i, k) => (values[(i + 1) * width + k] - values[i * width + k]) / h[i];
+  const notAKnot = (i, j, k) => { // step i of the end, and its neighbour j
+    const total = h[i] + h[j];
+    return ((h[i] + 2 * total) * h[j] * secant(i, k) + h[i] ** 2 * secant(j, k)) / total;
+  };
+  const matrix = Array.from({ length: last + 1 }, () => new Float64Array(last + 1)), right = [];
+  for (let i = 1; i < last; i++) {
+    matrix[i].set([h[i], 2 * (h[i - 1] + h[i]), h[i - 1]], i - 1);
+    right[i] = columns.map((k) => 3 * (h[i] * secant(i - 1, k) + h[i - 1] * secant(i, k)));
+  }
+  matrix[0].set([h[1], h[0] + h[1]]);
+  right[0] = columns.map((k) => notAKnot(0, 1, k));
+  matrix[last].set(flatEnd ? [0, 1] : [h[last - 1] + h[last - 2], h[last - 2]], last - 1);
+  right[last] = columns.map((k) => (flatEnd ? 0 : notAKnot(last - 1, last - 2, k)));
+  solveDense(matrix, right);
+  return right;
+}
+
+export { TAU, MIRROR, mod, halfTurn, clip, sum, mean, largest, smallest, largestSize, median, quantile, runningSum };
+export { differences, linspace, geomspace, column, placeBelow, interp, unwrap, convolved, compose, inversePose, arc };
+export { solveDense, inverse, splineAt };

@@ -1,0 +1,178 @@
+/* The look-up table: the tails' wrench and the response to a flip are learned, the head's balance is solved at each
+ * query.
+ *
+ * A robot is {C_t, C_r, C_yr, l_over_R, L_over_R, l_over_r0, omega_bar, N, a_over_R}. Curves of a response are flat,
+ * in l, l, rad, of a positive motor. Units: l, μ0 l⁴/EI, rad; theta_deg in degrees, gaps over 2 r0. */
+import { evaluate, headAndTails, membersAt, motionSensitivity, networkIndex, networkInputs } from "./balance.js";
+import { networkOf, solveBalance, steadyOutputs, tailInputs, wrenchSlopes } from "./balance.js";
+import { CONSTANTS } from "./constants.js";
+import { readData } from "./data.js";
+import { clip } from "./math.js";
+import { BEFORE, CURVE } from "./vehicle.js";
+import { InputError } from "./words.js";
+
+const { NOT_OF_HEAD } = CONSTANTS.lookup, { PARTS, SMALL_SURGE, OF_HEAD } = CONSTANTS.response_table;
+const { NORMAL_90, SIZES } = CONSTANTS.curve_errors, { HALVED } = CONSTANTS.intervals, { RELATIVE } = CONSTANTS.errors;
+const { DEGREE, DEGREE_OF_MANY, MANY } = CONSTANTS.support; // of monomials; of so many inputs and more
+const STEADY = ["v_z", "v_x", "omega_yr_bar"];
+const END = 1.02; // of half an input's range
+const BRANCHES = 0.6; // |ω_yr/ω_t| from which a robot may have several motions
+const REASONS = { // why a robot is outside
+  none: "none with as many tails were learned",
+  unknown: "its tails or its motor were not learned, or no motion was found",
+  novel: "its tails move as none of the learned ones do",
+  branches: "it yaws nearly as fast as its tails turn, and may have several motions",
+};
+
+/* A robot is outside the domain of a look-up table; the message is why. */
+class OutsideError extends InputError {}
+
+/* Read the table that Python has written into the page. */
+async function readTable(data) {
+  const { identity, content } = await readData(data), { intervals, ranges, bases, support } = content;
+  const networks = (parts) => parts.map((part) => (part ? networkOf(part) : null));
+  return {
+    identity, intervals, ranges, bases, support, curveErrors: content.curve_errors,
+    wrench: networks(content.wrench), gap: networkOf(content.gap), curves: networks(content.curves),
+  };
+}
+
+/* The steady motion of a robot. */
+function query(table, robot) {
+  const { head, tails, motion } = motionOf(table, robot);
+  return steadyOutputs(table, head, tails, motion);
+}
+
+/* Lag, memory, rest and spread after a flip, of a positive motor. */
+function response(table, robot) {
+  if (robot.N < 2) {
+    throw new InputError(
+      "N = 1: the response of one tail depends too much on the phase of the disc, so the look-up table has not "
+      + "learned it; simulate it (softflagella replay)",
+    );
+  }
+  const { head, tails, motion } = motionOf(table, robot), speeds = curveSpeeds(head, motion), curves = {};
+  const two = tails.number === 2 ? 1 : 0, ofHead = OF_HEAD.map((i) => tails.head[i]);
+  const inputs = [...tailInputs(tails, motion), ...ofHead, Math.log(tails.number), two];
+  PARTS.forEach((names, part) => {
+    const components = evaluate(table.curves[part], inputs);
+    let first = 0;
+    for (const name of names) {
+      const { mean, vectors } = table.bases[name], count = mean.values.length, curve = Float64Array.from(mean.values);
+      for (let c = 0; c < vectors.shape[0]; c++, first++) {
+        for (let at = 0; at < count; at++) curve[at] += components[first] * vectors.values[c * count + at];
+      }
+      curves[name] = curve.map((value, at) => value * speeds[at % 3]);
+      if (name === "spread") { // its logarithm was learned, of robots with two tails
+        curves.spread = curve.map((value, at) => two * Math.exp(Math.min(value, 0)) * Math.abs(speeds[at % 3]));
+      }
+    }
+  });
+  return curves;
+}
+
+/* (w, v_x, ω_yr) of the head's centre, by which the curves are divided. */
+function curveSpeeds(head, [vX, vZ, yaw]) {
+  const sway = vX + (yaw * head.length) / 2;
+  return [Math.hypot(vZ, SMALL_SURGE * sway), sway, yaw];
+}
+
+/* Solve for the motion of a robot: {head, tails, motion, inputs, own}; own: inputs of its network of the wrench. */
+function motionOf(table, robot) {
+  const { head, tails } = headAndTails(robot), kind = networkIndex(robot.N), network = table.wrench[kind];
+  if (!table.support[kind] || !network) throw new OutsideError(REASONS.none);
+  const { motion, converged } = solveBalance(network, head, tails);
+  const learned = NOT_OF_HEAD.every((name) => within(table.ranges[name], Math.abs(robot[name])));
+  if (!converged || !learned) throw new OutsideError(REASONS.unknown);
+  const inputs = tailInputs(tails, motion), own = networkInputs(tails, motion, network.shift.length);
+  if (!(novelty(table.support[kind], own) <= 1)) throw new OutsideError(REASONS.novel);
+  if (Math.abs(motion[2]) > BRANCHES * Math.abs(motion[4])) throw new OutsideError(REASONS.branches);
+  return { head, tails, motion, inputs, own };
+}
+
+/* Whether a size is within a range that was learned. */
+function within([low, high], size) {
+  return low * (1 - 1e-9) <= size && size <= high * (1 + 1e-9);
+}
+
+/* Independent errors of a robot, each of one of v_z, v_x and ω_yr, and then those of the lag: modes of one standard
+ * deviation {twist, lag, memory}; lag and memory are null where a mode changes nothing of them. */
+function tableErrorModes({ curveErrors, intervals, ...table }, robot) {
+  const found = motionOf(table, robot), { head, tails, motion } = found, speeds = curveSpeeds(head, motion);
+  const answer = steadyOutputs(table, head, tails, motion), features = widthFeatures(table, found);
+  const steady = STEADY.map((name, i) => {
+    const size = errorScale(name, answer), half = halfWidth(intervals, name, features, size) / NORMAL_90;
+    const sigma = Math.hypot(half, curveErrors.simulator * size);
+    return { twist: STEADY.map((_, k) => (k === i ? sigma : 0)), lag: null, memory: null };
+  });
+  const local = SIZES.map((name, axis) => (halfWidth(curveErrors.widths, name, features, 1) / NORMAL_90) * speeds[axis]);
+  const { shape, values } = curveErrors.curves, whole = (BEFORE.length + 1) * CURVE, first = BEFORE.length * CURVE;
+  const curves = Array.from({ length: shape[0] }, (_, k) => {
+    const curve = values.slice(k * whole, (k + 1) * whole).map((value, at) => value * local[at % 3]);
+    const lag = curve.slice(first), memory = curve.slice(0, first).map((value, at) => value - lag[at % CURVE]);
+    return { twist: [0, 0, 0], lag, memory };
+  });
+  return [...steady, ...curves];
+}
+
+/* What the width of an interval may depend on, 11 numbers. */
+function widthFeatures(table, { head, tails, motion, inputs, own }) {
+  const kind = networkIndex(tails.number), members = membersAt(table.wrench[kind], own);
+  const sensitivity = motionSensitivity(head, tails, motion), slopes = wrenchSlopes(tails, motion);
+  const product = (row, column) => row.reduce((total, entry, i) => total + entry * column[i], 0);
+  const middle = slopes[0].map((_, i) => members.reduce((total, y) => total + y[i], 0) / members.length);
+  const spread = members.reduce((total, y) => {
+    const wrench = slopes.map((row) => product(row, y.map((value, i) => value - middle[i])));
+    return total + Math.hypot(...sensitivity.map((row) => product(row, wrench))) / members.length;
+  }, 0);
+  const away = novelty(table.support[kind], own);
+  const more = [Math.log(away + 1e-12), Math.log(spread + 1e-9), Math.log(tails.number), kind === 0 ? 1 : 0];
+  return [...inputs, ...more].map((value) => (Number.isNaN(value) ? 0 : value));
+}
+
+/* The size that errors of a steady output are relative to. */
+function errorScale(name, answer) {
+  return RELATIVE.includes(name) ? Math.abs(answer[name]) : Math.hypot(answer.v_x, answer.v_z);
+}
+
+/* Half of the width of the interval of an output.
+ *
+ * The page's robots have no couple in yaw, so their factors are the first ones of `factor`. intervals: as a model
+ * file has them. size: what errors are relative to. */
+function halfWidth({ shift, scale, weights, bounds, middle, factor }, name, features, size) {
+  const single = features[features.length - 1] > 0.5;
+  const octant = HALVED.reduce((place, f, k) => place + (features[f] > middle.values[k] ? 2 ** k : 0), 0);
+  const x = features.map((value, i) => clip((value - shift.values[i]) / scale.values[i], -5, 5)), terms = [1, ...x];
+  x.forEach((value, i) => terms.push(...x.slice(i).map((other) => value * other)));
+  const log = terms.reduce((total, term, i) => total + term * weights[name].values[i], 0);
+  const local = Math.exp(clip(log, bounds[name][0], bounds[name][1]));
+  return factor[name].values[single ? 2 ** HALVED.length : octant] * local * size;
+}
+
+/* How far some inputs are from the joint support of the training data, a smooth measure: q over its limit, or how far
+ * they are outside their ranges; at most 1 inside. Monomial p is monomial parents[p] times input last[p]. */
+function novelty({ shift, scale, factor, limit }, inputs) {
+  const x = Float64Array.from(shift.values, (middle, i) => (inputs[i] - middle) / scale.values[i]);
+  const features = [1], last = [0], solved = [];
+  for (let degree = x.length >= MANY ? DEGREE_OF_MANY : DEGREE, from = 0; degree > 0; degree--) {
+    const end = features.length;
+    for (let p = from; p < end; p++) {
+      for (let input = p ? last[p] : 0; input < x.length; input++) {
+        features.push(features[p] * x[input]);
+        last.push(input);
+      }
+    }
+    from = end;
+  }
+  const count = features.length, rows = factor.values;
+  let total = 0;
+  for (let i = 0; i < count; i++) {
+    let remainder = features[i];
+    for (let j = 0; j < i; j++) remainder -= rows[i * count + j] * solved[j];
+    solved[i] = remainder / rows[i * count + i];
+    total += solved[i] ** 2;
+  }
+  return Math.max(total / count / limit, ...x.map(Math.abs).filter((size) => size > END));
+}
+
+export { OutsideError, readTable, query, response, within, tableErrorModes };

@@ -1,0 +1,113 @@
+/* Refusals, progress, and numbers as text. */
+
+const ADVICE_NUMBERS = 'under "Corners as numbers; move, scale, turn"';
+const ADVICE = [ // what a message of the planner says, and what the page says instead
+  ["choose one with --shape, or remove the others", "remove the others"],
+  [/simulate this robot's own table \([^)]*\), or measure/, "measure"],
+  [/give --smooth (\S+)/, 'set "Smooth over" to $1 cm and press "Smooth this path"'],
+  [/scale the path by (\S+)/, `scale it by $1 ${ADVICE_NUMBERS}`],
+  [/; scale it$/, `; scale it ${ADVICE_NUMBERS}`],
+  ["allow corner = nearest", 'choose another answer to "Corners that are too tight"'],
+  [/change the robot, or simulate it \([^)]*\)/, 'change it under "Robot"'],
+  ["simulate it (softflagella replay)", 'set "Number of tails N" to 2 or more'],
+  [/, or make a table of this robot with .*/, ' under "Largest stated error"'],
+];
+const DECLARING = "finding the nearest path that can be followed";
+const REMEDY = "too tight: looking for a change that helps";
+const FOLLOWING = "following the path";
+
+/* An error for bad input: one sentence that says what was given, what is allowed, what to change. Others are bugs. */
+class InputError extends Error {
+  /* about: "options" where an option of the plan is wrong; null: what is wrong follows from the question. */
+  constructor(message, about = null) {
+    super(message);
+    this.name = new.target.name;
+    this.about = about;
+  }
+}
+
+/* Do some work; a refusal becomes another answer, or another refusal. Errors of the program pass. */
+function refusing(work, instead) {
+  try {
+    return work();
+  } catch (refusal) {
+    if (refusal instanceof InputError) return instead(refusal);
+    throw refusal;
+  }
+}
+
+/* Do some work, and write the name of a file before its refusals. */
+function naming(where, work) {
+  return refusing(work, ({ message }) => {
+    throw new InputError(message.includes(where) ? message : `${where}: ${message}`);
+  });
+}
+
+/* Tell how far a stage is: progress is a function of the stage, in words, and the share of it that is done. */
+function tell(progress, stage, done) {
+  if (progress) progress(stage, done);
+}
+
+/* A message of the planner with its advice in the page's words; the lengths of smoothing become cm. */
+function inPage(message, robot) {
+  const cm = message.replace(/(?<=--smooth )(\S+)l/, (_, tails) => general(100 * robot.tailLength * tails, 3));
+  return ADVICE.reduce((words, [from, to]) => words.replace(from, to), cm);
+}
+
+/* A number as Python and JSON write a float: the shortest digits that are read back exactly. */
+function repr(value) {
+  if (!Number.isFinite(value)) return String(value).replace("Infinity", "inf").replace("NaN", "nan");
+  if (Object.is(value, -0)) return "-0.0";
+  const size = Math.abs(value);
+  if (size !== 0 && (size < 1e-4 || size >= 1e16)) return exponent(value.toExponential());
+  return Number.isInteger(value) ? `${value}.0` : String(value);
+}
+
+/* A number with so many significant digits, without zeros at the end: 0.32, 1.2e-05. */
+function general(value, digits = 6) {
+  if (!Number.isFinite(value)) return repr(value);
+  const [mantissa, power] = value.toExponential(digits - 1).split("e").map(Number);
+  return power < -4 || power >= digits ? exponent(`${mantissa}e${power}`) : String(Number(value.toPrecision(digits)));
+}
+
+/* An exponent of two digits or more, and its sign: 1e-05. */
+function exponent(text) {
+  return text.replace(/e([+-]?)(\d+)$/, (_, sign, power) => `e${sign || "+"}${power.padStart(2, "0")}`);
+}
+
+/* A number with so many decimals; zero has no sign. */
+function fixed(value, places) {
+  return value.toFixed(places).replace(/^-(0\.?0*)$/, "$1");
+}
+
+/* A text in quotes, without what a terminal does not show. */
+function quoted(text) {
+  const quote = text.includes("'") && !text.includes('"') ? '"' : "'";
+  const hidden = (sign) => `\\u${sign.charCodeAt(0).toString(16).padStart(4, "0")}`;
+  return quote + text.replace(/[^\S ]|\p{C}/gu, hidden).replaceAll(quote, `\\${quote}`) + quote;
+}
+
+/* The known word that is most like a given one, of at least this likeness; null if there is none. Likeness is twice
+ * the number of letters in common blocks, the longest first, over the letters of both words. */
+function closeMatch(word, known, least = 0.6) {
+  const alike = (other) => (2 * common(other, word)) / Math.max(word.length + other.length, 1);
+  const [best] = Array.from(known).sort((one, other) => alike(other) - alike(one));
+  return best !== undefined && alike(best) >= least ? best : null;
+}
+
+function common(first, second) {
+  let [length, at, other] = [0, 0, 0];
+  for (let i = 0; i < first.length; i++) {
+    for (let j = 0; j < second.length; j++) {
+      let count = 0;
+      while (i + count < first.length && first[i + count] === second[j + count]) count++;
+      if (count > length) [length, at, other] = [count, i, j];
+    }
+  }
+  if (!length) return 0;
+  const before = common(first.slice(0, at), second.slice(0, other));
+  return before + length + common(first.slice(at + length), second.slice(other + length));
+}
+
+export { InputError, refusing, naming, DECLARING, REMEDY, FOLLOWING, tell, inPage, repr, general, fixed, quoted };
+export { closeMatch };

@@ -1,0 +1,330 @@
+"""The page writes the files of the command, and reads or refuses files as the command does."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import softflagella as sf
+from planner.files.plan_files import write_plan
+from planner.files.plan_json import load_plan
+from planner.files.saved_plan import restore_plan
+from planner.files.tracker_header import DIRECTIONS, c_part, header_template
+from planner.files.tracking_error import tracking_error
+from planner.page.first_state import first_options, slider_ends
+from planner.paths.path import circle
+from planner.paths.shapes import shape_of
+from planner.planning.planned import Plan
+from planner.planning.request import PlanRequest
+from sim.inputs import load_robot
+from sim.io.errors import InputError
+from sim.io.provenance import code_version
+from sim.io.seals import sealed
+from sim.model.plan_file import plan_id
+from sim.model.presets import PRESETS
+from sim.model.robot import Robot
+from sim.model.robot_toml import robot_toml
+from sim.model.uncertainty import Sigma
+from tests.planner.page.cases import CONTROL, PATHS, followed, planned, shipped
+from tests.planner.page.page_core import TABLE, answer, answers, call, check_near, opened, page_options, to_page
+from tests.planner.page.parity import check_header, refusal_of
+
+pytestmark = pytest.mark.usefixtures("empty_folder")
+
+PARTS = {"codeVersion": code_version(), "directions": DIRECTIONS, "flash": c_part("schedule_flash.h"),
+         "schedule": c_part("schedule.h"), "tracker": header_template()}  # fmt: skip
+PLANS: dict[str, tuple[str, str, float, dict[str, Any]]] = {
+    "circle": ("circle", "symmetric", 0.0, {"objective": "flips"}),
+    "bend": ("bend", "biased", CONTROL.head_length / 2 / CONTROL.tail_length, {"objective": "flips"}),
+    "line": ("line", "in a current", 0.0, {"objective": "time"}),
+}
+
+
+def plan_of(name: str) -> Plan:
+    path, car, offset, options = PLANS[name]
+    return followed(path, car, offset, **options)
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_files_of_a_plan_differ_by_rounding_alone(name: str, tmp_path: Path) -> None:
+    result = plan_of(name)
+    if name == "line":  # its name could end a comment in C
+        result = replace(
+            result, tracked=result.tracked._replace(robot=replace(result.robot, name="böse */ #_-²½"))
+        )
+    write_plan(result, tmp_path)
+    found = answer("plan_files.js", "planFiles", result, PARTS)
+    for file, text in found.items():
+        check_header(text, (tmp_path / file).read_text(encoding="utf-8"), 1e-9)
+    Path("plan.json").write_text(found["plan.json"], encoding="utf-8")
+    assert load_plan(Path("plan.json"))["id"] == result.to_dict()["id"]
+
+
+def test_warnings() -> None:
+    result = plan_of("circle")
+    tight = replace(result.tracked.vehicle, tail_gap=0.7)
+    cases = [
+        result,
+        replace(result, errors=replace(result.errors, stated=9.0, table_share=0.9)),
+        replace(result, errors=replace(result.errors, distance=9 * result.errors.distance + 1)),
+        replace(result, tracked=result.tracked._replace(vehicle=tight)),
+        replace(result, declared=replace(result.declared, warnings=("the shape is lost in part: …",))),
+    ]
+    found = answers([("plan_files.js", "planWarnings", case) for case in cases])
+    assert found == [list(case.warnings) for case in cases]
+    assert sum(map(len, found)) == 4
+
+
+def test_a_plan_of_the_page_is_restored() -> None:
+    options = page_options({"objective": "flips"})
+    made = call("plan.js", "planPath", PATHS["wave"], CONTROL, TABLE, options)
+    theirs = json.loads(answer("plan_files.js", "planRecord", made)["text"])
+    restored = restore_plan(theirs, lookup=shipped())
+    check_near([restored.predicted_max, restored.predicted_rms],
+               [theirs["predicted_max_over_l"], theirs["predicted_rms_over_l"]])  # fmt: skip
+
+
+def track_of(result: Plan, noise: float = 0.0) -> pd.DataFrame:
+    """Make a track of the head's centre near a plan's poses."""
+    rng = np.random.default_rng(0)
+    poses = result.poses + noise * rng.normal(size=result.poses.shape)
+    time = np.concatenate([[0.0], np.cumsum(result.dwells)])
+    columns = {"time_bar": time, "x_over_l": poses[:, 0], "y_over_l": poses[:, 1], "heading_rad": poses[:, 2]}
+    return pd.DataFrame(columns)
+
+
+def compared(content: dict[str, Any], frame: pd.DataFrame, how: str = "none") -> Any:
+    plans = frame.get("plan_id", pd.Series(dtype=str)).unique().tolist()
+    numbers = frame.drop(columns="plan_id", errors="ignore")
+    table = {"names": list(numbers), "columns": [numbers[name].to_list() for name in numbers], "plans": plans}
+    return answer("track.js", "comparedTrack", content, table, how)
+
+
+@pytest.mark.parametrize("noise", [0.0, 2.0])
+@pytest.mark.parametrize("name", ["circle", "bend"])
+def test_errors_of_a_track(name: str, noise: float) -> None:
+    result = plan_of(name)
+    content, frame = result.to_dict(), track_of(result, noise)
+    cm = 100 * result.robot.tail_length
+    lab = {
+        "time [min]": frame["time_bar"] * result.robot.time_scale / 60, "x_mm": frame["x_over_l"] * 10 * cm,
+        "Y [cm]": frame["y_over_l"] * cm, "heading_deg": np.degrees(frame["heading_rad"]),
+    }  # fmt: skip
+    for table in (frame, pd.DataFrame(lab)):
+        wanted, found = tracking_error(content, table), compared(content, table)
+        for of_python, page in {"rms": "rms", "largest": "largest", "raw_rms": "rawRms", "stated": "stated",
+                                "raw_largest": "rawLargest"}.items():  # fmt: skip
+            assert found["error"][page] == pytest.approx(cm * getattr(wanted, of_python), rel=1e-8, abs=1e-8)
+        check_near(found["points"], cm * np.array(wanted.track), 1e-8)
+
+
+BAD: dict[str, Callable[[pd.DataFrame], pd.DataFrame]] = {
+    "a missing column": lambda frame: frame.drop(columns="heading_rad"),
+    "still": lambda frame: frame.assign(time_bar=1.0),
+    "back": lambda frame: frame.iloc[[0, 2, 1, 3]],
+    "far away": lambda frame: frame.assign(x_over_l=1e101),
+    "another robot": lambda frame: frame.assign(  # of tails of 15 cm
+        x_cm=15 * frame["x_over_l"], y_cm=15 * frame["y_over_l"], heading_deg=np.degrees(frame["heading_rad"])),
+    "no unit": lambda frame: frame.set_axis(["time", "x_cm", "y_cm", "heading_deg"], axis=1),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("change", BAD)
+def test_bad_tracks_are_refused(change: str) -> None:
+    result = plan_of("circle")
+    frame, content = BAD[change](track_of(result)), result.to_dict()
+    assert str(compared(content, frame)) == refusal_of(tracking_error, content, frame)
+
+
+def test_a_track_can_be_laid_on_the_plan_and_tells_of_another_plan() -> None:
+    result = plan_of("circle")
+    content, frame = result.to_dict(), track_of(result).assign(plan_id="p1")
+    turned = frame.assign(time_bar=frame["time_bar"] + 3, x_over_l=-frame["y_over_l"], y_over_l=frame["x_over_l"],
+                          heading_rad=frame["heading_rad"] + np.pi / 2, plan_id=content["id"])  # fmt: skip
+    measured, laid = compared(content, frame), compared(content, turned, "rigid")
+    assert (measured["shift"], measured["ofPlan"], laid["ofPlan"]) == ("", "p1", "")
+    assert "first pose" in laid["shift"]
+    check_near(laid["points"], measured["points"])
+    assert laid["error"]["rms"] == pytest.approx(measured["error"]["rms"])
+    assert laid["csv"].splitlines()[0] == "time_s,x_cm,y_cm,heading_deg"
+
+
+ROBOTS = [
+    *PRESETS.values(),
+    replace(CONTROL, name='it\'s "quoted" \\ ü\n\x7f', disc_offset=0.0123, tails=3),
+    replace(CONTROL, tail_length=0.1 / 3, viscosity=1 / 7, motor_speed=4.44),
+    replace(CONTROL, sigmas={"viscosity": Sigma(0.05, True), "tail_length": Sigma(0.00123, False)}),
+]
+TEXT = robot_toml(CONTROL)
+VISCOSITY = "viscosity_Pa_s = 1.49"
+CHANGES = [
+    ("length_cm = 11", "length_mm = 110"), ("length_cm = 11", "length_in = 4.5"), ("count = 2", "count = 2.5"),
+    ("count = 2", "count = 0"), (VISCOSITY, "viscosity_mPa_s = 1490"), ("count = 2", "count = '2'"),
+    (VISCOSITY, "viscosity_Pa_s = -1.49"), (VISCOSITY, "viscosity = 1.49"), (VISCOSITY, ""),
+    ("count = 2", "count = 2\ncolour = 'red'"), ("count = 2", "count = true"), ("[drag]", "drag"),
+    ("length_cm = 11", "length_cm = 11\nlength_mm = 110"), ("length_cm = 11", "length_cm = 1e200"),
+    *((VISCOSITY, f"{VISCOSITY}\n{more}") for more in (
+        "viscosity_Pa_s_sigma = '10 %'", "viscosity_Pa_s_sigma = 0.1", "viscosity_Pa_s_sigma = 'much'",
+        "viscosity_Pa_s_sigma = '60 %'", "viscosity_sigma = 0.1")),
+    ("C_t = 3.0", "C_t = 3.0\nC_t_sigma = 0.1"), ("C_t = 3.0", "C_t = 3"), ("[drag]", "[drags]"),
+    ('name = "paper-control"', ""), ("C_t = 3.0", "C_t = [\n'3', # three\n]"), ("C_t = 3.0", "C_t = 3,0"),
+    ('name = "paper-control"', "depth = 3"), ("radius_mm = 3.2", "radius_mm = 32"), ("speed_rpm", "speed_Hz"),
+    ("radius_mm = 3.2", "diameter_mm = 6.4"), ("[fluid]", "[liquid]"), ("length_cm = 11", "viscosity_Pa_s = 11"),
+    ("C_t = 3.0", "C_t = inf"), ("[drag]", "[tails]\n[drag]"), ('name = "paper-control"', 'name = "a'),
+    ('name = "paper-control"', "name = 'a # b' # c"), ("count = 2", "count = 02"), ("C_t = 3.0", "C_t = 3.0 4"),
+    ('name = "paper-control"', 'name = "\\u00e9 \\U0001F41F \\" \\\\"'),
+    ('name = "paper-control"', 'name = "\\q"'),
+]  # fmt: skip
+
+
+def check_robot(found: Any, wanted: Robot) -> None:
+    page = to_page(wanted)
+    del page["effects"]
+    for name in ("timeScale", "omegaBar"):
+        assert found.pop(name) == pytest.approx(page.pop(name), rel=1e-14)
+    assert found == page
+
+
+def test_robots_are_written_and_read_back_by_both() -> None:
+    for robot in ROBOTS:
+        text = answer("robot.js", "robotToml", robot)
+        Path("robot.toml").write_text(text, encoding="utf-8")
+        check_robot(opened("robot.toml", text)["fields"], robot)
+        assert to_page(load_robot("robot.toml")) == to_page(robot)
+
+
+@pytest.mark.parametrize(("old", "new"), CHANGES)
+def test_texts_of_robots_are_read_or_refused(old: str, new: str) -> None:
+    assert old in TEXT
+    text = TEXT.replace(old, new, 1)
+    Path("robot.toml").write_bytes(text.encode())
+    found = opened("robot.toml", text)
+    try:
+        wanted = load_robot("robot.toml")
+    except InputError:
+        assert isinstance(found, InputError)
+        assert "robot.toml" in str(found)
+        assert len(str(found).splitlines()) == 1
+    else:
+        check_robot(found["fields"], wanted)
+
+
+@pytest.mark.parametrize("table", ["effects", "correction", "learnt_from", "calibration"])
+def test_a_robot_that_python_must_make_is_refused(table: str) -> None:
+    found = opened("robot.toml", f"{TEXT}\n[{table}]\nx = 1\n")
+    assert f"has [{table}]" in str(found)
+    assert "softflagella page --robot robot.toml" in str(found)
+
+
+def test_robots_that_cannot_be_are_refused() -> None:
+    camel = {"tail_length": "tailLength", "tail_radius": "tailRadius", "motor_speed": "motorSpeed",
+             "disc_offset": "discOffset", "youngs_modulus": "youngsModulus"}  # fmt: skip
+    cases: list[dict[str, Any]] = [
+        {"tails": 0}, {"tails": 65}, {"tails": 2.5}, {"tail_length": 0.0}, {"viscosity": -1.5}, {"C_t": -1e-7},
+        {"motor_speed": 0.0}, {"disc_offset": -0.01}, {"tail_radius": 0.03}, {"youngs_modulus": 1e-320},
+        {"tail_length": 1e200, "tail_radius": 1e-200}, {"viscosity": 1e-310, "motor_speed": 1e-300},
+    ]  # fmt: skip
+    for changes in cases:
+        given = {**to_page(CONTROL), **{camel.get(name, name): value for name, value in changes.items()}}
+        with pytest.raises(ValueError, match=r".") as refusal:
+            replace(CONTROL, **changes)
+        assert str(answer("robot.js", "makeRobot", given)) == str(refusal.value)
+
+
+def test_sliders_end_where_the_look_up_table_does() -> None:
+    domain = shipped().domain
+    ends, units = (
+        slider_ends(CONTROL, domain),
+        {"motor_speed": 2 * np.pi / 60, "viscosity": 1.0, "youngs_modulus": 1e6},
+    )
+    for field, key in zip(units, ("motorSpeed", "viscosity", "youngsModulus"), strict=True):
+        reached = sorted(replace(CONTROL, **{field: end * units[field]}).omega_bar for end in ends[key])
+        assert reached == pytest.approx(domain["omega_bar"], rel=0.1)
+
+
+@pytest.mark.parametrize("wanted", [PlanRequest(dwell=1.0), PlanRequest(seed=3)])
+def test_a_plan_that_the_page_cannot_make_is_refused(wanted: PlanRequest) -> None:
+    with pytest.raises(InputError, match="no option for a dwell or a seed"):
+        first_options(wanted, CONTROL, None)
+
+
+def test_shapes_of_the_page_have_their_size() -> None:
+    for name, size in (("circle", 20.5), ("square", 3.0), ("triangle", 7.0), ("polygon:6", 2.0)):
+        wanted = shape_of(f"{name}:{size}cm")
+        assert wanted is not None
+        check_near(answer("path.js", "pageShape", name, size)["points"], wanted[0].points)
+    eight, wave = answers([("path.js", "pageShape", name, 40) for name in ("eight", "wave")])
+    assert (eight["closed"], wave["closed"]) == (True, False)
+    assert np.ptp(np.array(eight["points"])[:, 0]) == pytest.approx(40, rel=1e-3)
+    assert np.ptp(np.array(wave["points"])[:, 0]) == pytest.approx(40)
+    refused = answers([("path.js", "pageShape", "eight", size) for size in (0, -3, None)])
+    assert all(isinstance(refusal, InputError) for refusal in refused)
+
+
+def test_paths_tracks_robots_runs_and_drawings_are_told_apart() -> None:
+    path = opened("a.csv", "x_mm;y_mm\n0;0\n300,5;0\n")
+    assert (path["kind"], path["unit"]) == ("path", pytest.approx(0.1))
+    check_near(path["paths"][0]["points"], [[0, 0], [300.5, 0]])
+    assert opened("b.csv", "x,y\n0,0\n3,0\n")["unit"] is None
+    track = opened("t.csv", "time_s,x_cm,y_cm,heading_deg,plan_id\n0,0,0,0,p1\n1,0,0,0,\n2,0,0,0,p1\n")
+    assert (track["kind"], track["table"]["plans"]) == ("track", ["p1"])
+    runs = ("N,l_cm,omega_rpm,theta_deg\n3,9,100,20\n", "tails;rpm\n3;100\n", "theta_deg,R_yr_mm\n3,4\n")
+    assert [opened("runs.csv", text)["kind"] for text in runs] == ["runs"] * 3
+    drawing = opened("two.svg", '<svg><path id="a" d="M0 0 h 9"/><path id="b" d="M0 0 v 9 h 3 z"/></svg>')
+    assert [(path["name"], path["closed"]) for path in drawing["paths"]] == [("a", False), ("b", True)]
+
+
+def check_plan_opened(content: dict[str, Any]) -> None:
+    found = opened("plan.json", json.dumps(content, indent=1))
+    (drawn,) = found["paths"]
+    assert (found["kind"], found["unit"], drawn["closed"]) == ("path", pytest.approx(11.0), content["closed"])
+    check_near(drawn["points"], content["raw_path"][:-1] if content["closed"] else content["raw_path"])
+
+
+def test_a_plan_with_more_than_a_path_gives_it() -> None:
+    content = {**planned("circle", objective="flips").to_dict(), "lap": {"period_s": 1.0}, "arrival": None}
+    check_plan_opened({**content, "id": plan_id(content)})
+
+
+@pytest.mark.rest
+def test_plans_with_laps_walls_or_an_arrival_give_their_paths() -> None:
+    walls = [sf.Circle(6.0, 0.0, 0.5)]
+    options: dict[str, dict[str, Any]] = {"lap": {"loop": True}, "arrival": {"arrive_seconds": 1800.0},
+                                          "kept_clear": {"keep_out": walls}}  # fmt: skip
+    for kind, option in options.items():
+        content = sf.plan(circle(2.0), CONTROL, objective="flips", **option).to_dict()
+        assert kind in content
+        check_plan_opened(content)
+
+
+def test_an_edited_plan_and_a_robot_that_was_cut_are_refused() -> None:
+    content = {**planned("circle", objective="flips").to_dict(), "code_version": "0"}
+    check_plan_opened(content)
+    content["raw_path"][1][0] += 0.1
+    assert "plan.json was edited or damaged after it was written" in str(opened("plan.json", json.dumps(content)))
+    whole = sealed(robot_toml(CONTROL))
+    assert opened("robot.toml", whole)["kind"] == "robot"
+    for text in (whole[:-30], whole.replace("C_t = 3.", "C_t = 4.")):
+        assert "robot.toml was edited, damaged or cut short" in str(opened("robot.toml", text))
+
+
+def test_other_files_are_refused_in_one_line() -> None:
+    for name, content in (
+        ("names.csv", b"a,b\n1,2\n2,3\n"), ("none.svg", b"<svg></svg>"), ("html.svg", b"<html></html>"),
+        ("picture.png", b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"), ("robot.toml", b"tails = 2\nlenght_cm = 3\n"),
+        ("robot.toml", b"\xff\xfe\x00"), ("track.csv", b"time_s,x_cm,y_cm,heading_deg\n"), ("plan.json", b"{"),
+        ("plan.json", b"{}"), ("plan.json", b'{"format": 1}'), ("plan.json", b'{"format": 2}'),
+        ("plan.json", b"[1, 2]"),
+        ("plan.json", b'{"format": 2, "robot": {"tail_length_m": 0.1}, "raw_path": [[0, 1], [2]]}'),
+        ("plan.json", b'{"format": 2, "robot": {"tail_length_m": 0.1}, "raw_path": 3}'),
+    ):  # fmt: skip
+        refusal = opened(name, content)
+        assert isinstance(refusal, InputError), content
+        assert len(str(refusal).splitlines()) == 1

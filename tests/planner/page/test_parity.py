@@ -1,0 +1,191 @@
+"""Whole plans of the page are Python's: paths, robots, options, and files that a user opens."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from planner.paths.path import Path2D, circle, polygon
+from planner.paths.path_files import read_path
+from planner.planning.plan import make_plan, plan
+from planner.planning.planned import Plan
+from planner.planning.request import PlanRequest
+from sim.inputs import load_robot
+from sim.io.errors import InputError
+from sim.model.presets import PRESETS
+from sim.model.robot import Robot
+from sim.model.robot_toml import robot_toml
+from tests.planner.page.cases import (
+    CONTROL,
+    PATHS,
+    TRIANGLE,
+    VEHICLES,
+    planned,
+    random_case,
+    shipped,
+    tracked_of,
+)
+from tests.planner.page.page_core import TABLE, answers, call, opened, page_options
+from tests.planner.page.parity import refusal_of, without_digits
+
+pytestmark = pytest.mark.usefixtures("empty_folder")
+
+ALIKE = 1e-8  # of the largest number of a column; balances are solved to 2e-12, and plans amplify this
+MEASURED = PRESETS["paper-measured"]
+SQUARE, BEND = PATHS["square"], PATHS["bend"]
+SHORT = {"objective": "flips"}
+
+
+class Case(NamedTuple):
+    """A path, who follows it and how; a robot, or the name of one of VEHICLES with the offset of its point."""
+
+    path: Path2D
+    robot: Robot | tuple[str, float] = CONTROL
+    options: dict[str, Any] = SHORT
+
+
+FILES: dict[str, str] = {
+    "table.csv": "x_mm;y_mm\n0;0\n400,5;0\n400,5;300\n0;300\n",
+    "camera.csv": "# of the camera\nframe, X [cm], Y [cm]\n1, 0, 0\n2, 20, 5\n3, 42, 5\n4, 60, 30\n",
+    "drawing.svg": '<svg xmlns="http://www.w3.org/2000/svg" width="60cm" height="40cm" viewBox="0 0 600 400">'
+    '<g transform="translate(20 10) rotate(5)"><path d="M 20 20 C 200 20 300 200 500 150 S 300 350 100 300 z"/>'
+    "</g></svg>",
+    "robot.toml": robot_toml(CONTROL).replace("length_cm = 11", "length_in = 4.2").replace("= 1.49", "= 1.6"),
+    "plan.json": "",
+}  # fmt: skip
+
+
+def text_of(name: str) -> str:
+    return FILES[name] or json.dumps(planned("wave", objective="flips").to_dict())
+
+
+def opened_case(name: str) -> Case:
+    """Open a file in Python and in the page, which must read the same, and plan what it has."""
+    text = text_of(name)
+    with open(name, "w", encoding="utf-8") as file:
+        file.write(text)
+    found = opened(name, text)
+    if name == "robot.toml":
+        robot = load_robot(name)
+        assert found["fields"]["tailLength"] == pytest.approx(robot.tail_length, rel=1e-15)
+        assert found["fields"]["timeScale"] == pytest.approx(robot.time_scale, rel=1e-14)
+        return Case(circle(2.0), robot)
+    (drawn,) = found["paths"]
+    page = Path2D(np.array(drawn["points"]), drawn["closed"]).scaled(found["unit"] / 11)
+    if name == "plan.json":
+        wanted = planned("wave", objective="flips").drawn
+    else:
+        drawing = read_path(name)
+        assert drawing.unit is not None
+        wanted = drawing.path.scaled(drawing.unit / CONTROL.tail_length)
+    assert page.closed == wanted.closed
+    np.testing.assert_allclose(page.points, wanted.points, atol=1e-12)
+    return Case(page)
+
+
+CASES: dict[str, Callable[[], Case]] = {
+    "circle": lambda: Case(circle(2.0), CONTROL, {}),
+    "triangle, tip": lambda: Case(polygon(3, 4.0), TRIANGLE,
+                                  {"objective": "flips", "time_weight": 0.03, "point": "head_tip"}),
+    "hexagon, rounded": lambda: Case(polygon(6, 4.0), CONTROL, {**SHORT, "seed": 5, "corner": "fillet"}),
+    "biased": lambda: Case(SQUARE, ("biased", 0.27), {"objective": "time"}),
+    "in a current": lambda: Case(polygon(6, 4.0), ("in a current", 0.1), {**SHORT, "corner": "fillet"}),
+    "minimax": lambda: Case(SQUARE, ("symmetric", 0.0),
+                            {"objective": "flips", "tolerance": 0.1, "corner": "minimax"}),
+    "drawing.svg": lambda: opened_case("drawing.svg"),
+    "table.csv": lambda: opened_case("table.csv"),
+    "robot.toml": lambda: opened_case("robot.toml"),
+    "plan.json": lambda: opened_case("plan.json"),
+    **{f"random {seed}": lambda seed=seed: Case(*random_case(seed)) for seed in (1, 2, 3, 5, 8, 13)},
+    "long memory": lambda: Case(BEND, ("with a long memory", -0.3), {"minimum_seconds": 2.0}),
+    "without lags": lambda: Case(PATHS["wave"], ("without lags", 0.0), {"dwell": 1.3}),
+    "camera.csv": lambda: opened_case("camera.csv"),
+    "circle, pivot": lambda: Case(circle(1.5), MEASURED, {"objective": "flips", "point": "pivot"}),
+    "circle, tip, time": lambda: Case(circle(3.0), TRIANGLE, {"objective": "time", "point": "head_tip"}),
+    "square": lambda: Case(SQUARE, CONTROL, {}),
+    "square, time": lambda: Case(SQUARE, MEASURED, {"objective": "time"}),
+    "eight": lambda: Case(PATHS["eight"], CONTROL, SHORT),
+    "wave": lambda: Case(PATHS["wave"], MEASURED, SHORT),
+    "stroke": lambda: Case(PATHS["stroke"], CONTROL, SHORT),
+    "bend, minimax": lambda: Case(BEND, CONTROL, {"objective": "flips", "corner": "minimax"}),
+    "line": lambda: Case(PATHS["line"], TRIANGLE, {"objective": "time"}),
+    "star": lambda: Case(PATHS["star"], MEASURED, {"objective": "flips", "time_weight": 0.05}),
+    "long dwells": lambda: Case(PATHS["eight"].scaled(2), TRIANGLE, {"minimum_seconds": 3.0}),
+}  # fmt: skip
+QUICK = 10  # cases of `make test`; the others run with the rates
+CASE_MARKS = [pytest.param(name, marks=[] if i < QUICK else pytest.mark.rates) for i, name in enumerate(CASES)]
+ERRORS = {"stated": "stated", "guaranteed": "guaranteed", "predicted_rms": "predictedRms",
+          "predicted_max": "predictedMax", "drawn_rms": "drawnRms", "drawn_max": "drawnMax"}  # fmt: skip
+
+
+def numbers(result: Plan) -> dict[str, Any]:
+    """Return the numbers of Python's plan."""
+    errors = [getattr(result.errors, name) for name in ERRORS]
+    return {"dwells": result.dwells, "poses": result.switches.poses, "reference": result.declared.reference.p,
+            "heading": result.declared.reference.heading, "errors": [*errors, result.feedback_error],
+            "guidance": [*result.guidance],
+            "off": [result.declared.off_drawn, result.declared.missed]}  # fmt: skip
+
+
+def numbers_of_page(found: dict[str, Any]) -> dict[str, Any]:
+    switches, declared, errors = found["switches"], found["declared"], found["errors"]
+    return {"dwells": switches["dwells"], "poses": switches["poses"], "reference": declared["reference"]["p"],
+            "heading": declared["reference"]["heading"],
+            "errors": [*(errors[name] for name in ERRORS.values()), errors["feedback"]],
+            "guidance": [found["guidance"][name] for name in ("dwell", "ahead", "swing")],
+            "off": [declared["offDrawn"], declared["missed"]]}  # fmt: skip
+
+
+def difference(found: dict[str, Any], wanted: dict[str, Any]) -> float:
+    """Return the largest difference of two plans, as a share of the largest number of each column."""
+    worst = 0.0
+    for name, part in wanted.items():
+        one, other = (np.asarray(values, dtype=float) for values in (found[name], part))
+        assert one.shape == other.shape, name
+        size = np.maximum(np.abs(other).max(0), 1e-6) if other.ndim > 1 else max(np.abs(other).max(), 1e-6)
+        worst = max(worst, float((np.abs(one - other) / size).max()))
+    return worst
+
+
+def plan_call(case: Case) -> tuple[Any, ...]:
+    path, robot, options = case
+    if isinstance(robot, Robot):
+        return "plan.js", "planPath", path, robot, TABLE, page_options(options)
+    request = call("plan.js", "planRequest", page_options(options))
+    return "plan.js", "makePlan", path, tracked_of(VEHICLES[robot[0]], robot[1]), request
+
+
+def python_plan(case: Case) -> Plan:
+    path, robot, options = case
+    if isinstance(robot, Robot):
+        return plan(path, robot, lookup=shipped(), **options)
+    return make_plan(path, tracked_of(VEHICLES[robot[0]], robot[1]), PlanRequest(**options))
+
+
+@pytest.mark.parametrize("name", CASE_MARKS)
+def test_plans(name: str) -> None:
+    case = CASES[name]()
+    (found,) = answers([plan_call(case)], left_out=["vehicle"])
+    assert difference(numbers_of_page(found), numbers(python_plan(case))) <= ALIKE
+
+
+REFUSED: list[tuple[Path2D, dict[str, Any]]] = [
+    (circle(0.1), {}), (circle(4000.0), {}), (polygon(3, 0.8), {}), (SQUARE, {"corner": "error"}),
+    (SQUARE, {"corner": "it's round"}), (SQUARE, {"objective": "fun"}), (SQUARE, {"tolerance": -1.0}),
+    (SQUARE, {"tolerance": 0.001, "objective": "flips"}), (SQUARE, {"time_weight": -1.0}),
+    (SQUARE, {"time_weight": 0.1, "corner": "fillet"}), (SQUARE, {"minimum_seconds": -2.0}),
+    (SQUARE, {"dwell": 0.1}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("path", "options"), REFUSED)
+def test_refusals(path: Path2D, options: dict[str, Any]) -> None:
+    """The page speaks of its options where one is wrong, in the words of the command."""
+    case = Case(path, ("symmetric", 0.0), options)
+    (found,) = answers([plan_call(case)], left_out=["vehicle"])
+    assert isinstance(found, InputError)
+    assert without_digits(found) == without_digits(refusal_of(python_plan, case))
