@@ -5,41 +5,29 @@ from __future__ import annotations
 import os
 import shlex
 import threading
-from argparse import Namespace
+from typing import Any
 
-from sim.io.commands import JOBS, Program, argument, out
+from sim.io.commands import Program
 
 program = Program("dataset", "Simulate sweeps of robots into data sets.")
 main = program.main
-_DATA = argument("data", help="folder or URL of a data set")
-_SCHEDULER = "DASK_SCHEDULER_ADDRESS"
-_FORCE = argument("--force", action="store_true", help="take over a URL whose writer was killed")
 
 
-@program.command(
-    "build",
-    "simulate a sweep into Parquet",
-    argument("--config", help="sweep.toml (default: the one that comes with the package)"),
-    out("folder, or a URL that fsspec knows (s3://…),"),
-    argument("--rows", type=int, help="number of rows (default: the configuration's); more than before adds rows"),
-    JOBS,
-    argument("--backend", choices=("local", "dask", "ray"),
-             type=lambda name: "local" if name == "loky" else name,  # its name of the last release
-             help="where to run: processes here, dask or ray (default: local, or dask with a scheduler)"),
-    argument("--scheduler", help="address of a dask scheduler (default: DASK_SCHEDULER_ADDRESS) or ray head "
-             "(default: RAY_ADDRESS)"),
-    _FORCE,
-)  # fmt: skip
-def _build(arguments: Namespace) -> None:
-    from dataset.build import Interrupted, build
-    from dataset.design import SWEEP_TOML, load_design
+@program.command("build", of="dataset.api:sweep", resume="")
+def _build(*, out: str, config: str | None = None, **given: Any) -> None:
+    """Simulate a sweep into Parquet.
 
-    design = load_design(arguments.config or SWEEP_TOML).with_rows(arguments.rows)
-    known = arguments.scheduler or os.environ.get(_SCHEDULER)
-    backend = arguments.backend or ("dask" if known else "local")
-    where = {"jobs": arguments.jobs, "backend": backend, "address": arguments.scheduler}
+    Args:
+        config: sweep.toml (default: the one that comes with the package).
+        out: folder, or a URL that fsspec knows (s3://…).
+    """
+    from dataset.api import sweep
+    from dataset.build import Interrupted
+
+    written = {"config": config, "out": out, **given, "force": None}
+    words = [word for name, value in written.items() if value is not None for word in (f"--{name}", str(value))]
     try:
-        manifest = build(design, arguments.out, resume=_command(arguments), force=arguments.force, **where)
+        manifest = sweep(config, out, resume=shlex.join(["softflagella", "sweep", *words]), **given)
     except Interrupted as stop:
         emergency = threading.Timer(1.0, os._exit, (stop.status,))  # clusters wait at an ordinary one
         emergency.daemon = True
@@ -47,70 +35,75 @@ def _build(arguments: Namespace) -> None:
         raise
     print(
         f"{manifest['rows']} rows: {manifest['converged']} converged, {manifest['failed']} failed, "
-        f"tails touch in {manifest['touching']} -> {arguments.out}"
+        f"tails touch in {manifest['touching']} -> {out}"
     )
 
 
-def _command(arguments: Namespace) -> str:
-    """Write the command that continues a build."""
-    words = ["softflagella", "sweep"]
-    for name in ("config", "out", "rows", "jobs", "backend", "scheduler"):
-        if getattr(arguments, name) is not None:
-            words += [f"--{name}", str(getattr(arguments, name))]
-    return shlex.join(words)
+@program.command("report")
+def _report(data: str, *, out: str = "reports/dataset.html") -> None:
+    """The sweep at a glance, one page.
 
-
-@program.command("report", "the sweep at a glance, one page", _DATA, out("page", default="reports/dataset.html"))
-def _report(arguments: Namespace) -> None:
+    Args:
+        data: folder or URL of a data set.
+        out: page.
+    """
     from dataset.report import write_report
 
-    write_report(arguments.data, arguments.out)
-    print(f"-> {arguments.out}")
+    write_report(data, out)
+    print(f"-> {out}")
 
 
-@program.command(
-    "verify",
-    "check a data set against schema and simulator",
-    _DATA,
-    argument("--rows", type=int, default=8, help="rows to simulate again (default: 8)"),
-    argument("--mend", action="store_true", help="repair first: remove damaged files, simulate missing rows"),
-    argument("--rows-by", metavar="MODULE.FUNCTION", help="with --mend: the function of yours that made the rows"),
-    JOBS,
-    _FORCE,
-)
-def _verify(arguments: Namespace) -> None:
-    from dataset.build import imported_function, mend
+@program.command("verify")
+def _verify(
+    data: str,
+    *,
+    rows: int = 8,
+    mend: bool = False,
+    rows_by: str | None = None,
+    jobs: int | None = None,
+    force: bool = False,
+) -> None:
+    """Check a data set against schema and simulator.
+
+    Args:
+        data: folder or URL of a data set.
+        rows: rows to simulate again.
+        mend: repair first: remove damaged files, simulate missing rows.
+        rows_by: MODULE.FUNCTION of yours that made the rows, with --mend.
+        jobs: processes (default: all processors).
+        force: take over a URL whose writer was killed.
+    """
+    from dataset import build
     from dataset.verify import verify
 
-    if arguments.mend:
-        named = imported_function(arguments.rows_by) if arguments.rows_by else None
-        print(mend(arguments.data, jobs=arguments.jobs, simulate=named, force=arguments.force))
-    print(verify(arguments.data, rows=arguments.rows))
+    if mend:
+        named = build.imported_function(rows_by) if rows_by else None
+        print(build.mend(data, jobs=jobs, simulate=named, force=force))
+    print(verify(data, rows=rows))
 
 
-@program.command(
-    "config",
-    "write a sweep.toml, to edit",
-    argument("--robot", help="robot.toml or the name of a preset: sweep around it, in cm and rpm "
-             "(default: a copy of the sweep that comes with the package)"),
-    out("sweep.toml"),
-)  # fmt: skip
-def _config(arguments: Namespace) -> None:
+@program.command("config")
+def _config(*, out: str, robot: str | None = None) -> None:
+    """Write a sweep.toml, to edit.
+
+    Args:
+        robot: robot.toml or the name of a preset: sweep around it, in cm and rpm (default: a copy of the sweep
+            that comes with the package).
+        out: sweep.toml.
+    """
     from dataset.design import SWEEP_TOML
     from dataset.robot_inputs import sweep_toml
     from sim.inputs import load_robot
     from sim.io.files import write_text
     from sim.model.presets import PRESETS
 
-    if arguments.robot is None:
+    if robot is None:
         text = SWEEP_TOML.read_text()
     else:
-        source = arguments.robot
-        if source not in PRESETS:
-            source = os.path.relpath(source, os.path.dirname(os.path.abspath(arguments.out)))
-        text = sweep_toml(load_robot(arguments.robot), source)
-    write_text(arguments.out, text)
-    print(f"-> {arguments.out}")
+        source = robot if robot in PRESETS else os.path.relpath(robot, os.path.dirname(os.path.abspath(out)))
+        text = sweep_toml(load_robot(robot), source)
+    write_text(out, text)
+    print(f"-> {out}")
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from io import StringIO
 from typing import TYPE_CHECKING, Any
 
 from planner.command_line import progress_bar, say_written
-from sim.io.commands import Command, argument, out
+from sim.io.commands import Command, Declared, argument, out
 from sim.io.errors import InputError, naming
 
 if TYPE_CHECKING:
@@ -26,7 +26,9 @@ FLEET = (
 
 
 def fleet_command(
-    arguments: Namespace, commands: Mapping[str, Command], planned: Mapping[str, Callable[[Namespace], Any]]
+    arguments: Namespace,
+    commands: Mapping[str, Command | Declared],
+    planned: Mapping[str, Callable[[Namespace], Any]],
 ) -> None:
     """Plan for the robots of a file so that they keep apart, and write the plans.
 
@@ -60,7 +62,7 @@ def fleet_command(
 def _members(
     arguments: Namespace,
     asked: FleetFile,
-    commands: Mapping[str, Command],
+    commands: Mapping[str, Command | Declared],
     planned: Mapping[str, Callable[[Namespace], Any]],
 ) -> list[Member]:
     """Plan for each robot as if it were alone."""

@@ -3,119 +3,69 @@
 from __future__ import annotations
 
 import sys
-from argparse import Namespace
-from pathlib import Path
+from typing import Any
 
-from sim.io.commands import JOBS, RUNS_OF, Program, argument, out, refuse_runs_of
-from sim.io.errors import InputError, naming
+from sim.io.commands import Program
+from sim.io.errors import InputError
 from sim.model.sweepable import SWEEPABLE, read_range
 
 program = Program("sim", "Simulate swimming robots.")
 main = program.main
 
 
-@program.command(
-    "steady",
-    "mean motion of a robot, or of many, at constant motor speed",
-    argument("robot", metavar="ROBOT", help="robot.toml, the name of a preset, or a table of points: CSV with "
-             "C_t,C_r,C_yr,l_over_R,L_over_R,l_over_r0,omega_bar,N,…, or, with --robot, runs: N,l_cm,omega_rpm"),
-    RUNS_OF,
-    out("CSV with the same rows and their motion; needed for a table of points", default=None),
-    argument("--no-stability", action="store_true",
-             help="do not compute whether small perturbations decay, which adds a quarter to the time"),
-    JOBS,
-)  # fmt: skip
-def _steady(arguments: Namespace) -> None:
-    from sim.inputs import names_robot
+@program.command("steady", of="sim.api:steady")
+def _steady(robots: str, *, robot: str | None = None, out: str | None = None, **given: Any) -> None:
+    """Mean motion of a robot, or of many, at constant motor speed.
 
-    if names_robot(arguments.robot):
-        refuse_runs_of(arguments)
-        _steady_robot(arguments)
-    elif arguments.out is None:
-        from sim.io.tables import read_table
-
-        read_table(arguments.robot)  # refuses what is no table
-        raise InputError(f"{arguments.robot} is a table of points; name the file of their motion with --out")
-    else:
-        _steady_points(arguments)
-
-
-def _steady_robot(arguments: Namespace) -> None:
-    """Print the motion of one robot in lab units, beside the dimensionless numbers."""
-    from sim.inputs import group_columns, load_robot
-    from sim.io.files import write_csv
+    Args:
+        robots: robot.toml, the name of a preset, or a table of points: CSV with
+            C_t,C_r,C_yr,l_over_R,L_over_R,l_over_r0,omega_bar,N,…, or, with --robot, runs: N,l_cm,omega_rpm.
+        out: CSV with the same rows and their motion; needed for a table of points.
+    """
     from sim.motion.batches import steady_columns
-    from sim.motion.lab_units import describe_motion, lab_motion
+    from sim.motion.lab_units import describe_motion
+    from sim.robot_rows import command_rows, write_motion
 
-    robot = load_robot(arguments.robot)
-    columns = group_columns([robot])
-    stability = not arguments.no_stability
-    motion = steady_columns(columns, stability=stability, jobs=arguments.jobs, title="")
-    print(describe_motion(robot, motion))
-    if motion["note"][0]:
-        print(f"note: {motion['note'][0]}", file=sys.stderr)
-    if arguments.out:
-        import pandas as pd
-
-        table = pd.DataFrame({"robot": [robot.name], **lab_motion([robot], motion), **motion})
-        write_csv(table, arguments.out)
-        print(f"-> {arguments.out}")
+    rows = command_rows(robots, robot, out)
+    with rows.naming():
+        motion = steady_columns(rows.columns, title="steady" if rows.file else "", **given)
+    if rows.file:
+        said = _counts(rows.columns, motion)
+    else:
+        said = describe_motion(rows.robots[0], motion)
+        if motion["note"][0]:
+            print(f"note: {motion['note'][0]}", file=sys.stderr)
+    write_motion(rows, motion, out, said)
 
 
-def _steady_points(arguments: Namespace) -> None:
-    """Simulate every row of a table."""
-    import numpy as np
-    import pandas as pd
-
+def _counts(robots: dict[str, Any], motion: dict[str, Any]) -> str:
+    """Count the rows that converged, and those whose tails touch."""
     from sim.effects.tail_contact import EFFECT as CONTACT
     from sim.effects.tail_contact import least_gap
-    from sim.inputs import point_columns
-    from sim.io.files import write_csv
-    from sim.io.tables import read_table
-    from sim.motion.batches import steady_columns
-    from sim.motion.lab_units import LAB_COLUMNS, lab_motion
-    from sim.motion.steady_motion import QUALITY_COLUMNS, STEADY_COLUMNS
 
-    points = read_table(arguments.robot)
-    lab = () if arguments.runs_of is None else LAB_COLUMNS
-    replaced = [name for name in (*lab, *STEADY_COLUMNS, *QUALITY_COLUMNS) if name in points]
-    if replaced:
-        print(
-            f"note: these columns of the input are replaced by new results: {', '.join(replaced)}", file=sys.stderr
-        )
-        points = points.drop(columns=replaced)
-    with naming(arguments.robot):
-        robots, columns = point_columns(points, arguments.runs_of, arguments.robot)
-        motion = steady_columns(columns, stability=not arguments.no_stability, jobs=arguments.jobs)
-    result = {**lab_motion(robots, motion), **motion} if robots else motion
-    table = pd.concat([points.reset_index(drop=True), pd.DataFrame(result)], axis=1)
-    write_csv(table, arguments.out)
-    ended = table["converged"].to_numpy()
-    touching = int(np.count_nonzero(table["tail_gap"] < least_gap(columns.get(CONTACT.name, 0.0))))
-    direct = int(np.count_nonzero(table["method"] == "direct"))
-    print(
-        f"{len(table)} rows, {int(ended.sum())} converged ({direct} solved directly), "
-        f"tails touch in {touching} -> {arguments.out}"
-    )
+    touching = int((motion["tail_gap"] < least_gap(robots.get(CONTACT.name, 0.0))).sum())
+    direct, ended = int((motion["method"] == "direct").sum()), motion["converged"]
+    return f"{len(ended)} rows, {int(ended.sum())} converged ({direct} solved directly), tails touch in {touching}"
 
 
-@program.command(
-    "branches",
-    "all steady motions along an input: folds, Hopf points, stability, hysteresis; where LOW is negative, write "
-    "--INPUT=LOW:HIGH",
-    argument("robot", metavar="ROBOT", help="robot.toml or the name of a preset"),
-    argument("--speed", metavar="LOW:HIGH", help="sweep the motor's speed [rpm], such as 20:200"),
-    *(argument(f"--{name}", metavar="LOW:HIGH", help=f"sweep {what}")
-      for name, what in SWEEPABLE.items()),
-    argument("--steps", type=int, default=24, help="values in a slow sweep by time steps (default: 24)"),
-    out("folder, or the name of a page, FILE.html (default: branches)", default="branches"),
-)  # fmt: skip
-def _branches(arguments: Namespace) -> None:
-    given = [name for name in ("speed", *SWEEPABLE) if getattr(arguments, name) is not None]
+@program.command("branches", further={name: f"LOW:HIGH, sweep {what}" for name, what in SWEEPABLE.items()})
+def _branches(
+    robot: str, *, speed: str | None = None, steps: int = 24, out: str = "branches", **ranges: str
+) -> None:
+    """All steady motions along an input: folds, Hopf points, stability, hysteresis.
+
+    Args:
+        robot: robot.toml or the name of a preset.
+        speed: LOW:HIGH, sweep the motor's speed [rpm], such as 20:200; where LOW is negative, --INPUT=LOW:HIGH.
+        steps: values in a slow sweep by time steps.
+        out: folder, or the name of a page, FILE.html.
+    """
+    given = ({} if speed is None else {"speed": speed}) | ranges
     if len(given) != 1:
         what = "no range is given" if not given else f"ranges of {' and '.join(given)} are given"
         raise InputError(f"{what}; give the range of one input, such as --speed 20:200")
-    low, high = read_range(given[0], getattr(arguments, given[0]))
+    ((name, words),) = given.items()
+    low, high = read_range(name, words)
     from sim.compile_stages import saying_first_use
     from sim.compiling import CACHE
     from sim.inputs import load_robot
@@ -124,20 +74,19 @@ def _branches(arguments: Namespace) -> None:
     from sim.motion.branches import find_branches
     from sim.motion.swept_input import SweptInput
 
-    swept = SweptInput(load_robot(arguments.robot), given[0], low, high)
+    swept = SweptInput(load_robot(robot), name, low, high)
     with one_thread(), saying_first_use("sim", CACHE):
-        result = find_branches(
-            swept, steps=arguments.steps, progress=lambda line: print(line, file=sys.stderr, flush=True)
-        )
-    files = write_branches(result, arguments.out)
+        result = find_branches(swept, steps=steps, progress=lambda line: print(line, file=sys.stderr, flush=True))
+    files = write_branches(result, out)
     print(summary(result))
     for branch, kind, value, yaw, _ in special_rows(result):
         print(f"  branch {branch}: {kind} at {swept.column} = {value}, yaw rate {yaw}")
     print(f"-> {', '.join(map(str, files))}")
 
 
-@program.command("effects", "list the effects that the base model leaves out, a sentence each")
-def _effects(arguments: Namespace) -> None:
+@program.command("effects")
+def _effects() -> None:
+    """List the effects that the base model leaves out, a sentence each."""
     from importlib import import_module
 
     from sim.effects import catalogue
@@ -147,50 +96,52 @@ def _effects(arguments: Namespace) -> None:
         print(f"{name:22} {sentence}")
 
 
-@program.command(
-    "film",
-    "film of a plan: the robot from above with its bent tails, simulated",
-    argument("plan", help="plan.json"),
-    out("the film: .gif, .webp, or .mp4 where ffmpeg is installed"),
-    argument("--speed", type=float,
-             help="how many times faster than the robot (default: so that the film takes about 15 s)"),
-    argument("--width", type=int, default=640, help="pixels (default: 640)"),
-)  # fmt: skip
-def _film(arguments: Namespace) -> None:
+@program.command("film")
+def _film(plan: str, *, out: str, speed: float | None = None, width: int = 640) -> None:
+    """Film of a plan: the robot from above with its bent tails, simulated.
+
+    Args:
+        plan: plan.json.
+        out: the film: .gif, .webp, or .mp4 where ffmpeg is installed.
+        speed: how many times faster than the robot (default: so that the film takes about 15 s).
+        width: pixels.
+    """
     from tqdm import tqdm
 
     from sim.model.plan_file import read_plan_file
     from sim.model.schedule import load_schedule
     from sim.motion.film import Film, fitting_speed, write_film
 
-    if not 100 <= arguments.width <= 2000:
-        raise InputError(f"--width {arguments.width}; give 100 to 2000 pixels")
-    schedule = load_schedule(arguments.plan)
-    film = Film(arguments.speed or fitting_speed(schedule), width=arguments.width)
+    if not 100 <= width <= 2000:
+        raise InputError(f"--width {width}; give 100 to 2000 pixels")
+    schedule = load_schedule(plan)
+    film = Film(speed or fitting_speed(schedule), width=width)
     with tqdm(total=len(schedule.dwells), desc="simulating", unit="dwell", delay=1.0) as bar:
-        count = write_film(read_plan_file(arguments.plan), schedule, arguments.out, film, progress=bar.update)
-    print(f"{count} pictures at {film.speed:g} times the robot's speed -> {arguments.out}")
+        count = write_film(read_plan_file(plan), schedule, out, film, progress=bar.update)
+    print(f"{count} pictures at {film.speed:g} times the robot's speed -> {out}")
 
 
-@program.command(
-    "robot",
-    "write a preset robot as TOML, to start from",
-    argument("preset", help="paper-control, paper-triangle or paper-measured"),
-    out("robot.toml"),
-)
-def _robot(arguments: Namespace) -> None:
+@program.command("robot")
+def _robot(preset: str, *, out: str) -> None:
+    """Write a preset robot as TOML, to start from.
+
+    Args:
+        preset: paper-control, paper-triangle or paper-measured.
+        out: robot.toml.
+    """
     from sim.io.files import write_text
     from sim.model.presets import PRESETS
     from sim.model.robot_toml import robot_toml
 
-    if arguments.preset not in PRESETS:
-        raise InputError(f"no preset {arguments.preset!r}; there are {', '.join(PRESETS)}")
-    write_text(arguments.out, robot_toml(PRESETS[arguments.preset]))
-    print(f"{arguments.preset} -> {Path(arguments.out)}")
+    if preset not in PRESETS:
+        raise InputError(f"no preset {preset!r}; there are {', '.join(PRESETS)}")
+    write_text(out, robot_toml(PRESETS[preset]))
+    print(f"{preset} -> {out}")
 
 
-@program.command("check", "the paper's measured point, measured and simulated")
-def _check(_: Namespace) -> None:
+@program.command("check")
+def _check() -> None:
+    """The paper's measured point, measured and simulated."""
     from sim.model.presets import PRESETS
     from sim.motion.steady import steady
 
@@ -201,8 +152,9 @@ def _check(_: Namespace) -> None:
     print(f"  this simulator, its fit     {share:.3f}")
 
 
-@program.command("compile", "compile the simulator's loops now rather than on first use")
-def _compile(_: Namespace) -> None:
+@program.command("compile")
+def _compile() -> None:
+    """Compile the simulator's loops now rather than on first use."""
     from sim.compiling import CACHE
     from sim.motion.warm import compile_all
 

@@ -38,7 +38,6 @@ def _listed() -> dict[str, tuple[str, str]]:
 _HOMES = _listed()
 _RENAMED = {  # old name -> (module, name in it, what to use instead), for one release
     "Voyage": ("planner.goal.goal_plan", "GoalPlan", "GoalPlan"),
-    "switch_response": ("softflagella.api.simulate", "switch_response", "response"),
 }
 
 __all__ = sorted(_HOMES)

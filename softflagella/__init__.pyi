@@ -1,8 +1,13 @@
 # The public names of softflagella and their modules: the one list, for type checkers and for `__init__.py`.
+from calibration.api import calibrate as calibrate
+from calibration.api import decide as decide
+from calibration.api import tracks as tracks
 from calibration.report.robot_verdict import RobotVerdict as RobotVerdict
 from calibration.swimmer.synthetic_table import make_table as make_table
 from calibration.verdict.sequential_test import Decision as Decision
 from calibration.verdict.verdict import Verdict as Verdict
+from dataset.api import read_sweep as read_sweep
+from dataset.api import sweep as sweep
 from planner.files.goal_json import load_goal as load_goal
 from planner.files.plan_json import load_plan as load_plan
 from planner.files.saved_plan import restore_plan as restore_plan
@@ -24,6 +29,10 @@ from planner.tracking.swim import Swim as Swim
 from planner.tracking.tracker import Command as Command
 from planner.tracking.tracker import Tracker as Tracker
 from planner.vehicle.calibration_table import CalibrationKnowledge as CalibrationKnowledge
+from sim.api import replay as replay
+from sim.api import response as response
+from sim.api import sensitivities as sensitivities
+from sim.api import steady as steady
 from sim.effects import catalogue
 from sim.inputs import load_robot as load_robot
 from sim.inputs import save_robot as save_robot
@@ -33,9 +42,6 @@ from sim.model.effect import Effect as Effect
 from sim.model.robot import Robot as Robot
 from sim.model.schedule import Schedule as Schedule
 from sim.model.schedule import load_schedule as load_schedule
-from softflagella.api.calibrate import calibrate as calibrate
-from softflagella.api.calibrate import decide as decide
-from softflagella.api.calibrate import tracks as tracks
 from softflagella.api.goal import to_goal as to_goal
 from softflagella.api.jobs import cover as cover
 from softflagella.api.jobs import fleet as fleet
@@ -46,16 +52,10 @@ from softflagella.api.plan import check as check
 from softflagella.api.plan import plan as plan
 from softflagella.api.plan import replan as replan
 from softflagella.api.plan import write_plan as write_plan
-from softflagella.api.query import export as export
-from softflagella.api.query import inverse as inverse
-from softflagella.api.query import query as query
-from softflagella.api.simulate import replay as replay
-from softflagella.api.simulate import response as response
-from softflagella.api.simulate import sensitivities as sensitivities
-from softflagella.api.simulate import steady as steady
-from softflagella.api.simulate import swim as swim
-from softflagella.api.sweep import read_sweep as read_sweep
-from softflagella.api.sweep import sweep as sweep
+from softflagella.api.swim import swim as swim
+from surrogate.api import export as export
+from surrogate.api import inverse as inverse
+from surrogate.api import query as query
 from surrogate.interface import LookupTable as LookupTable
 from surrogate.one_robot.tabulate import tabulate as tabulate
 from surrogate.table.model_file import load_table as load_table

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import difflib
 import sys
-from argparse import Namespace
 from importlib import import_module
 
-from sim.io.commands import Command, Program, out
+from sim.io.commands import Command, Declared, Program
 from sim.io.errors import run_command
 
 WORDS = {  # the most important commands -> package and command
@@ -44,17 +43,22 @@ PACKAGES = {
 program = Program("softflagella", "Soft flagellated robots near a surface.")
 
 
-@program.command("demo", "run the whole pipeline on the paper's robots", out("page", default="reports/demo.html"))
-def _demo(arguments: Namespace) -> None:
+@program.command("demo")
+def _demo(*, out: str = "reports/demo.html") -> None:
+    """Run the whole pipeline on the paper's robots.
+
+    Args:
+        out: page.
+    """
     from softflagella.demo import run_demo
 
-    run_demo(arguments.out)
+    run_demo(out)
 
 
-def command(word: str) -> Command:
+def command(word: str) -> Command | Declared:
     """Return the command that a word stands for."""
     package, name = WORDS[word]
-    commands: dict[str, Command] = import_module(f"{package}.__main__").program.commands
+    commands: dict[str, Command | Declared] = import_module(f"{package}.__main__").program.commands
     return commands[name]
 
 
@@ -86,8 +90,7 @@ def main(argv: list[str] | None = None) -> None:
 
         print(f"softflagella {__version__}")
     elif words[0] in WORDS:
-        arguments = command(words[0]).parser(f"softflagella {words[0]}").parse_args(words[1:])
-        arguments.run(arguments)
+        command(words[0]).main(f"softflagella {words[0]}", words[1:])
     elif words[0] in PACKAGES:
         packaged: Program = import_module(f"{words[0]}.__main__").program
         packaged.main(words[1:])

@@ -3,38 +3,37 @@
 from __future__ import annotations
 
 import sys
-from argparse import Namespace
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, Literal
 
-from sim.io.commands import LOOKUP, RUNS_OF, Program, argument, out, refuse_runs_of
-from sim.io.errors import InputError, naming
+from sim.io.commands import Program
+from sim.io.errors import InputError
 
 program = Program("surrogate", "Train look-up tables and query them.")
 main = program.main
 
 
-@program.command(
-    "train",
-    "learn a data set",
-    argument("data", nargs="+", help="folders made by softflagella sweep"),
-    out("model file"),
-    argument("--epochs", type=int, help="this many epochs, and as many iterations after them"),
-    argument(
-        "--device",
-        choices=("cpu", "cuda", "auto"),
-        default="cpu",
-        help="where to train (default: cpu); auto: on a CUDA device if there is one",
-    ),
-)
-def _train(arguments: Namespace) -> None:
+@program.command("train")
+def _train(
+    data: Sequence[str], *, out: str, epochs: int | None = None, device: Literal["cpu", "cuda", "auto"] = "cpu"
+) -> None:
+    """Learn a data set.
+
+    Args:
+        data: folders made by softflagella sweep.
+        out: model file.
+        epochs: this many epochs, and as many iterations after them.
+        device: where to train (default: cpu); auto: on a CUDA device if there is one.
+    """
     from dataclasses import replace
 
     from dataset.data_set import read_manifest
     from sim.io.files import write_text
 
-    if arguments.epochs is not None and arguments.epochs < 1:
-        raise InputError(f"--epochs {arguments.epochs}; give a whole number from 1")
-    for folder in arguments.data:  # before torch is loaded
+    if epochs is not None and epochs < 1:
+        raise InputError(f"--epochs {epochs}; give a whole number from 1")
+    for folder in data:  # before torch is loaded
         read_manifest(folder)
     from surrogate.networks.checkpoints import device_named, remove_states
     from surrogate.networks.training_loop import Settings
@@ -43,176 +42,127 @@ def _train(arguments: Namespace) -> None:
     from surrogate.training.model_card import model_card
     from surrogate.training.train import held_out, train
 
-    device, states = device_named(arguments.device), f"{arguments.out}.states"
-    print(f"trains on the device {device}", flush=True)
+    trained_on, states = device_named(device), f"{out}.states"
+    print(f"trains on the device {trained_on}", flush=True)
     tails, curves = Settings(), SETTINGS
-    if arguments.epochs is not None:
-        tails, curves = (replace(s, epochs=arguments.epochs, iterations=arguments.epochs) for s in (tails, curves))
-    lookup = train(arguments.data, tails, curves, device=device, states=states)
-    lookup.save(arguments.out)
-    card = Path(arguments.out).with_suffix(".md")
-    write_text(card, model_card(lookup, held_out(arguments.data)))
+    if epochs is not None:
+        tails, curves = (replace(s, epochs=epochs, iterations=epochs) for s in (tails, curves))
+    lookup = train(data, tails, curves, device=trained_on, states=states)
+    lookup.save(out)
+    card = Path(out).with_suffix(".md")
+    write_text(card, model_card(lookup, held_out(data)))
     remove_states(states)
     rows = lookup.provenance["rows"]
     print(f"model {lookup.identity}: {rows['train']} rows, held-out error on {rows['held_out']}")
     print(error_table(lookup.errors))
     for words in shortcomings(lookup.errors):
         print(f"warning: {words}", file=sys.stderr)
-    print(f"-> {arguments.out}, {card}")
+    print(f"-> {out}, {card}")
 
 
-@program.command(
-    "query",
-    "predict the motion of a robot, or of many, with intervals, without simulating",
-    argument("robot", metavar="ROBOT", help="robot.toml, the name of a preset, or a table of points or runs "
-             "like that of softflagella steady, dwell_bar optional"),
-    RUNS_OF,
-    out("CSV; needed for a table of points", default=None),
-    LOOKUP,
-    argument(
-        "--flag", action="store_true", help="answer outside the domain, too; the column `outside` says where"
-    ),
-    argument("--certify", action="store_true", help="simulate each row as well: the column `certified_error`"),
-)  # fmt: skip
-def _query(arguments: Namespace) -> None:
-    from sim.inputs import names_robot
+@program.command("query", of="surrogate.api:query", derivatives="")
+def _query(
+    robots: str, *, robot: str | None = None, out: str | None = None, lookup: str | None = None, **given: Any
+) -> None:
+    """Predict the motion of a robot, or of many, with intervals, without simulating.
 
-    if names_robot(arguments.robot):
-        refuse_runs_of(arguments)
-        _query_robot(arguments)
-    elif arguments.out is None:
-        from sim.io.tables import read_table
-
-        read_table(arguments.robot)  # refuses what is no table
-        raise InputError(f"{arguments.robot} is a table of points; name the file of the answers with --out")
-    else:
-        _query_points(arguments)
-
-
-def _query_robot(arguments: Namespace) -> None:
-    """Print the answer for one robot in lab units, beside the dimensionless numbers."""
-    from sim.inputs import group_columns, load_robot
-    from sim.io.files import write_csv
-    from sim.motion.lab_units import describe_motion, lab_motion
-    from surrogate.table.answers import answer_with_error
+    Args:
+        robots: robot.toml, the name of a preset, or a table of points or runs like that of softflagella steady,
+            dwell_bar optional.
+        robot: of a table of runs, N,l_cm,omega_rpm: robot.toml or the name of a preset.
+        out: CSV; needed for a table of points.
+    """
+    from sim.model.groups import DWELL
+    from sim.motion.lab_units import describe_motion
+    from sim.robot_rows import command_rows, write_motion
+    from surrogate.table.answers import answer_rows
     from surrogate.table.model_file import load_table
-    from surrogate.table.refusals import refusing_robots
 
-    robot, table = load_robot(arguments.robot), load_table(arguments.lookup)
-    columns = group_columns([robot])
-    with refusing_robots([robot], table):
-        answer = answer_with_error(table, columns, flag=arguments.flag, certify=arguments.certify)
-    print(describe_motion(robot, answer, error="relative error of the look-up table (90 %)"))
-    if arguments.certify and "certified_error" in answer:
-        print(f"  certified relative error {100 * answer['certified_error'][0]:.2g} %")
-    if arguments.flag and answer.get("outside", [False])[0]:
+    rows = command_rows(robots, robot, out, DWELL)
+    answer = answer_rows(rows, load_table(lookup), **given)
+    if rows.file:
+        return write_motion(rows, answer, out, f"{len(answer['v_z'])} rows")
+    said = describe_motion(rows.robots[0], answer, error="relative error of the look-up table (90 %)")
+    if "certified_error" in answer:
+        said += f"\n  certified relative error {100 * answer['certified_error'][0]:.2g} %"
+    if answer.get("outside", [False])[0]:
         print("note: the robot is outside the domain of the look-up table", file=sys.stderr)
-    if arguments.out:
-        import pandas as pd
-
-        rows = pd.DataFrame({"robot": [robot.name], **lab_motion([robot], answer), **answer})
-        write_csv(rows, arguments.out)
-        print(f"-> {arguments.out}")
+    write_motion(rows, answer, out, said)
 
 
-def _query_points(arguments: Namespace) -> None:
-    """Answer for every row of a table."""
-    import pandas as pd
+@program.command("inverse", of="surrogate.api:inverse")
+def _inverse(targets: str, *, out: str, **given: Any) -> None:
+    """Find robots that have given motions.
 
-    from sim.inputs import point_columns
+    Args:
+        targets: CSV: the given inputs of the robots, and outputs that they shall have.
+        out: CSV: a row for each solution.
+    """
     from sim.io.files import write_csv
-    from sim.io.tables import read_table
-    from sim.motion.lab_units import lab_motion
-    from surrogate.table.lookup import NeuralTable
-    from surrogate.table.model_file import load_table
+    from surrogate.api import inverse
 
-    points = read_table(arguments.robot)
-    table = load_table(arguments.lookup)
-    with naming(arguments.robot):
-        robots, columns = point_columns(points, arguments.runs_of, arguments.robot)
-        if isinstance(table, NeuralTable):
-            result = table.query(columns, intervals=True, flag=arguments.flag, certify=arguments.certify)
-        else:
-            result = table.query(columns)
-    if robots:
-        result = {**lab_motion(robots, result), **result}
-    kept = points.drop(columns=[name for name in result if name in points]).reset_index(drop=True)
-    answers = pd.concat([kept, pd.DataFrame(result)], axis=1)
-    write_csv(answers, arguments.out)
-    print(f"{len(answers)} rows -> {arguments.out}")
+    table = inverse(targets, **given)
+    write_csv(table, out)
+    print(f"solutions: {len(table)}, targets: {table.attrs['targets']} -> {out}")
 
 
-@program.command(
-    "inverse",
-    "find robots that have given motions",
-    argument("targets", help="CSV: the given inputs of the robots, and outputs that they shall have"),
-    out("CSV: a row for each solution"),
-    LOOKUP,
-    argument("--free", default="C_t,C_r,C_yr", help="inputs to find, with commas (default: C_t,C_r,C_yr)"),
-)
-def _inverse(arguments: Namespace) -> None:
-    from sim.io.files import write_csv
-    from sim.io.tables import read_table
-    from surrogate.table.inverse import inverse_table
-    from surrogate.table.model_file import load
+@program.command("errors")
+def _errors(*, lookup: str | None = None) -> None:
+    """Print the stored held-out errors.
 
-    points = read_table(arguments.targets)
-    names = [name.strip() for name in arguments.free.split(",")]
-    with naming(arguments.targets):
-        table = inverse_table(load(arguments.lookup), points, names, where=arguments.targets)
-    write_csv(table, arguments.out)
-    print(f"solutions: {len(table)}, targets: {len(points)} -> {arguments.out}")
-
-
-@program.command("errors", "print the stored held-out errors", LOOKUP)
-def _errors(arguments: Namespace) -> None:
+    Args:
+        lookup: look-up table (default: the one that comes with the package).
+    """
     from surrogate.table.errors import error_table
     from surrogate.table.model_file import load
 
-    lookup = load(arguments.lookup)
-    rows = lookup.provenance["rows"]
-    print(f"model {lookup.identity}: {rows['train']} rows, held-out error on {rows['held_out']}")
-    print(error_table(lookup.errors))
+    table = load(lookup)
+    rows = table.provenance["rows"]
+    print(f"model {table.identity}: {rows['train']} rows, held-out error on {rows['held_out']}")
+    print(error_table(table.errors))
 
 
-@program.command(
-    "robot",
-    "simulate the table of one robot, effects included",
-    argument("robot", help="robot.toml or the name of a preset"),
-    out("JSON"),
-)
-def _robot(arguments: Namespace) -> None:
+@program.command("robot")
+def _robot(robot: str, *, out: str) -> None:
+    """Simulate the table of one robot, effects included.
+
+    Args:
+        robot: robot.toml or the name of a preset.
+        out: JSON.
+    """
     from sim.inputs import load_robot
     from surrogate.one_robot.tabulate import tabulate
 
-    table = tabulate(load_robot(arguments.robot))
-    table.save(arguments.out)
+    table = tabulate(load_robot(robot))
+    table.save(out)
     worst = max(error["rms"] for error in table.errors.values())
-    print(f"both directions of the motor, largest error {100 * worst:.2f} % -> {arguments.out}")
+    print(f"both directions of the motor, largest error {100 * worst:.2f} % -> {out}")
 
 
-@program.command(
-    "export",
-    "write a look-up table for other programs",
-    argument("model", nargs="?", help="look-up table (default: the one that comes with the package)"),
-    argument("--onnx", metavar="OUT.onnx", help="no longer written; use --small"),
-    argument("--small", metavar="FOLDER", help="at most 150 kB, for a microcontroller, with a reader in C"),
-)
-def _export(arguments: Namespace) -> None:
+@program.command("export")
+def _export(model: str | None = None, *, onnx: str | None = None, small: str | None = None) -> None:
+    """Write a look-up table for other programs.
+
+    Args:
+        model: look-up table (default: the one that comes with the package).
+        onnx: no longer written; use --small.
+        small: FOLDER, at most 150 kB, for a microcontroller, with a reader in C.
+    """
     from surrogate.export.small_copy_files import save_small_copy
     from surrogate.table.model_file import load
 
-    if arguments.onnx:
+    if onnx:
         raise InputError("ONNX files are no longer written; give --small FOLDER for a reader in C")
-    if not arguments.small:
+    if not small:
         raise InputError("nothing to write; give --small FOLDER")
-    table = load(arguments.model)
-    print(save_small_copy(table, arguments.small))
-    print(f"model {table.identity} -> {arguments.small}")
+    table = load(model)
+    print(save_small_copy(table, small))
+    print(f"model {table.identity} -> {small}")
 
 
-@program.command("compile", "compile the loops of queries now rather than on first use")
-def _compile(_: Namespace) -> None:
+@program.command("compile")
+def _compile() -> None:
+    """Compile the loops of queries now rather than on first use."""
     from time import perf_counter
 
     import numpy as np

@@ -14,7 +14,7 @@ import math
 import re
 from collections.abc import Iterable
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 
 class Unit(NamedTuple):
@@ -79,7 +79,8 @@ UNITS = {
         Unit("percent", "number", over=100.0),
     )
 }
-LENGTHS = ("l", "m", "cm", "mm")  # of lengths in words; l is the tail length
+LengthUnit = Literal["l", "m", "cm", "mm"]  # of lengths in words; l is the tail length
+LENGTHS = get_args(LengthUnit)
 _TEXTS = {
     "um": "µm", "rad_s": "rad/s", "deg_s": "degrees/s", "rps": "turns/s", "deg": "degrees", "m_s": "m/s",
     "cm_s": "cm/s", "mm_s": "mm/s", "m_min": "m/min", "cm_min": "cm/min", "mm_min": "mm/min", "Pa_s": "Pa s",

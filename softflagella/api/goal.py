@@ -15,7 +15,7 @@ from planner.planning.camera import Camera
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.dwell_choice import Objective
 from sim.io.keywords import checks_keywords
-from softflagella.api.robots import OneRobot
+from sim.robot_rows import OneRobot
 from softflagella.api.vehicles import robot_with_table
 from surrogate.interface import LookupTable
 

@@ -26,7 +26,7 @@ from planner.planning.request import RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
-from softflagella.api.robots import OneRobot
+from sim.robot_rows import OneRobot
 from softflagella.api.vehicles import vehicle_and_request
 from surrogate.interface import LookupTable
 

@@ -15,7 +15,7 @@ from planner.paths.path import Path2D
 from planner.planning.request import PlanRequest, RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.io.keywords import checks_keywords
-from softflagella.api.robots import OneRobot
+from sim.robot_rows import OneRobot
 from softflagella.api.vehicles import robot_with_table
 from surrogate.interface import LookupTable
 

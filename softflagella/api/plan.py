@@ -33,7 +33,7 @@ from sim.io.errors import InputError, naming
 from sim.io.keywords import checks_keywords
 from sim.io.tables import read_table
 from sim.model.robot import Robot
-from softflagella.api.robots import OneRobot
+from sim.robot_rows import OneRobot
 from softflagella.api.vehicles import vehicle_and_request
 from surrogate.interface import LookupTable
 

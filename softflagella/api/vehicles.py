@@ -7,7 +7,7 @@ from planner.planning.request import PlanRequest, RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from sim.model.robot import Robot
-from softflagella.api.robots import OneRobot, one_robot
+from sim.robot_rows import OneRobot, one_robot
 from surrogate.interface import LookupTable
 
 

@@ -9,14 +9,17 @@ A table of one robot has no intervals. Its error is the largest of those that it
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
 
 from sim.arrays import Floats
+from sim.robot_rows import RobotRows
 from surrogate.interface import LookupTable
 from surrogate.table.certify import CERTIFIED_OUTPUTS, RATES
 from surrogate.table.lookup import NeuralTable
+from surrogate.table.refusals import refusing_robots
 
 
 def answer_with_error(
@@ -46,3 +49,11 @@ def answer_with_error(
     with np.errstate(divide="ignore", invalid="ignore"):  # a rate of zero
         widths = [(answer[f"{name}_high"] - answer[f"{name}_low"]) / 2 / size for name, size in sizes.items()]
     return {**answer, "error": np.max(widths, axis=0)}
+
+
+def answer_rows(
+    rows: RobotRows, table: LookupTable, *, flag: bool = False, certify: bool = False
+) -> dict[str, Any]:
+    """Answer as `answer_with_error`; refusals name the robots, and the file of their table."""
+    with rows.naming(), refusing_robots(rows.robots, table) if rows.robots else nullcontext():
+        return answer_with_error(table, rows.columns, flag=flag, certify=certify)

@@ -11,9 +11,10 @@ import pytest
 
 import softflagella as sf
 import surrogate.__main__
+from dataset.schema import INPUTS, OUTPUTS
 from sim.io.tables import read_table
 from sim.motion.lab_units import LAB_COLUMNS
-from softflagella.api.robots import robot_rows, with_units
+from sim.robot_rows import UNITS, robot_rows, with_units
 from tests.softflagella.made import ROBOT, own_table
 
 
@@ -116,6 +117,23 @@ def test_a_response_in_lab_units(file: Path) -> None:
     of_robot = both.loc[both["robot"] == "paper-control", "lag_z"]
     np.testing.assert_allclose(table.loc[table["row"] == 1, "lag_z"], of_robot, rtol=1e-9, atol=1e-12)
     assert "dwell_s" not in table
+
+
+def test_a_table_is_the_same_as_its_file_and_its_results_are_replaced(tmp_path: Path) -> None:
+    table = pd.DataFrame({**ROBOT.group_values(), "omega_bar": [5.0, 10.0], "dwell_bar": 1.0, "v_x": 7.0})
+    table.to_csv(tmp_path / "points.csv", index=False)
+    motion = sf.query(tmp_path / "points.csv")
+    assert motion.equals(sf.query(table))
+    assert (motion["net_speed_bar"] > 0).all()
+    assert (motion["v_x"].abs() < 1).all()
+    assert motion.attrs["replaced"] == ["v_x"]
+    with pytest.raises(sf.InputError, match=r"points\.csv: unknown column 'dwell_bar'"):
+        sf.steady(tmp_path / "points.csv")
+
+
+def test_units_are_those_of_a_data_set() -> None:
+    declared = {column.name: column.unit for column in (*INPUTS, *OUTPUTS) if column.unit != "1"}
+    assert {name: declared[name] for name in UNITS} == UNITS
 
 
 def test_units_of_columns() -> None:

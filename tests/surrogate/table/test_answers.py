@@ -56,7 +56,7 @@ def test_the_command_prints_the_answer_for_a_robot(
     assert "points.csv: no such file" in capsys.readouterr().err
     Path("points.csv").write_text("N\n2\n")
     assert run_command(main, ["query", "points.csv"]) == 2
-    assert "name the file of the answers with --out" in capsys.readouterr().err
+    assert "name the file of their motion with --out" in capsys.readouterr().err
     assert run_command(sim, ["steady", "paper-control"]) == 0
     assert capsys.readouterr().out.splitlines()[0] == said.splitlines()[0]
 

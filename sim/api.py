@@ -1,22 +1,17 @@
-"""Simulate robots: `softflagella.steady`, `response`, `sensitivities`, `replay` and `swim`.
+"""Simulate robots: `softflagella.steady`, `response`, `sensitivities` and `replay`.
 
-What robots are is said in `softflagella.api.robots`.
+What robots are is said in `sim.robot_rows`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 
-from planner.planning.camera import Camera
-from planner.planning.planned import Plan
-from planner.tracking.swim import Swim
-from planner.tracking.swim import swim as swim_under
-from planner.tracking.tracker import Tracker
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.model.groups import DWELL, Groups
@@ -24,11 +19,19 @@ from sim.model.response import BEFORE, DWELLS, Responses
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule, load_schedule
 from sim.motion.batches import sensitivity_columns, split, steady_columns
-from sim.motion.lab_units import lab_motion
 from sim.motion.replay import replay as replay_schedules
 from sim.motion.response import responses
-from sim.motion.switching import switch_response as respond
-from softflagella.api.robots import NAME, OneRobot, RobotRows, Robots, one_robot, robot_rows, with_units
+from sim.robot_rows import NAME, OneRobot, RobotRows, one_robot, robot_rows, with_units
+
+if TYPE_CHECKING:
+    from sim.robot_rows import Robots
+
+
+class Scheduled(Protocol):
+    """A plan."""
+
+    def schedule(self) -> Schedule:
+        """Return its schedule."""
 
 
 @checks_keywords()
@@ -39,11 +42,11 @@ def steady(
 
     Args:
         robots: a `Robot`, the path of a robot.toml, the name of a preset, or a list of these; or dimensionless
-            robots, a table with M rows (single values stand for all rows); or, with `robot`, a table of its runs:
-            `N`, `l_cm`, `omega_rpm`, or these in other units.
+            robots, a table with M rows (single values stand for all rows), or its file; or, with `robot`, a table
+            of its runs: `N`, `l_cm`, `omega_rpm`, or these in other units.
         robot: the robot of a table of runs.
-        stability: whether to compute `stable` and `growth`, which adds a quarter to the time, and about as much as
-            the rest for robots with non-local effects (flow, contact, natural shape, thinning).
+        stability: compute whether small perturbations decay, `stable` and `growth`. This adds a quarter to the
+            time, for robots with non-local effects (flow, contact, natural shape, thinning) it doubles it.
         jobs: threads; default all processors.
 
     Returns:
@@ -78,34 +81,9 @@ def steady(
         [[9.0, 60.0, 9.19], [11.0, -60.0, 10.24]]
     """
     rows = robot_rows(robots, robot)
-    motion = steady_columns(rows.columns, stability=stability, jobs=jobs, title="")
-    return rows.frame(lab_motion(rows.robots, motion) if rows.robots else {}, motion)
-
-
-def switch_response(robots: Robots, dwell: ArrayLike) -> pd.DataFrame:
-    """Simulate flips of the motor every `dwell`, from the steady motion (deprecated: use `response`).
-
-    Args:
-        robots: a `Robot`, or a table with M rows.
-        dwell: half-period T̄ [μ0 l⁴/EI], one for all robots or (M,).
-
-    Returns:
-        A table with M rows and the columns `dwell_bar`, `net_speed_bar` [EI/(μ0 l³)], and the offset of a flip
-        `lag_psi_rad`, `lag_x`, `lag_z` [l]; NaN where a simulation broke down.
-
-    Raises:
-        InputError: a robot is not possible, or a dwell is not above 0.
-    """
-    columns = robot_rows(robots).columns
-    dwells = np.broadcast_to(np.asarray(dwell, dtype=float), columns["N"].shape)
-    names = (DWELL, "net_speed_bar", "lag_psi_rad", "lag_x", "lag_z")
-    table = pd.DataFrame({name: np.full(len(dwells), np.nan) for name in names})
-    for rows in split(columns["N"], len(dwells)):
-        flips = respond(Groups.from_columns({k: v[rows] for k, v in columns.items()}), dwells[rows])
-        values = (flips.dwell, flips.net_speed, flips.lag_psi, flips.lag_x, flips.lag_z)
-        for name, column in zip(names, values, strict=True):
-            table.loc[rows, name] = column
-    return table
+    with rows.naming():
+        motion = steady_columns(rows.columns, stability=stability, jobs=jobs, title="")
+    return rows.frame(motion)
 
 
 @checks_keywords()
@@ -223,7 +201,7 @@ def sensitivities(robots: Robots, parameters: Sequence[str], *, jobs: int | None
 
 
 @checks_keywords()
-def replay(schedule: Schedule | Plan | str | Path, robot: OneRobot | None = None) -> pd.DataFrame:
+def replay(schedule: Schedule | Scheduled | str | Path, robot: OneRobot | None = None) -> pd.DataFrame:
     """Simulate a schedule, from rest with straight tails.
 
     Args:
@@ -245,56 +223,10 @@ def replay(schedule: Schedule | Plan | str | Path, robot: OneRobot | None = None
         >>> round(float(track["time_bar"].iloc[-1]), 6), track["direction"].unique().tolist()
         (2.0, [1, -1])
     """
-    if isinstance(schedule, Plan):
-        schedule = schedule.schedule()
-    elif not isinstance(schedule, Schedule):
+    if isinstance(schedule, str | Path):
         schedule = load_schedule(schedule)
+    elif not isinstance(schedule, Schedule):
+        schedule = schedule.schedule()
     swum = schedule if robot is None else schedule.swum_by(one_robot(robot))
     track = replay_schedules([swum])[0]
     return with_units(track if robot is None else schedule.in_own_units(track))
-
-
-@checks_keywords()
-def swim(
-    pilot: Plan | Tracker,
-    truth: OneRobot | None = None,
-    camera: Camera | None = None,
-    *,
-    current_cm_s: tuple[float, float] = (0.0, 0.0),
-    longest: float = 3.0,
-) -> Swim:
-    """Simulate a robot under a tracker's orders, seen by a camera: a closed loop.
-
-    Args:
-        pilot: a tracker that has not begun, or a plan, which gets a tracker that knows the camera's noise.
-        truth: the robot that swims; default: the one that the plan was made for.
-        camera: what sees it; default: that of the plan.
-        current_cm_s: of the fluid, in x and y [cm/s], which the tracker does not know.
-        longest: times the planned duration after which the swim ends in any case.
-
-    Returns:
-        Times, poses, distances from the declared path, the tracker's bounds on them, and dwells as ordered.
-
-    Raises:
-        InputError: the robot cannot be simulated.
-
-    Example:
-        >>> import softflagella as sf
-        >>> result = sf.plan(sf.circle(1.2), "paper-control", objective="flips")
-        >>> track = sf.swim(result, camera=sf.Camera(delay_s=0.5))
-        >>> track.finished, track.rms() < 0.1
-        (True, True)
-    """
-    plan = pilot.plan if isinstance(pilot, Tracker) else pilot
-    camera = camera or plan.camera
-    tracker = pilot if isinstance(pilot, Tracker) else Tracker(plan, noise=camera.noise)
-    unit = plan.robot.time_scale / (100 * plan.robot.tail_length)
-    return swim_under(
-        tracker,
-        plan,
-        plan.robot if truth is None else one_robot(truth),
-        camera,
-        start=tracker.start,
-        current=(unit * current_cm_s[0], unit * current_cm_s[1]),
-        longest=longest,
-    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -13,13 +13,14 @@ from calibration.laws.law_model import with_law
 from calibration.report.robot_verdict import RobotVerdict, calibrate_robot
 from calibration.swimmer.camera_tracks import measure_tracks
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.possible_runs import Owned
+from calibration.swimmer.possible_runs import Owned, owned
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.sequential_test import Decision, read_explanations
 from calibration.verdict.sequential_test import decide as decide_between
 from calibration.verdict.verdict import Verdict
 from sim.io.keywords import checks_keywords
-from softflagella.api.robots import OneRobot, one_robot, with_units
+from sim.io.units import LengthUnit
+from sim.robot_rows import OneRobot, one_robot, with_units
 
 
 @checks_keywords()
@@ -29,13 +30,14 @@ def calibrate(
     *,
     protocol: Literal["session", "paper"] = "session",
     seed: int = 0,
-    own: Owned | None = None,
+    own: Owned | Sequence[str] | None = None,
     laws: bool = True,
     paths: Sequence[str] = (),
-    unit: str | None = None,
+    unit: LengthUnit | None = None,
     max_seconds: float | None = None,
     jobs: int | None = None,
     progress: bool = True,
+    tell: Callable[[str], object] = lambda line: None,
 ) -> RobotVerdict:
     """Fit a table of measured runs, find what the model lacks, and correct the robot.
 
@@ -45,16 +47,18 @@ def calibrate(
         robot: the robot as given, its robot.toml, or the name of a preset.
         protocol: what is fitted: all sessions but one ("session"), or N = 3 and 4 as in the paper ("paper").
         seed: of the bootstrap; the same seed gives the same result.
-        own: what the lab can set in its next runs, such as `{"l_cm": (5, 7, 9)}`; for `N`, `l_cm` and `omega_rpm`
-            (both directions). Default: the table's range.
-        laws: whether laws are looked for where no effect explains the runs.
+        own: what the lab can set in its next runs, `{"l_cm": (5, 7, 9)}` or `("l_cm=5,7,9",)`; for `N`, `l_cm`
+            and `omega_rpm` (both directions). Default: the table's range.
+        laws: look for laws where no effect explains the runs.
         paths: files or shapes, such as `("square:24cm",)`, on which the error with the robot as given and with the
             corrected one is stated; `verdict.paths` has it.
-        unit: "m", "cm", "mm" or "l", of paths that do not say theirs.
-        max_seconds: of processor time for the search; default 90, with laws 180. The verdict then is provisional,
+        unit: of lengths that are given without one; l for tail lengths. 24cm and 3l, columns x_cm and y_cm, and
+            drawings with a size have their own.
+        max_seconds: of processor time for the search (default 90, with laws 180). The verdict then is provisional,
             and says what was not tried.
         jobs: threads; default all processors.
         progress: show progress bars.
+        tell: is told, before the fit, what was converted and what was excluded, a line at a time.
 
     Returns:
         The verdict, with `verdict` ("none", "number", "effect", "ambiguous", "partial", "unexplained"),
@@ -74,7 +78,7 @@ def calibrate(
         table,
         one_robot(robot),
         protocol=protocol,
-        own=own,
+        own=own if own is None or isinstance(own, Mapping) else owned(own),
         laws=laws,
         paths=paths,
         unit=unit,
@@ -82,6 +86,7 @@ def calibrate(
         max_seconds=max_seconds,
         jobs=jobs,
         progress=progress,
+        tell=tell,
     )
 
 
@@ -94,7 +99,7 @@ def decide(
     Args:
         table: the measured table with the new runs, in sessions of their own.
         verdict: an "ambiguous" verdict on the table before, or its verdict.json.
-        robot: the robot as given.
+        robot: the robot as given, its robot.toml, or the name of a preset.
         jobs: threads; default all processors.
 
     Returns:
@@ -130,7 +135,8 @@ def tracks(
         tracks: one row for each sample: `run`, `time_s`, `x_cm`, `y_cm`, `heading_deg`, or these in other units.
         runs: one row for each run: `run`, `N`, `l_cm`, `omega_rpm` and other columns of a measured table.
         y_down: y and headings are those of a picture, whose y axis points down.
-        robot: the robot as given, with whose simulated motion the tracks are compared.
+        robot: the robot as given, its robot.toml, or the name of a preset, with whose simulated motion the tracks
+            are compared.
 
     Returns:
         The runs with `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s` and their errors. What was left out is in

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 from sim.io.keywords import checks_keywords
-from sim.motion.lab_units import lab_motion
-from softflagella.api.robots import OneRobot, Robots, robot_rows, with_units
+from sim.io.tables import read_table
+from sim.model.groups import DWELL
+from sim.robot_rows import OneRobot, robot_rows, with_units
 from surrogate.export.small_copy_files import save_small_copy
 from surrogate.interface import LookupTable
-from surrogate.table.answers import answer_with_error
+from surrogate.table.answers import answer_rows
 from surrogate.table.inverse import inverse_table
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load_table
-from surrogate.table.refusals import refusing_robots
+
+if TYPE_CHECKING:
+    from sim.robot_rows import Robots
 
 
 @checks_keywords(table="lookup")
@@ -35,8 +37,8 @@ def query(
     """Ask a look-up table for the mean motion at constant motor speed, without simulating.
 
     Args:
-        robots, robot: as for `steady`.
-        lookup: the table, or its file; default: the one that comes with the package.
+        robots, robot: as for `steady`; a table may have a column `dwell_bar`, for the response to flips after it.
+        lookup: look-up table, or its file; default: the one that comes with the package.
         flag: answer for robots outside the domain as well; the column `outside` says which.
         certify: simulate each robot as well; the column `certified_error` is the actual error of its answer.
         derivatives: add the Jacobian, in all dimensionless inputs but N, or in those named; effects may be named,
@@ -56,33 +58,33 @@ def query(
         >>> motion[["robot", "R_yr_cm", "v_cm_s"]].round(2).values.tolist()
         [['paper-control', 10.36, 0.23], ['paper-triangle', 10.11, 0.36]]
     """
-    rows, table = robot_rows(robots, robot), _table(lookup)
-    with refusing_robots(rows.robots, table) if rows.robots else nullcontext():
-        answer = answer_with_error(table, rows.columns, flag=flag, certify=certify)
+    rows, table = robot_rows(robots, robot, DWELL), _table(lookup)
+    answer = answer_rows(rows, table, flag=flag, certify=certify)
     if derivatives is not False:
         names = () if derivatives is True else derivatives
         slopes = _trained(table).derivatives(rows.columns, names, flag=True)
         answer |= {f"{output}_per_{name}": s for output, part in slopes.items() for name, s in part.items()}
-    return rows.frame(lab_motion(rows.robots, answer) if rows.robots else {}, answer)
+    return rows.frame(answer)
 
 
 @checks_keywords(table="lookup")
 def inverse(
-    targets: Mapping[str, Any] | pd.DataFrame,
+    targets: Mapping[str, Any] | pd.DataFrame | str | Path,
     *,
-    free: Sequence[str] = ("C_t", "C_r", "C_yr"),
+    free: str | Sequence[str] = "C_t,C_r,C_yr",
     lookup: LookupTable | str | Path | None = None,
 ) -> pd.DataFrame:
     """Find robots that have given motions, with a trained look-up table.
 
     Args:
-        targets: M rows (single values stand for all rows): the given inputs of the robots, and one or more
-            outputs that they shall have, such as `omega_yr_bar`.
-        free: inputs to find.
+        targets: M rows (single values stand for all rows), or their file: the given inputs of the robots, and one
+            or more outputs that they shall have, such as `omega_yr_bar`.
+        free: inputs to find, with commas or as a list.
         lookup: a trained table, or its file; default: the one that comes with the package.
 
     Returns:
         A row for each solution: `target` (the row of the target, from 1), the inputs, `misfit`, `outside`.
+        `attrs["targets"]` is their number.
 
     Raises:
         InputError: there is no output among the columns, or an input cannot be found.
@@ -94,7 +96,15 @@ def inverse(
         >>> sf.inverse({**given, "omega_yr_bar": 0.06}, free=["C_yr"])["C_yr"].round(2).tolist()
         [2.45]
     """
-    return with_units(inverse_table(_trained(lookup), pd.DataFrame(dict(targets), index=_index(targets)), free))
+    file = None
+    if isinstance(targets, str | Path):
+        file, targets = targets, read_table(targets)
+    points = pd.DataFrame(dict(targets), index=_index(targets))
+    names = [name.strip() for name in free.split(",")] if isinstance(free, str) else free
+    with naming(file):
+        table = inverse_table(_trained(lookup), points, names, where=str(file or "the table"))
+    table.attrs["targets"] = len(points)
+    return with_units(table)
 
 
 def _index(targets: Mapping[str, Any] | pd.DataFrame) -> Any:

@@ -1,0 +1,113 @@
+"""A function's signature and docstring are its command's parser."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
+from typing import Any, Literal
+
+import pytest
+
+from sim.io.commands import Command, Declared, Program
+from sim.io.errors import InputError
+from softflagella.__main__ import PACKAGES
+from softflagella.__main__ import program as top
+
+Shape = Literal["round", "square"]
+Colour = Shape | None
+
+
+def paint(
+    where: Sequence[str],
+    tin: str | Mapping[str, float],
+    *,
+    coats: int = 2,
+    shape: Colour = "round",
+    dry: bool = True,
+    spots: Sequence[tuple[str, str]] = (),
+    told: Callable[[str], object] | None = None,
+    sizes: Mapping[str, float] | None = None,
+) -> None:
+    """Paint a wall.
+
+    Args:
+        where: walls.
+        tin: of `paint`.
+        coats: how many, 100 % of the
+            wall each.
+        shape: of the brush.
+        dry: wait until it is dry.
+        spots: X Y, of a spot.
+
+    Returns:
+        Nothing.
+    """
+
+
+program = Program("house", "Keep a house.")
+called: list[dict[str, Any]] = []
+
+
+@program.command("paint", of="tests.sim.io.test_commands:paint", tin="--tin", spots="spot", further={"C_t": "a"})
+def _paint(where: str, *, tin: str, wet: bool = False, length: float | None = None, **given: Any) -> None:
+    """Paint walls. Or floors.
+
+    Args:
+        where: rooms.
+        wet: on wet walls.
+        length: LENGTH, of the brush.
+    """
+    called.append({"where": where, "tin": tin, "wet": wet, "length": length, **given})
+
+
+def test_the_function_is_called_with_what_was_written() -> None:
+    program.main(["paint", "hall", "--tin", "red"])
+    assert called.pop() == {"where": "hall", "tin": "red", "wet": False, "length": None}
+    words = "paint hall --tin red --no-dry --wet --spot 1 2 --spot -3cm 4 --coats 3 --length -1e3 --shape square"
+    program.main([*words.split(), "--C_t", "x"])
+    assert called.pop() == {
+        "where": "hall", "tin": "red", "wet": True, "length": -1000.0, "dry": False, "coats": 3, "C_t": "x",
+        "spots": [["1", "2"], ["-3cm", "4"]], "shape": "square",
+    }  # fmt: skip
+
+
+def test_help_is_the_docstring() -> None:
+    assert program.commands["paint"].help == "paint walls. Or floors"
+    said = " ".join(program.commands["paint"].parser("house paint").format_help().split())
+    for words in ("Paint walls. Or floors.", "WHERE rooms", "--tin TIN of paint", "--no-dry do not wait until",
+                  "--coats COATS how many, 100 % of the wall each (default: 2)", "--length LENGTH of the brush",
+                  "--shape {round,square} of the brush (default: round)", "--spot X Y of a spot; may be given",
+                  "--C_t C_T a"):  # fmt: skip
+        assert words in said
+    assert "told" not in said
+    assert "sizes" not in said
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("paint --tin red", "arguments are required: WHERE; softflagella house paint --help lists"),
+        ("paint hall", "arguments are required: --tin"),
+        ("paint hall --tin red --coats two", "argument --coats: invalid int value: 'two'"),
+        ("paint hall --tin red --shape long", "invalid choice: 'long' (choose from 'round', 'square')"),
+        ("paint hall --tin red --spot 1", "--spot: expected 2 arguments"),
+        ("paint hall --tin red --told x", "unrecognized arguments: --told x"),
+        ("sweep", "invalid choice: 'sweep'"),
+    ],
+)
+def test_wrong_words_are_refused(words: str, expected: str) -> None:
+    with pytest.raises(InputError) as refusal:
+        program.main(words.split())
+    assert expected in str(refusal.value)
+
+
+PROGRAMS = {name: import_module(f"{name}.__main__").program for name in PACKAGES} | {"softflagella": top}
+COMMANDS = [(package, name) for package, each in PROGRAMS.items() for name in each.commands]
+
+
+@pytest.mark.parametrize(("package", "name"), COMMANDS, ids=map(" ".join, COMMANDS))
+def test_every_option_of_every_command_says_what_it_is(package: str, name: str) -> None:
+    command: Command | Declared = PROGRAMS[package].commands[name]
+    assert command.help[0].islower() or not command.help[1].islower()
+    for action in command.parser(name)._actions:
+        assert action.help, action.dest
