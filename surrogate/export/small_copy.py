@@ -18,14 +18,12 @@ import numpy as np
 from sim.arrays import Flags, Floats
 from sim.inputs import check_columns
 from sim.io.errors import InputError
-from sim.mechanics import planar
 from sim.model.groups import DWELL
-from sim.motion.net_speed import twists
 from surrogate.input_ranges import ROBOT
 from surrogate.networks.ensemble import Ensemble
 from surrogate.table.errors import COMPARED, RESPONSE_OUTPUTS, error_scale, relative_errors
 from surrogate.table.lookup import NeuralTable
-from surrogate.table.response_table import Basis, lags_at_equal_dwells, memory_at_equal_dwells
+from surrogate.table.response_table import Basis, memory_at_equal_dwells, put_flips
 from surrogate.table.wrench_table import WrenchTable
 from surrogate.training.simulated import draw_robots
 
@@ -65,14 +63,12 @@ class SmallCopy:
         """
         values = check_columns({name: array for name, array in columns.items() if name != DWELL})
         motions = self.table.solve(values)
-        result = dict(motions.steady)
+        result = motions.steady
         if DWELL in columns and self.has_response:
             parts = [_network(self.arrays, name) for name in NETWORKS[4:]]
             basis = Basis(*(self.arrays[f"curves.{name}"].astype(float) for name in ("mean", "basis")))
-            lag = lags_at_equal_dwells(parts, basis, *motions[:4], columns[DWELL])
-            twist = twists(result["v_z"], result["v_x"], result["omega_yr_bar"], motions.heads.sense)
-            speed = planar.net_speed(twist, lag, columns[DWELL])
-            answers = zip(RESPONSE_OUTPUTS, (speed, *lag.T[::-1]), strict=True)
+            put_flips(parts, basis, motions, columns[DWELL])
+            answers = zip(RESPONSE_OUTPUTS, motions.outputs[len(result) :], strict=True)
             result |= {name: np.where(values["N"] > 1, answer, np.nan) for name, answer in answers}
         return result
 

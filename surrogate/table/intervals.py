@@ -18,18 +18,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from sim.arrays import Flags, Floats, Integers
+from surrogate.table.errors import ONE, OUTPUTS, SCALES
 
 COVERAGE = 0.90
 _TINY = 1e-9  # of the scale of an output
 _RIDGE = 1e-3
-_HALVED = [0, 3, 5]  # features whose halves make the octants: drag number, deflection, forward motion
+HALVED = (0, 3, 5)  # features whose halves make the octants: drag number, deflection, forward motion
 _ONE_TAIL = -1  # the width feature that is 1 for one tail
-PARTS = 2 ** len(_HALVED) + 1
+PARTS = 2 ** len(HALVED) + 1
 GROUPS = 2  # robots without and with a couple
 _FEWEST = 40  # robots in a part or group, for a q of its own
 _FIRMEST, _SOFTEST = 0.002, 0.998  # s is held between these quantiles of itself
@@ -46,39 +48,64 @@ class Intervals:
     middle: Floats  # (3,), the halves meet here
     factor: Mapping[str, Floats]  # output -> q of each part, (PARTS,) for all robots or (GROUPS PARTS,)
 
+    def ends(self, features: Floats, couples: Flags, outputs: Floats) -> dict[str, Floats]:
+        """Return `<name>_low` and `<name>_high`, (M,) each, of the outputs that have intervals.
+
+        Args:
+            features, couples: see `half_widths`.
+            outputs: OUTPUTS, (12, M).
+        """
+        low, high, _ = self._ask(*self._of_outputs, features, couples, outputs)
+        lows, highs = self._names
+        return {**dict(zip(lows, low, strict=True)), **dict(zip(highs, high, strict=True))}
+
     def half_widths(self, names: Sequence[str], features: Floats, couples: Flags | bool = False) -> Floats:
         """Return half-widths of the intervals of some outputs, (O, M), over what errors are relative to.
 
         Args:
             names: of the outputs.
-            features: (M, F), see `surrogate.table.lookup`.
+            features: (M, F), see `surrogate.table.loops`.
             couples: (M,), which robots have a couple in yaw from the spin of their tails.
         """
-        _, factors = self._stacked
-        parts = self.part(features) + PARTS * np.asarray(couples)
-        return factors[self._places(names)][:, parts] * self._local(names, features)
+        none = np.zeros(len(self.factor), dtype=np.int64)
+        _, half, _ = self._ask(none + ONE, none, features, couples, np.zeros((1, len(features))))
+        return half[[list(self.factor).index(name) for name in names]]
 
     def part(self, features: Floats) -> Integers:
         """Return which part each robot belongs to, (M,): 0 to 7 for octants, 8 for one tail."""
-        octant = (features[:, _HALVED] > self.middle) @ 2 ** np.arange(len(_HALVED))
-        return np.where(features[:, _ONE_TAIL] > 0.5, PARTS - 1, octant)
+        none = np.zeros(len(self.factor), dtype=np.int64)
+        return self._ask(none, none, features, False, np.zeros((1, len(features))))[2]
 
-    def _local(self, names: Sequence[str], features: Floats) -> Floats:
-        """Return s of some outputs, (O, M)."""
-        weights, _ = self._stacked
-        weights, (low, high) = weights[self._places(names)], np.array([self.bounds[n] for n in names]).T[..., None]
-        return np.exp(np.clip(weights @ _design((features - self.shift) / self.scale).T, low, high))
+    def _ask(
+        self, kinds: Integers, places: Integers, features: Floats, couples: Flags | bool, outputs: Floats
+    ) -> tuple[Floats, Floats, Integers]:
+        """Return ends (O, M) and parts (M,), see `surrogate.table.loops.intervals_of`."""
+        from surrogate.table.loops import intervals_of
 
-    def _places(self, names: Sequence[str]) -> list[int]:
-        """Return the rows of outputs in what is stacked."""
-        all_names = list(self.weights)
-        return [all_names.index(name) for name in names]
+        own = np.ascontiguousarray(features), np.zeros(len(features), dtype=bool) | couples
+        arguments: Any = (*self._stacked, kinds, places, *own, outputs)
+        return intervals_of(*arguments)
 
     @cached_property
-    def _stacked(self) -> tuple[Floats, Floats]:
-        """Weights (O, P) and factors (O, GROUPS PARTS) of all outputs; NaN where there are none."""
-        factors = [np.resize(self.factor.get(name, math.nan), GROUPS * PARTS) for name in self.weights]
-        return np.array(list(self.weights.values())), np.array(factors)
+    def _stacked(self) -> Any:
+        """The numbers of the outputs that have a q, for the compiled loops."""
+        count, size = len(self.factor), len(self.shift)
+        weights = np.array([self.weights[name] for name in self.factor]).reshape(
+            count, 1 + size + size * (size + 1) // 2
+        )
+        bounds = np.array([self.bounds[name] for name in self.factor]).reshape(count, 2).T.copy()
+        factors = np.array([np.resize(part, GROUPS * PARTS) for part in self.factor.values()])
+        return self.shift, self.scale, weights, bounds, self.middle, factors.reshape(count, GROUPS * PARTS)
+
+    @cached_property
+    def _of_outputs(self) -> tuple[Integers, Integers]:
+        """What errors are relative to, and places among OUTPUTS, (O,) each."""
+        kinds, places = [SCALES[name] for name in self.factor], [OUTPUTS.index(name) for name in self.factor]
+        return np.array(kinds), np.array(places)
+
+    @cached_property
+    def _names(self) -> tuple[list[str], list[str]]:
+        return [f"{name}_low" for name in self.factor], [f"{name}_high" for name in self.factor]
 
     @staticmethod
     def learned(
@@ -89,8 +116,11 @@ class Intervals:
         more_couples: Flags | bool = False,
     ) -> Intervals:
         """Learn from relative errors by output, (M,), of robots for s and of more robots, (M',), for q."""
+        from surrogate.table.loops import designs_of
+
+        features = np.ascontiguousarray(features)
         shift, scale = features.mean(0), np.maximum(features.std(0, ddof=1), 1e-6)
-        design = _design((features - shift) / scale)
+        design: Floats = designs_of(features, shift, scale)
         weights, bounds = {}, {}
         for name, error in errors.items():
             known = np.isfinite(error)
@@ -104,7 +134,7 @@ class Intervals:
             low, high = np.quantile(rows @ weights[name], [_FIRMEST, _SOFTEST])
             bounds[name] = (float(low), float(high))
         several = features[features[:, _ONE_TAIL] < 0.5]
-        middle = np.quantile((several if len(several) else features)[:, _HALVED], 0.5, axis=0, method="lower")
+        middle = np.quantile((several if len(several) else features)[:, list(HALVED)], 0.5, axis=0, method="lower")
         plain = Intervals(shift, scale, weights, bounds, middle, {})
         return plain.calibrated(more_features, more_errors, more_couples)
 
@@ -123,22 +153,13 @@ class Intervals:
         groups = [~couples, couples]
         if min(map(np.count_nonzero, groups)) < _FEWEST:
             groups = [~couples | couples]
-        for name, error in errors.items():
-            known, scores = np.isfinite(error), np.abs(error) / self._local([name], features)[0]
+        local = replace(self, factor=dict.fromkeys(errors, np.ones(PARTS))).half_widths(list(errors), features)
+        for (name, error), size in zip(errors.items(), local, strict=True):
+            known, scores = np.isfinite(error), np.abs(error) / size
             cells = [[group & (part == k) & known, group & known, known] for group in groups for k in range(PARTS)]
             pools = [next((c for c in cell if c.sum() >= _FEWEST), known) for cell in cells]
             factor[name] = np.array([_conformal_quantile(scores[pool]) for pool in pools])
         return replace(self, factor=factor)
-
-
-def _design(x: Floats) -> Floats:
-    """Assemble 1, x and all products of two, (M, P), with x held to five standard deviations."""
-    x = np.clip(x.T, -5, 5)
-    first, second = _pairs(len(x))
-    return np.concatenate([np.ones((1, x.shape[1])), x, x[first] * x[second]]).T
-
-
-_pairs = cache(np.triu_indices)
 
 
 def _conformal_quantile(scores: Floats) -> float:

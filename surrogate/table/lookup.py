@@ -16,16 +16,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sim.arrays import Floats, Integers
+from sim.arrays import Flags, Floats, Integers
 from sim.effects import catalogue
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.io.notebook import as_html, given_axes
-from sim.mechanics import planar
 from sim.model.groups import DWELL, checked_values
 from sim.model.response import DWELLS, Responses
 from sim.motion.net_speed import net_speeds, twists
@@ -35,15 +34,22 @@ from surrogate.input_ranges import ROBOT
 from surrogate.interface import ErrorModes, OutsideError
 from surrogate.networks.ensemble import Ensemble
 from surrogate.table.curve_errors import CURVE_ERRORS, NORMAL_90, CurveErrors
-from surrogate.table.errors import RELATIVE, RESPONSE_OUTPUTS, error_scale
+from surrogate.table.errors import OUTPUTS, RELATIVE, error_scale
 from surrogate.table.intervals import Intervals
 from surrogate.table.outside import INSIDE, NO_RESPONSE, NOT_LEARNED, reason_of
-from surrogate.table.response_table import ResponseTable, curve_speeds
+from surrogate.table.response_table import ResponseTable, flip_inputs
 from surrogate.table.support import Support
 from surrogate.table.tensor_file import digest, write
-from surrogate.table.wrench_table import WrenchTable, motion_sensitivity, network_index, rows_by_network
-from surrogate.wrench.heads import Heads, needs_no_learning, packed_robots, unpack_robots
-from surrogate.wrench.tails import Tails, network_inputs, wrench_slopes
+from surrogate.table.wrench_table import (
+    SPREAD,
+    TINY_SPREAD,
+    WrenchTable,
+    motion_sensitivity,
+    network_index,
+    rows_by_network,
+)
+from surrogate.wrench.heads import COUPLE, NUMBER, SENSE, needs_no_learning, packed_robots, unpack_robots
+from surrogate.wrench.tails import network_inputs, wrench_slopes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,16 +62,26 @@ _DIFFERENCE = 1e-4  # of an input, relative, for derivatives
 _NOT_OF_HEAD = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
 
 
-class Motions(NamedTuple):
+@dataclass(frozen=True)
+class Motions:
     """What a query works with, for M robots."""
 
-    heads: Heads
-    tails: Tails
+    robots: Floats  # (M, 39), see `surrogate.wrench.heads.pack_robots`
     motion: Floats  # (M, 5): (v_x of J, v_z, ω_yr, ω_h, ω_t), for a positive motor
     inputs: Floats  # (M, 7) of the networks, see `surrogate.wrench.tails.tail_inputs`
-    novelty: Floats  # (M,), see `surrogate.table.support`
+    features: Floats  # (M, 11): inputs, ln novelty, ln spread of the members, ln N, whether N = 1
     outside: Integers  # (M,), see `surrogate.table.outside`
-    steady: dict[str, Any]  # STEADY_OUTPUTS, (M,) each
+    outputs: Floats  # OUTPUTS, (12, M); NaN of a flip before there was one
+
+    @property
+    def steady(self) -> dict[str, Floats]:
+        """STEADY_OUTPUTS, (M,) each."""
+        return dict(zip(STEADY_OUTPUTS, self.outputs, strict=False))
+
+    @property
+    def couples(self) -> Flags:
+        """Which robots have a couple in yaw from the spin of their tails, (M,)."""
+        return np.asarray(self.robots[:, COUPLE] != 0)
 
 
 @dataclass(frozen=True, repr=False)
@@ -119,10 +135,11 @@ class NeuralTable:
             if wrong:
                 self._check_known(values, motions, flag=flag)  # a robot outside is refused before a dwell is
                 raise InputError(wrong)
-            result |= self._flips(motions, np.broadcast_to(dwells, values["N"].shape))
+            self.curves.put_flips(motions, np.broadcast_to(dwells, values["N"].shape))
+            result = dict(zip(OUTPUTS, motions.outputs, strict=True))
         self._check_known(values, motions, flag=flag)
         if intervals:
-            result |= self._intervals(motions, result)
+            result |= self._ends(motions, result)
         if flag:
             result[OUTSIDE] = motions.outside != INSIDE
         if certify:
@@ -141,10 +158,13 @@ class NeuralTable:
         values = check_columns(columns)
         _check_flips(values)
         motions = self.solve(values)
-        curves = self.curves.curves(motions.heads, motions.tails, motions.motion, motions.inputs)
-        self._mark_unlearned(motions, curves["lag"])
+        curves = self.curves.curves(motions.robots, motions.motion, motions.inputs)
+        unknown = ~np.isfinite(curves["lag"]).all((1, 2)) & (motions.outside == INSIDE)
+        motions.outside[unknown] = NO_RESPONSE
         self._check_known(values, motions, flag=flag)
-        speed = net_speeds(_twists(motions), curves["lag"], curves["memory"])
+        steady, sense = motions.steady, motions.robots[:, SENSE]
+        twist = twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], sense)
+        speed = net_speeds(twist, curves["lag"], curves["memory"])
         none = np.zeros(len(speed), dtype=bool)
         return Responses(**curves, net_speed=speed, failed=none, stepped=none)
 
@@ -156,9 +176,9 @@ class NeuralTable:
         motion = {name: float(values[0]) for name, values in motions.steady.items()}
         if self.intervals is None or self.curve_errors is None:
             return error_modes(self.errors, motion)
-        ends = self._intervals(motions, motions.steady)
+        ends = self._ends(motions, motions.steady)
         sizes = [float(ends[f"{name}_high"][0] - ends[f"{name}_low"][0]) / (2 * NORMAL_90) for name in STEADY]
-        speeds = curve_speeds(motions.heads, motions.motion)
+        _, speeds = flip_inputs(motions.robots, motions.motion, motions.inputs)
         curves = self.curve_errors.modes(self.width_features(motions), speeds)
         own = [self.curve_errors.simulator * float(error_scale(name, motion)) for name in STEADY]
         return joined(np.diag(np.hypot(sizes, own)), curves)
@@ -201,7 +221,9 @@ class NeuralTable:
             repeated[name][(2 * k + 1) * count : (2 * k + 2) * count] -= widths[name]
         values = checked_values({name: array for name, array in repeated.items() if name != DWELL})
         motions = self.solve(values)
-        answers = {**motions.steady, **(self._flips(motions, repeated[DWELL]) if DWELL in repeated else {})}
+        if DWELL in repeated:
+            self.curves.put_flips(motions, repeated[DWELL])
+        answers = dict(zip(OUTPUTS if DWELL in repeated else STEADY_OUTPUTS, motions.outputs, strict=False))
         slopes: dict[str, dict[str, Floats]] = {}
         for output, values in answers.items():
             pairs = values.reshape(len(parameters), 2, count)
@@ -253,73 +275,50 @@ class NeuralTable:
         """Return the motion of checked robots (`sim.inputs.check_columns`), known to the table or not."""
         from surrogate.table.loops import motions_of
 
-        robots, sizes = packed_robots(values), np.array([values[name] for name in _NOT_OF_HEAD]).T.copy()
-        parts = []
+        (groups, robots), parts = packed_robots(values), []
         for k, rows in rows_by_network(network_index(values["N"])):
             network, support, own = self.tails.wrench[k], self.support[k], robots[rows]
             if network is None or support is None:
-                unknown, none = np.full(len(own), NOT_LEARNED), np.full((len(own), 8), np.nan)
-                parts.append((rows, none[:, :5], none[:, :7], none[:, 0], unknown, none))
+                unknown, none = np.full(len(own), NOT_LEARNED), np.full((len(own), 12), np.nan)
+                parts.append((rows, none[:, :5], none[:, :7], 0 * own[:, :11], unknown, none.T))
             else:
                 numbers = (*network.layers, *self.tails.gap.layers, *support.numbers, self._limits)
-                parts.append((rows, *motions_of(*numbers, sizes[rows], own)))
-        motion, inputs, novelty, outside, outputs = parts[0][1:] if len(parts) == 1 else _joined(parts)
-        steady = dict(zip(STEADY_OUTPUTS, outputs.T, strict=True))
-        return Motions(*unpack_robots(robots), motion, inputs, novelty, outside, steady)
+                parts.append((rows, *motions_of(*numbers, groups[rows], own)))
+        return Motions(robots, *(parts[0][1:] if len(parts) == 1 else _joined(parts)))
 
     @cached_property
     def _limits(self) -> Floats:
-        """Least and greatest ω̄, l/R, l/r0 and a/R, (2, 4)."""
-        return np.ascontiguousarray(
-            np.array([self.ranges[name] for name in _NOT_OF_HEAD]).T * [[1 - 1e-9], [1 + 1e-9]]
-        )
-
-    @np.errstate(all="ignore")
-    def _flips(self, motions: Motions, dwells: Floats) -> dict[str, Floats]:
-        """Return RESPONSE_OUTPUTS at equal dwells (M,); mark robots whose response was not learned."""
-        lag = self.curves.lags(motions.heads, motions.tails, motions.motion, motions.inputs, dwells)
-        self._mark_unlearned(motions, lag)
-        speed = planar.net_speed(_twists(motions), lag, dwells)
-        return dict(zip(RESPONSE_OUTPUTS, (speed, *lag.T[::-1]), strict=True))
-
-    @staticmethod
-    def _mark_unlearned(motions: Motions, lag: Floats) -> None:
-        unknown = ~np.isfinite(lag).reshape(len(lag), -1).all(1) & (motions.outside == INSIDE)
-        motions.outside[unknown] = NO_RESPONSE
+        """Least and greatest size of each of ROBOT, (2, 9); only those of the tails and the motor have a limit."""
+        ends = [self.ranges[name] if name in _NOT_OF_HEAD else (0.0, np.inf) for name in ROBOT]
+        return np.ascontiguousarray(np.array(ends).T * [[1 - 1e-9], [1 + 1e-9]])
 
     def _check_known(self, values: Mapping[str, Floats], motions: Motions, *, flag: bool = False) -> None:
         """Refuse the first robot that is outside, unless such robots are flagged."""
         if not flag and motions.outside.any():
             row = int(np.flatnonzero(motions.outside)[0])
-            reason = reason_of(motions.outside[row], motions.tails.number[row], motions.motion[row, 2])
+            reason = reason_of(motions.outside[row], values["N"][row], motions.motion[row, 2])
             raise self._refusal(values, row, reason)
 
     def width_features(self, motions: Motions) -> Floats:
-        """Return what the width of an interval may depend on, (M, 11)."""
-        tails, spread = motions.tails, np.zeros(len(motions.motion))
-        kind = network_index(tails.number)
-        for k, rows in rows_by_network(kind):
-            network = self.tails.wrench[k]
-            if network is not None and network.shape["members"] > 1:
-                own, motion = tails.at(rows), motions.motion[rows]
-                weight = motion_sensitivity(motions.heads.at(rows), own, motion) @ wrench_slopes(own, motion)
-                members = network.members_at(network_inputs(own, motion, network.shape["inputs"]))
+        """Return what the width of an interval may depend on, (M, 11), with the spread of the members."""
+        several = [network is not None and len(network.bypass) > 1 for network in self.tails.wrench]
+        for k, rows in rows_by_network(network_index(motions.robots[:, NUMBER])) if any(several) else ():
+            network, motion = self.tails.wrench[k], motions.motion[rows]
+            if network is not None and several[k]:
+                heads, tails = unpack_robots(motions.robots[rows])
+                weight = motion_sensitivity(heads, tails, motion) @ wrench_slopes(tails, motion)
+                members = network.members_at(network_inputs(tails, motion, network.shape["inputs"]))
                 apart = (weight @ (members - members.mean(0))[..., None])[..., 0]
-                spread[rows] = np.linalg.norm(apart, axis=-1).mean(0)
-        extra = [np.log(motions.novelty + 1e-12), np.log(spread + 1e-9), np.log(tails.number), kind == 0]
-        return np.nan_to_num(np.column_stack([motions.inputs, *extra]))
+                spread = np.linalg.norm(apart, axis=-1).mean(0)
+                motions.features[rows, SPREAD] = np.nan_to_num(np.log(spread + TINY_SPREAD))
+        return motions.features
 
-    @np.errstate(all="ignore")
-    def _intervals(self, motions: Motions, result: Mapping[str, Floats]) -> dict[str, Floats]:
+    def _ends(self, motions: Motions, result: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Return the ends of the intervals of a result."""
         if self.intervals is None:
             raise InputError("this look-up table has no intervals; train it again")
-        names = [name for name in result if name in self.intervals.factor]
-        half = self.intervals.half_widths(names, self.width_features(motions), motions.heads.couples)
-        values = np.array([result[name] for name in names])
-        scales = np.array([np.broadcast_to(error_scale(name, result), values.shape[1:]) for name in names])
-        half = np.where(np.isfinite(values), half * scales, 0.0)
-        low = zip([f"{name}_low" for name in names], values - half, strict=True)
-        return {**dict(low), **dict(zip([f"{name}_high" for name in names], values + half, strict=True))}
+        ends = self.intervals.ends(self.width_features(motions), motions.couples, motions.outputs)
+        return {name: end for name, end in ends.items() if name.rpartition("_")[0] in result}
 
     def _refusal(self, values: Mapping[str, Floats], row: int, reason: str) -> OutsideError:
         words = ""
@@ -337,14 +336,10 @@ class NeuralTable:
 
 
 def _joined(parts: Sequence[tuple[Any, ...]]) -> list[Any]:
-    """Join parts of M robots, each with its rows first, in the order of the rows."""
-    order = np.argsort(np.concatenate([rows for rows, *_ in parts]))
-    return [np.concatenate(own)[order] for own in list(zip(*parts, strict=True))[1:]]
-
-
-def _twists(motions: Motions) -> Floats:
-    steady = motions.steady
-    return twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], motions.heads.sense)
+    """Join parts of M robots, each with its rows first and its outputs last, in the order of the rows."""
+    rows, *columns, outputs = zip(*parts, strict=True)
+    order = np.argsort(np.concatenate(rows))
+    return [*(np.concatenate(own)[order] for own in columns), np.concatenate(outputs, 1)[:, order]]
 
 
 def _medians(errors: Mapping[str, Mapping[str, float]]) -> str:
@@ -357,8 +352,8 @@ def _medians(errors: Mapping[str, Mapping[str, float]]) -> str:
 
 def _check_flips(values: Mapping[str, Floats]) -> None:
     """Refuse robots whose response to a flip was not learned."""
-    for name, size in values.items():
-        if name in catalogue() and catalogue()[name].symmetry == "odd" and size.any():
+    for name in values.keys() - ROBOT:
+        if catalogue()[name].symmetry == "odd" and values[name].any():
             raise InputError(
                 f"{name} makes left and right turns differ, which the look-up table has not learned; make the "
                 "robot a table of its own: softflagella surrogate robot ROBOT.toml --out TABLE.json"

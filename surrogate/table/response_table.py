@@ -20,15 +20,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from sim.arrays import Floats
 from sim.model.response import BEFORE, DWELLS, at_equal_dwells
 from surrogate.networks.ensemble import Ensemble
-from surrogate.wrench.heads import Heads
-from surrogate.wrench.tails import Tails
+from surrogate.wrench.heads import NUMBER
+
+if TYPE_CHECKING:
+    from surrogate.table.lookup import Motions
 
 SHAPES = {
     "lag": (len(DWELLS), 3),
@@ -37,8 +39,9 @@ SHAPES = {
     "spread": (len(DWELLS), 3),
 }
 PARTS = (("lag",), ("memory", "rest"), ("spread",))  # what each network gives
-_SMALL_SURGE = 0.1  # of v_x
-_OF_HEAD = [0, 1, 2, 3, 5, 6]  # of the inputs of the head: all but the coupling of sway and turn
+SMALL_SURGE = 0.1  # of v_x
+OF_HEAD = (0, 1, 2, 3, 5, 6)  # of the inputs of the head: all but the coupling of sway and turn
+_KNOTS = np.log(DWELLS)
 
 
 class Basis(NamedTuple):
@@ -55,20 +58,25 @@ class ResponseTable:
     networks: tuple[Ensemble, ...]  # one for each of PARTS
     bases: Mapping[str, Basis]
 
-    def curves(self, heads: Heads, tails: Tails, motion: Floats, inputs: Floats) -> dict[str, Floats]:
+    def curves(self, robots: Floats, motion: Floats, inputs: Floats) -> dict[str, Floats]:
         """Return lag, memory, rest and spread, each (M, …, 3) as in SHAPES, in l, l, rad, for a positive motor."""
-        speeds, curves = curve_speeds(heads, motion), {}
-        for name, components in self._components(tails, inputs).items():
-            curve = self.bases[name].mean + components @ self.bases[name].vectors
-            if name == "spread":  # its logarithm was learned, of robots with two tails
-                curve = np.exp(np.where((tails.number == 2)[:, None], np.minimum(curve, 0.0), -np.inf))
-            curves[name] = curve.reshape(-1, *SHAPES[name]) * along_axes(speeds, SHAPES[name])
+        x, speeds = flip_inputs(robots, motion, inputs)
+        curves = {}
+        for names, network in zip(PARTS, self.networks, strict=True):
+            answer, first = network(x), 0
+            for name in names:
+                basis = self.bases[name]
+                end = first + len(basis.vectors)
+                curve = basis.mean + answer[:, first:end] @ basis.vectors
+                if name == "spread":  # its logarithm was learned, of robots with two tails
+                    curve = np.exp(np.where(robots[:, NUMBER, None] == 2, np.minimum(curve, 0.0), -np.inf))
+                curves[name], first = curve.reshape(-1, *SHAPES[name]) * along_axes(speeds, SHAPES[name]), end
         curves["spread"] = np.abs(curves["spread"])
         return curves
 
-    def lags(self, heads: Heads, tails: Tails, motion: Floats, inputs: Floats, dwells: Floats) -> Floats:
-        """Return lags at equal dwells (M,), for a positive motor, (M, 3); NaN where none was learned."""
-        return lags_at_equal_dwells(self.networks[:2], self.equal_dwells, heads, tails, motion, inputs, dwells)
+    def put_flips(self, motions: Motions, dwells: Floats) -> None:
+        """Write the response at equal dwells (M,) into the outputs of motions; NaN where none was learned."""
+        put_flips(self.networks[:2], self.equal_dwells, motions, dwells)
 
     @cached_property
     def equal_dwells(self) -> Basis:
@@ -77,77 +85,42 @@ class ResponseTable:
         mean = lag.mean + memory_at_equal_dwells(memory.mean[None])[0]
         return Basis(mean, np.concatenate([lag.vectors, memory_at_equal_dwells(memory.vectors)]))
 
-    def _components(self, tails: Tails, inputs: Floats) -> dict[str, Floats]:
-        """Return the components of each kind of curve, (M, C)."""
-        inputs, components = response_inputs(tails, inputs), {}
-        for names, network in zip(PARTS, self.networks, strict=True):
-            answer, first = network(inputs), 0
-            for name in names:
-                end = first + len(self.bases[name].vectors)
-                components[name], first = answer[:, first:end], end
-        return components
-
 
 def memory_at_equal_dwells(flat: Floats) -> Floats:
     """Return memories (C, K D 3) where the dwell before is as long as the dwell, (C, D 3)."""
     return at_equal_dwells(flat.reshape(-1, *SHAPES["memory"])).reshape(len(flat), -1)
 
 
-def response_inputs(tails: Tails, inputs: Floats) -> Floats:
-    """Return inputs of the network, (M, 15), from `surrogate.wrench.tails.INPUTS` (M, 7)."""
-    two = (tails.number == 2).astype(float)
-    return np.column_stack([inputs, tails.head[:, _OF_HEAD], np.log(tails.number), two])
+def flip_inputs(robots: Floats, motion: Floats, inputs: Floats) -> tuple[Floats, Floats]:
+    """Return inputs of the networks (M, 15), and (w, v_x, ω_yr), what the curves are divided by, (M, 3).
+
+    Args:
+        robots: (M, 39), see `surrogate.wrench.heads.pack_robots`.
+        motion: (M, 5).
+        inputs: `surrogate.wrench.tails.INPUTS`, (M, 7).
+    """
+    from surrogate.table.loops import flip_inputs_of
+
+    found: tuple[Floats, Floats] = flip_inputs_of(robots, motion, inputs)
+    return found
 
 
-def curve_speeds(heads: Heads, motion: Floats) -> Floats:
-    """Return (w, v_x, ω_yr) of the head's centre, (M, 3): what the curves are divided by."""
-    v_x, v_z, yaw = motion[:, 0], motion[:, 1], motion[:, 2]
-    sway = v_x + yaw * heads.length / 2
-    return np.column_stack([np.hypot(v_z, _SMALL_SURGE * sway), sway, yaw])
+def put_flips(networks: Sequence[Ensemble], basis: Basis, motions: Motions, dwells: Floats) -> None:
+    """Write the response at equal dwells, one a robot (M,), into the outputs of their motions.
+
+    Args:
+        networks: of lag and memory, the memory without or with what else its network gives.
+        basis: of the lag, then of the memory where the dwell before is as long.
+        motions: of M robots.
+        dwells: (M,).
+    """
+    from surrogate.table.loops import put_flips as put
+
+    (lag, memory), own = networks, (motions.robots, motions.motion, motions.inputs)
+    numbers = (*lag.layers, *memory.layers, *basis, lag.shape["outputs"], _KNOTS)
+    put(*numbers, *own, np.ascontiguousarray(dwells, dtype=float), motions.outside, motions.outputs)
 
 
 def along_axes(speeds: Floats, shape: tuple[int, ...]) -> Floats:
     """Return speeds (M, 3) with axes of length 1 between, to multiply curves (M, *shape)."""
     return speeds.reshape(len(speeds), *[1] * (len(shape) - 1), 3)
-
-
-def lags_at_equal_dwells(
-    networks: Sequence[Ensemble],
-    basis: Basis,
-    heads: Heads,
-    tails: Tails,
-    motion: Floats,
-    inputs: Floats,
-    dwells: Floats,
-) -> Floats:
-    """Return lags at equal dwells, one a robot (M,), for a positive motor, (M, 3).
-
-    Args:
-        networks: of lag and memory, the memory without or with what else its network gives.
-        basis: of the lag, then of the memory where the dwell before is as long.
-        heads, tails, motion, inputs: M robots, their motions (M, 5), and `surrogate.wrench.tails.INPUTS` (M, 7).
-        dwells: (M,).
-    """
-    inputs = response_inputs(tails, inputs)
-    components = np.concatenate([network(inputs) for network in networks], 1)[:, : len(basis.vectors)]
-    curves = (basis.mean + components @ basis.vectors).reshape(-1, *SHAPES["lag"])
-    return between_dwells(curves, dwells) * curve_speeds(heads, motion)
-
-
-_KNOTS = np.log(DWELLS)
-_NEAR = np.arange(4)
-_APART = [
-    np.prod([_KNOTS[i + k] - _KNOTS[i + j] for j in range(4) if j != k])
-    for i in range(len(DWELLS) - 3)
-    for k in range(4)
-]
-
-
-def between_dwells(curves: Floats, dwells: Floats) -> Floats:
-    """Interpolate curves (M, D, 3), one dwell a row (M,): cubic in ln T̄ through four knots, then constant."""
-    place = np.log(np.minimum(dwells, DWELLS[-1]))
-    first = np.clip(np.searchsorted(_KNOTS, place) - 2, 0, len(_KNOTS) - 4)
-    near = first[:, None] + _NEAR
-    a, b, c, d = (place[:, None] - _KNOTS[near]).T
-    weights = np.array([b * c * d, a * c * d, a * b * d, a * b * c]).T / np.reshape(_APART, (-1, 4))[first]
-    return np.einsum("mk,mka->ma", weights, curves[np.arange(len(near))[:, None], near])

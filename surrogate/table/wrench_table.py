@@ -17,6 +17,7 @@ from surrogate.wrench.tails import INPUTS, SINGLE_INPUTS, Tails, linear_torque
 
 CLASSES = (1, 2, 3)  # networks for N = 1, N = 2, and three or more tails
 INPUT_COUNTS = (len(SINGLE_INPUTS), len(INPUTS), len(INPUTS))  # of these networks
+SPREAD, TINY_SPREAD = 8, 1e-9  # the spread of the members among what widths depend on, as a logarithm
 _LEAST_SURGE = 0.05  # of the speed: errors of v_z are relative to this at least
 
 

@@ -19,10 +19,9 @@ from surrogate.table.response_table import (
     Basis,
     ResponseTable,
     along_axes,
-    curve_speeds,
-    response_inputs,
+    flip_inputs,
 )
-from surrogate.wrench.heads import Heads
+from surrogate.wrench.heads import Heads, pack_robots
 from surrogate.wrench.tails import Tails, tail_inputs
 
 COMPONENTS = {"lag": 32, "memory": 32, "rest": 32, "spread": 8}
@@ -55,7 +54,7 @@ def fit_part(
     work: TrainingContext,
 ) -> tuple[Ensemble, dict[str, Basis]]:
     """Fit the network of some curves, one of PARTS, and their bases; see `fit_response`."""
-    inputs, speeds = response_inputs(tails, tail_inputs(tails, motion)), curve_speeds(heads, motion)
+    inputs, speeds = flip_inputs(pack_robots(heads, tails), motion, tail_inputs(tails, motion))
     known = np.all([np.isfinite(curves[n]).reshape(len(inputs), -1).all(1) for n in names], axis=0)
     if "spread" in names and (known & (tails.number == 2)).any():
         known &= tails.number == 2

@@ -94,7 +94,7 @@ def model_card(lookup: NeuralTable, held_out: SimulatedRobots) -> str:
 
 def _kinds(held_out: SimulatedRobots) -> dict[str, Flags]:
     """Return which robots are of a kind."""
-    plain, couples = without_effects(held_out.robots), heads_and_tails(held_out.robots)[0].couples
+    plain, couples = without_effects(held_out.robots), heads_and_tails(held_out.robots)[0].resistance[:, 2, 4] != 0
     single, apart = held_out.robots["N"] == 1, held_out.motion["tail_gap"] >= 1
     return {
         "N ≥ 2": plain & ~single & apart,

@@ -14,7 +14,7 @@ from surrogate.one_robot.tabulate import TOLERANCE
 from surrogate.table.curve_errors import KINDS, CurveErrors
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.outside import INSIDE
-from surrogate.table.response_table import SHAPES, along_axes, curve_speeds
+from surrogate.table.response_table import SHAPES, along_axes, flip_inputs
 from surrogate.training.simulated import SimulatedRobots, draw_robots, simulate_robots
 
 _FEWEST_FLIPS = 200  # robots, for the covariance of the errors of the response
@@ -33,7 +33,7 @@ def held_out_curve_errors(lookup: NeuralTable, flips: SimulatedRobots) -> CurveE
     if known.sum() < _FEWEST_FLIPS:
         return None
     response = lookup.response(flips.robots, flag=True)
-    speeds = curve_speeds(motions.heads, motions.motion)
+    _, speeds = flip_inputs(motions.robots, motions.motion, motions.inputs)
     errors = {
         kind: ((getattr(response, kind) - flips.curves[kind]) / along_axes(speeds, SHAPES[kind]))[known]
         for kind in KINDS

@@ -295,7 +295,7 @@ def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[Floats, dict[st
     return (
         lookup.width_features(motions)[inside],
         {name: error[inside] for name, error in errors.items()},
-        motions.heads.couples[inside],
+        motions.couples[inside],
         inside,
     )
 

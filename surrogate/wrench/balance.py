@@ -236,7 +236,7 @@ def _solve(network: Layers, robots: Floats, motion: Floats, found: Flags) -> Non
                     _update(inverse[row], step[row], before, left[row], room)
                 size = _take_step(robots[row], motion[row], left[row], inverse[row], step[row])
                 found[row] = size < ACCEPTED
-                if size >= CORRECTION and np.isfinite(size):
+                if CORRECTION <= size < np.inf:
                     going[remaining] = row
                     remaining += 1
         going = going[:remaining]

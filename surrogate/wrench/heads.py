@@ -32,6 +32,8 @@ Numbers = Callable[[Tails, Floats], Floats]  # tails and motion (M, 5) -> y (M, 
 # A robot for the compiled loops: |ω|, gain, resistance (20), L and sense of the head; then the tails, as packed.
 RESISTANCE, HEAD_LENGTH, SENSE, HEAD_NUMBERS = 2, 22, 23, 24
 ROBOT_NUMBERS = HEAD_NUMBERS + TAIL_NUMBERS
+COUPLE = RESISTANCE + 5 * 2 + 4  # in yaw, of the tails' spin
+NUMBER = HEAD_NUMBERS + Tails._fields.index("number")
 
 _ON_TAILS = ("tail_sag",)  # local, but on the tails
 _SENSES = np.array([-1.0, 1.0, -1.0, -1.0, -1.0])  # mirror image of (v_x, v_z, ω_yr, ω_h, ω_t)
@@ -45,11 +47,6 @@ class Heads(NamedTuple):
     resistance: Floats  # (M, 4, 5)
     length: Floats  # (M,) L
     sense: Floats  # (M,) sign of ω
-
-    @property
-    def couples(self) -> Flags:
-        """Which robots have a couple in yaw from the spin of their tails, (M,)."""
-        return np.asarray(self.resistance[:, 2, 4] != 0)
 
     def at(self, rows: Integers | Flags | slice) -> Heads:
         """Return the heads of the robots at indices, flags or a slice (M',)."""
@@ -73,18 +70,18 @@ def unpack_robots(robots: Floats) -> tuple[Heads, Tails]:
     return Heads(head[0], head[1], resistance, head[HEAD_LENGTH], head[SENSE]), Tails(*[*tail[:6], tail[6:].T])
 
 
-def packed_robots(columns: Mapping[str, Floats]) -> Floats:
-    """Return robots by column name, each (M,), for the compiled loops, (M, ROBOT_NUMBERS).
+def packed_robots(columns: Mapping[str, Floats]) -> tuple[Floats, Floats]:
+    """Return robots by column name, each (M,), for the compiled loops: groups (M, 9), and (M, ROBOT_NUMBERS).
 
     Raises:
         InputError: an effect changes the tails themselves.
     """
+    groups = np.array([columns[name] for name in ROBOT]).T.copy()
     if any(size.any() for name, size in columns.items() if name not in ROBOT):
-        return pack_robots(*heads_and_tails(columns))
+        return groups, pack_robots(*heads_and_tails(columns))
     from surrogate.wrench.balance import robots_of_groups
 
-    robots: Floats = robots_of_groups(np.array([columns[name] for name in ROBOT]).T.copy())
-    return robots
+    return groups, robots_of_groups(groups)
 
 
 def heads_and_tails(columns: Mapping[str, Floats]) -> tuple[Heads, Tails]:

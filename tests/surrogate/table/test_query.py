@@ -20,7 +20,6 @@ from surrogate.table.certify import certified_error
 from surrogate.table.intervals import PARTS
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
-from surrogate.table.response_table import between_dwells
 from surrogate.training.simulated import draw_robots
 from surrogate.wrench.heads import needs_no_learning
 from tests.oracles.query import answer
@@ -278,14 +277,6 @@ def test_responses_are_curves_that_end_constant() -> None:
     assert (found.spread >= 0).all()
     assert np.isfinite(found.net_speed).all()
     assert found.lag.shape == (len(robots["N"]), len(DWELLS), 3)
-
-
-def test_between_the_dwells_of_a_table_lags_are_smooth() -> None:
-    curve = np.stack([np.exp(-DWELLS), np.sin(DWELLS), np.log(DWELLS)], -1)[None]
-    times = np.geomspace(0.2, 2.0, 200)
-    found = between_dwells(np.repeat(curve, 200, 0), times)
-    assert np.allclose(found, np.stack([np.exp(-times), np.sin(times), np.log(times)], -1), atol=2e-3)
-    assert np.allclose(between_dwells(curve, np.array([50.0])), curve[:, -1])
 
 
 def test_odd_effects_and_short_dwells_have_no_learned_response() -> None:
