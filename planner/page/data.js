@@ -8,7 +8,10 @@ const LETTERS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!
 /* Read what `packed_data` has written, from the object that its JSON stands for. */
 async function readData({ numbers, ...plain }) {
   const byPlace = new Uint8Array(await inflated(numbers).arrayBuffer()), count = byPlace.length / 8;
-  const bytes = Uint8Array.from(byPlace, (_, i) => byPlace[(i % 8) * count + (i >> 3)]);
+  const bytes = new Uint8Array(8 * count);
+  for (let place = 0; place < 8; place++) {
+    for (let i = 0; i < count; i++) bytes[8 * i + place] = byPlace[place * count + i];
+  }
   return withTensors(plain, new Float64Array(bytes.buffer));
 }
 

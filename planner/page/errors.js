@@ -140,25 +140,25 @@ function flipsBetween(count) {
 function statedError(growth, flips, predicted, seed = 0) {
   const { low, high, normal } = extremes(predicted, flips), last = low.length - 1, modes = growth.length;
   const z = normals(seed, DRAWS * modes), across = new Float64Array(modes * (last + 1));
-  const onward = growth.map(({ x, y }) => x[last + 1] * normal[last][1] - y[last + 1] * normal[last][0]);
+  const onward = Float64Array.from(growth, ({ x, y }) => x[last + 1] * normal[last][1] - y[last + 1] * normal[last][0]);
   growth.forEach(({ x, y }, p) => {
     normal.forEach(([aside, ahead], block) => {
       across[block * modes + p] = x[block + 1] * aside + y[block + 1] * ahead;
     });
   });
-  const product = (draw, values, block) => {
+  const product = (at, values, from) => {
     let total = 0;
-    for (let p = 0; p < modes; p++) total += z[draw * modes + p] * values[block * modes + p];
+    for (let p = 0; p < modes; p++) total += z[at + p] * values[from + p];
     return total;
   };
   const worst = new Float64Array(DRAWS).map((_, draw) => {
     let off = 0, most = 0;
     for (let block = 0; block <= last; block++) {
-      const aside = product(draw, across, block);
+      const aside = product(draw * modes, across, block * modes);
       off = Math.max(Math.abs(high[block] + aside), Math.abs(low[block] + aside));
       most = Math.max(most, off);
     }
-    const beyond = predicted.closed ? 0 : Math.max(product(draw, onward, 0), 0); // past the end of an open path
+    const beyond = predicted.closed ? 0 : Math.max(product(draw * modes, onward, 0), 0); // past the end of an open path
     return Math.max(most, Math.hypot(off, beyond));
   });
   return quantile(worst.sort(), LEVEL) + WOBBLE;
@@ -171,7 +171,8 @@ function extremes({ signed, normal }, flips) {
     return signed.slice(flips[block] * samples, block === last - 1 ? undefined : end * samples);
   });
   return {
-    low: blocks.map((some) => Math.min(...some)), high: blocks.map((some) => Math.max(...some)),
+    low: Float64Array.from(blocks, (some) => Math.min(...some)),
+    high: Float64Array.from(blocks, (some) => Math.max(...some)),
     normal: flips.slice(1).map((end) => normal[end * samples]),
   };
 }

@@ -76,7 +76,7 @@ function unmeasuredModes(groups, table, vehicle) {
       return refusing(() => ({ ...motionOfOther(table, values), step }), () => edge);
     });
     const scale = sigma / (above.step - below.step || Infinity);
-    const slope = (one, other) => Array.from(one, (value, i) => scale * (value - other[i]));
+    const slope = (one, other) => Float64Array.from(one, (value, i) => scale * (value - other[i]));
     return {
       name: `coefficients: ${k + 1}`,
       twist: above.twist.map((twist, side) => slope(twist, below.twist[side])),

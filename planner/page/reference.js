@@ -104,73 +104,75 @@ function nearest(line, points) {
   const boxes = new Boxes(line), count = points.length;
   const distance = new Float64Array(count), segment = new Int32Array(count), share = new Float64Array(count);
   let last = 0;
-  points.forEach((point, i) => {
-    const least = boxes.leastGap(point, last);
-    last = segment[i] = boxes.firstWithin(point, least + TIE);
-    [distance[i], share[i]] = closest(line, last, point);
+  points.forEach(([x, y], i) => {
+    const square = boxes.leastSquare(x, y, last);
+    last = segment[i] = boxes.firstWithin(x, y, (Math.sqrt(square) + TIE) ** 2);
+    distance[i] = Math.sqrt(boxes.squareTo(last, x, y));
+    share[i] = boxes.share;
   });
   return { distance, segment, share };
 }
 
-/* The distance of a point from a segment, and the share of the segment where it is nearest. */
-function closest(line, segment, [x, y]) {
-  const [x0, y0] = line[segment], [x1, y1] = line[segment + 1];
-  const dx = x1 - x0, dy = y1 - y0, awayX = x - x0, awayY = y - y0;
-  const share = clip((awayX * dx + awayY * dy) / Math.max(dx * dx + dy * dy, 1e-300), 0, 1);
-  return [Math.hypot(awayX - share * dx, awayY - share * dy), share];
-}
-
-/* A tree of boxes: those of the lowest level hold RUN segments each, all others two boxes of the level below. */
+/* A tree of boxes around a polyline: those of the lowest level hold RUN segments each, all others two of the level below. */
 class Boxes {
   constructor(line) {
-    this.line = line;
+    this.x = column(line, 0);
+    this.y = column(line, 1);
     this.count = line.length - 1;
-    this.levels = [[]];
-    for (let first = 0; first < this.count; first += RUN) {
-      const some = line.slice(first, first + RUN + 1), x = column(some, 0), y = column(some, 1);
-      this.levels[0].push([smallest(x), largest(x), smallest(y), largest(y)]);
-    }
-    for (let below = this.levels[0]; below.length > 1; below = this.levels[this.levels.length - 1]) {
-      this.levels.push(below.filter((_, i) => i % 2 === 0).map(([left, right, low, high], i) => {
-        const other = below[2 * i + 1] ?? below[2 * i];
-        return [Math.min(left, other[0]), Math.max(right, other[1]), Math.min(low, other[2]), Math.max(high, other[3])];
+    const runs = Array.from({ length: Math.ceil(this.count / RUN) }, (_, i) => {
+      const x = this.x.subarray(i * RUN, (i + 1) * RUN + 1), y = this.y.subarray(i * RUN, (i + 1) * RUN + 1);
+      return [Math.min(...x), Math.max(...x), Math.min(...y), Math.max(...y)];
+    });
+    this.levels = [Float64Array.from(runs.flat())];
+    for (let below = this.levels[0]; below.length > 4; below = this.levels[this.levels.length - 1]) {
+      this.levels.push(Float64Array.from({ length: 4 * Math.ceil(below.length / 8) }, (_, at) => {
+        const one = 8 * (at >> 2) + (at & 3), other = one + 4 < below.length ? one + 4 : one;
+        return at & 1 ? Math.max(below[one], below[other]) : Math.min(below[one], below[other]);
       }));
     }
   }
 
-  /* The smallest distance of a point from any segment; `guess` is a segment that is probably near. */
-  leastGap(point, guess) {
-    let [least] = closest(this.line, guess, point);
-    this.visit(point, () => least, (segment) => {
-      least = Math.min(least, closest(this.line, segment, point)[0]);
-    });
+  /* The squared distance of a place from a segment; leaves the share of the segment where it is nearest. */
+  squareTo(segment, x, y) {
+    const fromX = this.x[segment], fromY = this.y[segment], dx = this.x[segment + 1] - fromX;
+    const dy = this.y[segment + 1] - fromY, square = dx * dx + dy * dy;
+    const along = square > 0 ? ((x - fromX) * dx + (y - fromY) * dy) / square : 0;
+    this.share = along < 0 ? 0 : along > 1 ? 1 : along;
+    const awayX = x - fromX - this.share * dx, awayY = y - fromY - this.share * dy;
+    return awayX * awayX + awayY * awayY;
+  }
+
+  /* The smallest squared distance from any segment; `guess` is a segment that is probably near. */
+  leastSquare(x, y, guess, level = this.levels.length - 1, i = 0, known = this.squareTo(guess, x, y)) {
+    let least = known;
+    if (!(this.squareOf(level, i, x, y) <= least)) return least;
+    if (level) {
+      least = this.leastSquare(x, y, guess, level - 1, 2 * i, least);
+      return 8 * i + 4 < this.levels[level - 1].length ? this.leastSquare(x, y, guess, level - 1, 2 * i + 1, least) : least;
+    }
+    const end = Math.min((i + 1) * RUN, this.count);
+    for (let segment = i * RUN; segment < end; segment++) least = Math.min(least, this.squareTo(segment, x, y));
     return least;
   }
 
-  /* The lowest number of a segment that is not further from a point than `reach`. */
-  firstWithin(point, reach) {
-    let first = -1;
-    this.visit(point, () => (first < 0 ? reach : -1), (segment) => {
-      if (first < 0 && closest(this.line, segment, point)[0] <= reach) first = segment;
-    });
-    return first;
+  /* The lowest number of a segment that is not further than the root of `reach`; −1: there is none. */
+  firstWithin(x, y, reach, level = this.levels.length - 1, i = 0) {
+    if (!(this.squareOf(level, i, x, y) <= reach)) return -1;
+    if (level) {
+      const first = this.firstWithin(x, y, reach, level - 1, 2 * i);
+      return first >= 0 || 8 * i + 4 >= this.levels[level - 1].length ? first
+        : this.firstWithin(x, y, reach, level - 1, 2 * i + 1);
+    }
+    const end = Math.min((i + 1) * RUN, this.count);
+    for (let segment = i * RUN; segment < end; segment++) if (this.squareTo(segment, x, y) <= reach) return segment;
+    return -1;
   }
 
-  /* Visit the segments in boxes that are within reach(), in rising order. */
-  visit([x, y], reach, seen) {
-    const stack = [[this.levels.length - 1, 0]];
-    while (stack.length) {
-      const [level, i] = stack.pop(), [left, right, low, high] = this.levels[level][i];
-      const away = Math.hypot(Math.max(left - x, x - right, 0), Math.max(low - y, y - high, 0));
-      if (!(away * (1 - 1e-12) <= reach())) continue;
-      if (level) {
-        if (2 * i + 1 < this.levels[level - 1].length) stack.push([level - 1, 2 * i + 1]);
-        stack.push([level - 1, 2 * i]);
-      } else {
-        const end = Math.min((i + 1) * RUN, this.count);
-        for (let segment = i * RUN; segment < end; segment++) seen(segment);
-      }
-    }
+  /* The squared distance of a place from a box, and a little less, for rounding. */
+  squareOf(level, i, x, y) {
+    const box = this.levels[level], at = 4 * i;
+    const awayX = Math.max(box[at] - x, x - box[at + 1], 0), awayY = Math.max(box[at + 2] - y, y - box[at + 3], 0);
+    return (awayX * awayX + awayY * awayY) * (1 - 1e-12);
   }
 }
 
