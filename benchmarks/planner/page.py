@@ -2,7 +2,7 @@
 
 Prints the size, the time from opening to the first plan, from lifting the pen to the plan of a drawn circle, and
 from a changed viscosity to the robot's motion. Medians over several openings. Writes pictures of the page on a
-laptop, on a telephone and in the dark into reports/; docs/page.png is that on a laptop.
+laptop, on a telephone and in the dark into reports/; docs/page*.png are these.
 
 Usage: python -m benchmarks page [TIMES]     (default 5)
 

@@ -5,7 +5,11 @@ import { showResults } from "./results.js";
 import { transformed } from "./corner_table.js";
 import { labValues } from "./state.js";
 
-const SAVES = ["plan.json", "plan.csv", "schedule.h", "tracker.h", "path.csv", "robot.toml", "plan.svg"];
+const SAVES = {
+  "schedule.h": "the dwells, for a microcontroller", "tracker.h": "the plan with feedback, for a microcontroller",
+  "plan.csv": "the dwells as a table", "plan.json": "all of the plan, for softflagella", "path.csv": "the path in cm",
+  "robot.toml": "the robot, for softflagella", "plan.svg": "this picture",
+};
 
 /* Fill the lists, and connect every control to the page. */
 function connect(page) {
@@ -67,6 +71,10 @@ function connectPath(page) {
     document.querySelector("[value=corners]").checked = true;
     page.mode("corners", true);
   });
+  byId("next").addEventListener("click", () => {
+    if (page.state.path.points) page.saveFile("schedule.h");
+    else byId("draw").click();
+  });
   byId("undo").addEventListener("click", () => page.step("undo"));
   byId("redo").addEventListener("click", () => page.step("redo"));
   byId("close").addEventListener("click", () => page.setPoints(page.editor.path.points, !page.drawn.closed));
@@ -112,7 +120,9 @@ function connectOptions(page) {
 
 function connectSaves(page) {
   byId("saves").append(
-    ...SAVES.map((name) => element("button", { type: "button", click: () => page.saveFile(name) }, name)),
+    ...Object.entries(SAVES).map(([name, title]) => {
+      return element("button", { type: "button", title, click: () => page.saveFile(name) }, name);
+    }),
   );
   byId("link").addEventListener("click", async () => {
     page.writeAddress();

@@ -115,6 +115,7 @@ class Page {
       const control = byId(key);
       if (control !== document.activeElement) control.value = options[key] ?? "";
     }
+    this.offerNext();
     byId("undo").disabled = this.history.past.length === 0;
     byId("redo").disabled = this.history.future.length === 0;
     if (!more) this.writeAddress();
@@ -143,7 +144,7 @@ class Page {
     if (answer.refusal) return;
     this.drawn = answer.answer;
     this.editor.take(answer.answer.corners);
-    byId("close").textContent = this.drawn.closed ? "Open path" : "Close path";
+    byId("close").textContent = this.drawn.closed ? "Part the ends" : "Join the ends";
     showCorners(byId("corner-table"), this.editor.path.points, (points) =>
       this.setPoints(points, this.drawn.closed),
     );
@@ -229,7 +230,7 @@ class Page {
     this.scale = chart(byId("strip"), {
       times: this.ends(),
       values: [...this.plan.dwells],
-      words: "dwells over time",
+      words: "dwell from flip to flip, over time",
       unit: "s",
       steps: true,
     });
@@ -386,10 +387,17 @@ class Page {
     if (this.history[way]()) this.refresh();
   }
 
+  /* Offer what most people do next. */
+  offerNext() {
+    const draw = this.editor.mode === "draw" ? "Draw one stroke in the picture" : "Draw your own path";
+    byId("next").textContent = this.state.path.points ? "Save the schedule" : draw;
+  }
+
   mode(name, anew = false) {
     this.editor.use(name, anew);
     byId("view").dataset.mode = name;
     say(byId("mode-words"), WORDS[name]);
+    this.offerNext();
     this.view.place();
   }
 }
