@@ -154,9 +154,7 @@ function headAndTails(robot) {
   const [parallel, perp] = tailCoefficients(robot.l_over_r0);
   const resistance = headResistance(robot.C_t, robot.C_r, robot.C_yr, radius, length);
   const gain = 1, offset = robot.a_over_R * radius;
-  const head = {
-    speed: Math.abs(robot.omega_bar), gain, resistance, length, sense: Math.sign(robot.omega_bar),
-  };
+  const head = { speed: Math.abs(robot.omega_bar), gain, resistance, length, sense: Math.sign(robot.omega_bar) };
   const tails = {
     perp, parallel, offset, radius: 1 / robot.l_over_r0, number,
     spinDrag: resistance[3][3], head: headInputs(resistance, length, gain, number * perp, offset),

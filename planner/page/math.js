@@ -133,9 +133,7 @@ function convolved(values, kernel) {
 /* The pose reached by `then`, given in the frame of `first`. */
 function compose(first, then) {
   const c = Math.cos(first[2]), s = Math.sin(first[2]);
-  return [
-    first[0] + (c * then[0] - s * then[1]), first[1] + (s * then[0] + c * then[1]), first[2] + then[2],
-  ];
+  return [first[0] + (c * then[0] - s * then[1]), first[1] + (s * then[0] + c * then[1]), first[2] + then[2]];
 }
 
 /* The pose that undoes a pose. */

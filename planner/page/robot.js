@@ -26,9 +26,7 @@ const DECIMAL_COMMA = /^[ \t]*[\w-]+[ \t]*=[ \t]*([+-]?\d{1,20}),(\d{1,20})[ \t]
 function makeRobot(fields) {
   const robot = { discOffset: null, sigmas: {}, ...fields }, ratio = robot.tailLength / robot.tailRadius;
   if (!(Number.isInteger(robot.tails) && robot.tails >= 1 && robot.tails <= MOST_TAILS)) {
-    throw new InputError(
-      `N = ${general(robot.tails)}; the number of tails is an integer from 1 to ${MOST_TAILS}`,
-    );
+    throw new InputError(`N = ${general(robot.tails)}; the number of tails is an integer from 1 to ${MOST_TAILS}`);
   }
   for (const [name, field] of Object.entries({ ...POSITIVE, disc_offset: "discOffset", C_yr: "C_yr" })) {
     const value = robot[field];

@@ -150,8 +150,7 @@ class TreeReader {
   /* What a <use> shows. */
   shown(own) {
     const link = own.href ?? own[XLINK] ?? "", element = this.named.get(link);
-    if (!element)
-      throw new InputError(`a <use> shows ${quoted(link)}, which is not in the drawing; remove it`);
+    if (!element) throw new InputError(`a <use> shows ${quoted(link)}, which is not in the drawing; remove it`);
     return element;
   }
 

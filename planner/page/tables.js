@@ -245,9 +245,7 @@ function rowsOf(lines, start, separator, where, most = Infinity) {
   for (let i = start; i < lines.length && rows.length < most; i++) {
     const line = separator === " " ? lines[i].trim().replace(BLANKS, (_, held) => held ?? "\t") : lines[i];
     const broken = (reason) =>
-      new InputError(
-        `${where} is no CSV table (line ${i + 1}: ${reason}); give a header and one row per line`,
-      );
+      new InputError(`${where} is no CSV table (line ${i + 1}: ${reason}); give a header and one row per line`);
     for (const sign of line) {
       if (state === "quoted") {
         if (sign === '"') state = "closed";
@@ -307,9 +305,7 @@ function columnNamed(where, table, axis) {
     throw new InputError(`${where}: ${columns.join(" and ")} are the same coordinate; drop all but one`);
   }
   if (!columns.length) {
-    throw new InputError(
-      `${where} has columns ${table.names.join(", ")}; give x and y, or with a unit x_mm, y_mm`,
-    );
+    throw new InputError(`${where} has columns ${table.names.join(", ")}; give x and y, or with a unit x_mm, y_mm`);
   }
   return columns[0];
 }

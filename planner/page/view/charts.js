@@ -8,23 +8,17 @@ const EDGE = { left: 46, right: 10, top: 10, bottom: 18 };
 
 /* Draw values over time as a line; `steps` holds each value until the next time. Return the pixel of a time. */
 function chart(svg, { times, values, words, unit, limit = null, steps = false }) {
-  const width = svg.clientWidth || 600,
-    height = svg.clientHeight || 64;
-  const first = times[0],
-    span = Math.max(times[times.length - 1] - first, 1e-12);
+  const width = svg.clientWidth || 600, height = svg.clientHeight || 64;
+  const first = times[0], span = Math.max(times[times.length - 1] - first, 1e-12);
   const high = Math.max(limit ?? 0, ...extremes(values)) || 1;
   const x = (time) => EDGE.left + ((width - EDGE.left - EDGE.right) * (time - first)) / span;
   const y = (value) => height - EDGE.bottom - ((height - EDGE.top - EDGE.bottom) * value) / high;
   const points = steps
-    ? values.flatMap((value, i) => [
-        [x(times[i]), y(value)],
-        [x(times[i + 1]), y(value)],
-      ])
+    ? values.flatMap((value, i) => [[x(times[i]), y(value)], [x(times[i + 1]), y(value)]])
     : values.map((value, i) => [x(times[i]), y(value)]);
   svg.replaceChildren(
     figure("path", {
-      class: "grid",
-      d: `M${EDGE.left},${y(0)}H${width - EDGE.right}M${EDGE.left},${y(high)}H${width - EDGE.right}`,
+      class: "grid", d: `M${EDGE.left},${y(0)}H${width - EDGE.right}M${EDGE.left},${y(high)}H${width - EDGE.right}`,
     }),
     figure("path", { class: "curve", d: lineData(points) }),
     figure("text", { x: EDGE.left - 4, y: y(high) + 4, "text-anchor": "end" }, digits(high, 2)),
@@ -34,9 +28,7 @@ function chart(svg, { times, values, words, unit, limit = null, steps = false })
   if (limit !== null)
     svg.append(
       figure("path", {
-        class: "now",
-        d: `M${EDGE.left},${y(limit)}H${width - EDGE.right}`,
-        "stroke-dasharray": "5 4",
+        class: "now", d: `M${EDGE.left},${y(limit)}H${width - EDGE.right}`, "stroke-dasharray": "5 4",
       }),
     );
   return x;
@@ -58,17 +50,12 @@ function marker(svg, x) {
 
 /* Draw stated error over time for several dwells; `take(dwell)` is called with the one that is chosen. */
 function tradeOff(rows, chosen, take) {
-  const width = 320,
-    height = 190;
+  const width = 320, height = 190;
   const svg = figure("svg", {
-    viewBox: `0 0 ${width} ${height}`,
-    role: "group",
-    "aria-label": "Stated error over time",
+    viewBox: `0 0 ${width} ${height}`, role: "group", "aria-label": "Stated error over time",
   });
-  const minutes = rows.map((row) => row.seconds / 60),
-    errors = rows.map((row) => row.stated);
-  const [low, high] = [0, Math.max(...minutes) * 1.05],
-    most = Math.max(...errors) * 1.1;
+  const minutes = rows.map((row) => row.seconds / 60), errors = rows.map((row) => row.stated);
+  const [low, high] = [0, Math.max(...minutes) * 1.05], most = Math.max(...errors) * 1.1;
   const x = (value) => 44 + ((width - 60) * (value - low)) / (high - low),
     y = (value) => height - 34 - ((height - 50) * value) / most;
   svg.append(
@@ -91,15 +78,8 @@ function tradeOff(rows, chosen, take) {
       figure(
         "circle",
         {
-          class: "dot",
-          cx: x(minutes[i]),
-          cy: y(errors[i]),
-          r: row.dwell === chosen ? 8 : 6,
-          tabindex: 0,
-          role: "button",
-          "aria-label": words,
-          click: choose,
-          keydown: key,
+          class: "dot", cx: x(minutes[i]), cy: y(errors[i]), r: row.dwell === chosen ? 8 : 6, tabindex: 0,
+          role: "button", "aria-label": words, click: choose, keydown: key,
         },
         figure("title", {}, words),
       ),

@@ -11,9 +11,7 @@ function showCorners(host, points, changed) {
     );
     return;
   }
-  const focused = host.contains(document.activeElement)
-    ? document.activeElement.getAttribute("aria-label")
-    : null;
+  const focused = host.contains(document.activeElement) ? document.activeElement.getAttribute("aria-label") : null;
   const rows = points.map((point, i) => row(points, i, changed));
   const add = () => changed([...points, after(points)]);
   host.replaceChildren(
@@ -27,9 +25,7 @@ function showCorners(host, points, changed) {
           "thead",
           {},
           element(
-            "tr",
-            {},
-            ...["corner", "x [cm]", "y [cm]", ""].map((words) => element("th", { scope: "col" }, words)),
+            "tr", {}, ...["corner", "x [cm]", "y [cm]", ""].map((words) => element("th", { scope: "col" }, words)),
           ),
         ),
         element("tbody", {}, ...rows),
@@ -38,9 +34,7 @@ function showCorners(host, points, changed) {
     element("button", { type: "button", click: add }, "Add a corner"),
   );
   if (focused)
-    [...host.querySelectorAll("[aria-label]")]
-      .find((node) => node.getAttribute("aria-label") === focused)
-      ?.focus();
+    [...host.querySelectorAll("[aria-label]")].find((node) => node.getAttribute("aria-label") === focused)?.focus();
 }
 
 function row(points, i, changed) {
@@ -53,16 +47,14 @@ function row(points, i, changed) {
     };
     const name = `corner ${i + 1}, ${"xy"[axis]} in cm`;
     return element(
-      "td",
-      {},
+      "td", {},
       element("input", { type: "number", step: "any", value: points[i][axis], change: set, "aria-label": name }),
     );
   });
   const remove = () => changed(points.filter((_, k) => k !== i));
   const button = element(
     "button",
-    { type: "button", click: remove, disabled: points.length < 3, "aria-label": `remove corner ${i + 1}` },
-    "×",
+    { type: "button", click: remove, disabled: points.length < 3, "aria-label": `remove corner ${i + 1}` }, "×",
   );
   return element("tr", {}, element("th", { scope: "row" }, String(i + 1)), ...cells, element("td", {}, button));
 }

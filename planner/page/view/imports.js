@@ -11,12 +11,7 @@ function askUnit({ paths, unit }, tailLength) {
   const dialog = byId("unit-dialog");
   const scales = unit === null ? { ...UNITS, "tail lengths": tailLength } : { "as the file says": unit };
   const choice = (group, value, words, checked) =>
-    element(
-      "label",
-      { class: "choice" },
-      element("input", { type: "radio", name: group, value, checked }),
-      words,
-    );
+    element("label", { class: "choice" }, element("input", { type: "radio", name: group, value, checked }), words);
   const size = (scale) => {
     const [width, height] = extent(paths[0].points).map((value) => digits(value * scale));
     return `${width} × ${height} cm`;

@@ -26,10 +26,7 @@ class Page {
     this.data = data;
     this.planner = planner;
     this.robots = new Map(data.robots.map((robot) => [robot.name, robot]));
-    this.client = new PlannerClient(
-      () => this.worker(),
-      (words) => this.problem(words),
-    );
+    this.client = new PlannerClient(() => this.worker(), (words) => this.problem(words));
     this.view = new PlanView();
     this.editor = new PathEditor(
       (points, closed) => this.smooth(points, closed, "my stroke"),
@@ -46,10 +43,7 @@ class Page {
     this.plan = null;
     this.track = null;
     this.fileProblem = new FileProblem();
-    this.runs = new Runs(
-      (content, use) => this.ask("runs", content, use),
-      () => this.saveFile("robot.toml"),
-    );
+    this.runs = new Runs((content, use) => this.ask("runs", content, use), () => this.saveFile("robot.toml"));
     this.timer = null;
     this.questions = 0; // that are not answered
     this.notice = ""; // about the link, until the next change
@@ -103,9 +97,7 @@ class Page {
     this.form.show(robot.values);
     byId("robot-name").value = this.robots.has(robot.name) ? robot.name : "";
     byId("shape").value = path.points
-      ? this.data.shapes.some((shape) => shape.name === path.name)
-        ? path.name
-        : ""
+      ? this.data.shapes.some((shape) => shape.name === path.name) ? path.name : ""
       : path.shape;
     const shape = this.data.shapes.find((candidate) => candidate.name === path.shape);
     byId("size").disabled = !shape;
@@ -215,9 +207,7 @@ class Page {
     if (!answer.broken) this.problem("");
     say(byId("options-problem"), "", true);
     if (answer.refusal) say(byId(`${answer.about ?? "path"}-problem`), answer.refusal, true);
-    byId("saves")
-      .querySelectorAll("button")
-      .forEach((button) => (button.disabled = Boolean(answer.refusal)));
+    byId("saves").querySelectorAll("button").forEach((button) => (button.disabled = Boolean(answer.refusal)));
     if (answer.refusal) {
       say(byId("message"), this.plan ? "Picture and numbers are those of the last plan that could be made." : "");
       this.show();
@@ -228,10 +218,7 @@ class Page {
     say(byId("message"), summary(this.plan));
     showResults(this.plan, byId("tails").checked);
     this.scale = chart(byId("strip"), {
-      times: this.ends(),
-      values: [...this.plan.dwells],
-      words: "dwell from flip to flip, over time",
-      unit: "s",
+      times: this.ends(), values: [...this.plan.dwells], words: "dwell from flip to flip, over time", unit: "s",
       steps: true,
     });
     this.player.take(this.plan);
@@ -310,8 +297,7 @@ class Page {
   async saveFile(name) {
     if (name === "plan.svg") {
       save(
-        name,
-        pictureText(byId("view"), document.title, document.querySelector("style").textContent),
+        name, pictureText(byId("view"), document.title, document.querySelector("style").textContent),
         "image/svg+xml",
       );
       return;
@@ -402,6 +388,5 @@ class Page {
   }
 }
 
-inflated(byId("planner").textContent.trim())
-  .text()
+inflated(byId("planner").textContent.trim()).text()
   .then((planner) => new Page(JSON.parse(byId("data").textContent), planner).start());

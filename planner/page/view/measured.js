@@ -17,21 +17,13 @@ function showTrack(track, plan, tails, actions) {
     ["From the path to follow", `${size(error.rms)} rms, ${size(error.largest)} at most`],
     ["Stated error", `${size(error.stated)}: the track is ${within ? "within" : "above"} it`],
     ["From the drawn path", `${size(error.rawRms)} rms, ${size(error.rawLargest)} at most`],
-    [
-      "Largest error",
-      `at ${duration(error.worst.time)}, x ${digits(worstX)} cm, y ${digits(worstY)} cm`,
-    ],
+    ["Largest error", `at ${duration(error.worst.time)}, x ${digits(worstX)} cm, y ${digits(worstY)} cm`],
   ]);
   const picture = figure("svg", {
-    class: "chart",
-    width: "100%",
-    height: 90,
-    role: "img",
-    "aria-label": "Distance from the path over time",
+    class: "chart", width: "100%", height: 90, role: "img", "aria-label": "Distance from the path over time",
   });
   const buttons = element(
-    "div",
-    { class: "row" },
+    "div", { class: "row" },
     element("button", { type: "button", click: () => actions.fit("time") }, "Begin at time 0"),
     element("button", { type: "button", click: () => actions.fit("rigid") }, "Lay on the plan (rigid motion)"),
     element("button", { type: "button", click: () => actions.fit("none") }, "As measured"),
@@ -40,10 +32,7 @@ function showTrack(track, plan, tails, actions) {
   );
   byId("measured").replaceChildren(list, picture, buttons);
   chart(picture, {
-    times: error.times,
-    values: error.distances,
-    words: "distance from the path over time",
-    unit: "cm",
+    times: error.times, values: error.distances, words: "distance from the path over time", unit: "cm",
     limit: error.stated,
   });
 }

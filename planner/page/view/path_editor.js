@@ -69,8 +69,7 @@ class PathEditor {
   }
 
   near(point, place) {
-    const [x, y] = pixelOf(this.view, point),
-      [px, py] = pixelOf(this.view, place);
+    const [x, y] = pixelOf(this.view, point), [px, py] = pixelOf(this.view, place);
     return Math.hypot(x - px, y - py) < NEAR;
   }
 
@@ -135,9 +134,7 @@ class PathEditor {
     if (this.mode === "corners") {
       points.forEach((point, i) => {
         const [cx, cy] = pixelOf(view, point);
-        shapes.push(
-          figure("circle", { class: i === this.held?.index ? "handle chosen" : "handle", cx, cy, r: 6 }),
-        );
+        shapes.push(figure("circle", { class: i === this.held?.index ? "handle chosen" : "handle", cx, cy, r: 6 }));
       });
     }
     return shapes;

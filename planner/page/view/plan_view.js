@@ -65,11 +65,7 @@ class PlanView {
   /* The points that are to be seen. */
   shown() {
     const { drawn, plan, tracks } = this.content;
-    return [
-      ...(drawn?.points ?? []),
-      ...(plan?.reference ?? []),
-      ...tracks.flatMap((track) => track.points),
-    ];
+    return [...(drawn?.points ?? []),...(plan?.reference ?? []),...tracks.flatMap((track) => track.points)];
   }
 
   fit() {

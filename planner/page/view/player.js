@@ -74,8 +74,7 @@ class Player {
 
 /* The pose at a time, and the number of the dwell: linear between the samples of the track. */
 function poseAt(plan, ends, time) {
-  let low = 0,
-    high = plan.dwells.length - 1;
+  let low = 0, high = plan.dwells.length - 1;
   while (low < high) {
     const middle = (low + high + 1) >> 1;
     if (ends[middle] <= time) low = middle;
@@ -83,8 +82,7 @@ function poseAt(plan, ends, time) {
   }
   const share = Math.min(Math.max((time - ends[low]) / plan.dwells[low], 0), 1) * plan.samples;
   const sample = Math.min(Math.floor(share), plan.samples - 1);
-  const before = plan.motion[low * plan.samples + sample],
-    after = plan.motion[low * plan.samples + sample + 1];
+  const before = plan.motion[low * plan.samples + sample], after = plan.motion[low * plan.samples + sample + 1];
   const pose = before.map((value, k) => value + (share - sample) * (after[k] - value));
   return { pose, dwell: low };
 }

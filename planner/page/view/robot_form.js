@@ -19,30 +19,17 @@ class RobotForm {
     const common = { "aria-describedby": "robot-problem" };
     const set = (event) => this.set(key, event.target.value, optional);
     const number = element("input", {
-      type: "number",
-      step: "any",
-      input: set,
-      change: this.settled,
-      "aria-label": name,
-      ...common,
+      type: "number", step: "any", input: set, change: this.settled, "aria-label": name, ...common,
     });
     const slider = element("input", {
-      type: "range",
-      min: low,
-      max: high,
-      step,
-      input: set,
-      change: this.settled,
-      "aria-label": `${name}, slider`,
+      type: "range", min: low, max: high, step, input: set, change: this.settled, "aria-label": `${name}, slider`,
     });
     this.inputs.set(key, [number, slider]);
     return element(
       "div",
       {},
       element(
-        "label",
-        {},
-        words,
+        "label", {}, words,
         element("span", { class: "field" }, number, element("span", { "aria-hidden": "true" }, unit), slider),
       ),
     );
@@ -79,12 +66,9 @@ function showMotion(answer) {
   }
   const { turnRadius, slip, yawRate, speed, tailGap, omegaBar } = answer.answer;
   describe(byId("motion"), [
-    ["Turn radius", length(turnRadius)],
-    ["Yaw rate", `${digits(yawRate)} rad/s`],
-    ["Speed round the circle", `${digits(60 * speed)} cm/min`],
-    ["Slip angle", `${degrees(slip)} degrees`],
-    ["Gap of the tails", `${digits(tailGap)} tail diameters`],
-    ["Motor speed ω̄", digits(omegaBar)],
+    ["Turn radius", length(turnRadius)], ["Yaw rate", `${digits(yawRate)} rad/s`],
+    ["Speed round the circle", `${digits(60 * speed)} cm/min`], ["Slip angle", `${degrees(slip)} degrees`],
+    ["Gap of the tails", `${digits(tailGap)} tail diameters`], ["Motor speed ω̄", digits(omegaBar)],
   ]);
 }
 

@@ -6,12 +6,8 @@ import { digits } from "./words.js";
 const PLAIN = /^[\w@%+=:,./-]+$/; // a word that a shell takes as it is
 /* Quantity and unit of a column. */
 const WORDS = {
-  omega_h_rpm: "spin of the head [rpm]",
-  omega_t_rpm: "spin of the tails [rpm]",
-  omega_yr_rad_s: "yaw rate [rad/s]",
-  R_yr_cm: "turn radius [cm]",
-  theta_deg: "slip angle [degrees]",
-  v_cm_s: "speed [cm/s]",
+  omega_h_rpm: "spin of the head [rpm]", omega_t_rpm: "spin of the tails [rpm]", omega_yr_rad_s: "yaw rate [rad/s]",
+  R_yr_cm: "turn radius [cm]", theta_deg: "slip angle [degrees]", v_cm_s: "speed [cm/s]",
 };
 
 /* The runs that are open, if there are any. */
@@ -50,13 +46,10 @@ class Runs {
 
   parts(name, runs) {
     return [
-      element("h3", {}, `Runs of ${name}`),
-      element("p", { class: "soft" }, summary(runs)),
-      ...(runs.rows.length ? [tableOf(runs)] : []),
-      ...listed("Runs that are still needed", runs.needed),
+      element("h3", {}, `Runs of ${name}`), element("p", { class: "soft" }, summary(runs)),
+      ...(runs.rows.length ? [tableOf(runs)] : []), ...listed("Runs that are still needed", runs.needed),
       ...listed("Rows and columns that are left out", runs.excluded),
-      ...listed("Columns that are missing", runs.missing),
-      ...listed("Columns that were converted", runs.converted),
+      ...listed("Columns that are missing", runs.missing), ...listed("Columns that were converted", runs.converted),
       ...this.commandParts(`softflagella calibrate ${quoted(name)} --robot robot.toml --out calibrated`),
     ];
   }
@@ -77,12 +70,9 @@ class Runs {
       element("p", {}, "Save robot.toml beside the table. The fit itself is made by the command:"),
       element("pre", {}, code),
       element(
-        "div",
-        { class: "row" },
-        element("button", { type: "button", click: copy }, "Copy the command"),
+        "div", { class: "row" }, element("button", { type: "button", click: copy }, "Copy the command"),
         element("button", { type: "button", click: this.saveRobot }, "Save robot.toml"),
-        element("button", { type: "button", click: () => this.remove() }, "Remove the runs"),
-        copied,
+        element("button", { type: "button", click: () => this.remove() }, "Remove the runs"), copied,
       ),
     ];
   }
@@ -125,9 +115,7 @@ function tableOf({ columns, rows }) {
       "table",
       {},
       element(
-        "thead",
-        {},
-        element("tr", {}, ...heads),
+        "thead", {}, element("tr", {}, ...heads),
         element("tr", {}, ...parts.map((words) => element("th", { scope: "col" }, words))),
       ),
       element("tbody", {}, ...rows.map((run) => rowOf(run, columns.length))),

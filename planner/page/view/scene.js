@@ -41,11 +41,7 @@ function motion(plan) {
     data[direction] += lineData(plan.track.slice(i * plan.samples, (i + 1) * plan.samples + 1));
   });
   return Object.entries(data).map(([direction, d]) =>
-    figure("path", {
-      class: direction === "1" ? "forward" : "backward",
-      d,
-      "vector-effect": "non-scaling-stroke",
-    }),
+    figure("path", { class: direction === "1" ? "forward" : "backward", d, "vector-effect": "non-scaling-stroke" }),
   );
 }
 
@@ -55,8 +51,7 @@ function startMark(plan) {
   const size = plan.body.headLength;
   const tip = [x + size * Math.cos(heading), y + size * Math.sin(heading)];
   const barbs = [2.6, -2.6].map((angle) => [
-    tip[0] + 0.35 * size * Math.cos(heading + angle),
-    tip[1] + 0.35 * size * Math.sin(heading + angle),
+    tip[0] + 0.35 * size * Math.cos(heading + angle), tip[1] + 0.35 * size * Math.sin(heading + angle),
   ]);
   const d = `${lineData([[x, y], tip])}${lineData([barbs[0], tip, barbs[1]])}`;
   return figure("path", { class: "start", d, "vector-effect": "non-scaling-stroke" });
@@ -64,9 +59,7 @@ function startMark(plan) {
 
 /* Dots at flips that are LEAST_APART pixels or more from the one drawn before; null: they are too dense. */
 function flips(plan, view) {
-  let d = "",
-    last = null,
-    drawn = 0;
+  let d = "", last = null, drawn = 0;
   for (const [x, y] of plan.flips) {
     const here = pixelOf(view, [x, y]);
     if (last && Math.hypot(here[0] - last[0], here[1] - last[1]) < LEAST_APART) return null;
@@ -90,22 +83,13 @@ function robotShape({ headLength, headRadius, tailLength, tailRadius, discOffset
     const across = discOffset * acrossOf(k, tails);
     shape.append(
       figure("rect", {
-        class: "tail",
-        x: rear - tailLength,
-        y: across - tailRadius,
-        width: tailLength,
-        height: 2 * tailRadius,
+        class: "tail", x: rear - tailLength, y: across - tailRadius, width: tailLength, height: 2 * tailRadius,
       }),
     );
   }
   shape.append(
     figure("rect", {
-      class: "head",
-      x: rear,
-      y: -headRadius,
-      width: headLength,
-      height: 2 * headRadius,
-      rx: headRadius / 4,
+      class: "head", x: rear, y: -headRadius, width: headLength, height: 2 * headRadius, rx: headRadius / 4,
     }),
   );
   return shape;
@@ -119,10 +103,8 @@ function poseTransform([x, y, heading]) {
 function axes(view, width, height, unit = "cm") {
   const step = tickStep(view);
   const group = figure("g", { class: "axes" });
-  const right = (width - view.left) / view.scale,
-    left = -view.left / view.scale;
-  const up = view.top / view.scale,
-    down = (view.top - height) / view.scale;
+  const right = (width - view.left) / view.scale, left = -view.left / view.scale;
+  const up = view.top / view.scale, down = (view.top - height) / view.scale;
   for (const x of ticks(left, right, step)) {
     const [px] = pixelOf(view, [x, 0]);
     group.append(figure("path", { class: "grid", d: `M${px},0V${height}` }));
@@ -139,8 +121,7 @@ function axes(view, width, height, unit = "cm") {
   group.append(
     figure("path", { class: "bar", d: `M${width - 16 - bar},${height - 30}v6h${bar}v-6` }),
     figure(
-      "text",
-      { x: width - 16 - bar / 2, y: height - 34, "text-anchor": "middle" },
+      "text", { x: width - 16 - bar / 2, y: height - 34, "text-anchor": "middle" },
       `${tickWords(step, step)} ${unit}`,
     ),
   );

@@ -21,8 +21,7 @@ function fitted(points, width, height, margin = 0.12) {
   const room = 1 + 2 * margin;
   const least = 1e-3;
   const scale = Math.min(
-    width / (room * Math.max(high - low, least)),
-    height / (room * Math.max(top - bottom, least)),
+    width / (room * Math.max(high - low, least)), height / (room * Math.max(top - bottom, least)),
   );
   return viewport(scale, width / 2 - (scale * (low + high)) / 2, height / 2 + (scale * (bottom + top)) / 2);
 }
@@ -49,11 +48,7 @@ function pixelOf(view, [x, y]) {
 }
 
 const LENS_PLACES = {
-  "right top": [1, 0],
-  "left top": [0, 0],
-  "right bottom": [1, 1],
-  "left bottom": [0, 1],
-  middle: [0.5, 0.5],
+  "right top": [1, 0], "left top": [0, 0], "right bottom": [1, 1], "left bottom": [0, 1], middle: [0.5, 0.5],
 };
 
 /* The place in width × height pixels at which a round lens hides the fewest points [cm]: "right top", …. */
@@ -84,8 +79,7 @@ function tickStep(view, pixels = 70) {
 
 /* Multiples of `step` from low to high. */
 function ticks(low, high, step) {
-  const first = Math.ceil(low / step),
-    last = Math.floor(high / step);
+  const first = Math.ceil(low / step), last = Math.floor(high / step);
   return Array.from({ length: Math.max(last - first + 1, 0) }, (_, i) => (first + i) * step);
 }
 

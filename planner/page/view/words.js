@@ -31,9 +31,7 @@ function degrees(radians) {
 /* A length in cm; with `tails`, in tail lengths behind it. */
 function length(centimetres, tailLength, tails) {
   if (centimetres < LEAST) return `below ${LEAST} cm`;
-  return tails
-    ? `${digits(centimetres)} cm (${digits(centimetres / tailLength)} l)`
-    : `${digits(centimetres)} cm`;
+  return tails ? `${digits(centimetres)} cm (${digits(centimetres / tailLength)} l)` : `${digits(centimetres)} cm`;
 }
 
 export { clock, degrees, digits, duration, length };

@@ -58,6 +58,12 @@ def test_the_page_opens_with_a_plan_and_a_saved_link_opens_with_the_same(browser
     with opened_page(browser, address) as page:
         assert "dwells: if the coefficients are exact, 95 of 100 such robots stay within" in planned(page)
         assert page.get_attribute("#play", "aria-pressed") == "false"  # less motion is wanted
+        for part in ("#message", "#next", "#view", "#play", ".legend", "#shape"):
+            box = page.locator(part).bounding_box()
+            assert box["y"] + box["height"] <= 860, part  # all that the first plan needs is on the first screen
+        page.check("#tails")
+        assert " l)" in text_of(page, "#facts")
+        page.uncheck("#tails")
         page.select_option("#shape", "square")
         page.fill("#size", "31.5")
         page.select_option("#objective", "time")
@@ -73,7 +79,7 @@ def test_the_page_opens_with_a_plan_and_a_saved_link_opens_with_the_same(browser
 def test_a_circle_drawn_with_the_mouse_is_planned_and_its_files_are_those_of_the_command(
     page: Any, tmp_path: Path
 ) -> None:
-    page.check("input[value=draw]")
+    page.get_by_role("button", name="Draw your own path").click()
     x, y = middle_of(page)
     page.mouse.move(x + 110, y)
     page.mouse.down()
@@ -83,6 +89,7 @@ def test_a_circle_drawn_with_the_mouse_is_planned_and_its_files_are_those_of_the
     assert "dwells" in planned(page)
     assert "points=" in address_of(page)
     assert "closed=1" in address_of(page)
+    assert "SCHEDULE_H" in saved(page, "Save the schedule", tmp_path).read_text()
     names = ("plan.json", "plan.csv", "schedule.h", "tracker.h", "path.csv", "robot.toml", "plan.svg")
     files = {name: saved(page, name, tmp_path) for name in names}
     words = ["plan", str(files["path.csv"]), "--robot", str(files["robot.toml"]), "--objective", "flips"]
