@@ -10,14 +10,11 @@ from planner.command_line import (
     DWELLS,
     OBSTACLES,
     TABLE,
-    arrival_time,
-    camera_of,
     length_of,
     progress_bar,
     say,
     say_job,
     say_written,
-    table_of,
     vehicle_and_request,
 )
 from planner.fleet_command import FLEET, fleet_command
@@ -30,10 +27,9 @@ from sim.io.commands import ROBOT, UNIT, Program, argument, out
 from sim.io.errors import InputError, naming
 
 if TYPE_CHECKING:
-    from planner.goal.goal_plan import GoalPlan
+    from planner.goal.trip import Trip
     from planner.paths.path import Path2D
     from planner.planning.planned import Plan
-    from planner.planning.request import PlanRequest
     from sim.model.robot import Robot
 
 program = Program("planner", "Plan switching schedules for paths, without simulating.")
@@ -81,12 +77,12 @@ _TRACKING = (
 def _plan(arguments: Namespace) -> None:
     from planner.files.plan_files import write_plan
 
-    result, request = _planned(arguments)
+    result = _planned(arguments)
     pictures = {}
     if arguments.trade_off:
         from planner.files.trade_off import draw_trade_off, trade_off
 
-        pictures["trade_off.svg"] = draw_trade_off(trade_off(result, request))
+        pictures["trade_off.svg"] = draw_trade_off(trade_off(result))
     paths = write_plan(result, arguments.out, pictures=pictures)
     say(result)
     robot, errors = result.robot, result.errors
@@ -120,43 +116,20 @@ def _plan(arguments: Namespace) -> None:
     out("folder"),
 )  # fmt: skip
 def _goal(arguments: Namespace) -> None:
-    from planner.files.goal_files import write_goal_plan
-
-    goal_plan = _goal_planned(arguments)
-    say_job(goal_plan, write_goal_plan(goal_plan, arguments.out))
+    say_job(_goal_planned(arguments), arguments.out)
 
 
-def _goal_planned(arguments: Namespace) -> GoalPlan:
+def _goal_planned(arguments: Namespace) -> Plan[Trip]:
     """Plan the way that the command asks for."""
-    from planner.files.goal_files import read_free_space
     from planner.goal.to_goal import to_goal
-    from planner.vehicle.calibration_table import read_knowledge
     from sim.inputs import load_robot
 
-    seconds = arrival_time(arguments)
-    robot = load_robot(arguments.robot)
-    unit = arguments.unit
+    robot, unit = load_robot(arguments.robot), arguments.unit
     start, goal = (read_pose(getattr(arguments, end), unit, robot, f"--{end}") for end in ("start", "goal"))
-    space = read_free_space(arguments.keep_out, arguments.walls, unit, robot)
     via = [tuple(read_length(each, unit, robot, "--via") for each in place) for place in arguments.via]
-    knowledge = read_knowledge(arguments.robot)
-    return to_goal(
-        start,
-        goal,
-        robot,
-        via=via,
-        keep_out=space.regions,
-        walls=space.walls,
-        lookup=table_of(arguments, robot, knowledge),
-        objective=arguments.objective,
-        minimum_dwell=arguments.minimum_dwell,
-        minimum_seconds=arguments.minimum_seconds,
-        tolerance=length_of(arguments, "tolerance", robot),
-        feedback=arguments.feedback,
-        arrive_seconds=seconds,
-        knowledge=knowledge,
-        camera=camera_of(arguments, robot),
-    )
+    tracked, request = vehicle_and_request(arguments, robot)
+    with progress_bar() as progress:
+        return to_goal(start, goal, tracked, request, via, progress)
 
 
 @program.command(
@@ -167,26 +140,20 @@ def _goal_planned(arguments: Namespace) -> GoalPlan:
     *POSES,
 )
 def _track(arguments: Namespace) -> None:
-    track(arguments, lambda words: _planned(words)[0], _TRACKING)
+    track(arguments, _planned, _TRACKING)
 
 
-def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
-    """Make the plan that the command asks for, and return it with the request."""
-    from planner.files.goal_files import read_free_space
-    from planner.jobs.plan_path import plan_path
+def _planned(arguments: Namespace) -> Plan[None]:
+    """Make the plan that the command asks for."""
+    from planner.jobs.plan import make_plan
     from sim.inputs import load_robot
 
-    seconds = arrival_time(arguments)
     robot = load_robot(arguments.robot)
     path = _path(arguments, robot)
-    space = read_free_space(arguments.keep_out, arguments.walls, arguments.unit, robot)
     print(f"path: {describe(path, robot)}")
     tracked, request = vehicle_and_request(arguments, robot)
     with progress_bar() as progress:
-        feedback, loop = arguments.feedback, arguments.loop
-        return plan_path(
-            path, tracked, request, space, seconds, loop=loop, feedback=feedback, progress=progress
-        ), request
+        return make_plan(path, tracked, request, progress)
 
 
 def _path(arguments: Namespace, robot: Robot) -> Path2D:
@@ -239,7 +206,7 @@ def _check(arguments: Namespace) -> None:
 @program.command("fleet", "plan several robots in one tank so that they keep apart", *FLEET)
 def _fleet(arguments: Namespace) -> None:
     planned = {
-        "plan": lambda words: _planned(words)[0],
+        "plan": _planned,
         "goal": _goal_planned,
         "tour": planned_tour,
         "cover": planned_cover,

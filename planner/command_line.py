@@ -7,7 +7,7 @@ from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from planner.paths.units import heading_in_degrees, place_in_lab, read_length, read_time
 from sim.io.commands import LOOKUP, argument
@@ -70,37 +70,22 @@ def say(result: Plan) -> None:
         f"{format_time(float(result.seconds.sum()))} in all"
     )
     print(result.error_line)
-    for line in result.job_lines():
+    for line in result.lines():
         print(line)
 
 
-class PlannedJob(Protocol):
-    """A plan with what it does for its job."""
+def say_job(result: Plan, folder: str) -> None:
+    """Print a plan with its job, and write its files."""
+    from planner.files.plan_files import write_plan
 
-    @property
-    def plan(self) -> Plan:
-        """Return the job's plan."""
-
-    def lines(self) -> list[str]:
-        """Return what there is to say of the job."""
-
-
-def say_job(job: PlannedJob, paths: Iterable[Path]) -> None:
-    """Print the job's plan, what there is to say of the job, and the files that were written."""
-    say(job.plan)
-    for line in job.lines():
-        print(line)
+    paths = write_plan(result, folder)
+    say(result)
     say_written(paths)
 
 
 def say_written(paths: Iterable[Path]) -> None:
     """Print the files that were written."""
     print(f"-> {', '.join(map(str, paths))}")
-
-
-def arrival_time(arguments: Namespace) -> float | None:
-    """Return the time of --arrive in seconds; None where none is asked for."""
-    return None if arguments.arrive is None else read_time(arguments.arrive, "--arrive")
 
 
 def table_of(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge) -> LookupTable:
@@ -147,17 +132,18 @@ def camera_of(arguments: Namespace, robot: Robot) -> Camera:
 
 def request_of(arguments: Namespace, robot: Robot) -> PlanRequest:
     """Return what the command asks of a plan."""
+    from planner.files.regions import read_free_space
     from planner.planning.request import PlanRequest
 
-    of_paths = {name: value for name, value in vars(arguments).items() if name in ("corner", "time_weight")}
+    given = vars(arguments)
+    named = ("point", "corner", "time_weight", "objective", "minimum_dwell", "minimum_seconds", "feedback", "loop")
+    seconds = None if given.get("arrive") is None else read_time(given["arrive"], "--arrive")
     return PlanRequest(
-        point=arguments.point,
-        objective=arguments.objective,
-        minimum_dwell=arguments.minimum_dwell,
-        minimum_seconds=arguments.minimum_seconds,
+        **{name: given[name] for name in named if name in given},
         tolerance=length_of(arguments, "tolerance", robot),
         camera=camera_of(arguments, robot),
-        **of_paths,
+        space=read_free_space(given.get("keep_out", ()), given.get("walls"), arguments.unit, robot),
+        arrive_seconds=seconds,
     )
 
 

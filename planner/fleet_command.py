@@ -74,5 +74,5 @@ def _members(
             words = [*robot.words[:2], "--out", arguments.out, *robot.words[2:]]
             options = commands[robot.command].parser(robot.command).parse_args(words)
             options.feedback = options.feedback or arguments.feedback
-            members.append(Member.of(robot.name, planned[robot.command](options), robot.delay))
+            members.append(Member(robot.name, planned[robot.command](options), robot.delay))
     return members

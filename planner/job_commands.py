@@ -19,8 +19,9 @@ from sim.io.commands import ROBOT, UNIT, Argument, Run, argument, out
 from sim.io.errors import InputError
 
 if TYPE_CHECKING:
-    from planner.jobs.coverage_plan import CoveragePlan
-    from planner.jobs.tour_plan import TourPlan
+    from planner.jobs.cover import Coverage
+    from planner.jobs.tour import Visits
+    from planner.planning.planned import Plan
 
 
 class Job(NamedTuple):
@@ -47,67 +48,52 @@ _COMMON = (
 
 
 def _tour(arguments: Namespace) -> None:
-    from planner.files.job_files import write_tour
-
-    result = planned_tour(arguments)
-    say_job(result, write_tour(result, arguments.out))
+    say_job(planned_tour(arguments), arguments.out)
 
 
-def planned_tour(arguments: Namespace) -> TourPlan:
+def planned_tour(arguments: Namespace) -> Plan[Visits]:
     """Plan the tour that the command asks for."""
-    from planner.files.goal_files import read_free_space
-    from planner.files.job_files import read_places
+    from planner.files.regions import read_places
     from planner.jobs.tour import tour
     from sim.inputs import load_robot
 
     robot = load_robot(arguments.robot)
     places = read_places(arguments.places, arguments.unit, robot)
-    space = read_free_space(arguments.keep_out, arguments.walls, arguments.unit, robot)
     tracked, request = vehicle_and_request(arguments, robot)
     with progress_bar() as progress:
         return tour(
             places.tolist(),
             tracked,
             request,
-            space,
             any_start=arguments.any_start,
             back=arguments.back,
-            feedback=arguments.feedback,
             progress=progress,
         )
 
 
 def _cover(arguments: Namespace) -> None:
-    from planner.files.job_files import write_cover
-
-    result = planned_cover(arguments)
-    say_job(result, write_cover(result, arguments.out))
+    say_job(planned_cover(arguments), arguments.out)
 
 
-def planned_cover(arguments: Namespace) -> CoveragePlan:
+def planned_cover(arguments: Namespace) -> Plan[Coverage]:
     """Plan the coverage that the command asks for."""
-    from planner.files.goal_files import read_free_space
-    from planner.files.job_files import read_field
+    from planner.files.regions import read_field
     from planner.jobs.cover import cover
     from planner.jobs.region import Field
     from sim.inputs import load_robot
 
     robot = load_robot(arguments.robot)
     field = read_field(arguments.region, arguments.hole, arguments.unit, robot)
-    space = read_free_space(arguments.keep_out, arguments.walls, arguments.unit, robot)
-    field = Field(field.outline, (*field.holes, *space.regions))
     width = read_length(arguments.width, arguments.unit, robot, "--width", above_zero=True)
     tracked, request = vehicle_and_request(arguments, robot)
+    field = Field(field.outline, (*field.holes, *request.space.regions))
     angle = None if arguments.angle is None else math.radians(math.fmod(arguments.angle, 360))
     with progress_bar() as progress:
-        return cover(
-            field, width, tracked, request, space, angle=angle, feedback=arguments.feedback, progress=progress
-        )
+        return cover(field, width, tracked, request, angle, progress)
 
 
 def _hold(arguments: Namespace) -> None:
-    from planner.files.goal_files import read_free_space
-    from planner.files.job_files import read_places, write_hold
+    from planner.files.regions import read_places
     from planner.jobs.hold import hold
     from sim.inputs import load_robot
 
@@ -116,13 +102,10 @@ def _hold(arguments: Namespace) -> None:
     if "," not in arguments.place:
         raise InputError(f"place {arguments.place!r}; write X,Y, for example 30cm,15cm")
     (place,) = read_places([arguments.place], arguments.unit, robot)
-    space = read_free_space(arguments.keep_out, arguments.walls, arguments.unit, robot)
     tracked, request = vehicle_and_request(arguments, robot)
     with progress_bar() as progress:
-        result = hold(
-            place.tolist(), tracked, request, seconds, space, feedback=arguments.feedback, progress=progress
-        )
-    say_job(result, write_hold(result, arguments.out))
+        result = hold(place.tolist(), tracked, request, seconds, progress)
+    say_job(result, arguments.out)
 
 
 JOBS = (

@@ -106,10 +106,7 @@ def without_robot(arguments: Sequence[Argument]) -> tuple[Argument, ...]:
 
 def replan(arguments: Namespace) -> None:
     """Plan the rest of a saved plan from the last pose of a track."""
-    from planner.files.goal_files import write_goal_plan
-    from planner.files.plan_files import write_plan
     from planner.files.replan import replan_from, saved_trip
-    from planner.goal.goal_plan import GoalPlan
     from sim.io.tables import read_table
     from surrogate.table.model_file import load_table
 
@@ -117,11 +114,7 @@ def replan(arguments: Namespace) -> None:
     plan = saved_trip(arguments.plan, lookup=lookup, own_table=arguments.own_table)
     with naming(arguments.track):
         rest = replan_from(plan, read_table(arguments.track))
-    if isinstance(rest, GoalPlan):
-        paths = write_goal_plan(rest, arguments.out)
-    else:
-        paths = write_plan(rest.plan, arguments.out)
-    say_job(rest, paths)
+    say_job(rest, arguments.out)
 
 
 REPLAN = Job(

@@ -36,20 +36,10 @@ def _listed() -> dict[str, tuple[str, str]]:
 
 
 _HOMES = _listed()
-_RENAMED = {  # old name -> (module, name in it, what to use instead), for one release
-    "Voyage": ("planner.goal.goal_plan", "GoalPlan", "GoalPlan"),
-}
-
 __all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str) -> Any:
-    if name in _RENAMED:
-        from sim.io.deprecated import warn_deprecated
-
-        module, attribute, instead = _RENAMED[name]
-        warn_deprecated(f"softflagella.{name}", f"softflagella.{instead}", callers=1)
-        return getattr(import_module(module), attribute)
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, attribute = _HOMES[name]

@@ -12,11 +12,11 @@ from planner.files.goal_json import load_goal as load_goal
 from planner.files.plan_json import load_plan as load_plan
 from planner.files.saved_plan import restore_plan as restore_plan
 from planner.files.tracking_error import TrackingError as TrackingError
-from planner.goal.goal_plan import GoalPlan as GoalPlan
-from planner.jobs.coverage_plan import CoveragePlan as CoveragePlan
+from planner.goal.trip import Trip as Trip
+from planner.jobs.cover import Coverage as Coverage
 from planner.jobs.fleet_plan import FleetPlan as FleetPlan
-from planner.jobs.hold_plan import HoldPlan as HoldPlan
-from planner.jobs.tour_plan import TourPlan as TourPlan
+from planner.jobs.hold import Orbit as Orbit
+from planner.jobs.tour import Visits as Visits
 from planner.paths.obstacles import Circle as Circle
 from planner.paths.path import Path2D as Path2D
 from planner.paths.path import circle as circle

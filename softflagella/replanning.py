@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from planner.files.tracking_error import TrackingError, tracking_error
+from planner.jobs.plan import plan
 from planner.paths.path import Path2D
-from planner.planning.plan import plan
 from sim.arrays import Floats
 from sim.model.robot import Robot
 from sim.motion.replay import replay

@@ -20,8 +20,8 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.common import heading, in_parallel, per_cent, row, two_quantiles
 from planner.files.tracking_error import tracking_error
+from planner.jobs.plan import plan
 from planner.paths.path import Path2D, circle, polygon
-from planner.planning.plan import plan
 from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS

@@ -14,8 +14,8 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from planner.files.tracking_error import tracking_error
+from planner.jobs.plan import plan
 from planner.paths.path import circle, polygon
-from planner.planning.plan import plan
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay

@@ -19,10 +19,10 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D
 from planner.paths.path_files import read_path
 from planner.planning.error_growth import error_growth
-from planner.planning.plan import make_plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.planning.stated_error import (

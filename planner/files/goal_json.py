@@ -1,4 +1,4 @@
-"""Read goal.json, which holds `GoalPlan.to_dict()` and the identity of the plan beside it."""
+"""Read goal.json, which holds `Trip.to_dict` and the identity of the plan beside it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from planner.goal.goal_plan import FORMAT
+from planner.goal.trip import FORMAT
 from planner.paths.obstacles import FreeSpace
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
@@ -18,7 +18,7 @@ _POSES = ("start", "goal", "predicted_end")
 
 @checks_keywords()
 def load_goal(path: str | Path) -> dict[str, Any]:
-    """Read and check the content of a goal.json, which is that of `GoalPlan.to_dict`.
+    """Read and check the content of a goal.json, which is that of `Trip.to_dict`.
 
     Args:
         path: the file, written by `write_plan`.

@@ -1,4 +1,4 @@
-"""Pictures beside those of plans, by matplotlib: a way from pose to pose, and how a figure is written."""
+"""Pictures by matplotlib: of plans with their jobs, of fleets, and how a figure is written."""
 
 from __future__ import annotations
 
@@ -9,13 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
 
 from planner.files.plan_picture import schedule_words
-from planner.goal.goal_plan import GoalPlan
-from planner.jobs.coverage_plan import CoveragePlan
 from planner.jobs.fleet_picture import draw_distances, draw_motions
 from planner.jobs.fleet_plan import FleetPlan
-from planner.jobs.hold_plan import HoldPlan
-from planner.jobs.tour_plan import TourPlan
-from planner.paths.units import in_lab
+from planner.planning.planned import Plan
 from sim.io.files import whole_file
 from sim.io.units import format_length, format_time
 
@@ -37,46 +33,11 @@ def legend_below(axes: Axes) -> None:
                 frameon=False)  # fmt: skip
 
 
-def draw_goal_plan(goal_plan: GoalPlan) -> Figure:
-    """Draw a plan from pose to pose, with what the robot must keep out of."""
+def draw_plan(plan: Plan) -> Figure:
+    """Draw a plan with what belongs to its job."""
     figure = Figure(figsize=(6, 6))
-    axes = goal_plan.plot(figure.add_subplot())
-    robot = goal_plan.plan.robot
-    way, stated = in_lab(goal_plan.length, robot), in_lab(goal_plan.plan.stated_error, robot)
-    axes.set_title(
-        f"{schedule_words(goal_plan.plan)}\nway {way}, stated error {stated}", fontsize=10, parse_math=False
-    )
-    legend_below(axes)
-    return figure
-
-
-def draw_tour(tour: TourPlan) -> Figure:
-    """Draw a tour with the numbers of its places."""
-    figure = Figure(figsize=(6, 6))
-    axes = tour.plot(figure.add_subplot())
-    stated = in_lab(tour.plan.stated_error, tour.plan.robot)
-    axes.set_title(f"{schedule_words(tour.plan)}\nstated error {stated}", fontsize=10, parse_math=False)
-    legend_below(axes)
-    return figure
-
-
-def draw_cover(cover: CoveragePlan) -> Figure:
-    """Draw a region and what is covered of it."""
-    figure = Figure(figsize=(6, 6))
-    axes = cover.plot(figure.add_subplot())
-    axes.set_title(
-        f"{schedule_words(cover.plan)}\ncovers {100 * cover.share:.1f} %", fontsize=10, parse_math=False
-    )
-    legend_below(axes)
-    return figure
-
-
-def draw_hold(held: HoldPlan) -> Figure:
-    """Draw an orbit about a place."""
-    figure = Figure(figsize=(6, 6))
-    axes = held.plot(figure.add_subplot())
-    within = in_lab(held.within, held.plan.robot)
-    axes.set_title(f"{schedule_words(held.plan)}\nwith feedback within {within}", fontsize=10, parse_math=False)
+    axes = plan.plot(figure.add_subplot())
+    axes.set_title(f"{schedule_words(plan)}\n{plan.job.title(plan)}", fontsize=10, parse_math=False)
     legend_below(axes)
     return figure
 

@@ -20,7 +20,7 @@ import numpy as np
 from planner.files.plan_picture import plan_svg
 from planner.files.tracker_header import DIRECTIONS, c_part, safe_name, tracker_header
 from planner.paths.units import in_lab
-from planner.planning.planned import Plan
+from planner.planning.planned import KINDS, Plan
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_numbers, write_text
 from sim.io.provenance import code_version
@@ -29,23 +29,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FILES = ("plan.json", "plan.csv", "schedule.h", "tracker.h", "plan.svg")
-EXTRA = (
-    "trade_off.svg",
-    "goal.json",
-    "goal.svg",
-    "tour.json",
-    "tour.svg",
-    "cover.json",
-    "cover.svg",
-    "hold.json",
-    "hold.svg",
-)  # of a folder that was planned into
+EXTRA = ("trade_off.svg", *(f"{kind}.{ending}" for kind in KINDS for ending in ("json", "svg")))  # planned before
 _MOST_MS = 65_535
 _CHECKPOINTS = 32
 
 
 def write_plan(result: Plan, folder: str | Path, *, pictures: Mapping[str, Figure] | None = None) -> list[Path]:
-    """Write the five files of a plan, all or none, and return their paths.
+    """Write the five files of a plan, and {kind}.json and {kind}.svg of its job, all or none; return their paths.
 
     Args:
         result: the plan.
@@ -63,26 +53,32 @@ def write_plan(result: Plan, folder: str | Path, *, pictures: Mapping[str, Figur
         ['plan.json', 'plan.csv', 'schedule.h', 'tracker.h', 'plan.svg']
     """
     with files_together(folder, (*FILES, *EXTRA)) as temporary:
-        identity = write_plan_files(result, temporary)
+        names = write_plan_files(result, temporary)
         if pictures:
             from planner.files.pictures import write_svg  # loads matplotlib
 
             for name, figure in pictures.items():
-                write_svg(figure, temporary / name, identity)
-    return [Path(folder, name) for name in (*FILES, *(pictures or ()))]
+                write_svg(figure, temporary / name, result.identity)
+    return [Path(folder, name) for name in (*names, *(pictures or ()))]
 
 
-def write_plan_files(result: Plan, folder: Path) -> str:
-    """Write the five files of a plan into a folder, one after the other, and return the plan's identity."""
-    record = result.to_dict()
-    identity = record["id"]
-    write_text(folder / "plan.json", json.dumps({**record, "code_version": code_version()}) + "\n")
+def write_plan_files(result: Plan, folder: Path) -> list[str]:
+    """Write the files of a plan into a folder, one after the other, and return their names."""
+    identity, names = result.identity, list(FILES)
+    write_text(folder / "plan.json", json.dumps({**result.to_dict(), "code_version": code_version()}) + "\n")
     columns = {name: values.tolist() for name, values in result.columns().items()}
     write_numbers({**columns, "plan_id": [identity] * len(result.dwells)}, folder / "plan.csv")
     write_text(folder / "schedule.h", controller_header(result, identity))
     write_text(folder / "tracker.h", tracker_header(result, identity))
     write_text(folder / "plan.svg", plan_svg(result, identity))
-    return identity
+    if result.job is not None and result.job.kind:
+        from planner.files.pictures import draw_plan, write_svg  # loads matplotlib
+
+        names += [f"{result.job.kind}.json", f"{result.job.kind}.svg"]
+        content = {**result.job.to_dict(result), "plan_id": identity}
+        write_text(folder / names[-2], json.dumps(content) + "\n")
+        write_svg(draw_plan(result), folder / names[-1], identity)
+    return names
 
 
 def milliseconds(seconds: np.ndarray) -> list[int]:

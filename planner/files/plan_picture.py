@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from planner.files.svg_axes import SvgAxes
@@ -13,7 +14,7 @@ from sim.io.units import format_time
 def plan_svg(result: Plan, identity: str) -> str:
     """Return plan.svg as text; `identity` names the plan."""
     axes: Any = SvgAxes()
-    result.plot(axes)
+    replace(result, job=None).plot(axes)
     rms, stated = (in_lab(error, result.robot) for error in (result.predicted_rms, result.stated_error))
     axes.set_title(f"{schedule_words(result)}\npredicted error {rms} rms, stated error {stated}")
     return str(axes.text(identity))

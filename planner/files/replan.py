@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,12 +18,12 @@ from planner.files.goal_json import load_goal
 from planner.files.plan_json import load_plan
 from planner.files.saved_plan import plan_json, restore_plan
 from planner.files.tracking_error import track_in_tails
-from planner.goal.goal_plan import GoalPlan
-from planner.goal.to_goal import make_goal_plan
+from planner.goal.to_goal import to_goal
+from planner.goal.trip import Trip
 from planner.paths.obstacles import FreeSpace
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
-from planner.tracking.rest import Rest, place_reached, rest_of
+from planner.tracking.rest import place_reached, rest_of
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.quantities import numbers_of
@@ -34,23 +33,8 @@ from surrogate.interface import LookupTable
 _LARGEST = 1e6  # l, of a place; time units, of a time
 
 
-@dataclass(frozen=True)
-class Trip:
-    """A trip to a goal, in memory or from goal.json."""
-
-    plan: Plan
-    goal: tuple[float, float, float]
-    via: Sequence[Sequence[float]]
-    free_space: FreeSpace
-    margin: float
-
-    @staticmethod
-    def of(trip: GoalPlan) -> Trip:
-        return Trip(trip.plan, trip.goal, trip.via, trip.free_space, trip.margin)
-
-
-def saved_trip(source: str | Path, *, lookup: LookupTable | None = None, own_table: bool = False) -> Plan | Trip:
-    """Read a plan, or the trip to a goal that it belongs to; see `restore_plan`.
+def saved_trip(source: str | Path, *, lookup: LookupTable | None = None, own_table: bool = False) -> Plan:
+    """Read a plan, with the trip to a goal that it belongs to; see `restore_plan`.
 
     Raises:
         InputError: the file is no plan, or its robot cannot be simulated.
@@ -64,31 +48,34 @@ def saved_trip(source: str | Path, *, lookup: LookupTable | None = None, own_tab
     if content["plan_id"] != load_plan(path)["id"]:
         return plan
     x, y, heading = map(float, content["goal"])
-    space, margin = FreeSpace.from_dict(content), float(content["margin_over_l"])
-    return Trip(plan, (x, y, heading), content["via"], space, margin)
+    via = tuple((float(x), float(y)) for x, y in content["via"])
+    return plan.with_job(Trip((x, y, heading), plan.end, via, float(content["length_over_l"])))
 
 
-def replan_from(plan: Plan | Trip, track: pd.DataFrame) -> Rest | GoalPlan:
-    """Plan the rest of a plan or a trip from the last pose of a track, at rest there.
+def replan_from(plan: Plan, track: pd.DataFrame) -> Plan:
+    """Plan the rest of a plan from the last pose of a track, at rest there; of a trip, the way to its goal.
 
     Raises:
         InputError: the track cannot be used, it has reached the end, or no way leads on.
     """
-    if isinstance(plan, Plan):
-        return rest_of(plan, *poses_of(track, plan.robot))
-    trip, plan = plan, plan.plan
     times, poses = poses_of(track, plan.robot)
-    place, q = place_reached(plan, times, poses), plan.declared.reference.q
+    if plan.ends_at is None:
+        return rest_of(plan, times, poses)
+    place, q, kept = place_reached(plan, times, poses), plan.declared.reference.q, plan.kept_clear
     left: list[Sequence[float]] = []
     passed = 0
-    for via in trip.via:
+    for via in plan.job.via:
         passed += int(np.hypot(*(q[passed:] - np.array(via)).T).argmin())
         left += [via] if passed > place else []
     x, y, heading = poses[-1].tolist()
-    request = PlanRequest(objective=plan.objective, minimum_dwell=plan.minimum_dwell, camera=plan.camera)
-    feedback = not trip.free_space.empty and trip.margin < plan.stated_error
-    start = x, y, math.remainder(heading, math.tau)
-    return make_goal_plan(start, trip.goal, plan.tracked, request, trip.free_space, via=left, feedback=feedback)
+    request = PlanRequest(
+        objective=plan.request.objective,
+        minimum_dwell=plan.minimum_dwell,
+        camera=plan.request.camera,
+        space=FreeSpace() if kept is None else kept.free_space,
+        feedback=kept is not None and kept.margin < plan.stated_error,
+    )
+    return to_goal((x, y, math.remainder(heading, math.tau)), plan.ends_at, plan.tracked, request, left)
 
 
 def poses_of(track: pd.DataFrame, robot: Robot) -> tuple[Floats, Floats]:

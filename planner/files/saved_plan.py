@@ -22,13 +22,14 @@ from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Reference
 from planner.planning.arrival import Arrival
-from planner.planning.camera import Camera
+from planner.planning.camera import DOCUMENTED, Camera
 from planner.planning.declared_path import Declared
 from planner.planning.errors import PlanErrors
 from planner.planning.kept_clear import Detour, KeptClear
 from planner.planning.lap import Lap
 from planner.planning.line_of_sight import Guidance
-from planner.planning.planned import GUARANTEE, Plan
+from planner.planning.planned import GUARANTEE, KINDS, Plan
+from planner.planning.request import PlanRequest
 from planner.planning.stated_error import predicted_error
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.dwell_choice import Objective
@@ -42,7 +43,7 @@ from sim.model.plan_file import check_format
 from sim.model.robot import Robot
 from surrogate.interface import LookupTable
 
-_JOBS = ("goal.json", "tour.json", "cover.json", "hold.json")  # beside the plan.json whose id they name
+_JOBS = tuple(f"{kind}.json" for kind in KINDS)  # beside the plan.json whose id they name
 _GROUPS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "N", "a_over_R")
 
 
@@ -61,7 +62,7 @@ def is_plan(path: str | Path) -> bool:
 @checks_keywords()
 def restore_plan(
     source: Mapping[str, Any] | str | Path, *, lookup: LookupTable | None = None, own_table: bool = False
-) -> Plan:
+) -> Plan[None]:
     """Make a plan again from its plan.json, to track it or to go on from where a robot is.
 
     Args:
@@ -156,7 +157,7 @@ def _robot(content: Mapping[str, Any]) -> Robot:
     )
 
 
-def _plan(content: Mapping[str, Any], tracked: TrackedVehicle) -> Plan:
+def _plan(content: Mapping[str, Any], tracked: TrackedVehicle) -> Plan[None]:
     """Put the parts of a plan together."""
     poses, dwells = np.array(content["predicted_poses"], dtype=float), np.array(content["dwell_bar"], dtype=float)
     if dwells.shape != (len(poses) - 1,) or not (np.isfinite(dwells) & (dwells > 0)).all():
@@ -177,11 +178,11 @@ def _plan(content: Mapping[str, Any], tracked: TrackedVehicle) -> Plan:
     if "arrival" in content:
         arrival, swing = Arrival.from_dict(content["arrival"], tracked.robot)
         declared = replace(declared, swing=swing)
-    plan = Plan(tracked, objective, drawn, declared, straight, guidance, switches, errors, kept_clear, arrival)
-    if "camera" in content:
-        plan = replace(plan, camera=Camera.from_dict(content["camera"]))
-    if "lap" in content:
-        plan = replace(plan, lap=Lap.from_dict(content["lap"]))
+    camera = Camera.from_dict(content["camera"]) if "camera" in content else DOCUMENTED
+    request = PlanRequest(point=tracked.point, objective=objective, camera=camera)
+    lap = Lap.from_dict(content["lap"]) if "lap" in content else None
+    parts = (tracked, request, drawn, declared, straight, guidance, switches, errors)
+    plan: Plan[None] = Plan(*parts, kept_clear, arrival, lap)
     said = tuple(str(warning) for warning in content["warnings"] if warning not in plan.warnings)
     return replace(plan, declared=replace(declared, warnings=said))
 

@@ -12,11 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from matplotlib.figure import Figure
 
-from planner.jobs.clear_plan import plan_clear
-from planner.paths.obstacles import FreeSpace
+from planner.jobs.plan import make_plan
 from planner.planning.picture import DECLARED, PREDICTED, RAW, REPLAYED, label_points
 from planner.planning.planned import Plan
-from planner.planning.request import PlanRequest
 from planner.vehicle.dwell_choice import QUICK, longest_dwell
 from sim.io.errors import InputError
 
@@ -31,19 +29,17 @@ class TradeOff:
     chosen: Plan
 
 
-def trade_off(chosen: Plan, request: PlanRequest) -> TradeOff:
+def trade_off(chosen: Plan) -> TradeOff:
     """Plan with dwells from the shortest whose response is known well to the longest that makes sense.
 
     Args:
         chosen: the plan that the user gets.
-        request: what it was made for.
     """
     tracked, plans = chosen.tracked, []
-    space = FreeSpace() if chosen.kept_clear is None else chosen.kept_clear.free_space
     for dwell in np.geomspace(QUICK, longest_dwell(tracked.vehicle, QUICK), _COUNT).tolist():
         try:
-            shorter = replace(request, dwell=dwell, tolerance=None)
-            plans.append(plan_clear(chosen.drawn, tracked, shorter, space))
+            other = replace(chosen.request, dwell=dwell, tolerance=None, arrive_seconds=None, loop=False)
+            plans.append(make_plan(chosen.drawn, tracked, other))
         except InputError:  # such dwells do not get the robot around the path
             continue
     return TradeOff(tuple(plans), chosen)

@@ -7,10 +7,14 @@ the distance from the goal. A pose has three coordinates, so a few dwells are en
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from planner.paths.distance import distance_to
+from planner.planning.camera import POSE
+from planner.planning.declared_path import Declared
+from planner.planning.setting import Setting
 from planner.vehicle.rollout import Switches, poses_at_flips
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
@@ -25,9 +29,20 @@ _GOAL = 1e7  # time units that a squared distance [l² or rad²] from the goal c
 _FAR = 3e4  # the same for a distance [l] from the track, beyond the largest one of the schedule
 
 
-def end_at_goal(
-    switches: Switches, goal: tuple[float, float, float], vehicle: Vehicle, dwell: float, track: Floats
-) -> Switches:
+@dataclass(frozen=True)
+class Ending:
+    """Changes the last dwells of a plan's schedule so that it ends at a pose."""
+
+    goal: POSE  # of the head's centre
+    least: float  # dwell that the motor allows
+    shorter: float = 1.0  # share of the plan's shortest dwell that these dwells must keep
+
+    def __call__(self, switches: Switches, declared: Declared, setting: Setting) -> Switches:
+        dwell = min(setting.dwell, max(self.least, self.shorter * setting.dwell))
+        return end_at_goal(switches, self.goal, setting.tracked.vehicle, dwell, declared.reference.q)
+
+
+def end_at_goal(switches: Switches, goal: POSE, vehicle: Vehicle, dwell: float, track: Floats) -> Switches:
     """Change the last dwells of a schedule so that it ends at a pose.
 
     Args:
@@ -50,7 +65,7 @@ def end_at_goal(
 class _Ending:
     """The least-squares problem of the last dwells of a schedule."""
 
-    def __init__(self, switches: Switches, goal: tuple[float, float, float], vehicle: Vehicle, dwell: float,
+    def __init__(self, switches: Switches, goal: POSE, vehicle: Vehicle, dwell: float,
                  track: Floats):  # fmt: skip
         self._switches, self._vehicle, self._least, self._track = switches, vehicle, dwell, track
         self._kept = max(len(switches.dwells) - _LAST, 0)

@@ -18,8 +18,8 @@ from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, words
 from planner.goal.lattice import Lattice, RouteLimits
 from planner.paths.obstacles import FreeSpace
 from planner.paths.units import in_lab, place_in_lab
+from planner.planning.kept_clear import BlockedError
 from sim.arrays import Floats
-from sim.io.errors import InputError
 from sim.model.robot import Robot
 
 COURSES = 24  # tried at a stop whose course is free
@@ -33,7 +33,7 @@ _MOST_CHECKS = 300  # chains of words
 AROUND = 6.0  # radii that the lattice reaches beyond stops and obstacles
 
 
-class NoWayError(InputError):
+class NoWayError(BlockedError):
     """There is no way to the goal."""
 
     status = 3

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 from typing import NamedTuple
 
@@ -17,9 +18,11 @@ import numpy as np
 
 from planner.goal.dubins import DubinsPaths, three_arcs
 from planner.paths.obstacles import Footprint, FreeSpace
+from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift, Reference, slips
 from planner.planning.arrival import Swing
-from planner.vehicle.tracked_point import TrackedVehicle
+from planner.planning.declared_path import Declared
+from planner.planning.setting import Setting
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
@@ -69,30 +72,38 @@ def swung(
     )
 
 
-def swung_clear(
-    reference: Reference, longer: float, tracked: TrackedVehicle, drift: Drift, space: FreeSpace, margin: float
-) -> tuple[Reference, Swing]:
-    """Make a vehicle's reference longer, with turns that it can follow well, and clear of obstacles.
+@dataclass(frozen=True)
+class Delay:
+    """Adds the length that a setting asks for, with turns that the vehicle can follow well.
 
     Args:
-        reference: of the pivot.
-        longer: length that is added.
-        tracked: the vehicle.
-        drift: what carries the robot off its heading.
-        space: what its body must keep clear of.
-        margin: around the body, without the swing; the swing keeps some more.
-
-    Raises:
-        NoRoomError: the track is too short, or obstacles leave no room.
+        space: what its body must keep clear of; the swing keeps more than the margin.
+        drawn: the path as drawn; None: the declared path counts as drawn.
     """
-    vehicle = tracked.vehicle
-    body = Footprint.of(tracked.robot, -vehicle.pivot_distance)
 
-    def free(poses: Floats) -> bool:
-        return bool(body.clearance(poses, space).min() >= _ROOM * margin)
+    space: FreeSpace
+    drawn: Path2D | None = None
 
-    radius = vehicle.pivot_radius / _CURVED * (1 + math.hypot(*drift.current))
-    return swung(reference, longer, radius, tracked.rod, drift, None if space.empty else free)
+    def __call__(self, declared: Declared, setting: Setting) -> Declared:
+        """Add a swing.
+
+        Raises:
+            NoRoomError: the track is too short, or obstacles leave no room.
+        """
+        if not setting.longer:
+            return declared
+        vehicle, drift = setting.tracked.vehicle, setting.drift
+        body, margin = Footprint.of(setting.tracked.robot, -vehicle.pivot_distance), setting.margin or 0.0
+
+        def free(poses: Floats) -> bool:
+            return bool(body.clearance(poses, self.space).min() >= _ROOM * margin)
+
+        radius = vehicle.pivot_radius / _CURVED * (1 + math.hypot(*drift.current))
+        reference, swing = swung(declared.reference, setting.longer, radius, setting.tracked.rod, drift,
+                                 None if self.space.empty else free)  # fmt: skip
+        if self.drawn is not None:
+            declared = declared.moved(reference, self.drawn, declared.curvature)
+        return replace(declared, reference=reference, swing=swing)
 
 
 class _Candidate(NamedTuple):

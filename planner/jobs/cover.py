@@ -10,35 +10,127 @@ times in μ0 l⁴/EI.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from planner.goal.dubins import DubinsPaths
 from planner.goal.route import Route, chained
-from planner.jobs.coverage_plan import CoveragePlan
-from planner.jobs.planned_track import pivot_poses, plan_track
-from planner.jobs.region import Field, across, lanes, share_covered
+from planner.jobs.region import Field, across, corners, lanes, share_covered
 from planner.jobs.shortest_order import EXACT, MOST, Order, shortest_order
+from planner.jobs.track import pivot_poses, plan_track, preferred_setting
 from planner.jobs.travel_times import SLACK, Travel
 from planner.paths.obstacles import Circle, FreeSpace
+from planner.paths.path import arc_length
 from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab
-from planner.planning.plan import zigzag_drift
+from planner.planning.picture import DECLARED
+from planner.planning.planned import Job, Plan
+from planner.planning.progress import Progress
 from planner.planning.request import PlanRequest
-from planner.vehicle.dwell_choice import dwells_for
 from planner.vehicle.tracked_point import TrackedVehicle
-from planner.vehicle.zigzag import zigzag
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.io.units import format_time
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FORMAT = 1
 DIRECTIONS = 12
 _CROSSED = 3.0  # turn radii; a shorter hole is crossed, which is quicker than to turn
 _LONGER = (0.0, 0.3, 0.6, 1.0, 1.5, -0.3, -0.6, -1.0)  # l, by which ends of lanes are moved outward
 _LEFT_OUT = 10.0  # times that a lane which cannot be swum counts when directions are compared
 _MOST_EDGES = 12  # whose directions are tried
+SWATH = "#d5ead6"
+_DISCS = 3_000  # at most, in a picture
+_DENSE = 12  # discs on a way as long as the footprint is wide
+
+
+@dataclass(frozen=True)
+class Coverage(Job):
+    """A region that a plan covers with a round footprint about the tracked point. Lengths in l, times in μ0 l⁴/EI.
+
+    Example:
+        >>> import softflagella as sf
+        >>> cover = sf.cover([[0, 0], [2, 0], [2, 2], [0, 2]], 0.5, "paper-control", objective="time")
+        >>> cover.job.share > 0.97, cover.duration > cover.job.bound
+        (True, True)
+    """
+
+    field: Field  # the region and its holes
+    width: float  # of the footprint
+    lanes: Floats  # (k, 2, 2), start and end of each lane, in the order in which they are swum
+    share: float  # of the area that the predicted track covers
+    sure: float  # of the area that is covered as long as the robot stays within the stated error
+    sure_tracked: float  # the same with feedback, if the margin around obstacles stays as it is
+    bound: float  # area by width and net speed on straight lines: lanes take longer, by turns and overlap
+    exact: bool  # no order of the lanes is quicker
+    gap: float  # how much longer than with the quickest order the ways between lanes may take, as a share
+
+    kind = "cover"
+
+    def lines(self, plan: Plan) -> list[str]:
+        """Say what is covered, and in what time."""
+        robot = plan.robot
+        scale, duration = robot.time_scale, plan.duration
+        if plan.kept_clear is not None:
+            proven = "the quickest order of those with direct ways"
+        elif self.exact:
+            proven = "no order of them is quicker"
+        else:
+            proven = f"another order takes at most {100 * self.gap / (1 + self.gap):.0f} % less"
+        share, sure, tracked = (100 * each for each in (self.share, self.sure, self.sure_tracked))
+        remedy = f", {tracked:.1f} % if a camera measures where it is (--feedback)" if tracked > sure else ""
+        if tracked == 0:
+            remedy = f"; with a camera (--feedback), give more than {in_lab(2 * plan.feedback_error, robot)}"
+        return [
+            f"{len(self.lanes)} lanes for a width of {in_lab(self.width, robot)}; {proven}",
+            f"covers {share:.1f} % as predicted, {sure:.1f} % wherever the robot is within the stated error"
+            f"{remedy}",
+            f"{format_time(duration * scale)}; area by width and net speed, the bound for lanes without turns, is "
+            f"{format_time(self.bound * scale)}",
+        ]
+
+    def title(self, plan: Plan) -> str:
+        """Name the share that is covered."""
+        return f"covers {100 * self.share:.1f} %"
+
+    def draw(self, axes: Axes, plan: Plan) -> None:
+        """Draw the region, its holes, and below the plan what is covered."""
+        from matplotlib.collections import PatchCollection
+        from matplotlib.patches import Circle as Disc
+
+        cm, track, width = 100 * plan.robot.tail_length, plan.smooth_track, self.width
+        way = arc_length(track)
+        places = np.linspace(0.0, way[-1], min(_DISCS, math.ceil(_DENSE * way[-1] / width) + 1))
+        centres = cm * np.stack([np.interp(places, way, track[:, i]) for i in (0, 1)], 1)
+        discs = [Disc((x, y), cm * width / 2) for x, y in centres.tolist()]
+        axes.add_collection(PatchCollection(discs, color=SWATH, lw=0, zorder=0))
+        axes.plot([], [], color=SWATH, lw=6, label="swept")
+        axes.autoscale_view()
+        for region in (self.field.outline, *self.field.holes):
+            outline = cm * corners(region)
+            axes.plot(*np.concatenate([outline, outline[:1]]).T, color=DECLARED, lw=1.0, ls="--")
+
+    def to_dict(self, plan: Plan) -> dict[str, Any]:
+        """Return the content of cover.json. Lengths in l, times in seconds."""
+        scale = plan.robot.time_scale
+        return {
+            "format": FORMAT,
+            "outline": FreeSpace((self.field.outline,)).to_dict()["keep_out"][0],
+            "holes": FreeSpace(self.field.holes).to_dict()["keep_out"],
+            "width_over_l": self.width,
+            "lanes": self.lanes.tolist(),
+            "share": self.share,
+            "share_within_stated_error": self.sure,
+            "duration_s": plan.duration * scale,
+            "bound_s": self.bound * scale,
+            "exact": self.exact,
+            "gap": self.gap,
+        }
 
 
 class _Cut(NamedTuple):
@@ -60,33 +152,25 @@ def cover(
     width: float,
     tracked: TrackedVehicle,
     request: PlanRequest,
-    space: FreeSpace | None = None,
-    *,
     angle: float | None = None,
-    feedback: bool = False,
-    progress: Callable[[float], object] | None = None,
-) -> CoveragePlan:
+    progress: Progress | None = None,
+) -> Plan[Coverage]:
     """Plan a track that covers a region.
 
     Args:
         field: the region and its holes.
         width: of the footprint about the tracked point.
         tracked: the vehicle, and the point that carries the footprint.
-        request: dwells, tolerance.
-        space: what the robot's body must keep clear of.
+        request: dwells, tolerance, obstacles; with feedback, the share is that covered within the error with it.
         angle: direction of the lanes; default: the quickest one.
-        feedback: the pose will be measured for a tracker. It counts for the margin around obstacles, and for the
-            share that is covered within the stated error.
         progress: called now and then with the share of the path that is done.
 
     Raises:
         InputError: the width is too small for this robot's zigzag, the region needs too many lanes, or an obstacle
             cannot be passed.
     """
-    space = space or FreeSpace()
-    vehicle, robot = tracked.vehicle, tracked.robot
-    dwell = request.dwell or dwells_for(vehicle, request.objective, request.least_dwell(robot))[0]
-    straight = zigzag(vehicle, dwell, tracked.offset)
+    robot, space, setting = tracked.robot, request.space, preferred_setting(tracked, request)
+    straight, drift = setting.straight, setting.drift
     swath = width - 2 * straight.largest
     if not (math.isfinite(width) and swath > 0.3 * width):
         zigzags = in_lab(2 * straight.largest, robot)
@@ -94,7 +178,6 @@ def cover(
             f"width {in_lab(width, robot)}: the robot's zigzag alone is {zigzags} wide; give a larger width, or "
             "shorter dwells"
         )
-    drift = zigzag_drift(tracked, straight, dwell)
     travel = Travel.of(tracked, straight, space, drift, 0.0)
     apart = _CROSSED * travel.radius
     angles = _angles(field) if angle is None else [angle]
@@ -112,26 +195,25 @@ def cover(
             f"the region needs {len(cut)} lanes; at most {MOST} can be ordered: widen them, or cover it in parts"
         )
     ordered = _ordered(cut, travel, tracked, drift)
-    track = partial(_track, ordered.ends, travel, tracked)
-    plan = plan_track(tracked, request, space, track, drift, feedback=feedback, progress=progress)
+    plan = plan_track(partial(_track, ordered.ends, travel, tracked), setting, request, progress)
 
     def sure(error: float) -> float:
         return share_covered(field, plan.reference, width - 2 * error) if width > 2 * error else 0.0
 
     tracked_sure = sure(plan.feedback_error)
     points, cell = field.raster(width / 20)
-    return CoveragePlan(
-        plan=plan,
+    job = Coverage(
         field=field,
         width=width,
         lanes=ordered.ends,
         share=share_covered(field, plan.track, width),
-        sure=tracked_sure if feedback else sure(plan.stated_error),
+        sure=tracked_sure if request.feedback else sure(plan.stated_error),
         sure_tracked=tracked_sure,
         bound=len(points) * cell / (width * straight.net_speed),
         exact=len(cut) <= EXACT and space.empty,
         gap=ordered.order.gap,
     )
+    return plan.with_job(job)
 
 
 def _angles(field: Field) -> list[float]:

@@ -14,6 +14,8 @@ turns are wider than the robot's narrowest one, as those of a path that is follo
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -29,11 +31,12 @@ from planner.paths.path import Path2D, arc_length
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.tractrix import reference as follow_path
 from planner.paths.units import in_lab, place_in_lab
+from planner.planning.declared_path import Declared
 from planner.planning.feasible import AS_DRAWN, TIGHTEST
-from planner.planning.kept_clear import Detour
+from planner.planning.kept_clear import BlockedError, Detour
+from planner.planning.setting import Setting
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.arrays import Flags, Floats
-from sim.io.errors import InputError
 
 _REACH = 6.0  # radii before and behind a blocked stretch, within which a way around leaves and joins
 _STEP = 0.35  # radii between two such places
@@ -47,10 +50,37 @@ _FAR = 0.05  # that it reaches at least
 _APART = 1.0  # between two ways around
 
 
-class BlockedError(InputError):
-    """There is no way around what stands on the path; `hopeless`: not even without a margin."""
+class Around:
+    """Replaces what obstacles block of a declared path by ways around, once a setting has a margin.
 
-    hopeless = False
+    Args:
+        tracked: the vehicle and its tracked point.
+        space: walls and regions.
+        drawn: the path as drawn.
+    """
+
+    def __init__(self, tracked: TrackedVehicle, space: FreeSpace, drawn: Path2D):
+        self._detours = cache(partial(Detours, tracked, space))  # by drift: they have lattices
+        self._drawn = drawn
+
+    def __call__(self, declared: Declared, setting: Setting) -> Declared:
+        """Keep clear.
+
+        Raises:
+            BlockedError: there is no way around; it says whether there is one without a margin.
+        """
+        if setting.margin is None:
+            return declared
+        ways = self._detours(setting.drift)
+        try:
+            reference, detours = ways.around(declared.reference, setting.margin)
+        except BlockedError as blocked:
+            try:
+                ways.around(declared.reference, 0.0)
+            except BlockedError:
+                blocked.hopeless = True
+            raise
+        return replace(declared.moved(reference, self._drawn), detours=detours) if detours else declared
 
 
 class Stretch(NamedTuple):

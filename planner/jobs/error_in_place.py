@@ -29,8 +29,8 @@ from planner.paths.obstacles import Footprint
 from planner.paths.path import Path2D, arc_length
 from planner.paths.tractrix import reference
 from planner.planning.error_growth import error_growth
-from planner.planning.plan import zigzag_drift
 from planner.planning.planned import Plan
+from planner.planning.setting import zigzag_drift
 from planner.planning.stated_error import LEVEL, WOBBLE, deviations_open_loop, flips_between
 from planner.vehicle.rollout import roll_out
 from planner.vehicle.tracked_point import TrackedVehicle
@@ -126,7 +126,7 @@ def _changed(tracked: TrackedVehicle, mode: Mode) -> TrackedVehicle:
 def _passing_times(path: Path2D, tracked: TrackedVehicle, dwell: float) -> Floats:
     """Compute the times (K,) at which the pivot of a robot that follows a path passes equal parts of it."""
     straight = zigzag(tracked.vehicle, dwell, tracked.offset)
-    drift = zigzag_drift(tracked, straight, dwell)
+    drift = zigzag_drift(tracked, straight)
     followed = reference(path, tracked.rod, max(_SPACING, path.length / 4000), drift)
     heading = (followed.heading[1:] + followed.heading[:-1]) / 2
     ahead = 1 + drift.current[0] * np.cos(heading) + drift.current[1] * np.sin(heading)

@@ -12,26 +12,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import combinations
 
 import numpy as np
 
-from planner.goal.goal_plan import GoalPlan, Pose
-from planner.jobs.coverage_plan import CoveragePlan
 from planner.jobs.error_in_place import times_at
 from planner.jobs.fleet_plan import FleetPlan
 from planner.jobs.priorities import Priorities
 from planner.jobs.separation import Places, Scheduled, approach, distances, too_near
 from planner.jobs.timed_motion import TimedMotion
 from planner.jobs.timetable import Timetable, Timing, Turn
-from planner.jobs.tour_plan import TourPlan
 from planner.jobs.waiting_circles import WaitingCircle, circle_reference, with_circles
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.planning.kept_clear import KeptClear
 from planner.planning.planned import Plan
-from planner.vehicle.rollout import predicted_poses
 from sim.io.errors import InputError
 from sim.io.units import format_length
 
@@ -56,18 +52,12 @@ class Member:
 
     name: str
     plan: Plan
-    goal: Pose | None = None  # the pose at which the plan ends, if it ends at one
-    free_space: FreeSpace = field(default_factory=FreeSpace)  # what waiting circles must keep clear of
     earliest: float = 0.0  # time before which it does not begin
 
-    @staticmethod
-    def of(name: str, planned: Plan | GoalPlan | TourPlan | CoveragePlan, earliest: float = 0.0) -> Member:
-        """Take any plan."""
-        plan = planned if isinstance(planned, Plan) else planned.plan
-        if isinstance(planned, GoalPlan):
-            return Member(name, plan, planned.goal, planned.free_space, earliest)
-        space = FreeSpace() if plan.kept_clear is None else plan.kept_clear.free_space
-        return Member(name, plan, None, space, earliest)
+    @property
+    def free_space(self) -> FreeSpace:
+        """What waiting circles must keep clear of."""
+        return FreeSpace() if self.plan.kept_clear is None else self.plan.kept_clear.free_space
 
 
 def fleet(
@@ -168,17 +158,14 @@ class _Fleet:
         Raises:
             InputError: there is no room.
         """
-        plan = with_circles(member.plan, circles, member.goal)
-        if member.free_space.empty:
+        plan = with_circles(member.plan, circles)
+        kept = plan.kept_clear
+        if kept is None:
             return plan
-        poses = predicted_poses(plan.tracked.vehicle, plan.switches)
-        clearance = float(Footprint.of(plan.robot, 0.0).clearance(poses, member.free_space).min())
+        clearance = plan.clearance(kept.free_space)
         needed = plan.feedback_error if self.feedback else plan.stated_error
         if clearance < needed:
             raise InputError("a waiting circle leaves no margin around obstacles")
-        if plan.kept_clear is None:
-            return plan
-        kept = plan.kept_clear
         return replace(
             plan, kept_clear=KeptClear(kept.free_space, max(kept.margin, needed), clearance, kept.detours)
         )
@@ -250,7 +237,7 @@ def _turns(member: Member, motion: TimedMotion, step: float) -> list[Turn]:
     count = max(1, min(_PLACES, math.floor(float(arc[-1]) / _SPACING)))
     places = np.unique(np.searchsorted(arc, np.linspace(0.0, arc[-1], count + 1)).clip(max=len(arc) - 1)).tolist()
     try:
-        circling = with_circles(plan, [WaitingCircle(places[len(places) // 2], 1)], member.goal)
+        circling = with_circles(plan, [WaitingCircle(places[len(places) // 2], 1)])
     except InputError:
         return []
     duration = (circling.duration - plan.duration) * robot.time_scale

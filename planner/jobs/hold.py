@@ -15,22 +15,112 @@ so that flips correct it in both directions. It repeats until told otherwise. Le
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planner.jobs.hold_plan import HoldPlan
-from planner.jobs.laps import looped
+from planner.jobs.plan import make_plan
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D, circle
 from planner.paths.units import in_lab, place_in_lab
-from planner.planning.plan import make_plan
+from planner.planning.camera import POSE
+from planner.planning.planned import Job, Plan
+from planner.planning.progress import Progress
 from planner.planning.request import PlanRequest
 from planner.vehicle.rollout import predicted_poses
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.io.errors import InputError
+from sim.io.units import format_time
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FORMAT = 1
 CURVED = 0.84  # below the share up to which a path is followed as it was drawn
+
+
+@dataclass(frozen=True)
+class Orbit(Job):
+    """An orbit about a place. Lengths in l, times in μ0 l⁴/EI.
+
+    Example:
+        >>> import softflagella as sf
+        >>> held = sf.hold((2, 1), "paper-control", seconds=1800)
+        >>> held.job.smallest < held.job.radius < 1.1 * held.job.smallest, held.job.laps
+        (True, 6)
+    """
+
+    place: tuple[float, float]  # that is held
+    radius: float  # of the orbit of the tracked point
+    reach: float  # largest distance of any part of the body from the place, on the orbit
+    laps: int | None  # whole laps that take the time that was asked for, or more; None: until told otherwise
+    smallest: float  # radius of the tracked point's smaller circle: no schedule stays nearer
+    still_direction: int  # of the motor, on that circle
+    still_start: POSE  # at rest, from where that circle is about the place
+
+    kind = "hold"
+
+    def within(self, plan: Plan) -> float:
+        """Return the distance from the place within which the tracked point stays with feedback."""
+        return self.radius + plan.feedback_error
+
+    def within_open_loop(self, plan: Plan, laps: int) -> float:
+        """Return the distance within which the tracked point stays for some laps without feedback."""
+        assert plan.lap is not None
+        return self.radius + plan.stated_error + (laps - 1) * plan.lap.drift
+
+    def lines(self, plan: Plan) -> list[str]:
+        """Say how near the robot stays."""
+        robot = plan.robot
+        radius, smallest, within, reach = (
+            in_lab(value, robot) for value in (self.radius, self.smallest, self.within(plan), self.reach)
+        )
+        x, y, heading = self.still_start
+        lap = format_time(plan.duration * robot.time_scale)
+        lines = [
+            f"orbit of radius {radius} about {place_in_lab(*self.place, robot)}, a lap in {lap}; with feedback "
+            f"within {within}, the body within {reach}; no schedule stays nearer than {smallest}"
+        ]
+        if self.laps is not None:
+            without = in_lab(self.within_open_loop(plan, self.laps), robot)
+            lines.append(f"{self.laps} laps; without feedback within {without} for so long")
+        lines.append(
+            f"without a camera, from {place_in_lab(x, y, robot)} with heading {math.degrees(heading):.0f} degrees "
+            f"and the motor always at {self.still_direction:+d}: a circle of radius {smallest} about the place, "
+            "which only a current moves"
+        )
+        return lines
+
+    def title(self, plan: Plan) -> str:
+        """Name the distance from the place."""
+        return f"with feedback within {in_lab(self.within(plan), plan.robot)}"
+
+    def draw(self, axes: Axes, plan: Plan) -> None:
+        """Draw the place, and what the body reaches."""
+        cm = 100 * plan.robot.tail_length
+        x, y = cm * np.array(self.place)
+        angle = np.linspace(0, 2 * math.pi, 200)
+        reach = cm * self.reach
+        axes.plot(x, y, "+", color="#c8452f", ms=8, label="place")
+        axes.plot(x + reach * np.cos(angle), y + reach * np.sin(angle), ":", color="0.5", lw=1, label="body")
+
+    def to_dict(self, plan: Plan) -> dict[str, Any]:
+        """Return the content of hold.json. Lengths in l, times in seconds, angles in rad."""
+        return {
+            "format": FORMAT,
+            "place": list(self.place),
+            "radius_over_l": self.radius,
+            "smallest_over_l": self.smallest,
+            "within_over_l": self.within(plan),
+            "reach_over_l": self.reach,
+            "lap_s": plan.duration * plan.robot.time_scale,
+            "laps": self.laps,
+            "within_open_loop_over_l": None if self.laps is None else self.within_open_loop(plan, self.laps),
+            "still_start": list(self.still_start),
+            "still_direction": self.still_direction,
+        }
 
 
 def hold(
@@ -38,20 +128,15 @@ def hold(
     tracked: TrackedVehicle,
     request: PlanRequest,
     seconds: float | None = None,
-    space: FreeSpace | None = None,
-    *,
-    feedback: bool = False,
-    progress: Callable[[float], object] | None = None,
-) -> HoldPlan:
+    progress: Progress | None = None,
+) -> Plan[Orbit]:
     """Plan an orbit about a place.
 
     Args:
         place: x, y.
         tracked: the vehicle, and the point that stays near the place.
-        request: dwells, tolerance.
+        request: dwells, tolerance, obstacles.
         seconds: for so long; None: until told otherwise.
-        space: what the robot's body must keep clear of.
-        feedback: the pose will be measured for a tracker, so the margin is the stated error with feedback.
         progress: called now and then with the share of the path that is done.
 
     Raises:
@@ -60,29 +145,28 @@ def hold(
     x, y = _checked(place)
     if seconds is not None and not (math.isfinite(seconds) and seconds > 0):
         raise InputError(f"hold for {seconds:g} s; give a time above 0")
-    vehicle, robot = tracked.vehicle, tracked.robot
+    vehicle, robot, space = tracked.vehicle, tracked.robot, request.space
     current = math.hypot(*vehicle.current.tolist()) / vehicle.speed
     radius = math.hypot(vehicle.pivot_radius * (1 + current) / CURVED, tracked.rod)
-    plan = looped(make_plan(_orbit(x, y, radius), tracked, request, progress), request.seed, progress)
-    poses = predicted_poses(vehicle, plan.switches)
+    orbit = Path2D.of(circle(radius).points + np.array([x, y]), closed=True)
+    plan = make_plan(orbit, tracked, replace(request, loop=True, space=FreeSpace()), progress)
+    if not space.empty and (clearance := plan.clearance(space)) < plan.margin_needed:
+        raise InputError(
+            f"there is no room to hold {place_in_lab(x, y, robot)}: the body comes within "
+            f"{in_lab(max(clearance, 0.0), robot)} of an obstacle and needs {in_lab(plan.margin_needed, robot)}; "
+            "move the place"
+        )
     body = Footprint.of(robot, 0.0)
-    margin = plan.feedback_error if feedback else plan.stated_error
-    if space is not None and not space.empty:
-        clearance = float(body.clearance(poses, space).min())
-        if clearance < margin:
-            raise InputError(
-                f"there is no room to hold {place_in_lab(x, y, robot)}: the body comes within "
-                f"{in_lab(max(clearance, 0.0), robot)} of an obstacle and needs {in_lab(margin, robot)}; move the "
-                "place"
-            )
-    centres = body.centres(poses) - [x, y]
+    centres = body.centres(predicted_poses(vehicle, plan.switches)) - [x, y]
     reach = float((centres**2).sum(-1).max() ** 0.5) + body.radius
     laps = None if seconds is None else math.ceil(seconds / (plan.duration * robot.time_scale))
-    return HoldPlan(plan, (x, y), radius, reach, laps)
-
-
-def _orbit(x: float, y: float, radius: float) -> Path2D:
-    return Path2D.of(circle(radius).points + np.array([x, y]), closed=True)
+    twists = [(direction, *twist) for direction, twist in zip((1, -1), vehicle.twist.tolist(), strict=True)]
+    smallest, still, (forward, left, rate) = min(
+        (math.hypot(forward, left + rate * tracked.offset) / abs(rate), -direction, (forward, left, rate))
+        for direction, forward, left, rate in twists
+    )
+    start = x + left / rate, y - forward / rate, 0.0
+    return plan.with_job(Orbit((x, y), radius, reach, laps, smallest, -still, start))
 
 
 def _checked(place: Sequence[float]) -> tuple[float, float]:

@@ -9,7 +9,6 @@ the start is where that one, too, ends in the pose from which all laps go on. Le
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +16,8 @@ import numpy as np
 from planner.goal.final_dwells import flips_after
 from planner.planning.errors import plan_errors
 from planner.planning.lap import OVERLAP, Lap, drift_of_a_lap
-from planner.planning.planned import Plan
+from planner.planning.planned import J, Plan
+from planner.planning.progress import Progress
 from planner.planning.schedule import follow
 from planner.vehicle.rollout import Switches, poses_at_flips
 from planner.vehicle.vehicle import Vehicle
@@ -32,18 +32,17 @@ _STEP = 1e-4  # for derivatives
 _CLOSED = 1e-4  # l and rad; a lap that closes less well is refused
 
 
-def looped(plan: Plan, seed: int = 0, progress: Callable[[float], object] | None = None) -> Plan:
+def looped(plan: Plan[J], progress: Progress | None = None) -> Plan[J]:
     """Turn the plan of a closed path into a schedule that repeats.
 
     Args:
         plan: of a closed path, for one lap from rest.
-        seed: of the random robots from which errors are stated.
         progress: called now and then with the share of the path that is done.
 
     Raises:
         InputError: no schedule closes.
     """
-    tracked, reference = plan.tracked, plan.declared.reference
+    tracked, reference, seed = plan.tracked, plan.declared.reference, plan.request.seed
     twice = reference.laps(2, OVERLAP * tracked.vehicle.pivot_radius)
     long = follow(twice, tracked.vehicle, plan.guidance, tracked.offset, progress=progress)
     turn = reference.turn

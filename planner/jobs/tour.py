@@ -12,31 +12,35 @@ is blocked, the order is chosen as if that took some turn radii more. Lengths in
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from operator import itemgetter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from planner.goal.route import Route
-from planner.jobs.planned_track import pivot_poses, plan_track
 from planner.jobs.shortest_order import EXACT, best_options, shortest_order
-from planner.jobs.tour_plan import TourPlan
+from planner.jobs.track import pivot_poses, plan_track, preferred_setting
 from planner.jobs.travel_times import SLACK, Travel
 from planner.paths.distance import distance_to
 from planner.paths.obstacles import FreeSpace
 from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab, place_in_lab
-from planner.planning.plan import zigzag_drift
-from planner.planning.planned import Plan
+from planner.planning.picture import REPLAYED, label_points
+from planner.planning.planned import Job, Plan
+from planner.planning.progress import Progress
 from planner.planning.request import PlanRequest
-from planner.vehicle.dwell_choice import dwells_for
 from planner.vehicle.tracked_point import TrackedVehicle
-from planner.vehicle.zigzag import zigzag
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.io.units import format_time
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FORMAT = 1
 COURSES = 72  # directions of motion at a place, for an exact order
 FEWER_COURSES = 16  # for many places, and among obstacles
 _SPACING = 0.02  # of the reference's points
@@ -45,46 +49,100 @@ _MARGINS = 3  # around obstacles, with which orders are sought
 _MISSED = 0.05  # l; a place that a way around leaves further aside is refused
 
 
+@dataclass(frozen=True)
+class Visits(Job):
+    """The places that a plan visits. Lengths in l, times in μ0 l⁴/EI.
+
+    Example:
+        >>> import softflagella as sf
+        >>> tour = sf.tour([(0, 0), (4, 0), (2, 1)], "paper-control")
+        >>> tour.job.order, tour.job.exact
+        ((0, 2, 1), True)
+    """
+
+    places: Floats  # (n, 2), as they were given
+    order: tuple[int, ...]  # indices of the places; with a return, the first one again at the end
+    exact: bool  # no order is quicker, with the directions of motion that were tried at each place
+    gap: float  # how much longer than the quickest order this one may take, as a share
+    estimate: float  # time of the tour by which orders were compared
+    reached: Floats  # (k,), time at which the predicted track is nearest to each place of the order
+    distance: Floats  # (k,), from the predicted track then
+    courses: int  # directions of motion that were tried at each place
+
+    kind = "tour"
+
+    def lines(self, plan: Plan) -> list[str]:
+        """Say order, times and distances."""
+        robot = plan.robot
+        tried = f"with {self.courses} headings tried at each place"
+        if self.exact:
+            proven = f"no other order is quicker, {tried}"
+        elif plan.kept_clear is None:
+            proven = f"at most {100 * self.gap:.0f} % longer than the quickest order, {tried}"
+        else:
+            proven = "the quickest one of those with direct ways; ways around obstacles were estimated"
+        return [
+            f"order: {' '.join(str(index + 1) for index in self.order)}; {proven}",
+            f"{format_time(plan.duration * robot.time_scale)} in all; the predicted track passes every place "
+            f"within {in_lab(float(self.distance.max()), robot)}",
+        ]
+
+    def draw(self, axes: Axes, plan: Plan) -> None:
+        """Draw the numbers of the places."""
+        cm = 100 * plan.robot.tail_length
+        places = cm * self.places
+        axes.plot(*places.T, "o", color=REPLAYED, ms=5)
+        numbers = [str(index + 1) for index in range(len(places))]
+        label_points(axes, places, numbers, [REPLAYED] * len(places), 9)
+
+    def to_dict(self, plan: Plan) -> dict[str, Any]:
+        """Return the content of tour.json. Lengths in l, times in seconds."""
+        scale = plan.robot.time_scale
+        return {
+            "format": FORMAT,
+            "places": self.places.tolist(),
+            "order": list(self.order),
+            "exact": self.exact,
+            "gap": self.gap,
+            "estimated_s": self.estimate * scale,
+            "reached_s": (self.reached * scale).tolist(),
+            "distance_over_l": self.distance.tolist(),
+        }
+
+
 def tour(
     places: Sequence[Sequence[float]],
     tracked: TrackedVehicle,
     request: PlanRequest,
-    space: FreeSpace | None = None,
     *,
     any_start: bool = False,
     back: bool = False,
-    feedback: bool = False,
-    progress: Callable[[float], object] | None = None,
-) -> TourPlan:
+    progress: Progress | None = None,
+) -> Plan[Visits]:
     """Plan a tour of places.
 
     Args:
         places: x, y of each.
         tracked: the vehicle, and the point that passes the places.
-        request: dwells, tolerance.
-        space: what the robot's body must keep clear of.
+        request: dwells, tolerance, obstacles.
         any_start: begin at any place, not at the first one.
         back: return to the first one at the end.
-        feedback: the pose will be measured for a tracker, so the margin is the stated error with feedback.
         progress: called now and then with the share of the path that is done.
 
     Raises:
         InputError: a place is no pair of finite numbers, is there twice, or cannot be reached.
     """
-    task = _Tour(
-        _checked(places), tracked, FreeSpace() if space is None else space, any_start=any_start, back=back
-    )
-    dwell = request.dwell or dwells_for(tracked.vehicle, request.objective, request.least_dwell(tracked.robot))[0]
-    straight = zigzag(tracked.vehicle, dwell, tracked.offset)
-    drift, margin = zigzag_drift(tracked, straight, dwell), 1.5 * straight.largest
+    task = _Tour(_checked(places), tracked, request.space, any_start=any_start, back=back)
+    setting = preferred_setting(tracked, request)
+    straight, drift = setting.straight, setting.drift
+    margin = 1.5 * straight.largest
     for _ in range(_MARGINS):
         found = task.ordered(Travel.of(tracked, straight, task.space, drift, margin))
-        track = partial(task.track, found)
-        plan = plan_track(tracked, request, task.space, track, drift, feedback=feedback, progress=progress)
+        plan = plan_track(partial(task.track, found), setting, request, progress)
         if plan.kept_clear is None or not plan.kept_clear.detours or plan.kept_clear.margin <= margin:
             break
         margin = plan.kept_clear.margin
-    return task.result(plan, found)
+    return plan.with_job(task.visits(plan, found))
 
 
 def _checked(places: Sequence[Sequence[float]]) -> Floats:
@@ -175,7 +233,7 @@ class _Tour:
         poses = pivot_poses(self.places[list(found.order)], found.courses, self.tracked, drift)
         return Route(travel.tracks(poses[:-1], poses[1:]), travel.radius)
 
-    def result(self, plan: Plan, found: _Ordered) -> TourPlan:
+    def visits(self, plan: Plan, found: _Ordered) -> Visits:
         """Compare the predicted track with the places.
 
         Raises:
@@ -193,8 +251,8 @@ class _Tour:
         samples = (len(plan.track) - 1) // len(plan.dwells)
         times = np.concatenate([[0.0], np.cumsum(np.repeat(plan.dwells / samples, samples))])
         reached, distance = _passed(plan.track, times, visited, before=plan.predicted_max)
-        return TourPlan(
-            plan, self.places, found.order, found.exact, found.gap, found.estimate, reached, distance, found.tried
+        return Visits(
+            self.places, found.order, found.exact, found.gap, found.estimate, reached, distance, found.tried
         )
 
 

@@ -15,15 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.goal.final_dwells import end_at_goal
-from planner.goal.goal_plan import Pose
-from planner.jobs.clear_plan import redeclared
+from planner.goal.final_dwells import Ending
 from planner.paths.tractrix import Reference
-from planner.planning.errors import plan_errors
-from planner.planning.plan import choose_guidance, zigzag_drift
-from planner.planning.planned import Plan
-from planner.planning.schedule import Start, follow
-from planner.planning.stated_error import guaranteed
+from planner.planning.planned import J, Plan
+from planner.planning.schedule import Start
+from planner.planning.setting import Setting
+from planner.planning.solve import follow_declared
 
 ROOM = 0.7  # radius of the narrowest circle over that of a waiting circle
 _SPACING = 0.02  # l, of the reference's points
@@ -39,7 +36,7 @@ class WaitingCircle(NamedTuple):
 def circle_reference(plan: Plan, circle: WaitingCircle) -> Reference:
     """Make the reference of a waiting circle; it begins and ends at the place, and ends a whole turn further."""
     reference, tracked = plan.declared.reference, plan.tracked
-    drift = zigzag_drift(tracked, plan.straight, plan.minimum_dwell)
+    drift = plan.drift
     radius = tracked.vehicle.pivot_radius / ROOM
     count = math.ceil(2 * math.pi * radius / _SPACING)
     ((x, y, course),) = reference.part(circle.place, circle.place + 1).courses(drift).tolist()
@@ -50,33 +47,29 @@ def circle_reference(plan: Plan, circle: WaitingCircle) -> Reference:
     return Reference.of_pivot(poses, tracked.rod, drift, float(reference.heading[circle.place]))
 
 
-def with_circles(plan: Plan, circles: Sequence[WaitingCircle], goal: Pose | None = None) -> Plan:
+def with_circles(plan: Plan[J], circles: Sequence[WaitingCircle]) -> Plan[J]:
     """Plan again with waiting circles.
 
     Args:
         plan: the plan without them.
         circles: where to wait; those at the same place follow each other.
-        goal: the pose at which the plan ends, if it ends at one.
 
     Raises:
         InputError: the robot has no room for a circle.
     """
     if not circles:
         return plan
-    tracked, vehicle = plan.tracked, plan.tracked.vehicle
-    reference = _inserted(plan, circles)
-    declared = redeclared(plan.declared, reference, plan.drawn)
+    goal, setting = plan.ends_at, Setting(plan.tracked, plan.minimum_dwell, plan.straight, plan.drift)
+    declared = plan.declared.moved(_inserted(plan, circles), plan.drawn)
     if goal is None:
-        guidance = choose_guidance(vehicle, declared, plan.straight, plan.minimum_dwell)
-        start = None
+        circling = follow_declared(declared, setting, plan.request, drawn=plan.drawn)
     else:
-        guidance, start = plan.guidance, Start(plan.start, plan.first_direction)
-    switches = follow(reference, vehicle, guidance, tracked.offset, start=start)
-    if goal is not None:
-        switches = end_at_goal(switches, goal, vehicle, plan.minimum_dwell, reference.q)
-    bound = None if goal else guaranteed(vehicle, tracked.rod, plan.straight.swing, guidance.ahead)
-    errors = plan_errors(tracked, plan.drawn, declared, switches, guaranteed=bound, seed=0)
-    return replace(plan, declared=declared, guidance=guidance, switches=switches, errors=errors, arrival=None)
+        circling = follow_declared(
+            declared, setting, plan.request, drawn=plan.drawn, guidance=plan.guidance,
+            start=Start(plan.start, plan.first_direction), ending=Ending(goal, plan.minimum_dwell),
+        )  # fmt: skip
+    return replace(plan, declared=circling.declared, guidance=circling.guidance, switches=circling.switches,
+                   errors=circling.errors, arrival=None)  # fmt: skip
 
 
 def _inserted(plan: Plan, circles: Sequence[WaitingCircle]) -> Reference:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import fields
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from planner.page.first_state import CAMEL
-from planner.planning.request import PlanRequest
+from planner.planning.request import PlanRequest, RequestOptions
 from planner.vehicle.calibration_table import UNMEASURED
 from sim.io import units
 from sim.model import uncertainty
@@ -33,10 +32,10 @@ _NAMES = {  # of each module; a leading underscore is left out
     "SPACING MOST_POINTS MINIMAX ROUNDING POINTS_A_POSE",
     "planner.planning.feedback_error": "WITHIN KEPT ZIGZAG PLACE COURSE STRETCH",
     "planner.planning.line_of_sight": "EXACT LARGEST_STEP TURNS MOST_BIAS HALVINGS MOST_LOOKS",
-    "planner.planning.plan": "WORTH SAVED LENGTHENED_FROM",
     "planner.planning.planned": "WIDE OWN_TABLE_FROM",
     "planner.planning.remedy": "SCALES MOST_WORK SMOOTHINGS FIRST",
     "planner.planning.schedule": "MOST_SWITCHES PATIENCE EVERY",
+    "planner.planning.solve": "WORTH SAVED LENGTHENED_FROM",
     "planner.planning.stated_error": "LEVEL WOBBLE DRAWS BLOCKS TIGHTEST PAIRS_AHEAD",
     "planner.tracking.guidance": "NEAR ERRORS",
     "planner.tracking.kalman_filter": "PRIOR MOST CURRENT MOST_CURRENT MARKER MOST_MARKER STATES",
@@ -66,7 +65,7 @@ def constants() -> dict[str, dict[str, Any]]:
     """Return the constants by the last name of their module."""
     found = {module.rpartition(".")[2]: _of(module, names.split()) for module, names in _NAMES.items()}
     request = PlanRequest()
-    options = [field.name for field in fields(request) if field.name != "camera"]
+    options = [name for name in RequestOptions.__annotations__ if name != "camera"]
     found["request"] = {"DEFAULTS": {_camel(name): getattr(request, name) for name in options}}
     found["paths_units"] = _of("planner.paths.units", ["LONGEST", "SMALLEST"])
     found["feedback_error"]["CAMERA"] = request.camera.to_dict()

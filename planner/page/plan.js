@@ -14,7 +14,7 @@ import { QUICK, checkLeast, dwellsFor, longerDwells, nearlyFastest, rodOf, turnR
 import { zigzagHysteresis } from "./vehicle.js";
 import { InputError, general, refusing } from "./words.js";
 
-const { WORTH, SAVED, LENGTHENED_FROM } = CONSTANTS.plan;
+const { WORTH, SAVED, LENGTHENED_FROM } = CONSTANTS.solve;
 const OWN_TABLE = "softflagella surrogate robot"; // makes the table of one robot
 const { DEFAULTS } = CONSTANTS.request;
 

@@ -9,16 +9,18 @@ reported in both directions: a missed corner is a point of the drawn path that i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import get_args
 
 import numpy as np
 
+from planner.paths.distance import two_sided
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Reference, reference
 from planner.paths.units import extent, in_lab, place_in_lab
 from planner.planning.arrival import Swing
 from planner.planning.feasible import TIGHTEST, Feasibility, feasible, place_of_largest, spacing
+from planner.planning.kept_clear import Detour
 from planner.planning.progress import Progress
 from planner.planning.remedy import remedy
 from planner.planning.request import Corner
@@ -34,10 +36,21 @@ class Declared:
 
     reference: Reference  # the path and the pivot that follows it
     curvature: float  # largest of the pivot's reference
-    off_drawn: float  # largest distance of a declared point from the drawn path
-    missed: float  # largest distance of a drawn point from the declared path
-    warnings: tuple[str, ...]  # in words
+    off_drawn: float = 0.0  # largest distance of a declared point from the drawn path
+    missed: float = 0.0  # largest distance of a drawn point from the declared path
+    warnings: tuple[str, ...] = ()  # in words
     swing: Swing | None = None  # that takes time
+    detours: tuple[Detour, ...] = ()  # around obstacles, in the order of the path
+
+    def moved(self, reference: Reference, drawn: Path2D, curvature: float | None = None) -> Declared:
+        """Declare another reference in place of this one, with `curvature` or its own one."""
+        off_drawn, missed = two_sided(reference.p, drawn.polyline())
+        curvature = float(np.abs(reference.curvature).max()) if curvature is None else curvature
+        return replace(self, reference=reference, curvature=curvature, off_drawn=off_drawn, missed=missed)
+
+    def same(self, other: Declared) -> bool:
+        """Tell whether the pivot has the same way."""
+        return self is other or np.array_equal(self.reference.q, other.reference.q)
 
 
 def declare(raw: Path2D, feasibility: Feasibility, progress: Progress | None = None) -> Declared:

@@ -7,7 +7,14 @@ from typing import Any, NamedTuple
 
 from planner.paths.obstacles import FreeSpace
 from planner.paths.units import in_lab, place_in_lab
+from sim.io.errors import InputError
 from sim.model.robot import Robot
+
+
+class BlockedError(InputError):
+    """There is no way around what stands on the path; `hopeless`: not even without a margin."""
+
+    hopeless = False
 
 
 class Detour(NamedTuple):

@@ -1,4 +1,4 @@
-"""The plan: a schedule with its errors, and how it shows itself: text, picture, table, content of plan.json."""
+"""The plan: a schedule with its errors and its job, and how it shows itself: text, picture, table, plan.json."""
 
 from __future__ import annotations
 
@@ -6,23 +6,26 @@ import math
 import textwrap
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D
+from planner.paths.tractrix import Drift
 from planner.paths.units import heading_in_degrees, in_lab, time_in_lab
 from planner.planning.arrival import Arrival
-from planner.planning.camera import DOCUMENTED, Camera
+from planner.planning.camera import POSE
 from planner.planning.declared_path import Declared
 from planner.planning.errors import PlanErrors, plan_errors
 from planner.planning.feedback_error import feedback_error
 from planner.planning.kept_clear import KeptClear
 from planner.planning.lap import Lap
 from planner.planning.line_of_sight import Guidance
-from planner.vehicle.dwell_choice import Objective
-from planner.vehicle.rollout import Switches, trace_smoothly
+from planner.planning.request import PlanRequest
+from planner.planning.setting import zigzag_drift
+from planner.vehicle.rollout import Switches, predicted_poses, trace_smoothly
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.zigzag import Zigzag
 from sim.arrays import Floats
@@ -36,14 +39,51 @@ from sim.model.schedule import Schedule
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
+    from typing_extensions import TypeVar
+
+    J = TypeVar("J", bound="Job | None", default=Any, covariant=True)
+    K = TypeVar("K", bound="Job")
+else:
+    from typing import TypeVar
+
+    J, K = TypeVar("J"), TypeVar("K")
 
 GUARANTEE = "guaranteed_error_over_l"  # of plan.json; null where it is not known
 WIDE = 0.25  # turn radii; a predicted track that is further from the declared path gets a warning
 _OWN_TABLE_FROM = 1.7  # stated error over predicted error, from which a table of its own is proposed
 
 
+KINDS = ("goal", "tour", "cover", "hold")  # of jobs that have files of their own
+
+
+class Job:
+    """What a plan does besides following its path."""
+
+    kind: ClassVar[str] = ""  # one of KINDS: there are {kind}.json and {kind}.svg
+
+    @property
+    def ends_at(self) -> POSE | None:
+        """The pose at which the plan must end; None: at the end of its path."""
+        return None
+
+    def lines(self, plan: Plan) -> list[str]:
+        """Say what the plan does for its job."""
+        raise NotImplementedError
+
+    def title(self, plan: Plan) -> str:
+        """Name what counts, for the picture."""
+        return f"stated error {in_lab(plan.stated_error, plan.robot)}"
+
+    def draw(self, axes: Axes, plan: Plan) -> None:
+        """Draw what belongs to the job over the plan, on axes in cm."""
+
+    def to_dict(self, plan: Plan) -> dict[str, Any]:
+        """Return the content of {kind}.json."""
+        raise NotImplementedError
+
+
 @dataclass(frozen=True, repr=False)
-class Plan:
+class Plan(Generic[J]):
     """A schedule and its errors. Lengths are in l, times in μ0 l⁴/EI, unless a name says its unit.
 
     Example:
@@ -54,7 +94,7 @@ class Plan:
     """
 
     tracked: TrackedVehicle  # who follows
-    objective: Objective  # what decided the shortest dwell
+    request: PlanRequest  # what was asked for
     drawn: Path2D  # the path that was asked for
     declared: Declared  # the path that is followed, with the pivot's reference
     straight: Zigzag  # straight motion with the shortest dwell: no schedule has a smaller rms error
@@ -64,7 +104,11 @@ class Plan:
     kept_clear: KeptClear | None = None  # walls and regions that it avoids; None: there are none
     arrival: Arrival | None = None  # the duration that was asked for; None: any
     lap: Lap | None = None  # of a schedule that repeats; None: it is carried out once
-    camera: Camera = DOCUMENTED  # whose poses a tracker gets
+    job: J = None  # type: ignore[assignment]  # what it does besides following its path
+
+    def with_job(self, job: K) -> Plan[K]:
+        """Return this plan with a job."""
+        return replace(cast("Plan[K]", self), job=job)
 
     @property
     def robot(self) -> Robot:
@@ -97,10 +141,26 @@ class Plan:
         return self.guidance.dwell
 
     @property
-    def start(self) -> tuple[float, float, float]:
+    def start(self) -> POSE:
         """Where the head's centre must be put, at rest: x, y [l] and heading [rad]."""
         x, y, heading = self.poses[0].tolist()
         return x, y, heading
+
+    @property
+    def end(self) -> POSE:
+        """Where it is at the end, as predicted."""
+        x, y, heading = self.poses[-1].tolist()
+        return x, y, heading
+
+    @property
+    def ends_at(self) -> POSE | None:
+        """The pose at which its job asks it to end; None: at the end of its path."""
+        return None if self.job is None else self.job.ends_at
+
+    @property
+    def drift(self) -> Drift:
+        """What carries the robot off its heading in straight motion."""
+        return zigzag_drift(self.tracked, self.straight)
 
     @property
     def poses(self) -> Floats:
@@ -141,7 +201,19 @@ class Plan:
     def feedback_error(self) -> float:
         """Distance within which a tracker keeps 95 % of the robots in 95 % of the time."""
         speed, scale = self.straight.net_speed, self.robot.time_scale
-        return feedback_error(self.errors.distance, self.dwells, speed, scale, self.camera, self.stated_error)
+        return feedback_error(
+            self.errors.distance, self.dwells, speed, scale, self.request.camera, self.stated_error
+        )
+
+    @property
+    def margin_needed(self) -> float:
+        """The error that a margin around obstacles must cover."""
+        return self.feedback_error if self.request.feedback else self.stated_error
+
+    def clearance(self, space: FreeSpace) -> float:
+        """Predict the smallest distance of the body from what is not free."""
+        body, poses = Footprint.of(self.robot, 0.0), predicted_poses(self.tracked.vehicle, self.switches)
+        return float(body.clearance(poses, space).min())
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -232,7 +304,7 @@ class Plan:
             f"  start at x = {x * cm:.4g} cm, y = {y * cm:.4g} cm, heading {heading_in_degrees(heading)}, "
             f"motor {self.first_direction:+d}",
         ]
-        lines += [f"  {line}" for line in self.job_lines()]
+        lines += [f"  {line}" for line in self.lines()]
         if self.warnings:
             count = "1 warning" if len(self.warnings) == 1 else f"{len(self.warnings)} warnings, the first"
             lines.append(f"  {count}: {textwrap.shorten(self.warnings[0], 120, placeholder=' …')}")
@@ -255,10 +327,12 @@ class Plan:
         draw_prediction(ax, self.smooth_track, length)
         if self.kept_clear is not None:
             draw_regions(ax, self.kept_clear.free_space, length)
+        if self.job is not None:
+            self.job.draw(ax, self)
         return ax
 
-    def job_lines(self) -> list[str]:
-        """Say what the plan keeps clear of, and when it arrives, if it was asked for."""
+    def lines(self) -> list[str]:
+        """Say what the plan keeps clear of, when it arrives, and what it does for its job."""
         lines = [] if self.kept_clear is None else self.kept_clear.lines(self.robot)
         if self.declared.swing is not None:
             lines.append(self.declared.swing.line(self.robot))
@@ -266,7 +340,7 @@ class Plan:
             lines.append(self.arrival.line(self.duration, self.robot))
         if self.lap is not None:
             lines.append(self.lap.line(self.robot))
-        return lines
+        return lines if self.job is None else [*lines, *self.job.lines(self)]
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Return the columns of `to_frame`, each (M,)."""
@@ -330,7 +404,7 @@ class Plan:
             "reference": self.reference.tolist(),
             "raw_path": self.drawn.polyline().tolist(),
             "closed": self.drawn.closed,
-            "objective": self.objective,
+            "objective": self.request.objective,
             "minimum_dwell_bar": self.minimum_dwell,
             "off_drawn_over_l": self.declared.off_drawn,
             "missed_over_l": self.declared.missed,
@@ -340,7 +414,7 @@ class Plan:
             "stated_error_unmeasured_over_l": self.unmeasured_error,
             "table_share": self.errors.table_share,
             "feedback_error_over_l": self.feedback_error,
-            "camera": self.camera.to_dict(),
+            "camera": self.request.camera.to_dict(),
             "predicted_rms_over_l": self.errors.predicted_rms,
             "predicted_max_over_l": self.errors.predicted_max,
             "drawn_rms_over_l": self.errors.drawn_rms,

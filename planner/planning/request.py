@@ -1,11 +1,12 @@
-"""What a user asks of a plan, besides path and robot. Lengths in l, times in μ0 l⁴/EI."""
+"""All that a user asks of a plan, besides path and robot. Lengths in l, times in μ0 l⁴/EI."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, TypedDict
 
+from planner.paths.obstacles import FreeSpace
 from planner.planning.camera import DOCUMENTED, Camera
 from planner.vehicle.dwell_choice import QUICK, Objective
 from planner.vehicle.tracked_point import Point
@@ -17,7 +18,7 @@ Corner = Literal["nearest", "minimax", "fillet", "error"]
 
 @dataclass(frozen=True)
 class PlanRequest:
-    """Point, corners, dwells and tolerance, as `softflagella.plan` explains them."""
+    """Point, corners, dwells, tolerance, obstacles and time, as `softflagella.plan` explains them."""
 
     point: Point = "head_centre"
     corner: Corner = "nearest"
@@ -29,6 +30,10 @@ class PlanRequest:
     tolerance: float | None = None
     seed: int = 0
     camera: Camera = DOCUMENTED
+    space: FreeSpace = field(default_factory=FreeSpace)  # what the robot's body must keep clear of
+    feedback: bool = False  # the pose will be measured: the margin around obstacles is the error with feedback
+    arrive_seconds: float | None = None  # from start to end, or of a lap
+    loop: bool = False  # the schedule repeats
 
     def __post_init__(self) -> None:
         if self.tolerance is not None and not (math.isfinite(self.tolerance) and self.tolerance > 0):
@@ -44,12 +49,9 @@ class PlanRequest:
         return max(seconds / robot.time_scale, QUICK if dwell is None else dwell)
 
 
-class RequestOptions(TypedDict, total=False):
-    """The fields of `PlanRequest` as keyword arguments."""
+class DwellOptions(TypedDict, total=False):
+    """Those fields of `PlanRequest` that every job has, as keyword arguments."""
 
-    point: Point
-    corner: Corner
-    time_weight: float
     objective: Objective
     minimum_dwell: float | None
     minimum_seconds: float | None
@@ -57,3 +59,11 @@ class RequestOptions(TypedDict, total=False):
     tolerance: float | None
     seed: int
     camera: Camera
+
+
+class RequestOptions(DwellOptions, total=False):
+    """And those of paths."""
+
+    point: Point
+    corner: Corner
+    time_weight: float

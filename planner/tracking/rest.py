@@ -10,8 +10,7 @@ the old plan. Lengths in l.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,20 +22,19 @@ from planner.paths.obstacles import Footprint
 from planner.paths.path import Path2D, arc_length, resample
 from planner.paths.tractrix import Drift, Reference, slips_at_heading
 from planner.paths.units import in_lab, place_in_lab
+from planner.planning.camera import POSE
 from planner.planning.declared_path import Declared
-from planner.planning.errors import plan_errors
 from planner.planning.kept_clear import KeptClear
-from planner.planning.plan import zigzag_drift
-from planner.planning.planned import Plan
-from planner.planning.schedule import Start, follow
+from planner.planning.planned import Job, Plan
+from planner.planning.schedule import Start
+from planner.planning.setting import Setting
+from planner.planning.solve import follow_declared
 from planner.tracking.guidance import TrackerGuidance, stride
 from planner.tracking.reached import reached
 from planner.tracking.way_back import ROOM, SEGMENTS, shortest_way
-from planner.vehicle.rollout import predicted_poses
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
-POSE = tuple[float, float, float]
 _SPACING = 0.02  # of a way
 _WORTH = 1.0  # of a length of the path: what it costs to leave it out
 _NEAR = 0.02  # l, rad: what is near in any case
@@ -45,18 +43,18 @@ _CANDIDATES = 12  # places of the path, a turn radius apart, to which a way amon
 _GUESS = 0.2  # what a length along the drawn path counts beside the distance from it
 
 
-class Rest(NamedTuple):
-    """The rest of a plan, and how it comes about."""
+@dataclass(frozen=True)
+class Remainder(Job):
+    """What is left of a plan, and how the robot comes back to it."""
 
-    plan: Plan
     followed: float  # length of the path up to the place that the robot has reached
     way: float  # length of the way back; 0: none
     left_out: float  # length of the path that the way leaves out
     joins: tuple[float, float]  # x, y of the tracked point where the way ends
 
-    def lines(self) -> list[str]:
+    def lines(self, plan: Plan) -> list[str]:
         """Say it in one sentence."""
-        robot = self.plan.robot
+        robot = plan.robot
         done = f"the track has followed {in_lab(self.followed, robot)} of the path"
         if self.way == 0:
             return [f"{done}; the robot goes on from there"]
@@ -66,7 +64,7 @@ class Rest(NamedTuple):
         ]
 
 
-def rest_of(plan: Plan, times: Floats, poses: Floats) -> Rest:
+def rest_of(plan: Plan, times: Floats, poses: Floats) -> Plan[Remainder]:
     """Plan the rest of a plan from the last pose of a track, at rest there.
 
     Args:
@@ -83,19 +81,19 @@ def rest_of(plan: Plan, times: Floats, poses: Floats) -> Rest:
         raise InputError("the track has followed the path to its end; there is nothing left to plan")
     x, y, heading = poses[-1].tolist()
     heading += 2 * math.pi * round((float(reference.heading[place]) - heading) / (2 * math.pi))
-    drift = zigzag_drift(plan.tracked, plan.straight, max(plan.straight.dwells))
-    way, join = _way(plan, (x, y, heading), place, drift)
+    way, join = _way(plan, (x, y, heading), place, plan.drift)
     path = reference.part(join)
     if way is not None:
         path = Reference.joined(way.part(0, -1), path)
     joins_x, joins_y = reference.p[join].tolist()
-    return Rest(
-        _planned(plan, path, (x, y, heading), 0 if way is None else len(way.q) - 1, join),
+    remainder = Remainder(
         float(arc_length(reference.p)[place]),
         0.0 if way is None else float(way.arc[-1]),
         float(arc_length(reference.p[place : join + 1])[-1]),
         (joins_x, joins_y),
     )
+    rest = _planned(plan, path, (x, y, heading), 0 if way is None else len(way.q) - 1, join)
+    return rest.with_job(remainder)
 
 
 def place_reached(plan: Plan, times: Floats, poses: Floats) -> int:
@@ -179,24 +177,18 @@ def _around(plan: Plan, start: POSE, place: int, limits: RouteLimits, margin: fl
     return best.poses(_SPACING), join
 
 
-def _planned(plan: Plan, path: Reference, pose: POSE, way: int, join: int) -> Plan:
+def _planned(plan: Plan, path: Reference, pose: POSE, way: int, join: int) -> Plan[None]:
     """Plan for way and path; `way` points of them are the way."""
-    tracked, heading = plan.tracked, pose[2]
-    drawn = _drawn(plan, path.p[: way + 1], join)
+    drawn, kept = _drawn(plan, path.p[: way + 1], join), plan.kept_clear
     off_drawn, missed = two_sided(path.p, drawn.polyline())
     declared = Declared(path, plan.declared.curvature, off_drawn, missed, plan.declared.warnings)
-    turned = heading - float(path.heading[0])
+    turned = pose[2] - float(path.heading[0])
     start = Start(pose, path.first_turn if abs(turned) < 1e-6 else -1 if turned > 0 else 1)
-    switches = follow(path, tracked.vehicle, plan.guidance, tracked.offset, start=start)
-    errors = plan_errors(tracked, drawn, declared, switches, guaranteed=None, seed=0)
-    rest = Plan(
-        tracked, plan.objective, drawn, declared, plan.straight, plan.guidance, switches, errors,
-        camera=plan.camera,
-    )  # fmt: skip
-    if plan.kept_clear is None:
+    setting = Setting(plan.tracked, plan.minimum_dwell, plan.straight, plan.drift)
+    rest = follow_declared(declared, setting, plan.request, drawn=drawn, start=start, guidance=plan.guidance)
+    if kept is None:
         return rest
-    body, kept = Footprint.of(tracked.robot, 0.0), plan.kept_clear
-    clearance = float(body.clearance(predicted_poses(tracked.vehicle, switches), kept.free_space).min())
+    clearance = rest.clearance(kept.free_space)
     if clearance <= 0:
         raise InputError("on the way back the robot would touch what it must keep out of; move it, and plan again")
     return replace(rest, kept_clear=KeptClear(kept.free_space, min(kept.margin, clearance), clearance, ()))

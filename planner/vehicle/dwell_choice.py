@@ -3,7 +3,7 @@
 A longer dwell loses less speed to the turn-over of the tails, and swings further. So one number decides between
 speed and error. All figures here are of straight motion; the plan's own errors are checked
 against the tolerance afterwards, and for "time" the path itself is followed with several dwells
-(`planner.planning.plan`). Times in μ0 l⁴/EI.
+(`planner.planning.solve`). Times in μ0 l⁴/EI.
 """
 
 from __future__ import annotations

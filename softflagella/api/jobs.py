@@ -8,26 +8,25 @@ from typing import Unpack
 from numpy.typing import ArrayLike
 
 from planner.files.fleet_files import distance_apart
-from planner.goal.goal_plan import GoalPlan
+from planner.jobs.cover import Coverage
 from planner.jobs.cover import cover as sweep_field
-from planner.jobs.coverage_plan import CoveragePlan
 from planner.jobs.fleet import Member
 from planner.jobs.fleet import fleet as keep_apart
 from planner.jobs.fleet_plan import FleetPlan
+from planner.jobs.hold import Orbit
 from planner.jobs.hold import hold as orbit
-from planner.jobs.hold_plan import HoldPlan
 from planner.jobs.region import Field
+from planner.jobs.tour import Visits
 from planner.jobs.tour import tour as plan_tour
-from planner.jobs.tour_plan import TourPlan
 from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.path import Path2D
 from planner.planning.planned import Plan
-from planner.planning.request import RequestOptions
+from planner.planning.request import PlanRequest, RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.robot_rows import OneRobot
-from softflagella.api.vehicles import vehicle_and_request
+from softflagella.api.vehicles import vehicle_of
 from surrogate.interface import LookupTable
 
 
@@ -46,12 +45,12 @@ def tour(
     knowledge: CalibrationKnowledge | None = None,
     progress: Callable[[float], object] | None = None,
     **options: Unpack[RequestOptions],
-) -> TourPlan:
+) -> Plan[Visits]:
     """Plan a tour of places in the order that takes the robot the least time, with free headings.
 
     Args:
         places: x, y of each [l]; the tour begins at the first one. Up to 12 more are ordered exactly; with more,
-            `gap` of the result says how much longer than the quickest order the tour may be.
+            `job.gap` of the result says how much longer than the quickest order the tour may be.
         robot: the robot, its robot.toml, or the name of a preset.
         back: end where the tour began.
         any_start: begin at any of the places.
@@ -71,13 +70,12 @@ def tour(
     Example:
         >>> import softflagella as sf
         >>> tour = sf.tour([(0, 0), (4, 0), (2, 1)], "paper-control", objective="time")
-        >>> tour.order, tour.exact, len(tour.plan.dwells) > 10
+        >>> tour.job.order, tour.job.exact, len(tour.dwells) > 10
         ((0, 2, 1), True, True)
     """
-    tracked, request = vehicle_and_request(robot, lookup, knowledge, options, own_table=own_table)
-    space = FreeSpace.of(keep_out, walls)
-    return plan_tour(places, tracked, request, space, any_start=any_start, back=back, feedback=feedback,
-                     progress=progress)  # fmt: skip
+    request = PlanRequest(space=FreeSpace.of(keep_out, walls), feedback=feedback, **options)
+    tracked = vehicle_of(robot, lookup, knowledge, request.point, own_table=own_table)
+    return plan_tour(places, tracked, request, any_start=any_start, back=back, progress=progress)
 
 
 @checks_keywords()
@@ -96,7 +94,7 @@ def cover(
     knowledge: CalibrationKnowledge | None = None,
     progress: Callable[[float], object] | None = None,
     **options: Unpack[RequestOptions],
-) -> CoveragePlan:
+) -> Plan[Coverage]:
     """Plan lanes and turns that sweep a region with a round footprint about the tracked point.
 
     Args:
@@ -120,14 +118,14 @@ def cover(
     Example:
         >>> import softflagella as sf
         >>> swept = sf.cover([[0, 0], [2, 0], [2, 2], [0, 2]], 0.5, "paper-control", objective="time")
-        >>> swept.share > 0.97, swept.plan.duration > swept.bound
+        >>> swept.job.share > 0.97, swept.duration > swept.job.bound
         (True, True)
     """
-    tracked, request = vehicle_and_request(robot, lookup, knowledge, options, own_table=own_table)
-    space = FreeSpace.of(keep_out, walls)
+    request = PlanRequest(space=FreeSpace.of(keep_out, walls), feedback=feedback, **options)
+    tracked = vehicle_of(robot, lookup, knowledge, request.point, own_table=own_table)
     (outline,) = FreeSpace.of([region]).regions
-    field = Field(outline, (*FreeSpace.of(holes).regions, *space.regions))
-    return sweep_field(field, width, tracked, request, space, angle=angle, feedback=feedback, progress=progress)
+    field = Field(outline, (*FreeSpace.of(holes).regions, *request.space.regions))
+    return sweep_field(field, width, tracked, request, angle, progress)
 
 
 @checks_keywords()
@@ -144,7 +142,7 @@ def hold(
     knowledge: CalibrationKnowledge | None = None,
     progress: Callable[[float], object] | None = None,
     **options: Unpack[RequestOptions],
-) -> HoldPlan:
+) -> Plan[Orbit]:
     """Plan the smallest orbit about a place that the robot can keep with a camera; it repeats.
 
     Args:
@@ -167,17 +165,17 @@ def hold(
     Example:
         >>> import softflagella as sf
         >>> held = sf.hold((2, 1), "paper-control", seconds=1800)
-        >>> round(held.smallest, 2), round(held.radius, 2)
+        >>> round(held.job.smallest, 2), round(held.job.radius, 2)
         (0.94, 0.97)
     """
-    tracked, request = vehicle_and_request(robot, lookup, knowledge, options, own_table=own_table)
-    space = FreeSpace.of(keep_out, walls)
-    return orbit(place, tracked, request, seconds, space, feedback=feedback, progress=progress)
+    request = PlanRequest(space=FreeSpace.of(keep_out, walls), feedback=feedback, **options)
+    tracked = vehicle_of(robot, lookup, knowledge, request.point, own_table=own_table)
+    return orbit(place, tracked, request, seconds, progress)
 
 
 @checks_keywords()
 def fleet(
-    plans: Sequence[Plan | GoalPlan | TourPlan | CoveragePlan],
+    plans: Sequence[Plan],
     apart: float | str,
     *,
     names: Sequence[str] | None = None,
@@ -220,7 +218,7 @@ def fleet(
         )
     if len(set(names)) < len(names):
         raise InputError("two robots have the same name; give each a name of its own")
-    members = [Member.of(*member) for member in zip(names, plans, delays, strict=True)]
+    members = [Member(*member) for member in zip(names, plans, delays, strict=True)]
     if not members:
         raise InputError("no robots; a fleet has two or more")
     distance = distance_apart(apart, None, [member.plan.robot for member in members])

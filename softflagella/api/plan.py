@@ -10,38 +10,29 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from planner.files.fleet_files import write_fleet
-from planner.files.goal_files import write_goal_plan
-from planner.files.job_files import write_cover, write_hold, write_tour
 from planner.files.plan_files import write_plan as write_plan_files
 from planner.files.plan_json import load_plan
-from planner.files.replan import Trip, replan_from, saved_trip
+from planner.files.replan import replan_from, saved_trip
 from planner.files.tracking_error import TrackingError, tracking_error
-from planner.goal.goal_plan import GoalPlan
-from planner.jobs.coverage_plan import CoveragePlan
 from planner.jobs.fleet_plan import FleetPlan
-from planner.jobs.hold_plan import HoldPlan
-from planner.jobs.plan_path import plan_path
-from planner.jobs.tour_plan import TourPlan
+from planner.jobs.plan import make_plan
 from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.path_files import Drawing, read_path
 from planner.paths.units import in_tails
 from planner.planning.planned import Plan
-from planner.planning.request import RequestOptions
+from planner.planning.request import PlanRequest, RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.io.errors import InputError, naming
 from sim.io.keywords import checks_keywords
 from sim.io.tables import read_table
 from sim.model.robot import Robot
 from sim.robot_rows import OneRobot
-from softflagella.api.vehicles import vehicle_and_request
+from softflagella.api.vehicles import vehicle_of
 from surrogate.interface import LookupTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-AnyPlan = Plan | GoalPlan | TourPlan | CoveragePlan | HoldPlan
 
 
 @checks_keywords()
@@ -60,7 +51,7 @@ def plan(
     arrive_seconds: float | None = None,
     loop: bool = False,
     **options: Unpack[RequestOptions],
-) -> Plan:
+) -> Plan[None]:
     """Plan the motor's switching times for a path.
 
     Args:
@@ -110,12 +101,10 @@ def plan(
         >>> len(result.dwells) > 100, result.predicted_rms < 0.03
         (True, True)
     """
-    tracked, request = vehicle_and_request(robot, lookup, knowledge, options, own_table=own_table)
-    drawn = _in_tails(path, tracked.robot, unit)
     space = FreeSpace.of(keep_out, walls)
-    return plan_path(
-        drawn, tracked, request, space, arrive_seconds, loop=loop, feedback=feedback, progress=progress
-    )
+    request = PlanRequest(space=space, feedback=feedback, arrive_seconds=arrive_seconds, loop=loop, **options)
+    tracked = vehicle_of(robot, lookup, knowledge, request.point, own_table=own_table)
+    return make_plan(_in_tails(path, tracked.robot, unit), tracked, request, progress)
 
 
 def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot, unit: str | None) -> Path2D:
@@ -131,7 +120,7 @@ def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot, uni
 
 @checks_keywords()
 def check(
-    plan: AnyPlan | Mapping[str, Any] | str | Path,
+    plan: Plan | Mapping[str, Any] | str | Path,
     track: pd.DataFrame | str | Path,
 ) -> TrackingError:
     """Compare a replayed or measured track with its plan.
@@ -155,8 +144,6 @@ def check(
         >>> error.rms < error.largest < error.stated
         True
     """
-    if isinstance(plan, GoalPlan | TourPlan | CoveragePlan | HoldPlan):
-        plan = plan.plan
     content = (
         load_plan(plan) if isinstance(plan, str | Path) else plan if isinstance(plan, Mapping) else plan.to_dict()
     )
@@ -166,7 +153,7 @@ def check(
 
 @checks_keywords()
 def write_plan(
-    result: AnyPlan | FleetPlan,
+    result: Plan | FleetPlan,
     folder: str | Path,
     *,
     pictures: Mapping[str, Figure] | None = None,
@@ -174,8 +161,8 @@ def write_plan(
     """Write the files of a plan, all or none, and return their paths.
 
     Args:
-        result: a plan; or a plan from pose to pose or of a job, which has goal.json, tour.json and so on, and a
-            picture besides; a fleet has a folder for each robot.
+        result: a plan; that of a job has goal.json, tour.json and so on, and a picture besides; a fleet has a
+            folder for each robot.
         folder: it is made if it is missing.
         pictures: of a plan, more pictures, by the name of their file, such as "trade_off.svg".
 
@@ -192,20 +179,14 @@ def write_plan(
     if isinstance(result, Plan):
         return write_plan_files(result, folder, pictures=pictures)
     if pictures:
-        raise InputError("a goal or a job takes no further pictures; write its plan: result.plan")
-    if isinstance(result, GoalPlan):
-        return write_goal_plan(result, folder)
-    if isinstance(result, HoldPlan):
-        return write_hold(result, folder)
-    if isinstance(result, FleetPlan):
-        return write_fleet(result, folder)
-    return write_tour(result, folder) if isinstance(result, TourPlan) else write_cover(result, folder)
+        raise InputError("a fleet takes no further pictures; write its plans: result.plans")
+    return write_fleet(result, folder)
 
 
 @checks_keywords()
 def replan(
-    plan: AnyPlan | str | Path, track: pd.DataFrame | str | Path, *, lookup: LookupTable | None = None
-) -> Plan | GoalPlan:
+    plan: Plan | str | Path, track: pd.DataFrame | str | Path, *, lookup: LookupTable | None = None
+) -> Plan:
     """Plan the rest of a plan from where a robot is now: the last pose of its track, at rest.
 
     The track tells which part of the path the robot has followed. Where it is away from its path, the rest begins
@@ -219,7 +200,7 @@ def replan(
         lookup: the look-up table with which a saved plan was made; see `restore_plan`.
 
     Returns:
-        A plan whose first dwell begins now; a goal plan for a trip to a goal.
+        A plan whose first dwell begins now; its `job` is a `Trip` for a trip to a goal.
 
     Raises:
         InputError: the file is no plan, the track cannot be used or has reached the end, or no way leads on.
@@ -233,13 +214,6 @@ def replan(
         >>> round(rest.start[0], 6), len(rest.dwells) < len(result.dwells)
         (2.0, True)
     """
-    old: Plan | Trip
-    if isinstance(plan, str | Path):
-        old = saved_trip(plan, lookup=lookup)
-    elif isinstance(plan, GoalPlan):
-        old = Trip.of(plan)
-    else:
-        old = plan if isinstance(plan, Plan) else plan.plan
+    old = saved_trip(plan, lookup=lookup) if isinstance(plan, str | Path) else plan
     with naming(track):
-        rest = replan_from(old, track if isinstance(track, pd.DataFrame) else read_table(track))
-    return rest if isinstance(rest, GoalPlan) else rest.plan
+        return replan_from(old, track if isinstance(track, pd.DataFrame) else read_table(track))

@@ -43,7 +43,7 @@ def swim(
         (True, True)
     """
     plan = pilot.plan if isinstance(pilot, Tracker) else pilot
-    camera = camera or plan.camera
+    camera = camera or plan.request.camera
     tracker = pilot if isinstance(pilot, Tracker) else Tracker(plan, noise=camera.noise)
     unit = plan.robot.time_scale / (100 * plan.robot.tail_length)
     return swim_under(

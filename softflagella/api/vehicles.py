@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from planner.files.own_table import table_for
-from planner.planning.request import PlanRequest, RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
-from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
+from planner.vehicle.tracked_point import Point, TrackedVehicle, tracked_vehicle
 from sim.model.robot import Robot
 from sim.robot_rows import OneRobot, one_robot
 from surrogate.interface import LookupTable
@@ -21,15 +20,14 @@ def robot_with_table(
     return swims, lookup or table_for(swims, source, known, own=own_table), known
 
 
-def vehicle_and_request(
+def vehicle_of(
     robot: OneRobot,
     lookup: LookupTable | None,
     knowledge: CalibrationKnowledge | None,
-    options: RequestOptions,
+    point: Point,
     *,
     own_table: bool,
-) -> tuple[TrackedVehicle, PlanRequest]:
-    """Return a robot's vehicle with its tracked point, and what the options ask of the plan."""
+) -> TrackedVehicle:
+    """Return a robot's vehicle with its tracked point."""
     swims, table, known = robot_with_table(robot, lookup, knowledge, own_table=own_table)
-    request = PlanRequest(**options)
-    return tracked_vehicle(swims, table, request.point, known), request
+    return tracked_vehicle(swims, table, point, known)

@@ -18,9 +18,9 @@ from calibration.statistics.gls import Noise
 from calibration.verdict.sequential_test import Explanation
 from dataset.data_set import sweep_key
 from dataset.schema import rows_version
-from planner.files.goal_files import write_goal_plan
+from planner.files.plan_files import write_plan
+from planner.jobs.plan import plan
 from planner.paths.path import circle
-from planner.planning.plan import plan
 from planner.vehicle.calibration_table import CalibrationKnowledge, knowledge_toml
 from sim.io.provenance import fingerprint
 from sim.model.correction import Correction
@@ -160,7 +160,7 @@ def plan_file() -> bytes:
 @shared
 def goal_file() -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        write_goal_plan(hindered_trip(), folder)
+        write_plan(hindered_trip(), folder)
         return Path(folder, "goal.json").read_bytes()
 
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from planner.goal.goal_plan import GoalPlan
 from planner.paths.obstacles import Circle, Footprint, Polygon
+from planner.planning.planned import Plan
 from sim.motion.replay import replay
 
 
@@ -26,10 +26,10 @@ def goal_behind_circles(rng: np.random.Generator) -> dict[str, Any]:
     return {"start": start, "goal": goal, "keep_out": circles, "walls": walls}
 
 
-def replayed_clearance(goal_plan: GoalPlan) -> tuple[float, float, float]:
+def replayed_clearance(goal_plan: Plan) -> tuple[float, float, float]:
     """Replay a plan; return least clearance [l], distance from the goal [l] and error of the heading [rad]."""
-    track = replay([goal_plan.plan.schedule()])[0]
+    track = replay([goal_plan.schedule()])[0]
     poses = np.stack([track[name].to_numpy(float) for name in ("x_over_l", "y_over_l", "heading_rad")], 1)
-    clearance = Footprint.of(goal_plan.plan.robot, 0.0).clearance(poses, goal_plan.free_space).min()
-    turn = (poses[-1, 2] - goal_plan.goal[2] + np.pi) % (2 * np.pi) - np.pi
-    return float(clearance), float(np.hypot(*(poses[-1, :2] - goal_plan.goal[:2]))), float(abs(turn))
+    clearance = Footprint.of(goal_plan.robot, 0.0).clearance(poses, goal_plan.kept_clear.free_space).min()
+    turn = (poses[-1, 2] - goal_plan.job.goal[2] + np.pi) % (2 * np.pi) - np.pi
+    return float(clearance), float(np.hypot(*(poses[-1, :2] - goal_plan.job.goal[:2]))), float(abs(turn))

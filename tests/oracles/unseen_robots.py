@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.jobs.plan import plan
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.errors import plan_errors
-from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from planner.planning.stated_error import WOBBLE, predicted_error
 from planner.vehicle.from_table import table_vehicle

@@ -8,18 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from planner.goal.goal_plan import GoalPlan
-from planner.goal.to_goal import to_goal
-from planner.jobs.clear_plan import plan_clear
+from planner.goal.trip import Trip
+from planner.jobs.plan import make_plan, plan
 from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.shapes import shape_of
-from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.tracked_point import Point, TrackedVehicle, tracked_vehicle
 from sim.model.presets import PRESETS
+from softflagella import to_goal
 from surrogate.one_robot.robot_table import RobotTable
 from surrogate.one_robot.tabulate import tabulate
 from tests.shared import shared
@@ -65,17 +64,17 @@ def planned(
 def around(dwell: float | None = None, *, feedback: bool = False) -> Plan:
     """Plan a line with a rock on it."""
     request = QUICK if dwell is None else PlanRequest(dwell=dwell)
-    return plan_clear(Path2D.of(LINE), tracked(), request, ROCK, feedback=feedback)
+    return make_plan(Path2D.of(LINE), tracked(), replace(request, space=ROCK, feedback=feedback))
 
 
 @shared
-def trip(goal: tuple[float, float, float] = (1.2, 0.5, 0.8)) -> GoalPlan:
+def trip(goal: tuple[float, float, float] = (1.2, 0.5, 0.8)) -> Plan[Trip]:
     """Plan from rest at the origin to a pose."""
     return to_goal((0.0, 0.0, 0.0), goal, CONTROL, objective="flips")
 
 
 @shared
-def hindered_trip() -> GoalPlan:
+def hindered_trip() -> Plan[Trip]:
     """Plan a trip through a place, between walls, around a circle and beside a triangle."""
     regions = [Circle(1.5, -1.1, 0.3), [[4.0, 1.5], [5.0, 1.5], [5.0, 2.5]]]
     task = {"keep_out": regions, "walls": WALLS, "via": [(1.5, 0.3)]}

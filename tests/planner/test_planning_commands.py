@@ -13,7 +13,6 @@ import pandas as pd
 import pytest
 
 from planner.__main__ import main
-from planner.files.goal_files import write_goal_plan
 from planner.files.plan_files import write_plan
 from planner.files.tracking_error import tracking_error
 from planner.tracking.tracker import Tracker
@@ -230,7 +229,7 @@ def test_a_saved_plan_gives_the_orders_of_the_plan_in_memory(
 def test_a_goal_trip_is_tracked_from_its_goal_json(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:
-    write_goal_plan(trip(), tmp_path)
+    write_plan(trip(), tmp_path)
     lines = "0\n1 0 0.1 0.1\n1.5 \xb0\n"  # the last one is no UTF-8
     first, second, _ = told([str(tmp_path / "goal.json")], lines, monkeypatch, capsys)
     assert first == "0 1.000000000 nan 0"

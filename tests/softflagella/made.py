@@ -15,7 +15,7 @@ START, GOAL = (0, 0, 0), (0.8, 0.2, 0.3)
 
 
 @shared
-def goal() -> sf.GoalPlan:
+def goal() -> sf.Plan[sf.Trip]:
     return sf.to_goal(START, GOAL, ROBOT, keep_out=[sf.Circle(1.2, -1.5, 0.3)])
 
 

@@ -15,8 +15,8 @@ import pytest
 from planner.files.plan_files import write_plan
 from planner.files.plan_json import load_plan
 from planner.files.tracking_error import tracking_error
+from planner.jobs.plan import plan
 from planner.paths.path import circle, polygon
-from planner.planning.plan import plan
 from sim.model.presets import PRESETS
 from sim.model.response import DWELLS
 from sim.motion.lab_units import lab_motion

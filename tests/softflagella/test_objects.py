@@ -105,12 +105,10 @@ def test_a_plan_as_a_table_and_as_plain_content(tmp_path: Path) -> None:
 
 def test_a_goal_plan_says_where_it_ends() -> None:
     goal, text = made("goal"), repr(made("goal"))
-    assert number(r"clearance # cm", text) == pytest.approx(CM * goal.clearance, rel=0.01)
-    assert number(r"margin # cm", text) == pytest.approx(CM * goal.margin, rel=0.01)
-    assert number(r"way of # cm", text) == pytest.approx(CM * goal.length, rel=0.01)
-    assert text.endswith(repr(goal.plan))
-    assert goal.to_frame().equals(goal.plan.to_frame())
-    assert goal.to_dict()["keep_out"] == [{"circle": [1.2, -1.5, 0.3]}]
+    assert number(r"clearance # cm", text) == pytest.approx(CM * goal.kept_clear.clearance, rel=0.01)
+    assert number(r"margin # cm", text) == pytest.approx(CM * goal.kept_clear.margin, rel=0.01)
+    assert number(r"way of # cm", text) == pytest.approx(CM * goal.job.length, rel=0.01)
+    assert goal.job.to_dict(goal)["keep_out"] == [{"circle": [1.2, -1.5, 0.3]}]
 
 
 def test_a_tracker_says_what_the_motor_does() -> None:

@@ -11,7 +11,7 @@ import pytest
 import softflagella as sf
 from sim.io.keywords import keywords_of
 
-LONG = {"FleetPlan", "GoalPlan", "HoldPlan", "Swim", "TrackingError", "hold", "load_goal", "tabulate"}
+LONG = {"FleetPlan", "Orbit", "Swim", "TrackingError", "Trip", "hold", "load_goal", "tabulate"}
 NAMES = [name for name in sf.__all__ if not name.startswith("_")]
 
 
@@ -44,12 +44,6 @@ def test_an_old_keyword_works_with_a_warning() -> None:
     with pytest.warns(DeprecationWarning, match="query\\(table=…\\) is deprecated; use lookup=…"):
         old = sf.query("paper-control", table=None)  # type: ignore[call-arg]
     assert old.equals(sf.query("paper-control"))
-
-
-def test_an_old_name_works_with_a_warning() -> None:
-    with pytest.warns(DeprecationWarning, match="Voyage is deprecated; use softflagella.GoalPlan"):
-        assert sf.Voyage is sf.GoalPlan
-    assert "Voyage" not in sf.__all__
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.rest) if n in LONG else n for n in NAMES])

@@ -20,8 +20,8 @@ from calibration.swimmer.synthetic_table import make_table
 from planner.__main__ import main as planner
 from planner.files.plan_json import load_plan
 from planner.files.tracking_error import tracking_error
+from planner.jobs.plan import plan
 from planner.paths.path import circle
-from planner.planning.plan import plan
 from planner.vehicle.calibration_table import read_knowledge
 from sim.inputs import load_robot, save_robot
 from sim.io.errors import run_command

@@ -15,8 +15,8 @@ from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.experiment import LearntCorrection
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
+from planner.jobs.plan import plan
 from planner.paths.path import circle
-from planner.planning.plan import plan
 from planner.vehicle.calibration_table import read_knowledge
 from planner.vehicle.from_table import table_vehicle
 from sim.inputs import load_robot

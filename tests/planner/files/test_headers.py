@@ -14,8 +14,8 @@ import pytest
 
 from planner.files.plan_files import controller_header, milliseconds
 from planner.files.tracker_header import rounded, table_bytes, tracker_header
+from planner.jobs.plan import plan
 from planner.planning.camera import Camera
-from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from planner.tracking.clock import SLACK
 from planner.tracking.swim import swim

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from planner.files.fleet_files import distance_apart, read_fleet
-from planner.files.goal_files import write_goal_plan
 from planner.files.goal_json import load_goal
+from planner.files.plan_files import write_plan
 from planner.files.plan_json import load_plan
-from planner.goal.goal_plan import FORMAT as GOAL_FORMAT
+from planner.goal.trip import FORMAT as GOAL_FORMAT
 from sim.io.errors import InputError, run_command
 from sim.model.plan_file import FORMAT, plan_id
 from sim.model.presets import PRESETS
@@ -116,7 +116,7 @@ def test_other_files_are_refused(
 def goal_file() -> str:
     """Return goal.json of a trip, as it is written."""
     with TemporaryDirectory() as folder:
-        write_goal_plan(hindered_trip(), Path(folder))
+        write_plan(hindered_trip(), Path(folder))
         content = load_goal(Path(folder, "goal.json"))
         made = load_plan(Path(folder, "plan.json"))
         assert content["plan_id"] == made["id"]

@@ -14,13 +14,12 @@ import pytest
 
 import softflagella as sf
 from planner.__main__ import main
-from planner.files.goal_files import write_goal_plan
 from planner.files.own_table import table_for
 from planner.files.plan_files import write_plan
 from planner.files.plan_json import load_plan
 from planner.files.saved_plan import is_plan, restore_plan
+from planner.jobs.plan import plan
 from planner.paths.path import circle
-from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from planner.tracking.tracker import Tracker
 from planner.vehicle.calibration_table import CalibrationKnowledge
@@ -49,7 +48,7 @@ PLANS: dict[str, Callable[[], Plan]] = {
     "head tip": lambda: planned(CORNER, point="head_tip", minimum_dwell=0.8),
     "pivot": lambda: planned(CORNER, point="pivot", objective="flips"),
     "current": in_current,
-    "goal": lambda: trip().plan,
+    "goal": trip,
     "obstacles": around,
 }
 
@@ -98,7 +97,7 @@ def test_the_microcontroller_gets_the_same_tracker(tmp_path: Path) -> None:
 
 
 def test_the_files_of_jobs_and_their_folder_lead_to_the_plan(tmp_path: Path) -> None:
-    write_goal_plan(trip(), tmp_path / "trip")
+    write_plan(trip(), tmp_path / "trip")
     places = [tmp_path / "trip", tmp_path / "trip" / "plan.json", tmp_path / "trip" / "goal.json"]
     first, *others = [restore_plan(place) for place in places]
     assert all(is_plan(place) for place in places)
@@ -170,25 +169,25 @@ def test_a_saved_plan_and_one_in_memory_have_the_same_rest_in_other_units_too(tm
 def test_a_trip_goes_on_to_its_goal_through_the_places_that_are_left(
     share: float, left: int, tmp_path: Path
 ) -> None:
-    track = track_of(hindered_trip().plan, share)
+    track = track_of(hindered_trip(), share)
     sf.write_plan(hindered_trip(), tmp_path)
     after = sf.replan(tmp_path / "goal.json", track)
-    assert isinstance(after, sf.GoalPlan)
-    assert len(after.via) == left
-    assert after.end_error[0] < 0.01
-    assert after.clearance > 0
-    assert after.plan.start == pytest.approx(tuple(track.iloc[-1, 1:] / [CM, CM, 180 / np.pi]), abs=1e-6)
+    assert isinstance(after.job, sf.Trip)
+    assert len(after.job.via) == left
+    assert after.job.end_error[0] < 0.01
+    assert after.kept_clear is not None
+    assert after.kept_clear.clearance > 0
+    assert after.start == pytest.approx(tuple(track.iloc[-1, 1:] / [CM, CM, 180 / np.pi]), abs=1e-6)
     if share == 0.1:
         same = sf.replan(hindered_trip(), track)
-        assert isinstance(same, sf.GoalPlan)
-        assert same.plan.dwells == pytest.approx(after.plan.dwells, abs=1e-4)
+        assert same.dwells == pytest.approx(after.dwells, abs=1e-4)
 
 
 def test_tours_go_on_along_their_path() -> None:
     tour = sf.tour([(0, 0), (2, 0), (1.5, 1)], CONTROL)
-    rest = sf.replan(tour, track_of(tour.plan, 0.5))
+    rest = sf.replan(tour, track_of(tour, 0.5))
     assert isinstance(rest, sf.Plan)
-    assert np.hypot(*(rest.track[-1] - tour.places[tour.order[-1]])) < 0.1
+    assert np.hypot(*(rest.track[-1] - tour.job.places[tour.job.order[-1]])) < 0.1
 
 
 def test_a_robot_that_the_package_s_table_knows_gets_that_table(tmp_path: Path) -> None:

@@ -13,15 +13,13 @@ import pytest
 from planner.files.plan_json import load_plan
 from planner.files.saved_plan import restore_plan
 from planner.files.tracking_error import tracking_error
-from planner.goal.arrive import EXACT
-from planner.jobs.arrival_plan import plan_arrival
-from planner.jobs.clear_plan import plan_clear
 from planner.jobs.hindered import Hindered
+from planner.jobs.plan import make_plan
 from planner.jobs.waiting_circles import WaitingCircle, circle_reference, with_circles
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.path import Path2D, circle
+from planner.planning.arrive import EXACT
 from planner.planning.declared_path import TIGHTEST
-from planner.planning.plan import make_plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.swim import swim
@@ -88,7 +86,7 @@ def test_a_path_that_is_clear_stays() -> None:
     assert result.kept_clear is not None
     assert result.kept_clear.detours == ()
     assert result.kept_clear.free_space.walls is not None
-    assert plan_clear(Path2D.of(line), tracked(), QUICK, FreeSpace()).kept_clear is None
+    assert make_plan(Path2D.of(line), tracked(), QUICK).kept_clear is None
     with pytest.raises(InputError, match="radius above 0"):
         sf.plan(line, "paper-control", keep_out=[sf.Circle(0, 0, math.nan)])
 
@@ -96,7 +94,7 @@ def test_a_path_that_is_clear_stays() -> None:
 @pytest.mark.rest
 def test_a_closed_path_that_is_blocked_at_its_start_begins_elsewhere() -> None:
     space = FreeSpace.of([Circle(2.5, 0, 0.4)])
-    result = plan_clear(circle(2.5), tracked(), QUICK, space)
+    result = make_plan(circle(2.5), tracked(), replace(QUICK, space=space))
     check_clear(result, space)
     assert result.start[0] < -1.5
     assert result.errors.closure is not None
@@ -111,7 +109,7 @@ def test_the_simulator_stays_clear() -> None:
 
 @pytest.mark.rest
 def test_a_tracked_robot_with_wrong_coefficients_stays_clear() -> None:
-    result = plan_clear(Path2D.of(LINE), tracked(), PlanRequest(), ROCK)
+    result = make_plan(Path2D.of(LINE), tracked(), PlanRequest(space=ROCK))
     assert result.kept_clear is not None
     twist = tracked().vehicle.twist * np.array([1.02, 1.0, 1.02])
     distances = swim(Tracker(result), result, replace(tracked().vehicle, twist=twist), FINE).distance
@@ -132,7 +130,7 @@ def test_random_obstacles(seed: int) -> None:
     path = Path2D.of(np.stack([1.6 * angle, rng.uniform(0.3, 1) * np.sin(1.5 * angle)], 1))
     rocks = [Circle(*(path.points[i] + rng.normal(0, 0.3, 2)).tolist(), rng.uniform(0.2, 0.6)) for i in (70, 130)]
     space = FreeSpace.of(rocks)
-    check_clear(plan_clear(path, tracked(), QUICK, space), space)
+    check_clear(make_plan(path, tracked(), replace(QUICK, space=space)), space)
 
 
 def test_regions_are_in_the_unit_that_is_given(tmp_path: Path) -> None:
@@ -158,7 +156,7 @@ FEW = PlanRequest(dwell=2.03)  # no flip is at the time of a picture
 def waiting() -> Plan:
     """Plan to arrive after 1.9 times the time that the path takes."""
     own = make_plan(BENT, tracked(), FEW)
-    return plan_arrival(BENT, tracked(), FEW, 1.9 * float(own.seconds.sum()))
+    return make_plan(BENT, tracked(), replace(FEW, arrive_seconds=1.9 * float(own.seconds.sum())))
 
 
 def check_arrival(plan: Plan) -> None:
@@ -170,7 +168,7 @@ def check_arrival(plan: Plan) -> None:
 @pytest.mark.parametrize("share", [1.0, 1.5])
 def test_dwells_decide_when_a_plan_arrives(share: float) -> None:
     fastest = make_plan(BENT, tracked(), PlanRequest(objective="time"))
-    plan = plan_arrival(BENT, tracked(), PlanRequest(), share * float(fastest.seconds.sum()))
+    plan = make_plan(BENT, tracked(), PlanRequest(arrive_seconds=share * float(fastest.seconds.sum())))
     assert plan.arrival is not None
     assert plan.arrival.fastest == pytest.approx(fastest.duration)
     check_arrival(plan)
@@ -195,7 +193,7 @@ def test_circles_take_time_where_dwells_do_not_suffice() -> None:
 
 def test_a_swing_takes_less_time_than_a_circle() -> None:
     own = make_plan(BENT, tracked(), FEW)
-    plan = plan_arrival(BENT, tracked(), FEW, 1.2 * float(own.seconds.sum()))
+    plan = make_plan(BENT, tracked(), replace(FEW, arrive_seconds=1.2 * float(own.seconds.sum())))
     check_arrival(plan)
     assert plan.declared.swing is not None
     assert plan.declared.swing.circles == 0
@@ -204,7 +202,7 @@ def test_a_swing_takes_less_time_than_a_circle() -> None:
 def test_circles_keep_clear_of_obstacles() -> None:
     space = FreeSpace.of([Circle(3.5, 0.3, 0.3)])
     own = make_plan(BENT, tracked(), FEW)
-    plan = plan_arrival(BENT, tracked(), FEW, 2.2 * float(own.seconds.sum()), space)
+    plan = make_plan(BENT, tracked(), replace(FEW, arrive_seconds=2.2 * float(own.seconds.sum()), space=space))
     check_arrival(plan)
     assert plan.kept_clear is not None
     assert plan.kept_clear.clearance > 0
@@ -236,7 +234,7 @@ def test_the_command_arrives(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     words = ["plan", "circle:1.5l", "--robot", "paper-control", "--out", str(tmp_path / "out")]
     for seconds in (0.0, np.nan, np.inf):
         with pytest.raises(InputError, match="above 0"):
-            plan_arrival(circle(1.5), tracked(), PlanRequest(), seconds)
+            make_plan(circle(1.5), tracked(), PlanRequest(arrive_seconds=seconds))
     assert run_command(main, [*words, "--arrive", "25min"]) == 0
     assert "arrives after 25 min as asked" in capsys.readouterr().out
     content = json.loads((tmp_path / "out" / "plan.json").read_text())
@@ -274,11 +272,11 @@ def test_the_robot_follows_circles_anywhere_on_its_path(place: int) -> None:
 
 
 def test_a_robot_with_a_goal_still_ends_there() -> None:
-    waiting = with_circles(trip().plan, [WaitingCircle(50, -1)], trip().goal)
+    waiting = with_circles(trip(), [WaitingCircle(50, -1)])
     x, y, heading = waiting.poses[-1]
-    assert (x, y) == pytest.approx(trip().goal[:2], abs=2e-3)
-    assert math.remainder(heading - trip().goal[2], math.tau) == pytest.approx(0, abs=2e-3)
-    assert waiting.start == trip().plan.start
+    assert (x, y) == pytest.approx(trip().job.goal[:2], abs=2e-3)
+    assert math.remainder(heading - trip().job.goal[2], math.tau) == pytest.approx(0, abs=2e-3)
+    assert waiting.start == trip().start
 
 
 def test_a_closed_path_and_a_current() -> None:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.jobs.clear_plan import plan_clear
 from planner.jobs.fleet import Member, NoTimingError, fleet
 from planner.jobs.fleet_plan import FleetPlan
+from planner.jobs.plan import make_plan
 from planner.jobs.priorities import Priorities
 from planner.jobs.separation import Places, Scheduled, distances, instants, line_distance, too_near
 from planner.jobs.timed_motion import Body
@@ -49,7 +49,7 @@ def crossing(**options: Any) -> list[Plan]:
 
 
 def keep_apart(plans: list[Plan], **options: Any) -> FleetPlan:
-    members = [Member.of(name, each) for name, each in zip("abcdef", plans, strict=False)]
+    members = [Member(name, each) for name, each in zip("abcdef", plans, strict=False)]
     return fleet(members, options.pop("apart", APART), **options)
 
 
@@ -129,7 +129,7 @@ def test_waiting_circles_keep_clear_of_walls() -> None:
     passing, across = straight((-1.0, -3.0), (-1.0, 3.5)), straight((3.2, -2.8), (3.2, 3.5))
     tracked = tracked_vehicle(CONTROL, None, "head_centre", None)
     rock = FreeSpace.of([Circle(1.0, 1.3, 0.3)])
-    waiting = plan_clear(Path2D.of(LINE), tracked, PlanRequest(), rock)
+    waiting = make_plan(Path2D.of(LINE), tracked, PlanRequest(space=rock))
     result = keep_apart([passing, across, waiting])
     kept = result.plans[2].kept_clear
     assert kept is not None

@@ -13,12 +13,11 @@ import pytest
 import planner.jobs.laps
 from planner.files.saved_plan import restore_plan
 from planner.files.tracker_header import rounded
-from planner.jobs.hold import hold
-from planner.jobs.hold_plan import HoldPlan
+from planner.jobs.hold import Orbit, hold
 from planner.jobs.laps import looped
+from planner.jobs.plan import make_plan
 from planner.paths.obstacles import Circle, Footprint, FreeSpace
 from planner.paths.path import Path2D, circle
-from planner.planning.plan import make_plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.guidance import TrackerGuidance
@@ -46,11 +45,11 @@ PLACE = (2.0, 1.0)
 
 @shared
 def laps() -> Plan:
-    return looped(make_plan(circle(1.2), tracked(), FEW))
+    return make_plan(circle(1.2), tracked(), replace(FEW, loop=True))
 
 
 @shared
-def held() -> HoldPlan:
+def held() -> Plan[Orbit]:
     return hold(PLACE, tracked(), FEW, 1800.0)
 
 
@@ -225,21 +224,22 @@ def test_no_pair_of_dwells_stays_nearer_than_one_direction(point: str) -> None:
 
 
 def test_the_orbit_is_little_wider_than_the_smallest_one() -> None:
-    place = held()
+    plan, place = held(), held().job
     assert place.smallest == pytest.approx(tracked().vehicle.turn_radius)
     assert place.smallest < place.radius < 1.05 * place.smallest
-    away = np.hypot(*(place.plan.track - PLACE).T)
-    assert np.abs(away - place.radius).max() <= place.plan.predicted_max + 1e-3
+    away = np.hypot(*(plan.track - PLACE).T)
+    assert np.abs(away - place.radius).max() <= plan.predicted_max + 1e-3
     body = Footprint.of(CONTROL, 0.0)
-    farthest = np.hypot(*np.moveaxis(body.centres(place.plan.poses) - PLACE, -1, 0)).max() + body.radius
+    farthest = np.hypot(*np.moveaxis(body.centres(plan.poses) - PLACE, -1, 0)).max() + body.radius
     assert farthest <= place.reach + 1e-9 < farthest + 0.02
-    assert place.laps == math.ceil(1800 / float(place.plan.seconds.sum()))
-    assert place.within < place.within_open_loop(place.laps)
+    assert place.laps == math.ceil(1800 / float(plan.seconds.sum()))
+    assert place.laps is not None
+    assert place.within(plan) < place.within_open_loop(plan, place.laps)
 
 
 def test_the_simulator_circles_about_the_place_at_constant_direction() -> None:
-    place = held()
-    lap = 2 * math.pi / place.plan.tracked.vehicle.yaw_rate
+    place = held().job
+    lap = 2 * math.pi / held().tracked.vehicle.yaw_rate
     still = Schedule(
         CONTROL.group_values(),
         place.still_direction,
@@ -254,14 +254,14 @@ def test_the_simulator_circles_about_the_place_at_constant_direction() -> None:
 @pytest.mark.parametrize(("current", "wrong"), [pytest.param(0.0, 1.05, marks=pytest.mark.rest), (0.001, 0.97)])
 def test_a_tracked_robot_stays(current: float, wrong: float) -> None:
     """A coefficient is 3 or 5 % off; the current would carry the robot 0.4 l away in three laps."""
-    place = held()
-    car, plan = tracked().vehicle, place.plan
+    plan, place = held(), held().job
+    car = tracked().vehicle
     car = replace(car, twist=car.twist * np.array([wrong, 1.0, 1.0]), current=np.array([current, 0.0]))
     result = swim(UntilTold(Tracker(plan), 2.5 * plan.duration), plan, car, FINE, longest=8)
     settled = result.times > plan.duration
     away = np.hypot(*(result.poses[settled, :2] - PLACE).T)
     assert result.finished
-    assert away.max() < place.within + 0.08
+    assert away.max() < place.within(plan) + 0.08
     assert away.min() > place.radius - 0.15
 
 
@@ -269,7 +269,7 @@ def test_a_tracked_robot_stays(current: float, wrong: float) -> None:
 def test_there_must_be_room(x: float) -> None:
     space = FreeSpace.of([Circle(x, 1.0, 0.2)])
     if x > 5:
-        assert hold(PLACE, tracked(), FEW, space=space).laps is None
+        assert hold(PLACE, tracked(), replace(FEW, space=space)).job.laps is None
         return
     with pytest.raises(InputError, match="no room to hold"):
-        hold(PLACE, tracked(), FEW, space=space)
+        hold(PLACE, tracked(), replace(FEW, space=space))

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from planner.jobs.plan import make_plan, plan
 from planner.paths.path import Path2D, circle, polygon
-from planner.planning.plan import make_plan, plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.from_table import table_vehicle

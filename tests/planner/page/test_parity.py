@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from planner.jobs.plan import make_plan, plan
 from planner.paths.path import Path2D, circle, polygon
 from planner.paths.path_files import read_path
-from planner.planning.plan import make_plan, plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from sim.inputs import load_robot

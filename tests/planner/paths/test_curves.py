@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planner.jobs.plan import plan
 from planner.paths.distance import distance_to, nearest, two_sided
 from planner.paths.fillets import fillet, largest_fillet
 from planner.paths.nearest_feasible import nearest_path
 from planner.paths.path import Path2D, circle, polygon, resample, smoothed
-from planner.paths.tractrix import STILL, Drift, reference
-from planner.planning.plan import plan
+from planner.paths.tractrix import STILL, Drift, Reference, reference
 from sim.io.errors import InputError
 from tests.planner.plans import CONTROL
 
@@ -189,3 +190,29 @@ def test_a_time_weight_saves_way_and_costs_distance() -> None:
     assert ways[-1] < 0.95 * ways[0]
     assert off(found[0], raw) < off(found[2], raw) < off(found[3], raw)
     assert all(sharpest(path) < 1.0 for path in found)
+
+
+def test_parts_of_a_reference_are_joined_to_the_same_one() -> None:
+    """A closed one begins elsewhere, and goes on for a lap and a half; whole turns go on, too."""
+    ring = reference(circle(2.0), 0.9, 0.02)
+    cut = Reference.joined(ring.part(0, 100), replace(ring.part(100), heading=ring.heading[100:] - 4 * math.pi))
+    assert cut.heading == pytest.approx(ring.heading)
+    assert cut.arc == pytest.approx(ring.arc)
+    later = ring.begun_at(100)
+    assert later.closed
+    assert later.q[[0, -1]] == pytest.approx(np.array([ring.q[100], ring.q[100]]))
+    assert later.turn == ring.turn == pytest.approx(2 * math.pi)
+    longer = ring.laps(2, ring.arc[-1] / 2)
+    assert longer.arc[-1] == pytest.approx(2.5 * ring.arc[-1], abs=0.03)
+    assert np.abs(np.diff(longer.heading)).max() < 0.05
+    assert longer.heading[-1] - ring.heading[0] == pytest.approx(5 * math.pi, abs=0.05)
+
+
+def test_a_track_of_the_pivot_leads_to_the_path_whose_tractrix_it_is() -> None:
+    bend = reference(Path2D.of([[0, 0], [2, 0], [3, 1]]), 0.9, 0.02)
+    again = Reference.of_pivot(
+        np.column_stack([bend.q, bend.heading]), 0.9, Drift(), bend.heading[0] + 2 * math.pi
+    )
+    assert again.p == pytest.approx(bend.p)
+    assert again.heading == pytest.approx(bend.heading + 2 * math.pi)
+    assert again.first_turn == bend.first_turn == 1

@@ -10,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from planner.jobs.plan import plan
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon, smoothed
 from planner.paths.tractrix import STILL, Drift, reference
@@ -17,7 +18,6 @@ from planner.planning import remedy
 from planner.planning.declared_path import declare
 from planner.planning.feasible import Feasibility, changed, cost, feasible
 from planner.planning.line_of_sight import hysteresis
-from planner.planning.plan import plan
 from planner.planning.progress import DECLARING, REMEDY, Share
 from planner.planning.request import Corner
 from planner.planning.schedule import follow

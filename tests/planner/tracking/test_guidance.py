@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from planner.goal.dubins import shortest_paths
+from planner.jobs.plan import plan
 from planner.planning.camera import POSE, Camera
-from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from planner.tracking.guidance import LearnedDrift, TrackerGuidance
 from planner.tracking.swim import Swim, swim

@@ -14,7 +14,7 @@ from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Reference, reference
 from planner.planning.planned import Plan
 from planner.tracking.reached import reached
-from planner.tracking.rest import Rest, rest_of
+from planner.tracking.rest import Remainder, rest_of
 from planner.vehicle.rollout import predicted_poses
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
@@ -30,7 +30,7 @@ PLANS: dict[str, Callable[[], Plan]] = {
 }
 
 
-def rest(name: str, share: float, *moved: float) -> Rest:
+def rest(name: str, share: float, *moved: float) -> Plan[Remainder]:
     """Follow a share of the dwells; then move the robot, within 10 time units."""
     result = PLANS[name]()
     count = round(share * len(result.dwells))
@@ -49,12 +49,12 @@ def end_error(name: str, after: Plan) -> float:
 @pytest.mark.parametrize(("name", "share"), [("circle", 0.0), ("circle", 0.9), ("square", 0.3), ("head tip", 0.3)])
 def test_a_robot_on_its_path_goes_on(name: str, share: float) -> None:
     result, after = PLANS[name](), rest(name, share)
-    assert after.way == 0
+    assert after.job.way == 0
     count = len(result.dwells) - round(share * len(result.dwells))
-    assert len(after.plan.dwells) == pytest.approx(count, abs=3)
-    assert after.plan.predicted_max < 1.5 * result.predicted_max + 0.01
-    assert end_error(name, after.plan) < 0.04
-    assert distance_to(result.reference, after.plan.reference).max() < 1e-9
+    assert len(after.dwells) == pytest.approx(count, abs=3)
+    assert after.predicted_max < 1.5 * result.predicted_max + 0.01
+    assert end_error(name, after) < 0.04
+    assert distance_to(result.reference, after.reference).max() < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -68,19 +68,19 @@ def test_a_robot_that_was_moved_finds_back(name: str, moved: tuple[float, float,
     result, after = PLANS[name](), rest(name, 0.3, *moved)
     count = round(0.3 * len(result.dwells))
     expected = result.poses[count] + moved
-    assert after.plan.poses[0, :2] == pytest.approx(expected[:2])
-    assert np.cos(after.plan.poses[0, 2] - expected[2]) == pytest.approx(1.0)
-    assert after.way > 0.1
-    assert after.left_out < 3.0
-    assert after.plan.predicted_max < 1.5 * result.predicted_max + 0.015
-    assert end_error(name, after.plan) < 1.5 * result.predicted_max + 0.015
-    joined = after.plan.reference[-(len(after.plan.reference) // 4) :]
+    assert after.poses[0, :2] == pytest.approx(expected[:2])
+    assert np.cos(after.poses[0, 2] - expected[2]) == pytest.approx(1.0)
+    assert after.job.way > 0.1
+    assert after.job.left_out < 3.0
+    assert after.predicted_max < 1.5 * result.predicted_max + 0.015
+    assert end_error(name, after) < 1.5 * result.predicted_max + 0.015
+    joined = after.reference[-(len(after.reference) // 4) :]
     assert distance_to(result.reference, joined).max() < 1e-9
-    assert after.plan.declared.missed < result.declared.missed + 0.02
+    assert after.declared.missed < result.declared.missed + 0.02
 
 
 def test_the_rest_in_the_simulator_ends_where_the_path_ends() -> None:
-    after = rest("square", 0.92, 0.3, -0.5, 0.8).plan
+    after = rest("square", 0.92, 0.3, -0.5, 0.8)
     track = replay([after.schedule()])[0]
     end = track[["x_over_l", "y_over_l"]].iloc[-1].to_numpy()
     assert np.hypot(*(end - PLANS["square"]().reference[-1])) < after.stated_error + 0.02
@@ -90,7 +90,7 @@ def test_the_rest_in_the_simulator_ends_where_the_path_ends() -> None:
     ("name", "moved"), [("around", ()), pytest.param("rock", (-0.3, 0.6, 0.5), marks=pytest.mark.rest)]
 )
 def test_the_way_back_keeps_clear_of_obstacles(name: str, moved: tuple[float, ...]) -> None:
-    after = rest(name, 0.3, *moved).plan
+    after = rest(name, 0.3, *moved)
     body = Footprint.of(CONTROL, 0.0)
     clearance = body.clearance(predicted_poses(after.tracked.vehicle, after.switches), ROCK).min()
     assert after.kept_clear is not None

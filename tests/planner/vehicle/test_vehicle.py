@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from planner.jobs.plan import plan
 from planner.paths.path import circle
-from planner.planning.plan import plan
 from planner.vehicle.calibration_table import (
     COEFFICIENTS,
     NUMBERS,

@@ -12,8 +12,7 @@ import pytest
 import planner.files.own_table
 import softflagella as sf
 import surrogate.one_robot.tabulate
-from planner.goal.to_goal import to_goal
-from planner.planning.plan import plan
+from planner.jobs.plan import plan
 from tests.softflagella.made import GOAL, ODD, ROBOT, START, goal, own_table
 
 KNOWN = sf.CalibrationKnowledge(names=("C_yr",), covariance=np.array([[0.01]]))
@@ -41,7 +40,7 @@ def test_a_robot_in_any_form_has_the_plan_of_the_planner(calibrated_file: Path) 
 
 @pytest.mark.slow
 def test_a_plan_to_a_goal_is_that_of_the_planner(calibrated_file: Path) -> None:
-    wanted = to_goal(START, GOAL, ROBOT, knowledge=KNOWN)
+    wanted = sf.to_goal(START, GOAL, ROBOT, knowledge=KNOWN)
     assert sf.to_goal(START, GOAL, calibrated_file).to_dict() == wanted.to_dict()
 
 
@@ -92,9 +91,9 @@ def test_every_planning_function_takes_the_robot_s_own_table(monkeypatch: pytest
     square = [[0, 0], [2, 0], [2, 2], [0, 2]]
     plans = [
         sf.plan(sf.circle(1.5), robot, own_table=True),
-        sf.to_goal((0, 0, 0), (4, 1, 0), robot, own_table=True).plan,
-        sf.tour([(0, 0), (4, 0)], robot, objective="time", own_table=True).plan,
-        sf.cover(square, 0.8, robot, objective="time", own_table=True).plan,
+        sf.to_goal((0, 0, 0), (4, 1, 0), robot, own_table=True),
+        sf.tour([(0, 0), (4, 0)], robot, objective="time", own_table=True),
+        sf.cover(square, 0.8, robot, objective="time", own_table=True),
     ]
     own = own_table().identity
     assert {plan.tracked.model for plan in plans} == {own}
@@ -121,8 +120,8 @@ def test_a_track_is_checked_against_a_plan_in_any_form(tmp_path: Path) -> None:
 def test_a_goal_plan_is_written_with_its_goal_and_checked_as_its_plan(tmp_path: Path) -> None:
     names = [path.name for path in sf.write_plan(goal(), tmp_path)]
     assert names[-2:] == ["goal.json", "goal.svg"]
-    assert sf.load_plan(tmp_path / "plan.json")["id"] == goal().plan.to_dict()["id"]
-    plan = goal().plan
+    assert sf.load_plan(tmp_path / "plan.json")["id"] == goal().to_dict()["id"]
+    plan = goal()
     track = pd.DataFrame(plan.poses, columns=["x_over_l", "y_over_l", "heading_rad"])
     track["time_bar"] = np.concatenate([[0.0], np.cumsum(plan.dwells)])
-    assert sf.check(goal(), track).rms == sf.check(plan, track).rms
+    assert sf.check(tmp_path / "plan.json", track).rms == sf.check(plan, track).rms

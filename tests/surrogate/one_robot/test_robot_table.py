@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from planner.files.tracking_error import tracking_error
+from planner.jobs.plan import plan
 from planner.paths.path import polygon
-from planner.planning.plan import plan
 from sim.io.errors import InputError
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS

@@ -13,9 +13,9 @@ import pandas as pd
 import pytest
 
 from planner.files.tracking_error import tracking_error
+from planner.jobs.plan import plan
 from planner.page.write_page import write_page
 from planner.paths.path import circle
-from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.rollout import predicted_poses

@@ -1,20 +1,20 @@
-"""Regions as words of a command or as files, and the files of a plan from pose to pose."""
+"""Places and regions as words of a command or as files."""
 
 from __future__ import annotations
 
 import difflib
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from planner.files.plan_files import EXTRA, FILES, write_plan_files
-from planner.goal.goal_plan import GoalPlan
+import numpy as np
+
+from planner.jobs.region import Field
 from planner.paths.obstacles import Circle, FreeSpace, Polygon, Region
 from planner.paths.path_files import Drawing, read_path
 from planner.paths.shapes import like_a_shape, shape_of
 from planner.paths.units import in_tails, read_length
+from sim.arrays import Floats
 from sim.io.errors import InputError, naming
-from sim.io.files import files_together, write_text
 from sim.model.robot import Robot
 
 _SHAPES = {"circle": "circle:X,Y,RADIUS", "box": "box:LEFT,LOW,RIGHT,HIGH"}
@@ -75,12 +75,41 @@ def read_free_space(keep_out: Sequence[str], walls: str | None, unit: str | None
     return FreeSpace(tuple(read_region(words, unit, robot) for words in keep_out), outline)
 
 
-def write_goal_plan(goal_plan: GoalPlan, folder: str | Path) -> list[Path]:
-    """Write the files of the plan, goal.json and a picture, all or none; return their paths."""
-    from planner.files.pictures import draw_goal_plan, write_svg
+def read_places(words: Sequence[str], unit: str | None, robot: Robot) -> Floats:
+    """Read places (n, 2), in tail lengths.
 
-    with files_together(folder, (*FILES, *EXTRA)) as temporary:
-        identity = write_plan_files(goal_plan.plan, temporary)
-        write_text(temporary / "goal.json", json.dumps({**goal_plan.to_dict(), "plan_id": identity}) + "\n")
-        write_svg(draw_goal_plan(goal_plan), temporary / "goal.svg", identity)
-    return [Path(folder, name) for name in (*FILES, "goal.json", "goal.svg")]
+    Args:
+        words: X,Y of each, or one file with a point for each.
+        unit: of numbers without one.
+        robot: its tail length.
+
+    Raises:
+        InputError: a word is no pair of numbers, or the file cannot be read.
+    """
+    if len(words) == 1 and "," not in Path(words[0]).name:
+        with naming(words[0]):
+            return read_path(words[0], closed=False).in_tails(robot, unit).points
+    for word in words:
+        if word.count(",") != 1:
+            raise InputError(f"place {word!r}; write X,Y, for example 30cm,15cm")
+    return np.array(
+        [[read_length(each, unit, robot, f"place {word}") for each in word.split(",")] for word in words]
+    )
+
+
+def read_field(words: str, holes: Sequence[str], unit: str | None, robot: Robot) -> Field:
+    """Read a region with holes, in tail lengths.
+
+    Args:
+        words: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline.
+        holes: the same for each hole.
+        unit: of numbers without one; a region of which a file says another unit is refused.
+        robot: its tail length.
+
+    Raises:
+        InputError: the words are no regions.
+    """
+    if words.partition(":")[0] not in ("circle", "box"):
+        with naming(words):
+            read_outline(words).in_tails(robot, unit)
+    return Field(read_region(words, unit, robot), tuple(read_region(hole, unit, robot) for hole in holes))

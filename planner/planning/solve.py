@@ -1,0 +1,307 @@
+"""From a request to a plan: one solver for all jobs.
+
+1. A task's source gives a declared path for a setting: the vehicle with one shortest dwell, and a margin.
+2. Changes transform it: a swing takes time, a way around keeps clear of an obstacle.
+3. Line-of-sight guidance follows the path, which gives the schedule, and its errors are computed
+   (`follow_declared`).
+4. Where there are obstacles, the margin grows until it covers the stated error (`at_dwell`).
+5. The objective chooses the shortest dwell. Where the path is blocked or the tolerance is not kept, others are
+   tried (`by_dwell`). A duration that is asked for is met by the secant method (`planner.planning.arrive`).
+
+Errors are distances of the tracked point from the declared path. Lengths in l, times in μ0 l⁴/EI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from planner.paths.obstacles import FreeSpace
+from planner.paths.path import Path2D
+from planner.paths.units import in_lab, time_in_lab
+from planner.planning.declared_path import Declared
+from planner.planning.errors import plan_errors
+from planner.planning.kept_clear import BlockedError, KeptClear
+from planner.planning.line_of_sight import Guidance
+from planner.planning.planned import Plan
+from planner.planning.progress import Progress
+from planner.planning.request import PlanRequest
+from planner.planning.schedule import Start, follow
+from planner.planning.setting import Setting
+from planner.planning.stated_error import guaranteed
+from planner.vehicle.coefficient_modes import OWN_TABLE
+from planner.vehicle.dwell_choice import check_least, dwells_for, longer_dwells, nearly_fastest
+from planner.vehicle.rollout import Switches
+from planner.vehicle.tracked_point import TrackedVehicle
+from sim.io.errors import InputError
+
+_MARGINS = 6  # tried for each dwell
+_MORE = 1.05  # times the stated error is the next margin
+_GROWS = 1.02  # or times the margin before
+_OTHERS = 4  # longer, and shorter dwells that are tried where the path is blocked
+_WORTH = 0.8  # of the stated error: a longer dwell, which swings further, must leave at most this
+_LENGTHENED_FROM = 1.2  # stated error over predicted error, below which fewer flips gain nothing
+_SAVED = 3.0  # dwells that corners and the end of a path may save
+
+Change = Callable[[Declared, Setting], Declared]  # a constraint: transforms the reference, or returns its argument
+Ending = Callable[[Switches, Declared, Setting], Switches]  # changes the last dwells
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """What is to be followed."""
+
+    source: Callable[[Setting], Declared]  # where the reference comes from
+    changes: tuple[Change, ...] = ()  # in order
+    drawn: Path2D | None = None  # None: the declared path counts as drawn
+    start: Callable[[Declared], Start] | None = None  # None: at rest on the path
+    ending: Ending | None = None
+    zigzags: float | None = None  # first margin over the zigzag; None: first there is no margin
+    longer: bool = True  # longer dwells are tried, too: for a small error, and where the path is blocked
+    quickest: bool = False  # for the shortest time, the path is followed with several dwells
+    blocked: type[BlockedError] = BlockedError
+
+    def declared(self, setting: Setting) -> Declared:
+        """Declare a path with all changes."""
+        declared = self.source(setting)
+        for change in self.changes:
+            declared = change(declared, setting)
+        return declared
+
+
+def solve(
+    task: Task, tracked: TrackedVehicle, request: PlanRequest, progress: Progress | None = None
+) -> Plan[None]:
+    """Plan for a task.
+
+    Raises:
+        BlockedError: there is no way that keeps clear.
+        InputError: the path cannot be followed as asked.
+    """
+    if request.arrive_seconds is None:
+        return by_dwell(task, tracked, request, progress=progress)
+    from planner.planning.arrive import arrive
+
+    return arrive(task, tracked, request, progress)
+
+
+def follow_declared(
+    declared: Declared,
+    setting: Setting,
+    request: PlanRequest,
+    *,
+    drawn: Path2D | None = None,
+    start: Start | None = None,
+    ending: Ending | None = None,
+    guidance: Guidance | None = None,
+    progress: Progress | None = None,
+) -> Plan[None]:
+    """Follow a declared path, and compute the errors.
+
+    Args:
+        declared: the path.
+        setting: the vehicle with its shortest dwell.
+        request: what the plan is asked for.
+        drawn: the path as drawn; None: the declared path.
+        start: at rest away from the path; the error of such a plan is not guaranteed. None: on the path.
+        ending: changes the last dwells.
+        guidance: default: as the setting says.
+        progress: called now and then with the share of the path that is done.
+    """
+    tracked, straight = setting.tracked, setting.straight
+    vehicle, guidance = tracked.vehicle, guidance or setting.guidance(declared)
+    drawn = drawn or Path2D(declared.reference.p, False)
+    switches = follow(declared.reference, vehicle, guidance, tracked.offset, start=start, progress=progress)
+    if ending is not None:
+        switches = ending(switches, declared, setting)
+        guidance = guidance._replace(dwell=min(guidance.dwell, float(switches.dwells.min())))
+    bound = None if start else guaranteed(vehicle, tracked.rod, straight.swing, guidance.ahead)
+    errors = plan_errors(tracked, drawn, declared, switches, guaranteed=bound, seed=request.seed)
+    return Plan(tracked, request, drawn, declared, straight, guidance, switches, errors)
+
+
+def at_dwell(
+    task: Task,
+    tracked: TrackedVehicle,
+    request: PlanRequest,
+    dwell: float,
+    longer: float = 0.0,
+    progress: Progress | None = None,
+) -> Plan[None]:
+    """Plan with one shortest dwell; the margin grows until it covers the error that the plan states.
+
+    Args:
+        task: what is to be followed.
+        tracked: the vehicle.
+        request: what the plan is asked for.
+        dwell: the shortest dwell.
+        longer: length that a swing adds.
+        progress: called now and then with the share of the path that is done.
+
+    Raises:
+        BlockedError: there is no such plan.
+    """
+    setting, space = Setting.of(tracked, dwell, longer), request.space
+    if task.zigzags and not space.empty:
+        setting = setting._replace(margin=task.zigzags * setting.straight.largest)
+    plan: Plan[None] | None = None
+    for _ in range(_MARGINS + (setting.margin is None)):
+        declared = task.declared(setting)
+        if plan is None or not declared.same(plan.declared):
+            start = task.start(declared) if task.start else None
+            plan = follow_declared(declared, setting, request, drawn=task.drawn, start=start, ending=task.ending,
+                                   progress=progress)  # fmt: skip
+        if space.empty:
+            return plan
+        needed, margin = plan.margin_needed, setting.margin
+        if margin is not None and needed <= margin and (clearance := plan.clearance(space)) > 0:
+            return replace(plan, kept_clear=KeptClear(space, margin, clearance, declared.detours))
+        setting = setting._replace(margin=max(_MORE * needed, _GROWS * (margin or 0.0)))
+    raise task.blocked(
+        f"there is no way that leaves the plan's stated error around the robot: it is "
+        f"{in_lab(needed, tracked.robot)}; plan with feedback, make a table of this robot ({OWN_TABLE}), or move "
+        "the path, the goal or the obstacles"
+    )
+
+
+def by_dwell(
+    task: Task,
+    tracked: TrackedVehicle,
+    request: PlanRequest,
+    longer: float = 0.0,
+    progress: Progress | None = None,
+) -> Plan[None]:
+    """Plan with the dwell that the objective chooses; where the path is blocked, with others.
+
+    With the objective "error" the dwell is that of the path without obstacles. For the least stated error among
+    the ways around, a dwell would be best whose error is so large that its way leaves out most of the path.
+
+    Raises:
+        BlockedError: there is no way around what blocks the path.
+        InputError: the path cannot be followed, or no dwell keeps the tolerance.
+    """
+    vehicle, plan = tracked.vehicle, None
+    at = partial(at_dwell, task, tracked, request, longer=longer, progress=progress)
+    if request.dwell is not None:
+        dwells = [check_least(request.dwell)]
+        others: list[float] = []
+    else:
+        least = request.least_dwell(tracked.robot)
+        dwells = dwells_for(vehicle, request.objective, least)
+        if task.quickest and request.objective == "time":
+            fastest = _quickest(task, tracked, dwells[0], least)
+            dwells = [fastest, *(dwell for dwell in dwells if dwell < fastest)]
+        shorter = np.unique(np.linspace(0, len(dwells) - 1, _OTHERS + 1).astype(int)).tolist()
+        others = [
+            *(longer_dwells(vehicle, dwells[0])[:_OTHERS] if task.longer else ()),
+            *(dwells[k] for k in shorter),
+        ]
+    first = dwells[0]
+    if task.longer and request.objective == "error" and request.dwell is None:
+        free, unhindered = replace(task, changes=()), replace(request, space=FreeSpace())
+        with suppress(*([] if request.space.empty else [InputError])):  # there may be a way around the tight place
+            plan = _least_stated(partial(at_dwell, free, tracked, unhindered, progress=progress), tracked, first)
+            first = plan.minimum_dwell
+    if plan is None or not request.space.empty:
+        plan = _first_clear(at, [first, *(dwell for dwell in others if dwell != first)])
+    if request.tolerance is None or plan.stated_error <= request.tolerance:
+        return plan
+    return _shortened(plan, dwells, at, request.tolerance)
+
+
+def _quickest(task: Task, tracked: TrackedVehicle, fastest: float, least: float | None) -> float:
+    """Choose the dwell with which a declared path takes the least time.
+
+    Shorter dwells are tried until they cost more time than corners and the end may save.
+
+    Args:
+        task: gives the declared path.
+        tracked: the vehicle and its tracked point.
+        fastest: the dwell with which straight motion is the fastest.
+        least: the shortest dwell that the motor allows.
+    """
+    declared = task.declared(Setting.of(tracked, fastest))
+    times: dict[float, float] = {}
+    for dwell in nearly_fastest(tracked.vehicle, least):
+        with suppress(InputError):  # too long for this path
+            guidance = Setting.of(tracked, dwell).guidance(declared)
+            switches = follow(declared.reference, tracked.vehicle, guidance, tracked.offset)
+            times[dwell] = float(switches.dwells.sum())
+            if times[dwell] > min(times.values()) + _SAVED * fastest:
+                break
+    return min(times, key=lambda dwell: times[dwell], default=fastest)
+
+
+def _least_stated(at: Callable[[float], Plan[None]], tracked: TrackedVehicle, dwell: float) -> Plan[None]:
+    """Lengthen the dwells where this makes the stated error smaller by a fifth or more.
+
+    What is uncertain of each flip adds up, so it shrinks with their number. The predicted error grows with the
+    dwell; where it alone is above the best stated error, longer dwells cannot be better.
+    """
+    best = at(dwell)
+    if best.stated_error < _LENGTHENED_FROM * best.predicted_max:
+        return best
+    for longer in longer_dwells(tracked.vehicle, dwell):
+        try:
+            candidate = at(longer)
+        except InputError:  # too long for this path
+            break
+        if candidate.predicted_max >= best.stated_error:
+            break
+        if candidate.stated_error < _WORTH * best.stated_error:
+            best = candidate
+    return best
+
+
+def _first_clear(at: Callable[[float], Plan[None]], dwells: list[float]) -> Plan[None]:
+    """Plan with the first dwell for which there is a way.
+
+    Raises:
+        BlockedError: there is none for any of them.
+    """
+    refusal: BlockedError | None = None
+    for dwell in dwells:
+        try:
+            return at(dwell)
+        except BlockedError as blocked:
+            refusal = refusal or blocked
+            if blocked.hopeless:
+                break
+    assert refusal is not None
+    raise refusal
+
+
+def _shortened(
+    first: Plan[None], dwells: list[float], at: Callable[[float], Plan[None]], tolerance: float
+) -> Plan[None]:
+    """Halve between the first dwell, which is too long, and the shortest one, until the tolerance is kept.
+
+    Raises:
+        InputError: no dwell that was tried keeps the tolerance.
+    """
+    best, kept = first, None
+    low, high = 0, len(dwells)
+    while high - low > 1:
+        middle = (low + high) // 2
+        try:
+            candidate = at(dwells[middle])
+        except BlockedError:
+            low = middle
+            continue
+        best = min(best, candidate, key=lambda plan: plan.stated_error)
+        if candidate.stated_error <= tolerance:
+            kept, high = candidate, middle
+        else:
+            low = middle
+    if kept is None:
+        robot = first.robot
+        raise InputError(
+            f"tolerance {in_lab(tolerance, robot)} cannot be kept: the smallest stated error is "
+            f"{in_lab(best.stated_error, robot)}, with dwells from {time_in_lab(best.minimum_dwell, robot)}; "
+            f"allow more, or make a table of this robot with {OWN_TABLE}"
+        )
+    return kept
