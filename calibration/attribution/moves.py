@@ -10,9 +10,13 @@ Else a shift is no different from an effect of N or l. A number that differs by 
 ∂f/∂x = ∂f/∂p in the runs of G, and 0 in the others. So every pair of number and group has a score
 (`calibration.statistics.residual_tests`), and costs no simulation. The largest is taken to be real if it is beyond
 what a bootstrap of all scores gives at a quarter of the level, beyond `CERTAIN` standard deviations of what the
-fit with it leaves (its Birge factor counts), and at most `CREDIBLE` tolerances of the number. Of pairs that cannot
-be told apart the one comes first that is off by the fewest of its tolerances, a coefficient before a number; the
-others are named with it. With it in the fit, a second one is looked for.
+fit with it leaves (its Birge factor counts), and credible: at most `CREDIBLE` tolerances of the number, or any angle
+for the zero of the course. Of pairs that cannot be told apart the one comes first that is off by the fewest of its
+tolerances, a coefficient before a number; the others are named with it. With it in the fit, a second one is looked
+for.
+
+The zero of the course shows only with a current, and a score is its derivative at the same zero in all runs. So
+a number with a grid is fitted in each group where another number has a large score, from all values of the grid.
 """
 
 from __future__ import annotations
@@ -26,7 +30,7 @@ import numpy as np
 
 from calibration.attribution.refits import INDISTINGUISHABLE
 from calibration.statistics.budget import skipped
-from calibration.statistics.fit import Fit, UnsolvedError, birge, fit
+from calibration.statistics.fit import Fit, UnsolvedError, birge, fit, two_digits
 from calibration.statistics.residual_tests import TESTABLE, Directions, examine_residual
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import Experiment, Parameter, Runs
@@ -57,13 +61,13 @@ class Move:
 
     def words(self, fitted: Fit) -> str:
         """Say by how much it differs, with its 95 % interval, from a fit that has it."""
-        number, (low, high) = self.shift.of, fitted.interval(self.name)
-        sizes = np.array([fitted.parameters[self.name], low, high])
+        number = self.shift.of
+        sizes = np.array([fitted.parameters[self.name], *fitted.interval(self.name)])
         sizes, unit = (100 * np.expm1(sizes), "%") if number.logarithmic else (sizes * number.shown, number.unit)
-        value, *ends = np.abs(sizes).tolist()
+        value, low, high = map(two_digits, (abs(float(sizes[0])), *sorted(np.abs(sizes[1:]).tolist())))
         others = f", or {' or '.join(self.instead)} differs" if self.instead else ""
         return (
-            f"{self.shift.parameter.title} is {value:.2g} {unit} ({min(ends):.2g} to {max(ends):.2g}) "
+            f"{self.shift.parameter.title} is {value} {unit} ({low} to {high}) "
             f"{'above' if sizes[0] > 0 else 'below'} that of the other runs ({abs(self.z):.1f} σ){others}"
         )
 
@@ -134,28 +138,38 @@ def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[Move, ...]]:
         fits: list[tuple[Move, Study, Fit]] = []
         for move in _clearest(study, base, groups, numbers):
             shifts = (*(m.shift for m in moves), move.shift)
-            moved = replace(study, model=Shifted(plain, shifts))
-            start, names = {**base.parameters, move.name: 0.0}, (*base.names, move.name)
-            if skipped(move.shift.parameter.title):
-                continue
-            try:
-                fits.append((move, moved, fit(moved.model, start, names, used, title="")))
-            except UnsolvedError:  # with an effect at work
-                continue
+            moved, names = replace(study, model=Shifted(plain, shifts)), (*base.names, move.name)
+            for change in move.shift.of.grid or (0.0,):
+                if skipped(move.shift.parameter.title):
+                    continue
+                try:
+                    start = {**base.parameters, move.name: change}
+                    fits.append((move, moved, fit(moved.model, start, names, used, title="")))
+                except UnsolvedError:  # with an effect at work
+                    continue
         fits = [each for each in fits if _is_real(plain.runs, used, each[0], each[2])]
         if not fits:
             break
         least = min(fitted.deviance for _, _, fitted in fits)
         alike = [each for each in fits if each[2].deviance - least < INDISTINGUISHABLE]
         (move, study, base), *others = sorted(alike, key=lambda each: _tolerances(each[0], each[2]))
-        moves = (*moves, replace(move, instead=tuple(other.shift.parameter.title for other, _, _ in others)))
+        instead = dict.fromkeys(m.shift.parameter.title for m, _, _ in others if m.name != move.name)
+        moves = (*moves, replace(move, instead=tuple(instead)))
     return study, base, moves
 
 
 def _is_real(runs: Runs, used: Flags, move: Move, fitted: Fit) -> bool:
     """Tell whether a number that differs is beyond what the fit with it leaves, and credible."""
     certain = abs(move.z) >= CERTAIN * math.sqrt(birge(runs, fitted, used))
-    return fitted.converged and certain and _tolerances(move, fitted) <= CREDIBLE
+    return fitted.converged and certain and _credible(move.shift.of, fitted.parameters[move.name])
+
+
+def _credible(number: Parameter, change: float) -> bool:
+    """Tell whether a number may differ by so much."""
+    if number.sigma is None:
+        return True
+    low, high = number.plausible or (-CREDIBLE * number.sigma, CREDIBLE * number.sigma)
+    return low <= change <= high
 
 
 def _tolerances(move: Move, fitted: Fit) -> float:
@@ -175,5 +189,10 @@ def _clearest(
     largest = float(np.abs(z).max())
     if largest < max(misfit.critical_z, CERTAIN):
         return []
-    near = [j for j in np.argsort(-np.abs(z)).tolist() if abs(z[j]) > _NEAR * largest]
-    return [Move(Shift(pairs[j][0], pairs[j][2], pairs[j][1]), float(z[j])) for j in near[:_FITTED]]
+    near = [j for j in np.argsort(-np.abs(z)).tolist() if abs(z[j]) > _NEAR * largest][:_FITTED]
+    where = {pairs[j][1]: float(z[j]) for j in reversed(near)}
+    with_grid = [
+        (place, words) for place, (n, words, _) in enumerate(pairs) if n.grid and n.sigma and words in where
+    ]
+    found = {j: float(z[j]) for j in near} | {j: where[words] for j, words in with_grid}
+    return [Move(Shift(pairs[j][0], pairs[j][2], pairs[j][1]), score) for j, score in found.items()]

@@ -27,7 +27,7 @@ import numpy as np
 from tqdm import tqdm
 
 from calibration.statistics.budget import skipped
-from calibration.statistics.fit import Fit, UnsolvedError, fit, noise_at_most
+from calibration.statistics.fit import Fit, UnsolvedError, fit
 from calibration.statistics.gls import solved
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
 from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, start_values
@@ -170,7 +170,7 @@ def examine(
             size[effect.second.name] = float(misfit.second[j]) if local else effect.second.start
         start = {**(base.parameters if local else start_values(study.model)), **size}
         names = (*base.names, *size)
-        target = noise_at_most(study.values, len(names))
+        target = study.noise_at_most(len(names))
         try:
             refit = fit(study.model, start, names, study.split.fitted, target=target, title="")
         except UnsolvedError:
@@ -197,7 +197,7 @@ def _reason_not_to_refit(
     # A refit takes z² from the deviance if the model is linear. `_CURVED` allows for its curvature.
     remainder = base.deviance - z**2 / _CURVED
     best = float(np.max(np.where(misfit.scores.survived >= TESTABLE, misfit.scores.z**2, 0.0)))
-    if z**2 < _CURVED * best and remainder > noise_at_most(study.values, len(base.names)):
+    if z**2 < _CURVED * best and remainder > study.noise_at_most(len(base.names)):
         return "leaves far more than noise, by its score"
     return ""
 
@@ -208,7 +208,7 @@ def coefficients_within_range(model: ForwardModel, fitted: Parameters) -> bool:
 
 
 def pairs(study: Study, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Add second effects to the best fits with a single one, and return the pairs that are kept."""
+    """Add second effects to the best fits with a single one; a pair is kept if it is worth more than one effect."""
     refitted = sorted((c for c in candidates if c.refit), key=penalised_deviance)
     again = replace(study, seed=study.seed + 2)
     title = "second effects" if study.progress else ""
@@ -222,11 +222,14 @@ def pairs(study: Study, candidates: Sequence[Candidate]) -> list[Candidate]:
         misfit = examine_residual(again, first.refit, tangents)
         second += examine(again, first.refit, misfit, tangents, beside=(first.effect,))
     single = lowest_ebic(study, candidates)
-    kept: dict[frozenset[str], Candidate] = {}
+    judged: dict[frozenset[str], Candidate] = {}
     for pair in second:
-        if pair.kept and pair.refit is not None and ebic(study, pair.refit, 2) < single:
-            kept.setdefault(frozenset(e.name for e in pair.claimed), pair)
-    return list(kept.values())
+        if pair.kept and pair.refit is not None and ebic(study, pair.refit, 2) >= single:
+            pair = replace(pair, verdict="costs more than it gains beside a single effect")
+        known = judged.setdefault(frozenset(e.name for e in pair.claimed), pair)
+        if pair.kept and not known.kept:
+            judged[frozenset(e.name for e in pair.claimed)] = pair
+    return list(judged.values())
 
 
 def lowest_ebic(study: Study, candidates: Sequence[Candidate]) -> float:

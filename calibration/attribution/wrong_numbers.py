@@ -28,7 +28,7 @@ from scipy.stats import norm as normal
 
 from calibration.attribution.refits import INDISTINGUISHABLE, Candidate, ebic, judge, lowest_ebic
 from calibration.statistics.budget import skipped
-from calibration.statistics.fit import Fit, Pull, UnsolvedError, fit, noise_at_most
+from calibration.statistics.fit import Fit, Pull, UnsolvedError, fit
 from calibration.statistics.residual_tests import Directions
 from calibration.statistics.statistical_model import Parameter, change
 from calibration.statistics.study import Study
@@ -42,11 +42,12 @@ _TRIED = 3  # effects that are fitted once more beside wrong numbers
 def pulls(fitted: Fit, nuisances: Sequence[Parameter]) -> tuple[Pull, ...]:
     """Compute the pull of every nuisance parameter, the farthest first.
 
-    A parameter whose prior was taken away has its value from the runs.
+    A parameter whose prior was taken away has its value from the runs. One with a grid has no pull: the runs show its
+    differences only, as a turn of all courses is another direction of the current.
     """
     computed = []
     for nuisance in nuisances:
-        if nuisance.sigma is None or nuisance.name not in fitted.names:
+        if nuisance.sigma is None or nuisance.grid or nuisance.name not in fitted.names:
             continue
         place = fitted.names.index(nuisance.name)
         variance = fitted.covariance[place, place] / fitted.inflation
@@ -128,7 +129,7 @@ def beside_wrong_numbers(
         assert candidate.refit is not None
         if skipped(f"{candidate.title} beside a wrong number"):
             continue
-        target = noise_at_most(study.values, len(candidate.refit.names))
+        target = study.noise_at_most(len(candidate.refit.names))
         try:
             refit = without_wrong_priors(study, candidate.refit, target=target)
         except UnsolvedError:

@@ -35,7 +35,7 @@ from calibration.laws.readings import (
     parameter_of,
 )
 from calibration.laws.search import Ranked
-from calibration.statistics.fit import Fit, fit, noise_at_most
+from calibration.statistics.fit import Fit, fit
 from calibration.statistics.held_out import error_interval, errors
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.study import Study
@@ -258,7 +258,7 @@ def _best_fit(
     """
     kept = {SIZE: linear[SIZE] / 2, LEVER: linear[LEVER]}
     flat = {name: kept.get(name, 0.0) for name in names}
-    target = noise_at_most(study.values, len(base.names) + len(names))
+    target = study.noise_at_most(len(base.names) + len(names))
     best: Fit | None = None
     for start in (
         {**base.parameters, **{name: linear[name] for name in names}},

@@ -57,7 +57,6 @@ _DAMPING = (0.0, *(10.0**e for e in range(-3, 9)))  # λ
 _NEARER = 5  # starts that are tried
 _KEPT = 0.25  # share of the promised fall below which the next step is damped
 _UNSETTLED = 1.0  # a fit has not converged if one more step is expected to reduce rᵀ Σ⁻¹ r by more
-_FAR = 6.0  # standard deviations of χ²
 _FLAT = 0.05  # share of the expected rise; if the rise is smaller, the deviance is flat and the end stays
 _STEEP = 5.0  # if it is larger, the others were not refitted along a bent valley, and the end stays
 
@@ -103,8 +102,12 @@ class Pull:
         if size < _NOTHING:
             return "what was given"
         unit, side = "%" if given.logarithmic else given.unit, "below" if change < 0 else "above"
-        digits = f"{size:.2g}" if size < 99.5 else f"{size:.0f}"
-        return f"{digits} {unit} {side} what was given"
+        return f"{two_digits(size)} {unit} {side} what was given"
+
+
+def two_digits(size: float) -> str:
+    """Write a positive number with two significant digits, a large one without an exponent."""
+    return f"{size:.2g}" if size < 99.5 else f"{size:.0f}"
 
 
 class UnsolvedError(Exception):
@@ -310,17 +313,6 @@ def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
             if least >= len(_DAMPING):
                 break
     return point
-
-
-def noise_at_most(values: int, parameters: int) -> float:
-    """Compute a deviance that noise alone hardly exceeds: `_FAR` standard deviations of χ² beyond its mean.
-
-    Args:
-        values: that are fitted.
-        parameters: fitted to them.
-    """
-    freedom = values - parameters
-    return freedom + _FAR * math.sqrt(2 * freedom)
 
 
 def birge(runs: Runs, fitted: Fit, used: Flags) -> float:

@@ -25,6 +25,7 @@ Parameters = Mapping[str, Any]  # name -> Value
 _LOG_STEP, _STEP = 0.01, 0.02  # finite-difference steps: in ln C, in units of a typical size
 _LARGEST = 100.0  # change of ln C, so that C stays a number
 _DIFFER = 0.001  # p-value below which repeats differ with sessions or notes
+FEWEST_REPEATS = 8  # runs, for a covariance from repeats alone
 _CUBIC = 0.2  # share of a cube that lower powers must leave
 
 
@@ -40,10 +41,14 @@ class Parameter:
     logarithmic: bool = False  # fitted as its logarithm
     unit: str = "1"  # in which it is shown
     sigma: float | None = None  # of a nuisance parameter's prior, on its own scale; None: free
-    plausible: tuple[float, float] | None = None  # sizes of an effect that its source allows; None: all
+    plausible: tuple[float, float] | None = None  # sizes of an effect that its source allows; None: all. Of a
+    # number: by how much it may differ in some runs
     shown: float = 1.0  # factor to that unit
     second: Parameter | None = None  # of an effect: its second number, which shows only with the effect
-    grid: tuple[float, ...] = ()  # of a second number: values at which the effect is looked for
+    grid: tuple[
+        float, ...
+    ] = ()  # of a second number: values at which the effect is looked for. Of a number: changes
+    # from which one is fitted that differs in some runs
 
     @property
     def words(self) -> str:
@@ -82,15 +87,17 @@ class Runs:
 
         A design (n', m) is taken where repeats differ otherwise, too: levels of condition and session, and what
         was noted (`noted_of_repeats`). Repeats in several sessions differ by what changed between these, which is
-        no noise of a run.
+        no noise of a run. Where fewer than `FEWEST_REPEATS` runs are repeated, mirror runs serve as repeats, but for
+        what is odd and linear in the inputs; without them all that is smooth in the inputs is no noise.
         """
         condition, session, noted = self.condition[rows], self.session[rows], self.noted_of_repeats[rows]
+        if (count := repeat_count(condition)) < FEWEST_REPEATS:
+            designs = self._mirror_design(rows), np.column_stack([_levels(session), features(self, rows)[1][rows]])
+            return next((d for d in designs if repeat_count(d) >= max(FEWEST_REPEATS, count)), condition)
         crossed = len(np.unique(np.stack([condition, session]), axis=1).T) > len(np.unique(condition))
         if not crossed and not noted.size:
             return condition
-        levels = [
-            (f[:, None] == np.unique(f)).astype(float) for f in ((condition, session) if crossed else (condition,))
-        ]
+        levels = [_levels(f) for f in ((condition, session) if crossed else (condition,))]
         plain: Integers | Floats = condition
         design = np.column_stack([*levels, noted])
         each = [np.where(level[:, None], noted, 0.0) for level in levels[-1].T.astype(bool)] if crossed else []
@@ -98,6 +105,17 @@ class Runs:
             if _differ_more(self.y[rows], plain, further):
                 plain = further
         return plain
+
+    def _mirror_design(self, rows: Flags | slice) -> Floats:
+        """Make levels of mirrored conditions and sessions, and what is odd: the direction, alone and times inputs."""
+        mirrored, direction = self.mirrored
+        odd = direction[rows, None] * np.column_stack([np.ones(len(self)), self.inputs])[rows]
+        return np.column_stack([_levels(mirrored[rows]), _levels(self.session[rows]), odd])
+
+    @property
+    def mirrored(self) -> tuple[Integers, Floats]:
+        """Number the conditions (n,), mirror images alike, and return the direction ±1 of each run, (n,)."""
+        return self.condition, np.zeros(len(self))
 
     @property
     def noted_of_repeats(self) -> Floats:
@@ -259,6 +277,11 @@ def regression(
     return Gls(columns[rows], precisions(fitted), runs.session[rows], runs.scale[rows], repeated)
 
 
+def _levels(factor: Integers) -> Floats:
+    """Make one column of ones and zeros for each level of a factor (n,)."""
+    return (factor[:, None] == np.unique(factor)).astype(float)
+
+
 def _differ_more(y: Floats, condition: Integers | Floats, design: Floats) -> bool:
     """Tell by F-tests of the outputs (n, k) whether a design of repeats takes more from them than noise allows."""
     plain, further = repeat_count(condition), repeat_count(design)
@@ -270,7 +293,7 @@ def _differ_more(y: Floats, condition: Integers | Floats, design: Floats) -> boo
     return bool(fdtrc(plain - further, further, ratio).min() < _DIFFER / len(ratio))
 
 
-def features(runs: Runs, used: Flags) -> tuple[tuple[str, ...], Floats]:
+def features(runs: Runs, used: Flags | slice) -> tuple[tuple[str, ...], Floats]:
     """Name and compute the inputs that differ, their squares, products and cubes for all runs, (n, f).
 
     Standardised on the runs in `used` (n,).

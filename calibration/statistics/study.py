@@ -15,6 +15,7 @@ particular to a row.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -22,12 +23,14 @@ from typing import Any
 
 import numpy as np
 
+from calibration.statistics.gls import repeat_count
 from calibration.statistics.statistical_model import ForwardModel, Runs
 from sim.arrays import Flags, Floats, Integers
 
 LEVEL = 0.04  # α of every claim; below 0.05, because the noise is estimated and false claims must stay below 5 %
 DRAWS = 1000  # of the bootstrap
 FAR = 12.0  # robust standard deviations between repeats
+_BEYOND = 6.0  # standard deviations of a deviance
 _MAD = 1.4826  # median absolute deviation to standard deviation
 _FEWEST = 3  # sessions that are held out as a whole
 _BLOCKS = 4  # in all
@@ -67,6 +70,24 @@ class Study:
     def values(self) -> int:
         """Number of values that are fitted, over runs and outputs."""
         return int(self.split.fitted.sum()) * self.model.runs.y.shape[1]
+
+    def noise_at_most(self, parameters: int) -> float:
+        """Compute a deviance that noise alone hardly exceeds: `_BEYOND` standard deviations above its mean.
+
+        The ν repeats contribute ν k exactly, since S is made of them. The other f values have an S that is
+        independent of them, and 1/S is inverse Wishart (von Rosen 1988): their mean is f c, c = ν/(ν − k − 1), and
+
+            variance = 2 c ν (ν − 1)/((ν − k)(ν − k − 3)) (f + f²/(k (ν − k − 1))).
+
+        Args:
+            parameters: fitted to the values.
+        """
+        v, k = repeat_count(self.model.runs.repeats(self.split.fitted)), self.model.runs.y.shape[1]
+        if v <= k + 3:
+            return math.inf
+        f, c = max(self.values - v * k - parameters, 0), v / (v - k - 1)
+        variance = 2 * c * v * (v - 1) / ((v - k) * (v - k - 3)) * (f + f**2 / (k * (v - k - 1)))
+        return v * k + f * c + _BEYOND * math.sqrt(variance)
 
     @classmethod
     def fitted_to(cls, model: ForwardModel, used: Flags, **settings: Any) -> Study:

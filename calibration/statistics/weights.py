@@ -34,7 +34,7 @@ import numpy as np
 
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.gls import Noise, inverse_root
-from calibration.statistics.statistical_model import ForwardModel, Runs
+from calibration.statistics.statistical_model import FEWEST_REPEATS, ForwardModel, Runs
 from calibration.statistics.study import Study
 from sim.arrays import Floats, Integers
 
@@ -143,6 +143,8 @@ def estimate(residual: Floats, condition: Integers) -> ContaminatedNormal | None
     groups = _Groups.of(condition)
     rows = residual[groups.order]
     repeated = groups.sizes > 1
+    if len(rows) - len(groups.sizes) < FEWEST_REPEATS:
+        return None
     means = groups.add(rows) / groups.sizes[:, None]
     centred = (rows - means[groups.place])[repeated[groups.place]]
     scatter = _MAD * np.median(np.abs(centred), 0)

@@ -6,7 +6,8 @@ Needed: N, l_cm, omega_rpm (tails relative to head; docs/reference/signs.md has 
 
 Columns in other units (R_yr_mm, "theta [rad]") are converted, and `Measurements.converted` says which.
 
-Some conditions must be repeated, because the noise is estimated from repeats. `session` names the group of runs
+The noise is estimated from repeated conditions. Without repeats mirror runs serve (ω and −ω), or all that is not
+smooth in the inputs counts as noise, and a caveat says so. `session` names the group of runs
 that were made together. Without it, all runs of one N are one session. `robot` names the specimen, where the table
 has several. Some effects need elapsed_min,
 temperature_C, tank_diameter_cm or course_deg (direction of the path in the lab, where a run is a part of a
@@ -25,14 +26,14 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.gls import repeat_covariance
-from calibration.statistics.statistical_model import Runs
+from calibration.statistics.gls import repeat_count, repeat_covariance
+from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs
 from calibration.swimmer.copied_rows import find_copies
 from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, TACHOMETER
 from sim.arrays import Floats, Integers
@@ -82,7 +83,7 @@ KNOWN_COLUMNS = {
     *_SIGMAS,
 }
 _LARGEST = 1e9  # of a value
-_FEWEST_RUNS, _FEWEST_REPEATS = 24, 8
+_FEWEST_RUNS = 24
 _COPY = "a copy of an earlier row, equal in all inputs and outputs"
 _GAPS = 0.1  # share of the usable rows that may lack a note
 _OWN = 1e-3  # share of an output's scatter that must be independent of the other outputs
@@ -105,6 +106,12 @@ class Measurements(Runs):
         """Temperature and course."""
         kept = [i for i, name in enumerate(self.noted_names) if name in ("temperature_K", "course_x", "course_y")]
         return self.noted[:, kept]
+
+    @property
+    def mirrored(self) -> tuple[Integers, Floats]:
+        """Number the runs by N, length and speed, (n,), and return the direction of the motor, (n,)."""
+        settings = np.column_stack([self.tails, self.length, np.abs(self.omega)]).round(9)
+        return np.unique(settings, axis=0, return_inverse=True)[1].reshape(-1), np.sign(self.omega)
 
     @property
     def partners(self) -> Floats:
@@ -177,26 +184,18 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
     robot_names, robot = np.unique(robots, return_inverse=True)
     condition: Integers = np.asarray(good.groupby([*INPUTS, robot], sort=True).ngroup(), dtype=np.int64)
     session_names, session = np.unique(names.to_numpy(dtype=str), return_inverse=True)
-    repeats = len(good) - len(np.unique(condition))
-    if repeats < _FEWEST_REPEATS:
-        copied = sum(_COPY in reason for reason in reasons)
-        without = f", without {copied} copies of rows" if copied else ""
-        raise InputError(
-            f"{repeats} repeated runs{without}; to estimate the noise, give at least {_FEWEST_REPEATS}"
-        )
     columns = []
     for name in outputs:
         column, factor, _ = OUTPUTS[name]
         value = good[column].to_numpy(dtype=float) * factor
         columns.append(value if name == "theta" else np.log(np.abs(value)))
-    y, outputs, follows = _independent(np.stack(columns, 1), outputs, condition)
     factors = (1, to_si(1.0, "cm"), to_si(1.0, "rpm"))
     tails, length, omega = (good[c].to_numpy(dtype=float) * f for c, f in zip(INPUTS, factors, strict=True))
     noted = _noted(good)
     inputs = [tails, np.log(length), np.log(np.abs(omega)), np.sign(omega), *noted.values()]
-    return Measurements(
+    data = Measurements(
         outputs=outputs,
-        y=y,
+        y=np.stack(columns, 1),
         condition=condition,
         session=session,
         session_names=tuple(str(n) for n in session_names),
@@ -205,7 +204,6 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         rows=np.flatnonzero(keep) + 1,
         excluded=(
             *aside,
-            *follows,
             *(f"column {name}: without any value, left out" for name in empty),
             *(
                 f"column {name}: without a value in more than {100 * _GAPS:.0f} % of the rows, left out"
@@ -224,6 +222,7 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         noted_names=tuple(noted),
         converted=converted,
     )
+    return _independent(data, sum(_COPY in reason for reason in reasons))
 
 
 def _is_empty(column: pd.Series) -> bool:
@@ -254,15 +253,28 @@ def _mark_copies(reasons: list[str], numbers: pd.DataFrame, outputs: tuple[str, 
         reasons[usable[place]] = f"{_COPY} (row {usable[earlier] + 1})"
 
 
-def _independent(
-    y: Floats, outputs: tuple[str, ...], condition: Integers
-) -> tuple[Floats, tuple[str, ...], tuple[str, ...]]:
+def _independent(data: Measurements, copies: int) -> Measurements:
     """Choose outputs that were measured: repeats differ, and not just as other outputs do.
 
+    Args:
+        copies: rows that were left out because they are copies.
+
     Raises:
-        InputError: an output is the same in all repeats.
+        InputError: there are too few repeats, or an output is the same in all of them.
     """
-    run = repeat_covariance(y, condition)
+    y, outputs, repeats = data.y, data.outputs, repeat_count(data.condition)
+    repeated = data.condition if repeats >= FEWEST_REPEATS else data.repeats()
+    if (count := repeat_count(repeated)) < FEWEST_REPEATS:
+        without = f", without {copies} copies of rows" if copies else ""
+        raise InputError(
+            f"{repeats} repeated runs{without}, too few to estimate the noise; give at least {FEWEST_REPEATS}, or "
+            "runs with both directions of the motor"
+        )
+    caveats = data.caveats
+    if repeats < FEWEST_REPEATS:
+        caveats += (f"{repeats} repeated runs: the noise is estimated from {count} values that a smooth dependence on "
+                    "the inputs, alike for both directions of the motor, leaves",)  # fmt: skip
+    run = repeat_covariance(y, repeated)
     kept: list[int] = []
     follows = []
     for i, name in enumerate(outputs):
@@ -278,7 +290,9 @@ def _independent(
             follows.append(f"column {column}: follows from {others}, so it is not counted twice")
         else:
             kept.append(i)
-    return y[:, kept], tuple(outputs[i] for i in kept), tuple(follows)
+    return replace(
+        data, y=y[:, kept], outputs=tuple(outputs[i] for i in kept), excluded=(*data.excluded, *follows), caveats=caveats
+    )
 
 
 def _sigmas(good: pd.DataFrame) -> dict[str, float]:

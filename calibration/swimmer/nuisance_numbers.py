@@ -1,8 +1,8 @@
 """The swimmer's nuisance parameters: which they are, how well they are known, and what depends on them.
 
-Those of the robot come from robot.toml. Three belong to the way of measuring and come from the table: the camera's
-scale, the zero of the heading and the tachometer. Each is a parameter with a prior
-(`calibration.statistics.statistical_model`).
+Those of the robot come from robot.toml. Four belong to the way of measuring and come from the table: the camera's
+scale, the zeros of the heading and of the course, and the tachometer. Each is a parameter with a prior
+(`calibration.statistics.statistical_model`). The zero of the course shows only where a current is at work.
 
 A motion depends on the robot through its groups, and on the unit of time μ0 l⁴/EI. Both are products of powers of
 the numbers, so the derivative along a number is a sum over groups with these powers.
@@ -18,8 +18,9 @@ from sim.io.units import UNITS, from_si
 from sim.model.robot import Robot
 
 CAMERA, HEADING, TACHOMETER = "camera_scale", "heading_zero", "tachometer"
+COURSE = "course_zero"
 LENGTH = "tail_length_offset"
-TABLE_DEFAULTS = {CAMERA: 0.01, HEADING: math.radians(1.0), TACHOMETER: 0.005}
+TABLE_DEFAULTS = {CAMERA: 0.01, HEADING: math.radians(1.0), TACHOMETER: 0.005, COURSE: math.radians(2.0)}
 
 # Powers of the groups, and of "time", "length" (l) and "ahead" (L/l), in each number. The offset of the tail
 # length changes ln l by 1/l for each metre.
@@ -34,6 +35,7 @@ POWERS: dict[str, dict[str, float]] = {
     TACHOMETER: {"omega_bar": 1},
     CAMERA: {},
     HEADING: {},
+    COURSE: {},
 }
 GROUPS = ("omega_bar", "l_over_r0", "l_over_R", "L_over_R", "a_over_R", "C_t", "C_r", "C_yr")
 _TITLES = {
@@ -57,13 +59,16 @@ def robot_number(robot: Robot, name: str) -> float:
     return float(robot.head_radius if value is None else value)
 
 
-def nuisance_parameters(robot: Robot, table: Mapping[str, float], outputs: Sequence[str]) -> tuple[Parameter, ...]:
+def nuisance_parameters(
+    robot: Robot, table: Mapping[str, float], outputs: Sequence[str], noted: Sequence[str]
+) -> tuple[Parameter, ...]:
     """List every number that is not exact.
 
     Args:
         robot: with its standard deviations.
         table: σ of CAMERA, HEADING [rad] and TACHOMETER.
         outputs: of the table; what no output shows is left out.
+        noted: names of what was noted of the runs.
     """
     parameters = []
     for name, title in _TITLES.items():
@@ -99,5 +104,12 @@ def nuisance_parameters(robot: Robot, table: Mapping[str, float], outputs: Seque
                 shown=180 / math.pi,
             )
         )
+    if "course_x" in noted and {"R_yr", "v"} & set(outputs):
+        parameters.append(
+            Parameter(
+                COURSE, "zero of the course", 0.0, (-4.0, 4.0), 0.1, False, "°", sigmas[COURSE],
+                (-math.pi, math.pi), 180 / math.pi, grid=(-math.pi / 2, math.pi / 2),
+            )
+        )  # fmt: skip
     parameters.append(Parameter(TACHOMETER, "ω (tachometer)", 1.0, (0.5, 2.0), 1.0, True, "1", sigmas[TACHOMETER]))
     return tuple(p for p in parameters if p.sigma)

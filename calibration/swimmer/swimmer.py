@@ -31,6 +31,7 @@ from calibration.swimmer.candidate_effects import (
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.nuisance_numbers import (
     CAMERA,
+    COURSE,
     GROUPS,
     HEADING,
     LENGTH,
@@ -102,7 +103,7 @@ class SwimmerModel:
 
     @cached_property
     def nuisances(self) -> tuple[Parameter, ...]:
-        return nuisance_parameters(self.robot, self.runs.sigmas, self.runs.outputs)
+        return nuisance_parameters(self.robot, self.runs.sigmas, self.runs.outputs, self.runs.noted_names)
 
     @cached_property
     def effects(self) -> tuple[Parameter, ...]:
@@ -142,11 +143,12 @@ class SwimmerModel:
         """
         parts = [self._conditions(parameters) for parameters in sets]
         runs = [run for conditions, _ in parts for run in conditions]
-        columns = self._columns(runs, sets)
+        columns, same = _distinct(self._columns(runs, sets))
         if lookup is not None:
-            motion: Mapping[str, Floats] = lookup.query(columns)
+            found: Mapping[str, Floats] = lookup.query(columns)
         else:
-            motion = self.solver.steady(columns, jobs=self.jobs, title=title)
+            found = self.solver.steady(columns, jobs=self.jobs, title=title)
+        motion = {name: column[same] for name, column in found.items()}
         table = self._observation(runs).see(motion)
         if not np.isfinite(table).all():
             raise InputError("the simulation of a run broke down; check the robot and the run's motor speed")
@@ -175,11 +177,20 @@ class SwimmerModel:
         # Non-local effects at their null may need more phases than the motion; with effects at work it has them.
         at_null = any(catalogue()[name].reach == "nonlocal" for name in wanted if name in catalogue())
         phases = MANY if at_null and self._is_at_null(parameters) else FEW
-        sensitivities = self.solver.slopes(columns, wanted, phases=phases, jobs=self.jobs, title=title)
+        distinct, same = _distinct(columns)
+        found = self.solver.slopes(distinct, wanted, phases=phases, jobs=self.jobs, title=title)
+        values, slopes = (
+            {name: table[same] for name, table in of.items()} for of in (found.values, found.derivatives)
+        )
+        sensitivities = replace(found, values=values, derivatives=slopes)
         view = self._observation(runs)
         J = np.empty((*self.runs.y.shape, len(names)))
         for j, (name, influence) in enumerate(influences.items()):
             powers = _powers(name, influence)
+            if name == COURSE:
+                slope = view.slopes(sensitivities.values, {}, current=1.0)
+                J[..., j] = slope[place] * self._across(parameters)[:, None]
+                continue
             if powers is not None:
                 by = np.array([1 / run.robot.tail_length if name == LENGTH else 1.0 for run in runs])
                 camera = float(name == CAMERA)
@@ -194,7 +205,8 @@ class SwimmerModel:
             slope = view.slopes(
                 sensitivities.values, motion, point=float(name == TRACKED_POINT), current=float(name in CURRENT)
             )
-            scale = self._drivers[influence.needs] if influence and influence.needs else np.ones(len(place))
+            needs = influence.needs if influence else None
+            scale = self._driver(needs, parameters) if needs else np.ones(len(place))
             if name == SLIP:
                 scale = scale * -columns["omega_bar"][place] / (1 - parameters[SLIP])
             J[..., j] = slope[place] * (scale if influence else parameters[name] * scale)[:, None]
@@ -318,6 +330,19 @@ class SwimmerModel:
             drivers["head_over_tank"] = 2 * self.robot.head_radius / drivers["tank_diameter"]
         return drivers
 
+    def _driver(self, name: str, parameters: Parameters) -> Floats:
+        """Return what drives an influence, (n,), with the zero of the course where it is at `parameters`."""
+        if name not in ("course_x", "course_y"):
+            return self._drivers[name]
+        x, y, zero = self._drivers["course_x"], self._drivers["course_y"], parameters.get(COURSE, 0.0)
+        turned = x * np.cos(zero) + y * np.sin(zero), y * np.cos(zero) - x * np.sin(zero)
+        return np.asarray(turned[0] if name == "course_x" else turned[1])
+
+    def _across(self, parameters: Parameters) -> Floats:
+        """Compute the derivative of the current along each path by the zero of the course, (n,)."""
+        x, y = (parameters.get(name, 0.0) for name in CURRENT)
+        return np.asarray(x * self._driver("course_y", parameters) - y * self._driver("course_x", parameters))
+
     def _conditions(self, parameters: Parameters, *, signed: bool = False) -> tuple[list[_Run], Integers]:
         """List runs to simulate at `parameters`, without duplicates, and the place of each run among them.
 
@@ -335,7 +360,7 @@ class SwimmerModel:
     def _noted_at_work(self, parameters: Parameters) -> list[Floats]:
         """List what was noted of every run (n,) and matters at `parameters`."""
         needs = (influence.needs for influence in self._at_work(parameters))
-        return [self._drivers[need] for need in dict.fromkeys(needs) if need]
+        return [self._driver(need, parameters) for need in dict.fromkeys(needs) if need]
 
     def _is_at_null(self, parameters: Parameters) -> bool:
         """Tell whether no effect is at work."""
@@ -348,7 +373,7 @@ class SwimmerModel:
             by = parameters[influence.parameter.name] - influence.parameter.start
             before = influence.parameter.start
             if influence.needs is not None:
-                by *= float(self._drivers[influence.needs][row])
+                by *= float(self._driver(influence.needs, parameters)[row])
                 before = self.robot.effects.get(influence.effect or "", before)
             if influence.effect is not None:
                 effects[influence.effect] = before + by
@@ -391,6 +416,13 @@ class SwimmerModel:
             current=np.array([run.current for run in runs]),
             camera=np.array([run.camera for run in runs]),
         )
+
+
+def _distinct(columns: dict[str, Floats]) -> tuple[dict[str, Floats], Integers]:
+    """Leave out rows of columns (m,) that are equal to others, and return the place of each among the rest."""
+    table = np.stack(list(columns.values()), 1)
+    _, first, place = np.unique(table, axis=0, return_index=True, return_inverse=True)
+    return {name: column[first] for name, column in columns.items()}, place.reshape(-1)
 
 
 def _powers(name: str, influence: Influence | None) -> Mapping[str, float] | None:

@@ -39,6 +39,7 @@ from calibration.attribution.refits import (
     INDISTINGUISHABLE,
     Candidate,
     coefficients_within_range,
+    ebic,
     examine,
     explaining,
     pairs,
@@ -230,6 +231,7 @@ class Explained:
     rival_numbers: tuple[Pull, ...] = ()  # the wrong numbers, where effects come ahead of them
     number_check: NumberCheck | None = None  # of the wrong number, where it comes ahead of effects
     nearest: Nearest | None = None  # the form that is adopted where nothing explains the residual
+    unkept: Fit | None = None  # the best fit with effects, where none explains the residual
 
     @property
     def final(self) -> Fit:
@@ -260,7 +262,8 @@ def _explain_with_moves(
 ) -> tuple[Study, Explained, tuple[Move, ...]]:
     """Explain the residual, with numbers that differ in some runs, unless effects do without them as well.
 
-    Such numbers are looked for before the effects, and again beside those that are named.
+    Such numbers are looked for before the effects, and again beside those that are named, or, where nothing
+    explains the residual, beside those that come nearest.
     """
     moved, with_moves, moves = find_moves(study, base)
     beside_moves = explain(moved, with_moves, seconds_of_fit) if moves else None
@@ -269,13 +272,16 @@ def _explain_with_moves(
         if explained.best and explained.final.deviance < with_moves.deviance + INDISTINGUISHABLE:
             return study, explained, ()
         return moved, beside_moves, moves
-    if explained.best:
-        moved, _, moves = find_moves(study, explained.final)
+    named = explained.final if explained.best else explained.unkept
+    if named:
+        moved, beside, moves = find_moves(study, named)
         if moves:
-            none = {move.name: 0.0 for move in moves}
-            start, names = {**base.parameters, **none}, (*base.names, *none)
+            changes = {move.name: beside.parameters[move.name] for move in moves}
+            start, names = {**base.parameters, **changes}, (*base.names, *changes)
             with_moves = fit(moved.model, start, names, study.split.fitted, title="")
-            return moved, explain(moved, with_moves, seconds_of_fit), moves
+            beside_moves = explain(moved, with_moves, seconds_of_fit)
+            if explained.best or beside_moves.best:
+                return moved, beside_moves, moves
     return study, explained, ()
 
 
@@ -340,12 +346,17 @@ def explain(study: Study, base: Fit, seconds_of_fit: float) -> Explained:
         return Explained(
             base, misfit, tangents, tuple(candidates), (), freed, rival_effects, number_check=checked_number
         )
-    best = (
-        best
-        or explaining(beside_wrong_numbers(study, base, candidates, tangents))
-        or explaining(pairs(study, candidates))
+    best = best or explaining(beside_wrong_numbers(study, base, candidates, tangents))
+    second = [] if best else pairs(study, candidates)
+    best = best or explaining(second)
+    unkept = (
+        ()
+        if best
+        else ((ebic(study, c.refit, len(c.claimed)), c.refit) for c in (*candidates, *second) if c.refit)
     )
-    return Explained(base, misfit, tangents, tuple(candidates), tuple(with_checks(study, best, base)))
+    _, nearest = min(unkept, key=lambda each: each[0], default=(math.inf, None))
+    checked = tuple(with_checks(study, best, base))
+    return Explained(base, misfit, tangents, tuple(candidates), checked, unkept=nearest)
 
 
 def _forecast(misfit: Misfit, threshold: float, seconds_of_fit: float, seconds_of_directions: float) -> str:

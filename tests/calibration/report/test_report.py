@@ -74,7 +74,7 @@ def test_numbers_are_written_without_exponents_and_changes_in_words() -> None:
     assert with_error(0.63, 0.26, "°", signed=True) == "+0.63 ± 0.26°"
     worst = direction_in_words({"C_t": 0.6, "C_r": -0.8, "C_yr": 0.01}, 0.1)
     assert worst == "C_t 6.2 % larger and C_r 7.7 % smaller"
-    stiffness = nuisance_parameters(START, {}, ("omega_yr",))[0]
+    stiffness = nuisance_parameters(START, {}, ("omega_yr",), ())[0]
     for change, words in (
         (8.7e-12, "E (Young's modulus) is what was given (0.0 σ)"),
         (math.log(0.6), "E (Young's modulus) is 40 % below what was given (5.1 σ)"),

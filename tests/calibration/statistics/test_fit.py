@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from calibration.statistics.fit import Fit, fit, noise_at_most
+from calibration.statistics.fit import Fit, fit
+from calibration.statistics.gls import repeat_covariance
 from calibration.statistics.held_out import error_interval, errors
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import Parameter, Parameters, Runs, start_values
@@ -227,8 +228,8 @@ def valley_fit(model: Valley, target: float = np.inf) -> Fit:
 
 
 def test_the_search_of_a_fit_ends_where_it_cannot_reach_the_noise_and_nowhere_else() -> None:
-    target = noise_at_most(2 * FEW, 2)
     free, ended = Valley(5.0), Valley(5.0)
+    target = Study.fitted_to(free, np.ones(FEW, bool)).noise_at_most(2)  # type: ignore[arg-type]
     best, given_up = valley_fit(free), valley_fit(ended, target)
     assert len(ended.calls) < len(free.calls)
     assert given_up.deviance == pytest.approx(best.deviance, rel=0.05)
@@ -237,3 +238,19 @@ def test_the_search_of_a_fit_ends_where_it_cannot_reach_the_noise_and_nowhere_el
     assert one.deviance < target
     assert other.parameters == one.parameters
     assert aimed.calls == free.calls
+
+
+def test_noise_alone_stays_below_the_deviance_that_ends_a_search_also_with_few_repeats() -> None:
+    """Of 24 conditions 12 are repeated, in five outputs: a bound without the error of S is exceeded."""
+    rng, condition = np.random.default_rng(0), np.r_[np.arange(24), np.arange(12)]
+    runs = replace(runs_of(np.zeros((36, 5)), session=np.zeros(36, int)), condition=condition, outputs=tuple("uvxyz"))
+    study = Study.fitted_to(Line(runs), np.ones(36, bool))
+    most, deviances = study.noise_at_most(5), []
+    for _ in range(2000):
+        y = rng.normal(size=(36, 5))
+        left = y - y.mean(0)
+        deviances.append((left @ np.linalg.inv(repeat_covariance(y, condition)) * left).sum())
+    values = study.values - 5
+    assert np.mean(np.array(deviances) > values + 6 * np.sqrt(2 * values)) > 0.2
+    assert np.mean(np.array(deviances) > most) < 0.01
+    assert most < 4 * np.mean(deviances)

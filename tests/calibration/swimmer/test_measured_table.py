@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.swimmer.copied_rows import find_copies
 from calibration.swimmer.measured_table import read_measurements
 from sim.io.errors import InputError
@@ -120,9 +121,21 @@ def test_copied_rows_are_no_repeats() -> None:
         "40 of 136 rows (rows 97, 98, 99 and 37 more): a copy"
     )
     assert result.conditions.rows == 136
-    single = table[table["trial"] == 1]
+    single = table[table["trial"] == 1].assign(session=range(48))
     with pytest.raises(InputError, match="0 repeated runs, without 48 copies of rows"):
         read_measurements(pd.concat([single, single]))
+
+
+def test_without_repeats_mirror_runs_give_the_noise() -> None:
+    """Noise 2.5 %, in a smooth odd effect; one direction alone needs many runs."""
+    table = toy_table(3, left_right_bias=0.2)
+    runs, single = (read_measurements(table[table["trial"] <= trial]) for trial in (2, 1))
+    noise = [np.sqrt(np.trace(repeat_covariance(r.y, r.repeats())) / 5) for r in (runs, single)]
+    assert repeat_count(single.repeats()) == 48 - 24 - 4
+    assert noise[1] == pytest.approx(noise[0], rel=0.3)
+    assert "0 repeated runs: the noise is estimated from 20 values" in single.caveats[-1]
+    result = calibrated(table[table["trial"] == 1], few=True)
+    assert result.verdict == "effect" and result.effects == ("left_right_bias",)
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def commanded(table: pd.DataFrame, folder: Path) -> int:
         (lambda t: t.drop(columns=["omega_yr_rad_s", "R_yr_cm", "theta_deg"]), "at least two outputs"),
         (lambda t: t.drop(columns=["omega_h_rpm", "omega_t_rpm", "R_yr_cm", "theta_deg"]), "at least two outputs"),
         (lambda t: t.head(10), "usable runs"),
-        (lambda t: t[t["trial"] == 1], "repeated runs|usable runs"),
+        (lambda t: t[t["trial"] == 1].assign(session=range(48)), "0 repeated runs, too few"),
         (lambda t: t.assign(omega_h_rpm=-t["omega_h_rpm"]), "wrong sign .*: the head turns against the motor"),
         (lambda t: t.assign(omega_yr_rad_s=-t["omega_yr_rad_s"]), "wrong sign .* to the left"),
         (lambda t: t.assign(omega_yr_rad_s=0.05 * np.sign(t["omega_rpm"])), "does not differ between repeats"),

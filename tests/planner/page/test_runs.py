@@ -117,7 +117,7 @@ def test_the_numbers_of_the_rules_are_pythons() -> None:
     assert "20 usable runs; a calibration needs at least 24" in refusal_of(read_measurements, NAME)
     text = (FOLDER / "runs.js").read_text()
     assert f"const FEWEST_RUNS = {measured_table._FEWEST_RUNS};" in text
-    assert f"const FEWEST_REPEATS = {measured_table._FEWEST_REPEATS};" in text
+    assert f"const FEWEST_REPEATS = {measured_table.FEWEST_REPEATS};" in text
 
 
 def with_copies(seed: int, digits: int) -> tuple[Floats, Floats]:
