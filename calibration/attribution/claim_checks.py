@@ -99,7 +99,7 @@ def absorbable_shares(study: Study, fitted: Fit, names: Sequence[str]) -> Floats
     factors = deformations(runs, used, _DRAWS, study.seed)
     signals = np.concatenate([fitted.jacobian[used, :, p] * factors.T[..., None] for p in claimed])  # (B, n, k)
     linear = regression(runs, used, fitted.jacobian[..., order], [fitted.fitted[i] for i in order])
-    normal = linear.products(signals, noise.run).at(np.full(len(signals), noise.share))
+    normal = linear.products(signals, noise.run).at(np.tile(noise.share, (len(signals), 1)))
     before = eliminated(normal, len(order) - len(claimed))
     after = eliminated(before, len(claimed))
     return np.asarray(1 - after[:, -1, -1] / np.maximum(before[:, -1, -1], 1e-300))

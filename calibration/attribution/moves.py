@@ -10,13 +10,13 @@ Else a shift is no different from an effect of N or l. A number that differs by 
 ∂f/∂x = ∂f/∂p in the runs of G, and 0 in the others. So every pair of number and group has a score
 (`calibration.statistics.residual_tests`), and costs no simulation. The largest is taken to be real if it is beyond
 what a bootstrap of all scores gives at a quarter of the level, beyond `CERTAIN` standard deviations of what the
-fit with it leaves (its Birge factor counts), and credible: at most `CREDIBLE` tolerances of the number, or any angle
-for the zero of the course. Of pairs that cannot be told apart the one comes first that is off by the fewest of its
-tolerances, a coefficient before a number; the others are named with it. With it in the fit, a second one is looked
-for.
+fit with it leaves (its Birge factor counts), and credible: at most `CREDIBLE` tolerances of the number, or any
+angle for the zero of the course. Of pairs that cannot be told apart the one comes first that is off by the fewest
+of its tolerances, a coefficient before a number; the others are named with it. With it in the fit, a second one is
+looked for.
 
-The zero of the course shows only with a current, and a score is its derivative at the same zero in all runs. So
-a number with a grid is fitted in each group where another number has a large score, from all values of the grid.
+The zero of the course shows only with a current, and a score is its derivative at the same zero in all runs. So a
+number with a grid is fitted in each group where another number has a large score, from all values of the grid.
 """
 
 from __future__ import annotations
@@ -152,7 +152,8 @@ def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[Move, ...]]:
             break
         least = min(fitted.deviance for _, _, fitted in fits)
         alike = [each for each in fits if each[2].deviance - least < INDISTINGUISHABLE]
-        (move, study, base), *others = sorted(alike, key=lambda each: _tolerances(each[0], each[2]))
+        alike.sort(key=lambda each: (_tolerances(each[0], each[2]), each[2].deviance))
+        (move, study, base), *others = alike
         instead = dict.fromkeys(m.shift.parameter.title for m, _, _ in others if m.name != move.name)
         moves = (*moves, replace(move, instead=tuple(instead)))
     return study, base, moves
@@ -173,8 +174,9 @@ def _credible(number: Parameter, change: float) -> bool:
 
 
 def _tolerances(move: Move, fitted: Fit) -> float:
-    """Return how many of its tolerances a number is off; none for a coefficient."""
-    return abs(fitted.parameters[move.name]) / (move.shift.of.sigma or math.inf)
+    """Return how many of its tolerances a number is off; none for a coefficient, and for a zero of any size."""
+    number = move.shift.of
+    return abs(fitted.parameters[move.name]) / (math.inf if number.plausible else number.sigma or math.inf)
 
 
 def _clearest(

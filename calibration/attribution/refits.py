@@ -208,7 +208,7 @@ def coefficients_within_range(model: ForwardModel, fitted: Parameters) -> bool:
 
 
 def pairs(study: Study, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Add second effects to the best fits with a single one; a pair is kept if it is worth more than one effect."""
+    """Add second effects to the best fits with a single one; of those kept each is worth more than one effect."""
     refitted = sorted((c for c in candidates if c.refit), key=penalised_deviance)
     again = replace(study, seed=study.seed + 2)
     title = "second effects" if study.progress else ""

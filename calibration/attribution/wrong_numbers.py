@@ -42,8 +42,8 @@ _TRIED = 3  # effects that are fitted once more beside wrong numbers
 def pulls(fitted: Fit, nuisances: Sequence[Parameter]) -> tuple[Pull, ...]:
     """Compute the pull of every nuisance parameter, the farthest first.
 
-    A parameter whose prior was taken away has its value from the runs. One with a grid has no pull: the runs show its
-    differences only, as a turn of all courses is another direction of the current.
+    A parameter whose prior was taken away has its value from the runs. One with a grid has no pull: the runs show
+    its differences only, as a turn of all courses is another direction of the current.
     """
     computed = []
     for nuisance in nuisances:

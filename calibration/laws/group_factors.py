@@ -158,7 +158,7 @@ def with_shifts(model: LawModel, fitted: Fit, used: Flags, symbol: str) -> Fit:
         freedom=np.r_[fitted.freedom, np.full(count, np.inf)],
         prediction=fitted.prediction + jacobian @ step,
         jacobian=jacobian,
-        noise=replace(fitted.noise, share=float(refit.share)),
+        noise=replace(fitted.noise, share=refit.share),
     )
 
 
@@ -245,7 +245,7 @@ def _estimated(linear: _LinearModel, rng: np.random.Generator, draws: int) -> Gr
     observed = float(linear.gain(linear.as_given[None])[0])
     null = np.empty(0)
     for first in range(0, draws, _AT_ONCE):
-        share = np.full(min(_AT_ONCE, draws - first), linear.fitted.noise.share)
+        share = np.tile(linear.fitted.noise.share, (min(_AT_ONCE, draws - first), 1))
         drawn = linear.tested.draw(rng, linear.fitted.noise.run, share)
         null = np.append(null, linear.gain(drawn))
     shifts, information = _shifts(linear)

@@ -276,7 +276,7 @@ class _Draws:
 
     def noise(self, share: Floats) -> Floats:
         """Draw tables without a law, (B, n, k), with ρ of each (B,)."""
-        return self._search.models.without.draw(self._rng, self._run, share)
+        return self._search.models.without.draw(self._rng, self._run, share[:, None])
 
     def with_laws(self, count: int) -> Floats:
         """Draw tables with the best law of a place, which is drawn by its probability, (B, n, k)."""

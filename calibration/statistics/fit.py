@@ -10,7 +10,10 @@ factor because S is estimated (`_inflation`). Nuisance parameters have priors, w
 A, in the residual and in the deviance. Intervals are 95 %, by Student's t. The scatter ρ of a few sessions is
 uncertain, which limits the degrees of freedom (Satterthwaite 1946):
 
-    ν = 2 V² / (V′² Var ρ),   Var ρ ≈ 2 (ρ + 1/n)² / (k (s − 1)),   n runs in each of s sessions.
+    ν = 2 V² / Σ_a V′_a² Var ρ_a,   Var ρ_a ≈ 2 (ρ_a + 1/n)² / (s − 1),   n runs in each of s sessions.
+
+V′_a is half of the derivative by ρ_a and half of its mean over the outputs, since half of each ρ_a is estimated
+from all outputs (`calibration.statistics.gls`).
 
 The deviance along one parameter, with the others refitted, may differ from a parabola. So `profile_intervals` runs
 the model at both ends of the interval that the covariance gives. Each end moves to where the deviance, as a
@@ -189,7 +192,6 @@ def fit(
         point = _descend(problem, problem.first(dict(start)), target)
         stopped = spent()
     linear = point.products.solve(passes=_PASSES)
-    share = float(linear.share)
     normal = point.products.at(linear.share)
     inflation = _inflation(repeat_count(repeats), len(run))
     return Fit(
@@ -198,11 +200,11 @@ def fit(
         names=names,
         covariance=inflation * linear.covariance,
         inflation=inflation,
-        freedom=_freedom(point.products, share, len(names)),
+        freedom=_freedom(point.products, linear.share, len(names)),
         prediction=point.prediction,
         jacobian=point.derivative,
-        noise=Noise(run, share),
-        deviance=float(normal[-1, -1] + len(run) * np.log1p(share * point.products.sizes).sum()),
+        noise=Noise(run, linear.share),
+        deviance=float(normal[-1, -1] + point.products.determinant(linear.share)),
         converged=_step(fitted, point.parameters, normal, 0).promise < _UNSETTLED,
         wrong_numbers=wrong_numbers,
         stopped=stopped,
@@ -372,14 +374,17 @@ def _inflation(repeats: int, outputs: int) -> float:
     return repeats / (repeats - outputs - 1) * (1 + (outputs - 1) / (repeats - outputs))
 
 
-def _freedom(products: Products, share: float, count: int) -> Floats:
+def _freedom(products: Products, share: Floats, count: int) -> Floats:
     """Estimate the degrees of freedom of the parameters' variances, (p,)."""
-    step = 0.01 * share + 1e-3 / products.sizes.mean()
-    inverse = [np.linalg.pinv(products.at(s)[:count, :count], hermitian=True) for s in (share, share + step)]
-    V, near = (np.maximum(np.diag(i), 1e-100) for i in inverse)
-    sessions = len(products.sizes)
-    spread = 2 * (share + 1 / products.sizes.mean()) ** 2 / (products.outputs * max(sessions - 1, 1))
-    return np.asarray(np.clip(2 * V**2 / np.maximum(((near - V) / step) ** 2 * spread, 1e-12 * V**2), 1.0, 1e6))
+    least = 1 / products.sizes.mean()
+    steps = 0.01 * share + 1e-3 * least
+    shares = np.vstack([share, share + np.diag(steps)])
+    inverse = np.linalg.pinv(np.stack([products.at(s) for s in shares])[:, :count, :count], hermitian=True)
+    V, *near = np.maximum(np.diagonal(inverse, axis1=-2, axis2=-1), 1e-100)
+    slopes = (np.array(near) - V) / steps[:, None]
+    error = math.sqrt(2 / max(len(products.sizes) - 1, 1)) * (share + least)
+    variance = (((slopes + slopes.mean(0)) / 2 * error[:, None]) ** 2).sum(0)
+    return np.asarray(np.clip(2 * V**2 / np.maximum(variance, 1e-12 * V**2), 1.0, 1e6))
 
 
 def profile_intervals(

@@ -1,21 +1,26 @@
 """Generalised least squares with a scatter of the sessions and priors, for any batch of residuals.
 
 **Noise.** Runs under the same condition give the covariance S (k, k) of the outputs of one run. All outputs
-together are needed, because R_yr and θ are not independent of the spins and the yaw rate. A session may shift all
-its runs together, with a variance that is a share ρ of that of a run. Repeats within a session do not average this
-shift out. So the covariance of a session's n runs is
+together are needed, because R_yr and θ are not independent of the spins and the yaw rate. With V = diag S and the
+correlation C = V^−½ S V^−½ the axes A = V^½ C^½ make a run white, S = A Aᵀ, and are those nearest to the
+outputs, one for each (ZCA-cor; Kessy, Lewin, Strimmer 2018). A session may shift all its runs together, with a
+variance that is a share ρ_a of that of a run along axis a. Repeats within a session do not average this shift out.
+So the covariance of a session's n runs is
 
-    Σ = (I_n + ρ 1 1ᵀ) ⊗ S.
+    Σ = I_n ⊗ S + 1 1ᵀ ⊗ A diag(ρ) Aᵀ.
 
-There is one ρ for all outputs. With three sessions and five outputs it has about a dozen degrees of freedom; a ρ
-for each output would have two. ρ comes from the residuals of the fitted model, so a missing effect makes it
-larger. Therefore it is at most `SESSION_SHARE`: sessions are assumed to scatter no more than single runs do, and a
-larger shift of a whole session must be explained by the model. With a single session nothing is known about ρ.
-Then ρ is that limit, and a shift that is equal in all runs has almost no weight.
+A zero of an angle that is set each morning shifts one output, the temperature all. With three sessions the ρ of
+one output has two degrees of freedom, one of all of them about a dozen. So each is the mean of its own estimate
+and that of all outputs, as if as many sessions again had scattered as all outputs do (moderated variances, Smyth
+2004).
+ρ comes from the residuals of the fitted model, so a missing effect makes it larger. Therefore it is at most
+`SESSION_SHARE`: sessions are assumed to scatter no more than single runs do, and a larger shift of a whole session
+must be explained by the model. With a single session nothing is known about ρ. Then ρ is that limit, and a shift
+that is equal in all runs has almost no weight.
 
 **Weights.** A run of weight w has the covariance S/w (`calibration.statistics.weights`):
 
-    Σ = (W⁻¹ + ρ 1 1ᵀ) ⊗ S = W^−½ (I_n + ρ √w √wᵀ) W^−½ ⊗ S,   W = diag w.
+    Σ = W⁻¹ ⊗ S + 1 1ᵀ ⊗ A diag(ρ) Aᵀ,   W = diag w.
 
 So rows are multiplied by √w, and means over a session are taken along √w. Σ w takes the place of n.
 
@@ -43,7 +48,7 @@ class Noise:
     """S (k, k) of a run and ρ of a session."""
 
     run: Floats  # S: covariance (k, k) of a run
-    share: float  # ρ: variance of a session over that of a run
+    share: Floats | float  # ρ: variance of a session over that of a run, of each output (k,) or of all
 
     def whitener(self, session: Integers, scale: Floats | None = None) -> Callable[[Floats], Floats]:
         """Make Σ^−½, which flattens (n, k, ...) to (n k, ...), for runs of `session` (n,).
@@ -53,18 +58,21 @@ class Noise:
         """
         along = np.ones(len(session)) if scale is None else scale
         root, (picks, sizes) = inverse_root(self.run), averaging_rows(session, along)
-        less = (1 / np.sqrt(1 + sizes * self.share) - 1)[:, None] * picks
+        less = 1 / np.sqrt(1 + sizes[:, None] * np.broadcast_to(self.share, len(root))) - 1  # (s, k)
 
         def whiten(table: Floats) -> Floats:
-            white = np.einsum("n,ab,nb...->na...", along, root, table, optimize=True).reshape(len(table), -1)
-            return np.asarray((white + picks.T @ (less @ white)).reshape(-1, *table.shape[2:]))
+            white = np.einsum("n,ab,nb...->na...", along, root, table, optimize=True)
+            means = np.einsum("sa,sn,na...->sa...", less, picks, white, optimize=True)
+            return np.asarray((white + np.tensordot(picks.T, means, 1)).reshape(-1, *table.shape[2:]))
 
         return whiten
 
     def covariance(self, session: Integers) -> Floats:
         """Compute Σ of the runs of `session` (n,), (n k, n k)."""
+        axes = np.linalg.inv(inverse_root(self.run))
+        shifts = (axes * np.broadcast_to(self.share, len(axes))) @ axes.T
         together = session[:, None] == session
-        return np.asarray(np.kron(np.eye(len(session)) + self.share * together, self.run))
+        return np.asarray(np.kron(np.eye(len(session)), self.run) + np.kron(together, shifts))
 
 
 class Gls:
@@ -99,17 +107,16 @@ class Gls:
         self._flat = self.columns.reshape(n * k, m)
         self.means = self.average(self.columns)  # (s, k, m)
         whole = np.einsum("nim,njl->ijml", self.columns, self.columns, optimize=True)
-        between = np.einsum("sim,sjl->ijsml", self.means, self.means, optimize=True)
-        self._whole, self._between = whole.reshape(k * k, m * m), between.reshape(k * k, -1)
+        self._whole = whole.reshape(k * k, m * m)
 
     def average(self, table: Floats) -> Floats:
         """Average each session, times the root of its size, (s, ...), of (n, ...)."""
         return np.asarray(np.tensordot(self.picks, table, 1))
 
     def shrink(self, table: Floats, share: Floats) -> Floats:
-        """Whiten runs (B, n, c) in Σ that are white in S, with ρ (B,)."""
-        less = 1 / np.sqrt(1 + share[:, None] * self.sizes) - 1  # (B, s)
-        return np.asarray(table + self.picks.T @ (less[..., None] * (self.picks @ table)))
+        """Whiten runs (B, n, k) in Σ that are white in S, with ρ (B, k)."""
+        less = 1 / np.sqrt(1 + share[:, None, :] * self.sizes[:, None]) - 1  # (B, s, k)
+        return np.asarray(table + self.picks.T @ (less * (self.picks @ table)))
 
     def noise(self, residual: Floats) -> Floats:
         """Estimate S (..., k, k) of residuals (..., n, k)."""
@@ -126,45 +133,44 @@ class Gls:
         """
         root = inverse_root(self.noise(residual) if run is None else run)
         precision = np.swapaxes(root, -1, -2) @ root
-        (*batch, n, k), (s, _, m) = residual.shape, self.means.shape
+        (*batch, n, k), m = residual.shape, self.means.shape[-1]
         residual = residual * self.scale[:, None]
-        weighted = residual @ precision
-        means, weighted_means = self.picks @ residual, self.picks @ weighted  # (..., s, k)
-        flat = precision.reshape(*precision.shape[:-2], k * k)
-        total, between = np.empty((*batch, m + 1, m + 1)), np.empty((*batch, s, m + 1, m + 1))
+        weighted, white_means = residual @ precision, self.picks @ (residual @ np.swapaxes(root, -1, -2))
+        of_columns = np.einsum("...ak,skm->...sam", root, self.means, optimize=True)
+        of_columns = np.broadcast_to(of_columns, (*batch, *of_columns.shape[-3:]))
+        means = np.concatenate([of_columns, white_means[..., None]], -1)
+        flat, total = precision.reshape(*precision.shape[:-2], k * k), np.empty((*batch, m + 1, m + 1))
         total[..., :m, :m] = (flat @ self._whole).reshape(*flat.shape[:-1], m, m)
-        between[..., :m, :m] = (flat @ self._between).reshape(*flat.shape[:-1], s, m, m)
         total[..., m, :m] = total[..., :m, m] = weighted.reshape(*batch, n * k) @ self._flat
-        across = np.einsum("...sk,skm->...sm", weighted_means, self.means, optimize=True)
-        between[..., m, :m] = between[..., :m, m] = across
         total[..., m, m] = (weighted * residual).sum((-1, -2))
-        between[..., m, m] = (weighted_means * means).sum(-1)
         own = np.arange(len(self.precision))
         total[..., own, own] += self.precision
         if change is not None:
             total[..., own, m] -= self.precision * change
             total[..., m, own] -= self.precision * change
             total[..., m, m] += (self.precision * change**2).sum()
-        return Products(total - between.sum(-3), between, self.sizes, k)
+        means = means.reshape(*batch, -1, m + 1)
+        return Products(total - np.swapaxes(means, -1, -2) @ means, means, self.sizes, k)
 
     def draw(self, rng: np.random.Generator, run: Floats, share: Floats, spread: Floats | None = None) -> Floats:
         """Draw residuals (B, n, k) from the parameters as given: noise of runs and sessions, and the parameters.
 
         Args:
             run: S (k, k).
-            share: (B,) ρ of each table.
+            share: (B, k) ρ of each table.
             spread: (p, p) root of the covariance of the first p parameters; default: that of the priors.
         """
         count, (n, k, _), p = len(share), self.columns.shape, len(self.precision)
         noise = rng.normal(size=(count, n, k)) / self.scale[:, None]
         shifts = rng.normal(size=(count, len(self.sizes), k))[:, self.session]
-        noise += np.sqrt(share)[:, None, None] * shifts
+        noise += np.sqrt(share)[:, None, :] * shifts
         if spread is None:
             known = self.precision > 0
             spread = np.diag(np.where(known, 1 / np.sqrt(np.where(known, self.precision, 1.0)), 0.0))
         change = rng.normal(size=(count, p)) @ spread.T
         J = self.columns[..., :p] / self.scale[:, None, None]
-        return np.asarray(noise @ np.linalg.cholesky(run).T + np.einsum("nkp,bp->bnk", J, change, optimize=True))
+        axes = np.linalg.inv(inverse_root(run))
+        return np.asarray(noise @ axes.T + np.einsum("nkp,bp->bnk", J, change, optimize=True))
 
 
 @dataclass(frozen=True)
@@ -173,31 +179,38 @@ class Linear:
 
     step: Floats  # (..., p)
     covariance: Floats  # (..., p, p)
-    share: Floats  # (...) ρ
+    share: Floats  # (..., k) ρ
 
 
 @dataclass(frozen=True)
 class Products:
-    """Products of columns, within sessions and of the sessions' means, for any ρ; `...` stands for batches."""
+    """Products of columns within sessions, and the sessions' means, for any ρ; `...` stands for batches."""
 
     within: Floats  # (..., m, m)
-    between: Floats  # (..., s, m, m)
+    means: Floats  # (..., s k, m) white in S, times the roots of the sizes
     sizes: Floats  # (s,) runs of a session, or their weights
     outputs: int
 
     def at(self, share: Floats | float) -> Floats:
-        """Compute columnᵀ Σ⁻¹ column, (..., m, m), for ρ (...)."""
-        weight = 1 / (1 + np.asarray(share)[..., None] * self.sizes)
-        columns = self.between.shape[-1]
-        flat = self.between.reshape(*self.between.shape[:-2], columns * columns)
-        between = (weight[..., None, :] @ flat).reshape(*weight.shape[:-1], *self.between.shape[-2:])
-        return np.asarray(self.within + between)
+        """Compute columnᵀ Σ⁻¹ column, (..., m, m), for ρ (..., k)."""
+        weighted = self._weights(np.asarray(share))[..., None] * self.means
+        return np.asarray(self.within + np.swapaxes(self.means, -1, -2) @ weighted)
+
+    def _weights(self, share: Floats) -> Floats:
+        """Compute 1/(1 + ρ n) of the means, (..., s k)."""
+        share = np.broadcast_to(share, (*share.shape[:-1], self.outputs))
+        weights = 1 / (1 + share[..., None, :] * self.sizes[:, None])
+        return np.asarray(weights.reshape(*share.shape[:-1], len(self.sizes) * self.outputs))
+
+    def determinant(self, share: Floats) -> Floats:
+        """Compute ln |Σ|/|S ⊗ I|, (...), for ρ (..., k)."""
+        return np.asarray(-np.log(self._weights(share)).sum(-1))
 
     def take(self, columns: Integers) -> Products:
         """Choose columns (c, q), (..., c, q, q)."""
         rows, cols = columns[:, :, None], columns[:, None, :]
-        between = np.swapaxes(self.between[..., rows, cols], -4, -3)
-        return Products(self.within[..., rows, cols], between, self.sizes, self.outputs)
+        means = np.moveaxis(self.means[..., columns], -3, -2)
+        return Products(self.within[..., rows, cols], means, self.sizes, self.outputs)
 
     def solve(self, *, passes: int) -> Linear:
         """Fit the last of the columns, with ρ from its own residuals after `passes` iterations (0: ρ = 0)."""
@@ -205,25 +218,32 @@ class Products:
         return Linear(*solved(self.at(share)), share)
 
     def share(self, *, passes: int) -> Floats:
-        """Estimate ρ (...) from the residuals of a fit of the last column, after `passes` iterations from 0.
+        """Estimate ρ (..., k) from the residuals of a fit of the last column, after `passes` iterations from 0.
 
-        The expected scatter of the sessions' means is Σ_s n_s |m_s|² = (k − h/s) Σ_s (1 + ρ n_s), where h of
-        their k s degrees of freedom are used by the fit.
+        The scatter of the sessions' means along an axis is expected to be
+
+            Σ_s n_s m_s² = (1 − h/s) Σ_s (1 + ρ n_s),
+
+        where h of their s degrees of freedom are used by the fit.
         """
-        count, p = len(self.sizes), self.within.shape[-1] - 1
-        share = np.zeros(self.within.shape[:-2])
+        count, k, batch = len(self.sizes), self.outputs, self.within.shape[:-2]
+        share = np.zeros((*batch, k))
         if count == 1 and passes:
             return np.full_like(share, SESSION_SHARE)
+        columns = self.means[..., :-1]
         for _ in range(passes):
-            normal = self.at(share)
-            step, covariance = solved(normal)
-            combination = np.concatenate([-step, np.ones((*share.shape, 1))], -1)
-            each = self.between @ combination[..., None, :, None]
-            between = (each[..., 0] * combination[..., None, :]).sum((-1, -2))
-            means = normal[..., :p, :p] - self.within[..., :p, :p]
-            freedom = self.outputs - (covariance * np.swapaxes(means, -1, -2)).sum((-1, -2)) / count
-            excess = between / np.maximum(freedom, 0.1 * self.outputs) - count
-            share = np.clip(excess / self.sizes.sum(), 0.0, SESSION_SHARE)
+            step, covariance = solved(self.at(share))
+            between = (self.means[..., -1] - (columns @ step[..., None])[..., 0]) ** 2
+            used = ((columns @ covariance) * columns).sum(-1) * self._weights(share)
+            each, taken = (part.reshape(*batch, count, k).sum(-2) for part in (between, used))
+            own, common = (
+                scatter / np.maximum(k_left, 0.1) - count
+                for scatter, k_left in (
+                    (each, 1 - taken / count),
+                    (each.mean(-1, keepdims=True), 1 - taken.mean(-1, keepdims=True) / count),
+                )
+            )
+            share = np.clip((own + common) / 2 / self.sizes.sum(), 0.0, SESSION_SHARE)
         return share
 
 
@@ -250,8 +270,11 @@ def _inverse(matrix: Floats) -> Floats:
 
 
 def inverse_root(run: Floats) -> Floats:
-    """Return L⁻¹ of S = L Lᵀ, (..., k, k)."""
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(run)))
+    """Return A⁻¹ = C^−½ V^−½ of S = A Aᵀ, (..., k, k)."""
+    deviation = np.sqrt(np.diagonal(run, axis1=-2, axis2=-1))
+    values, vectors = np.linalg.eigh(run / deviation[..., :, None] / deviation[..., None, :])
+    root = (vectors / np.sqrt(values)[..., None, :]) @ np.swapaxes(vectors, -1, -2)
+    return np.asarray(root / deviation[..., None, :])
 
 
 def averaging_rows(session: Integers, scale: Floats | None = None) -> tuple[Floats, Floats]:

@@ -55,7 +55,7 @@ def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> floa
     spread = np.asarray(np.linalg.cholesky(fitted.covariance + 1e-15 * np.diag(np.diag(fitted.covariance))))
     as_far = 0
     for _ in range(_DRAWS // _AT_ONCE):
-        drawn = linear.draw(rng, fitted.noise.run, np.full(_AT_ONCE, fitted.noise.share), spread)
+        drawn = linear.draw(rng, fitted.noise.run, np.tile(fitted.noise.share, (_AT_ONCE, 1)), spread)
         repeats = rng.normal(size=(_AT_ONCE, freedom, len(root)))
         of_repeats = inverse_root(np.swapaxes(repeats, -1, -2) @ repeats / freedom)
         white = scale * drawn @ root.T @ np.swapaxes(of_repeats, -1, -2)

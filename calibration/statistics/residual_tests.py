@@ -124,7 +124,7 @@ class Scores:
     survived: Floats  # (..., e) |d_j| / |W ∂f/∂ε_j|
     length: Floats  # (..., e) |d_j|: signal per unit of the effect, in standard deviations
     shapes: Floats  # (..., k, f) z of each output along each feature
-    share: Floats  # (...) ρ
+    share: Floats  # (..., k) ρ
 
 
 @dataclass(frozen=True)
@@ -209,10 +209,12 @@ class _Tester:
         """
         count, k = len(white), white.shape[-1]
         score = np.einsum("nf,bnk,bka->baf", self.F, self.design.shrink(white, share), root, optimize=True)
-        less = 1 / (1 + share[:, None] * self.design.sizes) - 1  # Σ⁻¹ of the sessions' means
-        followed = np.einsum("bs,sfkp->bfkp", less, self.FJ_means, optimize=True) + self.FJ
-        absorbed = np.einsum("bik,bia,bfkp->bafp", root, root, followed, optimize=True)
-        square = (root**2).sum(1)[:, :, None] * ((self.F**2).sum(0) + less @ self.F_means**2)[:, None]
+        less = 1 / (1 + share[:, None, :] * self.design.sizes[:, None]) - 1  # Σ⁻¹ of the sessions' means
+        of_means = np.einsum("bik,bsi,bia->bska", root, less, root, optimize=True)
+        absorbed = np.einsum("bik,bia,fkp->bafp", root, root, self.FJ, optimize=True)
+        absorbed += np.einsum("bska,sfkp->bafp", of_means, self.FJ_means, optimize=True)
+        square = (root**2).sum(1)[:, :, None] * (self.F**2).sum(0)
+        square += np.einsum("bsaa,sf->baf", of_means, self.F_means**2, optimize=True)
         projected = square - np.einsum("bafp,bpq,bafq->baf", absorbed, covariance, absorbed, optimize=True)
         seen = projected > TESTABLE**2 * square
         z = np.where(seen, score / np.sqrt(np.where(seen, projected, 1.0)), 0.0)
@@ -282,7 +284,7 @@ def examine_residual(
     batches: list[Floats] = []
     while (drawn := sum(map(len, batches))) < (draws or study.draws):
         count = min(_AT_ONCE, max(1, _VALUES // residual.size), (draws or study.draws) - drawn)
-        null = tester.scores(tester.design.draw(rng, run, np.full(count, observed.share[0])))
+        null = tester.scores(tester.design.draw(rng, run, np.tile(observed.share[0], (count, 1))))
         batches.append(np.column_stack([null.general, _largest(null.z, testable)]))
         if decide is not None and _decided(np.concatenate(batches), statistics, decide):
             break

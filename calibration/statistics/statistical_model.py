@@ -87,8 +87,8 @@ class Runs:
 
         A design (n', m) is taken where repeats differ otherwise, too: levels of condition and session, and what
         was noted (`noted_of_repeats`). Repeats in several sessions differ by what changed between these, which is
-        no noise of a run. Where fewer than `FEWEST_REPEATS` runs are repeated, mirror runs serve as repeats, but for
-        what is odd and linear in the inputs; without them all that is smooth in the inputs is no noise.
+        no noise of a run. Where fewer than `FEWEST_REPEATS` runs are repeated, mirror runs serve as repeats, but
+        for what is odd and linear in the inputs; without them what is smooth in the inputs is no noise.
         """
         condition, session, noted = self.condition[rows], self.session[rows], self.noted_of_repeats[rows]
         if (count := repeat_count(condition)) < FEWEST_REPEATS:
@@ -107,7 +107,7 @@ class Runs:
         return plain
 
     def _mirror_design(self, rows: Flags | slice) -> Floats:
-        """Make levels of mirrored conditions and sessions, and what is odd: the direction, alone and times inputs."""
+        """Make levels of mirrored conditions and sessions, and the direction, alone and times each input."""
         mirrored, direction = self.mirrored
         odd = direction[rows, None] * np.column_stack([np.ones(len(self)), self.inputs])[rows]
         return np.column_stack([_levels(mirrored[rows]), _levels(self.session[rows]), odd])

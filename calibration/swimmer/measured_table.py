@@ -272,8 +272,8 @@ def _independent(data: Measurements, copies: int) -> Measurements:
         )
     caveats = data.caveats
     if repeats < FEWEST_REPEATS:
-        caveats += (f"{repeats} repeated runs: the noise is estimated from {count} values that a smooth dependence on "
-                    "the inputs, alike for both directions of the motor, leaves",)  # fmt: skip
+        caveat = f"{repeats} repeated runs: the noise is estimated from what is not smooth in the inputs"
+        caveats += (f"{caveat}, or differs between mirror runs ({count} degrees of freedom)",)
     run = repeat_covariance(y, repeated)
     kept: list[int] = []
     follows = []
@@ -290,9 +290,8 @@ def _independent(data: Measurements, copies: int) -> Measurements:
             follows.append(f"column {column}: follows from {others}, so it is not counted twice")
         else:
             kept.append(i)
-    return replace(
-        data, y=y[:, kept], outputs=tuple(outputs[i] for i in kept), excluded=(*data.excluded, *follows), caveats=caveats
-    )
+    excluded = (*data.excluded, *follows)
+    return replace(data, y=y[:, kept], outputs=tuple(outputs[i] for i in kept), excluded=excluded, caveats=caveats)
 
 
 def _sigmas(good: pd.DataFrame) -> dict[str, float]:

@@ -349,31 +349,34 @@ class SwimmerModel:
         The motor's direction matters if something odd is present, or if `signed`.
         """
         runs, work = self.runs, self._at_work(parameters)
+        drivers = {i.needs: self._driver(i.needs, parameters) for i in work if i.needs}
         signed |= any(i.odd for i in work) or any(catalogue()[e].symmetry == "odd" for e in self.robot.effects)
         omega = runs.omega if signed else np.abs(runs.omega)
-        differing = [value for value in parameters.values() if np.ndim(value)]
-        table = np.column_stack([runs.tails, runs.length, omega, *differing, *self._noted_at_work(parameters)])
-        table = table.round(9)
+        by_run = {name: value for name, value in parameters.items() if np.ndim(value)}
+        table = np.column_stack([runs.tails, runs.length, omega, *by_run.values(), *drivers.values()]).round(9)
         _, first, place = np.unique(table, axis=0, return_index=True, return_inverse=True)
-        return [self._run(parameters, int(row), float(omega[row])) for row in first], place.reshape(-1)
-
-    def _noted_at_work(self, parameters: Parameters) -> list[Floats]:
-        """List what was noted of every run (n,) and matters at `parameters`."""
-        needs = (influence.needs for influence in self._at_work(parameters))
-        return [self._driver(need, parameters) for need in dict.fromkeys(needs) if need]
+        listed = []
+        for row in first.tolist():
+            here = {**parameters, **{name: float(value[row]) for name, value in by_run.items()}}
+            driven = {name: float(driver[row]) for name, driver in drivers.items()}
+            at_work = self._at_work(here) if by_run else work
+            listed.append(self._run(here, at_work, driven, row, float(omega[row])))
+        return listed, place.reshape(-1)
 
     def _is_at_null(self, parameters: Parameters) -> bool:
         """Tell whether no effect is at work."""
         return not any(influence.effect for influence in self._at_work(parameters))
 
-    def _run(self, parameters: Parameters, row: int, omega: float) -> _Run:
-        parameters = {name: float(v[row]) if np.ndim(v) else v for name, v in parameters.items()}
+    def _run(
+        self, parameters: Parameters, work: list[Influence], driven: Mapping[str, float], row: int, omega: float
+    ) -> _Run:
+        """Make the run of a row, from the influences at work in it and what drives them."""
         effects, current = dict(self.robot.effects), 0.0
-        for influence in self._at_work(parameters):
+        for influence in work:
             by = parameters[influence.parameter.name] - influence.parameter.start
             before = influence.parameter.start
             if influence.needs is not None:
-                by *= float(self._driver(influence.needs, parameters)[row])
+                by *= driven[influence.needs]
                 before = self.robot.effects.get(influence.effect or "", before)
             if influence.effect is not None:
                 effects[influence.effect] = before + by
@@ -384,7 +387,7 @@ class SwimmerModel:
         numbers = robot_numbers(self.robot, parameters)
         numbers["tail_length"] = float(self.runs.length[row]) + parameters.get(LENGTH, 0.0)
         tails = int(self.runs.tails[row])
-        for influence in self._at_work(parameters):
+        for influence in work:
             for name, power in influence.one_tail.items():
                 numbers[name] *= (1 - parameters[influence.parameter.name] / tails) ** power
         robot = replace(

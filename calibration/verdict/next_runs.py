@@ -111,7 +111,7 @@ def next_runs(rivals: Sequence[Rival], *, count: int = 3, seed: int = 0) -> tupl
         Pair(true[0] - wrong[0], wrong[1], again.covariance)
         for (_, true), (again, wrong) in itertools.permutations(zip(fits, sides, strict=True), 2)
     ]
-    noise = Noise(np.mean([f.noise.run for f in fits], 0), float(np.mean([f.noise.share for f in fits])))
+    noise = Noise(np.mean([f.noise.run for f in fits], 0), np.mean([np.asarray(f.noise.share) for f in fits], 0))
     alone = np.array([_together(pairs, noise, [place]).min() for place in range(len(settings))])
     runs = []
     rng = np.random.default_rng(seed)

@@ -269,7 +269,10 @@ def _data(result: Verdict) -> dict[str, Any]:
         "settings": {name: [float(v.min()), float(v.max()), unit] for name, (v, unit) in settings},
         "drawn_against": [runs.drawn[0], runs.drawn[1][0]],
         "scatter_of_a_run": dict(zip(runs.outputs, scatter, strict=True)),
-        "scatter_of_sessions": math.sqrt(result.final.noise.share),
+        "scatter_of_sessions": math.sqrt(np.mean(result.final.noise.share)),
+        "scatter_of_sessions_by_output": dict(
+            zip(runs.outputs, np.sqrt(result.final.noise.share).tolist(), strict=True)
+        ),
         "sessions": list(conditions.sessions),
         "fixed_before": conditions.hash,
         "rows": conditions.rows,

@@ -51,7 +51,7 @@ class Explanation:
             "parameters": self.parameters,
             "covariance": self.covariance.tolist(),
             "noise_of_a_run": self.noise.run.tolist(),
-            "share_of_sessions": self.noise.share,
+            "share_of_sessions": np.broadcast_to(self.noise.share, len(self.outputs)).tolist(),
             "outputs": list(self.outputs),
             **({"law": dict(self.law)} if self.law else {}),
         }
@@ -65,9 +65,11 @@ class Explanation:
         """
         parameters = {str(name): float(value) for name, value in record["parameters"].items()}
         covariance, run = (np.array(record[name], dtype=float) for name in ("covariance", "noise_of_a_run"))
-        outputs, share = tuple(map(str, record["outputs"])), float(record["share_of_sessions"])
-        numbers = np.concatenate([covariance.ravel(), run.ravel(), [share, *parameters.values()]])
+        outputs, share = tuple(map(str, record["outputs"])), np.array(record["share_of_sessions"], dtype=float)
+        numbers = np.concatenate([covariance.ravel(), run.ravel(), share.ravel(), list(parameters.values())])
         if covariance.shape != (len(parameters),) * 2 or run.shape != (len(outputs),) * 2:
+            raise ValueError
+        if share.shape not in ((), (len(outputs),)):  # one of all outputs, as before
             raise ValueError
         if not np.isfinite(numbers).all():
             raise ValueError

@@ -96,7 +96,7 @@ def test_a_coefficient_that_differs_on_a_day_is_named(day: int) -> None:
     assert low < np.log(0.8) < high
     assert result.corrected.C_r == pytest.approx(TRUTH.C_r, rel=0.05)
     held_out = "The held-out runs (day 3) do not agree with the model"
-    assert result.sentence.startswith(held_out if day == 3 else "C_r in session day 2 is 2")
+    assert result.sentence.startswith(held_out if day == 3 else "C_r in session day 2 is ")
     assert f"C_r in session day {day} is" in result.sentence
     first, second, *_ = next_steps(facts(result))
     assert first.startswith(f"Find out what changed in session day {day}")

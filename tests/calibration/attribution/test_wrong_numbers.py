@@ -129,7 +129,7 @@ def test_a_number_far_beyond_its_tolerance_does_not_come_ahead_of_an_effect(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A head's length nine of its tolerances off explains as much as the effect that was there."""
-    table = toy_table(2, **{DRAG: 0.6})
+    table = toy_table(2, **{DRAG: 0.58})
     result = calibrated(table, few=True)
     assert result.verdict == "ambiguous"
     assert result.effects == ("end_over_end_drag",)

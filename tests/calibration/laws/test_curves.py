@@ -168,7 +168,7 @@ def test_the_gain_is_that_of_dense_least_squares() -> None:
     assert float(linear.gain(linear.as_given[None])[0]) == pytest.approx(dense, rel=1e-3)
     power = linear_model("power")
     noise = power.fitted.noise
-    null = power.gain(power.tested.draw(np.random.default_rng(3), noise.run, np.full(400, noise.share)))
+    null = power.gain(power.tested.draw(np.random.default_rng(3), noise.run, np.tile(noise.share, (400, 1))))
     freedom = len(SPEEDS) - 2
     assert null.mean() == pytest.approx(freedom, abs=4 * math.sqrt(2 * freedom / 400) + 0.5)
     study, fit_of_law = fitted("power")  # curves are looked for in a law alone

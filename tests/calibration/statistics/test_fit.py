@@ -243,7 +243,7 @@ def test_the_search_of_a_fit_ends_where_it_cannot_reach_the_noise_and_nowhere_el
 def test_noise_alone_stays_below_the_deviance_that_ends_a_search_also_with_few_repeats() -> None:
     """Of 24 conditions 12 are repeated, in five outputs: a bound without the error of S is exceeded."""
     rng, condition = np.random.default_rng(0), np.r_[np.arange(24), np.arange(12)]
-    runs = replace(runs_of(np.zeros((36, 5)), session=np.zeros(36, int)), condition=condition, outputs=tuple("uvxyz"))
+    runs = replace(runs_of(np.zeros((36, 5)), session=np.zeros(36, int)), condition=condition)
     study = Study.fitted_to(Line(runs), np.ones(36, bool))
     most, deviances = study.noise_at_most(5), []
     for _ in range(2000):

@@ -24,7 +24,7 @@ def test_scores_along_features_are_those_of_least_squares() -> None:
     _, table = features(model.runs, used)
     J = fitted.jacobian[used]
     residual = (model.runs.y - fitted.prediction)[used] + J @ changes(fitted.fitted, fitted.parameters)
-    noise = Noise(repeat_covariance(residual, model.runs.condition[used]), float(scores.share))
+    noise = Noise(repeat_covariance(residual, model.runs.condition[used]), scores.share)
     white = noise.whitener(model.runs.session[used])
     prior = np.diag(np.sqrt(precisions(fitted.fitted)))
     for output, feature in ((0, 0), (2, 3), (4, 1)):
