@@ -169,7 +169,7 @@ def _tracks(
         out: CSV.
     """
     _refuse_early(tracks, runs)
-    from calibration.report.track_pictures import draw_tracks
+    from calibration.report.figures import draw_tracks
     from calibration.swimmer.camera_tracks import measure_tracks
     from sim.inputs import load_robot
     from sim.io.files import whole_file, write_csv

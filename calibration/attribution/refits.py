@@ -20,7 +20,8 @@ If no single effect is kept, a second one is looked for beside each of the best 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -136,6 +137,7 @@ def examine(
     *,
     threshold: float | None = None,
     beside: tuple[Parameter, ...] = (),
+    after_first: Callable[[int, float], None] | None = None,
 ) -> list[Candidate]:
     """Refit and judge every effect that is not in the model yet, best score first.
 
@@ -145,23 +147,22 @@ def examine(
         directions: of the effects there.
         threshold: |z| that a refit needs; the critical one of `misfit` if not given.
         beside: effects that `base` has already.
+        after_first: is told, after the first refit, how many there are, and the processor time of this one.
     """
     needed = misfit.critical_z if threshold is None else threshold
     effects = [e for e in study.model.effects if e not in beside]
     local = coefficients_within_range(study.model, base.parameters)
     scored = unexamined(misfit, effects, needed, beside)
+    reasons = reasons_not_to_refit(study, base, misfit, needed, beside)
     examined = []
     title = " ".join(("effects", *(f"beside {e.title}" for e in beside)))
     order = np.argsort(-np.abs(misfit.scores.z)).tolist()
     for j in tqdm(order, desc=title, unit="effect", delay=1.0, disable=not study.progress):
         effect, candidate = effects[j], scored[j]
-        guess = effect.start
-        if local:
-            guess = base.parameters[effect.name] + candidate.z / max(float(misfit.scores.length[j]), 1e-300)
-            reason = _reason_not_to_refit(study, candidate, base, misfit, guess, needed)
-            if reason:
-                examined.append(replace(candidate, verdict=reason))
-                continue
+        if reasons[j]:
+            examined.append(replace(candidate, verdict=reasons[j]))
+            continue
+        guess = _guess(base, misfit, candidate, j) if local else effect.start
         if skipped(f"a second effect beside {beside[0].title}" if beside else effect.title):
             examined.append(replace(candidate, verdict=NO_TIME))
             continue
@@ -170,21 +171,38 @@ def examine(
             size[effect.second.name] = float(misfit.second[j]) if local else effect.second.start
         start = {**(base.parameters if local else start_values(study.model)), **size}
         names = (*base.names, *size)
-        target = study.noise_at_most(len(names))
+        target, began = study.noise_at_most(len(names)), time.process_time()
         try:
             refit = fit(study.model, start, names, study.split.fitted, target=target, title="")
         except UnsolvedError:
             examined.append(replace(candidate, verdict="with it the motion of some runs is not found directly"))
             continue
         examined.append(judge(study, candidate, base, refit, directions.without(j)))
+        if after_first:
+            after_first(reasons.count(""), time.process_time() - began)
+            after_first = None
     return examined
 
 
-def _reason_not_to_refit(
-    study: Study, candidate: Candidate, base: Fit, misfit: Misfit, guess: float, needed: float
-) -> str:
-    """Say why an effect with this score and the size `guess` is not worth a refit; empty if it is."""
-    effect, z = candidate.effect, candidate.z
+def reasons_not_to_refit(
+    study: Study, base: Fit, misfit: Misfit, needed: float, beside: tuple[Parameter, ...] = ()
+) -> list[str]:
+    """Say for each effect why it is not worth a refit by its score; empty if it is. See `examine`."""
+    effects = [e for e in study.model.effects if e not in beside]
+    if not coefficients_within_range(study.model, base.parameters):
+        return [""] * len(effects)
+    most = study.noise_at_most(len(base.names))
+    return [_reason(c, base, misfit, j, needed, most) for j, c in enumerate(unexamined(misfit, effects, needed))]
+
+
+def _guess(base: Fit, misfit: Misfit, candidate: Candidate, place: int) -> float:
+    """Estimate the size of the effect at a place by its score."""
+    return base.parameters[candidate.effect.name] + candidate.z / max(float(misfit.scores.length[place]), 1e-300)
+
+
+def _reason(candidate: Candidate, base: Fit, misfit: Misfit, place: int, needed: float, most: float) -> str:
+    """Say why an effect with this score is not worth a refit; `most`: what noise may leave."""
+    effect, z, guess = candidate.effect, candidate.z, _guess(base, misfit, candidate, place)
     low, high = effect.bounds
     if candidate.detectable > UNSEEN:
         return "it changes nothing in these runs"
@@ -197,7 +215,7 @@ def _reason_not_to_refit(
     # A refit takes z² from the deviance if the model is linear. `_CURVED` allows for its curvature.
     remainder = base.deviance - z**2 / _CURVED
     best = float(np.max(np.where(misfit.scores.survived >= TESTABLE, misfit.scores.z**2, 0.0)))
-    if z**2 < _CURVED * best and remainder > study.noise_at_most(len(base.names)):
+    if z**2 < _CURVED * best and remainder > most:
         return "leaves far more than noise, by its score"
     return ""
 

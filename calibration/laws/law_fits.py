@@ -36,7 +36,7 @@ from calibration.statistics.budget import skipped
 from calibration.statistics.fit import Fit
 from calibration.statistics.study import LEVEL, Study
 from calibration.swimmer.swimmer import SwimmerModel
-from calibration.verdict.experiment import Rival
+from calibration.verdict.next_runs import Rival
 from calibration.words.render import say_laws
 from sim.arrays import Floats
 

@@ -42,7 +42,7 @@ from calibration.swimmer.candidate_effects import CURRENT
 from calibration.swimmer.head_correction import HeadCorrection
 from calibration.swimmer.nuisance_numbers import LENGTH
 from calibration.swimmer.swimmer import robot_numbers
-from calibration.verdict.experiment import LearntCorrection
+from calibration.verdict.verdict import LearntCorrection
 from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge, knowledge_toml
 from sim.arrays import Flags, Floats
 from sim.effects import catalogue

@@ -24,11 +24,10 @@ from calibration.report.robot_verdict import read_runs
 from calibration.statistics.fit import Fit
 from calibration.statistics.held_out import errors
 from calibration.statistics.residual_tests import Directions, examine_residual
-from calibration.statistics.statistical_model import start_values
-from calibration.statistics.study import Study, find_outliers, split_runs
-from calibration.statistics.weights import fit_weighted
+from calibration.statistics.study import Study
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.swimmer import SwimmerModel
+from calibration.verdict.calibrate import first_fit
 from sim.io.files import files_together, write_text
 from sim.io.provenance import provenance
 from sim.model.robot import Robot
@@ -143,11 +142,7 @@ def find_robot_laws(
     check_given(robot)
     data, held_out, name = read_runs(table, "session", tell)
     model = SwimmerModel(robot, data, jobs)
-    start = start_values(model)
-    given = model.predict([start], title="as given" if progress else "")[0]
-    model.check(given)
-    study = Study(model, split_runs(data, held_out, find_outliers(data, given)), seed=seed, progress=progress)
-    study, base = fit_weighted(study, model.guess(start, study.split.fitted))
+    study, base, _ = first_fit(model, held_out, seed=seed, progress=progress)
     none = Directions.plain(np.empty((*data.y.shape, 0)))
     p_value = examine_residual(study, base, none).general_p
     laws = find_laws(study, base) if p_value < study.level else None

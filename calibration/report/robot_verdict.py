@@ -17,9 +17,8 @@ from calibration.report.path_error import PathError, path_errors, wanted_paths
 from calibration.report.report import write_report
 from calibration.statistics.study import count_of_rows, summary_of_excluded
 from calibration.swimmer.head_correction import learn_head_correction
-from calibration.swimmer.measured_table import Measurements, read_measurements
+from calibration.swimmer.measured_table import PROTOCOLS, Measurements, read_measurements
 from calibration.swimmer.possible_runs import Owned
-from calibration.swimmer.protocols import PROTOCOLS
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record

@@ -27,7 +27,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -64,7 +64,7 @@ from calibration.statistics.held_out import (
     refit_to_all,
 )
 from calibration.statistics.residual_regression import regress_residual
-from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
+from calibration.statistics.residual_tests import Directions, Misfit, directions, examine_residual
 from calibration.statistics.shifted import Shifted
 from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values
 from calibration.statistics.study import (
@@ -84,15 +84,16 @@ from calibration.statistics.weights import (
     noise_of_any_run,
     rows_of_little_weight,
 )
-from calibration.verdict.experiment import Describe, LearntCorrection, Rival
-from calibration.verdict.next_runs import next_runs
+from calibration.verdict.next_runs import Rival, next_runs
 from calibration.verdict.sequential_test import Explanation
 from calibration.verdict.verdict import (
     Conditions,
     Corrections,
+    Describe,
     Evidence,
     Fits,
     HeldOutErrors,
+    LearntCorrection,
     Next,
     Verdict,
     reach_verdict,
@@ -102,6 +103,7 @@ from sim.io.errors import InputError
 from sim.io.provenance import fingerprint
 
 _SEARCH, _DESCRIBED = 0.6, 0.85  # shares of the time after which effects and descriptions are no longer looked for
+_SHARE_OF_TEST = 0.2  # of the time of the first tests, for those of what an effect leaves, with fewer draws
 _LAWS_TOLD_APART = 3  # beside a claim; the more there are, the fewer runs tell all of them apart
 
 Subject = TypeVar("Subject", bound=Experiment)
@@ -135,18 +137,13 @@ def calibrate(
             provisional, and says what was not tried.
         progress: show progress bars.
     """
-    began, start = time.process_time(), start_values(model)
-    uncalibrated = model.predict([start], title="as given" if progress else "")[0]
-    model.check(uncalibrated)
-    split = split_runs(model.runs, held_out, find_outliers(model.runs, uncalibrated))
-    study = Study(model, split, level, seed, draws, progress)
-    guess, fitted = model.guess(start, split.fitted), time.monotonic()
-    study, base = fit_weighted(study, guess)
-    model, seconds_of_fit = cast(Subject, study.model), time.monotonic() - fitted
+    began = time.process_time()
+    study, base, uncalibrated = first_fit(model, held_out, level=level, seed=seed, draws=draws, progress=progress)
+    model, split = cast(Subject, study.model), study.split
     used = time.process_time() - began
     with limited(_DESCRIBED * max_seconds - used) as budget:
         with limited(_SEARCH * max_seconds - used):
-            study, explained, moves = _explain_with_moves(study, base, seconds_of_fit)
+            study, explained, moves = _explain_with_moves(study, base)
         evidence = Evidence(
             misfit=explained.misfit,
             draws=draws,
@@ -217,6 +214,22 @@ def calibrate(
     )
 
 
+def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any) -> tuple[Study, Fit, Floats]:
+    """Divide and check the runs, and fit the model without effects.
+
+    Args:
+        settings: of the study.
+
+    Returns:
+        The study, the fit, and the prediction of the model as given.
+    """
+    start = start_values(model)
+    given = model.predict([start], title="as given" if settings.get("progress") else "")[0]
+    model.check(given)
+    study = Study(model, split_runs(model.runs, held_out, find_outliers(model.runs, given)), **settings)
+    return *fit_weighted(study, model.guess(start, study.split.fitted)), given
+
+
 @dataclass(frozen=True)
 class Explained:
     """The fit without effects, its residual, and what explains the residual."""
@@ -257,17 +270,15 @@ class Explained:
         return rivals if len(rivals) > 1 else ()
 
 
-def _explain_with_moves(
-    study: Study, base: Fit, seconds_of_fit: float
-) -> tuple[Study, Explained, tuple[Move, ...]]:
+def _explain_with_moves(study: Study, base: Fit) -> tuple[Study, Explained, tuple[Move, ...]]:
     """Explain the residual, with numbers that differ in some runs, unless effects do without them as well.
 
     Such numbers are looked for before the effects, and again beside those that are named, or, where nothing
     explains the residual, beside those that come nearest.
     """
     moved, with_moves, moves = find_moves(study, base)
-    beside_moves = explain(moved, with_moves, seconds_of_fit) if moves else None
-    explained = explain(study, base, seconds_of_fit)
+    beside_moves = explain(moved, with_moves) if moves else None
+    explained = explain(study, base)
     if beside_moves:
         if explained.best and explained.final.deviance < with_moves.deviance + INDISTINGUISHABLE:
             return study, explained, ()
@@ -279,7 +290,7 @@ def _explain_with_moves(
             changes = {move.name: beside.parameters[move.name] for move in moves}
             start, names = {**base.parameters, **changes}, (*base.names, *changes)
             with_moves = fit(moved.model, start, names, study.split.fitted, title="")
-            beside_moves = explain(moved, with_moves, seconds_of_fit)
+            beside_moves = explain(moved, with_moves)
             if explained.best or beside_moves.best:
                 return moved, beside_moves, moves
     return study, explained, ()
@@ -312,14 +323,15 @@ def _of_runs(study: Study, explained: Explained) -> Fit:
     return replace(fitted, parameters=parameters)
 
 
-def explain(study: Study, base: Fit, seconds_of_fit: float) -> Explained:
+def explain(study: Study, base: Fit) -> Explained:
     """Test the residual of the fit without effects, and look for what explains it, from the simplest on."""
     model, level = study.model, study.level
-    fitted = time.monotonic()
+    began = time.process_time()
     title = "derivatives" if study.progress else ""
     tangents = directions(model, base.parameters, model.effects, title=title)
-    derived = time.monotonic()
+    derived = time.process_time()
     misfit = examine_residual(study, base, tangents)
+    tested = time.process_time()
     freed = without_wrong_priors(study, base)
     number_is_wrong = freed is not base
     number_explains = number_is_wrong and (
@@ -331,9 +343,13 @@ def explain(study: Study, base: Fit, seconds_of_fit: float) -> Explained:
     if number_is_wrong:  # every effect that may explain as much as the wrong number does
         gain = base.deviance - freed.deviance
         threshold = min(threshold, math.sqrt(max(gain - INDISTINGUISHABLE, 1.0)))
-    if study.progress:
-        print(_forecast(misfit, threshold, seconds_of_fit, derived - fitted), file=sys.stderr)
-    candidates = examine(study, base, misfit, tangents, threshold=threshold)
+
+    def forecast(count: int, seconds: float) -> None:
+        if study.progress:
+            single = count * max(seconds, _SHARE_OF_TEST * (tested - derived))
+            print(_forecast(count, single, FIRST * (tested - began + single)), file=sys.stderr)
+
+    candidates = examine(study, base, misfit, tangents, threshold=threshold, after_first=forecast)
     best = explaining(candidates)
     if number_explains and (misfit.p_value >= level or not beats_number(best, freed)):
         rival_effects = tuple(as_good_as_number(candidates, freed, level))
@@ -349,26 +365,18 @@ def explain(study: Study, base: Fit, seconds_of_fit: float) -> Explained:
     best = best or explaining(beside_wrong_numbers(study, base, candidates, tangents))
     second = [] if best else pairs(study, candidates)
     best = best or explaining(second)
-    unkept = (
-        ()
-        if best
-        else ((ebic(study, c.refit, len(c.claimed)), c.refit) for c in (*candidates, *second) if c.refit)
-    )
-    _, nearest = min(unkept, key=lambda each: each[0], default=(math.inf, None))
+    tried = [(ebic(study, c.refit, len(c.claimed)), c.refit) for c in (*candidates, *second) if c.refit]
+    unkept = min(tried, key=lambda each: each[0])[1] if tried and not best else None
     checked = tuple(with_checks(study, best, base))
-    return Explained(base, misfit, tangents, tuple(candidates), checked, unkept=nearest)
+    return Explained(base, misfit, tangents, tuple(candidates), checked, unkept=unkept)
 
 
-def _forecast(misfit: Misfit, threshold: float, seconds_of_fit: float, seconds_of_directions: float) -> str:
-    """Say how long the effects will take, by how long the first fit and the derivatives took."""
-    scores = misfit.scores
-    count = int(((np.abs(scores.z) >= threshold) & (scores.survived >= TESTABLE)).sum())
-    single = count * seconds_of_fit
-    pairs_at_most = FIRST * (seconds_of_directions + single)
-    ends = f"; the search ends after {_duration(seconds_left())} of processor time" * (seconds_left() < math.inf)
+def _forecast(count: int, single: float, pairs_at_most: float) -> str:
+    """Say how many seconds of processor time `count` effects take, and pairs."""
+    ends = f"; the search ends after {_duration(seconds_left())}" * (seconds_left() < math.inf)
     return (
-        f"there is more than noise: {count} effects to fit, about {_duration(single)}; if none of them explains "
-        f"the runs, pairs follow, {_duration(pairs_at_most)} at most, mostly much less{ends}"
+        f"there is more than noise: {count} effects to fit take {_duration(single)} of processor time; if none "
+        f"explains the runs, pairs follow, {_duration(pairs_at_most)} at most, mostly much less{ends}"
     )
 
 

@@ -20,15 +20,16 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import ndtr
 
+from calibration.statistics.fit import Fit
 from calibration.statistics.gls import Noise
-from calibration.verdict.experiment import Rival
+from calibration.statistics.statistical_model import Experiment
 from sim.arrays import Floats
 
 STOP = 25.0  # ratio of likelihoods at which an explanation is given up, 1/α of the sequence of batches
@@ -40,6 +41,16 @@ _DECIDES = 3.84  # difference of χ² at which one of the two is chosen
 _WANTED = 0.9  # share of draws that should decide
 _MOST_REPEATS = 16
 _MOST_RIVALS = 4
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A fitted model that explains or describes the runs as well as others do."""
+
+    title: str  # in words
+    fit: Fit
+    model: Experiment  # that was fitted
+    law: Mapping[str, Any] = field(default_factory=dict)  # what makes this model of one without the law
 
 
 @dataclass(frozen=True)

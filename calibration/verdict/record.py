@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calibration.attribution.halved_tolerances import notable_gains, overall_gains
 from calibration.attribution.nearest import largest_along
 from calibration.attribution.refits import UNSEEN, Candidate
-from calibration.attribution.wrong_numbers import notable_pull
+from calibration.attribution.wrong_numbers import notable_gains, notable_pull, overall_gains
 from calibration.statistics.fit import Fit, Pull, least_determined
 from calibration.statistics.gls import inverse_root
 from calibration.statistics.statistical_model import Parameter

@@ -18,8 +18,7 @@ import numpy as np
 
 from calibration.statistics.gls import Noise
 from calibration.statistics.statistical_model import ForwardModel, Runs, start_values
-from calibration.verdict.experiment import Rival
-from calibration.verdict.next_runs import GIVEN_UP
+from calibration.verdict.next_runs import GIVEN_UP, Rival
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError
 from sim.io.reading import ContentError, read_json

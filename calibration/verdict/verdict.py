@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 from calibration.attribution.claim_checks import NumberCheck
 from calibration.attribution.moves import StatedMove
@@ -22,9 +23,8 @@ from calibration.statistics.held_out import FinalRefit
 from calibration.statistics.residual_regression import Regression
 from calibration.statistics.residual_tests import Misfit
 from calibration.statistics.statistical_model import Runs
-from calibration.statistics.study import Split, summary_of_excluded
-from calibration.verdict.experiment import Description, LearntCorrection
-from calibration.verdict.next_runs import Batch, NextRun
+from calibration.statistics.study import Split, Study, summary_of_excluded
+from calibration.verdict.next_runs import Batch, NextRun, Rival
 from calibration.verdict.record import facts
 from calibration.verdict.sequential_test import Explanation
 from calibration.words.quantities import percent
@@ -33,6 +33,55 @@ from sim.arrays import Floats
 
 _DISAGREES = 0.01  # p of the held-out runs below which they do not agree with the final model
 _LONGEST = 500  # letters of a sentence in a repr
+
+
+class LearntCorrection(Protocol):
+    """A correction that predicts runs that no effect explains."""
+
+    @property
+    def prediction(self) -> Floats:
+        """(n, k), learnt without the held-out runs."""
+        ...
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """What it depends on, in words."""
+        ...
+
+
+class Describe(Protocol):
+    """Looks for laws that describe a residual."""
+
+    def __call__(self, study: Study, base: Fit, *, beside_claim: bool) -> Description | None:
+        """Describe what a fit without effects leaves; `beside_claim`: an effect is claimed for it."""
+        ...
+
+
+class Description(Protocol):
+    """Laws that describe runs which no effect explains, or only one that something else could imitate."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether the best law leaves no more than noise."""
+        ...
+
+    @property
+    def prediction(self) -> Floats:
+        """(n, k) of the best law, fitted without the held-out runs; without a law, of the calibrated model."""
+        ...
+
+    @property
+    def rivals(self) -> tuple[Rival, ...]:
+        """Laws that the runs cannot tell apart, best first; none if there are not two."""
+        ...
+
+    def as_good_as(self, claim: Fit) -> tuple[Rival, ...]:
+        """Laws that leave no more than noise and fit as well as a claimed effect, best first."""
+        ...
+
+    def to_dict(self, claim: Fit | None = None) -> dict[str, Any]:
+        """Return the record for verdict.json; beside a claimed effect it has the laws that fit as well."""
+        ...
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibration.attribution.halved_tolerances import notable_gains, overall_gains
+from calibration.attribution.wrong_numbers import notable_gains, overall_gains
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.residual_tests import TESTABLE, Misfit, directions, examine_residual
 from calibration.statistics.statistical_model import parameter, start_values

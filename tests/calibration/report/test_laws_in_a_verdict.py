@@ -20,8 +20,7 @@ from calibration.report.corrected_robot import _slopes, check_given, robot_with_
 from calibration.report.figures import draw_dependences, draw_place
 from calibration.report.robot_verdict import RobotVerdict
 from calibration.statistics.held_out import refit_to_all
-from calibration.verdict.experiment import Rival
-from calibration.verdict.next_runs import BATCH, next_runs
+from calibration.verdict.next_runs import BATCH, Rival, next_runs
 from calibration.verdict.sequential_test import Explanation, standings
 from dataset.robot_inputs import robot_fields
 from planner.vehicle.calibration_table import read_knowledge

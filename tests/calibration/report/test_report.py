@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from calibration.attribution.halved_tolerances import notable_gains
+from calibration.attribution.wrong_numbers import notable_gains
 from calibration.report.report import write_report
 from calibration.statistics.fit import Pull
 from calibration.swimmer.nuisance_numbers import nuisance_parameters

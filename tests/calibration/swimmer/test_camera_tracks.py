@@ -8,9 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.report.track_pictures import draw_tracks
-from calibration.swimmer.camera_tracks import measure_tracks
-from calibration.swimmer.track_fit import measure_track
+from calibration.report.figures import draw_tracks
+from calibration.swimmer.camera_tracks import fit_track, measure_tracks
 from sim.inputs import load_robot
 from sim.io.errors import InputError
 from sim.motion.steady import steady
@@ -153,7 +152,7 @@ def test_names_of_runs_are_compared_as_text_and_rows_without_are_named() -> None
 
 
 def measured(table: pd.DataFrame) -> dict[str, float]:
-    return vars(measure_track(*(table[c].to_numpy() for c in ("time_s", "x_cm", "y_cm", "heading_deg"))))
+    return vars(fit_track(*(table[c].to_numpy() for c in ("time_s", "x_cm", "y_cm", "heading_deg"))).result)
 
 
 @pytest.mark.parametrize("rate", [RATE, -RATE])

@@ -12,9 +12,8 @@ import pytest
 from calibration.__main__ import main
 from calibration.report.corrected_robot import corrected_robot, corrected_toml
 from calibration.swimmer.swimmer import SwimmerModel
-from calibration.verdict.experiment import LearntCorrection
 from calibration.verdict.record import verdict_record
-from calibration.verdict.verdict import Verdict
+from calibration.verdict.verdict import LearntCorrection, Verdict
 from planner.jobs.plan import plan
 from planner.paths.path import circle
 from planner.vehicle.calibration_table import read_knowledge

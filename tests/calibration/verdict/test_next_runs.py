@@ -17,8 +17,7 @@ from scipy.stats import binom
 from calibration.statistics.fit import fit
 from calibration.statistics.gls import Noise
 from calibration.statistics.statistical_model import start_values
-from calibration.verdict.experiment import Rival
-from calibration.verdict.next_runs import BATCH, GIVEN_UP, STOP, Pair, _greedy, _together, next_runs
+from calibration.verdict.next_runs import BATCH, GIVEN_UP, STOP, Pair, Rival, _greedy, _together, next_runs
 from calibration.verdict.record import verdict_record
 from calibration.verdict.sequential_test import (
     Decision,

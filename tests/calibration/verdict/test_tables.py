@@ -13,8 +13,7 @@ import pytest
 from calibration.__main__ import main
 from calibration.statistics.gls import SESSION_SHARE
 from calibration.statistics.study import middle_session
-from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.protocols import PROTOCOLS
+from calibration.swimmer.measured_table import PROTOCOLS, read_measurements
 from calibration.verdict.record import verdict_record
 from sim.io.errors import InputError, run_command
 from tests.calibration.toy_tables import DRAG, calibrated, effect, toy_table
