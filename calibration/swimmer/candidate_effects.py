@@ -61,16 +61,8 @@ def influences() -> dict[str, Influence]:
         plausible=(-0.6, 0.6),
     )  # fmt: skip
     for name, axis in zip(CURRENT, "xy", strict=True):
-        current = Parameter(
-            name,
-            f"current in the tank along {axis}",
-            0.0,
-            (-0.05, 0.05),
-            0.001,
-            unit="cm/s",
-            plausible=(-0.02, 0.02),
-            shown=100.0,
-        )
+        title, plausible = f"current in the tank along {axis}", (-0.02, 0.02)
+        current = Parameter(name, title, 0.0, (-0.05, 0.05), 0.001, unit="cm/s", plausible=plausible, shown=100.0)
         known[name] = Influence(current, None, f"course_{axis}", False)
     for name, (title, unit, bounds, typical, plausible, numbers) in _ONE_TAIL.items():
         fault = Parameter(name, title, 0.0, bounds, typical, unit=unit, plausible=plausible)

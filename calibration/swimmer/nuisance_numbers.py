@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from calibration.statistics.statistical_model import Parameter
 from sim.io.units import UNITS, from_si
@@ -78,38 +79,20 @@ def nuisance_parameters(
         unit = UNITS[_SHOWN_IN[name]]
         shown = from_si(1.0, unit.suffix)
         parameters.append(Parameter(name, title, value, bounds, 1.0, True, unit.text, sigma, shown=shown))
-    length = robot.sigma("tail_length")
-    size = length.of(robot.tail_length)
-    parameters.append(
-        Parameter(
-            LENGTH, "l (tail length, all tails alike)", 0.0, (-0.02, 0.02), 1e-3, False, "mm", size, shown=1e3
-        )
+    sigmas = {**TABLE_DEFAULTS, **table, LENGTH: robot.sigma("tail_length").of(robot.tail_length)}
+    degree, turn, log = {"shown": 180 / math.pi}, math.pi / 2, {"logarithmic": True}
+    course = {**degree, "plausible": (-2 * turn, 2 * turn), "grid": (-turn, turn)}
+    sees = bool({"R_yr", "v"} & set(outputs))
+    measured: tuple[tuple[bool, str, str, float, tuple[float, float], float, str, dict[str, Any]], ...] = (
+        (True, LENGTH, "l (tail length, all tails alike)", 0.0, (-0.02, 0.02), 1e-3, "mm", {"shown": 1e3}),
+        (sees, CAMERA, "scale of the camera", 1.0, (0.5, 2.0), 1.0, "1", log),
+        ("theta" in outputs, HEADING, "zero of the heading", 0.0, (-0.5, 0.5), 0.02, "°", degree),
+        (sees and "course_x" in noted, COURSE, "zero of the course", 0.0, (-4.0, 4.0), 0.1, "°", course),
+        (True, TACHOMETER, "ω (tachometer)", 1.0, (0.5, 2.0), 1.0, "1", log),
     )
-    sigmas = {**TABLE_DEFAULTS, **table}
-    if {"R_yr", "v"} & set(outputs):
-        parameters.append(
-            Parameter(CAMERA, "scale of the camera", 1.0, (0.5, 2.0), 1.0, True, "1", sigmas[CAMERA])
-        )
-    if "theta" in outputs:
-        parameters.append(
-            Parameter(
-                HEADING,
-                "zero of the heading",
-                0.0,
-                (-0.5, 0.5),
-                0.02,
-                False,
-                "°",
-                sigmas[HEADING],
-                shown=180 / math.pi,
+    for seen, name, title, start, bounds, typical, text, further in measured:
+        if seen:
+            parameters.append(
+                Parameter(name, title, start, bounds, typical, unit=text, sigma=sigmas[name], **further)
             )
-        )
-    if "course_x" in noted and {"R_yr", "v"} & set(outputs):
-        parameters.append(
-            Parameter(
-                COURSE, "zero of the course", 0.0, (-4.0, 4.0), 0.1, False, "°", sigmas[COURSE],
-                (-math.pi, math.pi), 180 / math.pi, grid=(-math.pi / 2, math.pi / 2),
-            )
-        )  # fmt: skip
-    parameters.append(Parameter(TACHOMETER, "ω (tachometer)", 1.0, (0.5, 2.0), 1.0, True, "1", sigmas[TACHOMETER]))
     return tuple(p for p in parameters if p.sigma)

@@ -262,11 +262,6 @@ class Verdict:
         return self.errors.rms["after"]
 
     @property
-    def error_generic(self) -> float:
-        """Relative error of the calibrated model with a regression of its residual on the held-out runs."""
-        return self.errors.rms["generic"]
-
-    @property
     def error_predictive(self) -> float | None:
         """Relative error with the learnt correction on the held-out runs, if there is one."""
         return self.errors.rms.get("predictive")
