@@ -2,220 +2,376 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
-from typing import TYPE_CHECKING
+import math
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout
+from functools import partial
+from importlib import import_module
+from io import TextIOWrapper
+from typing import TYPE_CHECKING, Any
 
-from planner.command_line import (
-    ARRIVE,
-    DWELLS,
-    OBSTACLES,
-    TABLE,
-    length_of,
-    progress_bar,
-    say,
-    say_job,
-    say_written,
-    vehicle_and_request,
-)
-from planner.fleet_command import FLEET, fleet_command
-from planner.job_commands import JOBS, planned_cover, planned_tour
-from planner.page_command import PAGE
-from planner.paths.units import describe, in_lab, read_length, read_pose
-from planner.replay_command import REPLAY
-from planner.tracking_commands import POSES, REPLAN, START, track, without_robot
-from sim.io.commands import ROBOT, UNIT, Program, argument, out
+from planner.paths.units import heading_in_degrees, in_lab, place_in_lab, read_length, read_pose
+from sim.io.commands import Program
 from sim.io.errors import InputError, naming
+from sim.io.units import format_length, format_time
 
 if TYPE_CHECKING:
-    from planner.goal.trip import Trip
-    from planner.paths.path import Path2D
     from planner.planning.planned import Plan
-    from sim.model.robot import Robot
+    from planner.tracking.tracker import Tracker
 
 program = Program("planner", "Plan switching schedules for paths, without simulating.")
 main = program.main
-
-_PLANNING = (
-    argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE, polygon:CORNERS:SIDE "
-             "(square:24cm, polygon:6:2l)"),
-    ROBOT,
-    *TABLE,
-    UNIT,
-    argument("--scale", type=float, default=1.0, help="multiply the path's coordinates"),
-    argument("--shape", help="which path of an SVG with several"),
-    argument("--closed", action="store_true", help="join the path's end to its start"),
-    argument("--smooth", metavar="LENGTH", help="smooth the path over this length, such as 1cm"),
-    argument("--point", default="head_centre", choices=("head_centre", "head_tip", "pivot"),
-             help="which point follows the path (default: head_centre)"),
-    argument("--corner", default="nearest", choices=("nearest", "minimax", "fillet", "error"),
-             help="places that are too tight: the nearest path that can be followed, by root mean square or by "
-             "its largest distance (minimax); round corners; or refuse"),
-    argument("--time-weight", type=float, default=0.0,
-             help="cut corners to save time: the mean squared distance, in l², that is worth the time of the "
-             "whole path (default: 0; 0.03 cuts a little)"),
-    argument("--objective", default="error", choices=("error", "time", "flips"),
-             help="what decides the dwell: small error, short time, or few flips (default: error)"),
-    *DWELLS,
-    ARRIVE,
-    argument("--loop", action="store_true", help="a closed path is followed lap after lap, until told otherwise"),
-    *OBSTACLES,
-)  # fmt: skip
-_TRACKING = (
-    argument("path", help="a path to plan for, as for planner plan; or a plan.json, its folder, or a goal.json, "
-             "tour.json or cover.json beside it"),
-    *without_robot(_PLANNING[1:]),
-)  # fmt: skip
+BAR_AFTER = 1.0  # s
+_GOAL = "planner.api.goal:to_goal"
+_TOUR, _COVER, _HOLD = (f"planner.api.jobs:{job}" for job in ("tour", "cover", "hold"))
 
 
-@program.command(
-    "plan",
-    "plan the switching times for a path",
-    *_PLANNING,
-    argument("--trade-off", action="store_true", help="draw error against time and flips, for ten dwells"),
-    out("folder"),
-)
-def _plan(arguments: Namespace) -> None:
-    from planner.files.plan_files import write_plan
-
-    result = _planned(arguments)
-    pictures = {}
-    if arguments.trade_off:
-        from planner.files.trade_off import draw_trade_off, trade_off
-
-        pictures["trade_off.svg"] = draw_trade_off(trade_off(result))
-    paths = write_plan(result, arguments.out, pictures=pictures)
-    say(result)
-    robot, errors = result.robot, result.errors
-    rms, largest, missed = (
-        in_lab(value, robot) for value in (errors.drawn_rms, errors.drawn_max, result.declared.missed)
-    )
+def say(result: Plan) -> None:
+    """Print warnings, start, dwells and errors."""
+    for warning in result.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    robot = result.robot
+    x, y, heading = result.start
+    place = place_in_lab(x, y, robot)
+    print(f"start: put the head's centre at {place}, heading {heading_in_degrees(heading)}, at rest")
+    shortest = format_time(result.minimum_dwell * robot.time_scale)
     print(
-        f"from the path as drawn {rms} rms, {largest} at most; every drawn point is within {missed} of the "
-        "declared path"
+        f"{len(result.dwells)} dwells of {shortest} ({result.minimum_dwell:.2f} time units) or more, "
+        f"{format_time(float(result.seconds.sum()))} in all"
     )
-    say_written(paths)
+    print(result.error_line)
+    for line in result.lines():
+        print(line)
 
 
-@program.command(
-    "goal",
-    "plan the way from one pose to another, around obstacles; exit status 3 where there is none",
-    argument("--goal", nargs=3, required=True, metavar=("X", "Y", "DEGREES"),
-             help="of the head's centre at the end"),
-    argument("--start", nargs=3, default=("0", "0", "0"), metavar=("X", "Y", "DEGREES"),
-             help="of the head's centre at the start, at rest (default: 0 0 0)"),
-    argument("--via", nargs=2, action="append", default=[], metavar=("X", "Y"),
-             help="a place that the pivot passes; may be given again"),
-    *OBSTACLES,
-    UNIT,
-    ROBOT,
-    *TABLE,
-    argument("--objective", default="time", choices=("error", "time", "flips"),
-             help="what decides the dwell: small error, short time, or few flips (default: time)"),
-    *DWELLS,
-    ARRIVE,
-    out("folder"),
-)  # fmt: skip
-def _goal(arguments: Namespace) -> None:
-    say_job(_goal_planned(arguments), arguments.out)
+def _write(result: Plan, out: str, *lines: str, **pictures: Any) -> None:
+    """Write a plan, and print what there is to say of it and its files."""
+    from planner.api.plan import write_plan
+
+    files = write_plan(result, out, **pictures)
+    say(result)
+    for line in (*lines, f"-> {', '.join(map(str, files))}"):
+        print(line)
 
 
-def _goal_planned(arguments: Namespace) -> Plan[Trip]:
-    """Plan the way that the command asks for."""
-    from planner.goal.to_goal import to_goal
-    from sim.inputs import load_robot
+@contextmanager
+def _progress_bar() -> Iterator[Callable[[float], object]]:
+    """Show a bar on a terminal, for plans that take long."""
+    from tqdm import tqdm
 
-    robot, unit = load_robot(arguments.robot), arguments.unit
-    start, goal = (read_pose(getattr(arguments, end), unit, robot, f"--{end}") for end in ("start", "goal"))
-    via = [tuple(read_length(each, unit, robot, "--via") for each in place) for place in arguments.via]
-    tracked, request = vehicle_and_request(arguments, robot)
-    with progress_bar() as progress:
-        return to_goal(start, goal, tracked, request, via, progress)
+    from planner.planning.progress import Share
 
+    style = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}"
+    with tqdm(
+        total=100, leave=False, delay=1.0, miniters=0, bar_format=style, disable=not sys.stderr.isatty()
+    ) as bar:
 
-@program.command(
-    "track",
-    "keep a robot on a path or a saved plan: poses come in on a pipe, orders go out (planner.tracking.pipe)",
-    *_TRACKING,
-    START,
-    *POSES,
-)
-def _track(arguments: Namespace) -> None:
-    track(arguments, _planned, _TRACKING)
+        def show(share: float) -> None:
+            if isinstance(share, Share):
+                bar.set_description_str(share.stage, refresh=False)
+                bar.update(100 * min(share.done, 1.0) - bar.n)
+
+        yield show
 
 
-def _planned(arguments: Namespace) -> Plan[None]:
-    """Make the plan that the command asks for."""
-    from planner.jobs.plan import make_plan
-    from sim.inputs import load_robot
+@program.command("plan", of="planner.api.plan:plan", robot="--robot")
+def _plan(path: str, *, robot: str, out: str, trade_off: bool = False, **given: Any) -> None:
+    """Plan the switching times for a path.
 
-    robot = load_robot(arguments.robot)
-    path = _path(arguments, robot)
-    print(f"path: {describe(path, robot)}")
-    tracked, request = vehicle_and_request(arguments, robot)
-    with progress_bar() as progress:
-        return make_plan(path, tracked, request, progress)
+    Args:
+        trade_off: draw error against time and flips, for ten dwells.
+        out: folder.
+    """
+    result = _planned(path, robot, **given)
+    pictures = {}
+    if trade_off:
+        from planner.files import trade_off as pictured
 
-
-def _path(arguments: Namespace, robot: Robot) -> Path2D:
-    """Make the path that the command asks for, in l."""
-    from planner.paths.path import smoothed
-    from planner.paths.path_files import read_path
-
-    drawing = read_path(arguments.path, closed=True if arguments.closed else None, shape=arguments.shape)
-    if not 0 < arguments.scale < float("inf"):
-        raise InputError(f"--scale {arguments.scale}; give a number above 0")
-    with naming(arguments.path):
-        path = drawing.in_tails(robot, arguments.unit).scaled(arguments.scale)
-    length = length_of(arguments, "smooth", robot)
-    if length is None:
-        return path
-    smooth, moved = smoothed(path, length)
-    print(f"smoothed over {in_lab(length, robot)}, which moves the path by up to {in_lab(moved, robot)}")
-    return smooth
+        pictures["trade_off.svg"] = pictured.draw_trade_off(pictured.trade_off(result))
+    errors = result.errors
+    rms, largest, missed = (
+        in_lab(value, result.robot) for value in (errors.drawn_rms, errors.drawn_max, result.declared.missed)
+    )
+    drawn = f"from the path as drawn {rms} rms, {largest} at most; every drawn point is within {missed} of the "
+    _write(result, out, f"{drawn}declared path", pictures=pictures)
 
 
-@program.command(
-    "check",
-    "tracking error of a replayed track",
-    argument("plan", help="plan.json"),
-    argument("track", help="table written by softflagella replay, or with time_s, x_cm, y_cm, heading_deg"),
-    out("overlay picture, PNG", default=None),
-)
-def _check(arguments: Namespace) -> None:
+def _job(target: str, out: str, given: Mapping[str, Any]) -> None:
+    """Plan with a public function, and write what it returns."""
+    module, _, name = target.partition(":")
+    with _progress_bar() as progress:
+        result = getattr(import_module(module), name)(progress=progress, **given)
+    _write(result, out)
+
+
+@program.command("goal", of=_GOAL, robot="--robot")
+def _goal(
+    *, goal: tuple[str, str, str], start: tuple[str, str, str] = ("0", "0", "0"), out: str, **given: Any
+) -> None:
+    """Plan the way from one pose to another, around obstacles; exit status 3 where there is none.
+
+    Args:
+        goal: X Y DEGREES, of the head's centre at the end.
+        start: X Y DEGREES, of the head's centre at the start, at rest (default: 0 0 0).
+        out: folder.
+    """
+    _job(_GOAL, out, {"start": start, "goal": goal, **given})
+
+
+@program.command("tour", of=_TOUR, robot="--robot", back="return")
+def _tour(*, out: str, **given: Any) -> None:
+    """Visit places in the order that takes the robot the least time.
+
+    Args:
+        out: folder.
+    """
+    _job(_TOUR, out, given)
+
+
+@program.command("cover", of=_COVER, robot="--robot", width="--width", holes="hole")
+def _cover(*, out: str, **given: Any) -> None:
+    """Sweep a region with a camera, magnet or sampler under the robot.
+
+    Args:
+        out: folder.
+    """
+    _job(_COVER, out, given)
+
+
+@program.command("hold", of=_HOLD, robot="--robot", seconds="for")
+def _hold(*, out: str, **given: Any) -> None:
+    """Stay about a place, on the smallest orbit that the robot can keep.
+
+    Args:
+        out: folder.
+    """
+    _job(_HOLD, out, given)
+
+
+def _from_rest(plan: Callable[..., Any], start: Sequence[str] = ("0", "0", "0"), **given: Any) -> Any:
+    return plan(start, **given)
+
+
+@program.command("fleet")
+def _fleet(fleet: str, *, apart: str | None = None, feedback: bool = False, out: str) -> None:
+    """Plan several robots in one tank so that they keep apart.
+
+    Args:
+        fleet: TOML with a table [[member]] for each robot: robot, and path, goal, places or region.
+        apart: least distance between bodies, such as 10cm (default: apart of the file).
+        feedback: the poses will be measured for a tracker.
+        out: folder.
+    """
+    from planner.api import goal, jobs, plan
+    from planner.files.fleet_files import distance_apart, read_fleet, write_fleet
+    from planner.jobs.fleet import Member
+    from planner.jobs.fleet import fleet as keep_apart
+
+    asked = read_fleet(fleet)
+    if (apart := apart or asked.apart) is None:
+        raise InputError(f"{fleet}: how far apart? give --apart 10cm, or apart in the file")
+    plans: dict[str, Callable[..., Any]] = {
+        "plan": plan.plan,
+        "goal": partial(_from_rest, goal.to_goal),
+        "tour": jobs.tour,
+        "cover": jobs.cover,
+    }
+    members = []
+    for robot in asked.robots:
+        with naming(f"{fleet}: {robot.name}"):
+            command = program.commands[robot.command]
+            given = vars(
+                command.parser(robot.command).parse_args([*robot.words[:2], "--out", out, *robot.words[2:]])
+            )
+            options = {name: value for name, value in given.items() if name not in ("out", "trade_off")}
+            if feedback:
+                options["feedback"] = True
+            members.append(Member(robot.name, plans[robot.command](**options), robot.delay))
+    distance = distance_apart(apart, asked.unit, [member.plan.robot for member in members])
+    with _progress_bar() as progress:
+        result = keep_apart(members, distance, feedback=feedback or asked.feedback, progress=progress)
+    files = write_fleet(result, out)
+    for warning in result.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    for line in (*result.lines(), f"-> {', '.join(map(str, files))}"):
+        print(line)
+
+
+@program.command("track", of="planner.api.plan:plan", robot="--robot")
+def _track(
+    path: str,
+    *,
+    robot: str | None = None,
+    start: tuple[str, str, str] | None = None,
+    noise: str = "0.01l",
+    noise_rad: float = 0.01,
+    latency: float = 0.0,
+    **given: Any,
+) -> None:
+    """Keep a robot on a path or a saved plan: poses come in on a pipe, orders go out (planner.tracking.pipe).
+
+    Args:
+        path: a path to plan for, as for planner plan; or a plan.json, its folder, or a goal.json, tour.json or
+            cover.json beside it.
+        robot: robot.toml or the name of a preset; a saved plan has its own.
+        start: X Y DEGREES, of the head's centre, at rest; the robot finds its way to the path from there (default:
+            a path's start; the first pose that comes in, for a saved plan).
+        noise: LENGTH, standard deviation of x and y (default: 0.01l).
+        noise_rad: standard deviation of the heading.
+        latency: age of a pose when it comes in, in seconds (default: 0).
+    """
+    from planner.files.saved_plan import is_plan
+    from planner.tracking.pipe import answers
+    from planner.tracking.tracker import Tracker
+
+    if not 0 < noise_rad < math.inf:
+        raise InputError(f"--noise-rad {noise_rad}; give a number above 0")
+    if not 0 <= latency < math.inf:
+        raise InputError(f"--latency {latency}; give a number of seconds, 0 or more")
+    if isinstance(sys.stdin, TextIOWrapper):  # a damaged line must not end the tracker
+        sys.stdin.reconfigure(errors="replace")
+    saved = is_plan(path)
+    with redirect_stdout(sys.stderr):
+        plan = _saved(path, robot=robot, **given) if saved else _planned(path, robot, **given)
+    unit, scale = given.get("unit"), plan.robot.time_scale
+    deviations = (read_length(noise, unit, plan.robot, "--noise", above_zero=True), noise_rad)
+
+    def begin(pose: tuple[float, float, float] | None, now: float) -> Tracker:
+        return Tracker(plan, noise=deviations, latency=latency / scale, begin=now, start=pose)
+
+    if start is not None:
+        tracker: Tracker | None = begin(read_pose(start, unit, plan.robot, "--start"), 0.0)
+    else:
+        tracker = None if saved else begin(None, 0.0)
+    for answer in answers(tracker, sys.stdin, plan.robot, begin):
+        print(answer, flush=True)
+
+
+def _planned(path: str, robot: str | None, **given: Any) -> Plan:
+    """Plan for a path, with a bar and a line on the path."""
+    from planner.api.plan import plan
+
+    if robot is None:
+        raise InputError(f"{path} is no saved plan, so --robot is needed: a robot.toml or a preset")
+    with _progress_bar() as progress:
+        return plan(path, robot, progress=progress, tell=print, **given)
+
+
+def _saved(path: str, *, unit: str | None = None, lookup: str | None = None, own_table: bool = False,
+           **planning: Any) -> Plan:  # fmt: skip
+    """Make a saved plan again; options of planning are refused beside it."""
+    from planner.files.saved_plan import restore_plan
+    from surrogate.table.model_file import load_table
+
+    for name in (name for name, value in planning.items() if value is not None):
+        option = f"--{name.replace('_', '-')}"
+        raise InputError(f"{option}: {path} is planned already; leave {option} out, or plan again")
+    return restore_plan(path, lookup=None if lookup is None else load_table(lookup), own_table=own_table)
+
+
+@program.command("page", of="planner.api.page:write_page", path="", robot="--robot", paths="path")
+def _page(*, out: str, paths: Sequence[str] = (), **given: Any) -> None:
+    """Write one HTML file that plans: draw a path in the browser, take the schedule along.
+
+    Args:
+        paths: a path that the page offers: CSV, SVG, or a shape such as circle:20cm.
+        out: the page, HTML.
+    """
+    from planner.api.page import write_page
+
+    page = write_page(out, paths=paths, **given)
+    print(f"{page.stat().st_size / 1e6:.2f} MB, opens in a browser -> {page}")
+
+
+@program.command("replan", of="planner.api.follow:replan")
+def _replan(plan: str, track: str, *, out: str, **given: Any) -> None:
+    """Plan the rest of a saved plan from where a robot is now.
+
+    Args:
+        plan: plan.json, its folder, or a goal.json, tour.json or cover.json beside it.
+        track: table of the robot so far: time_s, x_cm, y_cm, heading_deg; in its last row the robot is now, at
+            rest.
+        out: folder.
+    """
+    from planner.api.follow import replan
+
+    _write(replan(plan, track, **given), out)
+
+
+@program.command("replay")
+def _replay(plan: str, *, robot: str | None = None, out: str, error: bool = True) -> None:
+    """Simulate a planned schedule, and compare the track with the plan.
+
+    Args:
+        plan: plan.json.
+        robot: another robot that carries the plan out: a robot.toml or a preset (default: the plan's).
+        out: CSV with the track.
+        error: estimate the error of the track, which takes more than half as long again.
+    """
+    from tqdm import tqdm
+
     from planner.files.plan_json import load_plan
-    from planner.files.tracking_error import draw_overlay, tracking_error
-    from sim.io.files import whole_file
-    from sim.io.tables import read_table
+    from planner.files.tracking_error import tracking_error
+    from sim.inputs import load_robot
+    from sim.io.files import write_csv
+    from sim.io.units import format_time
+    from sim.model.plan_file import read_plan_file
+    from sim.model.schedule import load_schedule
+    from sim.motion.replay import replay, replay_error
 
-    content = load_plan(arguments.plan)
-    with naming(arguments.track):
-        error = tracking_error(content, read_table(arguments.track))
+    planned = load_schedule(plan)
+    schedule = planned if robot is None else planned.swum_by(load_robot(robot))
+    shown: Any = {"unit": "dwell", "delay": BAR_AFTER, "disable": None}  # None: shown on a terminal alone
+    with tqdm(total=len(schedule.dwells), desc="replay", **shown) as bar:
+        track = replay([schedule], progress=bar.update)[0]
+    own_error = ""
+    if error:
+        with tqdm(total=len(schedule.dwells), desc="on a coarser mesh", **shown) as bar:
+            size = replay_error(schedule, track, progress=bar.update)
+        length = schedule.tail_length
+        in_lab = f"{size:.2g} l" if length is None else f"{format_length(size * length)} ({size:.2g} l)"
+        own_error = f", the simulator's own error is {in_lab} at most"
+    track = planned.in_own_units(track)
+    write_csv(track, out)
+    end = track.iloc[-1]
+    place = f"({end.x_over_l:.3f}, {end.y_over_l:.3f}) l"
+    if "x_cm" in track:
+        place = f"({end.x_cm:.2f}, {end.y_cm:.2f}) cm = {place}"
+    time = format_time(end.time_s)
+    print(f"{len(schedule.dwells)} dwells, {time}, ends at {place}{own_error} -> {out}")
+    if "reference" in read_plan_file(plan):  # a schedule alone has no path
+        print(tracking_error(load_plan(plan), track).line)
+
+
+@program.command("check", of="planner.api.follow:check")
+def _check(plan: str, track: str, *, out: str | None = None) -> None:
+    """Tracking error of a replayed track.
+
+    Args:
+        plan: plan.json.
+        track: table written by softflagella replay, or with time_s, x_cm, y_cm, heading_deg.
+        out: overlay picture, PNG.
+    """
+    from planner.api.follow import check
+    from planner.files.plan_json import load_plan
+
+    content = load_plan(plan)
+    error = check(content, track)
     print(error.line)
-    if arguments.out:
+    if out is not None:
         from matplotlib.figure import Figure
+
+        from planner.files.tracking_error import draw_overlay
+        from sim.io.files import whole_file
 
         figure = Figure(figsize=(6, 6))
         axes = figure.add_subplot()
         draw_overlay(axes, content, error, content["robot"]["name"])
         axes.legend(fontsize=8, frameon=False)
-        with whole_file(arguments.out) as part:
+        with whole_file(out) as part:
             figure.savefig(part, format="png", dpi=130, bbox_inches="tight")
-        print(f"-> {arguments.out}")
-
-
-@program.command("fleet", "plan several robots in one tank so that they keep apart", *FLEET)
-def _fleet(arguments: Namespace) -> None:
-    planned = {
-        "plan": _planned,
-        "goal": _goal_planned,
-        "tour": planned_tour,
-        "cover": planned_cover,
-    }
-    fleet_command(arguments, program.commands, planned)
-
-
-for job in (*JOBS, PAGE, REPLAN, REPLAY):
-    program.command(job.name, job.help, *job.arguments)(job.run)
+        print(f"-> {out}")
 
 
 if __name__ == "__main__":

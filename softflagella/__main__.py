@@ -6,7 +6,7 @@ import difflib
 import sys
 from importlib import import_module
 
-from sim.io.commands import Command, Declared, Program
+from sim.io.commands import Command, Program
 from sim.io.errors import run_command
 
 WORDS = {  # the most important commands -> package and command
@@ -55,10 +55,10 @@ def _demo(*, out: str = "reports/demo.html") -> None:
     run_demo(out)
 
 
-def command(word: str) -> Command | Declared:
+def command(word: str) -> Command:
     """Return the command that a word stands for."""
     package, name = WORDS[word]
-    commands: dict[str, Command | Declared] = import_module(f"{package}.__main__").program.commands
+    commands: dict[str, Command] = import_module(f"{package}.__main__").program.commands
     return commands[name]
 
 

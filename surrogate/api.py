@@ -71,7 +71,7 @@ def query(
 def inverse(
     targets: Mapping[str, Any] | pd.DataFrame | str | Path,
     *,
-    free: str | Sequence[str] = "C_t,C_r,C_yr",
+    free: Sequence[str] | str = "C_t,C_r,C_yr",
     lookup: LookupTable | str | Path | None = None,
 ) -> pd.DataFrame:
     """Find robots that have given motions, with a trained look-up table.

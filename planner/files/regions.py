@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.jobs.region import Field
-from planner.paths.obstacles import Circle, FreeSpace, Polygon, Region
+from planner.paths.obstacles import Circle, Polygon, Region
 from planner.paths.path_files import Drawing, read_path
 from planner.paths.shapes import like_a_shape, shape_of
 from planner.paths.units import in_tails, read_length
@@ -63,18 +62,6 @@ def read_outline(words: str) -> Drawing:
     return read_path(words, closed=True)
 
 
-def read_free_space(keep_out: Sequence[str], walls: str | None, unit: str | None, robot: Robot) -> FreeSpace:
-    """Read what a robot must keep out of, and what it must stay within; see `read_region`.
-
-    Raises:
-        InputError: the words are no regions, or the walls are round.
-    """
-    outline = None if walls is None else read_region(walls, unit, robot)
-    if outline is not None and not isinstance(outline, Polygon):
-        raise InputError(f"--walls {walls!r}; give a box or an outline")
-    return FreeSpace(tuple(read_region(words, unit, robot) for words in keep_out), outline)
-
-
 def read_places(words: Sequence[str], unit: str | None, robot: Robot) -> Floats:
     """Read places (n, 2), in tail lengths.
 
@@ -97,19 +84,8 @@ def read_places(words: Sequence[str], unit: str | None, robot: Robot) -> Floats:
     )
 
 
-def read_field(words: str, holes: Sequence[str], unit: str | None, robot: Robot) -> Field:
-    """Read a region with holes, in tail lengths.
-
-    Args:
-        words: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline.
-        holes: the same for each hole.
-        unit: of numbers without one; a region of which a file says another unit is refused.
-        robot: its tail length.
-
-    Raises:
-        InputError: the words are no regions.
-    """
-    if words.partition(":")[0] not in ("circle", "box"):
-        with naming(words):
-            read_outline(words).in_tails(robot, unit)
-    return Field(read_region(words, unit, robot), tuple(read_region(hole, unit, robot) for hole in holes))
+def refuse_other_unit(region: object, unit: str | None, robot: Robot) -> None:
+    """Refuse a file with an outline that says another unit than `unit`; other regions have none of their own."""
+    if isinstance(region, str) and region.partition(":")[0] not in _SHAPES:
+        with naming(region):
+            read_outline(region).in_tails(robot, unit)

@@ -33,15 +33,9 @@ from pathlib import Path
 from typing import Any, NamedTuple, NoReturn, TypeVar
 
 from sim.io.errors import InputError, run_command
-from sim.io.units import LENGTHS
 
-_RENAMED = {
-    "--minimum-dwell": "--min-dwell",
-    "--minimum-seconds": "--min-dwell-s",
-    "--lookup": "--model",
-}  # old names
-_PLAIN: dict[str, dict[str, Any]] = {"str": {}, "bool": {}, "int": {"type": int}, "float": {"type": float}}
-Run = Callable[[Namespace], None]
+_RENAMED = {"--minimum-dwell": "--min-dwell", "--minimum-seconds": "--min-dwell-s", "--lookup": "--model"}
+_PLAIN: dict[str, dict[str, Any]] = {kind.__name__: {"type": kind} for kind in (str, bool, int, float)}
 F = TypeVar("F", bound=Callable[..., None])
 
 
@@ -62,12 +56,11 @@ def _source(file: Path) -> ast.Module:
     return ast.parse(file.read_text())
 
 
-def read_function(file: Path, name: str) -> tuple[str, dict[str, Parameter]]:
-    """Read the first sentence of a function's docstring, and its parameters by name, from the source."""
+def read_function(file: Path, name: str) -> dict[str, Parameter]:
+    """Read a function's parameters from the source, those of **options: Unpack[Options] among them."""
     found = (node for node in _source(file).body if isinstance(node, ast.FunctionDef) and node.name == name)
     function = next(found)
-    summary, about = _read_docstring(ast.get_docstring(function) or "")
-    signature = function.args
+    signature, about = function.args, _read_docstring(function)
     plain = [*signature.posonlyargs, *signature.args]
     defaults = [*[None] * (len(plain) - len(signature.defaults)), *signature.defaults, *signature.kw_defaults]
     parameters = {}
@@ -75,64 +68,78 @@ def read_function(file: Path, name: str) -> tuple[str, dict[str, Parameter]]:
         value = default.value if isinstance(default, ast.Constant) else None
         parameters[node.arg] = Parameter(node.arg, node.annotation, file, value, default is None,
                                          node in plain, about.get(node.arg))  # fmt: skip
-    return summary, parameters
+    options = signature.kwarg.annotation if signature.kwarg else None
+    return _read_options(options.slice, file) | parameters if isinstance(options, ast.Subscript) else parameters
 
 
-def _read_docstring(text: str) -> tuple[str, dict[str, str]]:
-    """Return the first sentence, and what stands under "Args:" by parameter."""
-    summary = " ".join(text.split("\n\n")[0].split())
-    section = re.search(r"^Args:\n((?:    .*\n|\n)*)", text + "\n", re.MULTILINE)
-    entries = re.findall(
-        r"^    (\w+(?:, \w+)*): (.*\n(?:     .*\n)*)", section[1] if section else "", re.MULTILINE
-    )
-    about = {
-        name: " ".join(words.split()).replace("`", "") for names, words in entries for name in names.split(", ")
+def _read_options(name: ast.expr, file: Path) -> dict[str, Parameter]:
+    """Read the fields of a TypedDict from the source, those of its bases first."""
+    for node, home in _named(name, file):
+        if isinstance(node, ast.ClassDef):
+            fields = [field for field in node.body if isinstance(field, ast.AnnAssign)]
+            about = _read_docstring(node)
+            own = {ast.unparse(field.target): field.annotation for field in fields}
+            inherited = [_read_options(base, home) for base in node.bases]
+            return {key: each for base in inherited for key, each in base.items()} | {
+                key: Parameter(key, hint, home, help=about.get(key)) for key, hint in own.items()
+            }
+    return {}
+
+
+def _named(name: ast.expr, file: Path) -> Iterator[tuple[ast.stmt, Path]]:
+    """Find the assignments and classes of a name in a file, or in the one that it is imported from."""
+    wanted = ast.unparse(name)
+    for node in ast.walk(_source(file)):
+        if (isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == wanted) or (
+            isinstance(node, ast.ClassDef) and node.name == wanted
+        ):
+            yield node, file
+        elif isinstance(node, ast.ImportFrom) and wanted in [alias.name for alias in node.names]:
+            spec = find_spec(node.module) if node.module and "." in node.module else None
+            if spec and spec.origin:
+                yield from _named(name, Path(spec.origin))
+
+
+def _read_docstring(node: ast.FunctionDef | ast.ClassDef) -> dict[str, str]:
+    """Return what stands under "Args:" or "Attributes:" by name."""
+    text = ast.get_docstring(node) or ""
+    section = re.search(r"^(?:Args|Attributes):\n((?:    .*\n|\n)*)", text + "\n", re.MULTILINE)
+    entry = re.compile(r"^    (\w+(?:, \w+)*): (.*\n(?:     .*\n)*)", re.MULTILINE)
+    return {
+        name: " ".join(words.split()).replace("`", "").removesuffix(".")
+        for names, words in entry.findall(section[1] if section else "")
+        for name in names.split(", ")
     }
-    return summary, {name: words.removesuffix(".") for name, words in about.items()}
 
 
 def _alternatives(hint: ast.expr, file: Path) -> Iterator[tuple[ast.expr, Path]]:
-    """List the types of a union, names of other types in the packages' sources resolved."""
+    """List the types of a union from the last to the first, names of unions resolved."""
     if isinstance(hint, ast.BinOp):
-        yield from _alternatives(hint.left, file)
         yield from _alternatives(hint.right, file)
-    elif not (isinstance(hint, ast.Name) and hint.id not in _PLAIN):
-        yield hint, file
+        yield from _alternatives(hint.left, file)
+    elif isinstance(hint, ast.Name) and hint.id not in _PLAIN:
+        for node, home in _named(hint, file):
+            if isinstance(node, ast.Assign):
+                yield from _alternatives(node.value, home)
     else:
-        for node in ast.walk(_source(file)):
-            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == hint.id:
-                yield from _alternatives(node.value, file)
-            elif isinstance(node, ast.ImportFrom) and hint.id in [alias.name for alias in node.names]:
-                spec = find_spec(node.module or "") if "." in (node.module or "") else None
-                if spec and spec.origin:
-                    yield from _alternatives(hint, Path(spec.origin))
+        yield hint, file
 
 
 def _from_words(hint: ast.expr, file: Path) -> dict[str, Any] | None:
-    """Say how argparse makes values of a type, None if it cannot; bool is {"type": bool}."""
-    union = hint
-    while isinstance(union, ast.BinOp):  # str in sight needs no other file
-        if ast.unparse(union.right) == "str":
-            return {}
-        union = union.left
-    if ast.unparse(union) == "str":
-        return {}
-    for node, home in list(_alternatives(hint, file)):
+    """Say how argparse makes values of a type, of a union of the last one that it can; None if it cannot."""
+    for node, home in _alternatives(hint, file):
         if isinstance(node, ast.Name):
-            return {"type": bool} if node.id == "bool" else dict(_PLAIN[node.id])
+            return dict(_PLAIN[node.id])
         if not isinstance(node, ast.Subscript):
             continue
-        kind, parts = (
-            ast.unparse(node.value),
-            node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice],
-        )
+        parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        kind, inner = ast.unparse(node.value), None
         if kind == "Literal":
             return {"choices": [ast.literal_eval(part) for part in parts]}
-        inner = _from_words(parts[0], home)
-        if kind == "tuple" and inner is not None:
-            return {**inner, "nargs": len(parts)}
-        if kind == "Sequence" and inner is not None:
-            return {**inner, "many": True}
+        if kind in ("tuple", "Sequence"):
+            inner = _from_words(parts[0], home)
+        if inner is not None:
+            return {**inner, **({"nargs": len(parts)} if kind == "tuple" else {"many": True})}
     return None
 
 
@@ -171,11 +178,11 @@ class Command(NamedTuple):
     def parameters(self) -> dict[str, Parameter]:
         """Return the parameters of the public function, with those of its own."""
         code = self.run.__code__
-        own = read_function(Path(code.co_filename), code.co_name)[1]
+        own = read_function(Path(code.co_filename), code.co_name)
         if not self.of:
             return own
         module, _, name = self.of.partition(":")
-        theirs = read_function(Path(str(find_spec(module).origin)), name)[1]  # type: ignore[union-attr]
+        theirs = read_function(Path(str(find_spec(module).origin)), name)  # type: ignore[union-attr]
         return theirs | {name: each for name, each in own.items() if each.help is not None or name not in theirs}
 
     def add_arguments(self, parser: ArgumentParser) -> None:
@@ -213,7 +220,8 @@ def _add(parser: ArgumentParser, parameter: Parameter, name: str, words: dict[st
     if parameter.positional and not name.startswith("-"):
         if many or not parameter.needed:
             words["nargs"] = "+" if many else "?"
-        parser.add_argument(parameter.name, metavar=name.upper(), help=about, **words)
+        words.setdefault("metavar", name.upper())
+        parser.add_argument(parameter.name, help=about, **words)
         return
     option = f"--{name.removeprefix('--')}"
     if flag and default:
@@ -232,16 +240,10 @@ class Program:
 
     def __init__(self, package: str, about: str):
         self.package, self.about = package, about
-        self.commands: dict[str, Command | Declared] = {}
+        self.commands: dict[str, Command] = {}
 
     def command(
-        self,
-        name: str,
-        help: str = "",
-        *arguments: Argument,
-        of: str = "",
-        further: Mapping[str, str] | None = None,
-        **names: str,
+        self, name: str, *, of: str = "", further: Mapping[str, str] | None = None, **names: str
     ) -> Callable[[F], F]:
         """Decorate the function that runs a command; its docstring begins with a sentence for overviews.
 
@@ -254,9 +256,6 @@ class Program:
         """
 
         def add(run: F) -> F:
-            if help:
-                self.commands[name] = Declared(run, name, help, arguments)
-                return run
             summary = " ".join((run.__doc__ or "").split("\n\n")[0].split()).removesuffix(".")
             summary = summary[0].lower() + summary[1:]
             self.commands[name] = Command(run, name, summary, of, names, further or {})
@@ -288,69 +287,3 @@ class Program:
     def exit(self) -> None:
         """Run as a process: exit status 0; for bad input 2, with one line on stderr."""
         sys.exit(run_command(self.main))
-
-
-class Argument(NamedTuple):
-    """Arguments of `ArgumentParser.add_argument`."""
-
-    names: tuple[str, ...]
-    options: dict[str, Any]
-
-
-def argument(*names: str, **options: Any) -> Argument:
-    """Declare an argument of a command, written as for argparse; `old`: its name of the last release."""
-    return Argument(names, options)
-
-
-def out(what: str, **options: Any) -> Argument:
-    """Declare the option --out; it is required unless it has a default."""
-    return Argument(("--out",), {"required": "default" not in options, "help": f"output: {what}", **options})
-
-
-ROBOT = argument("--robot", required=True, help="robot.toml or the name of a preset")
-RUNS_OF = argument(
-    "--robot", dest="runs_of", help="robot.toml or the name of a preset, for a table of its runs: N,l_cm,omega_rpm"
-)
-JOBS = argument("--jobs", type=int, help="processes or threads (default: all processors)")
-UNIT = argument("--unit", choices=LENGTHS, metavar="UNIT",
-                help="of all lengths that are given without one: m, cm, mm, or l for tail lengths. 24cm and 3l, "
-                "columns x_cm and y_cm, and drawings with a size have their own")  # fmt: skip
-LOOKUP = argument("--lookup", old="--model", help="look-up table (default: the one that comes with the package)")
-
-
-def refuse_runs_of(arguments: Namespace) -> None:
-    """Refuse RUNS_OF beside a robot."""
-    if arguments.runs_of is not None:
-        raise InputError(
-            f"--robot goes with a table of runs, and {arguments.robot} is a robot; leave one of them out"
-        )
-
-
-class Declared(NamedTuple):
-    """A command whose arguments are declared one by one."""
-
-    run: Callable[[Namespace], None]
-    name: str
-    help: str
-    arguments: tuple[Argument, ...]
-
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the arguments to a parser, and the function that runs the command."""
-        for names, options in self.arguments:
-            old = options.get("old")
-            added = parser.add_argument(*names, **{key: value for key, value in options.items() if key != "old"})
-            if old:
-                kind = options.get("type", str)
-                parser.add_argument(old, dest=added.dest, type=kind, action=_Renamed, const=names[0],
-                                    default=SUPPRESS, help=SUPPRESS)  # fmt: skip
-        parser.set_defaults(run=self.run)
-
-    def parser(self, prog: str) -> ArgumentParser:
-        """Return a parser of this command alone."""
-        parser = Parser(prog=prog, description=self.help[0].upper() + self.help[1:] + ".")
-        self.add_arguments(parser)
-        return parser
-
-    def main(self, prog: str, words: list[str]) -> None:
-        """Parse words and run the command."""
-        self.run(self.parser(prog).parse_args(words))

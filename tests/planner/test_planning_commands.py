@@ -240,7 +240,7 @@ def test_another_robot_carries_out_a_plan_and_its_tracking_error_is_told(
     tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its track is in the plan's tail lengths; without a terminal no bar is written."""
-    monkeypatch.setattr("planner.replay_command.BAR_AFTER", 0.0)
+    monkeypatch.setattr("planner.__main__.BAR_AFTER", 0.0)
     result = planned("circle:1l", objective="flips")
     other = replace(CONTROL, name="other", tail_length=0.9 * CONTROL.tail_length)
     write_plan(result, tmp_path)

@@ -9,7 +9,6 @@ import pytest
 
 import softflagella as sf
 from sim.io.errors import run_command
-from sim.io.keywords import keywords_of
 from softflagella.__main__ import PACKAGES, WORDS, command, main
 
 
@@ -70,21 +69,6 @@ def test_wrong_words_end_in_one_line(words: list[str], expected: str, capsys: py
     assert line.startswith("error: ")
     assert expected in line
     assert captured.out == ""
-
-
-PYTHON = {"plan": sf.plan, "goal": sf.to_goal, "tour": sf.tour, "cover": sf.cover, "hold": sf.hold,
-          "page": sf.write_page, "query": sf.query, "steady": sf.steady,
-          "calibrate": sf.calibrate, "tracks": sf.tracks}  # fmt: skip
-OF_COMMANDS = {  # files, units and words of the command line
-    "out", "unit", "scale", "shape", "closed", "trade_off", "smooth", "path", "no_path", "hole", "check", "arrive",
-    "back", "no_laws", "no_stability", "runs_of",  # --robot of a table of runs: `robot=` in Python
-}  # fmt: skip
-
-
-def test_an_option_has_the_name_of_the_keyword() -> None:
-    for word, function in PYTHON.items():
-        options = {action.dest for action in command(word).parser("x")._actions if action.option_strings}
-        assert options - {"help"} - OF_COMMANDS <= set(keywords_of(function)), word
 
 
 def test_an_old_option_works_with_a_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

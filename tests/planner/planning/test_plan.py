@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 import numpy as np
 import pytest
 
-from planner.command_line import say
+from planner.__main__ import say
 from planner.files.plan_files import controller_header
 from planner.jobs.plan import plan
 from planner.paths.distance import distance_to

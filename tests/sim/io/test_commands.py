@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import pytest
 
-from sim.io.commands import Command, Declared, Program
+from sim.io.commands import Program
 from sim.io.errors import InputError
 from softflagella.__main__ import PACKAGES
 from softflagella.__main__ import program as top
@@ -107,7 +107,7 @@ COMMANDS = [(package, name) for package, each in PROGRAMS.items() for name in ea
 
 @pytest.mark.parametrize(("package", "name"), COMMANDS, ids=map(" ".join, COMMANDS))
 def test_every_option_of_every_command_says_what_it_is(package: str, name: str) -> None:
-    command: Command | Declared = PROGRAMS[package].commands[name]
+    command = PROGRAMS[package].commands[name]
     assert command.help[0].islower() or not command.help[1].islower()
     for action in command.parser(name)._actions:
         assert action.help, action.dest

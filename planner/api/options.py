@@ -1,0 +1,237 @@
+"""Options that the planning functions share, as words of a command or as Python has them.
+
+Numbers are in tail lengths l, time units μ0 l⁴/EI and rad. Words are as in commands: lengths with their units, as
+4cm or 0.3l, or in `unit`; times as 12min; regions as circle:X,Y,RADIUS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypedDict
+
+from numpy.typing import ArrayLike
+
+from planner.files.own_table import table_for
+from planner.files.regions import read_places, read_region
+from planner.paths.obstacles import Circle, FreeSpace, Polygon
+from planner.paths.path import Path2D
+from planner.paths.units import read_length, read_pose, read_time
+from planner.planning.camera import POSE, Camera
+from planner.planning.request import Corner, PlanRequest
+from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
+from planner.vehicle.dwell_choice import Objective
+from planner.vehicle.tracked_point import Point, TrackedVehicle, tracked_vehicle
+from sim.io.errors import InputError
+from sim.io.units import LengthUnit
+from sim.model.robot import Robot
+from sim.robot_rows import OneRobot, one_robot
+from surrogate.interface import LookupTable
+from surrogate.table.model_file import load_table
+
+Length = float | str
+Region = Circle | Polygon | Path2D | ArrayLike | str
+_REQUEST = ("point", "corner", "time_weight", "objective", "minimum_dwell", "minimum_seconds", "dwell",
+            "tolerance", "seed", "camera", "feedback")  # fmt: skip
+
+
+class TableOptions(TypedDict, total=False):
+    """Which table knows the robot, and units.
+
+    Attributes:
+        lookup: look-up table, or its file (default: the one that comes with the package; where that one does not
+            know the robot, the robot's own table is simulated, and kept beside its file).
+        own_table: simulate a look-up table of this robot, once; it is more accurate on long paths.
+        knowledge: what a calibration found besides the robot: covariance, current. Default: that of the file.
+        unit: of all lengths in words that are given without one; l for tail lengths. 24cm and 3l, columns x_cm and
+            y_cm, and drawings with a size have their own.
+    """
+
+    lookup: LookupTable | str | Path | None
+    own_table: bool
+    knowledge: CalibrationKnowledge | None
+    unit: LengthUnit | None
+
+
+class DwellOptions(TableOptions, total=False):
+    """What dwells must keep to.
+
+    Attributes:
+        minimum_dwell: shortest dwell that the motor allows, in time units μ0 l⁴/EI.
+        minimum_seconds: the same in seconds; the larger one counts.
+        tolerance: LENGTH, largest acceptable stated error, such as 5mm; the dwell is shortened until it is kept.
+    """
+
+    minimum_dwell: float | None
+    minimum_seconds: float | None
+    tolerance: Length | None
+
+
+class SpaceOptions(TypedDict, total=False):
+    """What the body must keep clear of, and how sure that is.
+
+    Attributes:
+        keep_out: REGION, that the robot's body must not touch: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a
+            CSV or SVG outline; or a `Circle`, or corners (n, 2). Where it is in the way, a way around is chosen.
+        walls: REGION, what the body must stay within: box:…, or a CSV or SVG outline, or corners (n, 2).
+        feedback: the pose will be measured for a tracker: the margin around obstacles is the stated error with
+            feedback.
+        camera: NOISE RAD EVERY LATE LOST, of the stated error with feedback: standard deviations of a place and of
+            a heading in rad, seconds between poses, their age in seconds, share that is lost (default: 0.01l 0.01
+            1 2 0.2); or a `Camera`.
+        seed: of the random robots from which the stated error is computed.
+    """
+
+    keep_out: Sequence[Region]
+    walls: Region | None
+    feedback: bool
+    camera: Camera | tuple[str, str, str, str, str]
+    seed: int
+
+
+class GoalOptions(DwellOptions, SpaceOptions, total=False):
+    """Options of `to_goal`."""
+
+
+class PointOptions(DwellOptions, total=False):
+    """Which point follows, and what decides the dwell.
+
+    Attributes:
+        point: which point of the robot follows the path or does the job (default: head_centre).
+        objective: what decides the dwell: small error, short time, or few flips (default: error).
+        dwell: this shortest dwell, in time units, and not the one that the objective would choose.
+    """
+
+    point: Point
+    objective: Objective
+    dwell: float | None
+
+
+class CornerOptions(PointOptions, total=False):
+    """What is done with places that are too tight.
+
+    Attributes:
+        corner: places that are too tight: the nearest path that can be followed, by root mean square (nearest, the
+            default) or by its largest distance (minimax); round corners (fillet); or refuse (error).
+        time_weight: cut corners to save time: the mean squared distance, in l², that is worth the time of the
+            whole path (default: 0; 0.03 cuts a little).
+    """
+
+    corner: Corner
+    time_weight: float
+
+
+class JobOptions(PointOptions, SpaceOptions, total=False):
+    """Options of `tour`, `cover` and `hold`.
+
+    Attributes:
+        progress: called now and then with the share of what is done.
+    """
+
+    progress: Callable[[float], object] | None
+
+
+class PathOptions(CornerOptions, JobOptions, total=False):
+    """Options of `plan`."""
+
+
+def asked(robot: OneRobot, options: Mapping[str, Any], **own: Any) -> tuple[TrackedVehicle, PlanRequest]:
+    """Return a robot's vehicle with its tracked point, and what is asked of its plan.
+
+    Args:
+        robot: the robot.
+        options: see the classes above.
+        own: further fields of `PlanRequest`.
+
+    Raises:
+        InputError: an option cannot be, or no table knows the robot.
+    """
+    swims = one_robot(robot)
+    request = request_of(options, swims, **own)
+    table, knowledge = table_of(robot, options)
+    return tracked_vehicle(swims, table, request.point, knowledge), request
+
+
+def table_of(robot: OneRobot, options: Mapping[str, Any]) -> tuple[LookupTable, CalibrationKnowledge]:
+    """Return the look-up table that knows a robot, and what a calibration found besides."""
+    source = None if isinstance(robot, Robot) else str(robot)
+    known = options.get("knowledge") or (CalibrationKnowledge() if source is None else read_knowledge(source))
+    lookup = options.get("lookup")
+    if isinstance(lookup, str | Path):
+        lookup = load_table(lookup)
+    return lookup or table_for(one_robot(robot), source, known, own=options.get("own_table", False)), known
+
+
+def request_of(options: Mapping[str, Any], robot: Robot, **own: Any) -> PlanRequest:
+    """Return what is asked of a plan; `own` are further fields."""
+    given, unit = {name: options[name] for name in _REQUEST if name in options}, options.get("unit")
+    if "camera" in given:
+        given["camera"] = camera_of(given["camera"], unit, robot)
+    if given.get("tolerance") is not None:
+        given["tolerance"] = length_of(given["tolerance"], unit, robot, "--tolerance")
+    space = free_space(options.get("keep_out", ()), options.get("walls"), unit, robot)
+    return PlanRequest(**given, **own, space=space)
+
+
+def length_of(given: Length, unit: str | None, robot: Robot, name: str) -> float:
+    """Return a length above 0 in l; a number is one."""
+    return read_length(given, unit, robot, name, above_zero=True) if isinstance(given, str) else given
+
+
+def camera_of(given: Camera | Sequence[str], unit: str | None, robot: Robot) -> Camera:
+    """Return a camera, or read its words.
+
+    Raises:
+        InputError: a word is no number, or cannot be.
+    """
+    if isinstance(given, Camera):
+        return given
+    place, *numbers = given
+    noise = read_length(place, unit, robot, "--camera", above_zero=True)
+    try:
+        heading, every_s, delay_s, lost = map(float, numbers)
+    except ValueError:
+        raise InputError(
+            f"--camera {' '.join(given)}: RAD, EVERY, LATE, LOST are numbers without a unit, such as 0.01 1 2 0.2"
+        ) from None
+    return Camera((noise, heading), every_s, delay_s, lost)
+
+
+def region_of(given: Region, unit: str | None, robot: Robot) -> Circle | Polygon:
+    """Return a region, or read its words."""
+    if isinstance(given, str | Path):
+        return read_region(str(given), unit, robot)
+    return given if isinstance(given, Circle | Polygon) else Polygon.of(given)
+
+
+def free_space(keep_out: Sequence[Region], walls: Region | None, unit: str | None, robot: Robot) -> FreeSpace:
+    """Return the space that regions and walls leave.
+
+    Raises:
+        InputError: the words are no regions, or the walls are round.
+    """
+    outline = None if walls is None else region_of(walls, unit, robot)
+    if isinstance(outline, Circle):
+        raise InputError(f"--walls {walls!r}; give a box or an outline")
+    return FreeSpace(tuple(region_of(each, unit, robot) for each in keep_out), outline)
+
+
+def pose_of(given: Sequence[Length], unit: str | None, robot: Robot, name: str) -> POSE:
+    """Return a pose in l and rad, or read its words: X, Y and degrees."""
+    if any(isinstance(each, str) for each in given):
+        return read_pose([str(each) for each in given], unit, robot, name)
+    x, y, heading = (float(each) for each in given)
+    return x, y, heading
+
+
+def places_of(
+    given: Sequence[Sequence[float] | str] | str | Path, unit: str | None, robot: Robot
+) -> Sequence[Sequence[float]]:
+    """Return places in l, or read their words: X,Y of each, or a file."""
+    words = [str(given)] if isinstance(given, str | Path) else [each for each in given if isinstance(each, str)]
+    return read_places(words, unit, robot).tolist() if words else given  # type: ignore[return-value]
+
+
+def seconds_of(given: float | str | None, name: str) -> float | None:
+    """Return a time in seconds, or read its words."""
+    return read_time(given, name) if isinstance(given, str) else given

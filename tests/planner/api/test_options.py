@@ -1,0 +1,53 @@
+"""Options of the planning functions: words of commands and numbers ask for the same."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planner.api.options import places_of, pose_of, request_of, seconds_of
+from planner.paths.obstacles import Circle
+from planner.planning.camera import Camera
+from sim.io.errors import InputError
+from tests.planner.plans import CONTROL
+
+CM = 100 * CONTROL.tail_length  # in a tail length
+
+
+def test_words_ask_for_what_numbers_ask_for() -> None:
+    words = {"keep_out": ["circle:1l,0,4"], "walls": "box:-3l,-2l,3l,2l", "tolerance": "5mm", "unit": "cm",
+             "camera": ("0.02l", "0.03", "1", "2", "0.1"), "feedback": True}  # fmt: skip
+    numbers = {"keep_out": [Circle(1, 0, 4 / CM)], "walls": [[-3, -2], [3, -2], [3, 2], [-3, 2]],
+               "tolerance": 0.5 / CM, "camera": Camera((0.02, 0.03), 1.0, 2.0, 0.1), "feedback": True}  # fmt: skip
+    first, second = request_of(words, CONTROL, loop=True), request_of(numbers, CONTROL, loop=True)
+    assert first.tolerance == pytest.approx(second.tolerance)
+    assert (first.camera, first.feedback, first.loop) == (second.camera, True, True)
+    probes = np.random.default_rng(0).uniform(-4, 4, (50, 2))
+    np.testing.assert_allclose(first.space.distance(probes), second.space.distance(probes), atol=1e-12)
+    assert request_of({}, CONTROL).space.empty
+
+
+def test_poses_places_and_times() -> None:
+    assert pose_of(("1l", f"{CM}cm", "90"), None, CONTROL, "--goal") == pytest.approx((1, 1, math.pi / 2))
+    assert pose_of((1, 2, 3), "cm", CONTROL, "--goal") == (1, 2, 3)
+    assert places_of(["1l,0", f"0,{CM}"], "cm", CONTROL) == [pytest.approx([1, 0]), pytest.approx([0, 1])]
+    assert places_of([(1, 2), (3, 4)], "cm", CONTROL) == [(1, 2), (3, 4)]
+    assert seconds_of("1h20min", "--for") == seconds_of(4800.0, "--for") == 4800
+    assert seconds_of(None, "--for") is None
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({"walls": "circle:0,0,3l"}, "--walls 'circle:0,0,3l'; give a box or an outline"),
+        ({"tolerance": "5"}, "--tolerance: 5 has no unit"),
+        ({"camera": ("0.02l", "x", "1", "2", "0.1")}, "RAD, EVERY, LATE, LOST are numbers"),
+    ],
+)
+def test_words_that_cannot_be(options: dict[str, Any], expected: str) -> None:
+    with pytest.raises(InputError) as refusal:
+        request_of(options, CONTROL)
+    assert expected in str(refusal.value)
