@@ -175,7 +175,8 @@ def to_page(value: Any) -> Any:
         return to_page({**_parts(value), "arc": value.arc, "curvature": value.curvature})
     if isinstance(value, Plan):
         errors = _named({name: getattr(value.errors, name) for name in ERRORS})
-        own = {"errors": errors | {"feedback": value.feedback_error}, "unmeasured": value.unmeasured_error}
+        own = {"errors": errors | {"feedback": value.feedback_error}, "unmeasured": value.unmeasured_error,
+               "objective": value.request.objective}  # fmt: skip
         return to_page({**_parts(value), **own})
     if hasattr(value, "_asdict"):
         return to_page(_named(value._asdict()))
