@@ -52,14 +52,24 @@ class Parameter(NamedTuple):
 
 
 @cache
-def _source(file: Path) -> ast.Module:
-    return ast.parse(file.read_text())
+def _source(file: Path) -> dict[str, ast.stmt]:
+    """Map the names of a module's source to what makes them: functions, classes, assignments, imports."""
+    names: dict[str, ast.stmt] = {}
+    top = ast.parse(file.read_text()).body
+    for node in [inner for each in top for inner in (each.body if isinstance(each, ast.If) else [each])]:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names[node.name] = node
+        elif isinstance(node, ast.Assign):
+            names[ast.unparse(node.targets[0])] = node
+        elif isinstance(node, ast.ImportFrom):
+            names |= {alias.name: node for alias in node.names}
+    return names
 
 
 def read_function(file: Path, name: str) -> dict[str, Parameter]:
     """Read a function's parameters from the source, those of **options: Unpack[Options] among them."""
-    found = (node for node in _source(file).body if isinstance(node, ast.FunctionDef) and node.name == name)
-    function = next(found)
+    function = _source(file)[name]
+    assert isinstance(function, ast.FunctionDef)
     signature, about = function.args, _read_docstring(function)
     plain = [*signature.posonlyargs, *signature.args]
     defaults = [*[None] * (len(plain) - len(signature.defaults)), *signature.defaults, *signature.kw_defaults]
@@ -69,35 +79,34 @@ def read_function(file: Path, name: str) -> dict[str, Parameter]:
         parameters[node.arg] = Parameter(node.arg, node.annotation, file, value, default is None,
                                          node in plain, about.get(node.arg))  # fmt: skip
     options = signature.kwarg.annotation if signature.kwarg else None
-    return _read_options(options.slice, file) | parameters if isinstance(options, ast.Subscript) else parameters
+    return (
+        _read_options(ast.unparse(options.slice), file) | parameters
+        if isinstance(options, ast.Subscript)
+        else parameters
+    )
 
 
-def _read_options(name: ast.expr, file: Path) -> dict[str, Parameter]:
+def _read_options(name: str, file: Path) -> dict[str, Parameter]:
     """Read the fields of a TypedDict from the source, those of its bases first."""
-    for node, home in _named(name, file):
-        if isinstance(node, ast.ClassDef):
-            fields = [field for field in node.body if isinstance(field, ast.AnnAssign)]
-            about = _read_docstring(node)
-            own = {ast.unparse(field.target): field.annotation for field in fields}
-            inherited = [_read_options(base, home) for base in node.bases]
-            return {key: each for base in inherited for key, each in base.items()} | {
-                key: Parameter(key, hint, home, help=about.get(key)) for key, hint in own.items()
-            }
-    return {}
+    node, home = _named(name, file)
+    if not isinstance(node, ast.ClassDef):
+        return {}
+    fields, about = dict[str, Parameter](), _read_docstring(node)
+    for base in node.bases:
+        fields |= _read_options(ast.unparse(base), home)
+    own = [field for field in node.body if isinstance(field, ast.AnnAssign)]
+    keys = [ast.unparse(field.target) for field in own]
+    hints = [field.annotation for field in own]
+    return fields | {k: Parameter(k, hint, home, help=about.get(k)) for k, hint in zip(keys, hints, strict=True)}
 
 
-def _named(name: ast.expr, file: Path) -> Iterator[tuple[ast.stmt, Path]]:
-    """Find the assignments and classes of a name in a file, or in the one that it is imported from."""
-    wanted = ast.unparse(name)
-    for node in ast.walk(_source(file)):
-        if (isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == wanted) or (
-            isinstance(node, ast.ClassDef) and node.name == wanted
-        ):
-            yield node, file
-        elif isinstance(node, ast.ImportFrom) and wanted in [alias.name for alias in node.names]:
-            spec = find_spec(node.module) if node.module and "." in node.module else None
-            if spec and spec.origin:
-                yield from _named(name, Path(spec.origin))
+def _named(name: str, file: Path) -> tuple[ast.stmt | None, Path]:
+    """Find what makes a name: in a file, or in the file of the packages from which that imports it."""
+    node = _source(file).get(name)
+    if not isinstance(node, ast.ImportFrom):
+        return node, file
+    spec = find_spec(node.module) if node.module and "." in node.module else None
+    return _named(name, Path(spec.origin)) if spec and spec.origin else (None, file)
 
 
 def _read_docstring(node: ast.FunctionDef | ast.ClassDef) -> dict[str, str]:
@@ -118,9 +127,9 @@ def _alternatives(hint: ast.expr, file: Path) -> Iterator[tuple[ast.expr, Path]]
         yield from _alternatives(hint.right, file)
         yield from _alternatives(hint.left, file)
     elif isinstance(hint, ast.Name) and hint.id not in _PLAIN:
-        for node, home in _named(hint, file):
-            if isinstance(node, ast.Assign):
-                yield from _alternatives(node.value, home)
+        node, home = _named(hint.id, file)
+        if isinstance(node, ast.Assign):
+            yield from _alternatives(node.value, home)
     else:
         yield hint, file
 
