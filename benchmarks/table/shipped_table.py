@@ -3,14 +3,10 @@
 Usage: softflagella sweep --config surrogate/shipped/domain.toml --out SWEEP
        python -m benchmarks shipped_table WORK --sweep SWEEP --out MODEL    simulate the rest (kept in WORK), train
        python -m benchmarks shipped_table WORK --test MODEL [--card CARD]
-       python -m benchmarks shipped_table WORK --spread-of MODEL --sweep TWO --out NEW
-       python -m benchmarks shipped_table WORK --tails-of MODEL [--single] --out NEW
 
---test prints errors and coverage on robots of the test set. --spread-of learns the spread over the disc's phase
-anew, from a sweep of robots with two tails. That of the shipped file is from domain.toml with 8192 rows, the
-seed 20261123, N = 2 and a history every 64 rows. --tails-of learns all but the response to a flip anew; with
---single, the network of a single tail only. The shipped file was made in this order: --sweep, --spread-of,
---tails-of, --tails-of with --single.
+--test prints errors and coverage on robots of the test set. The shipped file was made by an earlier version of
+this program. It learned the spread over the disc's phase apart, from domain.toml with 8192 rows, the seed
+20261123, N = 2 and a history every 64 rows, and the tails again after the response.
 
 The tails are learned from robots with heads far wider than those of the domain, a single tail also from robots of
 the domain, half of which have effects on head and motor, and from 8192 robots with all these effects and a surface
@@ -39,12 +35,12 @@ from sim.motion.batches import steady_columns
 from surrogate.input_ranges import ROBOT
 from surrogate.networks.checkpoints import TrainingContext, remove_states
 from surrogate.networks.training_loop import Settings
+from surrogate.one_robot.tabulate import TOLERANCE
 from surrogate.table.errors import coverage, curve_errors, error_table, relative_errors, summary
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
-from surrogate.table.response_table import ResponseTable
+from surrogate.table.outside import INSIDE
 from surrogate.training.model_card import model_card
-from surrogate.training.response_errors import with_response_errors
 from surrogate.training.simulated import (
     MOTION,
     SimulatedRobots,
@@ -53,12 +49,11 @@ from surrogate.training.simulated import (
     read_robots,
     simulate_robots,
 )
-from surrogate.training.train import fit_spread, learn, learn_tails_again, split, with_radius
+from surrogate.training.train import held_out_curve_errors, learn, split, with_radius
 
 TAILS = Settings(width=64, depth=3, members=1, epochs=60, iterations=3000)
 SINGLE = replace(TAILS, iterations=6000)
 CURVES = Settings(width=64, depth=2, members=1, epochs=60, iterations=1500)
-SPREAD = Settings(width=32, depth=2, members=1, epochs=60, iterations=600)
 ROWS = {
     "tails": (32768, 101), "single": (16384, 505), "couples": (8192, 606),
     "widths": (8192, 202), "widths_couples": (6144, 911),
@@ -74,6 +69,7 @@ _COUPLES = ("couples", "widths_couples", "held_out_couples", "locked_couples")
 _SINGLE = {"single": 1.0, "couples": 1.0, "widths_couples": 0.5, "held_out_couples": 0.5}
 _STEADY_ONLY = ("surface_couple", "motor_droop")  # effects that the response to a flip is not learned with
 _SWEPT = 16384  # rows of the sweep without history whose lags are learned
+_DRAWN = 4  # times as many as are wanted for the errors of the response: some are outside the domain
 _FLIPS_DRAWN = 6400  # of this sequence, the first ones are simulated
 
 
@@ -171,33 +167,32 @@ def covered(lookup: NeuralTable, rows: SimulatedRobots) -> dict[str, float]:
     return coverage(answered, known)
 
 
-def relearned_spread(lookup: NeuralTable, folder: str) -> NeuralTable:
-    """Learn the spread of a table's lags anew, and print its error on held-out robots of the sweep."""
-    rows, numbers = read_robots(folder)
-    part = split(numbers)
-    network, bases = fit_spread(rows.at(part == 0), SPREAD)
-    curves = ResponseTable((*lookup.curves.networks[:2], network), {**lookup.curves.bases, **bases})
-    source = {"spread": {"rows": len(rows), "data_hash": read_manifest(folder)["config_hash"]}}
-    changed = replace(lookup, curves=curves, provenance={**lookup.provenance, **source})
-    held_out = rows.at(part == 2)
-    known = ~changed.query(held_out.robots, flag=True)["outside"]
-    found, wanted = changed.response(held_out.robots, flag=True).spread[known], held_out.curves["spread"][known]
-    factor = np.exp(np.abs(np.log(found[..., 2] / wanted[..., 2])))
-    middle, most = np.quantile(factor, [0.5, 0.95])
-    print(f"{known.sum()} held-out robots: within a factor of {middle:.2f}, 95 % within {most:.2f}")
-    return changed
+def with_response_errors(
+    lookup: NeuralTable, *, count: int = 420, seed: int = 202, title: str = ""
+) -> NeuralTable:
+    """Return a table with errors of its response learned from new robots; half a second of one core each.
 
+    The curves of a data set are simulated with time steps that leave errors as large as the table's. These robots
+    have a tenth of the tolerance.
 
-def tails_again(lookup: NeuralTable, work: Path, *, single_only: bool) -> NeuralTable:
-    """Learn all of a table anew but the response to a flip, and print the errors; see `learn_tails_again`."""
-    learned, widths, held_out = (_joined(work, names) for names in (_LEARNED, _WIDTHS, _HELD_OUT))
-    source = {name: part for name, part in lookup.provenance.items() if name in ("data_hash", "spread")}
-    changed = learn_tails_again(
-        lookup, learned, widths, held_out, TAILS, single_settings=SINGLE, single_only=single_only,
-        source={**source, "seeds": {**ROWS, **FLIPS}}, work=TrainingContext("train", folder=work / "states"),
-    )  # fmt: skip
-    print(error_table(changed.errors))
-    return with_response_errors(changed, title="errors of the response")
+    Args:
+        lookup: a trained table.
+        count: robots, with two tails or more.
+        seed: of their draws; another one than those of the robots that the table has learned.
+        title: of the progress bar; empty for none.
+    """
+    robots = draw_robots(_DRAWN * count, seed, wide=False)
+    several = robots["N"] > 1
+    robots = {name: values[several] for name, values in robots.items()}
+    inside = np.flatnonzero(lookup.solve(robots).outside == INSIDE)[:count]
+    chosen = {name: values[inside] for name, values in robots.items()}
+    flips = simulate_robots(chosen, curves=True, tolerance=TOLERANCE, title=title)
+    source = {"robots": len(flips), "seed": seed, "tolerance": TOLERANCE}
+    return replace(
+        lookup,
+        curve_errors=held_out_curve_errors(lookup, flips),
+        provenance={**lookup.provenance, "response_errors": source},
+    )
 
 
 def as_reached(robots: Mapping[str, Floats], *, title: str = "") -> SimulatedRobots:
@@ -213,23 +208,11 @@ def main(*words: str) -> None:
     parser.add_argument("--out")
     parser.add_argument("--sweep", help="data set built from surrogate/shipped/domain.toml")
     parser.add_argument("--test")
-    parser.add_argument("--tails-of", help="model whose tails are learned anew")
-    parser.add_argument("--single", action="store_true", help="with --tails-of: learn that of one tail only")
-    parser.add_argument("--spread-of", help="model whose spread is learned anew from --sweep")
     parser.add_argument("--card", help="with --test: write the card, from held-out robots of the domain")
     arguments = parser.parse_args(words)
-    if arguments.single and not arguments.tails_of:
-        parser.error("--single needs --tails-of")
     if arguments.out:
-        if arguments.tails_of:
-            tails_again(load(arguments.tails_of), arguments.work, single_only=arguments.single).save(arguments.out)
-            remove_states(arguments.work / "states")
-            return
         if not arguments.sweep:
             parser.error("--out needs --sweep")
-        if arguments.spread_of:
-            relearned_spread(load(arguments.spread_of), arguments.sweep).save(arguments.out)
-            return
         steady, widths, held_out = (_joined(arguments.work, names) for names in (_LEARNED, _WIDTHS, _HELD_OUT))
         flips = kept(arguments.work, "flips")
         source = {"seeds": {**ROWS, **FLIPS}, "data_hash": read_manifest(arguments.sweep)["config_hash"]}
@@ -239,6 +222,7 @@ def main(*words: str) -> None:
             single_settings=SINGLE, source=source,
             flips_held_out=swept_held_out, work=TrainingContext("train", folder=arguments.work / "states"),
         )  # fmt: skip
+        lookup = with_response_errors(lookup, title="errors of the response")
         lookup.save(arguments.out)
         remove_states(arguments.work / "states")
         print(error_table(lookup.errors))

@@ -23,22 +23,22 @@ from sim.io.keywords import checks_keywords
 from sim.io.provenance import fingerprint, provenance
 from surrogate.input_ranges import ROBOT
 from surrogate.networks.checkpoints import TrainingContext, device_named
-from surrogate.networks.ensemble import Ensemble
 from surrogate.networks.training_loop import Settings
+from surrogate.table.curve_errors import KINDS, CurveErrors
 from surrogate.table.errors import curve_errors, relative_errors, summary
 from surrogate.table.intervals import Intervals
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.outside import INSIDE, MAX_YAW_SHARE
-from surrogate.table.response_table import PARTS, Basis
+from surrogate.table.response_table import PARTS, SHAPES, along_axes, flip_inputs
 from surrogate.table.support import Support
 from surrogate.table.wrench_table import CLASSES, INPUT_COUNTS, network_index
-from surrogate.training.fit_response import SETTINGS, fit_part, fit_response
-from surrogate.training.fit_wrench import WrenchSamples, fit_class, fit_wrench, learnable, wrench_samples
-from surrogate.training.response_errors import held_out_curve_errors
+from surrogate.training.fit_response import SETTINGS, fit_response
+from surrogate.training.fit_wrench import WrenchSamples, fit_wrench, learnable, wrench_samples
 from surrogate.training.simulated import SimulatedRobots, join_robots, read_robots, simulate_robots
 from surrogate.wrench.tails import network_inputs
 
 _FEWEST_INSIDE = 10
+_FEWEST_FLIPS = 200  # robots, for the covariance of the errors of the response
 _FEWEST_ROWS, _FEWEST_OF_A_CLASS = 64, 16
 _QUIET = TrainingContext()
 
@@ -166,7 +166,10 @@ def learn(
         "held_out": len(held_out),
         "flips": len(usable),
     }
-    created = _created(wrench_settings, single_settings, asdict(response_settings), work)
+    created = provenance({
+        "tails": asdict(wrench_settings), "single": asdict(single_settings or wrench_settings),
+        "curves": asdict(response_settings), "device": work.device,
+    })  # fmt: skip
     lookup = NeuralTable(
         tails=table,
         curves=response,
@@ -179,79 +182,12 @@ def learn(
     return _judged(lookup, width_rows, held_out, flips_held_out)
 
 
-def learn_tails_again(
-    lookup: NeuralTable,
-    learned: SimulatedRobots,
-    width_rows: SimulatedRobots,
-    held_out: SimulatedRobots,
-    settings: Settings | None = None,
-    *,
-    single_settings: Settings | None = None,
-    single_only: bool = False,
-    source: dict[str, Any] | None = None,
-    work: TrainingContext = _QUIET,
-) -> NeuralTable:
-    """Learn networks, domain and intervals of a table's tails anew; its response to a flip stays.
-
-    The errors of the response depend on the domain: `surrogate.training.response_errors` learns them anew.
-
-    Args:
-        lookup: the table.
-        learned, width_rows, held_out: steady motions, see `learn`.
-        settings: networks of the tails and their optimiser.
-        single_settings: of the network of robots with one tail; by default `settings`.
-        single_only: learn only network and domain of robots with one tail, and keep the others.
-        source: more provenance.
-        work: device, progress bars, and where states are kept.
-    """
-    wrench_settings, rows = settings or Settings(), _learnable(learned)
-    created = _created(wrench_settings, single_settings, lookup.provenance["config"]["curves"], work)
-    counts = {"train": len(rows.motion), "widths": len(width_rows), "held_out": len(held_out)}
-    support, ranges = _supports(rows), _ranges(learned)
-    if single_only:
-        single = fit_class(rows, 1, single_settings or wrench_settings, work)
-        tails = replace(lookup.tails, wrench=(single, *lookup.tails.wrench[1:]))
-        support = (support[0], *lookup.support[1:])
-        ends = {name: (*lookup.ranges[name], *ranges[name]) for name in ranges}
-        ranges = {name: (min(values), max(values)) for name, values in ends.items()}
-        created["several_tails_of"] = lookup.identity
-    else:
-        tails = fit_wrench(rows, wrench_settings, work, single_settings=single_settings)
-    changed = replace(
-        lookup,
-        tails=tails,
-        support=support,
-        ranges=ranges,
-        provenance={**created, **(source or {}), "rows": {**lookup.provenance["rows"], **counts}},
-    )
-    return _with_intervals(changed, width_rows, held_out)
-
-
-def _created(
-    settings: Settings, single_settings: Settings | None, curves: dict[str, Any], work: TrainingContext
-) -> dict[str, Any]:
-    """Return the provenance of a table that is trained with these settings."""
-    single = asdict(single_settings or settings)
-    return provenance({"tails": asdict(settings), "single": single, "curves": curves, "device": work.device})
-
-
 def _supports(rows: WrenchSamples) -> tuple[Support | None, ...]:
     """Learn the domain of each of CLASSES, from the inputs of its network; None where there are no rows."""
     kind = network_index(rows.tails.number)
     parts = [rows.at(kind == k) for k in range(len(CLASSES))]
     inputs = [network_inputs(p.tails, p.motion, size) for p, size in zip(parts, INPUT_COUNTS, strict=True)]
     return tuple(Support.learned(x) if len(x) else None for x in inputs)
-
-
-def fit_spread(
-    flipped: SimulatedRobots, settings: Settings, work: TrainingContext = _QUIET
-) -> tuple[Ensemble, dict[str, Basis]]:
-    """Fit the spread of the lags over the disc's phase alone; `flipped` are robots with response curves."""
-    flipped = _several_tails(flipped)
-    samples = _learnable(flipped)
-    usable = np.flatnonzero(learnable(wrench_samples(flipped.robots, flipped.motion)))
-    curves = flipped.at(usable).curves
-    return fit_part(("spread",), samples.heads, samples.tails, samples.motion, curves, settings, work)
 
 
 def _judged(
@@ -264,6 +200,28 @@ def _judged(
     truth = {**flips.motion, **flips.curves}
     report = summary(curve_errors(response, truth), flips.motion["tail_gap"] >= 1)
     return replace(lookup, errors={**lookup.errors, **report}, curve_errors=held_out_curve_errors(lookup, flips))
+
+
+def held_out_curve_errors(lookup: NeuralTable, flips: SimulatedRobots) -> CurveErrors | None:
+    """Learn the errors of the response from robots that were not learned; None where they are too few.
+
+    Args:
+        lookup: the table.
+        flips: held-out robots with curves.
+    """
+    motions = lookup.solve(flips.robots)
+    known = (motions.outside == INSIDE) & (flips.motion["tail_gap"] >= 1)
+    if known.sum() < _FEWEST_FLIPS:
+        return None
+    response = lookup.response(flips.robots, flag=True)
+    _, speeds = flip_inputs(motions.robots, motions.motion, motions.inputs)
+    errors = {
+        kind: ((getattr(response, kind) - flips.curves[kind]) / along_axes(speeds, SHAPES[kind]))[known]
+        for kind in KINDS
+    }
+    return CurveErrors.learned(
+        lookup.width_features(motions)[known], errors, lookup.curves.bases, flips.motion["error"][known]
+    )
 
 
 def _with_intervals(lookup: NeuralTable, width_rows: SimulatedRobots, held_out: SimulatedRobots) -> NeuralTable:

@@ -14,7 +14,7 @@ is found. Units: l, μ0 l⁴/EI, EI/l².
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,9 +25,7 @@ from sim.io.errors import InputError
 from sim.model.groups import Groups
 from sim.solve.assembly import assemble
 from surrogate.input_ranges import ROBOT
-from surrogate.wrench.tails import TAIL_NUMBERS, Tails, head_inputs, total_wrench
-
-Numbers = Callable[[Tails, Floats], Floats]  # tails and motion (M, 5) -> y (M, 6) of `surrogate.wrench.tails`
+from surrogate.wrench.tails import TAIL_NUMBERS, Tails, head_inputs
 
 # A robot for the compiled loops: |ω|, gain, resistance (20), L and sense of the head; then the tails, as packed.
 RESISTANCE, HEAD_LENGTH, SENSE, HEAD_NUMBERS = 2, 22, 23, 24
@@ -120,18 +118,6 @@ def needs_no_learning(effect: str) -> bool:
     """Return whether an effect enters the balance by algebra: it changes head, disc, motor, or all drag alike."""
     entry = catalogue()[effect]
     return entry.reach == "local" and entry.term not in _ON_TAILS
-
-
-def full_motion(heads: Heads, u: Floats) -> Floats:
-    """Return (v_x, v_z, ω_yr, ω_h, ω_t), (M, 5), from the four velocities u (M, 4)."""
-    return np.concatenate([u, (heads.speed + heads.gain * u[:, 3])[:, None]], 1)
-
-
-def unbalanced(heads: Heads, tails: Tails, u: Floats, numbers: Numbers) -> Floats:
-    """Return W − R (v_x, v_z, ω_yr, ω_h, ω_t), (M, 4)."""
-    motion = full_motion(heads, u)
-    wrench = total_wrench(tails, motion, numbers(tails, motion))
-    return wrench - (heads.resistance @ motion[..., None])[..., 0]
 
 
 def straight_resistance(tails: Tails) -> Floats:

@@ -228,11 +228,6 @@ def wrench_slopes(tails: Tails, motion: Floats) -> Floats:
     return np.stack([np.stack(row, -1) for row in rows], -2)
 
 
-def total_wrench(tails: Tails, motion: Floats, y: Floats) -> Floats:
-    """Return (F_x, F_z, M_y, M_z) of all tails on the disc about J, (M, 4), for the network's numbers y (M, 6)."""
-    return straight_wrench(tails, motion) + (wrench_slopes(tails, motion) @ y[..., None])[..., 0]
-
-
 def _terms(tails: Tails, motion: Floats) -> tuple[Floats, ...]:
     terms: tuple[Floats, ...] = wrench_terms(
         tails.zeta_perp, tails.zeta_parallel, tails.offset, tails.number, motion.T

@@ -69,18 +69,15 @@ def test_robots_that_couples_turn_against_their_tails_are_learned_with_one_tail_
         assert learned[against].mean() > 0.9 if tails == 1 else not learned[against].any()
 
 
-def test_a_single_tail_can_be_learned_again_alone() -> None:
-    """The table knows robots with more tails as before, though it learns none."""
-    before, several = table(), rows(256, 13, wide=False)
+def test_a_single_tail_is_learned_beside_several() -> None:
+    several = rows(256, 13, wide=False)
     held = join_robots([several, turned(1.0, 18)])
-    after = training.learn_tails_again(before, turned(1.0), held, held, TAILS, single_only=True)
-    first, second = (lookup.query(several.robots, flag=True) for lookup in (before, after))
-    assert before.tails.wrench[0] is None
-    assert not first["outside"].all()
-    assert all(np.array_equal(first[name], second[name]) for name in first)
-    assert after.provenance["several_tails_of"] == before.identity
+    few = replace(TAILS, epochs=20, iterations=40)
+    found = training.learn(
+        join_robots([several, turned(1.0)]), held, held, flips(), few, CURVES, single_settings=TAILS
+    )
     fresh = turned(1.0, 19)
-    answer = after.query(fresh.robots, intervals=True, flag=True)
+    answer = found.query(fresh.robots, intervals=True, flag=True)
     wanted, inside = fresh.motion["omega_yr_bar"], ~answer["outside"]
     assert inside.mean() > 0.5
     assert np.median(np.abs(answer["omega_yr_bar"] / wanted - 1)[inside]) < 0.2
