@@ -148,7 +148,7 @@ def _export(model: str | None = None, *, onnx: str | None = None, small: str | N
         onnx: no longer written; use --small.
         small: FOLDER, at most 150 kB, for a microcontroller, with a reader in C.
     """
-    from surrogate.export.small_copy_files import save_small_copy
+    from surrogate.export.small_copy import save_small_copy
     from surrogate.table.model_file import load
 
     if onnx:

@@ -13,7 +13,7 @@ from sim.io.keywords import checks_keywords
 from sim.io.tables import read_table
 from sim.model.groups import DWELL
 from sim.robot_rows import OneRobot, robot_rows, with_units
-from surrogate.export.small_copy_files import save_small_copy
+from surrogate.export.small_copy import save_small_copy
 from surrogate.interface import LookupTable
 from surrogate.table.answers import answer_rows
 from surrogate.table.inverse import inverse_table

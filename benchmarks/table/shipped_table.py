@@ -39,7 +39,7 @@ from surrogate.one_robot.tabulate import TOLERANCE
 from surrogate.table.errors import coverage, curve_errors, error_table, relative_errors, summary
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
-from surrogate.table.outside import INSIDE
+from surrogate.table.support import INSIDE
 from surrogate.training.model_card import model_card
 from surrogate.training.simulated import (
     MOTION,

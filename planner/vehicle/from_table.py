@@ -16,7 +16,7 @@ from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.robot import Robot
 from surrogate.interface import ErrorModes, LookupTable
-from surrogate.table.refusals import refusing_robots
+from surrogate.table.answers import refusing_robots
 
 _TIME_STEPS = 2.5e-4  # of the yaw rate, one standard deviation: error of time steps (`sim.motion.resolution`)
 _ODD = 0.2  # share of a table's error that has opposite signs in the two directions

@@ -6,7 +6,7 @@ K members are evaluated side by side; their mean is the answer. Inputs are shift
 larger than the spread says that the output changes slowly along this input; the first weights are then small.
 This is prior knowledge of the problem, and training gains much from it (docs/explanation/lookup.md).
 
-`surrogate.networks.loops` evaluates, `surrogate.networks.trainable` trains.
+`surrogate.networks.loops` evaluates, `surrogate.networks.training_loop` trains.
 """
 
 from __future__ import annotations

@@ -191,41 +191,23 @@ def _digest(content: Mapping[str, Any]) -> str:
 
 def _wrong(table: RobotTable) -> str:
     """Return what is wrong with the numbers of a table; empty if nothing is."""
-    if not all(isinstance(part, dict) for part in (table.robot, table.steady, table.slopes, table.errors)):
-        return "its robot, motion, slopes and errors are not named numbers"
-    numbers = [table.robot, table.steady, table.slopes, table.errors, table.before, table.error_curves]
-    if _has_words([*numbers, *(getattr(table, name) for name in _CURVES)]):
-        return "its numbers have no such form"
-    before = np.array(table.before, dtype=float)
-    if before.ndim != 1 or not _all_ordinary(before):
-        return "its numbers have no such form"
-    for name, shape in _CURVES.items():
-        curves = np.array(getattr(table, name), dtype=float)
-        wanted = tuple(len(table.before) if size < 0 else size for size in shape)
-        if curves.shape != wanted or not _all_ordinary(curves):
-            return f"it has no curves {name!r} of shape {wanted} in finite numbers"
-    modes = np.array(table.error_curves, dtype=float)
-    wanted = (len(before) + 1, len(DWELLS), 3)
-    if len(modes) and (modes.shape[1:] != wanted or not _all_ordinary(modes)):
-        return f"it has no modes of errors of shape {wanted} in finite numbers"
-    missing = [name for name in STEADY_OUTPUTS if name not in table.steady]
-    if missing:
-        return f"it has no {missing[0]!r}"
-    motion = np.array([table.steady[name] for name in STEADY_OUTPUTS], dtype=float)
-    columns = [np.array(values) for values in table.steady.values()]
-    if any(column.shape != (2,) for column in columns) or not _all_ordinary(motion[np.isfinite(motion)]):
-        return "its steady motion is not two numbers for each output"
-    gap = STEADY_OUTPUTS.index("tail_gap")
-    if (
-        not np.isfinite(np.delete(motion, gap, 0)).all() or not (motion[gap] > -np.inf).all()
-    ):  # infinite for one tail
-        return "its steady motion is not two numbers for each output"
-    groups = np.array([table.robot[name] for name in {*ROBOT, *table.robot}], dtype=float)
-    slopes = [np.array(slope, dtype=float) for slope in table.slopes.values()]
-    if not _all_ordinary(groups) or any(s.shape != (2, 3) or not _all_ordinary(s) for s in slopes):
-        return "its robot or its slopes are not finite numbers"
-    if not all(math.isfinite(size) for error in table.errors.values() for size in error.values()):
-        return "its errors are not finite numbers"
+    count, gap = len(table.before), "tail_gap"  # the gap of one tail is infinite
+    parts: dict[str, tuple[Any, tuple[int, ...]]] = {
+        "before": (table.before, (count,)),
+        **{name: (getattr(table, name), tuple(count if n < 0 else n for n in _CURVES[name])) for name in _CURVES},
+        **{name: (table.steady.get(name), (2,)) for name in dict.fromkeys((*STEADY_OUTPUTS, *table.steady))},
+        **{name: (table.robot.get(name), ()) for name in dict.fromkeys((*ROBOT, *table.robot))},
+        **{f"slope in {name}": (slope, (2, 3)) for name, slope in table.slopes.items()},
+        **{f"error of {name}": (list(error.values()), (len(error),)) for name, error in table.errors.items()},
+    }
+    if table.error_curves:
+        parts["error_curves"] = table.error_curves, (len(table.error_curves), count + 1, len(DWELLS), 3)
+    for name, (content, shape) in parts.items():
+        numbers = np.array(None if _has_words(content) else content, dtype=float)
+        if name == gap:
+            numbers = np.where(numbers == np.inf, 1.0, numbers)
+        if numbers.shape != shape or not (np.abs(numbers) < _LARGEST).all():
+            return f"its {name!r} is not finite numbers, {' × '.join(map(str, shape)) or 'one'}"
     return ""
 
 
@@ -234,8 +216,3 @@ def _has_words(content: Any) -> bool:
     if isinstance(content, dict | list | tuple):
         return any(map(_has_words, content.values() if isinstance(content, dict) else content))
     return isinstance(content, str | bool)
-
-
-def _all_ordinary(values: Floats) -> bool:
-    """Whether numbers are finite, and such that sums and squares of them are."""
-    return bool((np.abs(values) < _LARGEST).all())

@@ -1,25 +1,157 @@
-"""Ask a look-up table for the motion of robots, each with an error of its own.
+"""Answers of a look-up table, each with an error of its own, and refusals in the words of a laboratory.
 
-    error = largest half-width of the 90 % intervals of spins, yaw rate and velocities, relative to the value
-            (of velocities: to the speed)
+    error           = largest half-width of the 90 % intervals of spins, yaw rate and velocities, relative to the
+                      value (of velocities: to the speed); of a table of one robot the largest that it states
+    certified error = largest relative difference of these between table and simulator + the simulator's own error
 
-A table of one robot has no intervals. Its error is the largest of those that it states.
+The simulator takes about a millisecond a robot, and longer for one and two tails.
+
+A table refuses a robot by its groups. A refusal names the number of the robot that a laboratory sets, such as the
+motor's speed for ω̄, with the values of this number that the table knows for this robot. They are found by asking
+the table about robots that differ in this number alone; other groups that depend on it change, too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from contextlib import nullcontext
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from sim.arrays import Floats
+from sim.inputs import group_columns
+from sim.io.errors import InputError
+from sim.io.units import from_si
+from sim.model.groups import MOST_TAILS
+from sim.model.robot import Robot
 from sim.robot_rows import RobotRows
-from surrogate.interface import LookupTable
-from surrogate.table.certify import CERTIFIED_OUTPUTS, RATES
-from surrogate.table.lookup import NeuralTable
-from surrogate.table.refusals import refusing_robots
+from surrogate.interface import LookupTable, OutsideError
+from surrogate.table.lookup import OUTSIDE, NeuralTable
+
+_FACTOR, _STEPS = 1000.0, 600  # values up to this many times as large or as small are asked about, on either side
+_REMEDY = "change the robot, or simulate it (softflagella steady, softflagella surrogate robot)"
+
+
+class _Number(NamedTuple):
+    """A number of a robot that decides a group."""
+
+    words: str
+    field: str
+    unit: str = ""
+
+
+_NUMBERS = {
+    "omega_bar": _Number("motor speed", "motor_speed", "rpm"),
+    "l_over_R": _Number("tail length", "tail_length", "cm"),
+    "l_over_r0": _Number("tail radius", "tail_radius", "mm"),
+    "L_over_R": _Number("head length", "head_length", "mm"),
+    "a_over_R": _Number("disc offset", "disc_offset", "mm"),
+    "N": _Number("number of tails", "tails"),
+}
+
+
+@contextmanager
+def refusing_robots(robots: Sequence[Robot], table: LookupTable) -> Iterator[None]:
+    """Say in the units of a laboratory why a table refuses one of its robots.
+
+    Args:
+        robots: those that the table is asked about, in the order of its rows.
+        table: the table.
+
+    Raises:
+        OutsideError: a robot is outside the table's domain.
+    """
+    try:
+        yield
+    except OutsideError as refusal:
+        words = _in_lab_units(refusal, robots[refusal.row], table)
+        raise OutsideError(words, refusal.row, refusal.reason) from None
+
+
+def _in_lab_units(refusal: OutsideError, robot: Robot, table: LookupTable) -> str:
+    """Name a number of the robot that is outside, and the values of it that the table knows."""
+    values = robot.group_values()
+    outside = [
+        group for group in _NUMBERS for low, high in [table.domain[group]]
+        if not low * (1 - 1e-9) <= values[group] <= high * (1 + 1e-9)
+    ]  # fmt: skip
+    groups = outside or ["omega_bar"]  # the number that is changed most easily
+    group, known = next(((g, known) for g in groups if (known := _known(robot, g, table))), (groups[0], []))
+    value = f"{_NUMBERS[group].words} {_lab(robot, group)} ({_group(robot, group)})"
+    why = value if group in outside else f"{refusal.reason}; {value}"
+    words = f"robot {robot.name!r} is outside the look-up table: {why}"
+    if known:
+        ends = (f"{_lab(end, group)} ({_group(end, group)})" for end in (known[0], known[-1]))
+        words += f"; for this robot it knows {' to '.join(ends)}"
+    return f"{words}; {_REMEDY}"
+
+
+def _group(robot: Robot, group: str) -> str:
+    return f"{group} = {robot.group_values()[group]:.3g}"
+
+
+def _lab(robot: Robot, group: str) -> str:
+    """Write the number that decides a group in its unit."""
+    unit = _NUMBERS[group].unit
+    return f"{from_si(_size(robot, group), unit):.4g} {unit}" if unit else f"{robot.tails}"
+
+
+def _size(robot: Robot, group: str) -> float:
+    """Return the number that decides a group, in SI units."""
+    value = getattr(robot, _NUMBERS[group].field)
+    return float(robot.head_radius if value is None else value)  # the default of the disc offset
+
+
+def _known(robot: Robot, group: str, table: LookupTable) -> list[Robot]:
+    """Return those nearest to a robot that the table knows, without a gap, of robots that differ in one number."""
+    robots = _variants(robot, group) if isinstance(table, NeuralTable) else []
+    if not isinstance(table, NeuralTable) or not robots:
+        return []
+    known = ~table.query(group_columns(robots), flag=True)[OUTSIDE]
+    if not known.any():
+        return []
+    far = np.abs(np.log([_size(variant, group) / _size(robot, group) for variant in robots]))
+    first = last = int(np.argmin(np.where(known, far, np.inf)))
+    while first > 0 and known[first - 1]:
+        first -= 1
+    while last < len(robots) - 1 and known[last + 1]:
+        last += 1
+    return robots[first : last + 1]
+
+
+def _variants(robot: Robot, group: str) -> list[Robot]:
+    """Return robots that differ in the number that decides a group, rising; without those that cannot be."""
+    values: list[Any] = list(range(1, MOST_TAILS + 1))
+    if group != "N":
+        values = (_size(robot, group) * np.geomspace(1 / _FACTOR, _FACTOR, 2 * _STEPS + 1)).tolist()
+    robots = []
+    for value in values:
+        try:
+            variant = replace(robot, **{_NUMBERS[group].field: value})
+            variant.group_values()  # a correction has a range of its own
+        except InputError:
+            continue
+        robots.append(variant)
+    return robots
+
+
+RATES = ("omega_t_bar", "omega_h_bar", "omega_yr_bar")
+_VELOCITIES = ("v_x", "v_z")
+CERTIFIED_OUTPUTS = (*RATES, *_VELOCITIES)
+
+
+def certified_error(robots: Mapping[str, Floats], answer: Mapping[str, Any]) -> Floats:
+    """Certify the relative error of each robot's answer, (M,); NaN where the simulator finds no steady motion."""
+    from sim.motion.batches import steady_columns  # a query that is not certified needs no simulator
+
+    simulated = steady_columns(robots, stability=False, title="certify")
+    speed = np.hypot(simulated["v_x"], simulated["v_z"])
+    apart = [np.abs(answer[name] / simulated[name] - 1) for name in RATES]
+    apart += [np.abs(answer[name] - simulated[name]) / speed for name in _VELOCITIES]
+    error = np.max(apart, axis=0) + simulated["error"]
+    return np.where(simulated["converged"], error, np.nan)
 
 
 def answer_with_error(

@@ -36,9 +36,8 @@ from surrogate.networks.ensemble import Ensemble
 from surrogate.table.curve_errors import CURVE_ERRORS, NORMAL_90, CurveErrors
 from surrogate.table.errors import OUTPUTS, RELATIVE, error_scale
 from surrogate.table.intervals import Intervals
-from surrogate.table.outside import INSIDE, NO_RESPONSE, NOT_LEARNED, reason_of
 from surrogate.table.response_table import ResponseTable, flip_inputs
-from surrogate.table.support import Support
+from surrogate.table.support import INSIDE, NO_RESPONSE, NOT_LEARNED, Support, reason_of
 from surrogate.table.tensor_file import digest, write
 from surrogate.table.wrench_table import (
     SPREAD,
@@ -70,7 +69,7 @@ class Motions:
     motion: Floats  # (M, 5): (v_x of J, v_z, ω_yr, ω_h, ω_t), for a positive motor
     inputs: Floats  # (M, 7) of the networks, see `surrogate.wrench.tails.tail_inputs`
     features: Floats  # (M, 11): inputs, ln novelty, ln spread of the members, ln N, whether N = 1
-    outside: Integers  # (M,), see `surrogate.table.outside`
+    outside: Integers  # (M,), see `surrogate.table.support`
     outputs: Floats  # OUTPUTS, (12, M); NaN of a flip before there was one
 
     @property
@@ -143,7 +142,7 @@ class NeuralTable:
         if flag:
             result[OUTSIDE] = motions.outside != INSIDE
         if certify:
-            from surrogate.table.certify import certified_error
+            from surrogate.table.answers import certified_error
 
             result[CERTIFIED] = certified_error(values, result)
         return result

@@ -13,9 +13,8 @@ from sim.arrays import Flags, Floats, Integers
 from surrogate.networks.loops import BLOCK, Layers, evaluate, inner, kernel, product
 from surrogate.table.errors import ITSELF, ONE, SPEED, SURGE
 from surrogate.table.intervals import HALVED, PARTS
-from surrogate.table.outside import FAST_YAW, INSIDE, MAX_YAW_SHARE, NO_MOTION, NO_RESPONSE, NOVEL
 from surrogate.table.response_table import OF_HEAD, SMALL_SURGE
-from surrogate.table.support import SupportNumbers
+from surrogate.table.support import FAST_YAW, INSIDE, MAX_YAW_SHARE, NO_MOTION, NO_RESPONSE, NOVEL, SupportNumbers
 from surrogate.table.wrench_table import SPREAD, TINY_SPREAD
 from surrogate.wrench.balance import inputs_at, network_inputs_at, solve
 from surrogate.wrench.heads import HEAD_LENGTH, HEAD_NUMBERS, SENSE
@@ -77,7 +76,7 @@ def motions_of(
 
     Returns:
         Motions (M, 5), `surrogate.wrench.tails.INPUTS` (M, 7), what widths depend on (M, 11) without a spread of
-        members, why a robot is outside, one of `surrogate.table.outside` (M,), and outputs, NaN of a flip.
+        members, why a robot is outside, one of `surrogate.table.support` (M,), and outputs, NaN of a flip.
     """
     network, gap = Layers(w0, w1, w2, w3, w4, w5), Layers(g0, g1, g2, g3, g4, g5)
     support, count = SupportNumbers(shift, scale, inverse, products), len(robots)

@@ -11,8 +11,7 @@ from torch import Tensor
 from sim.arrays import Floats
 from surrogate.networks.checkpoints import TrainingContext
 from surrogate.networks.ensemble import Ensemble
-from surrogate.networks.trainable import TrainableEnsemble
-from surrogate.networks.training_loop import Settings, fit
+from surrogate.networks.training_loop import Settings, TrainableEnsemble, fit
 from surrogate.table.response_table import (
     PARTS,
     SHAPES,

@@ -23,8 +23,7 @@ from torch import Tensor
 from sim.arrays import Flags, Floats, Integers
 from surrogate.networks.checkpoints import TrainingContext
 from surrogate.networks.ensemble import Ensemble
-from surrogate.networks.trainable import TrainableEnsemble
-from surrogate.networks.training_loop import Settings, fit
+from surrogate.networks.training_loop import Settings, TrainableEnsemble, fit
 from surrogate.table.wrench_table import (
     CLASSES,
     INPUT_COUNTS,

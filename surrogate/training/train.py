@@ -28,9 +28,8 @@ from surrogate.table.curve_errors import KINDS, CurveErrors
 from surrogate.table.errors import curve_errors, relative_errors, summary
 from surrogate.table.intervals import Intervals
 from surrogate.table.lookup import NeuralTable
-from surrogate.table.outside import INSIDE, MAX_YAW_SHARE
 from surrogate.table.response_table import PARTS, SHAPES, along_axes, flip_inputs
-from surrogate.table.support import Support
+from surrogate.table.support import INSIDE, MAX_YAW_SHARE, Support
 from surrogate.table.wrench_table import CLASSES, INPUT_COUNTS, network_index
 from surrogate.training.fit_response import SETTINGS, fit_response
 from surrogate.training.fit_wrench import WrenchSamples, fit_wrench, learnable, wrench_samples

@@ -14,7 +14,7 @@ import pytest
 
 import softflagella as sf
 from sim.inputs import load_robot
-from surrogate.export.small_copy_files import save_small_copy
+from surrogate.export.small_copy import save_small_copy
 from surrogate.table.model_file import load
 from tests.docs.pages import DOCS, PAGES, ROOT, blocks, page_name
 from tests.planner.compiled import compile_c

@@ -16,8 +16,7 @@ from sim.io.errors import InputError, run_command
 from sim.model.groups import DWELL
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.__main__ import main
-from surrogate.export.small_copy import MOST_BYTES, SmallCopy, make_small_copy, measure_losses
-from surrogate.export.small_copy_files import save_small_copy
+from surrogate.export.small_copy import MOST_BYTES, SmallCopy, make_small_copy, measure_losses, save_small_copy
 from surrogate.input_ranges import ROBOT
 from surrogate.table.errors import RESPONSE_OUTPUTS, error_scale
 from surrogate.table.model_file import load

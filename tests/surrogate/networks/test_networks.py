@@ -22,8 +22,7 @@ from sim.io.errors import InputError
 from surrogate.networks.bfgs import Minimiser
 from surrogate.networks.checkpoints import Checkpoint, TrainingContext, device_named, remove_states
 from surrogate.networks.ensemble import Ensemble, state_shapes
-from surrogate.networks.trainable import TrainableEnsemble
-from surrogate.networks.training_loop import Problem, Settings, Watch, _adam, fit
+from surrogate.networks.training_loop import Problem, Settings, TrainableEnsemble, Watch, _adam, fit
 from tests.processes import LIMIT
 from tests.surrogate.small import table
 

@@ -64,13 +64,13 @@ def test_a_table_of_one_robot_comes_back_as_it_was_and_damaged_ones_are_refused(
 
 
 WRONG = [
-    ("lag", [[1.0]], "no curves 'lag'"), ("spread", None, "no curves 'spread'"),
-    ("steady", {}, "no 'omega_t_bar'"), ("robot", {"C_t": float("nan")}, "its numbers have no such form"),
-    ("slopes", {"C_t": [1.0]}, "slopes are not finite numbers"),
-    ("errors", {"v_x": {"rms": float("inf")}}, "errors are not finite"),
-    ("before", 5, "its numbers have no such form"),
-    ("errors", {"v_x": {"rms": "0.1"}}, "its numbers have no such form"),
-    ("slopes", {"C_t": [["1", 2.0, 3.0], [1.0, 2.0, 3.0]]}, "its numbers have no such form"),
+    ("lag", [[1.0]], "'lag' is not finite numbers, 2 × 25 × 3"), ("spread", None, "'spread' is not"),
+    ("steady", {}, "'omega_t_bar' is not"), ("robot", {"C_t": float("nan")}, "'C_t' is not finite numbers, one"),
+    ("slopes", {"C_t": [1.0]}, "'slope in C_t' is not"), ("before", 5, "its numbers have no such form"),
+    ("errors", {"v_x": {"rms": float("inf")}}, "'error of v_x' is not"),
+    ("errors", {"v_x": {"rms": "0.1"}}, "'error of v_x' is not"),
+    ("slopes", {"C_t": [["1", 2.0, 3.0], [1.0, 2.0, 3.0]]}, "'slope in C_t' is not"),
+    ("error_curves", [[1.0]], "'error_curves' is not"),
 ]  # fmt: skip
 
 

@@ -19,9 +19,8 @@ from sim.model.robot import Robot
 from sim.motion.lab_units import describe_motion
 from surrogate.__main__ import main
 from surrogate.interface import OutsideError
-from surrogate.table.answers import answer_with_error
+from surrogate.table.answers import answer_with_error, refusing_robots
 from surrogate.table.model_file import load
-from surrogate.table.refusals import refusing_robots
 from tests.surrogate.small import robot_table
 
 ROBOT = PRESETS["paper-control"]

@@ -16,7 +16,7 @@ from sim.model.groups import DWELL
 from sim.model.response import DWELLS, SETTLED
 from surrogate.input_ranges import ROBOT
 from surrogate.interface import OutsideError
-from surrogate.table.certify import certified_error
+from surrogate.table.answers import certified_error
 from surrogate.table.intervals import PARTS
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load

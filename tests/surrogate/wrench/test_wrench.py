@@ -13,7 +13,7 @@ from sim.solve.assembly import bodies
 from sim.solve.refinement import orbit_on_mesh
 from surrogate.input_ranges import ROBOT
 from surrogate.table.model_file import load
-from surrogate.table.outside import INSIDE
+from surrogate.table.support import INSIDE
 from surrogate.training.fit_wrench import wrench_samples
 from surrogate.training.simulated import draw_robots
 from surrogate.wrench.heads import heads_and_tails, needs_no_learning, packed_robots, unpack_robots
