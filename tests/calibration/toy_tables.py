@@ -13,6 +13,7 @@ import pytest
 import calibration.swimmer.swimmer
 import calibration.swimmer.synthetic_table
 import sim.motion.batches
+from calibration.attribution import moves
 from calibration.laws import law_fits
 from calibration.laws.places import place_named
 from calibration.report.robot_laws import RobotLaws, find_robot_laws
@@ -46,6 +47,8 @@ def install_toy(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(SwimmerModel.__init__, "__defaults__", tuple(toy.SOLVER if d is DIRECT else d for d in defaults))
     patch.setattr(calibration.swimmer.synthetic_table, "stepped_columns", toy.steady_columns)
     patch.setattr(SwimmerModel, "guess", lambda model, start, used: start)
+    patch.setitem(calibrate.__kwdefaults__, "draws", FEW_DRAWS)
+    patch.setattr(moves, "_DRAWS", FEW_DRAWS)
     for name in ("steady", "sensitivities", "settle"):  # what all of the simulator's batches call
         patch.setattr(sim.motion.batches, name, refuse_to_simulate)
 

@@ -10,7 +10,7 @@ import pytest
 
 from tests.processes import LIMIT
 
-LINES = "\n".join(f"    y = (y * {1 + i / 128} + x) / (1.0 + y * y) - {i / 3}" for i in range(60))
+LINES = "\n".join(f"    y = (y * {1 + i / 128} + x) / (1.0 + y * y) - {i / 3}" for i in range(36))
 LOOPS = f"""
 from sim.compiling import compiled, compiled_exactly
 

@@ -49,16 +49,12 @@ EXACT = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("names", [("inertia",), pytest.param((), marks=pytest.mark.rest)], ids=["few", "all"])
-def test_a_stiffness_that_was_given_too_high_is_no_inertia(
-    names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_stiffness_that_was_given_too_high_is_no_inertia(monkeypatch: pytest.MonkeyPatch) -> None:
     """Tail drag 25 % above the formula is Young's modulus 20 % below; with the simulator on both sides."""
-    if names:
-        install_few_candidates(monkeypatch, names)
+    install_few_candidates(monkeypatch, ("inertia",))
     softer = replace(TRUTH, youngs_modulus=0.8 * TRUTH.youngs_modulus)
     model = SwimmerModel(START, read_measurements(make_table(softer, seed=5, title="")))
-    result = calibrate(model, progress=False)
+    result = calibrate(model, draws=FEW_DRAWS, progress=False)
     assert "inertia" in {c.effect.name for c in result.evidence.candidates}
     assert "inertia" not in result.effects
     assert result.verdict != "number"
@@ -175,12 +171,13 @@ def test_an_effect_beside_a_wrong_number_comes_behind_a_single_effect_that_fits_
 
 
 @pytest.mark.rest
-def test_a_stiffness_far_off_is_named_with_what_looks_like_it() -> None:
+def test_a_stiffness_far_off_is_named_with_what_looks_like_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """20 % where E is stated to 3 % and the other numbers to be exact."""
+    install_few_candidates(monkeypatch, ("inertia", "tail_spin_drag"))
     share, sigmas = 0.8, {"youngs_modulus": Sigma(0.03, True), **EXACT}
     softer = replace(TRUTH, youngs_modulus=share * TRUTH.youngs_modulus)
     data = read_measurements(make_table(softer, seed=5, title=""))
-    result = calibrate(SwimmerModel(replace(START, sigmas=sigmas), data), progress=False)
+    result = calibrate(SwimmerModel(replace(START, sigmas=sigmas), data), draws=FEW_DRAWS, progress=False)
     assert result.verdict == "number"
     assert result.wrong_numbers[0][0].parameter.name == "youngs_modulus"
     given = result.fits.final_refit.parameters["youngs_modulus"] / START.youngs_modulus

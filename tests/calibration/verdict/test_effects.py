@@ -147,7 +147,7 @@ def in_thinning_fluid(table: pd.DataFrame, rate: float) -> pd.DataFrame:
     return table.assign(**ratios, theta_deg=table["theta_deg"] + after["theta_deg"] - before["theta_deg"])
 
 
-@pytest.mark.parametrize("seed", [7, *(pytest.param(seed, marks=pytest.mark.rest) for seed in (8, 9))])
+@pytest.mark.parametrize("seed", [7, *(pytest.param(seed, marks=pytest.mark.rates) for seed in (8, 9))])
 def test_a_drift_with_time_is_found_where_there_is_a_clock(seed: int) -> None:
     """Viscosity that falls by 6 % an hour through a day of runs; nothing is claimed where it does not fall."""
     few = ("viscosity_with_time", DRAG, "left_right_bias") if seed == 7 else ()

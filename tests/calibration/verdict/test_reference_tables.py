@@ -19,15 +19,15 @@ from calibration.verdict.verdict import Verdict
 from sim.inputs import load_robot
 from sim.io.errors import run_command
 from sim.model.uncertainty import DEFAULTS, Sigma
-from tests.calibration.toy_tables import DRAG, install_few_candidates
+from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, FEW_DRAWS, install_few_candidates
 from tests.reference.make import GIVEN, HERE, TABLES
 
 pytestmark = pytest.mark.slow
 
 
-def calibrated(name: str) -> Verdict:
+def calibrated(name: str, draws: int = FEW_DRAWS) -> Verdict:
     data = read_measurements(HERE / f"{name}.csv")
-    return calibrate(SwimmerModel(load_robot(HERE / "robot.toml"), data), progress=False)
+    return calibrate(SwimmerModel(load_robot(HERE / "robot.toml"), data), draws=draws, progress=False)
 
 
 @pytest.mark.rest
@@ -67,8 +67,14 @@ def test_one_effect_is_named_sized_and_handed_on(
     assert "<svg" in (tmp_path / "report.html").read_text()
 
 
-@pytest.mark.rest
-def test_what_no_effect_does_is_left_unexplained() -> None:
+@pytest.mark.parametrize(
+    "few",
+    [pytest.param(True, marks=pytest.mark.rest), pytest.param(False, marks=pytest.mark.rates)],
+    ids=["few", "all"],
+)
+def test_what_no_effect_does_is_left_unexplained(few: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    if few:
+        install_few_candidates(monkeypatch, (*FEW_CANDIDATES, "disc_drag", "surface_couple", "inertia"))
     result = calibrated("unexplained")
     assert result.verdict == "unexplained"
     assert result.effects == ()
@@ -81,7 +87,7 @@ def test_rivals_are_all_named_with_the_runs_that_would_tell_them_apart(tmp_path:
     data = read_measurements(HERE / "ambiguous.csv")
     known = replace(load_robot(HERE / "robot.toml"), sigmas=dict.fromkeys(DEFAULTS, Sigma(0.0, False)))
     lab = {"l_cm": (5.0, 8.0, 11.0)}  # the table has one length, with which no runs tell the rivals apart
-    result = calibrate(SwimmerModel(known, data, own=lab), progress=False)
+    result = calibrate(SwimmerModel(known, data, own=lab), draws=FEW_DRAWS, progress=False)
     assert result.verdict == "ambiguous"
     assert "tail_spin_drag" in result.effects
     assert len(result.effects) > 1

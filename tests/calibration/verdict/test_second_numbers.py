@@ -66,7 +66,7 @@ def test_scores_are_taken_at_several_values_and_the_largest_counts() -> None:
     assert remaining.table[0, 0].tolist() == [0.0, 3.0]
 
 
-@pytest.mark.parametrize("seed", [4, pytest.param(3, marks=pytest.mark.rest)])
+@pytest.mark.parametrize("seed", [4, pytest.param(3, marks=pytest.mark.rates)])
 def test_size_and_time_are_recovered_from_the_toy(seed: int) -> None:
     few = (SIZE, DRAG) if seed == 4 else ()
     result = calibrated(toy_table(seed, design={"motor_rpm": SPEEDS}, **HIDDEN), few=few)

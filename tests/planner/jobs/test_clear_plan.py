@@ -122,8 +122,9 @@ def test_with_feedback_the_margin_is_smaller() -> None:
     assert watched.feedback_error <= watched.kept_clear.margin < watched.stated_error
 
 
-@pytest.mark.rest
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(
+    "seed", [pytest.param(s, marks=pytest.mark.rest if s < 3 else pytest.mark.rates) for s in range(8)]
+)
 def test_random_obstacles(seed: int) -> None:
     rng = np.random.default_rng(seed)
     angle = np.linspace(0, 5, 200)

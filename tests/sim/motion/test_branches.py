@@ -153,7 +153,7 @@ def test_both_stable_motions_of_two_tails_are_found_and_drawn(low: float, steps:
     assert largest_hysteresis(result)[0] < 0.03
 
 
-@pytest.mark.rest
+@pytest.mark.rates
 def test_the_fold_joins_a_stable_to_an_unstable_motion() -> None:
     """Below the fold time steps leave the branch; above it they return to the stable motion."""
     result = two_tails(60.0, 6)

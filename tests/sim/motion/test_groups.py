@@ -93,10 +93,13 @@ def test_a_robot_has_the_same_bits_in_any_group(solver: Callable[[Floats, int], 
 
 
 @solvers
-@pytest.mark.parametrize("width", [ALONE, HALF_GROUP, GROUP])
+@pytest.mark.parametrize(
+    "width", [ALONE, *(pytest.param(width, marks=pytest.mark.rates) for width in (HALF_GROUP, GROUP))]
+)
 def test_the_width_of_groups_does_not_matter(
     solver: Callable[[Floats, int], Numbers], width: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Loops of the width that this machine does not use take two minutes to compile."""
     rows = numbers(robots(3, 6))
     wanted = solver(rows, 3)
     for place in (flips, orbit_groups, grouping):

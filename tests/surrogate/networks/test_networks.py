@@ -23,19 +23,20 @@ from surrogate.networks.bfgs import Minimiser
 from surrogate.networks.checkpoints import Checkpoint, TrainingContext, device_named, remove_states
 from surrogate.networks.ensemble import Ensemble, state_shapes
 from surrogate.networks.training_loop import Problem, Settings, TrainableEnsemble, Watch, _adam, fit
+from surrogate.table.lookup import NeuralTable
+from surrogate.training import fit_wrench
+from surrogate.training.train import learn
 from tests.processes import LIMIT
-from tests.surrogate.small import table
+from tests.surrogate.small import flips, rows
 
 SMALL = Settings(width=8, depth=2, members=2, epochs=6, batch=16, iterations=12)
 # Trains the small table of these tests, and kills itself after so many states.
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-import numpy as np
 import torch
 import surrogate.networks.checkpoints as checkpoints
-from surrogate.training.train import learn
-from tests.surrogate.small import CURVES, TAILS, flips, rows
+from tests.surrogate.networks.test_networks import quickly_learned
 
 torch.set_num_threads(1)  # as in the tests
 checkpoints.EVERY = checkpoints._SHARE = 0.0
@@ -49,12 +50,18 @@ def counted(self, state, *, now=False):
         os.kill(os.getpid(), signal.SIGKILL)
 
 checkpoints.Checkpoint.write = counted
-held = rows(256, 13, wide=False)
-halves = held.at(np.arange(len(held)) % 2 == 0)
-context = checkpoints.TrainingContext("train", folder=Path(sys.argv[1]))
-found = learn(rows(), halves, held, flips(), TAILS, CURVES, work=context)
-print(found.identity)
+print(quickly_learned(checkpoints.TrainingContext("train", folder=Path(sys.argv[1]))).identity)
 """
+
+
+def quickly_learned(work: TrainingContext | None = None) -> NeuralTable:
+    """Train the smallest table on few of the small table's robots."""
+    some, held = rows().at(np.arange(96)), rows(256, 13, wide=False)
+    small = Settings(width=8, depth=1, members=2, epochs=12, iterations=12)
+    halves = held.at(np.arange(len(held)) % 2 == 0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fit_wrench, "_GAP", small)
+        return learn(some, halves, held, flips(), small, replace(small, members=1), work=work or TrainingContext())
 
 
 class OneDevice(TorchDispatchMode):
@@ -97,15 +104,15 @@ def same(one: dict[str, torch.Tensor], other: dict[str, torch.Tensor]) -> bool:
 @pytest.mark.rest
 def test_training_that_is_killed_twice_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
     folder = tmp_path / "model.pt.states"
-    goes_on = "train: tails of N = 3 and more, network 1 of 5: goes on after epoch 10 of 40"
-    for count, where in ((10, None), (120, goes_on)):
+    goes_on = "train: tails of N = 3 and more, network 1 of 5: goes on after epoch 10 of 12"
+    for count, where in ((10, None), (24, goes_on)):
         killed = run(folder, count)
         assert killed.returncode == -signal.SIGKILL
         assert where is None or where in killed.stderr
     done = run(folder, 10**9)
     assert done.returncode == 0, done.stderr
-    assert "goes on after iteration 30 of 60, member 2 of 2" in done.stderr
-    assert done.stdout.split() == [table().identity]
+    assert "goes on after iteration 10 of 12, member 2 of 2" in done.stderr
+    assert done.stdout.split() == [quickly_learned().identity]
     again = run(folder, 10**9)
     assert again.stdout == done.stdout
     assert "tails of N = 3 and more, network 1 of 5: was finished before" in again.stderr

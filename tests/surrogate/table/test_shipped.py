@@ -61,12 +61,16 @@ def test_the_shipped_table_matches_the_independent_solver_and_states_its_errors(
 
 
 def answered(robots: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], np.ndarray]:
-    """Return the table's answers, the simulator's, and which robots both know."""
-    simulated = steady_columns(robots, title="", stability=False)
-    names = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap")
-    truth = with_radius({name: np.asarray(simulated[name], dtype=float) for name in names})
+    """Return the table's answers, the simulator's (NaN outside the domain), and which robots both know."""
     answer = load().query(robots, intervals=True, flag=True)
-    return answer, truth, np.asarray(simulated["converged"] & ~answer["outside"])
+    good = ~answer["outside"]
+    simulated = steady_columns({name: values[good] for name, values in robots.items()}, title="", stability=False)
+    truth = {}
+    for name in ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap"):
+        truth[name] = np.full(len(good), np.nan)
+        truth[name][good] = simulated[name]
+    good[good] = simulated["converged"]
+    return answer, with_radius(truth), good
 
 
 def test_fresh_robots_are_near_the_simulator_and_inside_their_intervals() -> None:

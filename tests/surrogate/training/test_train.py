@@ -13,6 +13,7 @@ import surrogate.training.train as training
 from dataset.build import build
 from sim.io.errors import InputError
 from surrogate.table.errors import relative_errors
+from surrogate.training import fit_wrench
 from surrogate.training.fit_wrench import learnable, wrench_samples
 from surrogate.training.model_card import model_card
 from surrogate.training.simulated import SimulatedRobots, draw_robots, join_robots, simulate_robots
@@ -22,6 +23,11 @@ from tests.shared import shared
 from tests.surrogate.small import CURVES, TAILS, flips, rows, table
 
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(autouse=True)
+def _small_network_of_the_gap(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fit_wrench, "_GAP", CURVES)
 
 
 def test_training_is_repeatable_and_reads_a_folder(monkeypatch: pytest.MonkeyPatch) -> None:
