@@ -23,11 +23,20 @@ from calibration.verdict.record import facts, verdict_record
 from calibration.words.render import next_steps
 from sim.inputs import load_robot
 from sim.model.uncertainty import DEFAULTS, Sigma
-from tests.calibration.toy_tables import DRAG, START, TRUTH, calibrated, on_the_toy, toy_swimmer, toy_table
+from tests.calibration.toy_tables import (
+    DRAG,
+    LENGTHS_CM,
+    START,
+    TRUTH,
+    calibrated,
+    on_the_toy,
+    toy_swimmer,
+    toy_table,
+)
 from tests.shared import shared
 
 MEASURED = Path(__file__).parents[4] / "shared" / "measured"
-DAYS, LENGTHS_CM = 4, (5.0, 11.0)
+DAYS, TWO_CM = 4, (5.0, 11.0)
 KNOWN = replace(START, sigmas=dict.fromkeys(DEFAULTS, Sigma(0.0, False)))  # with few numbers that could differ
 
 
@@ -38,18 +47,21 @@ def in_days(table: pd.DataFrame, column: str = "session") -> pd.DataFrame:
     return table.assign(**{column: [f"day {d}" for d in day]})
 
 
-def of_two(column: str, other: str, seed: int, **changed: float) -> pd.DataFrame:
+def of_two(
+    column: str, other: str, seed: int, lengths_cm: tuple[float, ...] = TWO_CM, **changed: float
+) -> pd.DataFrame:
     """A table in days, or on robots, of which those called `other` are of another truth."""
-    table = in_days(toy_table(seed, lengths_cm=LENGTHS_CM), column)
-    moved = in_days(toy_table(seed, lengths_cm=LENGTHS_CM, truth=replace(TRUTH, **changed)), column)
+    table = in_days(toy_table(seed, lengths_cm=lengths_cm), column)
+    moved = in_days(toy_table(seed, lengths_cm=lengths_cm, truth=replace(TRUTH, **changed)), column)
     return table.where(table[column] != other, moved)
 
 
 @shared
 def moved_on(day: int, **changed: float) -> RobotVerdict:
-    table = of_two("session", f"day {day}", 3, **changed)
+    lengths, robot = (LENGTHS_CM, START) if day == 2 else (TWO_CM, KNOWN)
+    table = of_two("session", f"day {day}", 3, lengths, **changed)
     with on_the_toy(few=True):
-        return calibrate_robot(table, START if day == 2 else KNOWN, laws=False, progress=False)
+        return calibrate_robot(table, robot, laws=False, progress=False)
 
 
 def test_sessions_of_one_number_of_tails_each_are_no_groups() -> None:
@@ -126,7 +138,7 @@ def test_nothing_differs_where_nothing_did() -> None:
 def test_an_effect_in_all_sessions_is_no_move() -> None:
     with on_the_toy(few=True):
         result = calibrate_robot(
-            in_days(toy_table(5, lengths_cm=LENGTHS_CM, **{DRAG: 5.0})), KNOWN, laws=False, progress=False
+            in_days(toy_table(5, lengths_cm=TWO_CM, **{DRAG: 5.0})), KNOWN, laws=False, progress=False
         )
     assert result.effects == (DRAG,)
     assert result.moves == ()
