@@ -1,0 +1,116 @@
+"""A vehicle of five measured numbers: against the bicycle, an integrated relaxation, and its own differences."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from planner.vehicle.measured import MeasuredVehicle
+from planner.vehicle.rollout import Switches, poses_at_flips
+from planner.vehicle.vehicle import Vehicle
+from sim.io.errors import InputError
+from sim.mechanics import planar
+
+SWIMMER = MeasuredVehicle(
+    speed=(0.02, 4e-4), turn_left=(0.25, 0.01), turn_right=(0.2, 0.01), slip=(0.4, 0.02), lag=(0.8, 0.1)
+)
+
+
+def _integrated(vehicle: MeasuredVehicle, seconds: np.ndarray) -> np.ndarray:
+    """Integrate the equations of motion from rest, left first: poses (M + 1, 3) in m and rad."""
+    speed, left, right, slip, lag = (
+        vehicle.measured(name)[0] for name in ("speed", "turn_left", "turn_right", "slip", "lag")
+    )
+    pose, twist, poses = np.zeros(3), np.zeros(3), [np.zeros(3)]
+    for number, dwell in enumerate(seconds):
+        sign = 1 if number % 2 == 0 else -1
+        own = np.array([speed * math.cos(slip), sign * speed * math.sin(slip), left if sign > 0 else -right])
+
+        def rate(t: float, pose: np.ndarray, begun: np.ndarray = twist, own: np.ndarray = own) -> list[float]:
+            ahead, across, yaw = own + (begun - own) * math.exp(-t / lag)
+            c, s = math.cos(pose[2]), math.sin(pose[2])
+            return [c * ahead - s * across, s * ahead + c * across, yaw]
+
+        pose = solve_ivp(rate, (0, dwell), pose, rtol=1e-10, atol=1e-12).y[:, -1]
+        twist = own + (twist - own) * math.exp(-dwell / lag)
+        poses.append(pose)
+    return np.array(poses)
+
+
+def _at_flips(vehicle: MeasuredVehicle, motion: Vehicle, seconds: np.ndarray) -> np.ndarray:
+    """Predict poses (M + 1, 3) in m and rad, left first."""
+    poses = poses_at_flips(motion, Switches(1, seconds / vehicle.time_scale, np.zeros((1, 3))))
+    return poses * [vehicle.tail_length, vehicle.tail_length, 1]
+
+
+@pytest.mark.parametrize(("dwells", "error"), [(0.3, 0.012), (0.6, 0.001), ("random", 0.002)])
+def test_the_motion_is_that_of_a_twist_that_relaxes(dwells: float | str, error: float) -> None:
+    rng = np.random.default_rng(0)
+    seconds = (rng.uniform(0.3, 1.2, 40) if dwells == "random" else np.full(40, dwells)) * SWIMMER.time_scale
+    predicted = _at_flips(SWIMMER, SWIMMER.motion(), seconds)
+    assert np.abs(predicted - _integrated(SWIMMER, seconds)).max() < error
+
+
+def test_without_lag_it_is_the_bicycle() -> None:
+    """Front wheel at the tracked point, wheel base b: the rear axle moves on circles of radius R."""
+    base, radius, speed = 0.024, 0.22, 0.005
+    yaw = speed / math.hypot(base, radius)
+    needle = MeasuredVehicle(speed=speed, turn_left=yaw, turn_right=yaw, slip=math.atan(base / radius))
+    motion = needle.motion()
+    length = needle.tail_length
+    assert motion.pivot_distance * length == pytest.approx(base)
+    assert motion.pivot_radius * length == pytest.approx(radius)
+    assert not motion.lag.any()
+    assert not motion.rest.any()
+    assert motion.modes == ()
+
+
+@pytest.mark.parametrize("name", ["speed", "turn_left", "turn_right", "slip", "lag"])
+def test_a_mode_is_what_one_standard_deviation_changes(name: str) -> None:
+    seconds = np.full(11, 0.5) * SWIMMER.time_scale  # from the second flip on nothing is left of the start
+    value, spread = SWIMMER.measured(name)
+    own, other = (_at_flips(v, v.motion(), seconds) for v in (SWIMMER, replace(SWIMMER, **{name: value + spread})))
+    motion = SWIMMER.motion()
+    mode = next(mode for mode in motion.modes if mode.name == name)
+    moved = replace(motion, twist=motion.twist + mode.twist, lag=motion.lag + mode.lag)
+    ends = [planar.between(poses[2], poses[-1]) for poses in (_at_flips(SWIMMER, moved, seconds), own, other)]
+    assert np.abs(ends[0] - ends[1]).max() > 1e-3
+    assert ends[0] == pytest.approx(ends[2], abs=0.1 * np.abs(ends[2] - ends[1]).max())
+
+
+def test_a_file_holds_the_same_vehicle(tmp_path: Path) -> None:
+    file = tmp_path / "fish.toml"
+    lines = [f"{key} = {value!r}" for key, value in SWIMMER.to_dict().items()]
+    file.write_text("\n".join(lines).replace("'", '"'))
+    assert MeasuredVehicle.load(file) == SWIMMER
+    file.write_text("speed_cm_s = [2, 0.1]\nturn_left_deg_s = 20\nturn_right_deg_s = 19.0\nlag_s = 1\n")
+    fish = MeasuredVehicle.load(file)
+    assert fish.name == "fish"
+    assert fish.measured("speed") == pytest.approx((0.02, 0.001))
+    assert fish.measured("turn_left") == pytest.approx((math.radians(20), 0.0))
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ("speed_cm_s = 2\nturn_left_deg_s = 20", "no turn_right; write a line turn_right_deg_s"),
+        ("speed_deg = 2", "speed_deg is no line of a vehicle"),
+        ("velocity_cm_s = 2", "velocity_cm_s is no line of a vehicle"),
+        ("speed = 2", "speed is no line of a vehicle"),
+        ("speed_cm_s = 'fast'", "write a number, or"),
+        ("speed_cm_s = [1, 2, 3]", "write a number, or"),
+        ("speed_cm_s = [1, 0.5]\nturn_left_deg_s = 20\nturn_right_deg_s = 20", "above 0 by three standard"),
+        ("speed_cm_s = 1\nturn_left_deg_s = 20\nturn_right_deg_s = -20", "turn_right = -0.349"),
+        ("speed_cm_s = 1\nturn_left_deg_s = 20\nturn_right_deg_s = 20\nslip_deg = -5", "further ahead"),
+        ("speed_cm_s = 1\nturn_left_deg_s = 20\nturn_right_deg_s = 20\nlag_s = -1", "not below 0"),
+        ("speed_cm_s = nan\nturn_left_deg_s = 20\nturn_right_deg_s = 20", "finite"),
+    ],
+)
+def test_bad_files(tmp_path: Path, lines: str, words: str) -> None:
+    file = tmp_path / "vehicle.toml"
+    file.write_text(lines)
+    with pytest.raises(InputError, match=f"vehicle.toml.*{words}"):
+        MeasuredVehicle.load(file)
