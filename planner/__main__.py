@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 program = Program("planner", "Plan switching schedules for paths, without simulating.")
 main = program.main
 BAR_AFTER = 1.0  # s
+ROBOT = "--robot --vehicle"  # options that mean the same
 _GOAL = "planner.api.goal:to_goal"
 _TOUR, _COVER, _HOLD = (f"planner.api.jobs:{job}" for job in ("tour", "cover", "hold"))
 
@@ -75,7 +76,7 @@ def _progress_bar() -> Iterator[Callable[[float], object]]:
         yield show
 
 
-@program.command("plan", of="planner.api.plan:plan", robot="--robot")
+@program.command("plan", of="planner.api.plan:plan", robot=ROBOT)
 def _plan(path: str, *, robot: str, out: str, trade_off: bool = False, **given: Any) -> None:
     """Plan the switching times for a path.
 
@@ -105,7 +106,7 @@ def _job(target: str, out: str, given: Mapping[str, Any]) -> None:
     _write(result, out)
 
 
-@program.command("goal", of=_GOAL, robot="--robot")
+@program.command("goal", of=_GOAL, robot=ROBOT)
 def _goal(
     *, goal: tuple[str, str, str], start: tuple[str, str, str] = ("0", "0", "0"), out: str, **given: Any
 ) -> None:
@@ -119,7 +120,7 @@ def _goal(
     _job(_GOAL, out, {"start": start, "goal": goal, **given})
 
 
-@program.command("tour", of=_TOUR, robot="--robot", back="return")
+@program.command("tour", of=_TOUR, robot=ROBOT, back="return")
 def _tour(*, out: str, **given: Any) -> None:
     """Visit places in the order that takes the robot the least time.
 
@@ -129,7 +130,7 @@ def _tour(*, out: str, **given: Any) -> None:
     _job(_TOUR, out, given)
 
 
-@program.command("cover", of=_COVER, robot="--robot", width="--width", holes="hole")
+@program.command("cover", of=_COVER, robot=ROBOT, width="--width", holes="hole")
 def _cover(*, out: str, **given: Any) -> None:
     """Sweep a region with a camera, magnet or sampler under the robot.
 
@@ -139,7 +140,7 @@ def _cover(*, out: str, **given: Any) -> None:
     _job(_COVER, out, given)
 
 
-@program.command("hold", of=_HOLD, robot="--robot", seconds="for")
+@program.command("hold", of=_HOLD, robot=ROBOT, seconds="for")
 def _hold(*, out: str, **given: Any) -> None:
     """Stay about a place, on the smallest orbit that the robot can keep.
 
@@ -198,7 +199,7 @@ def _fleet(fleet: str, *, apart: str | None = None, feedback: bool = False, out:
         print(line)
 
 
-@program.command("track", of="planner.api.plan:plan", robot="--robot")
+@program.command("track", of="planner.api.plan:plan", robot=ROBOT)
 def _track(
     path: str,
     *,

@@ -40,6 +40,7 @@ from planner.tracking.swim import Swim as Swim
 from planner.tracking.tracker import Command as Command
 from planner.tracking.tracker import Tracker as Tracker
 from planner.vehicle.calibration_table import CalibrationKnowledge as CalibrationKnowledge
+from planner.vehicle.measured import MeasuredVehicle
 from sim.api import replay as replay
 from sim.api import response as response
 from sim.api import sensitivities as sensitivities
@@ -64,6 +65,7 @@ from surrogate.tensors import torch_steady as torch_steady
 from surrogate.training.train import train as train
 
 effects = catalogue
+Vehicle = MeasuredVehicle
 __all__: list[str]
 
 def __dir__() -> list[str]: ...

@@ -17,7 +17,6 @@ from planner.files.tracking_error import tracking_error
 from planner.jobs.plan import plan
 from planner.paths.path import circle, polygon
 from sim.model.presets import PRESETS
-from sim.model.schedule import Schedule
 from sim.motion.replay import replay
 from surrogate.table.model_file import load
 
@@ -36,10 +35,7 @@ def main() -> None:
         began = time.perf_counter()
         plans.append(plan(path, PRESETS[robot], lookup=lookup))
         spent.append(time.perf_counter() - began)
-    schedules = [
-        Schedule(p.robot.group_values(), p.first_direction, p.dwells, tuple(p.poses[0]), p.robot.time_scale)
-        for p in plans
-    ]
+    schedules = [p.schedule() for p in plans]
     with tqdm(total=sum(len(p.dwells) for p in plans), desc="replay", unit="dwell") as bar:
         tracks: list[pd.DataFrame] = replay(schedules, progress=bar.update)
     print("\nOpen-loop replay against the declared path, in tail lengths l")

@@ -53,11 +53,11 @@ def outcome(seed: int, in_time_steps: bool) -> Outcome | str:
         result, own_stated, found = carried(seed, lookup)
     except InputError as refused:
         return f"{seed}: {refused}"
-    columns = {name: np.array([value]) for name, value in result.robot.group_values().items()}
+    schedule = result.schedule()
+    columns = {name: np.array([value]) for name, value in schedule.robot.items()}
     features = lookup.width_features(lookup.solve(columns))
     replayed = error = float("nan")
-    schedule = result.schedule()
-    if in_time_steps and schedule.dwells.sum() * schedule.robot["omega_bar"] * result.robot.tails < _LITTLE:
+    if in_time_steps and schedule.dwells.sum() * schedule.robot["omega_bar"] * schedule.robot["N"] < _LITTLE:
         track = replay([schedule])[0]
         replayed, error = tracking_error(result.to_dict(), track).largest, replay_error(schedule, track)
     return Outcome(

@@ -186,7 +186,7 @@ def carry_out(plan: Plan, swims: TrackedVehicle) -> CarriedOut:
         swims: the robot that carries it out, from the same start and with the same seconds.
     """
     metres = swims.robot.tail_length
-    schedule = plan.schedule(swims.robot)
+    schedule = plan.schedule(swims.robot if isinstance(swims.robot, Robot) else None)
     switches = Switches(schedule.first_direction, schedule.dwells, np.array([schedule.start]))
     rollout = roll_out(swims.vehicle, switches, swims.offset)
     path = plan.drawn.scaled(plan.robot.tail_length / metres).polyline()

@@ -19,6 +19,7 @@ from planner.tracking.tracker import Tracker
 from sim.io.errors import naming
 from sim.io.keywords import checks_keywords
 from sim.io.tables import read_table
+from sim.model.robot import Robot
 from sim.robot_rows import OneRobot, one_robot
 from surrogate.interface import LookupTable
 from surrogate.table.model_file import load_table
@@ -113,7 +114,8 @@ def swim(
 
     Args:
         pilot: a tracker that has not begun, or a plan, which gets a tracker that knows the camera's noise.
-        truth: the robot that swims; default: the one that the plan was made for.
+        truth: the robot that swims; default: the one that the plan was made for. A measured vehicle moves as
+            planned.
         camera: what sees it; default: that of the plan.
         current_cm_s: of the fluid, in x and y [cm/s], which the tracker does not know.
         longest: times the planned duration after which the swim ends in any case.
@@ -135,10 +137,11 @@ def swim(
     camera = camera or plan.request.camera
     tracker = pilot if isinstance(pilot, Tracker) else Tracker(plan, noise=camera.noise)
     unit = plan.robot.time_scale / (100 * plan.robot.tail_length)
+    robot = plan.robot if truth is None else one_robot(truth)
     return swim_under(
         tracker,
         plan,
-        plan.robot if truth is None else one_robot(truth),
+        robot if isinstance(robot, Robot) else plan.tracked.vehicle,
         camera,
         start=tracker.start,
         current=(unit * current_cm_s[0], unit * current_cm_s[1]),

@@ -5,21 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Unpack
 
-from planner.api.options import GoalOptions, Length, asked, pose_of, seconds_of
+from planner.api.options import AnyVehicle, GoalOptions, Length, asked, pose_of, seconds_of, swimmer_of
 from planner.goal.to_goal import to_goal as plan_to_goal
 from planner.goal.trip import Trip
 from planner.paths.units import read_length
 from planner.planning.planned import Plan
 from planner.vehicle.dwell_choice import Objective
 from sim.io.keywords import checks_keywords
-from sim.robot_rows import OneRobot, one_robot
 
 
 @checks_keywords(arrive_seconds="arrive")
 def to_goal(
     start: Sequence[Length],
     goal: Sequence[Length],
-    robot: OneRobot,
+    robot: AnyVehicle,
     *,
     via: Sequence[tuple[Length, Length]] = (),
     arrive: float | str | None = None,
@@ -32,7 +31,8 @@ def to_goal(
     Args:
         start: x, y [l] and heading [rad] of the head's centre, at rest; or words: X, Y and degrees.
         goal: the same at the end.
-        robot: robot.toml or the name of a preset, or the robot; its motor speed is used in both directions.
+        robot: robot.toml or the name of a preset, or the robot, with its motor speed in both directions; or a
+            measured vehicle, or its vehicle.toml.
         via: X Y, of a place that the pivot passes on its way.
         arrive: TIME, when the robot is at the goal, such as 12min, or in seconds: dwells are changed, or swings or
             waiting circles added.
@@ -50,7 +50,7 @@ def to_goal(
         >>> trip.job.end_error[0] < 0.01
         True
     """
-    swims, unit = one_robot(robot), options.get("unit")
+    swims, unit = swimmer_of(robot), options.get("unit")
     ends = (pose_of(start, unit, swims, "--start"), pose_of(goal, unit, swims, "--goal"))
     places = [[read_length(x, unit, swims, "--via") if isinstance(x, str) else x for x in place] for place in via]
     own = {"objective": objective, "arrive_seconds": seconds_of(arrive, "--arrive")}

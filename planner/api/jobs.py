@@ -6,7 +6,17 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Unpack
 
-from planner.api.options import JobOptions, Length, Region, asked, length_of, places_of, region_of, seconds_of
+from planner.api.options import (
+    AnyVehicle,
+    JobOptions,
+    Length,
+    Region,
+    asked,
+    length_of,
+    places_of,
+    region_of,
+    seconds_of,
+)
 from planner.files.fleet_files import distance_apart
 from planner.files.regions import refuse_other_unit
 from planner.jobs.cover import Coverage
@@ -23,13 +33,12 @@ from planner.paths.units import read_degrees
 from planner.planning.planned import Plan
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
-from sim.robot_rows import OneRobot
 
 
 @checks_keywords()
 def tour(
     places: str | Path | Sequence[Sequence[float] | str],
-    robot: OneRobot,
+    robot: AnyVehicle,
     *,
     back: bool = False,
     any_start: bool = False,
@@ -41,7 +50,7 @@ def tour(
         places: X,Y of each, or one CSV or SVG with a point for each; or x, y of each [l]. The tour begins at the
             first one. Up to 12 more are ordered exactly; with more, `job.gap` says how much longer than the
             quickest order the tour may be.
-        robot: robot.toml or the name of a preset, or the robot.
+        robot: robot.toml or the name of a preset, or the robot; or a measured vehicle, or its vehicle.toml.
         back: end where the tour began.
         any_start: begin at any of the places.
         options: see `JobOptions`.
@@ -64,7 +73,7 @@ def tour(
 def cover(
     region: Region,
     width: Length,
-    robot: OneRobot,
+    robot: AnyVehicle,
     *,
     holes: Sequence[Region] = (),
     angle: float | str | None = None,
@@ -76,7 +85,7 @@ def cover(
         region: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline; or a `Circle`, or
             corners (n, 2) [l].
         width: LENGTH, of the footprint, such as 4cm.
-        robot: robot.toml or the name of a preset, or the robot.
+        robot: robot.toml or the name of a preset, or the robot; or a measured vehicle, or its vehicle.toml.
         holes: REGION, a part that need not be swept, and may be crossed, as is what `keep_out` has.
         angle: DEGREES, direction of the lanes; a number is in rad (default: the quickest).
         options: see `JobOptions`.
@@ -103,7 +112,7 @@ def cover(
 @checks_keywords()
 def hold(
     place: Sequence[float] | str,
-    robot: OneRobot,
+    robot: AnyVehicle,
     *,
     seconds: float | str | None = None,
     **options: Unpack[JobOptions],
@@ -112,7 +121,7 @@ def hold(
 
     Args:
         place: X,Y; or x, y [l].
-        robot: robot.toml or the name of a preset, or the robot.
+        robot: robot.toml or the name of a preset, or the robot; or a measured vehicle, or its vehicle.toml.
         seconds: TIME, for so long, such as 30min (default: until told otherwise).
         options: see `JobOptions`.
 

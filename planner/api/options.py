@@ -16,11 +16,12 @@ from planner.files.own_table import table_for
 from planner.files.regions import read_places, read_region
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.path import Path2D
-from planner.paths.units import read_length, read_pose, read_time
+from planner.paths.units import Swimmer, read_length, read_pose, read_time
 from planner.planning.camera import POSE, Camera
 from planner.planning.request import Corner, PlanRequest
 from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
 from planner.vehicle.dwell_choice import Objective
+from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import Point, TrackedVehicle, tracked_vehicle
 from sim.io.errors import InputError
 from sim.io.units import LengthUnit
@@ -29,6 +30,7 @@ from sim.robot_rows import OneRobot, one_robot
 from surrogate.interface import LookupTable
 from surrogate.table.model_file import load_table
 
+AnyVehicle = OneRobot | MeasuredVehicle
 Length = float | str
 Region = Circle | Polygon | Path2D | ArrayLike | str
 _REQUEST = ("point", "corner", "time_weight", "objective", "minimum_dwell", "minimum_seconds", "dwell",
@@ -135,21 +137,32 @@ class PathOptions(CornerOptions, JobOptions, total=False):
     """Options of `plan`."""
 
 
-def asked(robot: OneRobot, options: Mapping[str, Any], **own: Any) -> tuple[TrackedVehicle, PlanRequest]:
+def asked(robot: AnyVehicle, options: Mapping[str, Any], **own: Any) -> tuple[TrackedVehicle, PlanRequest]:
     """Return a robot's vehicle with its tracked point, and what is asked of its plan.
 
     Args:
-        robot: the robot.
+        robot: the robot, or a measured vehicle.
         options: see the classes above.
         own: further fields of `PlanRequest`.
 
     Raises:
         InputError: an option cannot be, or no table knows the robot.
     """
-    swims = one_robot(robot)
+    swims = swimmer_of(robot)
     request = request_of(options, swims, **own)
+    if isinstance(robot, MeasuredVehicle) or isinstance(swims, MeasuredVehicle):
+        if any(options.get(name) for name in ("lookup", "own_table", "knowledge")):
+            raise InputError(f"{swims.name!r} is a measured vehicle; it needs no look-up table and no calibration")
+        return tracked_vehicle(swims, None, request.point, None), request
     table, knowledge = table_of(robot, options)
     return tracked_vehicle(swims, table, request.point, knowledge), request
+
+
+def swimmer_of(robot: AnyVehicle) -> Robot | MeasuredVehicle:
+    """Return a robot or a measured vehicle, read from its file where a path or a preset's name is given."""
+    if isinstance(robot, str | Path) and MeasuredVehicle.is_in(robot):
+        return MeasuredVehicle.load(robot)
+    return robot if isinstance(robot, MeasuredVehicle) else one_robot(robot)
 
 
 def table_of(robot: OneRobot, options: Mapping[str, Any]) -> tuple[LookupTable, CalibrationKnowledge]:
@@ -162,7 +175,7 @@ def table_of(robot: OneRobot, options: Mapping[str, Any]) -> tuple[LookupTable, 
     return lookup or table_for(one_robot(robot), source, known, own=options.get("own_table", False)), known
 
 
-def request_of(options: Mapping[str, Any], robot: Robot, **own: Any) -> PlanRequest:
+def request_of(options: Mapping[str, Any], robot: Swimmer, **own: Any) -> PlanRequest:
     """Return what is asked of a plan; `own` are further fields."""
     given, unit = {name: options[name] for name in _REQUEST if name in options}, options.get("unit")
     if "camera" in given:
@@ -173,12 +186,12 @@ def request_of(options: Mapping[str, Any], robot: Robot, **own: Any) -> PlanRequ
     return PlanRequest(**given, **own, space=space)
 
 
-def length_of(given: Length, unit: str | None, robot: Robot, name: str) -> float:
+def length_of(given: Length, unit: str | None, robot: Swimmer, name: str) -> float:
     """Return a length above 0 in l; a number is one."""
     return read_length(given, unit, robot, name, above_zero=True) if isinstance(given, str) else given
 
 
-def camera_of(given: Camera | Sequence[str], unit: str | None, robot: Robot) -> Camera:
+def camera_of(given: Camera | Sequence[str], unit: str | None, robot: Swimmer) -> Camera:
     """Return a camera, or read its words.
 
     Raises:
@@ -197,14 +210,14 @@ def camera_of(given: Camera | Sequence[str], unit: str | None, robot: Robot) -> 
     return Camera((noise, heading), every_s, delay_s, lost)
 
 
-def region_of(given: Region, unit: str | None, robot: Robot) -> Circle | Polygon:
+def region_of(given: Region, unit: str | None, robot: Swimmer) -> Circle | Polygon:
     """Return a region, or read its words."""
     if isinstance(given, str | Path):
         return read_region(str(given), unit, robot)
     return given if isinstance(given, Circle | Polygon) else Polygon.of(given)
 
 
-def free_space(keep_out: Sequence[Region], walls: Region | None, unit: str | None, robot: Robot) -> FreeSpace:
+def free_space(keep_out: Sequence[Region], walls: Region | None, unit: str | None, robot: Swimmer) -> FreeSpace:
     """Return the space that regions and walls leave.
 
     Raises:
@@ -216,7 +229,7 @@ def free_space(keep_out: Sequence[Region], walls: Region | None, unit: str | Non
     return FreeSpace(tuple(region_of(each, unit, robot) for each in keep_out), outline)
 
 
-def pose_of(given: Sequence[Length], unit: str | None, robot: Robot, name: str) -> POSE:
+def pose_of(given: Sequence[Length], unit: str | None, robot: Swimmer, name: str) -> POSE:
     """Return a pose in l and rad, or read its words: X, Y and degrees."""
     if any(isinstance(each, str) for each in given):
         return read_pose([str(each) for each in given], unit, robot, name)
@@ -225,7 +238,7 @@ def pose_of(given: Sequence[Length], unit: str | None, robot: Robot, name: str) 
 
 
 def places_of(
-    given: Sequence[Sequence[float] | str] | str | Path, unit: str | None, robot: Robot
+    given: Sequence[Sequence[float] | str] | str | Path, unit: str | None, robot: Swimmer
 ) -> Sequence[Sequence[float]]:
     """Return places in l, or read their words: X,Y of each, or a file."""
     words = [str(given)] if isinstance(given, str | Path) else [each for each in given if isinstance(each, str)]

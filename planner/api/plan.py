@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from numpy.typing import ArrayLike
 
-from planner.api.options import Length, PathOptions, asked, length_of, seconds_of
+from planner.api.options import AnyVehicle, Length, PathOptions, asked, length_of, seconds_of
 from planner.files.plan_files import write_plan as write_plan_files
 from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D, smoothed
@@ -17,7 +17,6 @@ from planner.paths.units import describe, in_lab, in_tails
 from planner.planning.planned import Plan
 from sim.io.errors import InputError, naming
 from sim.io.keywords import checks_keywords
-from sim.robot_rows import OneRobot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 @checks_keywords(arrive_seconds="arrive")
 def plan(
     path: Path2D | Drawing | ArrayLike | str | Path,
-    robot: OneRobot,
+    robot: AnyVehicle,
     *,
     scale: float = 1.0,
     shape: str | None = None,
@@ -44,7 +43,8 @@ def plan(
     Args:
         path: CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE, polygon:CORNERS:SIDE (square:24cm,
             polygon:6:2l); or what `read_path` reads, a Path2D, or points (n, 2), in tail lengths l or in `unit`.
-        robot: robot.toml or the name of a preset, or the robot; its motor speed is used in both directions.
+        robot: robot.toml or the name of a preset, or the robot, with its motor speed in both directions; or a
+            measured vehicle, or its vehicle.toml.
         scale: multiply the path's coordinates.
         shape: which path of an SVG with several.
         closed: join the path's end to its start.

@@ -27,11 +27,10 @@ from typing import Any, NamedTuple
 
 from planner.files.plan_files import EXTRA, FILES, write_plan_files
 from planner.jobs.fleet_plan import FleetPlan
-from planner.paths.units import number_and_unit, read_length
+from planner.paths.units import Swimmer, number_and_unit, read_length
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_text
 from sim.io.reading import read_json, read_toml
-from sim.model.robot import Robot
 
 _JOBS = {"path": "plan", "goal": "goal", "places": "tour", "region": "cover"}  # key -> command
 _OWN = ("robot", "name", "delay_s")
@@ -137,7 +136,7 @@ def _beside(folder: Path, key: str, value: Any) -> str:
     return str(beside) if key in _FILES and beside.is_file() else str(value)
 
 
-def distance_apart(words: str | float, unit: str | None, robots: Sequence[Robot]) -> float:
+def distance_apart(words: str | float, unit: str | None, robots: Sequence[Swimmer]) -> float:
     """Read a distance such as 10cm in m.
 
     Raises:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from planner.planning.planned import KINDS, Plan
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_numbers, write_text
 from sim.io.provenance import code_version
+from sim.model.robot import Robot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -127,8 +128,7 @@ def controller_header(result: Plan, identity: str) -> str:
 #define SCHEDULE_FIRST_DIRECTION ({result.first_direction})
 #define SCHEDULE_COUNT {len(entries)}{_repeats(result)}
 #define SCHEDULE_TOTAL_MS {sum(entries)}UL
-#define SCHEDULE_MOTOR_RPM {result.robot.motor_speed * 30 / np.pi:.3f}
-#define SCHEDULE_START_X_CM {cm * x:.4f}
+{_motor(result)}#define SCHEDULE_START_X_CM {cm * x:.4f}
 #define SCHEDULE_START_Y_CM {cm * y:.4f}
 #define SCHEDULE_START_HEADING_DEG {np.degrees(heading):.3f}
 #define SCHEDULE_START_X {x:.6f}
@@ -146,6 +146,12 @@ static const schedule_checkpoint SCHEDULE_TABLE(schedule_checkpoints)[SCHEDULE_C
 }};
 {c_part("schedule.h")}#endif
 """
+
+
+def _motor(result: Plan[Any]) -> str:
+    """Define the motor's speed; a measured vehicle has none."""
+    robot = result.robot
+    return f"#define SCHEDULE_MOTOR_RPM {robot.motor_speed * 30 / np.pi:.3f}\n" if isinstance(robot, Robot) else ""
 
 
 def _after(result: Plan) -> str:

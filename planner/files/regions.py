@@ -11,15 +11,14 @@ import numpy as np
 from planner.paths.obstacles import Circle, Polygon, Region
 from planner.paths.path_files import Drawing, read_path
 from planner.paths.shapes import like_a_shape, shape_of
-from planner.paths.units import in_tails, read_length
+from planner.paths.units import Swimmer, in_tails, read_length
 from sim.arrays import Floats
 from sim.io.errors import InputError, naming
-from sim.model.robot import Robot
 
 _SHAPES = {"circle": "circle:X,Y,RADIUS", "box": "box:LEFT,LOW,RIGHT,HIGH"}
 
 
-def read_region(words: str, unit: str | None, robot: Robot) -> Region:
+def read_region(words: str, unit: str | None, robot: Swimmer) -> Region:
     """Read a region, in tail lengths.
 
     Args:
@@ -62,7 +61,7 @@ def read_outline(words: str) -> Drawing:
     return read_path(words, closed=True)
 
 
-def read_places(words: Sequence[str], unit: str | None, robot: Robot) -> Floats:
+def read_places(words: Sequence[str], unit: str | None, robot: Swimmer) -> Floats:
     """Read places (n, 2), in tail lengths.
 
     Args:
@@ -84,7 +83,7 @@ def read_places(words: Sequence[str], unit: str | None, robot: Robot) -> Floats:
     )
 
 
-def refuse_other_unit(region: object, unit: str | None, robot: Robot) -> None:
+def refuse_other_unit(region: object, unit: str | None, robot: Swimmer) -> None:
     """Refuse a file with an outline that says another unit than `unit`; other regions have none of their own."""
     if isinstance(region, str) and region.partition(":")[0] not in _SHAPES:
         with naming(region):

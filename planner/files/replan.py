@@ -21,13 +21,13 @@ from planner.files.tracking_error import track_in_tails
 from planner.goal.to_goal import to_goal
 from planner.goal.trip import Trip
 from planner.paths.obstacles import FreeSpace
+from planner.paths.units import Swimmer
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.rest import place_reached, rest_of
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.quantities import numbers_of
-from sim.model.robot import Robot
 from surrogate.interface import LookupTable
 
 _LARGEST = 1e6  # l, of a place; time units, of a time
@@ -78,7 +78,7 @@ def replan_from(plan: Plan, track: pd.DataFrame) -> Plan:
     return to_goal((x, y, math.remainder(heading, math.tau)), plan.ends_at, plan.tracked, request, left)
 
 
-def poses_of(track: pd.DataFrame, robot: Robot) -> tuple[Floats, Floats]:
+def poses_of(track: pd.DataFrame, robot: Swimmer) -> tuple[Floats, Floats]:
     """Return times (N,) and poses (N, 3) of a track, in time units, l and rad.
 
     Raises:

@@ -33,6 +33,7 @@ from planner.planning.request import PlanRequest
 from planner.planning.stated_error import predicted_error
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.dwell_choice import Objective
+from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.rollout import Switches, trace
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import Zigzag
@@ -96,7 +97,9 @@ def restore_plan(
             robot = _robot(content["robot"])
             knowledge = CalibrationKnowledge.from_dict(content.get("calibration", {}), name)
             own = own_table or bool(content.get("own_table", False))
-            table = table_for(robot, kept, knowledge, own=own) if lookup is None else lookup
+            table = lookup
+            if lookup is None and isinstance(robot, Robot):
+                table = table_for(robot, kept, knowledge, own=own)
             tracked = tracked_vehicle(robot, table, content["point"], knowledge)
             plan = _plan(content, tracked)
     except InputError:
@@ -130,11 +133,13 @@ def plan_json(source: str | Path) -> Path:
     return beside
 
 
-def _robot(content: Mapping[str, Any]) -> Robot:
-    """Make a robot of the groups and scales in a plan.json.
+def _robot(content: Mapping[str, Any]) -> Robot | MeasuredVehicle:
+    """Make a robot of the groups and scales in a plan.json, or the vehicle that was measured.
 
-    Its Young's modulus and viscosity are nominal: they count through the unit of time alone.
+    A robot's Young's modulus and viscosity are nominal: they count through the unit of time alone.
     """
+    if "vehicle" in content:
+        return MeasuredVehicle.from_dict(content["vehicle"])
     groups = {name: float(value) for name, value in content["groups"].items()}
     effects = {name: value for name, value in groups.items() if name not in _GROUPS}
     length, time = float(content["tail_length_m"]), float(content["time_scale_s"])

@@ -17,10 +17,9 @@ import numpy as np
 from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, words
 from planner.goal.lattice import Lattice, RouteLimits
 from planner.paths.obstacles import FreeSpace
-from planner.paths.units import in_lab, place_in_lab
+from planner.paths.units import Swimmer, in_lab, place_in_lab
 from planner.planning.kept_clear import BlockedError
 from sim.arrays import Floats
-from sim.model.robot import Robot
 
 COURSES = 24  # tried at a stop whose course is free
 LEVELS = ((0.6, 16), (0.3, 32))  # spacing of the lattice, in radii, and number of courses
@@ -65,7 +64,7 @@ class Route:
 Lattices = dict[tuple[float, int], Lattice]
 
 
-def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lattices, robot: Robot) -> Route:
+def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lattices, robot: Swimmer) -> Route:
     """Find a short route through the stops.
 
     Args:
@@ -100,7 +99,7 @@ def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lat
     )
 
 
-def _check(stop: Floats, number: int, count: int, limits: RouteLimits, margin: float, robot: Robot) -> None:
+def _check(stop: Floats, number: int, count: int, limits: RouteLimits, margin: float, robot: Swimmer) -> None:
     clearance = float(limits.clearance(stop).max())
     if clearance >= margin:
         return

@@ -23,6 +23,7 @@ from planner.planning.progress import Progress
 from planner.planning.request import PlanRequest, RequestOptions
 from planner.planning.solve import Change, Task, solve
 from planner.vehicle.calibration_table import CalibrationKnowledge
+from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from sim.io.errors import InputError
 from sim.model.robot import Robot
@@ -31,7 +32,7 @@ from surrogate.interface import LookupTable
 
 def plan(
     path: Path2D | ArrayLike,
-    robot: Robot,
+    robot: Robot | MeasuredVehicle,
     *,
     lookup: LookupTable | None = None,
     knowledge: CalibrationKnowledge | None = None,
@@ -42,7 +43,7 @@ def plan(
 
     Args:
         path: (n, 2) points or a Path2D, lengths in tail lengths l.
-        robot: the robot; its motor speed is used in both directions.
+        robot: the robot; its motor speed is used in both directions. Or a measured vehicle.
         lookup: trained table, or the table of this one robot; default the shipped one.
         knowledge: what a calibration found besides the robot: covariance, current.
         progress: called now and then with the share of the path that is done.

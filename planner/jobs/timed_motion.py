@@ -13,10 +13,10 @@ import numpy as np
 
 from planner.jobs.error_in_place import error_open_loop, error_with_feedback
 from planner.paths.obstacles import Footprint
+from planner.paths.units import Swimmer
 from planner.planning.planned import Plan
 from sim.arrays import Floats
 from sim.mechanics import planar
-from sim.model.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Body:
     radius: float  # of the body around the line
 
     @staticmethod
-    def of(robot: Robot) -> Body:
+    def of(robot: Swimmer) -> Body:
         """Cover head and straight tails."""
         discs, length = Footprint.of(robot, 0.0), robot.tail_length
         return Body(float(discs.places.max()) * length, float(discs.places.min()) * length, discs.radius * length)

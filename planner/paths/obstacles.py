@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planner.paths.path import Path2D
+from planner.paths.units import Swimmer
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
-from sim.model.robot import Robot
 
 _BLOCK = 2_000_000  # distances computed at once
 
@@ -181,12 +181,9 @@ class Footprint:
     radius: float  # of all
 
     @staticmethod
-    def of(robot: Robot, origin: float) -> Footprint:
-        """Cover head and straight tails; `origin` is the distance from the head's centre forward to the point."""
-        length = robot.tail_length
-        half, width = robot.head_length / 2 / length, robot.head_radius / length
-        width = max(width, ((robot.disc_offset or robot.head_radius) + robot.tail_radius) / length)
-        front, back = half, -half - 1.0
+    def of(swimmer: Swimmer, origin: float) -> Footprint:
+        """Cover the body; `origin` is the distance from its pose's point forward to the point of the axis."""
+        front, back, width = swimmer.outline
         count = max(2, math.ceil((front - back) / width))
         step = (front - back) / count
         places = np.asarray(back + step * (np.arange(count) + 0.5) - origin, dtype=np.float64)

@@ -13,12 +13,11 @@ from planner.paths.file_kinds import refuse_other_kinds
 from planner.paths.path import Path2D
 from planner.paths.shapes import SHAPES, like_a_shape, nearest_shape, shape_of
 from planner.paths.svg_drawing import read_svg
-from planner.paths.units import NO_UNIT, in_tails
+from planner.paths.units import NO_UNIT, Swimmer, in_tails
 from sim.arrays import Floats
 from sim.io.errors import InputError, naming
 from sim.io.keywords import checks_keywords
 from sim.io.units import split, to_si
-from sim.model.robot import Robot
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,7 +38,7 @@ class Drawing:
     path: Path2D  # in the unit of the file
     unit: float | str | None  # its size in m, or "m", "cm", "mm", "l"; None: the numbers have no unit
 
-    def in_tails(self, robot: Robot, unit: str | None = None) -> Path2D:
+    def in_tails(self, robot: Swimmer, unit: str | None = None) -> Path2D:
         """Return the path in tail lengths of a robot.
 
         Args:

@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from sim.io.errors import InputError
 from sim.io.units import LENGTHS, format_length, format_time, of_kind, to_si
 
 if TYPE_CHECKING:  # the command needs them before it loads NumPy
     from planner.paths.path import Path2D
-    from sim.model.robot import Robot
 
 LONGEST = 12_000.0  # l
 SMALLEST = 0.25  # of the radius of the robot's circle, largest extent of a path
@@ -26,7 +25,27 @@ NO_UNIT = (
 )
 
 
-def in_lab(value: float, robot: Robot) -> str:
+class Swimmer(Protocol):
+    """What the planner must know besides the motion: a robot has it, and a vehicle that was measured."""
+
+    @property
+    def name(self) -> str:
+        """In texts and files."""
+
+    @property
+    def tail_length(self) -> float:
+        """The unit of length, l [m]."""
+
+    @property
+    def time_scale(self) -> float:
+        """The unit of time [s]."""
+
+    @property
+    def outline(self) -> tuple[float, float, float]:
+        """Front and back of the body, forward from the point whose poses count, and half of the width [l]."""
+
+
+def in_lab(value: float, robot: Swimmer) -> str:
     """Write a length given in tail lengths: 3.52 cm (0.32 l)."""
     return length_in_lab(value, robot.tail_length)
 
@@ -36,7 +55,7 @@ def length_in_lab(value: float, tail_length: float) -> str:
     return f"{format_length(value * tail_length)} ({_tails(value)} l)"
 
 
-def time_in_lab(value: float, robot: Robot) -> str:
+def time_in_lab(value: float, robot: Swimmer) -> str:
     """Write a time given in units of μ0 l⁴/EI: 1.79 s (0.81 time units)."""
     return f"{format_time(value * robot.time_scale)} ({value:.2g} time units)"
 
@@ -58,7 +77,7 @@ def read_time(words: str, name: str) -> float:
     return seconds
 
 
-def place_in_lab(x: float, y: float, robot: Robot) -> str:
+def place_in_lab(x: float, y: float, robot: Swimmer) -> str:
     """Write a place given in tail lengths: (3.52, 1.1) cm = (0.32, 0.1) l."""
     cm = 100 * robot.tail_length
     lab, tails = (", ".join(_fixed(s * value, n) for value in (x, y)) for s, n in ((cm, 2), (1.0, 3)))
@@ -81,14 +100,14 @@ def _tails(value: float) -> str:
     return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
 
 
-def describe(path: Path2D, robot: Robot) -> str:
+def describe(path: Path2D, robot: Swimmer) -> str:
     """Describe length and extent of a path."""
     width, height = extent(path)
     across = [format_length(value * robot.tail_length) for value in (width, height)]
     return f"{in_lab(path.length, robot)} long, {' by '.join(across)} ({_tails(width)} by {_tails(height)} l)"
 
 
-def in_tails(unit: str, robot: Robot) -> float:
+def in_tails(unit: str, robot: Swimmer) -> float:
     """Convert a unit of length to tail lengths; l is the tail length itself.
 
     Raises:
@@ -109,7 +128,7 @@ def number_and_unit(words: str) -> tuple[float, str | None]:
         return math.nan, unit
 
 
-def read_length(words: str, unit: str | None, robot: Robot, name: str, *, above_zero: bool = False) -> float:
+def read_length(words: str, unit: str | None, robot: Swimmer, name: str, *, above_zero: bool = False) -> float:
     """Read a length, in tail lengths.
 
     Args:
@@ -132,7 +151,7 @@ def read_length(words: str, unit: str | None, robot: Robot, name: str, *, above_
     return value * in_tails(own or unit or "l", robot)
 
 
-def read_pose(words: Sequence[str], unit: str | None, robot: Robot, name: str) -> tuple[float, float, float]:
+def read_pose(words: Sequence[str], unit: str | None, robot: Swimmer, name: str) -> tuple[float, float, float]:
     """Read a pose, in tail lengths and rad, from two lengths and an angle in degrees.
 
     Raises:
@@ -160,7 +179,7 @@ def extent(path: Path2D) -> tuple[float, float]:
     return width, height
 
 
-def check_size(path: Path2D, robot: Robot, turn_radius: float) -> None:
+def check_size(path: Path2D, robot: Swimmer, turn_radius: float) -> None:
     """Refuse a path that no schedule can be meant for.
 
     Raises:

@@ -8,9 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from planner.paths.units import in_lab, place_in_lab
+from planner.paths.units import Swimmer, in_lab, place_in_lab
 from sim.io.units import format_time
-from sim.model.robot import Robot
 
 
 class Swing(NamedTuple):
@@ -21,7 +20,7 @@ class Swing(NamedTuple):
     longer: float  # by how much the pivot's track is longer
     circles: int  # waiting circles in it
 
-    def line(self, robot: Robot) -> str:
+    def line(self, robot: Swimmer) -> str:
         """Say in one sentence where the swing is."""
         place = place_in_lab(self.x, self.y, robot)
         what = {0: "a swing", 1: "a waiting circle"}.get(self.circles, f"{self.circles} waiting circles")
@@ -34,7 +33,7 @@ class Arrival(NamedTuple):
     wished: float  # as it was asked for
     fastest: float  # duration of the fastest plan
 
-    def line(self, duration: float, robot: Robot) -> str:
+    def line(self, duration: float, robot: Swimmer) -> str:
         """Say in one sentence how near the duration of a plan comes to the wish."""
         wished, missed, fastest = (
             format_time(time * robot.time_scale)
@@ -42,7 +41,7 @@ class Arrival(NamedTuple):
         )
         return f"arrives after {wished} as asked, to within {missed}; the fastest plan takes {fastest}"
 
-    def to_dict(self, swing: Swing | None, robot: Robot) -> dict[str, Any]:
+    def to_dict(self, swing: Swing | None, robot: Swimmer) -> dict[str, Any]:
         """Return the content for plan.json."""
         scale = robot.time_scale
         return {
@@ -52,7 +51,7 @@ class Arrival(NamedTuple):
         }
 
     @staticmethod
-    def from_dict(content: Mapping[str, Any], robot: Robot) -> tuple[Arrival, Swing | None]:
+    def from_dict(content: Mapping[str, Any], robot: Swimmer) -> tuple[Arrival, Swing | None]:
         """Read the content of a plan.json."""
         wished, fastest = (float(content[name]) / robot.time_scale for name in ("wished_s", "fastest_s"))
         swing = None

@@ -17,13 +17,12 @@ from planner.paths.fillets import CORNER, fillet, kinks, largest_fillet
 from planner.paths.nearest_feasible import nearest_path, pose_spacing
 from planner.paths.path import Path2D, smoothed
 from planner.paths.tractrix import Drift, Reference, reference
-from planner.paths.units import extent, place_in_lab
+from planner.paths.units import Swimmer, extent, place_in_lab
 from planner.planning.progress import DECLARING, Progress, tell
 from planner.planning.request import Corner
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
 from sim.io.errors import InputError
-from sim.model.robot import Robot
 
 AS_DRAWN = 0.85  # share of the pivot's largest curvature up to which a path is followed as it was drawn
 ROOMS = (0.92, 0.85, 0.7, 0.55, 0.35, 0.2)  # shares of it that the nearest path may use
@@ -45,7 +44,7 @@ _POINTS_A_POSE = 80  # points of a reference that cost as much as one pose of th
 class Feasibility(NamedTuple):
     """What decides whether a path can be followed, and which one is declared if it cannot."""
 
-    robot: Robot  # whose lengths messages are in
+    robot: Swimmer  # whose lengths messages are in
     vehicle: Vehicle  # its pivot radius limits the curvature
     rod: float  # from the pivot to the tracked point
     drift: Drift  # what carries the robot off its heading
@@ -150,7 +149,7 @@ def spacing(path: Path2D) -> float:
     return max(_SPACING, path.length / _MOST_POINTS)
 
 
-def _refuse_corner(raw: Path2D, robot: Robot) -> None:
+def _refuse_corner(raw: Path2D, robot: Swimmer) -> None:
     """Refuse a path with a sharp corner, and name the corner."""
     angle = np.abs(kinks(raw))
     sharpest = place_of_largest(angle)

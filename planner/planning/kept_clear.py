@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from planner.paths.obstacles import FreeSpace
-from planner.paths.units import in_lab, place_in_lab
+from planner.paths.units import Swimmer, in_lab, place_in_lab
 from sim.io.errors import InputError
-from sim.model.robot import Robot
 
 
 class BlockedError(InputError):
@@ -26,7 +25,7 @@ class Detour(NamedTuple):
     replaced: float  # of the part of the path that is not followed
     farthest: float  # largest distance of the tracked point from the path
 
-    def line(self, robot: Robot) -> str:
+    def line(self, robot: Swimmer) -> str:
         """Say in one sentence where the way around leaves the path and joins it again."""
         leaves, joins = (place_in_lab(*place, robot) for place in (self.leaves, self.joins))
         return (
@@ -45,7 +44,7 @@ class KeptClear:
     clearance: float  # smallest, of the body on the predicted track
     detours: tuple[Detour, ...]  # in the order of the path
 
-    def lines(self, robot: Robot) -> list[str]:
+    def lines(self, robot: Swimmer) -> list[str]:
         """Say how the plan keeps clear, a sentence for each detour and one for the margin."""
         margin, clearance = (in_lab(value, robot) for value in (self.margin, self.clearance))
         last = f"margin {margin} around the body; predicted clearance {clearance}"

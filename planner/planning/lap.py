@@ -12,12 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planner.draws import normals
-from planner.paths.units import in_lab
+from planner.paths.units import Swimmer, in_lab
 from planner.planning.error_growth import error_growth
 from planner.planning.stated_error import LEVEL, flips_between
 from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import TrackedVehicle
-from sim.model.robot import Robot
 
 _DRAWS = 1000
 _SHOWN = 1e-5  # l and rad; smaller differences are rounding
@@ -32,7 +31,7 @@ class Lap(NamedTuple):
     drift: float  # distance that 95 % of the robots keep to that the model's uncertainty allows, open loop
     drift_turn: float  # angle of the same robots
 
-    def line(self, robot: Robot) -> str:
+    def line(self, robot: Swimmer) -> str:
         """Say in one sentence how well the laps repeat."""
         closes, drift = in_lab(max(self.closes, _SHOWN), robot), in_lab(self.drift, robot)
         turned, drift_turn = (math.degrees(angle) for angle in (max(self.closes_turn, _SHOWN), self.drift_turn))

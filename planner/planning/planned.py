@@ -25,6 +25,7 @@ from planner.planning.lap import Lap
 from planner.planning.line_of_sight import Guidance
 from planner.planning.request import PlanRequest
 from planner.planning.setting import zigzag_drift
+from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.rollout import Switches, predicted_poses, trace_smoothly
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.zigzag import Zigzag
@@ -111,8 +112,8 @@ class Plan(Generic[J]):
         return replace(cast("Plan[K]", self), job=job)
 
     @property
-    def robot(self) -> Robot:
-        """The robot that the plan is for."""
+    def robot(self) -> Robot | MeasuredVehicle:
+        """The robot, or the measured vehicle, that the plan is for."""
         return self.tracked.robot
 
     @property
@@ -277,11 +278,13 @@ class Plan(Generic[J]):
             laps: how often a schedule that repeats is carried out.
 
         Raises:
-            InputError: the schedule does not repeat.
+            InputError: the schedule does not repeat, or is that of a measured vehicle, which cannot be simulated.
         """
         if laps != 1 and (self.lap is None or laps < 1):
             raise InputError(f"{laps} laps of a schedule that is carried out once; plan it with --loop, loop=True")
         planned = self.robot
+        if isinstance(planned, MeasuredVehicle):
+            raise InputError(f"{planned.name!r} is a measured vehicle; only robots can be simulated, see `swim`")
         schedule = Schedule(
             planned.group_values(),
             self.first_direction,
@@ -389,9 +392,15 @@ class Plan(Generic[J]):
             "format": FORMAT,
             "robot": {
                 "name": robot.name,
-                "groups": robot.group_values(),
-                "tail_length_m": robot.tail_length,
-                "motor_speed_rad_s": robot.motor_speed,
+                **(
+                    {"vehicle": robot.to_dict(), "tail_length_m": robot.tail_length}
+                    if isinstance(robot, MeasuredVehicle)
+                    else {
+                        "groups": robot.group_values(),
+                        "tail_length_m": robot.tail_length,
+                        "motor_speed_rad_s": robot.motor_speed,
+                    }
+                ),
                 "time_scale_s": robot.time_scale,
             },
             "point": self.tracked.point,

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Literal, TypedDict
 
 from planner.paths.obstacles import FreeSpace
+from planner.paths.units import Swimmer
 from planner.planning.camera import DOCUMENTED, Camera
 from planner.vehicle.dwell_choice import QUICK, Objective
 from planner.vehicle.tracked_point import Point
 from sim.io.errors import InputError
-from sim.model.robot import Robot
 
 Corner = Literal["nearest", "minimax", "fillet", "error"]
 
@@ -39,7 +39,7 @@ class PlanRequest:
         if self.tolerance is not None and not (math.isfinite(self.tolerance) and self.tolerance > 0):
             raise InputError(f"tolerance {self.tolerance:g} l; give a number above 0")
 
-    def least_dwell(self, robot: Robot) -> float | None:
+    def least_dwell(self, robot: Swimmer) -> float | None:
         """Return the shortest dwell that the motor allows, in time units; None: the user gave none."""
         seconds, dwell = self.minimum_seconds, self.minimum_dwell
         if seconds is None:

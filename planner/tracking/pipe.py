@@ -30,11 +30,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 
+from planner.paths.units import Swimmer
 from planner.tracking.kalman_filter import POSE
 from planner.tracking.pipe_columns import Columns, is_header
 from planner.tracking.tracker import Tracker
 from sim.io.units import from_si
-from sim.model.robot import Robot
 
 BEGIN = "begin"  # the word before a pose where the robot begins
 FINISH = "finish"
@@ -44,7 +44,7 @@ WAIT = 1.0  # s
 def answers(
     tracker: Tracker | None,
     lines: Iterable[str],
-    robot: Robot,
+    robot: Swimmer,
     begin: Callable[[POSE, float], Tracker] | None = None,
 ) -> Iterator[str]:
     """Answer every line, until the path ends.

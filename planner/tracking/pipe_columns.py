@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from planner.paths.units import Swimmer
 from planner.tracking.kalman_filter import POSE
 from sim.io.errors import InputError
 from sim.io.units import split, to_si
-from sim.model.robot import Robot
 
 _KINDS = {"time": "time", "x": "length", "y": "length", "heading": "angle", "seen": "time"}
 _TAILS = "_over_l"
@@ -30,12 +30,12 @@ class Columns:
     length: str | None = None  # suffix of the unit of x; None: tail lengths
 
     @classmethod
-    def plain(cls, robot: Robot) -> Columns:
+    def plain(cls, robot: Swimmer) -> Columns:
         """Return the columns of lines without a header."""
         return cls.named(list(_KINDS), robot)
 
     @classmethod
-    def named(cls, header: list[str], robot: Robot) -> Columns:
+    def named(cls, header: list[str], robot: Swimmer) -> Columns:
         """Read a header.
 
         Raises:

@@ -35,6 +35,7 @@ from sim.mechanics import planar
 Measured = float | tuple[float, float]  # a value, and its standard deviation where it is known
 _TURN = 0.25  # rad in the unit of time, where the vehicle has no lag
 _LAGS = 10.0  # time constants in the unit of time, at least
+_POINT = 0.01  # l, radius of a body without a size
 _SUBSTEPS = 10  # of a step of TIMES, for the integral of the motion
 _KINDS = {
     "speed": "speed", "turn_left": "angular velocity", "turn_right": "angular velocity", "slip": "angle",
@@ -90,8 +91,8 @@ class MeasuredVehicle:
                 )
         if not 0 <= self.measured("slip")[0] < math.pi / 2:
             raise InputError(
-                "slip: give an angle from 0 up to 90 degrees, to the inside of the turn; where the point slides to "
-                "the outside, track one that is further ahead"
+                "slip: give an angle from 0 up to 90 degrees, to the inside of the turn; where the point slides "
+                "outwards, track one that is further ahead"
             )
         if self.measured("lag")[0] < 0 or not all(0 <= size < math.inf for size in (self.length, self.width)):
             raise InputError("lag, length and width: give finite numbers, not below 0")
@@ -111,6 +112,12 @@ class MeasuredVehicle:
     def time_scale(self) -> float:
         """The unit of time [s]."""
         return max(_LAGS * self._values[4], _TURN / max(self._values[1:3]))
+
+    @property
+    def outline(self) -> tuple[float, float, float]:
+        """Front and back of the body, forward from its point, and half of the width [l]; never quite a point."""
+        half = self.length / 2 / self.tail_length
+        return half, -half, max(self.width / 2 / self.tail_length, _POINT)
 
     @cached_property
     def _values(self) -> Floats:
@@ -145,6 +152,16 @@ class MeasuredVehicle:
         before = twist[::-1, None] + left_over * (twist - twist[::-1])[:, None]
         lags = _relaxation(before, twist[:, None], lag / time)
         return twist, lags, _relaxation(np.zeros((2, 3)), twist, lag / time)
+
+    @staticmethod
+    def is_in(path: str | Path) -> bool:
+        """Tell whether a TOML file describes a vehicle, by its speed; a robot has none."""
+        file = Path(path)
+        return (
+            file.suffix == ".toml"
+            and file.is_file()
+            and any(split(key).quantity == "speed" for key in read_toml(path))
+        )
 
     @staticmethod
     def load(path: str | Path) -> MeasuredVehicle:

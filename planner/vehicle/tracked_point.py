@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 from planner.vehicle.calibration_table import COEFFICIENTS, UNMEASURED, CalibrationKnowledge
 from planner.vehicle.coefficient_modes import Motion, coefficient_modes
 from planner.vehicle.from_table import default_table, table_vehicle
+from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.vehicle import Mode, Vehicle
 from sim.io.errors import InputError
 from sim.model.robot import Robot
@@ -18,7 +19,7 @@ Point = Literal["head_centre", "head_tip", "pivot"]
 class TrackedVehicle(NamedTuple):
     """A robot, its vehicle, and the tracked point: the point of its axis that follows the path."""
 
-    robot: Robot  # in SI units
+    robot: Robot | MeasuredVehicle  # in SI units
     vehicle: Vehicle  # its motion as the look-up table tells it
     point: Point  # the point that follows the path
     offset: float  # from the head's centre forward to the tracked point
@@ -34,8 +35,8 @@ class TrackedVehicle(NamedTuple):
 
     @property
     def calibrated(self) -> bool:
-        """Whether the coefficients of the head have a covariance."""
-        return set(COEFFICIENTS) <= set(self.knowledge.names)
+        """Whether the errors are measured: of the coefficients of the head, or of the vehicle itself."""
+        return isinstance(self.robot, MeasuredVehicle) or set(COEFFICIENTS) <= set(self.knowledge.names)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -48,13 +49,21 @@ class TrackedVehicle(NamedTuple):
 
 
 def tracked_vehicle(
-    robot: Robot, lookup: LookupTable | None, point: Point, knowledge: CalibrationKnowledge | None
+    robot: Robot | MeasuredVehicle,
+    lookup: LookupTable | None,
+    point: Point,
+    knowledge: CalibrationKnowledge | None,
 ) -> TrackedVehicle:
     """Ask a table for the vehicle of a robot, and add the tracked point. Without a table, ask the shipped one.
+
+    A measured vehicle needs no table.
 
     Raises:
         InputError: the point is unknown, or the robot is outside the table's domain.
     """
+    if isinstance(robot, MeasuredVehicle):
+        vehicle = robot.motion()
+        return TrackedVehicle(robot, vehicle, point, _offset(point, robot, vehicle), robot.MODEL)
     lookup = default_table() if lookup is None else lookup
     vehicle = table_vehicle(robot, lookup, knowledge)
     own = all(low == high for low, high in lookup.domain.values())
@@ -70,12 +79,12 @@ def tracked_vehicle(
     return tracked._replace(unmeasured=tuple(modes))
 
 
-def _offset(point: Point, robot: Robot, vehicle: Vehicle) -> float:
+def _offset(point: Point, robot: Robot | MeasuredVehicle, vehicle: Vehicle) -> float:
     """Compute the distance from the head's centre forward to the tracked point [l]."""
     if point == "head_centre":
         return 0.0
     if point == "head_tip":
-        return robot.head_length / 2 / robot.tail_length
+        return robot.outline[0]
     if point == "pivot":
         return -vehicle.pivot_distance
     raise InputError(f"point {point!r}; allowed are head_centre, head_tip, pivot")

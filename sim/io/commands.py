@@ -232,14 +232,14 @@ def _add(parser: ArgumentParser, parameter: Parameter, name: str, words: dict[st
         words.setdefault("metavar", name.upper())
         parser.add_argument(parameter.name, help=about, **words)
         return
-    option = f"--{name.removeprefix('--')}"
+    option, *synonyms = name.split() if name.startswith("--") else [f"--{name}"]
     if flag and default:
         option, about = f"--no-{name}", f"do not {about}"
     if flag:
         words = {"action": f"store_{str(not default).lower()}"}
     elif many:
         words["action"], about = "append", f"{about}; may be given again"
-    parser.add_argument(option, dest=parameter.name, help=about, required=parameter.needed, **words)
+    parser.add_argument(option, *synonyms, dest=parameter.name, help=about, required=parameter.needed, **words)
     if old := _RENAMED.get(option):
         parser.add_argument(old, dest=parameter.name, action=_Renamed, const=option, help=SUPPRESS, **words)
 
@@ -261,7 +261,7 @@ class Program:
             of: the public function whose parameters the command has, such as "sim.api:steady".
             further: options of words for the function's **given, with their help.
             names: parameter -> the name of its argument, where it differs; "--name" makes a positional one an
-                option, "" leaves one out.
+                option, "--name --synonym" with two names, "" leaves one out.
         """
 
         def add(run: F) -> F:

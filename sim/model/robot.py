@@ -142,6 +142,13 @@ class Robot:
         """Return this robot as a batch of one."""
         return Groups.from_columns({name: np.array([value]) for name, value in self.group_values().items()})
 
+    @property
+    def outline(self) -> tuple[float, float, float]:
+        """Front and back of head and straight tails, forward from the head's centre, and half of the width [l]."""
+        half = self.head_length / 2 / self.tail_length
+        width = max(self.head_radius, (self.disc_offset or self.head_radius) + self.tail_radius)
+        return half, -half - 1.0, width / self.tail_length
+
     def with_motor(self, omega_bar: float) -> Robot:
         """Return the same robot with the motor speed that gives `omega_bar`."""
         return replace(self, motor_speed=abs(omega_bar) / self.time_scale)

@@ -112,6 +112,8 @@ def load_schedule(path: str | Path) -> Schedule:
         True
     """
     content = read_plan_file(path)
+    if "vehicle" in content["robot"]:
+        raise InputError(f"{path} is the plan of a measured vehicle; only robots can be simulated")
     try:
         return Schedule(
             robot={str(k): float(v) for k, v in content["robot"]["groups"].items()},
