@@ -231,6 +231,8 @@ def free_space(keep_out: Sequence[Region], walls: Region | None, unit: str | Non
 
 def pose_of(given: Sequence[Length], unit: str | None, robot: Swimmer, name: str) -> POSE:
     """Return a pose in l and rad, or read its words: X, Y and degrees."""
+    if len(given) != 3:
+        raise InputError(f"{name.removeprefix('--')}: give x, y and heading")
     if any(isinstance(each, str) for each in given):
         return read_pose([str(each) for each in given], unit, robot, name)
     x, y, heading = (float(each) for each in given)

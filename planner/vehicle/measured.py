@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.integrate import cumulative_simpson
 
 from planner.vehicle.vehicle import BEFORE_KNOTS, STEP, TIMES, Mode, Vehicle
 from sim.arrays import Floats
@@ -64,8 +63,8 @@ class MeasuredVehicle:
     Example:
         >>> import softflagella as sf
         >>> needle = sf.Vehicle(speed=(0.005, 1e-4), turn_left=(0.0225, 0.001), turn_right=(0.0225, 0.001))
-        >>> path = sf.plan([(0, 0), (0.1, 0.01), (0.2, 0)], needle, unit="m")
-        >>> path.stated_error > path.predicted_max
+        >>> result = sf.plan("circle:1m", needle)
+        >>> result.stated_error > result.predicted_max
         True
     """
 
@@ -217,6 +216,8 @@ def _relaxation(start: Floats, end: Floats, lag: float) -> Floats:
 
     The motion is the lag, and then the arc of `end`.
     """
+    from scipy.integrate import cumulative_simpson  # slow to import, and only vehicles with a lag need it
+
     end = np.broadcast_to(end, start.shape)
     if lag <= 0:
         return np.zeros((*start.shape[:-1], len(TIMES), 3))

@@ -17,7 +17,6 @@ from random import Random
 from typing import Any
 
 import numpy as np
-from planner.files.goal_files import read_region
 
 from calibration.swimmer.camera_tracks import measure_tracks
 from calibration.swimmer.measured_table import read_measurements
@@ -29,6 +28,7 @@ from dataset.schema import schema
 from dataset.shards import BadFileError, checked_part, file_name
 from planner.files.goal_json import load_goal
 from planner.files.plan_json import load_plan
+from planner.files.regions import read_region
 from planner.files.saved_plan import restore_plan
 from planner.files.tracking_error import tracking_error
 from planner.paths.path_files import read_path

@@ -52,7 +52,7 @@ def test_a_word_runs_its_command(tmp_path: Path, capsys: pytest.CaptureFixture[s
         (["report"], "no command 'report'; it is softflagella dataset report"),
         (["calibrat"], "no command 'calibrat'; is it calibrate?"),
         (["qqq"], "no command 'qqq'; there are robot, steady"),
-        (["plan", "square:3l"], "required: --robot, --out; softflagella plan --help"),
+        (["plan", "square:3l"], "required: --robot/--vehicle, --out; softflagella plan --help"),
         (["plan", "square:3l", "--robot", "r", "--out", "o", "--objective", "speed"], "invalid choice: 'speed'"),
         (["planner", "goal", "--goal", "3", "0"], "expected 3 arguments; softflagella planner goal --help"),
         (["planner", "fly"], "invalid choice: 'fly'"),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tests.processes import LIMIT
 
-SLOW = ("torch", "scipy.stats", "scipy.interpolate", "scipy.optimize", "scipy.spatial", "matplotlib", "joblib")
+SLOW = ("torch", "scipy.stats", "scipy.integrate", "matplotlib", "joblib")
 CODE = f"""
 import sys
 def check(*slow):
@@ -33,7 +33,7 @@ table.query(columns | {{"dwell_bar": np.array([1.0])}}, intervals=True)
 table.response(columns)
 table.derivatives(columns, ["C_t", "disc_drag"])
 sf.Tracker(sf.restore_plan(folder + "/plan.json")).update(0.0)
-check("torch", "scipy.stats", "scipy.interpolate", "scipy.optimize", "joblib")
+check("torch", "scipy.stats", "scipy.integrate", "joblib")
 """
 
 

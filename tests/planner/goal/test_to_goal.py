@@ -140,7 +140,7 @@ def test_a_replay_in_the_simulator_stays_out() -> None:
         ),
         ((0, 0, 0), (4, 1, 90), {}, r"goal: a heading of 90 is more than one turn; .* math\.radians\(90\)"),
         ((0, 0, -30), (4, 1, 0), {}, "start: a heading of -30"),
-        ((0, 0, 0), (0.5, 0, 0), {"minimum_dwell": 2.0, "arrive_seconds": 5.0}, "the fastest plan takes"),
+        ((0, 0, 0), (0.5, 0, 0), {"minimum_dwell": 2.0, "arrive": 5.0}, "the fastest plan takes"),
     ],
     ids=["start", "heading", "number", "same", "tolerance", "degrees", "start in degrees", "time"],
 )
@@ -153,7 +153,7 @@ def test_refusals(start: Any, goal: Any, options: dict[str, Any], expected: str)
 def test_a_plan_to_a_goal_arrives_when_it_is_asked_to() -> None:
     fastest = to_goal((0, 0, 0), (2.5, 1, 0), CONTROL, minimum_dwell=2.0)
     seconds = 1.2 * float(fastest.seconds.sum())
-    goal_plan = to_goal((0, 0, 0), (2.5, 1, 0), CONTROL, minimum_dwell=2.0, arrive_seconds=seconds)
+    goal_plan = to_goal((0, 0, 0), (2.5, 1, 0), CONTROL, minimum_dwell=2.0, arrive=seconds)
     dwell = min(goal_plan.straight.dwells) * CONTROL.time_scale
     assert float(goal_plan.seconds.sum()) == pytest.approx(seconds, abs=dwell)
     assert goal_plan.declared.swing is not None

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from planner.files.goal_files import read_region
 
+from planner.files.regions import read_region
 from planner.paths.fillets import CORNER, kinks
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.path import Path2D, polygon
