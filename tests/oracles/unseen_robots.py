@@ -112,8 +112,8 @@ def carried(seed: int, lookup: NeuralTable) -> Carried:
     rng = np.random.default_rng(seed)
     robot = lab_robot(rng)
     result = plan(lab_path(rng), robot, lookup=lookup)
-    own = tabulate(result.robot)
-    tracked = result.tracked._replace(vehicle=table_vehicle(result.robot, own))
+    own = tabulate(robot)
+    tracked = result.tracked._replace(vehicle=table_vehicle(robot, own))
     errors = plan_errors(tracked, result.drawn, result.declared, result.switches, guaranteed=None, seed=0)
     track = trace(tracked.vehicle, result.switches, tracked.offset)
     found = predicted_error(result.reference, track, closed=result.drawn.closed).largest
