@@ -4,23 +4,32 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import pandas as pd
 
+from calibration.laws.law_fits import find_laws
 from calibration.laws.law_model import with_law
-from calibration.report.robot_verdict import RobotVerdict, calibrate_robot
+from calibration.report.corrected_robot import check_given
+from calibration.report.path_error import path_errors, wanted_paths
+from calibration.report.robot_verdict import RobotVerdict, read_runs
 from calibration.swimmer.camera_tracks import measure_tracks
+from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.possible_runs import Owned, owned
 from calibration.swimmer.swimmer import SwimmerModel
+from calibration.verdict.calibrate import calibrate as find_what_is_missing
 from calibration.verdict.sequential_test import Decision, read_explanations
 from calibration.verdict.sequential_test import decide as decide_between
 from calibration.verdict.verdict import Verdict
+from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.io.units import LengthUnit
 from sim.robot_rows import OneRobot, one_robot, with_units
+
+MAX_SECONDS = 90.0  # of processor time for the search, without laws
 
 
 @checks_keywords()
@@ -74,20 +83,26 @@ def calibrate(
         >>> print(verdict.sentence)  # doctest: +SKIP
         >>> result = sf.plan(sf.circle(2.0), verdict.corrected, knowledge=verdict.knowledge)  # doctest: +SKIP
     """
-    return calibrate_robot(
-        table,
-        one_robot(robot),
-        protocol=protocol,
-        own=own if own is None or isinstance(own, Mapping) else owned(own),
-        laws=laws,
-        paths=paths,
-        unit=unit,
+    robot = one_robot(robot)
+    check_given(robot)
+    limit = MAX_SECONDS * (1 + laws) if max_seconds is None else max_seconds
+    if not limit > 0:
+        raise InputError(f"max_seconds: {limit:g}; give a positive number of seconds")
+    wanted = wanted_paths(paths, robot, unit)
+    settings = own if isinstance(own, Mapping) else owned(own or ())
+    data, held_out, name = read_runs(table, protocol, tell)
+    model = SwimmerModel(robot, data, jobs, own=settings)
+    verdict = find_what_is_missing(
+        model,
+        held_out=held_out,
+        describe=find_laws if laws else None,
+        correction=learn_head_correction,
         seed=seed,
-        max_seconds=max_seconds,
-        jobs=jobs,
+        max_seconds=limit,
         progress=progress,
-        tell=tell,
     )
+    result = RobotVerdict(**vars(verdict), robot=robot, table=name)
+    return replace(result, paths=path_errors(wanted, robot, result.corrected, result.knowledge))
 
 
 @checks_keywords()

@@ -16,10 +16,10 @@ import matplotlib.image as image
 import numpy as np
 from matplotlib.figure import Figure
 
+from calibration.api import calibrate
 from calibration.laws.law import dependences
 from calibration.laws.law_fits import Laws
 from calibration.report.figures import draw_dependences, draw_place
-from calibration.report.robot_verdict import calibrate_robot
 from calibration.swimmer.synthetic_table import make_table
 from sim.model.presets import PRESETS
 
@@ -30,7 +30,7 @@ _DPI = 130
 def main(path: str = "docs/tutorial/laws.png") -> None:
     robot = PRESETS["paper-measured"]
     table = make_table(replace(robot, effects=HIDDEN), seed=8, title="").round(6)
-    verdict = calibrate_robot(table, robot, progress=False)
+    verdict = calibrate(table, robot, progress=False)
     laws = verdict.corrections.law
     assert isinstance(laws, Laws)
     best = laws.kept[0]

@@ -24,7 +24,7 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.common import Records, heading, in_parallel, per_cent, row
-from calibration.report.robot_verdict import calibrate_robot
+from calibration.api import calibrate
 from calibration.verdict.verdict import Verdict
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
@@ -167,7 +167,7 @@ def calibrated(case: Case, place: int, seed: int) -> dict[str, Any]:
     """Calibrate one table."""
     table = make_table(case, place, seed)
     began = time.process_time()
-    verdict = calibrate_robot(table, GIVEN, progress=False, jobs=1)
+    verdict = calibrate(table, GIVEN, progress=False, jobs=1)
     return {
         "seed": seed, "case": case.label, "answer": answer(verdict, case), "kind": verdict.verdict,
         "seconds": time.process_time() - began, "sentence": verdict.sentence,

@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import pandas as pd
 
-from calibration.laws.law_fits import Laws, find_laws
-from calibration.report.corrected_robot import as_toml, check_given, handed_on, law_handed_on
-from calibration.report.path_error import PathError, path_errors, wanted_paths
+from calibration.laws.law_fits import Laws
+from calibration.report.corrected_robot import as_toml, handed_on, law_handed_on
+from calibration.report.path_error import PathError
 from calibration.report.report import write_report
 from calibration.statistics.study import count_of_rows, summary_of_excluded
-from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.measured_table import PROTOCOLS, Measurements, read_measurements
-from calibration.swimmer.possible_runs import Owned
-from calibration.swimmer.swimmer import SwimmerModel
-from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.arrays import Flags
-from sim.io.errors import InputError
 from sim.io.files import files_together, write_text
 from sim.io.notebook import as_html, given_axes
 from sim.model.robot import Robot
@@ -33,7 +28,6 @@ from sim.model.robot import Robot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MAX_SECONDS = 90.0  # of processor time for the search, without laws
 FILES = ("verdict.json", "report.html", "corrected.toml")
 
 
@@ -112,63 +106,9 @@ class RobotVerdict(Verdict):
 def read_runs(
     table: str | Path | pd.DataFrame, protocol: Literal["session", "paper"], tell: Callable[[str], object]
 ) -> tuple[Measurements, Flags | None, str]:
-    """Read the runs of a table, those that its protocol holds out, and its name; see `calibrate_robot`."""
+    """Read the runs of a table, those that its protocol holds out, and its name; see `softflagella.calibrate`."""
     data = read_measurements(table)
     excluded = summary_of_excluded(data.excluded, len(data) + count_of_rows(data.excluded))
     for line in (*data.converted, *(f"excluded: {line}" for line in excluded)):
         tell(line)
     return *PROTOCOLS[protocol](data), "table" if isinstance(table, pd.DataFrame) else Path(table).name
-
-
-def calibrate_robot(
-    table: str | Path | pd.DataFrame,
-    robot: Robot,
-    *,
-    protocol: Literal["session", "paper"] = "session",
-    own: Owned | None = None,
-    laws: bool = True,
-    paths: Sequence[str] = (),
-    unit: str | None = None,
-    seed: int = 0,
-    max_seconds: float | None = None,
-    jobs: int | None = None,
-    progress: bool = True,
-    tell: Callable[[str], object] = lambda line: None,
-) -> RobotVerdict:
-    """Calibrate a robot, see `softflagella.calibrate`.
-
-    Args:
-        table: measured runs, or their file.
-        robot: as given.
-        protocol: what is fitted and tested.
-        own: what the lab can set in its next runs.
-        laws: whether laws are looked for where no effect explains the runs, or something else could imitate it.
-        paths: files or shapes, such as square:24cm, on which the error is stated before and after.
-        unit: of paths that do not say theirs.
-        seed: of the bootstrap.
-        max_seconds: of processor time for the search; default `MAX_SECONDS`, twice that with laws.
-        jobs: threads; default all processors.
-        progress: show progress bars.
-        tell: is told, before the fit, what was converted and what was excluded, a line at a time.
-
-    Raises:
-        InputError: the table or a path cannot be used.
-    """
-    check_given(robot)
-    limit = MAX_SECONDS * (1 + laws) if max_seconds is None else max_seconds
-    if not limit > 0:
-        raise InputError(f"max_seconds: {limit:g}; give a positive number of seconds")
-    wanted = wanted_paths(paths, robot, unit)
-    data, held_out, name = read_runs(table, protocol, tell)
-    model = SwimmerModel(robot, data, jobs, own=own or {})
-    verdict = calibrate(
-        model,
-        held_out=held_out,
-        describe=find_laws if laws else None,
-        correction=learn_head_correction,
-        seed=seed,
-        max_seconds=limit,
-        progress=progress,
-    )
-    result = RobotVerdict(**vars(verdict), robot=robot, table=name)
-    return replace(result, paths=path_errors(wanted, robot, result.corrected, result.knowledge))

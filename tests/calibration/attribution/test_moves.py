@@ -11,8 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.api import calibrate
 from calibration.attribution.moves import groups_that_may_differ
-from calibration.report.robot_verdict import RobotVerdict, calibrate_robot
+from calibration.report.robot_verdict import RobotVerdict
 from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import by_differences, start_values
@@ -61,7 +62,7 @@ def moved_on(day: int, **changed: float) -> RobotVerdict:
     lengths, robot = (LENGTHS_CM, START) if day == 2 else (TWO_CM, KNOWN)
     table = of_two("session", f"day {day}", 3, lengths, **changed)
     with on_the_toy(few=True):
-        return calibrate_robot(table, robot, laws=False, progress=False)
+        return calibrate(table, robot, laws=False, progress=False)
 
 
 def test_sessions_of_one_number_of_tails_each_are_no_groups() -> None:
@@ -137,7 +138,7 @@ def test_nothing_differs_where_nothing_did() -> None:
 @pytest.mark.slow
 def test_an_effect_in_all_sessions_is_no_move() -> None:
     with on_the_toy(few=True):
-        result = calibrate_robot(
+        result = calibrate(
             in_days(toy_table(5, lengths_cm=TWO_CM, **{DRAG: 5.0})), KNOWN, laws=False, progress=False
         )
     assert result.effects == (DRAG,)
@@ -150,7 +151,7 @@ def test_another_robot_is_named() -> None:
     table["robot"] = table["robot"].where(table["robot"] == "day 2", "A").replace({"day 2": "B"})
     with on_the_toy(few=True):
         turned = in_days(table.iloc[::-1].reset_index(drop=True))
-        result = calibrate_robot(turned, KNOWN, laws=False, progress=False)
+        result = calibrate(turned, KNOWN, laws=False, progress=False)
     assert result.effects == ()
     (move,) = result.moves
     assert re.search(r"on robot [AB] is 1", move.words)
@@ -187,6 +188,6 @@ def test_what_moved_on_a_bench_is_named(name: str, effects: tuple[str, ...], sai
     """Bubbles on day 3 (C_r 20 % lower); two robots (E 25 % higher, C_yr 15 % lower); a current, and the camera
     turned on day 3."""
     robot = load_robot(MEASURED / "bench-robot.toml")
-    result = calibrate_robot(MEASURED / name, robot, laws=False, progress=False)
+    result = calibrate(MEASURED / name, robot, laws=False, progress=False)
     assert set(result.effects) == set(effects)
     assert all(words in result.sentence for words in said)
