@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from planner.api.plan import plan
 from planner.files.tracking_error import TrackingError, tracking_error
-from planner.jobs.plan import plan
 from planner.paths.path import Path2D
 from sim.arrays import Floats
 from sim.model.robot import Robot

@@ -7,6 +7,7 @@ Numbers are in tail lengths l, time units μ0 l⁴/EI and rad. Words are as in c
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -33,8 +34,7 @@ from surrogate.table.model_file import load_table
 AnyVehicle = OneRobot | MeasuredVehicle
 Length = float | str
 Region = Circle | Polygon | Path2D | ArrayLike | str
-_REQUEST = ("point", "corner", "time_weight", "objective", "minimum_dwell", "minimum_seconds", "dwell",
-            "tolerance", "seed", "camera", "feedback")  # fmt: skip
+_REQUEST = tuple(field.name for field in fields(PlanRequest))
 
 
 class TableOptions(TypedDict, total=False):
@@ -154,7 +154,7 @@ def asked(robot: AnyVehicle, options: Mapping[str, Any], **own: Any) -> tuple[Tr
         if any(options.get(name) for name in ("lookup", "own_table", "knowledge")):
             raise InputError(f"{swims.name!r} is a measured vehicle; it needs no look-up table and no calibration")
         return tracked_vehicle(swims, None, request.point, None), request
-    table, knowledge = table_of(robot, options)
+    table, knowledge = table_of(robot, swims, options)
     return tracked_vehicle(swims, table, request.point, knowledge), request
 
 
@@ -165,14 +165,22 @@ def swimmer_of(robot: AnyVehicle) -> Robot | MeasuredVehicle:
     return robot if isinstance(robot, MeasuredVehicle) else one_robot(robot)
 
 
-def table_of(robot: OneRobot, options: Mapping[str, Any]) -> tuple[LookupTable, CalibrationKnowledge]:
-    """Return the look-up table that knows a robot, and what a calibration found besides."""
+def table_of(
+    robot: OneRobot, swims: Robot, options: Mapping[str, Any]
+) -> tuple[LookupTable, CalibrationKnowledge]:
+    """Return the look-up table that knows a robot, and what a calibration found besides.
+
+    Args:
+        robot: as it was given: the robot's own table is kept beside its file.
+        swims: the robot.
+        options: see `TableOptions`.
+    """
     source = None if isinstance(robot, Robot) else str(robot)
     known = options.get("knowledge") or (CalibrationKnowledge() if source is None else read_knowledge(source))
     lookup = options.get("lookup")
     if isinstance(lookup, str | Path):
         lookup = load_table(lookup)
-    return lookup or table_for(one_robot(robot), source, known, own=options.get("own_table", False)), known
+    return lookup or table_for(swims, source, known, own=options.get("own_table", False)), known
 
 
 def request_of(options: Mapping[str, Any], robot: Swimmer, **own: Any) -> PlanRequest:

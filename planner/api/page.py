@@ -65,7 +65,7 @@ def write_page(
                 drawn = read_path(name).in_tails(swims, unit)
             short = Path(name).stem if shape_of(name) is None else name
             named.append(NamedPath(short, drawn.scaled(swims.tail_length)))
-    table, known = table_of(robot, options)
+    table, known = table_of(robot, swims, options)
     over = None if smooth is None else length_of(smooth, unit, swims, "--smooth")
     request = request_of(options, swims)
     return write(path, swims, table, request, knowledge=known, paths=named, smooth=over, title=title or TITLE)

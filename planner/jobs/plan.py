@@ -1,4 +1,4 @@
-"""plan(path, robot): from a path to a frozen plan, without simulating.
+"""From a path to a frozen plan, without simulating.
 
 The look-up table gives the vehicle: both directions, and the memory of the last dwell
 (`planner.vehicle.from_table`). The path that the robot can follow and that is nearest to the drawn one is declared
@@ -9,9 +9,6 @@ The look-up table gives the vehicle: both directions, and the memory of the last
 from __future__ import annotations
 
 from functools import cache
-from typing import Unpack
-
-from numpy.typing import ArrayLike
 
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
@@ -20,54 +17,16 @@ from planner.planning.declared_path import Declared, declare
 from planner.planning.feasible import Feasibility
 from planner.planning.planned import Plan
 from planner.planning.progress import Progress
-from planner.planning.request import PlanRequest, RequestOptions
+from planner.planning.request import PlanRequest
 from planner.planning.solve import Change, Task, solve
-from planner.vehicle.calibration_table import CalibrationKnowledge
-from planner.vehicle.measured import MeasuredVehicle
-from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
+from planner.vehicle.tracked_point import TrackedVehicle
 from sim.io.errors import InputError
-from sim.model.robot import Robot
-from surrogate.interface import LookupTable
-
-
-def plan(
-    path: Path2D | ArrayLike,
-    robot: Robot | MeasuredVehicle,
-    *,
-    lookup: LookupTable | None = None,
-    knowledge: CalibrationKnowledge | None = None,
-    progress: Progress | None = None,
-    **options: Unpack[RequestOptions],
-) -> Plan[None]:
-    """Plan the motor's switching times for a path.
-
-    Args:
-        path: (n, 2) points or a Path2D, lengths in tail lengths l.
-        robot: the robot; its motor speed is used in both directions. Or a measured vehicle.
-        lookup: trained table, or the table of this one robot; default the shipped one.
-        knowledge: what a calibration found besides the robot: covariance, current.
-        progress: called now and then with the share of the path that is done.
-        options: fields of `PlanRequest`; `softflagella.plan` explains them.
-
-    Raises:
-        InputError: the path is bad or too tight, the dwell too short, the tolerance too small, or the robot
-            outside the table's domain.
-
-    Example:
-        >>> from softflagella import circle, load_robot, plan
-        >>> result = plan(circle(2.0), load_robot("paper-control"))
-        >>> len(result.dwells) > 100, result.predicted_rms < 0.03
-        (True, True)
-    """
-    request = PlanRequest(**options)
-    tracked = tracked_vehicle(robot, lookup, request.point, knowledge)
-    return make_plan(path if isinstance(path, Path2D) else Path2D.of(path), tracked, request, progress)
 
 
 def make_plan(
     drawn: Path2D, tracked: TrackedVehicle, request: PlanRequest, progress: Progress | None = None
 ) -> Plan[None]:
-    """Plan for a path, a vehicle and a request; see `plan`.
+    """Plan for a path, a vehicle and a request.
 
     Args:
         drawn: the path as drawn.

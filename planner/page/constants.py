@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from planner.page.first_state import CAMEL
-from planner.planning.request import PlanRequest, RequestOptions
+from planner.planning.request import PlanRequest
 from planner.vehicle.calibration_table import UNMEASURED
 from sim.io import units
 from sim.model import uncertainty
@@ -60,12 +60,14 @@ _NAMES = {  # of each module; a leading underscore is left out
     "TORQUE_POWER",
 }
 
+_NOT_ASKED = ("camera", "space", "feedback", "arrive_seconds", "loop")  # of a plan that the page makes
+
 
 def constants() -> dict[str, dict[str, Any]]:
     """Return the constants by the last name of their module."""
     found = {module.rpartition(".")[2]: _of(module, names.split()) for module, names in _NAMES.items()}
     request = PlanRequest()
-    options = [name for name in RequestOptions.__annotations__ if name != "camera"]
+    options = [name for name in vars(request) if name not in _NOT_ASKED]
     found["request"] = {"DEFAULTS": {_camel(name): getattr(request, name) for name in options}}
     found["paths_units"] = _of("planner.paths.units", ["LONGEST", "SMALLEST"])
     found["feedback_error"]["CAMERA"] = request.camera.to_dict()

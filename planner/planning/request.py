@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal, TypedDict
+from typing import Literal
 
 from planner.paths.obstacles import FreeSpace
 from planner.paths.units import Swimmer
@@ -47,23 +47,3 @@ class PlanRequest:
         if not (math.isfinite(seconds) and seconds > 0):
             raise InputError(f"minimum dwell {seconds:g} s; give a number above 0")
         return max(seconds / robot.time_scale, QUICK if dwell is None else dwell)
-
-
-class DwellOptions(TypedDict, total=False):
-    """Those fields of `PlanRequest` that every job has, as keyword arguments."""
-
-    objective: Objective
-    minimum_dwell: float | None
-    minimum_seconds: float | None
-    dwell: float | None
-    tolerance: float | None
-    seed: int
-    camera: Camera
-
-
-class RequestOptions(DwellOptions, total=False):
-    """And those of paths."""
-
-    point: Point
-    corner: Corner
-    time_weight: float

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.jobs.plan import plan
+from planner.api.plan import plan
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.errors import plan_errors
 from planner.planning.planned import Plan

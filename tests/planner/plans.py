@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from planner.api.plan import plan
 from planner.goal.trip import Trip
-from planner.jobs.plan import make_plan, plan
+from planner.jobs.plan import make_plan
 from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.shapes import shape_of

@@ -18,9 +18,9 @@ from calibration.report.robot_verdict import FILES, RobotVerdict
 from calibration.swimmer.candidate_effects import CURRENT
 from calibration.swimmer.synthetic_table import make_table
 from planner.__main__ import main as planner
+from planner.api.plan import plan
 from planner.files.plan_json import load_plan
 from planner.files.tracking_error import tracking_error
-from planner.jobs.plan import plan
 from planner.paths.path import circle
 from planner.vehicle.calibration_table import read_knowledge
 from sim.inputs import load_robot, save_robot

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planner.api.plan import plan
 from planner.files.plan_files import controller_header, milliseconds
 from planner.files.tracker_header import rounded, table_bytes, tracker_header
-from planner.jobs.plan import plan
 from planner.planning.camera import Camera
 from planner.planning.planned import Plan
 from planner.tracking.clock import SLACK

@@ -14,11 +14,11 @@ import pytest
 
 import softflagella as sf
 from planner.__main__ import main
+from planner.api.plan import plan
 from planner.files.own_table import table_for
 from planner.files.plan_files import write_plan
 from planner.files.plan_json import load_plan
 from planner.files.saved_plan import is_plan, restore_plan
-from planner.jobs.plan import plan
 from planner.paths.path import circle
 from planner.planning.planned import Plan
 from planner.tracking.tracker import Tracker

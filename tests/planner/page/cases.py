@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from planner.jobs.plan import make_plan, plan
+from planner.api.plan import plan
+from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest

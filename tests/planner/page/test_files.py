@@ -296,7 +296,7 @@ def test_a_plan_with_more_than_a_path_gives_it() -> None:
 @pytest.mark.rest
 def test_plans_with_laps_walls_or_an_arrival_give_their_paths() -> None:
     walls = [sf.Circle(6.0, 0.0, 0.5)]
-    options: dict[str, dict[str, Any]] = {"lap": {"loop": True}, "arrival": {"arrive_seconds": 1800.0},
+    options: dict[str, dict[str, Any]] = {"lap": {"loop": True}, "arrival": {"arrive": 1800.0},
                                           "kept_clear": {"keep_out": walls}}  # fmt: skip
     for kind, option in options.items():
         content = sf.plan(circle(2.0), CONTROL, objective="flips", **option).to_dict()

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.jobs.plan import plan
+from planner.api.plan import plan
 from planner.paths.distance import distance_to, nearest, two_sided
 from planner.paths.fillets import fillet, largest_fillet
 from planner.paths.nearest_feasible import nearest_path

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from planner.__main__ import say
+from planner.api.options import PathOptions
+from planner.api.plan import plan
 from planner.files.plan_files import controller_header
-from planner.jobs.plan import plan
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
-from planner.planning.request import PlanRequest, RequestOptions
+from planner.planning.request import PlanRequest
 from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
 from planner.vehicle.dwell_choice import dwells_for, longest_dwell
 from planner.vehicle.from_table import table_vehicle
@@ -78,9 +79,11 @@ def test_other_points_of_the_axis(point: str) -> None:
 
 
 def test_options_are_the_fields_of_a_request() -> None:
-    others = {"space", "feedback", "arrive_seconds", "loop"}  # which have arguments of their own
+    others = {"space", "arrive_seconds", "loop"}  # which have arguments of their own
     wanted = {name: hint for name, hint in get_type_hints(PlanRequest).items() if name not in others}
-    assert get_type_hints(RequestOptions) == wanted
+    options = get_type_hints(PathOptions)
+    words = {name: options[name] for name in ("tolerance", "camera")}  # as users write them, too
+    assert {name: options.get(name) for name in wanted} == wanted | words
 
 
 def test_a_tolerance_shortens_the_dwell_and_says_when_it_cannot() -> None:
@@ -172,7 +175,7 @@ FAST = CalibrationKnowledge(current=(0.0, 0.5 * LAB))
 )  # fmt: skip
 def test_refusals(path: Any, expected: str, options: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=expected) as caught:
-        plan(path, **{"robot": CONTROL, **options})
+        plan(path, **{"robot": CONTROL, "lookup": load(), **options})  # of this table alone
     assert "\n" not in str(caught.value)
 
 

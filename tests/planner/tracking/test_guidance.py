@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from planner.api.plan import plan
 from planner.goal.dubins import shortest_paths
-from planner.jobs.plan import plan
 from planner.planning.camera import POSE, Camera
 from planner.planning.planned import Plan
 from planner.tracking.guidance import LearnedDrift, TrackerGuidance

@@ -12,7 +12,7 @@ import pytest
 import planner.files.own_table
 import softflagella as sf
 import surrogate.one_robot.tabulate
-from planner.jobs.plan import plan
+from planner.api.plan import plan
 from tests.softflagella.made import GOAL, ODD, ROBOT, START, goal, own_table
 
 KNOWN = sf.CalibrationKnowledge(names=("C_yr",), covariance=np.array([[0.01]]))
