@@ -28,7 +28,7 @@ from planner.vehicle.vehicle import BEFORE_KNOTS, STEP, TIMES, Mode, Vehicle
 from sim.arrays import Floats
 from sim.io.errors import InputError, naming
 from sim.io.reading import read_toml
-from sim.io.units import split, to_si
+from sim.io.units import UNITS, of_kind, split, to_si
 from sim.mechanics import planar
 
 Measured = float | tuple[float, float]  # a value, and its standard deviation where it is known
@@ -36,11 +36,12 @@ _TURN = 0.25  # rad in the unit of time, where the vehicle has no lag
 _LAGS = 10.0  # time constants in the unit of time, at least
 _POINT = 0.01  # l, radius of a body without a size
 _SUBSTEPS = 10  # of a step of TIMES, for the integral of the motion
-_KINDS = {
-    "speed": "speed", "turn_left": "angular velocity", "turn_right": "angular velocity", "slip": "angle",
-    "lag": "time", "length": "length", "width": "length",
+_LINES = {  # of a vehicle.toml, with the unit that messages propose
+    "speed": "cm_s", "turn_left": "deg_s", "turn_right": "deg_s", "slip": "deg", "lag": "s",
+    "length": "cm", "width": "cm",
 }  # fmt: skip
-_SPREADS = ("speed", "turn_left", "turn_right", "slip", "lag")
+_NEEDED = ("speed", "turn_left", "turn_right")
+_SPREADS = (*_NEEDED, "slip", "lag")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +85,7 @@ class MeasuredVehicle:
             value, spread = self.measured(name)
             if not (math.isfinite(value) and 0 <= spread < math.inf):
                 raise InputError(f"{name} = {value:g} ± {spread:g}; give finite numbers, the second not below 0")
-            if name in ("speed", "turn_left", "turn_right") and value - 3 * spread <= 0:
+            if name in _NEEDED and value - 3 * spread <= 0:
                 raise InputError(
                     f"{name} = {value:g} ± {spread:g}; give a number above 0 by three standard deviations"
                 )
@@ -181,15 +182,16 @@ class MeasuredVehicle:
             InputError: a key is missing or unknown, or a number is not one.
         """
         values = {"name": str(content.get("name", "vehicle"))} | dict(_in_si(content))
-        for name, unit in (("speed", "cm_s"), ("turn_left", "deg_s"), ("turn_right", "deg_s")):
+        for name in _NEEDED:
             if name not in values:
-                raise InputError(f"no {name}; write a line {name}_{unit} = [value, standard deviation]")
+                raise InputError(f"no {name}; write a line {name}_{_LINES[name]} = [value, standard deviation]")
         return MeasuredVehicle(**values)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of a vehicle.toml, in SI units."""
-        units = {"speed": "m_s", "turn_left": "rad_s", "turn_right": "rad_s", "slip": "rad", "lag": "s"}
-        numbers = {f"{name}_{unit}": list(self.measured(name)) for name, unit in units.items()}
+        numbers = {
+            f"{name}_{of_kind(UNITS[_LINES[name]].kind)[0]}": list(self.measured(name)) for name in _SPREADS
+        }
         return {"name": self.name, **numbers, "length_m": self.length, "width_m": self.width}
 
 
@@ -199,11 +201,9 @@ def _in_si(content: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
         if key == "name":
             continue
         quantity, unit = split(key)
-        if quantity not in _KINDS or unit is None or unit.kind != _KINDS[quantity]:
-            known = ", ".join(
-                ("speed_cm_s", "turn_left_deg_s", "turn_right_deg_s", "slip_deg", "lag_s", "length_cm")
-            )
-            raise InputError(f"{key} is no line of a vehicle; allowed are {known}, width_cm and name, in any unit")
+        if quantity not in _LINES or unit is None or unit.kind != UNITS[_LINES[quantity]].kind:
+            known = ", ".join(f"{name}_{lab}" for name, lab in _LINES.items())
+            raise InputError(f"{key} is no line of a vehicle; allowed are {known}, in any unit, and name")
         pair = given if isinstance(given, list) and len(given) == 2 and quantity in _SPREADS else [given]
         if not all(isinstance(number, int | float) and not isinstance(number, bool) for number in pair):
             raise InputError(f"{key} = {given!r}; write a number, or [value, standard deviation]")
@@ -216,11 +216,11 @@ def _relaxation(start: Floats, end: Floats, lag: float) -> Floats:
 
     The motion is the lag, and then the arc of `end`.
     """
-    from scipy.integrate import cumulative_simpson  # slow to import, and only vehicles with a lag need it
-
-    end = np.broadcast_to(end, start.shape)
     if lag <= 0:
         return np.zeros((*start.shape[:-1], len(TIMES), 3))
+    from scipy.integrate import cumulative_simpson  # slow to import, and only a lag needs it
+
+    end = np.broadcast_to(end, start.shape)
     time = np.linspace(0.0, TIMES[-1], _SUBSTEPS * (len(TIMES) - 1) + 1)
     rate = (start - end)[..., None, :]
     heading = end[..., None, 2] * time + rate[..., 2] * lag * -np.expm1(-time / lag)
