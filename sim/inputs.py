@@ -101,13 +101,6 @@ def run_columns(table: pd.DataFrame, robot: Robot, where: str) -> tuple[list[Rob
     return robots, {**columns, "omega_bar": columns["omega_bar"] * np.array(directions)}
 
 
-def point_columns(points: pd.DataFrame, robot: str | None, where: str) -> tuple[list[Robot], dict[str, Any]]:
-    """Return the robots where a table has the runs of one, otherwise none, and the columns of the points, (M,)."""
-    if robot is not None:
-        return run_columns(points, load_robot(robot), where)
-    return [], {str(name): points[name].to_numpy() for name in points}
-
-
 def names_robot(source: str | Path) -> bool:
     """Tell whether words name a robot, a preset or a robot.toml, rather than a table of points."""
     path = Path(source)

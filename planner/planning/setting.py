@@ -12,7 +12,6 @@ from planner.planning.declared_path import Declared
 from planner.planning.line_of_sight import Guidance
 from planner.planning.stated_error import look_ahead
 from planner.vehicle.tracked_point import TrackedVehicle
-from planner.vehicle.vehicle import Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.io.errors import InputError
 
@@ -39,13 +38,8 @@ class Setting(NamedTuple):
 
     def guidance(self, declared: Declared) -> Guidance:
         """Choose look-ahead and hysteresis for a declared path."""
-        return choose_guidance(self.tracked.vehicle, declared, self.straight, self.dwell)
-
-
-def choose_guidance(vehicle: Vehicle, declared: Declared, straight: Zigzag, dwell: float) -> Guidance:
-    """Choose look-ahead and hysteresis for a declared path and a shortest dwell."""
-    ahead = look_ahead(vehicle, declared.curvature, straight)
-    return Guidance(dwell, ahead, straight.hysteresis(ahead))
+        ahead = look_ahead(self.tracked.vehicle, declared.curvature, self.straight)
+        return Guidance(self.dwell, ahead, self.straight.hysteresis(ahead))
 
 
 def zigzag_drift(tracked: TrackedVehicle, straight: Zigzag) -> Drift:

@@ -75,11 +75,6 @@ class TrackerGuidance(LineOfSight):
         self._way: Way | None = None
         self._leg, self._along = SEGMENTS, 0.0  # of the way; the path follows its last segment
 
-    @property
-    def on_way(self) -> bool:
-        """Whether the robot is on a way back."""
-        return self._way is not None
-
     def update_drift(self, drift: LearnedDrift) -> None:
         """Update the drift with what was learned."""
         self._drift = drift
