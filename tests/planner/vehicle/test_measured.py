@@ -60,6 +60,21 @@ def test_the_motion_is_that_of_a_twist_that_relaxes(dwells: float | str, error: 
     assert np.abs(predicted - _integrated(SWIMMER, seconds)).max() < error
 
 
+def test_a_zigzag_whose_start_is_forgotten_is_exact() -> None:
+    """There what the dwell before left is that of a dwell of the same length."""
+    seconds = np.full(40, 0.25) * SWIMMER.time_scale
+    ends = (_at_flips(SWIMMER, SWIMMER.motion(), seconds), _integrated(SWIMMER, seconds))
+    first, second = (planar.between(poses[10], poses[-1]) for poses in ends)
+    assert first == pytest.approx(second, abs=3e-4)
+
+
+def test_a_lag_below_its_standard_deviation_has_a_mode_of_its_size() -> None:
+    """After a long dwell a lag of τ has turned the vehicle less by twice the yaw rate times τ."""
+    (mode,) = MeasuredVehicle(speed=0.02, turn_left=0.25, turn_right=0.2, lag=(0.05, 0.1)).motion().modes
+    assert mode.lag is not None
+    assert mode.lag[:, -1, -1, 2] == pytest.approx([-0.045, 0.045], rel=1e-3)
+
+
 def test_without_lag_it_is_the_bicycle() -> None:
     """Front wheel at the tracked point, wheel base b: the rear axle moves on circles of radius R."""
     base, radius, speed = 0.024, 0.22, 0.005
@@ -177,6 +192,7 @@ def test_a_vehicle_swims_as_planned_and_cannot_be_simulated(tmp_path: Path) -> N
     result = sf.plan("circle:30cm", SWIMMER)
     swum = sf.swim(result)
     assert swum.finished
+    assert "coefficients" not in result.error_line
     assert swum.within(result.feedback_error) > 0.9
     with pytest.raises(InputError, match="measured vehicle; only robots"):
         result.schedule()
