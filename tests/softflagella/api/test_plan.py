@@ -12,7 +12,6 @@ import pytest
 import planner.files.own_table
 import softflagella as sf
 import surrogate.one_robot.tabulate
-from planner.api.plan import plan
 from tests.softflagella.made import GOAL, ODD, ROBOT, START, goal, own_table
 
 KNOWN = sf.CalibrationKnowledge(names=("C_yr",), covariance=np.array([[0.01]]))
@@ -30,7 +29,7 @@ def calibrated_file(tmp_path: Path) -> Path:
 @pytest.mark.slow
 def test_a_robot_in_any_form_has_the_plan_of_the_planner(calibrated_file: Path) -> None:
     circle, few = sf.circle(1.5), {"objective": "flips"}
-    exact, wanted = (plan(circle, ROBOT, knowledge=known, **few) for known in (None, KNOWN))
+    exact, wanted = (sf.plan(circle, ROBOT, knowledge=known, **few) for known in (None, KNOWN))
     for robot in (ROBOT, "paper-control"):
         assert sf.plan(circle, robot, **few).to_dict()["id"] == exact.to_dict()["id"]
     uncertain = sf.plan(circle, ROBOT, knowledge=KNOWN, **few)
@@ -71,7 +70,7 @@ def test_a_robot_that_the_shipped_table_does_not_know_gets_its_own_once(
     monkeypatch.setattr(planner.files.own_table, "_TABLES", {})
     monkeypatch.setattr(surrogate.one_robot.tabulate, "tabulate", lambda robot: own)
     with pytest.raises(sf.InputError, match="left_right_bias"):
-        plan(sf.circle(2.0), ODD)
+        sf.plan(sf.circle(2.0), ODD, lookup=sf.load_table())
     file = tmp_path / "robot.toml"
     sf.save_robot(ODD, file)
     for first, again in ((ODD, replace(ODD, name="same groups")), (file, str(file))):
