@@ -62,10 +62,10 @@ def planned(
 
 
 @shared
-def around(dwell: float | None = None, *, feedback: bool = False) -> Plan:
+def around(dwell: float | None = None) -> Plan:
     """Plan a line with a rock on it."""
     request = QUICK if dwell is None else PlanRequest(dwell=dwell)
-    return make_plan(Path2D.of(LINE), tracked(), replace(request, space=ROCK, feedback=feedback))
+    return make_plan(Path2D.of(LINE), tracked(), replace(request, space=ROCK))
 
 
 @shared

@@ -117,7 +117,8 @@ def test_a_tracked_robot_with_wrong_coefficients_stays_clear() -> None:
 
 
 def test_with_feedback_the_margin_is_smaller() -> None:
-    watched = around(2.5, feedback=True)
+    straight = Path2D.of(((0.0, 0.0), (14.0, 0.0)))  # long enough for the error without a camera to grow
+    watched = make_plan(straight, tracked(), PlanRequest(dwell=2.5, space=ROCK, feedback=True))
     assert watched.kept_clear is not None
     assert watched.feedback_error <= watched.kept_clear.margin < watched.stated_error
 
