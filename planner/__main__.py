@@ -301,14 +301,24 @@ def _replan(plan: str, track: str, *, out: str, **given: Any) -> None:
 
 
 @program.command("replay")
-def _replay(plan: str, *, robot: str | None = None, out: str, error: bool = True) -> None:
+def _replay(
+    plan: str,
+    *,
+    robot: str | None = None,
+    out: str | None = None,
+    error: bool = True,
+    shapes: str | None = None,
+    every: float | None = None,
+) -> None:
     """Simulate a planned schedule, and compare the track with the plan.
 
     Args:
         plan: plan.json.
         robot: another robot that carries the plan out: a robot.toml or a preset (default: the plan's).
-        out: CSV with the track.
+        out: CSV with the track; needed unless --shapes is given.
         error: estimate the error of the track, which takes more than half as long again.
+        shapes: the shape of the robot and the forces on it in time: .npz, or .pvd for ParaView.
+        every: s between the shapes (default: a 24th of a motor revolution).
     """
     from tqdm import tqdm
 
@@ -320,10 +330,22 @@ def _replay(plan: str, *, robot: str | None = None, out: str, error: bool = True
     from sim.model.plan_file import read_plan_file
     from sim.model.schedule import load_schedule
     from sim.motion.replay import replay, replay_error
+    from sim.motion.shape_files import check_name, equal_times, write_shapes
+    from sim.motion.shapes import scheduled_shapes
 
-    planned = load_schedule(plan)
-    schedule = planned if robot is None else planned.swum_by(load_robot(robot))
+    if out is None and shapes is None:
+        raise InputError("name a file: --out for the track, or --shapes for the shapes")
+    planned, swimmer = load_schedule(plan), None if robot is None else load_robot(robot)
+    schedule = planned if swimmer is None else planned.swum_by(swimmer)
     shown: Any = {"unit": "dwell", "delay": BAR_AFTER, "disable": None}  # None: shown on a terminal alone
+    if shapes is not None:
+        check_name(shapes)
+        times = equal_times(schedule, every)
+        with tqdm(total=len(schedule.dwells), desc="replay", **shown) as bar:
+            write_shapes(shapes, scheduled_shapes(schedule, times, progress=bar.update), schedule, swimmer)
+        print(f"{len(times)} shapes, {format_time(times[-1] * schedule.time_scale)} -> {shapes}")
+    if out is None:
+        return
     with tqdm(total=len(schedule.dwells), desc="replay", **shown) as bar:
         track = replay([schedule], progress=bar.update)[0]
     own_error = ""

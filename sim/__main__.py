@@ -3,30 +3,39 @@
 from __future__ import annotations
 
 import sys
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from sim.io.commands import Program
 from sim.io.errors import InputError
 from sim.model.sweepable import SWEEPABLE, read_range
+
+if TYPE_CHECKING:
+    from sim.model.robot import Robot
 
 program = Program("sim", "Simulate swimming robots.")
 main = program.main
 
 
 @program.command("steady", of="sim.api:steady")
-def _steady(robots: str, *, robot: str | None = None, out: str | None = None, **given: Any) -> None:
+def _steady(
+    robots: str, *, robot: str | None = None, out: str | None = None, shapes: str | None = None, **given: Any
+) -> None:
     """Mean motion of a robot, or of many, at constant motor speed.
 
     Args:
         robots: robot.toml, the name of a preset, or a table of points: CSV with
             C_t,C_r,C_yr,l_over_R,L_over_R,l_over_r0,omega_bar,N,…, or, with --robot, runs: N,l_cm,omega_rpm.
         out: CSV with the same rows and their motion; needed for a table of points.
+        shapes: of one robot, its shape and the forces on it in a turn of the disc: .npz, or .pvd for ParaView.
     """
     from sim.motion.batches import steady_columns
     from sim.motion.lab_units import describe_motion
     from sim.robot_rows import command_rows, write_motion
 
     rows = command_rows(robots, robot, out)
+    if shapes is not None:
+        _write_steady_shapes(rows.robots, shapes)
     with rows.naming():
         motion = steady_columns(rows.columns, title="steady" if rows.file else "", **given)
     if rows.file:
@@ -36,6 +45,19 @@ def _steady(robots: str, *, robot: str | None = None, out: str | None = None, **
         if motion["note"][0]:
             print(f"note: {motion['note'][0]}", file=sys.stderr)
     write_motion(rows, motion, out, said)
+
+
+def _write_steady_shapes(robots: Sequence[Robot], path: str) -> None:
+    """Write the shapes of one robot."""
+    from sim.motion.shape_files import check_name, write_shapes
+    from sim.motion.shapes import steady_shapes
+
+    check_name(path)
+    if len(robots) != 1:
+        raise InputError("--shapes goes with one robot; give a robot.toml or the name of a preset")
+    shapes = steady_shapes(robots[0])
+    write_shapes(path, shapes, robot=robots[0])
+    print(f"{len(shapes.times)} shapes -> {path}")
 
 
 def _counts(robots: dict[str, Any], motion: dict[str, Any]) -> str:

@@ -90,8 +90,9 @@ def short_plan(made: Path, out: Path) -> Path:
 
 
 def planner_replay(made: Path, out: Path) -> str:
-    done("planner", "replay", short_plan(made, out), "--out", out / "track.csv")
-    track = pd.read_csv(out / "track.csv")
+    done("planner", "replay", short_plan(made, out), "--out", out / "track.csv", "--shapes", out / "shapes.npz")
+    track, last = pd.read_csv(out / "track.csv"), np.load(out / "shapes.npz")["head_position"][-1]
+    assert 100 * last[:2] == pytest.approx(track[["x_cm", "y_cm"]].iloc[-1], abs=0.02)
     dwells = json.loads((out / "short.json").read_text())["dwell_bar"]
     assert track["time_bar"].iloc[-1] == pytest.approx(sum(dwells), rel=1e-6)
     assert sorted(set(track["direction"])) == [-1, 1]

@@ -30,10 +30,11 @@ from sim.io.errors import InputError
 from sim.motion.continuation import Equations, Point, first_point, follow, locate
 from sim.motion.exponents import FOLD, Leading, leading_exponent
 from sim.motion.revolution import Revolutions
+from sim.motion.shapes import state_from_orbit
 from sim.motion.slow_sweep import Settled, from_rest, perturbed, settled_from, slow_sweep
 from sim.motion.swept_input import SweptInput
 from sim.motion.tails_alike import EDGES, TailsAlike
-from sim.motion.turn_shapes import orbit_from_turn, state_from_orbit
+from sim.motion.turn_shapes import orbit_from_turn
 from sim.solve.march import State
 from sim.solve.refinement import difference
 

@@ -16,7 +16,7 @@ from sim.io.errors import InputError
 from sim.io.files import whole_file
 from sim.io.units import format_time
 from sim.model.schedule import Schedule
-from sim.motion.film_frames import Frames, film_frames
+from sim.motion.shapes import Shapes, scheduled_shapes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -84,17 +84,17 @@ def write_film(
         raise InputError(f"{path}: a film ends in {', '.join(ENDINGS)}")
     if ending == ".mp4" and shutil.which("ffmpeg") is None:
         raise InputError(f"{path}: .mp4 needs ffmpeg, which is not installed; write a .gif or .webp")
-    frames = film_frames(schedule, film.times(schedule), progress=progress)
-    pictures = _pictures(content, schedule, frames, film)
+    shapes = scheduled_shapes(schedule, film.times(schedule), progress=progress)
+    pictures = _pictures(content, schedule, shapes, film)
     with whole_file(path) as part:
         if ending == ".mp4":
             _write_mp4(pictures, part, film)
         else:
             _write_animation(pictures, part, film, ending)
-    return len(frames.times)
+    return len(shapes.times)
 
 
-def _pictures(content: Mapping[str, Any], schedule: Schedule, frames: Frames, film: Film) -> Iterator[Image]:
+def _pictures(content: Mapping[str, Any], schedule: Schedule, shapes: Shapes, film: Film) -> Iterator[Image]:
     """Draw one picture after the other, in cm."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -105,7 +105,8 @@ def _pictures(content: Mapping[str, Any], schedule: Schedule, frames: Frames, fi
     drawn, declared = (np.array(content[name], dtype=float) for name in ("raw_path", "reference"))
     if content.get("closed"):
         drawn, declared = (np.concatenate([line, line[:1]]) for line in (drawn, declared))
-    seen = np.concatenate([drawn, declared, frames.poses[:, :2], frames.tails.reshape(-1, 2)])
+    tails = shapes.nodes[..., :2]
+    seen = np.concatenate([drawn, declared, shapes.heads[:, :2], tails.reshape(-1, 2)])
     low, high = seen.min(0) - _MARGIN, seen.max(0) + _MARGIN
     size = high - low
     height = 2 * round(film.width * float(np.clip(size[1] / size[0], 0.3, 1.5)) / 2)
@@ -119,7 +120,7 @@ def _pictures(content: Mapping[str, Any], schedule: Schedule, frames: Frames, fi
     axes.plot(*(cm * drawn.T), color=_SOFT, lw=1.2, ls=(0, (6, 4)))
     axes.plot(*(cm * declared.T), color=_INK, lw=0.8)
     (track,) = axes.plot([], [], color=_HEAD, lw=1.8)
-    tails = [axes.plot([], [], color=_TAIL, lw=2.2, solid_capstyle="round")[0] for _ in frames.tails[0]]
+    lines = [axes.plot([], [], color=_TAIL, lw=2.2, solid_capstyle="round")[0] for _ in tails[0]]
     head = Polygon(np.zeros((4, 2)), facecolor="#dfe9f1", edgecolor=_HEAD, lw=1.4, zorder=3)
     axes.add_patch(head)
     words = axes.text(0.02, 0.02, "", transform=axes.transAxes, fontsize=11, color=_INK)
@@ -128,13 +129,11 @@ def _pictures(content: Mapping[str, Any], schedule: Schedule, frames: Frames, fi
     radius = 1 / schedule.robot["l_over_R"]
     length = radius * schedule.robot["L_over_R"]
     corners = np.array([[-length, -radius], [length, -radius], [length, radius], [-length, radius]]) * [0.5, 1]
-    for time, pose, shapes, direction in zip(
-        frames.times, frames.poses, frames.tails, frames.directions, strict=True
-    ):
-        past = frames.track[frames.track[:, 0] <= time, 1:]
+    for time, pose, shape, direction in zip(shapes.times, shapes.heads, tails, shapes.directions, strict=True):
+        past = shapes.track[shapes.track[:, 0] <= time, 1:]
         track.set_data(*(cm * past.T))
-        for line, shape in zip(tails, shapes, strict=True):
-            line.set_data(*(cm * shape.T))
+        for line, tail in zip(lines, shape, strict=True):
+            line.set_data(*(cm * tail.T))
         cos, sin = math.cos(pose[2]), math.sin(pose[2])
         head.set_xy(cm * (pose[:2] + corners @ np.array([[cos, sin], [-sin, cos]])))
         words.set_text(f"{format_time(time * schedule.time_scale)}   {film.speed:g} ×")

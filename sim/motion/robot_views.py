@@ -14,7 +14,7 @@ from matplotlib.patches import Circle, FancyArrowPatch, Polygon
 from sim.arrays import Floats
 from sim.mechanics import planar
 from sim.model.robot import Robot
-from sim.motion.shapes import tails_over_a_revolution
+from sim.motion.shapes import nodes_in_body, steady_states
 from sim.motion.steady import steady
 
 HEADING = math.radians(20)
@@ -49,11 +49,11 @@ class Scene(NamedTuple):
 def scene(robot: Robot) -> Scene:
     """Simulate the robot with its motor at +1."""
     motion = steady(robot.groups(), stability=False)
-    _, tails = tails_over_a_revolution(robot, 8)
+    body, (state,) = steady_states(robot, np.array([math.pi / 4]))
     return Scene(
         robot.head_radius / robot.tail_length,
         robot.head_length / robot.tail_length,
-        tails[1],
+        nodes_in_body(body, state),
         np.array([motion.v_z[0], motion.v_x[0], motion.omega_yr[0]]),
         (float(motion.omega_t[0]), float(motion.omega_h[0])),
         float(motion.slip_angle[0]),

@@ -1,49 +1,185 @@
-"""The tails of a steadily swimming robot over one revolution of the disc, for pictures and for starting values.
+"""The shape of a robot in time, and the forces of the fluid on it: what films, pictures and other programs show.
 
-Positions in l, in the body frame: origin J at the disc's centre, e_x sideways, e_y up, e_z forward along the axis.
+Lab: x and y as seen from above, z up from the axis of the robot, which stays in the plane z = 0. Body: origin J
+(the disc's centre), e_x to the left, e_y up, e_z forward along the axis. Tails are arrays (tail, node, 3), node 0
+at the clamp. Units: l, μ0 l⁴/EI, EI/l².
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
 import numpy as np
 
-from sim.arrays import Floats
+from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
 from sim.linear.spectral import differentiation, interpolation
-from sim.mechanics.balance import tail_spin
+from sim.mechanics import planar
+from sim.mechanics.balance import motor_gain, tail_spin
 from sim.model.body import Body
 from sim.model.robot import Robot
+from sim.model.schedule import Schedule
+from sim.motion.replay import run_at_rest
+from sim.motion.run import Run
 from sim.solve.assembly import bodies
-from sim.solve.march import PHASE, State
+from sim.solve.fluid_forces import fluid_forces
+from sim.solve.march import PHASE, YAW, State, X, Y
 from sim.solve.orbit import FIRST_PHASE
-from sim.solve.refinement import FEW, REASONS, SOLVED, orbit_on_mesh, refined_orbit
+from sim.solve.refinement import MANY, REASONS, SOLVED, orbit_on_mesh, refined_orbit
+
+_JUST_AFTER = 1e-3  # of a time step: when forces are taken after a jump of the motor's speed
 
 
-def tails_over_a_revolution(robot: Robot, frames: int) -> tuple[Floats, Floats]:
-    """Return disc phases (F,) and tails (F, N, n + 1, 3), clamp to tip, with the motor in its positive direction.
+class Shapes(NamedTuple):
+    """A robot with N tails of n edges at F times, in the lab."""
+
+    times: Floats  # (F,)
+    heads: Floats  # (F, 3): x, y and heading of the head's centre
+    angles: Floats  # (F, 2): of head and disc about the axis, from e_x towards e_y; both 0 at rest
+    nodes: Floats  # (F, N, n + 1, 3)
+    forces: Floats  # (F, N, n + 1, 3), of the fluid on the nodes
+    on_head: Floats  # (F, 4): F_x, F_z, M_y, M_z of the fluid on head and disc, in the body frame about J
+    directions: Integers  # (F,), of the motor
+    track: Floats  # (K, 3): time, x and y of the head's centre at every step
+
+
+def steady_states(robot: Robot, phases: Floats) -> tuple[Body, list[State]]:
+    """Return the states of a steadily swimming robot at disc phases (F,), with the motor at +1.
 
     Raises:
         InputError: the robot has no steady motion in which its tails move alike.
     """
     groups = robot.groups()
     body = bodies(groups)[0]
-    orbit = refined_orbit(body, groups.N, FEW)
+    orbit = refined_orbit(body, groups.N, MANY)
     if orbit.ended != SOLVED:
         raise InputError(f"{robot.name} has no shape to draw: {REASONS[orbit.ended]}")
-    x = orbit.x[2]
-    phases = 2 * np.pi * np.arange(frames) / frames
-    root = np.zeros((1, x.shape[1], 3))
+    return body, [state_from_orbit(body, orbit.x[2], orbit.u[2], phase) for phase in phases.tolist()]
+
+
+def steady_shapes(robot: Robot, frames: int = 96) -> Shapes:
+    """Return the shapes in a turn of the disc of a steadily swimming robot, at `frames` + 1 equal phases.
+
+    Raises:
+        InputError: the robot has no steady motion in which its tails move alike.
+    """
+    from scipy.integrate import cumulative_simpson  # slow to import
+
+    def integral(rates: Floats) -> Floats:
+        return np.asarray(cumulative_simpson(rates, x=phases, axis=0, initial=0.0))
+
+    phases = np.linspace(0, 2 * np.pi, frames + 1)
+    body, states = steady_states(robot, phases)
+    u = np.array([state.u for state in states])
+    spins = (body.omega + motor_gain(body) * u[:, 3])[:, None]
+    times, yaw, angle = integral(np.column_stack([np.ones(len(u)), u[:, 2:]]) / spins).T
+    forward_left = np.column_stack([u[:, 1], u[:, 0] + u[:, 2] * body.head_length / 2])
+    places = integral(planar.turn(forward_left, yaw) / spins)
+    heads, angles = np.column_stack([places, yaw]), np.column_stack([angle, phases])
+    shown = [_in_lab(body, state, state, head) for state, head in zip(states, heads, strict=True)]
+    track = np.column_stack([times, places])
+    return _stacked(times, heads, angles, shown, np.ones(len(u), int), track)
+
+
+def scheduled_shapes(
+    schedule: Schedule, times: Floats, *, progress: Callable[[int], object] | None = None
+) -> Shapes:
+    """Simulate a schedule and return the shapes at times that increase, (F,).
+
+    At the time of a flip, the forces are those just after it.
+
+    Args:
+        schedule: any robot.
+        times: from 0 to the end of the schedule.
+        progress: called after each dwell with 1.
+
+    Raises:
+        InputError: the schedule cannot be simulated.
+    """
+    run = run_at_rest(schedule)
+    start, now, head_angle, direction = np.array(schedule.start), 0.0, 0.0, schedule.first_direction
+    heads, angles, shown, directions, track = [], [], [], [], [np.zeros((1, 3))]
+    ends = np.cumsum(schedule.dwells)
+    dwell_of_frame = np.minimum(np.searchsorted(ends, times, side="right"), len(ends) - 1)
+    for index, dwell_end in enumerate(ends.tolist()):
+        if index:
+            run.flip()
+            direction = -direction
+        jumped = True
+        for end in (*times[dwell_of_frame == index].tolist(), None):
+            until = dwell_end if end is None else end
+            if until > now:
+                phase = run.state.pose[PHASE]
+                steps, poses = run.go(until - now)
+                track.append(np.column_stack([now + steps, poses[:, [X, Y]]]))
+                turned = run.state.pose[PHASE] - phase - run.body.omega * (until - now)
+                head_angle += turned / motor_gain(run.body)
+                now, jumped = until, False
+            if run.failed:
+                raise InputError(f"the simulation failed in dwell {index + 1} of the schedule")
+            if end is not None:
+                heads.append(planar.compose(start, run.state.pose[[X, Y, YAW]]))
+                angles.append((head_angle, run.state.pose[PHASE]))
+                shown.append(_in_lab(run.body, run.state, _moving(run) if jumped else run.state, heads[-1]))
+                directions.append(direction)
+        if progress is not None:
+            progress(1)
+    path = np.concatenate(track)
+    path[:, 1:] = planar.turn(path[:, 1:], start[2]) + start[:2]
+    return _stacked(times, np.array(heads), np.array(angles), shown, np.array(directions), path)
+
+
+def _moving(run: Run) -> State:
+    """Return the state just after a jump of the motor's speed, when its velocities are known."""
+    later = run.copy()
+    later.steps(2, _JUST_AFTER * run.time_step)
+    return later.state
+
+
+def _in_lab(body: Body, state: State, moving: State, head: Floats) -> tuple[Floats, Floats, Floats]:
+    """Place the nodes and the forces on them in the lab, (N, n + 1, 3) each; the wrench on the head stays.
+
+    Args:
+        moving: the same state, with the velocities that the forces depend on.
+    """
+    phase = float(moving.pose[PHASE])
+    forces, on_head = fluid_forces(body, moving.x, moving.x_dot, moving.u, phase)
+    nodes = nodes_in_body(body, state) - [0.0, 0.0, body.head_length / 2]
+    placed = _along_lab(nodes, head[2]) + np.append(head[:2], 0.0)
+    return placed, _along_lab(_along_body(forces, phase), head[2]), on_head
+
+
+def _stacked(
+    times: Floats,
+    heads: Floats,
+    angles: Floats,
+    shown: Sequence[tuple[Floats, Floats, Floats]],
+    directions: Integers,
+    track: Floats,
+) -> Shapes:
+    nodes, forces, on_head = (np.array(parts) for parts in zip(*shown, strict=True))
+    return Shapes(times, heads, angles, nodes, forces, on_head, directions, track)
+
+
+def nodes_in_body(body: Body, state: State) -> Floats:
+    """Return the nodes of each tail in the body frame, (N, n + 1, 3), clamp to tip."""
+    root = np.zeros((1, *state.x.shape[1:]))
     root[:, :, 0] = body.offset
-    nodes = np.concatenate([root, x])
-    tails = np.empty((frames, groups.N, len(nodes), 3))
-    for j in range(groups.N):
-        turn = phases + 2 * np.pi * j / groups.N  # tail j moves like tail 0, at the phase 2πj/N later
-        shape = at_phases(nodes, turn)
-        cos, sin = np.cos(turn)[:, None], np.sin(turn)[:, None]
-        tails[:, j, :, 0] = cos * shape[..., 0] - sin * shape[..., 1]
-        tails[:, j, :, 1] = sin * shape[..., 0] + cos * shape[..., 1]
-        tails[:, j, :, 2] = shape[..., 2]
-    return phases, tails
+    return _along_body(np.concatenate([root, state.x]), float(state.pose[PHASE]))
+
+
+def _along_body(vectors: Floats, phase: float) -> Floats:
+    """Turn vectors (K, N, 3), each in the frame of its tail, to the body frame, (N, K, 3)."""
+    x, y, z = vectors.transpose(2, 1, 0)
+    turn = phase + 2 * np.pi * np.arange(len(x))[:, None] / len(x)
+    cos, sin = np.cos(turn), np.sin(turn)
+    return np.stack([cos * x - sin * y, sin * x + cos * y, z], -1)
+
+
+def _along_lab(vectors: Floats, heading: float) -> Floats:
+    """Turn vectors (..., 3) from the body frame to that of the lab."""
+    return np.concatenate([planar.turn(vectors[..., [2, 0]], heading), vectors[..., [1]]], -1)
 
 
 def at_phases(periodic: Floats, at: Floats) -> Floats:
@@ -51,20 +187,22 @@ def at_phases(periodic: Floats, at: Floats) -> Floats:
     return np.einsum("fm,kmc->fkc", interpolation(periodic.shape[1], at - FIRST_PHASE), periodic)
 
 
-def state_on_orbit(body: Body, tails: int, edges: int, phase: float) -> State | None:
-    """Return the state of a steadily swimming robot at a disc phase; None where there is no orbit."""
-    solved, x, u = orbit_on_mesh(body, tails, edges)
-    if not solved:
-        return None
+def state_from_orbit(body: Body, x: Floats, u: Floats, phase: float = 0.0) -> State:
+    """Return the state of all tails at a disc phase, from an orbit x (n, M, 3), u (P, 4).
+
+    In an orbit, tail j at disc phase φ has the shape of tail 0 at φ + 2πj/N (`sim.solve.orbit`).
+    """
+    tails = x.shape[1] // u.shape[0]
     each = phase + 2 * np.pi * np.arange(tails) / tails
     slope = np.einsum("ml,klc->kmc", differentiation(x.shape[1]), x)
-    velocity = _in_one_period(u, phase, tails)
+    velocity = at_phases(np.tile(u, (tails, 1))[None], np.array([phase]))[0, 0]
     pose = np.zeros(6)
     pose[PHASE] = phase
     shape, rate = (np.ascontiguousarray(at_phases(a, each).transpose(1, 0, 2)) for a in (x, slope))
     return State(shape, rate * tail_spin(body, velocity), pose, velocity)
 
 
-def _in_one_period(u: Floats, phase: float, tails: int) -> Floats:
-    """Interpolate velocities (P, 4) of period 2π/N at a disc phase, (4,)."""
-    return at_phases(np.tile(u, (tails, 1))[None], np.array([phase]))[0, 0]
+def state_on_orbit(body: Body, tails: int, edges: int, phase: float) -> State | None:
+    """Return the state of a steadily swimming robot at a disc phase; None where there is no orbit."""
+    solved, x, u = orbit_on_mesh(body, tails, edges)
+    return state_from_orbit(body, x, u, phase) if solved else None

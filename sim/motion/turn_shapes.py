@@ -1,4 +1,4 @@
-"""From one turn of all tails to an orbit of tails that move alike, and back.
+"""From one turn of all tails to an orbit of tails that move alike.
 
 In an orbit, tail j at disc phase φ has the shape of tail 0 at φ + 2πj/N (`sim.solve.orbit`).
 Units: l, μ0 l⁴/EI.
@@ -9,12 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats
-from sim.linear.spectral import differentiation
-from sim.mechanics.balance import tail_spin
-from sim.model.body import Body
 from sim.motion.revolution import Turn
-from sim.motion.shapes import at_phases
-from sim.solve.march import State
 from sim.solve.orbit import FIRST_PHASE
 
 _ALIKE = 0.02  # largest distance between nodes of tails that move alike, in l
@@ -52,13 +47,3 @@ def orbit_from_turn(turn: Turn, instants: int) -> tuple[Floats, Floats] | None:
             return None
     u = np.tile(turn.state.u, (instants, 1))
     return np.ascontiguousarray(x.transpose(1, 0, 2)), u
-
-
-def state_from_orbit(body: Body, x: Floats, u: Floats) -> State:
-    """Return the state of all tails at disc phase 0, from an orbit x (n, M, 3), u (P, 4)."""
-    tails = x.shape[1] // u.shape[0]
-    each = _TURN * np.arange(tails) / tails
-    slope = np.einsum("ml,klc->kmc", differentiation(x.shape[1]), x)
-    velocity = at_phases(np.tile(u, (tails, 1))[None], np.array([0.0]))[0, 0]
-    shape, rate = (np.ascontiguousarray(at_phases(a, each).transpose(1, 0, 2)) for a in (x, slope))
-    return State(shape, rate * tail_spin(body, velocity), np.zeros(6), velocity)

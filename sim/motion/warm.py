@@ -16,7 +16,7 @@ from sim.motion.replay import replay
 from sim.motion.response import responses
 from sim.motion.sensitivity import sensitivities
 from sim.motion.settling import settle
-from sim.motion.shapes import tails_over_a_revolution
+from sim.motion.shapes import steady_shapes
 from sim.motion.steady import steady
 from sim.motion.tails_alike import TailsAlike
 from sim.solve.assembly import bodies
@@ -46,7 +46,7 @@ _STAGES: tuple[Stage, ...] = (
     ("derivatives with flow", lambda: sensitivities(_ROBOT.groups(), ("C_t", "tail_interaction"))),
     ("contact between tails", lambda: steady(_TOUCHING.groups())),
     ("branches", _follow_a_branch),
-    ("pictures", lambda: tails_over_a_revolution(_ROBOT, 4)),
+    ("pictures", lambda: steady_shapes(_ROBOT, 4)),
 )
 
 

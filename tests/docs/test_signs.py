@@ -17,7 +17,7 @@ from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
-from sim.motion.shapes import tails_over_a_revolution
+from sim.motion.shapes import nodes_in_body, steady_states
 from sim.motion.steady import steady
 from surrogate.input_ranges import BOUNDS
 from tests.docs.pages import DOCS
@@ -63,7 +63,8 @@ def test_the_table_holds_in_the_simulator(direction: int, tails: int) -> None:
 def test_the_words_of_the_table_are_what_is_seen() -> None:
     """From the shapes and the track, not from the columns' signs."""
     motion, track = steady(ROBOT.groups()), steady_part(1)
-    _, tails = tails_over_a_revolution(ROBOT, 12)
+    body, states = steady_states(ROBOT, 2 * np.pi * np.arange(12) / 12)
+    tails = np.array([nodes_in_body(body, state) for state in states])
     assert tails[:, :, -1, 2].max() < -0.9  # behind the head
     clamp = -tails[:, 0, 0, 0] + 1j * tails[:, 0, 0, 1]  # from behind e_x is on the left, because e_y is up
     clockwise = -np.sign((clamp[0].conj() * clamp[1]).imag)

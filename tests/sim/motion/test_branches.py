@@ -19,10 +19,10 @@ from sim.motion.branches import Branch, Branches, Motion, find_branches
 from sim.motion.continuation import Point, first_point, follow, locate
 from sim.motion.exponents import DOUBLING, FOLD, HOPF, Leading, leading_exponent
 from sim.motion.revolution import Revolutions
+from sim.motion.shapes import state_from_orbit
 from sim.motion.slow_sweep import perturbed, settled_from
 from sim.motion.swept_input import SweptInput
 from sim.motion.tails_alike import EDGES, TailsAlike
-from sim.motion.turn_shapes import state_from_orbit
 from sim.solve.refinement import difference
 from tests.shared import shared
 

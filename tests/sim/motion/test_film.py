@@ -16,9 +16,8 @@ from sim.io.errors import InputError, run_command
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
 from sim.motion.film import Film, _draw_scale_bar, fitting_speed, write_film
-from sim.motion.film_frames import film_frames
 from sim.motion.replay import replay
-from sim.motion.shapes import tails_over_a_revolution
+from sim.motion.shapes import nodes_in_body, scheduled_shapes, steady_states
 
 ROBOT = PRESETS["paper-triangle"]
 LINE = [[0.0, 0.0], [1.0, 0.5]]
@@ -33,9 +32,9 @@ def schedule(*dwells: float) -> Schedule:
 def test_poses_and_directions_are_those_of_a_replay() -> None:
     wanted = schedule(1.1, 0.8, 1.3)
     track = replay([wanted])[0]
-    frames = film_frames(wanted, np.linspace(0, 3.2, 41))
+    frames = scheduled_shapes(wanted, np.linspace(0, 3.2, 41))
     for k, name in enumerate(("x_over_l", "y_over_l", "heading_rad")):
-        assert np.abs(frames.poses[:, k] - np.interp(frames.times, track.time_bar, track[name])).max() < 3e-3
+        assert np.abs(frames.heads[:, k] - np.interp(frames.times, track.time_bar, track[name])).max() < 3e-3
         if k < 2:
             assert np.abs(frames.track[-1, 1 + k] - track[name].iloc[-1]) < 1e-3
     assert frames.directions.tolist() == [-1] * 14 + [1] * 10 + [-1] * 17
@@ -45,16 +44,17 @@ def test_no_frame_is_lost_where_rounded_dwells_end() -> None:
     for seed in (1, 8):  # sums of dwells that depend on the order
         wanted = schedule(*np.random.default_rng(seed).uniform(0.05, 0.1, 20))
         times = Film(speed=wanted.time_scale).times(wanted)
-        assert len(film_frames(wanted, times).poses) == len(times)
+        assert len(scheduled_shapes(wanted, times).heads) == len(times)
 
 
 def test_tails_are_those_of_a_steadily_swimming_robot() -> None:
-    _, tails = tails_over_a_revolution(ROBOT, 128)
+    body, states = steady_states(ROBOT, 2 * np.pi * np.arange(128) / 128)
+    tails = np.array([nodes_in_body(body, state) for state in states])
     swims = Schedule(ROBOT.group_values(), 1, np.array([12.0]), (0.0, 0.0, 0.0), 1.0)
-    frames = film_frames(swims, np.array([11.5, 11.9]))
+    frames = scheduled_shapes(swims, np.array([11.5, 11.9]))
     ahead = ROBOT.head_length / ROBOT.tail_length / 2
     shapes = resampled(tails[..., [2, 0]] - [ahead, 0])
-    for pose, seen in zip(frames.poses, frames.tails, strict=True):
+    for pose, seen in zip(frames.heads, frames.nodes[..., :2], strict=True):
         cos, sin = np.cos(pose[2]), np.sin(pose[2])
         body = (seen - pose[:2]) @ np.array([[cos, -sin], [sin, cos]])  # forward, left
         assert np.abs(shapes - resampled(body)).max((1, 2, 3)).min() < 0.03
@@ -107,17 +107,3 @@ def test_a_film_that_cannot_be_written_leaves_nothing(
     assert run_command(main, ["film", "plan.json", "--out", str(tmp_path / "no.gif"), "--width", "10"]) == 2
     assert capsys.readouterr().err == "error: --width 10; give 100 to 2000 pixels\n"
     assert list(tmp_path.iterdir()) == []
-
-
-def test_tails_over_a_revolution_hang_on_their_clamps() -> None:
-    phases, tails = tails_over_a_revolution(ROBOT, 8)
-    assert tails.shape == (8, 4, 13, 3)
-    radius = ROBOT.head_radius / ROBOT.tail_length
-    for j in range(4):
-        angle = phases + 2 * np.pi * j / 4
-        clamp = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0 * angle], 1)
-        assert tails[:, j, 0] == pytest.approx(clamp, abs=1e-12)
-    lengths = np.linalg.norm(np.diff(tails, axis=2), axis=-1).sum(-1)
-    assert lengths == pytest.approx(1.0, abs=1e-2)
-    # After a quarter turn tail 1 is where tail 0 was.
-    assert tails[2, 0] == pytest.approx(tails[0, 1], abs=1e-9)
