@@ -263,7 +263,7 @@ def _saved(path: str, *, unit: str | None = None, lookup: str | None = None, own
            **planning: Any) -> Plan:  # fmt: skip
     """Make a saved plan again; options of planning are refused beside it."""
     from planner.files.saved_plan import restore_plan
-    from surrogate.table.model_file import load_table
+    from surrogate.table_file import load_table
 
     for name in (name for name, value in planning.items() if value is not None):
         option = f"--{name.replace('_', '-')}"

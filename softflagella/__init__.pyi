@@ -58,8 +58,8 @@ from surrogate.api import export as export
 from surrogate.api import inverse as inverse
 from surrogate.api import query as query
 from surrogate.interface import LookupTable as LookupTable
-from surrogate.one_robot.tabulate import tabulate as tabulate
-from surrogate.table.model_file import load_table as load_table
+from surrogate.table_file import load_table as load_table
+from surrogate.tabulate import tabulate as tabulate
 from surrogate.tensors import torch_query as torch_query
 from surrogate.tensors import torch_steady as torch_steady
 from surrogate.training.train import train as train

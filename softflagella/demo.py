@@ -55,7 +55,7 @@ from softflagella.demo_figures import draw_plans
 from softflagella.demo_files import ROBOT_PAGE
 from softflagella.demo_page import Results, write_page
 from softflagella.replanning import Steered, steer
-from surrogate.table.model_file import load
+from surrogate.table_file import load
 
 
 @dataclass(frozen=True)

@@ -42,8 +42,8 @@ from softflagella.demo_figures import (
 )
 from softflagella.demo_files import PLAN_FILES, ROBOT_PAGE, ROBOT_PICTURE, documentation, header_excerpt
 from softflagella.replanning import Steered, gap_closed
-from surrogate.table.lookup import NeuralTable
-from surrogate.table.model_file import load
+from surrogate.table import NeuralTable
+from surrogate.table_file import load
 
 _ERRORS = {  # column of a look-up table -> what it is called
     "omega_t_bar": "tail spin",

@@ -1,6 +1,6 @@
 """Measure what a corrected model gains: plan with different models, and run every schedule on the true robot.
 
-Each model is tabulated (`surrogate.one_robot.tabulate`) and plans the same path. Then the schedule is run on the
+Each model is tabulated (`surrogate.tabulate`) and plans the same path. Then the schedule is run on the
 simulated true robot, without feedback. With a wrong yaw rate the robot drifts from the path with every
 dwell. So errors of a few percent in the model can lead to errors as large as the path.
 """
@@ -17,7 +17,7 @@ from planner.paths.path import Path2D
 from sim.arrays import Floats
 from sim.model.robot import Robot
 from sim.motion.replay import replay
-from surrogate.one_robot.tabulate import tabulate
+from surrogate.tabulate import tabulate
 
 
 @dataclass(frozen=True)

@@ -35,16 +35,15 @@ def _train(
         raise InputError(f"--epochs {epochs}; give a whole number from 1")
     for folder in data:  # before torch is loaded
         read_manifest(folder)
-    from surrogate.networks.checkpoints import device_named, remove_states
-    from surrogate.networks.training_loop import Settings
-    from surrogate.table.errors import error_table, shortcomings
-    from surrogate.training.fit_response import SETTINGS
+    from surrogate.errors import error_table, shortcomings
+    from surrogate.training.fits import CURVES
     from surrogate.training.model_card import model_card
+    from surrogate.training.networks import Settings, device_named, remove_states
     from surrogate.training.train import held_out, train
 
     trained_on, states = device_named(device), f"{out}.states"
     print(f"trains on the device {trained_on}", flush=True)
-    tails, curves = Settings(), SETTINGS
+    tails, curves = Settings(), CURVES
     if epochs is not None:
         tails, curves = (replace(s, epochs=epochs, iterations=epochs) for s in (tails, curves))
     lookup = train(data, tails, curves, device=trained_on, states=states)
@@ -75,8 +74,8 @@ def _query(
     from sim.model.groups import DWELL
     from sim.motion.lab_units import describe_motion
     from sim.robot_rows import command_rows, write_motion
-    from surrogate.table.answers import answer_rows
-    from surrogate.table.model_file import load_table
+    from surrogate.answers import answer_rows
+    from surrogate.table_file import load_table
 
     rows = command_rows(robots, robot, out, DWELL)
     answer = answer_rows(rows, load_table(lookup), **given)
@@ -113,8 +112,8 @@ def _errors(*, lookup: str | None = None) -> None:
     Args:
         lookup: look-up table (default: the one that comes with the package).
     """
-    from surrogate.table.errors import error_table
-    from surrogate.table.model_file import load
+    from surrogate.errors import error_table
+    from surrogate.table_file import load
 
     table = load(lookup)
     rows = table.provenance["rows"]
@@ -131,7 +130,7 @@ def _robot(robot: str, *, out: str) -> None:
         out: JSON.
     """
     from sim.inputs import load_robot
-    from surrogate.one_robot.tabulate import tabulate
+    from surrogate.tabulate import tabulate
 
     table = tabulate(load_robot(robot))
     table.save(out)
@@ -140,21 +139,16 @@ def _robot(robot: str, *, out: str) -> None:
 
 
 @program.command("export")
-def _export(model: str | None = None, *, onnx: str | None = None, small: str | None = None) -> None:
+def _export(model: str | None = None, *, small: str) -> None:
     """Write a look-up table for other programs.
 
     Args:
         model: look-up table (default: the one that comes with the package).
-        onnx: no longer written; use --small.
         small: FOLDER, at most 150 kB, for a microcontroller, with a reader in C.
     """
-    from surrogate.export.small_copy import save_small_copy
-    from surrogate.table.model_file import load
+    from surrogate.small_copy import save_small_copy
+    from surrogate.table_file import load
 
-    if onnx:
-        raise InputError("ONNX files are no longer written; give --small FOLDER for a reader in C")
-    if not small:
-        raise InputError("nothing to write; give --small FOLDER")
     table = load(model)
     print(save_small_copy(table, small))
     print(f"model {table.identity} -> {small}")
@@ -167,15 +161,15 @@ def _compile() -> None:
 
     import numpy as np
 
+    from sim.compiling import folder_of_package
     from sim.inputs import group_columns
     from sim.model.presets import PRESETS
-    from surrogate.networks.loops import FOLDER
-    from surrogate.table.model_file import load
+    from surrogate.table_file import load
 
     began = perf_counter()
     robot = group_columns([PRESETS["paper-control"]])
     load().query({**robot, "dwell_bar": np.ones(1)}, intervals=True)
-    print(f"loops compiled in {perf_counter() - began:.0f} s -> {FOLDER}")
+    print(f"loops compiled in {perf_counter() - began:.0f} s -> {folder_of_package(Path(__file__).parent)}")
 
 
 if __name__ == "__main__":

@@ -13,12 +13,12 @@ from sim.io.keywords import checks_keywords
 from sim.io.tables import read_table
 from sim.model.groups import DWELL
 from sim.robot_rows import OneRobot, robot_rows, with_units
-from surrogate.export.small_copy import save_small_copy
+from surrogate.answers import answer_rows
 from surrogate.interface import LookupTable
-from surrogate.table.answers import answer_rows
-from surrogate.table.inverse import inverse_table
-from surrogate.table.lookup import NeuralTable
-from surrogate.table.model_file import load_table
+from surrogate.inverse import inverse_table
+from surrogate.small_copy import save_small_copy
+from surrogate.table import NeuralTable
+from surrogate.table_file import load_table
 
 if TYPE_CHECKING:
     from sim.robot_rows import Robots

@@ -1,8 +1,8 @@
 """The interface of a look-up table, which planner and calibration use.
 
-`surrogate.table.lookup.NeuralTable` (trained networks, a domain of robots) and
-`surrogate.one_robot.robot_table.RobotTable` (one robot, simulated) are look-up tables.
-`surrogate.table.model_file.load_table` reads either.
+`surrogate.table.NeuralTable` (trained networks, a domain of robots) and
+`surrogate.robot_table.RobotTable` (one robot, simulated) are look-up tables.
+`surrogate.table_file.load_table` reads either.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class LookupTable(Protocol):
 
     @property
     def errors(self) -> Mapping[str, Mapping[str, float]]:
-        """Errors by output; each has at least "rms", see `surrogate.table.errors`."""
+        """Errors by output; each has at least "rms", see `surrogate.errors`."""
         ...
 
     @property

@@ -19,8 +19,8 @@ from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.motion.batches import sensitivity_columns
-from surrogate.table.lookup import NeuralTable
-from surrogate.table.model_file import load
+from surrogate.table import NeuralTable
+from surrogate.table_file import load
 
 Inputs = Mapping[str, Tensor | Floats | float]
 Answer = tuple[Mapping[str, Floats], Mapping[str, Mapping[str, Floats]]]  # values, and derivatives by input

@@ -25,7 +25,7 @@ from sim.io.units import format_time
 from sim.model.plan_file import plan_id
 from sim.model.presets import PRESETS
 from softflagella.__main__ import PACKAGES, main
-from surrogate.table.model_file import SHIPPED, load
+from surrogate.table_file import SHIPPED, load
 from tests.calibration.toy_tables import (
     DRAG,
     FEW_PLACES,
@@ -172,17 +172,16 @@ def dataset_config(made: Path, out: Path) -> str:
 
 def surrogate_train(made: Path, out: Path) -> str:
     """Learn rows that were not simulated, of robots with two tails, by the smallest networks."""
-    from surrogate.networks import training_loop  # loads torch
-    from surrogate.training import fit_response, fit_wrench
+    from surrogate.training import fits, networks  # they load torch
 
     sweep = design(100)
     sweep = replace(sweep, axes={**sweep.axes, "N": Axis(2, 2, "integer")})
     build(sweep, str(out / "data"), jobs=1, title="", simulate=invented)
-    small = training_loop.Settings(width=8, depth=1, members=1, epochs=2, iterations=2)
+    small = networks.Settings(width=8, depth=1, members=1, epochs=2, iterations=2)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fit_wrench, "_GAP", small)
-        patch.setattr(fit_response, "SETTINGS", small)
-        patch.setattr(training_loop, "Settings", lambda: small)
+        patch.setattr(fits, "_GAP", small)
+        patch.setattr(fits, "CURVES", small)
+        patch.setattr(networks, "Settings", lambda: small)
         done("surrogate", "train", out / "data", "--out", out / "model.safetensors", "--epochs", 2)
     assert load(out / "model.safetensors").provenance["rows"]["train"] > 50
     assert not (out / "model.safetensors.states").exists()

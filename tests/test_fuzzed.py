@@ -29,7 +29,7 @@ from sim.model.schedule import load_schedule
 from sim.motion.batches import steady_columns
 from sim.motion.replay import replay
 from softflagella.__main__ import main
-from surrogate.table.model_file import load
+from surrogate.table_file import load
 from tests.calibration.toy_tables import on_the_toy, toy_table
 
 CONTROL = PRESETS["paper-control"].group_values()

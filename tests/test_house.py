@@ -54,11 +54,14 @@ def test_imports_run_one_way(package: str) -> None:
 
 def test_statistics_and_networks_know_no_robot() -> None:
     """And the swimmer knows no verdict; only tests and teaching use the simulator's reference."""
-    for package, room in (("calibration", "statistics"), ("surrogate", "networks")):
-        assert rooms_imported(package)[room] == set()
-        names = {name for file in (ROOT / package / room).glob("*.py") for name in imported(file)}
-        assert {name.split(".")[0] for name in names} == {package, "sim"}
-        assert not {name.split(".")[1] for name in names if name.startswith("sim.")} & ROBOTS
+    networks = [ROOT / "surrogate" / name for name in ("network.py", "training/bfgs.py", "training/networks.py")]
+    assert rooms_imported("calibration")["statistics"] == rooms_imported("surrogate")["network"] == set()
+    for file in (*(ROOT / "calibration" / "statistics").glob("*.py"), *networks):
+        names = imported(file)
+        assert not {name.split(".")[1] for name in names if name.startswith("sim.")} & ROBOTS, file
+        others = {name for name in names if not name.startswith("sim.")}
+        assert all(name.startswith(("calibration.statistics", "surrogate.network.", "surrogate.training."))
+                   for name in others), file  # fmt: skip
     assert rooms_imported("calibration")["swimmer"] == {"statistics"}
     assert not any("reference" in rooms for rooms in rooms_imported("sim").values())
 
@@ -67,7 +70,7 @@ LIBRARIES = {"jinja2", "joblib", "matplotlib", "numba", "numpy", "pandas", "pyar
              "svgelements", "torch", "tqdm"}  # fmt: skip
 SOLVERS = {"sim.linear", "sim.motion", "sim.reference", "sim.solve"}
 SIMULATOR = {"sim.solve.newton", "sim.solve.orbit", "sim.motion.steady", "sim.motion.replay", "sim.motion.run"}
-TRAINING = {"surrogate.training", "surrogate.networks.training_loop", "surrogate.networks.checkpoints"}
+TRAINING = {"surrogate.training", "surrogate.training.networks"}
 CODE = """
 import json, sys
 from importlib import import_module
@@ -79,7 +82,7 @@ for name in sys.argv[1:]:
 from planner.paths.path import circle
 from planner.api.plan import plan
 from sim.inputs import load_robot
-from surrogate.table.model_file import load_table
+from surrogate.table_file import load_table
 table, robot = load_table(), load_robot("paper-control")
 table.query({name: [value] for name, value in robot.group_values().items()})
 plan(circle(2.0), robot, lookup=table)
@@ -98,5 +101,5 @@ def test_importing_loads_only_what_is_used() -> None:
     for name, modules in loaded.items():
         others = set(ORDER) - {"sim", name.split(".")[0]}
         assert not set(modules) & (LIBRARIES | SOLVERS | others), name
-    assert "surrogate.table.wrench_table" in after_a_plan
+    assert "surrogate.motions" in after_a_plan
     assert not set(after_a_plan) & (SIMULATOR | TRAINING | {"joblib", "pandas", "torch"})

@@ -47,8 +47,8 @@ _QUERY = (
     """
 from functools import cache
 from sim.inputs import group_columns, load_robot
-from surrogate.table.answers import answer_with_error
-from surrogate.table.model_file import load_table
+from surrogate.answers import answer_with_error
+from surrogate.table_file import load_table
 read = cache(load_table)
 """,
     "answer_with_error(read(), group_columns([load_robot('paper-control')]))",

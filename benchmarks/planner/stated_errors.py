@@ -28,8 +28,8 @@ from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.motion.replay import replay
 from sim.motion.warm import compile_once
-from surrogate.one_robot.tabulate import tabulate
-from surrogate.table.model_file import load
+from surrogate.table_file import load
+from surrogate.tabulate import tabulate
 
 SIGMA = 0.01  # of ln C
 QUICK = 0.25  # rad that the robot turns in a time unit: from here on a fast turner

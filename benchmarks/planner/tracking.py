@@ -18,7 +18,7 @@ from planner.files.tracking_error import tracking_error
 from planner.paths.path import circle, polygon
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay
-from surrogate.table.model_file import load
+from surrogate.table_file import load
 
 CASES = (
     ("circle, radius 1.5 l, N = 2", circle(1.5), "paper-control"),

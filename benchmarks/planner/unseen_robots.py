@@ -24,7 +24,7 @@ from planner.files.tracking_error import tracking_error
 from sim.io.errors import InputError
 from sim.motion.replay import replay, replay_error
 from sim.motion.warm import compile_once
-from surrogate.table.model_file import load
+from surrogate.table_file import load
 from tests.oracles.unseen_robots import LONG, carried
 
 _LITTLE = 4e4  # radians that tails turn in a replay

@@ -15,11 +15,11 @@ import numpy as np
 
 from benchmarks.table.shipped_table import as_reached
 from sim.effects import catalogue
-from surrogate.table.errors import coverage, relative_errors
-from surrogate.table.model_file import load
+from surrogate.errors import coverage, relative_errors
+from surrogate.table_file import load
+from surrogate.tails import needs_no_learning
 from surrogate.training.simulated import draw_robots
 from surrogate.training.train import with_radius
-from surrogate.wrench.heads import needs_no_learning
 
 COUNT, SEED = 384, 20280202
 _WALL, _DRIFT = (0.0, 0.5), (-1.0, 1.0)  # of the effects without a plausible range: tank_wall, viscosity_drift

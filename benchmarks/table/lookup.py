@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from surrogate.table.errors import error_table
-from surrogate.table.model_file import load
+from surrogate.errors import error_table
+from surrogate.table_file import load
 from surrogate.training.simulated import draw_robots
 
 ROWS = 16384

@@ -1,6 +1,6 @@
 """Cost and error of tables of one robot, for each effect of the catalogue at its typical size.
 
-For each robot: the processor time of `surrogate.one_robot.tabulate.tabulate`, and the error of the net motion that
+For each robot: the processor time of `surrogate.tabulate.tabulate`, and the error of the net motion that
 its table predicts. The net motion is the change of the robot's pose over two equal dwells, one in each direction
 of the motor, once earlier dwells are forgotten; first with the motor forwards, then with the motor backwards. The
 error is the distance between the two ends over the net distance, or, where it is larger, the difference of the
@@ -38,8 +38,8 @@ from sim.motion.settling import steady_state
 from sim.motion.switching import MEMORY, steady_twist
 from sim.motion.warm import compile_once
 from sim.solve.assembly import bodies, reversed_bodies
-from surrogate.one_robot.robot_table import RobotTable
-from surrogate.one_robot.tabulate import tabulate
+from surrogate.robot_table import RobotTable
+from surrogate.tabulate import tabulate
 
 AT = (8, 13, 18, 22)  # of DWELLS: 0.54, 1.0, 1.9, 3.1
 _MESHES = (Resolution(16, 48), Resolution(24, 72))

@@ -32,15 +32,13 @@ from dataset.data_set import read_manifest
 from sim.arrays import Floats
 from sim.io.files import write_text
 from sim.motion.batches import steady_columns
-from surrogate.input_ranges import ROBOT
-from surrogate.networks.checkpoints import TrainingContext, remove_states
-from surrogate.networks.training_loop import Settings
-from surrogate.one_robot.tabulate import TOLERANCE
-from surrogate.table.errors import coverage, curve_errors, error_table, relative_errors, summary
-from surrogate.table.lookup import NeuralTable
-from surrogate.table.model_file import load
-from surrogate.table.support import INSIDE
+from surrogate.domain import INSIDE, ROBOT
+from surrogate.errors import coverage, curve_errors, error_table, relative_errors, summary
+from surrogate.table import NeuralTable
+from surrogate.table_file import load
+from surrogate.tabulate import TOLERANCE
 from surrogate.training.model_card import model_card
+from surrogate.training.networks import Settings, TrainingContext, remove_states
 from surrogate.training.simulated import (
     MOTION,
     SimulatedRobots,
@@ -220,7 +218,7 @@ def main(*words: str) -> None:
         lookup = learn(
             steady, widths, held_out, join_robots([flips, learned]), TAILS, CURVES,
             single_settings=SINGLE, source=source,
-            flips_held_out=swept_held_out, work=TrainingContext("train", folder=arguments.work / "states"),
+            flips_held_out=swept_held_out, context=TrainingContext("train", folder=arguments.work / "states"),
         )  # fmt: skip
         lookup = with_response_errors(lookup, title="errors of the response")
         lookup.save(arguments.out)

@@ -19,15 +19,15 @@ from benchmarks.common import interpreter_time, processor_time
 from sim.arrays import Floats
 from sim.inputs import group_columns, load_robot
 from sim.model.groups import DWELL
-from surrogate.table.lookup import NeuralTable
-from surrogate.table.model_file import load
+from surrogate.table import NeuralTable
+from surrogate.table_file import load
 from surrogate.training.simulated import draw_robots
 
 BATCH, RUNS = 4096, 5
 _QUERY = """
 import numpy as np
 from sim.inputs import load_robot
-from surrogate.table.model_file import load_table
+from surrogate.table_file import load_table
 groups = load_robot("paper-control").group_values()
 load_table().query({name: np.array([value]) for name, value in groups.items()})
 """

@@ -35,7 +35,7 @@ from sim.model.effect import Effect
 from sim.model.groups import Groups
 from sim.model.power_law import STEEPEST, Powers
 from sim.model.robot import Robot
-from surrogate.table.lookup import NeuralTable
+from surrogate.table import NeuralTable
 
 SIZE, LEVER = "law_size", "law_lever"
 _LARGEST = 2000.0  # size of a term

@@ -54,7 +54,7 @@ from sim.model.power_law import force_law
 from sim.model.presets import CONTROL
 from sim.model.robot import Robot
 from sim.model.robot_toml import ENTRIES, robot_toml
-from surrogate.input_ranges import COEFFICIENTS
+from surrogate.domain import COEFFICIENTS
 
 _CERTAIN = 1e-12  # least variance of a logarithm, and of a correlated combination of them
 

@@ -39,7 +39,7 @@ from sim.arrays import Floats
 from sim.io.errors import InputError, naming
 from sim.io.units import format_length
 from sim.model.robot import Robot
-from surrogate.one_robot.tabulate import tabulate
+from surrogate.tabulate import tabulate
 
 Model = Literal["as_given", "corrected"]
 WORDS: dict[Model, str] = {"as_given": "the robot as given", "corrected": "the corrected robot"}

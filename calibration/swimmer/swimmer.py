@@ -50,9 +50,9 @@ from sim.model.robot import Robot
 from sim.motion.batches import sensitivity_columns, steady_columns
 from sim.motion.sensitivity import Sensitivities
 from sim.solve.refinement import FEW, MANY
-from surrogate.input_ranges import COEFFICIENTS
-from surrogate.table.lookup import NeuralTable
-from surrogate.table.model_file import load
+from surrogate.domain import COEFFICIENTS
+from surrogate.table import NeuralTable
+from surrogate.table_file import load
 
 SANE = (0.1, 20.0)  # range of the coefficients; at its ends the model lacks something
 

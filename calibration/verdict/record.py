@@ -19,7 +19,7 @@ from calibration.statistics.statistical_model import Parameter
 from calibration.statistics.study import count_of_rows, summary_of_excluded
 from calibration.words.render import next_steps, sentence
 from sim.io.provenance import provenance
-from surrogate.input_ranges import COEFFICIENTS
+from surrogate.domain import COEFFICIENTS
 
 if TYPE_CHECKING:
     from calibration.verdict.verdict import Verdict

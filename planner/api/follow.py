@@ -22,7 +22,7 @@ from sim.io.tables import read_table
 from sim.model.robot import Robot
 from sim.robot_rows import OneRobot, one_robot
 from surrogate.interface import LookupTable
-from surrogate.table.model_file import load_table
+from surrogate.table_file import load_table
 
 
 @checks_keywords()

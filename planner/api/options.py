@@ -29,7 +29,7 @@ from sim.io.units import LengthUnit
 from sim.model.robot import Robot
 from sim.robot_rows import OneRobot, one_robot
 from surrogate.interface import LookupTable
-from surrogate.table.model_file import load_table
+from surrogate.table_file import load_table
 
 AnyVehicle = OneRobot | MeasuredVehicle
 Length = float | str

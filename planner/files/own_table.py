@@ -53,7 +53,7 @@ def table_for(
 
 def _kept_table(robot: Robot, kept: Path | None, knowledge: CalibrationKnowledge) -> LookupTable | None:
     """Read the table beside the robot's file; None where there is none, or one of another robot or version."""
-    from surrogate.one_robot.robot_table import load_robot_table
+    from surrogate.robot_table import load_robot_table
 
     if kept is None:
         return _TABLES.get(_key(robot))
@@ -69,7 +69,7 @@ def _kept_table(robot: Robot, kept: Path | None, knowledge: CalibrationKnowledge
 
 def _simulated_table(robot: Robot, kept: Path | None) -> LookupTable:
     """Simulate the table of a robot, and keep it where that is possible."""
-    from surrogate.one_robot.tabulate import tabulate
+    from surrogate.tabulate import tabulate
 
     table = tabulate(robot)
     if kept is None:

@@ -48,15 +48,15 @@ _NAMES = {  # of each module; a leading underscore is left out
     "sim.model.groups": "MOST_TAILS LEAST_SLENDERNESS",
     "sim.model.response": "DWELLS BEFORE FORGOTTEN",
     "sim.model.robot_toml": "LARGEST SIGMA HEADER NOTES NO_EFFECTS SI",
-    "surrogate.table.curve_errors": "NORMAL_90 SIZES",
-    "surrogate.table.errors": "RELATIVE",
-    "surrogate.table.intervals": "HALVED",
-    "surrogate.table.lookup": "NOT_OF_HEAD",
-    "surrogate.table.response_table": "PARTS SMALL_SURGE OF_HEAD",
-    "surrogate.table.support": "DEGREE DEGREE_OF_MANY MANY",
-    "surrogate.table.wrench_table": "LEAST_SURGE",
-    "surrogate.wrench.balance": "STEPS CORRECTION ACCEPTED DIFFERENCE MIN_SHARE FIRST_SPIN MAX_TURN",
-    "surrogate.wrench.tails": "SOFT SMALL_DEFLECTION SMALL_SURGE TINY THRUST THRUST_SOFT THRUST_POWER TORQUE_SOFT "
+    "surrogate.error_modes": "NORMAL_90 SIZES",
+    "surrogate.errors": "RELATIVE",
+    "surrogate.intervals": "HALVED",
+    "surrogate.table": "NOT_OF_HEAD",
+    "surrogate.response": "PARTS SMALL_SURGE OF_HEAD",
+    "surrogate.domain": "DEGREE DEGREE_OF_MANY MANY",
+    "surrogate.motions": "LEAST_SURGE",
+    "surrogate.balance": "STEPS CORRECTION ACCEPTED DIFFERENCE MIN_SHARE FIRST_SPIN MAX_TURN",
+    "surrogate.tails": "SOFT SMALL_DEFLECTION SMALL_SURGE TINY THRUST THRUST_SOFT THRUST_POWER TORQUE_SOFT "
     "TORQUE_POWER",
 }
 

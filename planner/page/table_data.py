@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Floats
-from surrogate.table.lookup import NeuralTable, table_content
+from surrogate.table import NeuralTable, table_content
 
 _LETTERS = str.maketrans("<>&`", ",.:/")  # of RFC 1924, which HTML or a template of JavaScript would read
 

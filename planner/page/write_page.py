@@ -23,7 +23,7 @@ from sim.io.files import write_text
 from sim.io.provenance import __version__, code_version
 from sim.model.robot import Robot
 from surrogate.interface import LookupTable
-from surrogate.table.lookup import NeuralTable
+from surrogate.table import NeuralTable
 
 TITLE = "Plan a path for a soft robot"
 

@@ -15,8 +15,8 @@ from sim.effects.tail_contact import least_gap
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.robot import Robot
+from surrogate.answers import refusing_robots
 from surrogate.interface import ErrorModes, LookupTable
-from surrogate.table.answers import refusing_robots
 
 _TIME_STEPS = 2.5e-4  # of the yaw rate, one standard deviation: error of time steps (`sim.motion.resolution`)
 _ODD = 0.2  # share of a table's error that has opposite signs in the two directions
@@ -24,7 +24,7 @@ _ODD = 0.2  # share of a table's error that has opposite signs in the two direct
 
 def default_table() -> LookupTable:
     """Load the table that comes with the package."""
-    from surrogate.table.model_file import load  # loads PyTorch, which the import of a plan does not need
+    from surrogate.table_file import load  # loads PyTorch, which the import of a plan does not need
 
     return load()
 

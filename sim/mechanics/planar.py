@@ -11,10 +11,13 @@ Source: exponential map of SE(2), e.g. Murray, Li, Sastry (1994), ch. 2.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.arrays import Floats
+from sim.compiling import formula
 
 Poses = Floats  # (..., 3)
 
@@ -63,6 +66,17 @@ def net_speed(twist: Poses, lag: Poses, dwell: ArrayLike) -> Floats:
 
     The second dwell is the mirror image of the first, since a reversed motor mirrors the motion.
     """
-    change = compose(lag, arc(twist, dwell))
-    pair = compose(change, change * MIRROR)
-    return np.hypot(pair[..., 0], pair[..., 1]) / (2 * np.asarray(dwell))
+    numbers: Any = (*np.moveaxis(lag, -1, 0), *np.moveaxis(twist, -1, 0), np.asarray(dwell))
+    speeds: Floats = zigzag_speed(*numbers)
+    return speeds
+
+
+@formula
+def zigzag_speed(ahead: Any, aside: Any, turned: Any, forward: Any, left: Any, yaw_rate: Any, dwell: Any) -> Any:
+    """Return the net speed of a zigzag from the numbers of lag and twist, see `net_speed`.
+
+    A dwell and its mirror image, p + Rot(ψ) M p, are 2 |p · (cos ψ/2, sin ψ/2)|; on an arc p is a chord.
+    """
+    half, turn = yaw_rate * dwell / 2, turned / 2
+    along = dwell * np.sinc(half / np.pi) * (forward * np.cos(turn) - left * np.sin(turn))
+    return np.abs(ahead * np.cos(turn + half) + aside * np.sin(turn + half) + along) / dwell

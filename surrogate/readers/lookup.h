@@ -11,7 +11,7 @@
        if (lookup_response(&robot, 0.8, &flip) == LOOKUP_INSIDE) ...
 
    The networks give the mean force of the tails. The balance of forces on head and motor is solved here, by
-   Broyden's method. The formulas are those of surrogate/wrench/tails.py and surrogate/wrench/heads.py. */
+   Broyden's method. The formulas are those of surrogate/tails.py and surrogate/tails.py. */
 #ifndef LOOKUP_H
 #define LOOKUP_H
 
@@ -363,7 +363,6 @@ static inline int lookup_query(const lookup_robot *robot, lookup_motion *motion)
 
 /* ---- the response to a flip ---------------------------------------------------------------------------------- */
 
-#if LOOKUP_COMPONENTS
 /* Lags (z, x, psi) at a dwell, cubic in ln dwell through four of the dwells of the table. */
 static void lookup_lags(const lookup_body *body, lookup_real dwell, lookup_real *lag)
 {
@@ -424,6 +423,5 @@ static inline int lookup_response(const lookup_robot *robot, lookup_real dwell, 
     flip->lag_z = lag[0];
     return state;
 }
-#endif
 
 #endif

@@ -11,13 +11,13 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from sim.arrays import Flags, Floats
-from surrogate.input_ranges import ROBOT
-from surrogate.table.errors import relative_errors
-from surrogate.table.intervals import COVERAGE
-from surrogate.table.lookup import NeuralTable
+from surrogate.domain import ROBOT
+from surrogate.errors import relative_errors
+from surrogate.intervals import COVERAGE
+from surrogate.table import NeuralTable
+from surrogate.tails import robots_of
 from surrogate.training.simulated import SimulatedRobots
 from surrogate.training.train import with_radius, without_effects
-from surrogate.wrench.heads import heads_and_tails
 
 _FEWEST = 20  # robots, for a line of a table
 _YAW_RATE = "omega_yr_bar"
@@ -94,7 +94,7 @@ def model_card(lookup: NeuralTable, held_out: SimulatedRobots) -> str:
 
 def _kinds(held_out: SimulatedRobots) -> dict[str, Flags]:
     """Return which robots are of a kind."""
-    plain, couples = without_effects(held_out.robots), heads_and_tails(held_out.robots)[0].resistance[:, 2, 4] != 0
+    plain, couples = without_effects(held_out.robots), robots_of(held_out.robots).resistance[:, 2, 4] != 0
     single, apart = held_out.robots["N"] == 1, held_out.motion["tail_gap"] >= 1
     return {
         "N ≥ 2": plain & ~single & apart,

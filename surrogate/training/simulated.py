@@ -25,7 +25,7 @@ from sim.model.response import BEFORE, DWELLS, LAG_PARTS
 from sim.motion.batches import run_batches, split
 from sim.motion.response import TOLERANCE, responses
 from sim.motion.steady import orbits
-from surrogate.input_ranges import DOMAIN, MOST_TAILS, ROBOT, WIDE
+from surrogate.domain import DOMAIN, MOST_TAILS, ROBOT, WIDE
 
 MOTION = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap", "error")
 _TAILS = (1, 1, 2, 2, 3, 4, 5, 7)  # N of eighths of the wide robots; half of the last two have one tail more

@@ -21,24 +21,21 @@ from sim.arrays import Flags, Floats, Integers
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.io.provenance import fingerprint, provenance
-from surrogate.input_ranges import ROBOT
-from surrogate.networks.checkpoints import TrainingContext, device_named
-from surrogate.networks.training_loop import Settings
-from surrogate.table.curve_errors import KINDS, CurveErrors
-from surrogate.table.errors import curve_errors, relative_errors, summary
-from surrogate.table.intervals import Intervals
-from surrogate.table.lookup import NeuralTable
-from surrogate.table.response_table import PARTS, SHAPES, along_axes, flip_inputs
-from surrogate.table.support import INSIDE, MAX_YAW_SHARE, Support
-from surrogate.table.wrench_table import CLASSES, INPUT_COUNTS, network_index
-from surrogate.training.fit_response import SETTINGS, fit_response
-from surrogate.training.fit_wrench import WrenchSamples, fit_wrench, learnable, wrench_samples
+from surrogate.domain import INSIDE, MAX_YAW_SHARE, ROBOT, Support
+from surrogate.error_modes import KINDS, CurveErrors
+from surrogate.errors import curve_errors, relative_errors, summary
+from surrogate.intervals import Intervals
+from surrogate.motions import CLASSES, INPUT_COUNTS, network_index
+from surrogate.response import PARTS, SHAPES, along_axes, flip_inputs
+from surrogate.table import NeuralTable
+from surrogate.tails import network_inputs
+from surrogate.training.fits import CURVES, WrenchSamples, fit_response, fit_wrench, learnable, wrench_samples
+from surrogate.training.networks import Settings, TrainingContext, device_named
 from surrogate.training.simulated import SimulatedRobots, join_robots, read_robots, simulate_robots
-from surrogate.wrench.tails import network_inputs
 
-_FEWEST_INSIDE = 10
-_FEWEST_FLIPS = 200  # robots, for the covariance of the errors of the response
-_FEWEST_ROWS, _FEWEST_OF_A_CLASS = 64, 16
+_MIN_INSIDE = 10
+_MIN_FLIPS = 200  # robots, for the covariance of the errors of the response
+_MIN_ROWS, _MIN_OF_A_CLASS = 64, 16
 _QUIET = TrainingContext()
 
 
@@ -70,7 +67,7 @@ def train(
         title: of the progress bars; empty for none.
         device: "cpu", "cuda", or "auto" for the latter where there is one.
         states: folder in which training keeps its states. Started again with the same arguments, it goes on
-            from there, to the same table. When the table is saved, `checkpoints.remove_states` removes
+            from there, to the same table. When the table is saved, `remove_states` removes
             them.
 
     Raises:
@@ -80,13 +77,13 @@ def train(
         >>> from softflagella import train
         >>> table = train("data/sweep")  # doctest: +SKIP
     """
-    work = TrainingContext(title, device_named(device), None if states is None else Path(states))
+    context = TrainingContext(title, device_named(device), None if states is None else Path(states))
     folders = [folder] if isinstance(folder, str) else list(folder)
     manifests = [read_manifest(path) for path in folders]
     rows, numbers = _together(folders, manifests)
     part = split(numbers)
-    if len(rows) < _FEWEST_ROWS:
-        raise InputError(f"{', '.join(folders)} has {len(rows)} usable rows; training needs {_FEWEST_ROWS}")
+    if len(rows) < _MIN_ROWS:
+        raise InputError(f"{', '.join(folders)} has {len(rows)} usable rows; training needs {_MIN_ROWS}")
     sets = [rows.at(part == i) for i in range(3)]
     flipped = sets[0].with_curves()
     if not len(flipped):
@@ -95,7 +92,7 @@ def train(
     kept = {"data_hash": "config_hash", "data_code_version": "code_version"}
     source = {name: "+".join(str(m.get(key, "")) for m in manifests) for name, key in kept.items()}
     learned, width_rows, held_out = sets
-    return learn(learned, width_rows, held_out, flipped, settings, curve_settings, source=source, work=work)
+    return learn(learned, width_rows, held_out, flipped, settings, curve_settings, source=source, context=context)
 
 
 def held_out(folder: str | Sequence[str]) -> SimulatedRobots:
@@ -130,7 +127,7 @@ def learn(
     single_settings: Settings | None = None,
     flips_held_out: SimulatedRobots | None = None,
     source: dict[str, Any] | None = None,
-    work: TrainingContext = _QUIET,
+    context: TrainingContext = _QUIET,
 ) -> NeuralTable:
     """Train a look-up table on simulated robots.
 
@@ -142,32 +139,28 @@ def learn(
         single_settings: of the network of robots with one tail; by default `settings`.
         flips_held_out: robots with curves for the errors of the response; by default a tenth of `flipped`.
         source: more provenance.
-        work: device, progress bars, and where states are kept.
+        context: device, progress bars, and where states are kept.
     """
-    wrench_settings, response_settings = settings or Settings(), curve_settings or SETTINGS
+    wrench_settings, response_settings = settings or Settings(), curve_settings or CURVES
     if flips_held_out is None:
         tenth = np.arange(len(flipped)) % 10 == 9
         flipped, flips_held_out = flipped.at(~tenth), flipped.at(tenth)
-    rows = _learnable(learned)
-    classes = len(np.unique(network_index(rows.tails.number)))
-    work = replace(work, networks=classes + 1 + len(PARTS))  # one of the gap, and those of the response
-    table = fit_wrench(rows, wrench_settings, work, single_settings=single_settings)
+    rows, _ = _learnable(learned)
+    classes = len(np.unique(network_index(rows.robots.number)))
+    context = replace(context, networks=classes + 1 + len(PARTS))  # one of the gap, and those of the response
+    table = fit_wrench(rows, wrench_settings, context, single_settings=single_settings)
     flipped, flips_held_out = _several_tails(flipped), _several_tails(flips_held_out)
-    flip_samples = _learnable(flipped)
-    usable = np.flatnonzero(learnable(wrench_samples(flipped.robots, flipped.motion)))
-    known = flipped.at(usable).curves
-    response = fit_response(
-        flip_samples.heads, flip_samples.tails, flip_samples.motion, known, response_settings, work.part("flips")
-    )
+    flips, usable = _learnable(flipped)
+    response = fit_response(flips, flipped.at(usable).curves, response_settings, context.part("flips"))
     counts = {
         "train": len(rows.motion),
         "widths": len(width_rows),
         "held_out": len(held_out),
-        "flips": len(usable),
+        "flips": len(flips.motion),
     }
     created = provenance({
         "tails": asdict(wrench_settings), "single": asdict(single_settings or wrench_settings),
-        "curves": asdict(response_settings), "device": work.device,
+        "curves": asdict(response_settings), "device": context.device,
     })  # fmt: skip
     lookup = NeuralTable(
         tails=table,
@@ -183,9 +176,9 @@ def learn(
 
 def _supports(rows: WrenchSamples) -> tuple[Support | None, ...]:
     """Learn the domain of each of CLASSES, from the inputs of its network; None where there are no rows."""
-    kind = network_index(rows.tails.number)
+    kind = network_index(rows.robots.number)
     parts = [rows.at(kind == k) for k in range(len(CLASSES))]
-    inputs = [network_inputs(p.tails, p.motion, size) for p, size in zip(parts, INPUT_COUNTS, strict=True)]
+    inputs = [network_inputs(p.robots, p.motion, size) for p, size in zip(parts, INPUT_COUNTS, strict=True)]
     return tuple(Support.learned(x) if len(x) else None for x in inputs)
 
 
@@ -210,7 +203,7 @@ def held_out_curve_errors(lookup: NeuralTable, flips: SimulatedRobots) -> CurveE
     """
     motions = lookup.solve(flips.robots)
     known = (motions.outside == INSIDE) & (flips.motion["tail_gap"] >= 1)
-    if known.sum() < _FEWEST_FLIPS:
+    if known.sum() < _MIN_FLIPS:
         return None
     response = lookup.response(flips.robots, flag=True)
     _, speeds = flip_inputs(motions.robots, motions.motion, motions.inputs)
@@ -245,7 +238,7 @@ def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[Floats, dict[st
     """Return features, relative errors and couples of rows inside the domain, and which those are."""
     motions = lookup.solve(rows.robots)
     inside = motions.outside == INSIDE
-    if inside.sum() < _FEWEST_INSIDE:  # a table of few rows has a domain that holds hardly any others: all count
+    if inside.sum() < _MIN_INSIDE:  # a table of few rows has a domain that holds hardly any others: all count
         inside[:] = True
     truth = with_radius(rows.motion)
     errors = relative_errors(motions.steady, truth)
@@ -275,15 +268,16 @@ def with_radius(motion: dict[str, Floats]) -> dict[str, Floats]:
     return {**motion, "R_yr_over_l": speed / np.abs(motion["omega_yr_bar"]), "theta_deg": angle}
 
 
-def _learnable(rows: SimulatedRobots) -> WrenchSamples:
+def _learnable(rows: SimulatedRobots) -> tuple[WrenchSamples, Flags]:
+    """Return the samples of rows that a table may learn, and which those are."""
     samples = wrench_samples(rows.robots, rows.motion)
     good = learnable(samples)
-    kept = samples.at(good)
-    counts = [int((network_index(kept.tails.number) == k).sum()) for k in range(len(CLASSES))]
-    for count, number in zip(counts, ("N = 1", "N = 2", "N = 3 and more"), strict=True):
-        if 0 < count < _FEWEST_OF_A_CLASS:
-            raise InputError(f"{count} usable rows with {number}; training needs {_FEWEST_OF_A_CLASS} or none")
-    return kept
+    kind = network_index(samples.robots.number[good])
+    for k, words in enumerate(("N = 1", "N = 2", "N = 3 and more")):
+        count = np.count_nonzero(kind == k)
+        if 0 < count < _MIN_OF_A_CLASS:
+            raise InputError(f"{count} usable rows with {words}; training needs {_MIN_OF_A_CLASS} or none")
+    return samples.at(good), good
 
 
 def _ranges(learned: SimulatedRobots) -> dict[str, tuple[float, float]]:

@@ -17,8 +17,8 @@ import softflagella as sf
 from sim.inputs import load_robot
 from sim.io.errors import run_command
 from softflagella.__main__ import main
-from surrogate.export.small_copy import save_small_copy
-from surrogate.table.model_file import load
+from surrogate.small_copy import save_small_copy
+from surrogate.table_file import load
 from tests.docs.pages import DOCS, PAGES, ROOT, blocks, page_name
 from tests.planner.compiled import compile_c
 from tests.processes import LIMIT

@@ -19,7 +19,7 @@ from sim.model.schedule import Schedule
 from sim.motion.replay import replay
 from sim.motion.shapes import nodes_in_body, steady_states
 from sim.motion.steady import steady
-from surrogate.input_ranges import BOUNDS
+from surrogate.domain import BOUNDS
 from tests.docs.pages import DOCS
 from tests.sim.robots import CONTROL_VALUES
 

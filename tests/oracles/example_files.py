@@ -27,11 +27,11 @@ from sim.model.correction import Correction
 from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
 from sim.motion.steady_motion import STEADY_OUTPUTS
-from surrogate.one_robot.robot_table import FORMAT as TABLE_FORMAT
-from surrogate.one_robot.robot_table import RobotTable, _digest
-from surrogate.table import tensor_file
-from surrogate.table.lookup import FORMAT
-from surrogate.table.model_file import SHIPPED, load
+from surrogate import tensor_file
+from surrogate.robot_table import FORMAT as TABLE_FORMAT
+from surrogate.robot_table import RobotTable, _digest
+from surrogate.table import FORMAT
+from surrogate.table_file import SHIPPED, load
 from tests.calibration.track import track
 from tests.dataset.sweeps import design, invented, write_rows
 from tests.planner.plans import hindered_trip

@@ -40,8 +40,8 @@ from sim.io.errors import InputError, naming
 from sim.io.tables import read_table
 from sim.model.robot_toml import robot_toml
 from sim.model.schedule import load_schedule
-from surrogate.one_robot.robot_table import load_robot_table
-from surrogate.table.model_file import SHIPPED, load
+from surrogate.robot_table import load_robot_table
+from surrogate.table_file import SHIPPED, load
 from tests.oracles.example_files import (
     JSON,
     NOTED,

@@ -1,7 +1,7 @@
 """A query of the look-up table with arrays: reference for its compiled loops. Robots are the last axis.
 
 Networks, balance by Broyden's method, support, outputs, response at equal dwells, intervals and domain, written
-from the formulas. Only heads and tails come from the package (`surrogate.wrench.heads.heads_and_tails`).
+from the formulas. Only the robots' numbers come from the package (`surrogate.tails.robots_of`).
 """
 
 from __future__ import annotations
@@ -15,14 +15,12 @@ from sim.mechanics import planar
 from sim.model.groups import DWELL
 from sim.model.response import DWELLS
 from sim.motion.steady_motion import STEADY_OUTPUTS
-from surrogate.networks.ensemble import Ensemble
-from surrogate.table.errors import RESPONSE_OUTPUTS, error_scale
-from surrogate.table.intervals import PARTS
-from surrogate.table.lookup import NeuralTable
-from surrogate.table.support import Support, products_of
-from surrogate.table.wrench_table import motion_sensitivity
-from surrogate.wrench.heads import Heads, heads_and_tails
-from surrogate.wrench.tails import Tails, wrench_slopes
+from surrogate import tails
+from surrogate.domain import Support, products_of
+from surrogate.errors import RESPONSE_OUTPUTS, error_scale
+from surrogate.intervals import PARTS
+from surrogate.network import Ensemble
+from surrogate.table import NeuralTable
 
 STEPS, CORRECTION, ACCEPTED = 60, 2e-12, 1e-9
 RANGES = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
@@ -31,27 +29,24 @@ RANGES = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
 class Robots(NamedTuple):
     """Numbers of M robots, seen with a positive motor."""
 
-    heads: Heads
-    tails: Tails
+    own: tails.Robots
     R: Any  # (4, 5, M)
     drag: Any  # (4, 5, M), with straight tails
-    head: Any  # (9, M)
 
     def at(self, rows: Any) -> Robots:
-        parts = (self.R[..., rows], self.drag[..., rows], self.head[:, rows])
-        return Robots(self.heads.at(rows), self.tails.at(rows), *parts)
+        return Robots(self.own.at(rows), self.R[..., rows], self.drag[..., rows])
 
 
 def robots_of(values: dict[str, Any]) -> Robots:
-    heads, tails = heads_and_tails(values)
+    own = tails.robots_of(values)
     R, straight, across = (
-        heads.resistance.transpose(1, 2, 0),
-        np.zeros((4, 5, len(tails.number))),
-        tails.number * tails.zeta_perp,
+        own.resistance.transpose(1, 2, 0),
+        np.zeros((4, 5, len(own.number))),
+        own.number * own.perp,
     )
-    straight[0, 0], straight[1, 1], straight[2, 2] = across, tails.number * tails.zeta_parallel, across / 3
+    straight[0, 0], straight[1, 1], straight[2, 2] = across, own.number * own.parallel, across / 3
     straight[0, 2] = straight[2, 0] = -across / 2
-    return Robots(heads, tails, R, R + straight, tails.head.T)
+    return Robots(own, R, R + straight)
 
 
 def members(network: Ensemble, x: Any) -> Any:
@@ -77,62 +72,62 @@ def side_speed(u: Any) -> Any:
 
 def tail_inputs(r: Robots, u: Any) -> Any:
     """Return the inputs of networks, (7, M), at motions u (5, M)."""
-    t, S = r.tails, r.tails.zeta_perp * u[4]
+    t, S = r.own, r.own.perp * u[4]
     deflection = side_speed(u) / u[4] * S / (S + 12.0)
-    own = np.log(t.head_spin_drag / (t.number * t.zeta_perp * t.offset**2))
+    own = np.log(t.spin_drag / (t.number * t.perp * t.offset**2))
     bent, ahead = np.arcsinh(20.0 * deflection), np.arcsinh(20.0 * u[1] / (t.offset * u[4]))
     return np.array([np.log(S), np.log(t.offset), -np.log(t.radius), bent, np.arctan2(u[0], u[2]), ahead, own])
 
 
 def single_inputs(r: Robots, u: Any) -> Any:
     """Return the inputs of the network of one tail, (13, M)."""
-    return np.concatenate([tail_inputs(r, u)[[0, 1, 2, 6]], r.head])
+    return np.concatenate([tail_inputs(r, u)[[0, 1, 2, 6]], r.own.head.T])
 
 
 def residual(r: Robots, u: Any, y: Any) -> Any:
     """Return the wrench of the tails less that on the head, (4, ..., M), at motions u (5, ..., M)."""
-    t, S, side = r.tails, r.tails.zeta_perp * u[4], side_speed(u)
+    t, S, side = r.own, r.own.perp * u[4], side_speed(u)
     force, couple, m2 = (
-        t.number * t.zeta_perp * side,
+        t.number * t.perp * side,
         t.number * u[4] * t.offset**2,
         (side / (t.offset * u[4])) ** 2,
     )
-    along = (t.zeta_perp - t.zeta_parallel) * couple * thrust(S) * (y[1] + m2 * y[4])
-    push = np.array([force * y[0], along, force * y[2], -t.zeta_perp * couple * torque(S) * (y[3] + m2 * y[5])])
+    along = (t.perp - t.parallel) * couple * thrust(S) * (y[1] + m2 * y[4])
+    push = np.array([force * y[0], along, force * y[2], -t.perp * couple * torque(S) * (y[3] + m2 * y[5])])
     return push - np.einsum("ijm,j...m->i...m", r.drag, u)
 
 
 def first_guess(r: Robots) -> Any:
     """Return motions (5, M) of linear theory."""
-    t, gain, speed, spin = r.tails, r.heads.gain, r.heads.speed, 0.6 * r.heads.speed
+    t, gain, speed, spin = r.own, r.own.gain, r.own.speed, 0.6 * r.own.speed
     for _ in range(3):
-        pull = t.number * t.zeta_perp * t.offset**2 * torque(t.zeta_perp * spin)
+        pull = t.number * t.perp * t.offset**2 * torque(t.perp * spin)
         spin = speed * r.R[3, 3] / (r.R[3, 3] + gain * (pull + r.R[3, 4]))
     head = (spin - speed) / gain
     push = -r.R[:3, 3] * head - r.R[:3, 4] * spin
-    push[1] += t.number * (t.zeta_perp - t.zeta_parallel) * t.offset**2 * spin * thrust(t.zeta_perp * spin)
+    push[1] += t.number * (t.perp - t.parallel) * t.offset**2 * spin * thrust(t.perp * spin)
     return np.array([*np.linalg.solve(r.drag[:3, :3].transpose(2, 0, 1), push.T[..., None])[..., 0].T, head, spin])
 
 
 def solve(network: Ensemble, r: Robots) -> tuple[Any, Any]:
     """Return motions (5, M) in balance, and which were found."""
     inputs = single_inputs if network.shape["inputs"] == 13 else tail_inputs
-    u, rows = first_guess(r), np.arange(len(r.heads.speed))
+    u, rows = first_guess(r), np.arange(len(r.own.speed))
     motion, size, y = np.empty_like(u), np.empty(len(rows)), members(network, inputs(r, u)).mean(0)
     width = 1e-6 * (np.abs(u[:4]) + 1e-3 * np.abs(u[:4]).max(0))
     moved = np.repeat(u[:, None], 5, 1)
     for j in range(4):
         moved[j, j] += width[j]
-    moved[4] = r.heads.speed + r.heads.gain * moved[3]
+    moved[4] = r.own.speed + r.own.gain * moved[3]
     at = residual(r, moved, y)
     left, slope = at[:, 4], ((at[:, :4] - at[:, 4:]) / width).transpose(2, 0, 1)
     slope = np.where(np.isfinite(slope), slope, np.eye(4))  # a robot that cannot be: it fails below
     inverse = np.linalg.inv(slope).transpose(1, 2, 0)
     for count in range(STEPS):
         step = -np.einsum("ijm,jm->im", inverse, left)
-        step *= np.minimum(0.5 * u[4] / np.abs(r.heads.gain * step[3]), 1.0)
+        step *= np.minimum(0.5 * u[4] / np.abs(r.own.gain * step[3]), 1.0)
         u[:4] += step
-        u[4] = r.heads.speed + r.heads.gain * u[3]
+        u[4] = r.own.speed + r.own.gain * u[3]
         speed = np.hypot(u[0], u[1]) + np.abs(u[2])
         now = np.abs(step / np.array([speed, speed, u[2], u[3]])).max(0)
         some = np.flatnonzero((now >= CORRECTION) & np.isfinite(now) & (u[4] > 0))
@@ -175,16 +170,16 @@ def answer(table: NeuralTable, columns: dict[str, Any]) -> dict[str, Any]:
 
 def _part(table: NeuralTable, k: int, r: Robots, within: Any, dwells: Any) -> dict[str, Any]:
     """Answer for robots with one network."""
-    network, support, sense = table.tails.wrench[k], table.support[k], r.heads.sense
+    network, support, sense = table.tails.wrench[k], table.support[k], r.own.sense
     assert network is not None
     assert support is not None
     u, found = solve(network, r)
     x, own = tail_inputs(r, u), single_inputs(r, u) if k == 0 else tail_inputs(r, u)
-    novelty, number = novelty_of(support, own), r.tails.number
+    novelty, number = novelty_of(support, own), r.own.number
     outside = ~(found & within & (novelty <= 1) & (np.abs(u[2]) <= 0.6 * np.abs(u[4])))
-    sway, surge, yaw = u[0] + u[2] * r.heads.length / 2, u[1], u[2]
+    sway, surge, yaw = u[0] + u[2] * r.own.head_length / 2, u[1], u[2]
     share = members(table.tails.gap, np.array([*x, np.log(number)]))[:, 0].mean(0)
-    gap = np.where(number > 1, share * r.tails.offset * np.sin(np.pi / number) / r.tails.radius, np.inf)
+    gap = np.where(number > 1, share * r.own.offset * np.sin(np.pi / number) / r.own.radius, np.inf)
     radius, slip = np.hypot(sway, surge) / np.abs(yaw), np.degrees(np.arctan2(np.abs(sway), surge))
     steady = (sense * u[4], sense * u[3], sense * yaw, sense * sway, surge, radius, slip, gap)
     result: dict[str, Any] = dict(zip(STEADY_OUTPUTS, steady, strict=True))
@@ -192,7 +187,7 @@ def _part(table: NeuralTable, k: int, r: Robots, within: Any, dwells: Any) -> di
         result |= _response(table, np.array([surge, sway, yaw]), x, r, dwells)
     members_of = members(network, own)
     apart = (members_of - members_of.mean(0)).transpose(0, 2, 1)[..., None]
-    weight = motion_sensitivity(r.heads, r.tails, u.T) @ wrench_slopes(r.tails, u.T)
+    weight = tails.motion_sensitivity(r.own, u.T) @ tails.wrench_slopes(r.own, u.T)
     spread = np.linalg.norm((weight @ apart)[..., 0], axis=-1).mean(0)
     extra = [np.log(novelty + 1e-12), np.log(spread + 1e-9), np.log(number), np.full(len(number), k == 0)]
     widths = _half_widths(table, np.nan_to_num(np.array([*x, *extra])), r.R[2, 4] != 0, result)
@@ -201,7 +196,7 @@ def _part(table: NeuralTable, k: int, r: Robots, within: Any, dwells: Any) -> di
 
 def _response(table: NeuralTable, twist: Any, x: Any, r: Robots, T: Any) -> dict[str, Any]:
     """Return RESPONSE_OUTPUTS at equal dwells T (M,); the twist is (surge, sway, yaw rate), (3, M)."""
-    own = np.array([*x, *r.head[[0, 1, 2, 3, 5, 6]], np.log(r.tails.number), r.tails.number == 2])
+    own = np.array([*x, *r.own.head.T[[0, 1, 2, 3, 5, 6]], np.log(r.own.number), r.own.number == 2])
     lag, memory = (members(network, own).mean(0).T for network in table.curves.networks[:2])
     basis = table.curves.equal_dwells
     curves = basis.mean + np.concatenate([lag, memory], 1)[:, : len(basis.vectors)] @ basis.vectors

@@ -16,8 +16,8 @@ from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.rollout import trace
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
-from surrogate.one_robot.tabulate import tabulate
-from surrogate.table.lookup import NeuralTable
+from surrogate.table import NeuralTable
+from surrogate.tabulate import tabulate
 
 LONG = 150.0  # l, from which a path is a long one
 

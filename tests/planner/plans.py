@@ -20,8 +20,8 @@ from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.tracked_point import Point, TrackedVehicle, tracked_vehicle
 from sim.model.presets import PRESETS
 from softflagella import to_goal
-from surrogate.one_robot.robot_table import RobotTable
-from surrogate.one_robot.tabulate import tabulate
+from surrogate.robot_table import RobotTable
+from surrogate.tabulate import tabulate
 from tests.shared import shared
 
 CONTROL = PRESETS["paper-control"]

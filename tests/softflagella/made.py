@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import softflagella as sf
-from surrogate.one_robot.tabulate import tabulate
+from surrogate.tabulate import tabulate
 from tests.shared import shared
 
 ROBOT = sf.load_robot("paper-control")

@@ -27,7 +27,7 @@ from softflagella.demo_figures import draw_circles, draw_schedule, draw_steered,
 from softflagella.demo_files import documentation, header_excerpt
 from softflagella.demo_page import Results, write_page
 from softflagella.replanning import Steered, gap_closed, steer
-from surrogate.table.model_file import load
+from surrogate.table_file import load
 from tests.calibration.toy_tables import DRAG, ambiguous, none, toy_swimmer, toy_table
 from tests.page_text import PageText
 

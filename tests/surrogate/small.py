@@ -13,12 +13,12 @@ import pytest
 
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
-from surrogate.networks.training_loop import Settings
-from surrogate.one_robot.robot_table import RobotTable
-from surrogate.one_robot.tabulate import tabulate
-from surrogate.table.lookup import NeuralTable
-from surrogate.table.model_file import load
-from surrogate.training import fit_wrench
+from surrogate.robot_table import RobotTable
+from surrogate.table import NeuralTable
+from surrogate.table_file import load
+from surrogate.tabulate import tabulate
+from surrogate.training import fits
+from surrogate.training.networks import Settings
 from surrogate.training.simulated import SimulatedRobots, draw_robots, simulate_robots
 from surrogate.training.train import learn
 from tests.shared import shared
@@ -47,7 +47,7 @@ def table() -> NeuralTable:
     """Train a table on them; its errors are some per cent."""
     held = rows(256, 13, wide=False)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fit_wrench, "_GAP", CURVES)
+        patch.setattr(fits, "_GAP", CURVES)
         return learn(rows(), held.at(np.arange(len(held)) % 2 == 0), held, flips(), TAILS, CURVES)
 
 

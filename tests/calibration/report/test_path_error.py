@@ -21,9 +21,9 @@ from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.motion.replay import replay
 from surrogate.interface import LookupTable
-from surrogate.one_robot.robot_table import RobotTable
-from surrogate.one_robot.tabulate import tabulate
-from surrogate.table.model_file import load
+from surrogate.robot_table import RobotTable
+from surrogate.table_file import load
+from surrogate.tabulate import tabulate
 from tests.calibration.toy_tables import DRAG, effect, toy_table, verdict_of
 from tests.page_text import PageText
 from tests.shared import shared

@@ -30,7 +30,7 @@ from sim.model.robot import Robot
 from sim.model.schedule import Schedule, load_schedule
 from sim.motion.replay import replay
 from surrogate.__main__ import main as surrogate
-from surrogate.table.model_file import load_table
+from surrogate.table_file import load_table
 from tests.calibration.toy_tables import DRAG, START, effect, install_few_candidates, none, verdict_of
 
 

@@ -24,7 +24,7 @@ from sim.model.correction import Correction
 from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
 from sim.motion.steady import steady
-from surrogate.table.model_file import load
+from surrogate.table_file import load
 from tests.calibration.toy_tables import DRAG, START, calibrated, toy_swimmer, toy_table
 from tests.shared import shared
 

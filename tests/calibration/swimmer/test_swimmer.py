@@ -17,7 +17,7 @@ from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
-from surrogate.table.model_file import load
+from surrogate.table_file import load
 from tests.calibration import toy
 from tests.calibration.toy_tables import START, TRUTH, toy_swimmer, toy_table
 

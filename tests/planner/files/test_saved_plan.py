@@ -27,7 +27,7 @@ from sim.inputs import save_robot
 from sim.io.errors import InputError, run_command
 from sim.model.plan_file import plan_id
 from sim.model.robot import Robot
-from surrogate.table.model_file import load
+from surrogate.table_file import load
 from tests.planner.compiled import CompiledTracker
 from tests.planner.plans import BIASED, CONTROL, CORNER, around, hindered_trip, own_table, planned, trip
 from tests.shared import shared
@@ -202,9 +202,7 @@ def test_a_robot_that_it_does_not_know_is_planned_for_at_once(
 ) -> None:
     """Its table is kept and used again, but not for another robot, and not if it is damaged."""
     simulated: list[Robot] = []
-    monkeypatch.setattr(
-        "surrogate.one_robot.tabulate.tabulate", lambda robot: simulated.append(robot) or own_table()
-    )
+    monkeypatch.setattr("surrogate.tabulate.tabulate", lambda robot: simulated.append(robot) or own_table())
     robot, kept = tmp_path / "robot.toml", tmp_path / "robot.table.json"
     save_robot(BIASED, robot)
     words = ["plan", "circle:1.5l", "--robot", str(robot), "--objective", "flips", "--out"]

@@ -20,10 +20,10 @@ from planner.vehicle.vehicle import Mode, Vehicle
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
-from surrogate.input_ranges import ROBOT as GROUPS
-from surrogate.one_robot.tabulate import tabulate
-from surrogate.table.lookup import NeuralTable
-from surrogate.table.model_file import load
+from surrogate.domain import ROBOT as GROUPS
+from surrogate.table import NeuralTable
+from surrogate.table_file import load
+from surrogate.tabulate import tabulate
 from surrogate.training.simulated import draw_robots
 from tests.planner.vehicles import vehicle
 from tests.shared import shared

@@ -29,7 +29,7 @@ from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Vehicle
 from sim.io.errors import InputError
 from sim.model.robot import Robot
-from surrogate.table.model_file import load
+from surrogate.table_file import load
 from tests.processes import LIMIT
 from tests.shared import FOLDER as SESSION
 from tests.shared import shared

@@ -24,7 +24,7 @@ from planner.vehicle.rollout import trace
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
-from surrogate.table.model_file import load
+from surrogate.table_file import load
 from tests.planner.plans import CONTROL, planned
 
 pytestmark = pytest.mark.slow

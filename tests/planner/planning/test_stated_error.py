@@ -36,7 +36,7 @@ from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.motion.replay import replay
-from surrogate.table.model_file import load
+from surrogate.table_file import load
 from tests.oracles.unseen_robots import carried
 from tests.planner.plans import planned as plan_of
 from tests.planner.vehicles import drawn_vehicle, plain_guidance, vehicle

@@ -29,7 +29,7 @@ from sim.model.response import BEFORE, DWELLS, memory_after
 from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml
 from surrogate.interface import LookupTable
-from surrogate.table.model_file import load
+from surrogate.table_file import load
 from tests.planner.plans import BIASED, CONTROL, own_table, planned
 from tests.planner.vehicles import vehicle
 

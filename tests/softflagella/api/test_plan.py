@@ -11,7 +11,7 @@ import pytest
 
 import planner.files.own_table
 import softflagella as sf
-import surrogate.one_robot.tabulate
+import surrogate.tabulate
 from tests.softflagella.made import GOAL, ODD, ROBOT, START, goal, own_table
 
 KNOWN = sf.CalibrationKnowledge(names=("C_yr",), covariance=np.array([[0.01]]))
@@ -68,7 +68,7 @@ def test_a_robot_that_the_shipped_table_does_not_know_gets_its_own_once(
     """In memory, or beside its file; the table is simulated elsewhere."""
     own = own_table(odd=True)
     monkeypatch.setattr(planner.files.own_table, "_TABLES", {})
-    monkeypatch.setattr(surrogate.one_robot.tabulate, "tabulate", lambda robot: own)
+    monkeypatch.setattr(surrogate.tabulate, "tabulate", lambda robot: own)
     with pytest.raises(sf.InputError, match="left_right_bias"):
         sf.plan(sf.circle(2.0), ODD, lookup=sf.load_table())
     file = tmp_path / "robot.toml"

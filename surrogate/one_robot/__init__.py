@@ -1,1 +1,0 @@
-"""A look-up table of one robot."""

@@ -1,0 +1,195 @@
+"""The table of the response to a flip: curves over the dwell (`sim.model.response`), learned from simulated flips.
+
+The curves are lengths and angles. Over the speeds of the steady motion they are times, which vary little from
+robot to robot:
+
+    Δz/w, Δx/v_x, Δψ/ω_yr,   w² = v_z² + (v_x/10)²
+
+(w and not v_z, because v_z may vanish). Lag, memory, rest and the logarithm of the spread are each written in the
+principal components of the rows that were learned. Three networks give the components: one for the lag, one for
+memory and rest, which data sets hold for a part of their robots, and one for the spread. Robots with two tails
+have a spread; with more, the lag does not depend on the phase of the disc. A robot's inputs are those of its tails
+in steady motion (`surrogate.tails`), how the drag of its head compares with that of its tails, and N.
+
+The components are curves of the simulator. So the curves of the table are smooth, and constant for long dwells.
+Left out: robots with one tail, and robots whose left and right turns differ. Units: l, μ0 l⁴/EI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.arrays import Floats, Integers
+from sim.compiling import compiled
+from sim.mechanics.planar import zigzag_speed
+from sim.model.response import BEFORE, DWELLS, at_equal_dwells
+from sim.motion.steady_motion import STEADY_OUTPUTS
+from surrogate.domain import INSIDE, NO_RESPONSE
+from surrogate.motions import Motions
+from surrogate.network import BLOCK, Ensemble, Layers, evaluate
+from surrogate.tails import HEAD_LENGTH, INPUTS, NUMBER, TAILS
+
+SHAPES = {
+    "lag": (len(DWELLS), 3),
+    "memory": (len(BEFORE), len(DWELLS), 3),
+    "rest": (len(DWELLS), 3),
+    "spread": (len(DWELLS), 3),
+}
+PARTS = (("lag",), ("memory", "rest"), ("spread",))  # what each network gives
+SMALL_SURGE = 0.1  # of v_x
+OF_HEAD = (0, 1, 2, 3, 5, 6)  # of the inputs of the head: all but the coupling of sway and turn
+_KNOTS = np.log(DWELLS)
+_INPUTS, _FLIP = len(INPUTS), len(STEADY_OUTPUTS)  # inputs of the tails; the place of the first output of a flip
+FLIP_INPUTS = _INPUTS + len(OF_HEAD) + 2
+
+
+class Basis(NamedTuple):
+    """Principal components of one kind of curve, flattened: curve = mean + c · vectors."""
+
+    mean: Floats  # (D,)
+    vectors: Floats  # (C, D)
+
+
+@dataclass(frozen=True)
+class ResponseTable:
+    """Response curves of robots from their steady motion."""
+
+    networks: tuple[Ensemble, ...]  # one for each of PARTS
+    bases: Mapping[str, Basis]
+
+    def curves(self, robots: Floats, motion: Floats, inputs: Floats) -> dict[str, Floats]:
+        """Return lag, memory, rest and spread, each (M, …, 3) as in SHAPES, in l, l, rad, for a positive motor."""
+        x, speeds = flip_inputs(robots, motion, inputs)
+        curves = {}
+        for names, network in zip(PARTS, self.networks, strict=True):
+            answer, first = network(x), 0
+            for name in names:
+                basis = self.bases[name]
+                end = first + len(basis.vectors)
+                curve = basis.mean + answer[:, first:end] @ basis.vectors
+                if name == "spread":  # its logarithm was learned, of robots with two tails
+                    curve = np.exp(np.where(robots[:, NUMBER, None] == 2, np.minimum(curve, 0.0), -np.inf))
+                curves[name], first = curve.reshape(-1, *SHAPES[name]) * along_axes(speeds, SHAPES[name]), end
+        curves["spread"] = np.abs(curves["spread"])
+        return curves
+
+    def put_flips(self, motions: Motions, dwells: Floats) -> None:
+        """Write the response at equal dwells (M,) into the outputs of motions; NaN where none was learned."""
+        put_flips(self.networks[:2], self.equal_dwells, motions, dwells)
+
+    @cached_property
+    def equal_dwells(self) -> Basis:
+        """Lag and memory where the dwell before is as long: components of the lag, then of the memory."""
+        lag, memory = self.bases["lag"], self.bases["memory"]
+        mean = lag.mean + memory_at_equal_dwells(memory.mean[None])[0]
+        return Basis(mean, np.concatenate([lag.vectors, memory_at_equal_dwells(memory.vectors)]))
+
+
+def memory_at_equal_dwells(flat: Floats) -> Floats:
+    """Return memories (C, K D 3) where the dwell before is as long as the dwell, (C, D 3)."""
+    return at_equal_dwells(flat.reshape(-1, *SHAPES["memory"])).reshape(len(flat), -1)
+
+
+def put_flips(networks: Sequence[Ensemble], basis: Basis, motions: Motions, dwells: Floats) -> None:
+    """Write the response at equal dwells, one a robot (M,), into the outputs of motions.
+
+    Args:
+        networks: of lag and memory, the memory without or with what else its network gives.
+        basis: of the lag, then of the memory where the dwell before is as long.
+        motions: of M robots.
+        dwells: (M,).
+    """
+    (lag, memory), own = networks, (motions.robots, motions.motion, motions.inputs)
+    numbers = (*lag.layers, *memory.layers, *basis, lag.shape["outputs"], _KNOTS)
+    write_flips(*numbers, *own, np.ascontiguousarray(dwells, dtype=float), motions.outside, motions.outputs)
+
+
+def along_axes(speeds: Floats, shape: tuple[int, ...]) -> Floats:
+    """Return speeds (M, 3) with axes of length 1 between, to multiply curves (M, *shape)."""
+    return speeds.reshape(len(speeds), *[1] * (len(shape) - 1), 3)
+
+
+@compiled
+def _put_flip_inputs(robot: Floats, motion: Floats, inputs: Floats, x: Floats, speeds: Floats) -> None:
+    """Write the inputs of the networks of a flip (15,), and what their curves are multiplied by (3,)."""
+    tail = robot[TAILS:]
+    x[:_INPUTS] = inputs
+    for i, place in enumerate(OF_HEAD):
+        x[_INPUTS + i] = tail[6 + place]
+    x[FLIP_INPUTS - 2], x[FLIP_INPUTS - 1] = np.log(tail[4]), 1.0 if tail[4] == 2 else 0.0
+    sway = motion[0] + motion[2] * robot[HEAD_LENGTH] / 2
+    speeds[0], speeds[1], speeds[2] = np.hypot(motion[1], SMALL_SURGE * sway), sway, motion[2]
+
+
+@compiled
+def flip_inputs(robots: Floats, motion: Floats, inputs: Floats) -> tuple[Floats, Floats]:
+    """Return inputs of the networks (M, 15), and (w, v_x, ω_yr), what the curves are divided by, (M, 3).
+
+    Args:
+        robots: (M, 39), see `surrogate.tails.pack_robots`.
+        motion: (M, 5).
+        inputs: `surrogate.tails.INPUTS`, (M, 7).
+    """
+    x, speeds = np.empty((len(robots), FLIP_INPUTS)), np.empty((len(robots), 3))
+    for row in range(len(robots)):
+        _put_flip_inputs(robots[row], motion[row], inputs[row], x[row], speeds[row])
+    return x, speeds
+
+
+@compiled
+def write_flips(
+    l0: Floats, l1: Floats, l2: Floats, l3: Floats, l4: Floats, l5: Floats, m0: Floats, m1: Floats, m2: Floats,
+    m3: Floats, m4: Floats, m5: Floats, mean: Floats, vectors: Floats, components: int, knots: Floats,
+    robots: Floats, motion: Floats, inputs: Floats, dwells: Floats, outside: Integers, outputs: Floats,
+) -> None:  # fmt: skip
+    """Write the response to flips with equal dwells, and mark robots whose response was not learned.
+
+    A lag between the dwells of its curve is cubic in ln T̄ through four knots, and constant after the last one.
+
+    Args:
+        l0 to l5, m0 to m5: `Layers` of the lag and of the memory.
+        mean, vectors: of lag and memory at equal dwells, (D 3,) and (C, D 3).
+        components: number of vectors of the lag, which come first.
+        knots: ln T̄ of the curves, (D,).
+        robots, motion, inputs: of M robots, see `surrogate.motions.Motions`.
+        dwells: (M,).
+        outside, outputs: written to.
+    """
+    lag, memory = Layers(l0, l1, l2, l3, l4, l5), Layers(m0, m1, m2, m3, m4, m5)
+    x, of_lag = np.empty((BLOCK, FLIP_INPUTS)), np.empty((BLOCK, lag.rest.shape[1]))
+    speeds, of_memory, near = np.empty((BLOCK, 3)), np.empty((BLOCK, memory.rest.shape[1])), np.empty(12)
+    own = np.empty(3)
+    for begin in range(0, len(robots), BLOCK):
+        count = min(BLOCK, len(robots) - begin)
+        for k in range(count):
+            _put_flip_inputs(robots[begin + k], motion[begin + k], inputs[begin + k], x[k], speeds[k])
+        evaluate(lag, x[:count], of_lag[:count])
+        evaluate(memory, x[:count], of_memory[:count])
+        for k in range(count):
+            row = begin + k
+            place = min(np.log(dwells[row]), knots[-1])
+            first = min(max(np.searchsorted(knots, place) - 2, 0), len(knots) - 4)
+            near[:] = mean[3 * first : 3 * first + 12]
+            for c in range(len(vectors)):
+                size = of_lag[k, c] if c < components else of_memory[k, c - components]
+                for i in range(12):
+                    near[i] += size * vectors[c, 3 * first + i]
+            own[:] = 0.0
+            for i in range(4):
+                weight = 1.0
+                for j in range(4):
+                    if j != i:
+                        weight *= (place - knots[first + j]) / (knots[first + i] - knots[first + j])
+                for axis in range(3):
+                    own[axis] += weight * near[3 * i + axis] * speeds[k, axis]
+            outputs[_FLIP, row] = zigzag_speed(
+                own[0], own[1], own[2], motion[row, 1], speeds[k, 1], speeds[k, 2], dwells[row]
+            )
+            outputs[_FLIP + 1, row], outputs[_FLIP + 2, row], outputs[_FLIP + 3, row] = own[2], own[1], own[0]
+            if outside[row] == INSIDE and not abs(own.sum()) < np.inf:
+                outside[row] = NO_RESPONSE

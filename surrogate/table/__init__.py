@@ -1,1 +1,0 @@
-"""The look-up table and its query: what planning needs, nothing more."""

@@ -1,1 +1,0 @@
-"""The tails' and the head's wrench, and their balance: formulas only."""
