@@ -109,9 +109,10 @@ def pack_robots(robots: Robots) -> Floats:
 
 def unpack_robots(packed: Floats) -> Robots:
     """Return packed robots (M, ROBOT_NUMBERS) by field, without copying them."""
-    columns: Any = list(packed.T)
+    columns = packed.T
     resistance = packed[:, RESISTANCE:HEAD_LENGTH].reshape(-1, 4, 5)
-    return Robots(columns[0], columns[1], resistance, *columns[HEAD_LENGTH:30], packed[:, 30:])
+    parts: Any = (columns[0], columns[1], resistance, *columns[HEAD_LENGTH:30], packed[:, 30:])
+    return Robots(*parts)
 
 
 def packed_robots(columns: Mapping[str, Floats]) -> tuple[Floats, Floats]:
@@ -152,8 +153,9 @@ def robots_of(columns: Mapping[str, Floats]) -> Robots:
     )
     spin_drag = resistance[:, 3, 3]
     gain = 1 + body.droop * spin_drag
-    entries: Any = list(resistance[:, [0, 1, 2, 3, 0, 0, 3, 2], [0, 1, 2, 3, 2, 3, 4, 4]].T)
-    head = inputs_of_head(*entries, body.head_length, gain, count * body.zeta_perp, body.offset)
+    entries = resistance[:, [0, 1, 2, 3, 0, 0, 3, 2], [0, 1, 2, 3, 2, 3, 4, 4]].T
+    numbers: Any = (*entries, body.head_length, gain, count * body.zeta_perp, body.offset)
+    head = inputs_of_head(*numbers)
     return Robots(
         np.abs(body.omega), gain, resistance, body.head_length, sense, body.zeta_perp, body.zeta_parallel,
         body.offset, body.tail_radius, count, spin_drag, np.stack(head, -1),
