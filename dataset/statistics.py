@@ -27,8 +27,8 @@ import numpy as np
 from sim.arrays import Floats
 from sim.inputs import check_columns
 from sim.mechanics.drag import tail_coefficients
+from sim.mechanics.linear_theory import linear_motion
 from sim.model.groups import Groups
-from sim.reference.linear_theory import linear_motion
 
 _HIGHEST = 4  # degree of the polynomials
 _ROWS_A_TERM = 4

@@ -25,10 +25,10 @@ from sim.io.pages import Page
 from sim.io.provenance import code_version
 from sim.io.units import format_length, format_time
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
+from sim.model.presets import INDEPENDENT
 from sim.model.robot import Robot
 from sim.motion.lab_units import RPM, lab_motion
 from sim.motion.steady_motion import Steady
-from sim.reference.control_example import INDEPENDENT
 from softflagella.demo_figures import (
     draw_circles,
     draw_net_speed,

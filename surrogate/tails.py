@@ -33,7 +33,7 @@ The network gives six numbers y, near (0, 1, 0, 1, 0, 0):
     M_z = −N ζ⊥ ω_t a² Q(S) (y_3 + m² y_5)
 
 The terms without y are the drag of straight tails. T and Q are simple fits to thrust and torque in linear theory
-(`sim.reference.linear_theory`). The network learns what is left.
+(`sim.mechanics.linear_theory`). The network learns what is left.
 
 Frame: body axes at the centre J of the disc, motor positive. Left out: effects on the tails themselves, and
 several motions of one robot; the solution next to linear theory is found. Units: l, μ0 l⁴/EI, EI/l². Source: the

@@ -53,7 +53,7 @@ def test_imports_run_one_way(package: str) -> None:
 
 
 def test_statistics_and_networks_know_no_robot() -> None:
-    """And the swimmer knows no verdict; only tests and teaching use the simulator's reference."""
+    """And the swimmer knows no verdict."""
     networks = [ROOT / "surrogate" / name for name in ("network.py", "training/bfgs.py", "training/networks.py")]
     assert rooms_imported("calibration")["statistics"] == rooms_imported("surrogate")["network"] == set()
     for file in (*(ROOT / "calibration" / "statistics").glob("*.py"), *networks):
@@ -63,12 +63,11 @@ def test_statistics_and_networks_know_no_robot() -> None:
         assert all(name.startswith(("calibration.statistics", "surrogate.network.", "surrogate.training."))
                    for name in others), file  # fmt: skip
     assert rooms_imported("calibration")["swimmer"] == {"statistics"}
-    assert not any("reference" in rooms for rooms in rooms_imported("sim").values())
 
 
 LIBRARIES = {"jinja2", "joblib", "matplotlib", "numba", "numpy", "pandas", "pyarrow", "safetensors", "scipy",
              "svgelements", "torch", "tqdm"}  # fmt: skip
-SOLVERS = {"sim.linear", "sim.motion", "sim.reference", "sim.solve"}
+SOLVERS = {"sim.linear", "sim.motion", "sim.solve"}
 SIMULATOR = {"sim.solve.newton", "sim.solve.orbit", "sim.motion.steady", "sim.motion.replay", "sim.motion.run"}
 TRAINING = {"surrogate.training", "surrogate.training.networks"}
 CODE = """

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.model.presets import PRESETS
+from sim.model.presets import INDEPENDENT, PRESETS
 from sim.motion.batches import steady_columns
 from sim.motion.steady import steady
-from sim.reference.control_example import INDEPENDENT
 from tests.reference.cases import FILAMENT, MEASURED_HEAD_SHARE, STEADY_INPUTS, STEADY_POINTS
 from tests.sim.robots import extrapolated_loads
 

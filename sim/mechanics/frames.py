@@ -14,7 +14,7 @@ of an edge is ∂(E + R)/∂e at constant θ. Here the frames follow the edges b
 ∂τ/∂e = κb/2|e| depends on neighbouring edges only.
 
 `add_frames` adds the difference to the elastic forces of straight, untwisted tails (`sim.mechanics.rod`), where θ
-is zero. `sim.reference.framed_rod` has the same rod by automatic differentiation; a test shows that the two agree.
+is zero. A test compares them with a framed rod by automatic differentiation.
 Left out: θ̇ in the torque and the turning of the directors in κ̇ (both are of second order in curvature).
 Units: EI = 1, l = 1. Source: Bergou et al. (2008, 2010); Jawed, Novelia, O'Reilly, *A Primer on the Kinematics of
 Discrete Elastic Rods* (2018).

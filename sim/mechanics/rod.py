@@ -13,11 +13,10 @@ half Voronoi length l_0 = h/2 (l_k = h elsewhere). This converges at second orde
 would be too short, and the error would be of first order.
 
 Natural curvature and twist are zero here. Then the twist of an isotropic rod with a free end relaxes to zero,
-whatever the shape, and there is no force of twist on the nodes. `sim.reference.framed_rod` has the material
-frames; a test shows that the two agree.
+whatever the shape, and there is no force of twist on the nodes. `sim.mechanics.frames` has the material frames.
 
-Written node by node on component tuples (`sim.linear.vectors`), so that compiled loops (`sim.mechanics.geometry`)
-and tensors (`sim.reference.elastic`) read the same lines. Units: EI = 1, l = 1, so EA = 4 (l/r0)².
+Written node by node on component tuples (`sim.linear.vectors`), for compiled loops (`sim.mechanics.geometry`) and
+for arrays. Units: EI = 1, l = 1, so EA = 4 (l/r0)².
 Source: Bergou et al. (2008, 2010); Jawed, Novelia, O'Reilly, *A Primer on the Kinematics of Discrete
 Elastic Rods* (2018); the paper's energies (arXiv 2103.05712, eqs. 1-3).
 """

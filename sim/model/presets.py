@@ -55,3 +55,14 @@ PRESETS: dict[str, Robot] = {
     # Its one measured point: N = 4, l = 11 cm, 143.66 rpm.
     "paper-measured": _paper("paper-measured", tails=4, motor_speed=_MEASURED_SPEED, **_FITTED),
 }
+
+# Motion of paper-control by another program for the same equations: 32 edges, converged in the step.
+INDEPENDENT = {
+    "omega_t_bar": 7.589,
+    "omega_h_bar": -2.411,
+    "omega_yr_bar": 0.0490,
+    "v_x": 0.0425,
+    "v_z": 0.0180,
+    "R_yr_over_l": 0.9415,
+    "theta_deg": 67.1,
+}

@@ -11,7 +11,6 @@ is necessary because stretching is stiff. The pose is part of the same step:
 the track of the head's centre seen from above: X along the first heading, Y to its left, ψ counter-clockwise. The
 integrals of h_x and v_z (body frame) are stored as well, for means.
 
-`sim.reference.stepper` takes the same steps with tensors; a test shows that the two agree.
 Units: l, μ0 l⁴/EI, EI/l².
 Source: Alexander (1977) for SDIRK2; Hairer and Wanner, *Solving ODEs II*, V.1 for BDF2.
 """
@@ -30,7 +29,7 @@ from sim.model.body import Body
 from sim.solve.newton import new_workspace, newton
 from sim.solve.rates import in_stage
 
-PHASE, YAW, X, Y, SWAY, SURGE = range(6)  # entries of a pose, here and in `sim.reference.stepper`
+PHASE, YAW, X, Y, SWAY, SURGE = range(6)  # entries of a pose
 TOLERANCE = 2e-4  # on the last correction; Newton converges quadratically
 GAMMA = 1 - 1 / np.sqrt(2)
 

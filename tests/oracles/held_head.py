@@ -1,7 +1,7 @@
 """Torque of a single tail whose head is held: by the simulator's balance, and by linear theory.
 
 With the head held and no flow between tails, a tail turns at the motor's speed with a constant shape, and the
-other tails do not matter. Linear theory (`sim.reference.linear_theory`) with a tilted clamp:
+other tails do not matter. Linear theory (`sim.mechanics.linear_theory`) with a tilted clamp:
 w'''' = −i S w, w(0) = a,
 w'(0) = θ, w''(l) = w'''(l) = 0, and the torque about the axis is S ∫ |w|² ds in EI/l.
 

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-import torch
 
 from dataset.design import load_design
 from sim.mechanics.balance import head_drag
 from sim.model.body import Body
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
-from sim.reference.balance import TensorRobots, tensor_robots
 from sim.solve.assembly import bodies
 from sim.solve.orbit import residual_on_orbit, solve_orbit, straight_start
 from sim.solve.refinement import MESHES, extrapolate
@@ -31,12 +27,6 @@ def first_body(groups: Groups) -> Body:
     return bodies(groups)[0]
 
 
-def held(robots: TensorRobots) -> TensorRobots:
-    """Return the same tails on a disc that nothing moves: the motor alone turns it."""
-    resistance = 1e12 * torch.eye(4, 5, dtype=torch.float64).unsqueeze(-1).expand(4, 5, robots.robots)
-    return replace(robots, body=robots.body._replace(resistance=resistance))
-
-
 def mean_tail_wrench(body: Body, x: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Return (F_x, F_z, M_y, M_z) of the tails on the disc about J, mean over the phases, (4,)."""
     _, t = residual_on_orbit(body, x, u)
@@ -48,9 +38,7 @@ def held_loads(
     omega_bar: float, l_over_r0: float, offset: float, *, edges: int, **effects: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Average the wrench (F_x, F_z, M_y, M_z) of the fluid on a filament whose disc is held; nodes (n, 3), too."""
-    _, groups = single_filament(2, omega_bar, l_over_r0, offset, **effects)
-    body = first_body(groups)
-    body.resistance[:, :4] += 1e9 * np.eye(4)
+    body = held_filament(omega_bar, l_over_r0, offset, **effects)
     x, u = straight_start(body, edges, 2, 1)
     u[:] = 0.0
     _, size = solve_orbit(body, x, u, 1e-9)
@@ -64,13 +52,12 @@ def extrapolated_loads(omega_bar: float, l_over_r0: float, offset: float, **effe
     return extrapolate(np.array(values))
 
 
-def single_filament(
-    edges: int, omega_bar: float, l_over_r0: float, offset: float, **effects: float
-) -> tuple[TensorRobots, Groups]:
-    """Make one filament at distance `offset` [l] from the axis, turned at `omega_bar`."""
+def held_filament(omega_bar: float, l_over_r0: float, offset: float, **effects: float) -> Body:
+    """Assemble one filament at distance `offset` [l] from the axis of a disc that the motor alone turns."""
     offset *= CONTROL_VALUES["l_over_R"]
-    groups = control(1, N=1, omega_bar=omega_bar, l_over_r0=l_over_r0, a_over_R=offset, **effects)
-    return held(tensor_robots(groups, edges=edges)), groups
+    body = first_body(control(1, N=1, omega_bar=omega_bar, l_over_r0=l_over_r0, a_over_R=offset, **effects))
+    body.resistance[:, :4] += 1e9 * np.eye(4)
+    return body
 
 
 def sweep_points(count: int) -> dict[str, np.ndarray]:

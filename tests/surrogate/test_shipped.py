@@ -12,8 +12,8 @@ import pytest
 
 from dataset.design import load_design
 from sim.io.errors import InputError, run_command
+from sim.model.presets import INDEPENDENT
 from sim.motion.batches import steady_columns
-from sim.reference.control_example import INDEPENDENT
 from surrogate.__main__ import main
 from surrogate.domain import BOUNDS, DOMAIN, MOST_TAILS, WIDE
 from surrogate.errors import coverage, relative_errors

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from sim.effects import catalogue
+from sim.mechanics.linear_theory import linear_filament
 from sim.model.groups import Groups
 from sim.motion.batches import steady_columns
-from sim.reference.linear_theory import linear_filament
 from sim.solve.assembly import bodies
 from sim.solve.refinement import orbit_on_mesh
 from surrogate.domain import INSIDE, ROBOT

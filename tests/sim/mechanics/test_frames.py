@@ -14,7 +14,7 @@ from sim.mechanics.balance import motion_at
 from sim.mechanics.frames import add_frames
 from sim.mechanics.geometry import measure, new_geometry
 from sim.model.presets import PRESETS
-from sim.reference.framed_rod import FramedRod, Frames
+from tests.oracles.framed_rod import FramedRod, Frames
 from tests.sim.robots import control, extrapolated_loads, first_body, held_loads
 
 ROBOT = PRESETS["paper-control"]

@@ -77,6 +77,25 @@ def test_the_forces_of_the_fluid_balance(tails: int, effects: dict[str, float]) 
     assert np.abs(swum.forces).max((1, 2, 3)).min() > 0.03
 
 
+def test_forces_are_the_drag_of_the_velocities_that_the_nodes_have_in_the_lab() -> None:
+    """From positions and times alone, by differences."""
+    shapes = steady_shapes(CONTROL, 192)
+    nodes, n = shapes.nodes, shapes.nodes.shape[2] - 1
+    velocity = np.gradient(nodes, shapes.times, axis=0, edge_order=2)[1:-1]
+    edges = np.diff(nodes, axis=2)[1:-1]
+    tangent = edges / np.linalg.norm(edges, axis=-1)[..., None]
+    ends = (tangent[:, :, :1], tangent[:, :, -1:])
+    tangent = np.concatenate([ends[0], tangent[:, :, :-1] + tangent[:, :, 1:], ends[1]], axis=2)
+    tangent /= np.linalg.norm(tangent, axis=-1)[..., None]
+    log = np.log(CONTROL.tail_length / CONTROL.tail_radius)
+    parallel, perp = 2 * np.pi / (log - 0.5), 4 * np.pi / (log + 0.5)
+    along = (tangent * velocity).sum(-1)[..., None] * tangent
+    drag = -(perp * velocity + (parallel - perp) * along) / n
+    found = shapes.forces[1:-1]
+    assert found[:, :, 1:-1] == pytest.approx(drag[:, :, 1:-1], abs=2e-3 * np.abs(found).max())
+    assert found[:, :, -1] == pytest.approx(drag[:, :, -1] / 2, abs=2e-3 * np.abs(found).max())
+
+
 def test_a_turn_moves_the_robot_as_its_mean_motion_does() -> None:
     shapes, motion = steady_shapes(CONTROL), steady(CONTROL.groups())
     time = shapes.times[-1]

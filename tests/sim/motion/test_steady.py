@@ -7,14 +7,13 @@ import pytest
 
 import sim.motion.settling
 import sim.motion.steady
-from sim.model.presets import PRESETS
+from sim.model.presets import INDEPENDENT, PRESETS
 from sim.motion.batches import steady_columns, stepped_columns
 from sim.motion.orbits import Orbits, Perturbed
 from sim.motion.settling import settle
 from sim.motion.stability import QUICK
 from sim.motion.steady import orbits, steady
 from sim.motion.steady_motion import DIRECT, STEPPING
-from sim.reference.control_example import INDEPENDENT
 from sim.solve.refinement import LOST, REASONS
 from tests.reference.cases import INDEPENDENT_HEAD_SHARE, MEASURED_HEAD_SHARE, STEADY_INPUTS, STEADY_POINTS
 from tests.sim.robots import control, sweep_points

@@ -8,17 +8,15 @@ import numpy as np
 import pytest
 
 from sim.effects import catalogue
-from sim.io.errors import InputError
 from sim.linear.spectral import with_phases
 from sim.model.groups import Groups
 from sim.motion.resolution import Resolution
 from sim.motion.sensitivity import sensitivities
 from sim.motion.settling import settle
 from sim.motion.steady import orbits
-from sim.reference.stepper import at_rest
 from sim.solve.orbit import mean_motion, solve_orbit
 from sim.solve.refinement import FEW, MANY, SOLVED, difference, refined_orbit, with_edges
-from tests.sim.robots import control, first_body, single_filament, sweep_points
+from tests.sim.robots import control, first_body, sweep_points
 
 # Natural twist alone shows nothing (it needs natural splay beside it).
 NONLOCAL = tuple(e.name for e in catalogue().values() if e.reach == "nonlocal" and not e.beside)
@@ -66,12 +64,6 @@ def test_sensitivities_are_differences(name: str, at: str) -> None:
 def test_nonlocal_effects_stand_beside_each_other() -> None:
     sizes = {name: 0.3 * catalogue()[name].typical for name in NONLOCAL}
     assert orbits(control(N=4, **sizes)).converged.all()
-
-
-def test_tensor_steps_refuse_what_they_leave_out() -> None:
-    robots, _ = single_filament(6, 5.0, 34.375, 1 / 6.875, tail_spin_drag=1.0)
-    with pytest.raises(InputError, match="tail_spin_drag"):
-        at_rest(robots)
 
 
 def test_the_stated_error_covers_a_much_finer_mesh() -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from sim.mechanics.drag import tail_coefficients
+from sim.mechanics.linear_theory import linear_filament, linear_motion
 from sim.model.presets import PRESETS
 from sim.motion.steady import steady
-from sim.reference.linear_theory import linear_filament, linear_motion
 from tests.oracles.held_head import held_torque, linear_torque
 from tests.reference.cases import LINEAR_FILAMENT
 from tests.sim.robots import control
