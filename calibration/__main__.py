@@ -54,9 +54,9 @@ def _calibrate(
     print(result.errors_in_words)
     for error in result.paths:
         print(error.sentence)
-    for limit in result.conditions.caveats:
+    for limit in result.caveats:
         print(f"the conclusion is weaker: {limit}")
-    for line in result.conditions.summary_of_excluded:
+    for line in result.summary_of_excluded:
         print(f"excluded: {line}")
     print(f"-> {', '.join(map(str, files))}")
 
@@ -87,7 +87,7 @@ def _laws(table: str, *, robot: str, out: str, seed: int = 0, jobs: int | None =
         jobs: threads (default: all processors).
     """
     _refuse_early(table)
-    from calibration.report.robot_laws import find_robot_laws
+    from calibration.report.robot_verdict import find_robot_laws
     from sim.inputs import load_robot
 
     described = find_robot_laws(table, load_robot(robot), seed=seed, jobs=jobs, tell=_to_stderr)

@@ -10,8 +10,8 @@ from typing import Literal
 
 import pandas as pd
 
-from calibration.laws.law_fits import find_laws
 from calibration.laws.law_model import with_law
+from calibration.laws.laws import find_laws
 from calibration.report.corrected_robot import check_given
 from calibration.report.path_error import path_errors, wanted_paths
 from calibration.report.robot_verdict import RobotVerdict, read_runs
@@ -21,8 +21,8 @@ from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.possible_runs import Owned, owned
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate as find_what_is_missing
-from calibration.verdict.sequential_test import Decision, read_explanations
-from calibration.verdict.sequential_test import decide as decide_between
+from calibration.verdict.next_runs import Decision, read_explanations
+from calibration.verdict.next_runs import decide as decide_between
 from calibration.verdict.verdict import Verdict
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
@@ -129,7 +129,7 @@ def decide(
         'Decided: tank wall. The next step is to calibrate with all runs.'
     """
     if isinstance(verdict, Verdict):
-        explanations, before = list(verdict.next.explanations), set(verdict.conditions.sessions)
+        explanations, before = list(verdict.explanations), set(verdict.runs.session_names)
     else:
         explanations, before = read_explanations(verdict)
     model = SwimmerModel(one_robot(robot), read_measurements(table), jobs)

@@ -17,8 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from calibration.api import calibrate
-from calibration.laws.law import dependences
-from calibration.laws.law_fits import Laws
+from calibration.laws.laws import Laws, dependences
 from calibration.report.figures import draw_dependences, draw_place
 from calibration.swimmer.synthetic_table import make_table
 from sim.model.presets import PRESETS
@@ -31,10 +30,10 @@ def main(path: str = "docs/tutorial/laws.png") -> None:
     robot = PRESETS["paper-measured"]
     table = make_table(replace(robot, effects=HIDDEN), seed=8, title="").round(6)
     verdict = calibrate(table, robot, progress=False)
-    laws = verdict.corrections.law
+    laws = verdict.law
     assert isinstance(laws, Laws)
     best = laws.kept[0]
-    curves = dependences(best, verdict.conditions.split.fitted)
+    curves = dependences(best, verdict.split.fitted)
     parts = [_pixels(draw_place(best.model.robot, best.place)), _pixels(draw_dependences(curves))]
     width = max(part.shape[1] for part in parts)
     image.imsave(Path(path), np.concatenate([_wide(part, width) for part in parts]))

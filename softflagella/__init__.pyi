@@ -4,7 +4,7 @@ from calibration.api import decide as decide
 from calibration.api import tracks as tracks
 from calibration.report.robot_verdict import RobotVerdict as RobotVerdict
 from calibration.swimmer.synthetic_table import make_table as make_table
-from calibration.verdict.sequential_test import Decision as Decision
+from calibration.verdict.next_runs import Decision as Decision
 from calibration.verdict.verdict import Verdict as Verdict
 from dataset.api import read_sweep as read_sweep
 from dataset.api import sweep as sweep

@@ -185,7 +185,7 @@ def _steer(verdict: Verdict) -> dict[str, Steered]:
     truth = replace(start, **HIDDEN, effects=HIDDEN_EFFECT)  # type: ignore[arg-type]
     models = {
         "calibrated": corrected_robot(start, verdict.base.parameters),
-        "corrected": corrected_robot(start, verdict.fits.final_refit.parameters),
+        "corrected": corrected_robot(start, verdict.final_refit.parameters),
         "truth known": truth,
     }
     steered = steer(models, truth, polygon(4, 3.0))
@@ -208,9 +208,7 @@ def _calibrate(folder: Path, name: str) -> tuple[Verdict, Measurements]:
     verdict = calibrate(SwimmerModel(start, data), correction=learn_head_correction)
     record = verdict_record(verdict, table="table.csv")
     write_text(case / "verdict.json", json.dumps(record, indent=1) + "\n")
-    write_report(verdict, case / "report.html", title=f"table with {name}")
-    write_text(
-        case / "corrected.toml", corrected_toml(start, verdict.fits.final_refit, verdict.corrections.learnt)
-    )
+    write_report(verdict, record | {"table": f"table with {name}"}, case / "report.html")
+    write_text(case / "corrected.toml", corrected_toml(start, verdict.final_refit, verdict.learnt))
     print(f"  {name}: {verdict.sentence}")
     return verdict, data

@@ -292,7 +292,7 @@ def _add_calibration(page: Page, results: Results, name: str) -> None:
         ("noise of one run, from repeats", verdict.noise_ceiling),
     ]
     page.table(
-        (f"error on the held-out session ({verdict.conditions.split.names})", "relative rms"),
+        (f"error on the held-out session ({verdict.split.names})", "relative rms"),
         [(label, f"{100 * value:.2f} %") for label, value in errors],
     )
     page.figures([(draw_summary(verdict), "residual of each output over the noise of a run",

@@ -4,8 +4,8 @@ Forty tables by a solver of its own, whose tails may differ (`tests.oracles.harm
 two to four tails of 7, 9.5 and 12 cm, two speeds, both directions, trials on three of four days. Noise 2.5 %,
 session scatter 0.5 %, coefficients drawn for each table.
 
-"Named": alone, in a set, or as what differs in these runs; where nothing can be named, nothing is. "Warned":
-something else is claimed, with a reservation.
+"Named": alone, in a set, as what differs in these runs, or as the form that is adopted; where nothing can be
+named, nothing is. "Warned": something else is claimed, with a reservation.
 
 Usage: python -m benchmarks hardware [FILE] [CASE]     FILE: of records, to continue with
 
@@ -152,9 +152,10 @@ def _seen(robot: Robot, hardware: Hardware) -> np.ndarray:
 
 def answer(verdict: Verdict, case: Case) -> str:
     """Say whether a verdict names what is off."""
-    claims = (*verdict.explaining, *verdict.evidence.rival_effects)
+    claims = (*verdict.explaining, *verdict.found.rival_effects)
     names = [e.name for c in claims for e in c.claimed] + [move.words for move in verdict.moves]
     claimed = bool(names) or bool(verdict.wrong_numbers)
+    names += [verdict.nearest.effect.name] if verdict.nearest else []  # a description, and no claim
     if any(word in name for word in case.named for name in names) or not (case.named or claimed):
         return "named"
     if not claimed:

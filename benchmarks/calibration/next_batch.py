@@ -66,9 +66,9 @@ def decided(model: Linear, count: int, effect: int, size: float, seed: int) -> t
     """Return what the table says and what it says with the new runs; None if it is not ambiguous."""
     truth, signal, made = model.effects[effect].name, model.D[..., effect] * size, np.arange(count)
     first = close(model, signal, seed, made)
-    if first.verdict != "ambiguous" or outcome(first, truth) == "wrong" or first.next.batch is None:
+    if first.verdict != "ambiguous" or outcome(first, truth) == "wrong" or first.next_batch is None:
         return None
-    batch = np.array([s["run"] for s in first.next.batch.settings]) + count
+    batch = np.array([s["run"] for s in first.next_batch.settings]) + count
     said = " or ".join("+".join(e.name for e in c.claimed) for c in first.explaining)
     return f"{truth}: {said}", outcome(close(model, signal, seed, made, batch), truth)
 

@@ -86,12 +86,12 @@ class Result(NamedTuple):
 def answers(verdict: Verdict, case: Case) -> dict[str, bool]:
     """Answer every question that can be asked of a verdict."""
     sets = [{e.name for e in c.claimed} for c in verdict.explaining]
-    beside = [{e.name for e in c.claimed} for c in verdict.evidence.rival_effects]
+    beside = [{e.name for e in c.claimed} for c in verdict.found.rival_effects]
     name, value = case.planted
     found = {
         _CLAIMED: bool(sets),
         _CLAIMED_PLAINLY: bool(sets) and not any(c.uncertain for c in verdict.explaining),
-        _WRONG: verdict.verdict == "number" or bool(verdict.evidence.rival_numbers),
+        _WRONG: verdict.verdict == "number" or bool(verdict.found.rival_numbers),
         _UNEXPLAINED: verdict.verdict == "unexplained",
         _MOVED: bool(verdict.moves),
         _MOVED_NAMED: any(case.planted[0] in move.words for move in verdict.moves),

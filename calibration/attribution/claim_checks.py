@@ -29,9 +29,8 @@ from calibration.attribution.refits import IMITABLE, SURE, Candidate
 from calibration.attribution.wrong_numbers import IMPLAUSIBLE, pulls
 from calibration.statistics.fit import Fit
 from calibration.statistics.gls import eliminated
-from calibration.statistics.held_out import held_out_p_value
 from calibration.statistics.statistical_model import Runs, regression, stepped
-from calibration.statistics.study import Study
+from calibration.statistics.study import Study, held_out_p_value
 from sim.arrays import Flags, Floats
 
 SEEN = 6.0  # standard deviations of a remainder that the tests notice nearly always

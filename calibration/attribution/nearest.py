@@ -44,7 +44,6 @@ from calibration.attribution.refits import FIRST, Candidate, left_out_residuals
 from calibration.statistics.budget import skipped, spent
 from calibration.statistics.fit import Fit, UnsolvedError, birge, fit
 from calibration.statistics.gls import solved
-from calibration.statistics.held_out import FinalRefit
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, examine_residual
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import (
@@ -56,7 +55,7 @@ from calibration.statistics.statistical_model import (
     changes,
     regression,
 )
-from calibration.statistics.study import Study
+from calibration.statistics.study import FinalRefit, Study
 from sim.arrays import Floats, Integers
 
 _REMOVED = 0.5  # least share of what is beyond noise

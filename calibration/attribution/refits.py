@@ -23,6 +23,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -31,7 +32,7 @@ from calibration.statistics.budget import skipped
 from calibration.statistics.fit import Fit, UnsolvedError, fit
 from calibration.statistics.gls import solved
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
-from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, start_values
+from calibration.statistics.statistical_model import Experiment, ForwardModel, Parameter, Parameters, start_values
 from calibration.statistics.study import Study, groups, leave_one_group_out
 from sim.arrays import Flags, Floats
 
@@ -88,6 +89,16 @@ class Candidate:
     def words(self) -> str:
         """Titles and names of all effects of its refit."""
         return " and ".join(e.words for e in self.claimed)
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A fitted model that explains or describes the runs as well as others do."""
+
+    title: str  # in words
+    fit: Fit
+    model: Experiment  # that was fitted
+    law: Mapping[str, Any] = field(default_factory=dict)  # what makes this model of one without the law
 
 
 def unexamined(

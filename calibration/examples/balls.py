@@ -155,8 +155,8 @@ def main(table: str, without: Sequence[str] = (), out: str | None = None) -> Non
     print(verdict.sentence)
     if out:
         with files_together(out, ("verdict.json", "report.html")) as folder:
-            write_report(verdict, folder / "report.html", title=Path(table).name)
             record = verdict_record(verdict, table=Path(table).name)
+            write_report(verdict, record, folder / "report.html")
             write_text(folder / "verdict.json", json.dumps(record, indent=1) + "\n")
         print(f"-> {out}/report.html, {out}/verdict.json")
 

@@ -136,7 +136,7 @@ def law_of_diameter(model: Spheres) -> str:
         return "not described by a power of the diameter"
     power, (low, high) = verdict.final.parameters[_LAW.name], verdict.final.interval(_LAW.name)
     before, after = 100 * verdict.error_before, 100 * verdict.error_after
-    errors = f"held out {verdict.conditions.split.names}: {before:.1f} % -> {after:.1f} %"
+    errors = f"held out {verdict.split.names}: {before:.1f} % -> {after:.1f} %"
     return f"drag as d^{power:.2f} ({low:.2f} to {high:.2f}); {errors}"
 
 
@@ -152,7 +152,7 @@ def main(table: str, name: str = "KW2023") -> None:
     model = read_spheres(table, name)
     verdict = calibrate(model, progress=False)
     print(f"{name}: {verdict.sentence}")
-    for candidate in verdict.evidence.candidates:
+    for candidate in verdict.found.candidates:
         print(f"  {candidate.effect.title}: score {candidate.z:+.1f}, {candidate.verdict}")
     for label, effects in (
         ("Stokes", {}),
@@ -165,7 +165,7 @@ def main(table: str, name: str = "KW2023") -> None:
         print(f"  next: {run.record()}")
     print(f"  as a law: {law_of_diameter(model)}")
     before, after = 100 * verdict.error_before, 100 * verdict.error_after
-    print(f"  held out {verdict.conditions.split.names}: {before:.1f} % -> {after:.1f} %")
+    print(f"  held out {verdict.split.names}: {before:.1f} % -> {after:.1f} %")
 
 
 if __name__ == "__main__":

@@ -24,8 +24,8 @@ import numpy as np
 from calibration.laws.places import Place, place_named
 from calibration.laws.readings import EXPONENTS, INPUTS, NOTED, logarithms, noted_values, parameter_of
 from calibration.statistics.statistical_model import Parameter, Parameters, by_differences
+from calibration.swimmer.influences import robot_number
 from calibration.swimmer.measured_table import Measurements
-from calibration.swimmer.nuisance_numbers import robot_number
 from calibration.swimmer.swimmer import SwimmerModel
 from sim.arrays import Floats, Integers
 from sim.effects import effect_named

@@ -2,9 +2,19 @@
 
 With the columns d of a place at the fit without laws, the law is the span of d (if it is a term) and of d x_i for
 the chosen inputs i, at most three. A side force elsewhere than at the disc is ranked with a few levers, each of
-which has columns of its own; its lever counts as one parameter more. The law is fitted together with the
-coefficients and the nuisance parameters by generalised least squares (`calibration.laws.linear_models`). A place
-is ranked by its best model whose exponents are within their bounds.
+which has columns of its own; its lever counts as one parameter more. A place is ranked by its best model whose
+exponents are within their bounds.
+
+**Linear models**, for many residuals at once. A model has the p columns J of the coefficients and nuisance
+parameters and q columns X of one place. Each residual has its own S, and each place the scatter of sessions that
+all of its columns leave (`calibration.statistics.gls`). With this Σ the J are absorbed once for all models of a
+place,
+
+    C = Xᵀ Σ⁻¹ X − Xᵀ Σ⁻¹ J A⁻¹ Jᵀ Σ⁻¹ X,   b = Xᵀ Σ⁻¹ r − Xᵀ Σ⁻¹ J A⁻¹ Jᵀ Σ⁻¹ r,   A = Jᵀ Σ⁻¹ J + P⁻¹,
+
+so that a model costs the inverse of its q × q matrix: weights C⁻¹ b, of covariance C⁻¹, and
+
+    BIC = rᵀ Σ⁻¹ r − aᵀ A⁻¹ a − bᵀ C⁻¹ b + ln |Σ|/|S ⊗ I| + q ln(n k),   a = Jᵀ Σ⁻¹ r.
 
 What the choice among the places costs, `examine_selection` tells.
 
@@ -44,15 +54,98 @@ import numpy as np
 
 from calibration.attribution.refits import INDISTINGUISHABLE
 from calibration.laws.law_model import LEVER, lever_arms
-from calibration.laws.linear_models import LinearFits, LinearModels
 from calibration.laws.places import Place
 from calibration.laws.readings import EXPONENTS, logarithms, noted_values, parameter_of
 from calibration.statistics.fit import Fit
+from calibration.statistics.gls import Gls, eliminated, solved
 from calibration.statistics.statistical_model import changes, precisions
 from calibration.swimmer.swimmer import SwimmerModel
 from sim.arrays import Flags, Floats, Integers
 from sim.effects import catalogue, effect_named
 from sim.model.power_law import STEEPEST
+
+_AT_ONCE = 25  # residuals
+_PASSES = 3  # iterations for the scatter of the sessions
+_ABSORBED = 1e-6  # of a column's square, added to it: what is left of one that others explain is rounding
+
+
+@dataclass(frozen=True)
+class LinearFits:
+    """All models fitted to B residuals; M models, P places with v columns."""
+
+    gain: Floats  # (B, M) BIC of the model without a place less that with it
+    weights: Floats  # (B, M, v) of the place's columns; 0 where the column is not in the model
+    errors: Floats  # (B, M, v) their standard errors; infinite where the column is not in the model
+    share: Floats  # (B, P, k) ρ
+    base_share: Floats  # (B, k) ρ without a place
+
+
+class LinearModels:
+    """The columns of a search, which stay the same for every residual."""
+
+    def __init__(
+        self,
+        absorbed: Floats,
+        precision: Floats,
+        columns: Floats,
+        models: Sequence[tuple[int, tuple[int, ...]]],
+        session: Integers,
+        repeated: Integers | Floats,
+        *,
+        scale: Floats | None = None,
+        further: Sequence[int] = (),
+    ):
+        """Multiply the columns with each other.
+
+        Args:
+            absorbed: J, (n, k, p).
+            precision: 1/σ² of their priors, 0 for those that are free, (p,).
+            columns: (n, k, P, v) of P places.
+            models: place and columns of each.
+            session: (n,) numbers of the runs' sessions.
+            repeated: what tells repeats, see `Runs.repeats`.
+            scale: (n,) roots of the weights of the runs; default 1.
+            further: parameters that a model has beside its columns; default none.
+        """
+        self.columns, self.models = columns, tuple(models)
+        self.p, (self._places, self._count) = absorbed.shape[-1], columns.shape[2:]
+        table = np.concatenate([absorbed, columns.reshape(*columns.shape[:2], -1)], -1)
+        self.design = Gls(table, precision, session, scale, repeated)
+        self._further = np.array(further if len(further) else [0] * len(self.models))
+
+    def fit(self, residuals: Floats) -> LinearFits:
+        """Fit all models to residuals (B, n, k) from the parameters as given."""
+        parts = [self._fit(residuals[i : i + _AT_ONCE]) for i in range(0, len(residuals), _AT_ONCE)]
+        return LinearFits(*(np.concatenate([getattr(part, f) for part in parts]) for f in vars(parts[0])))
+
+    def _fit(self, residual: Floats) -> LinearFits:
+        p, own, absorbed = self.p, np.arange(self._count), list(range(self.p))
+        products = self.design.products(residual)
+        base = products.take(np.array([[*absorbed, -1]]))
+        base_share = base.share(passes=_PASSES)
+        without = eliminated(base.at(base_share), p)[..., 0, 0] + base.determinant(base_share)  # (B, 1)
+        firsts = range(p, p + self._places * self._count, self._count)
+        places = products.take(np.array([[*absorbed, *(first + own), -1] for first in firsts]))
+        share = places.share(passes=_PASSES)
+        normal, determinant = places.at(share), places.determinant(share)
+        left = eliminated(normal, p)  # (B, P, v + 1, v + 1)
+        left[..., own, own] += _ABSORBED * normal[..., p + own, p + own]
+        shape = len(residual), len(self.models)
+        gain, weights = np.empty(shape), np.zeros((*shape, self._count))
+        errors = np.full_like(weights, np.inf)
+        for q in sorted({len(chosen) for _, chosen in self.models}):
+            which = np.array([i for i, (_, chosen) in enumerate(self.models) if len(chosen) == q])
+            place, chosen = (np.array([self.models[i][part] for i in which]) for part in (0, 1))
+            at = np.column_stack([chosen, np.full(len(which), -1)])
+            of_models = left[:, place[:, None, None], at[:, :, None], at[:, None, :]]  # (B, models, q + 1, q + 1)
+            step, covariance = solved(of_models)
+            deviance = of_models[..., -1, -1] - (step * of_models[..., :-1, -1]).sum(-1) + determinant[:, place]
+            price = (q + self._further[which]) * math.log(residual[0].size)
+            gain[:, which] = without - deviance - price
+            weights[:, which[:, None], chosen] = step
+            errors[:, which[:, None], chosen] = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+        return LinearFits(gain, weights, errors, share, base_share[:, 0])
+
 
 _POWERS_AT_START = 2.0  # largest exponent with which a fit starts
 _MOST_INPUTS = 3  # of one law
@@ -246,45 +339,26 @@ class Selection:
 
 def examine_selection(search: Search, *, seed: int) -> Selection:
     """Draw tables without and with laws, and run the whole search on each; `seed` of the draws."""
-    draws = _Draws(search, np.random.default_rng(seed))
-    null = search.models.fit(draws.noise(np.full(_NULL_DRAWS, search.fits.base_share[0])))
-    as_large = int(np.count_nonzero(null.gain.max(1) >= search.fits.gain.max()))
+    rng, models, fits = np.random.default_rng(seed), search.models, search.fits
+    run = models.design.noise(search.residual)
+    null = models.fit(models.design.draw(rng, run, np.tile(fits.base_share, (_NULL_DRAWS, 1))))
+    as_large = int(np.count_nonzero(null.gain.max(1) >= fits.gain.max()))
     largest = np.abs(null.weights / null.errors).max((1, 2))
-    gains = search.models.fit(draws.with_laws(_LAW_DRAWS)).gain
+    best: Integers = search.best(fits.gain)[0]
+    gain = fits.gain[0, best]
+    probability = np.exp((gain - gain.max()) / 2)
+    true = rng.choice(best, _LAW_DRAWS, p=probability / probability.sum())  # the law of each table
+    place = np.array([models.models[m][0] for m in true])
+    law = np.einsum("nkbv,bv->bnk", models.columns[:, :, place], fits.weights[0, true])
+    gains = models.fit(law + models.design.draw(rng, run, fits.share[0, place])).gain
     of_places = np.take_along_axis(gains, search.best(gains), 1)  # (tables, names)
     behind = of_places.max(1)[:, None] - of_places
+    first, near = (dict(zip(search.names, chosen.mean(0).tolist(), strict=True))
+                   for chosen in (behind == 0, behind < INDISTINGUISHABLE))  # fmt: skip
     return Selection(
         p_value=(1 + as_large) / (1 + _NULL_DRAWS),
-        first=_shares(search, behind == 0),
-        near=_shares(search, behind < INDISTINGUISHABLE),
+        first=first,
+        near=near,
         widest=float(np.quantile(largest, _COVERED)),
-        models=dict(Counter(len(chosen) for _, chosen in search.models.models)),
+        models=dict(Counter(len(chosen) for _, chosen in models.models)),
     )
-
-
-def _shares(search: Search, chosen: Floats) -> dict[str, float]:
-    """Compute the share of tables (tables, names) in which each place is chosen."""
-    return dict(zip(search.names, chosen.mean(0).tolist(), strict=True))
-
-
-class _Draws:
-    """Residuals of drawn tables, from the parameters as given."""
-
-    def __init__(self, search: Search, rng: np.random.Generator):
-        self._search, self._rng = search, rng
-        self._run = search.models.without.noise(search.residual)
-
-    def noise(self, share: Floats) -> Floats:
-        """Draw tables without a law, (B, n, k), with ρ of each (B,)."""
-        return self._search.models.without.draw(self._rng, self._run, share[:, None])
-
-    def with_laws(self, count: int) -> Floats:
-        """Draw tables with the best law of a place, which is drawn by its probability, (B, n, k)."""
-        search = self._search
-        best: Integers = search.best(search.fits.gain)[0]
-        gain = search.fits.gain[0, best]
-        probability = np.exp((gain - gain.max()) / 2)
-        model = self._rng.choice(best, count, p=probability / probability.sum())
-        place = np.array([search.models.models[m][0] for m in model])
-        law = np.einsum("nkbv,bv->bnk", search.models.columns[:, :, place], search.fits.weights[0, model])
-        return np.asarray(law + self.noise(search.fits.share[0, model]))

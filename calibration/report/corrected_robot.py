@@ -33,16 +33,14 @@ from typing import Any
 
 import numpy as np
 
-from calibration.laws.law import Law
 from calibration.laws.law_model import LEVER, SIZE
+from calibration.laws.laws import Law
 from calibration.laws.readings import EXPONENTS
-from calibration.statistics.held_out import FinalRefit, refit_to_all
 from calibration.statistics.statistical_model import Parameters
-from calibration.swimmer.candidate_effects import CURRENT
+from calibration.statistics.study import FinalRefit, refit_to_all
 from calibration.swimmer.head_correction import HeadCorrection
-from calibration.swimmer.nuisance_numbers import LENGTH
+from calibration.swimmer.influences import CURRENT, LENGTH
 from calibration.swimmer.swimmer import robot_numbers
-from calibration.verdict.verdict import LearntCorrection
 from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge, knowledge_toml
 from sim.arrays import Flags, Floats
 from sim.effects import catalogue
@@ -114,7 +112,7 @@ def calibration_knowledge(
     )
 
 
-def corrected_toml(robot: Robot, final: FinalRefit, learnt: LearntCorrection | None = None) -> str:
+def corrected_toml(robot: Robot, final: FinalRefit, learnt: HeadCorrection | None = None) -> str:
     """Write corrected.toml, with the correction that was `learnt` where nothing explains the runs."""
     return as_toml(*handed_on(robot, final, learnt))
 
@@ -125,12 +123,12 @@ def as_toml(robot: Robot, known: CalibrationKnowledge) -> str:
 
 
 def handed_on(
-    robot: Robot, final: FinalRefit, learnt: LearntCorrection | None = None
+    robot: Robot, final: FinalRefit, learnt: HeadCorrection | None = None
 ) -> tuple[Robot, CalibrationKnowledge]:
     """Return the corrected robot and what is known about it, see `corrected_toml`."""
     corrected = corrected_robot(robot, final.parameters)
     known = calibration_knowledge(robot, final)
-    if isinstance(learnt, HeadCorrection):
+    if learnt:
         known = _with_correction(known, learnt, corrected)
         corrected = replace(corrected, correction=learnt.correction)
     return significant(corrected, known), known

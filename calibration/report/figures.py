@@ -14,7 +14,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLoca
 from calibration.attribution.nearest import Nearest
 from calibration.attribution.refits import UNSEEN
 from calibration.laws.curves import Curve
-from calibration.laws.law import Dependence
+from calibration.laws.laws import Dependence
 from calibration.laws.places import Place
 from calibration.report.path_error import WORDS, Model, PathError
 from calibration.statistics.residual_tests import Misfit
@@ -43,10 +43,10 @@ def compared(result: Verdict) -> list[tuple[str, Floats]]:
     models = [("calibrated", result.base.prediction)]
     if final := final_model(result.verdict, result.nearest, result.effects):
         models.append((final, result.final.prediction))
-    elif result.described and result.corrections.law is not None:
-        models.append(("with the law in corrected.toml", result.corrections.law.prediction))
-    elif result.corrections.learnt is not None:
-        models.append(("with the correction in corrected.toml", result.corrections.learnt.prediction))
+    elif result.described and result.law is not None:
+        models.append(("with the law in corrected.toml", result.law.prediction))
+    elif result.learnt is not None:
+        models.append(("with the correction in corrected.toml", result.learnt.prediction))
     return models
 
 
@@ -67,7 +67,7 @@ def plot_summary(axes: Axes, result: Verdict) -> None:
     models = compared(result)
     height = 0.7 / len(models)
     for i, ((label, prediction), colour) in enumerate(zip(models, (ORANGE, GREEN), strict=False)):
-        rms = np.sqrt(((data.y - prediction)[result.conditions.split.fitted] ** 2).mean(0)) / noise
+        rms = np.sqrt(((data.y - prediction)[result.split.fitted] ** 2).mean(0)) / noise
         axes.barh(
             place + height * ((len(models) - 1) / 2 - i), rms, height=0.9 * height, color=colour, label=label
         )
@@ -79,7 +79,7 @@ def plot_summary(axes: Axes, result: Verdict) -> None:
 
 def draw_residuals(result: Verdict) -> list[tuple[Figure, str]]:
     """Draw measured minus model against a setting, a figure for each model; return each with its model."""
-    data, used = result.runs, result.conditions.split.fitted
+    data, used = result.runs, result.split.fitted
     residuals = {label: (data.y - prediction)[used] for label, prediction in compared(result)}
     limits = 1.1 * np.max([np.abs(residual).max(0) for residual in residuals.values()], 0)
     return [(_draw_residual(residual, limits, used, data), label) for label, residual in residuals.items()]
@@ -122,11 +122,11 @@ def _name_kinds(axes: Axes, kinds: Sequence[str]) -> None:
 
 def draw_maps(result: Verdict) -> list[tuple[Figure, str]]:
     """Draw z of every output along every feature of the inputs, a figure for each model; each with its model."""
-    maps = [("calibrated", result.evidence.misfit)]
+    maps = [("calibrated", result.found.misfit)]
     if result.explaining and result.explaining[0].refit_misfit is not None:
         final = final_model(result.verdict, result.nearest, result.effects)
         maps.append((final, result.explaining[0].refit_misfit))
-    limit = max(4.0, float(np.abs(result.evidence.misfit.scores.shapes).max(initial=0.0)))
+    limit = max(4.0, float(np.abs(result.found.misfit.scores.shapes).max(initial=0.0)))
     return [(_draw_map(misfit, result.runs.outputs, limit), label) for label, misfit in maps]
 
 
@@ -170,9 +170,9 @@ def draw_sizes(nearest: Nearest) -> Figure:
 def draw_evidence(result: Verdict) -> Figure:
     """Draw the score of every effect that these runs can show, with the critical score; what explains is green."""
     named = {name for c in result.explaining for name in (e.name for e in c.claimed)}
-    seen = [c for c in result.evidence.candidates if c.detectable < UNSEEN]
+    seen = [c for c in result.found.candidates if c.detectable < UNSEEN]
     ranked = sorted(seen, key=lambda c: abs(c.z))
-    critical = result.evidence.misfit.critical_z
+    critical = result.found.misfit.critical_z
     figure = Figure(figsize=(_WIDTH, 0.7 + 0.36 * len(ranked)))
     axes = figure.add_subplot()
     limit = 1.15 * max([critical, *(abs(c.z) for c in ranked)])

@@ -11,9 +11,8 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from calibration.attribution.refits import IMITABLE, SURE
-from calibration.laws.law import dependences
-from calibration.laws.law_fits import Laws
 from calibration.laws.law_model import LEVER
+from calibration.laws.laws import Laws, dependences
 from calibration.report.figures import (
     draw_dependences,
     draw_evidence,
@@ -27,7 +26,6 @@ from calibration.report.figures import (
 from calibration.report.path_error import PathError
 from calibration.statistics.fit import WRONG
 from calibration.verdict.next_runs import STOP
-from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
 from calibration.words.render import rendered
 from sim.arrays import Flags
@@ -43,11 +41,11 @@ _LAW = (
 Drawn = tuple[Figure, str, str]  # with a description and a caption
 
 
-def write_report(result: Verdict, out: str | Path, *, title: str, paths: Sequence[PathError] = ()) -> None:
-    """Write report.html, with a section on the errors on `paths` where there are some."""
-    record = verdict_record(result, table=title)
-    record["path"] = {error.wanted.words: error.record() for error in paths}
-    page = Page(f"Calibration: {title}", record["sentence"])
+def write_report(
+    result: Verdict, record: Mapping[str, Any], out: str | Path, *, paths: Sequence[PathError] = ()
+) -> None:
+    """Write report.html from a verdict and its record, with the figures of the errors on `paths`."""
+    page = Page(f"Calibration: {record['table']}", record["sentence"])
     page.add(sections(record, _figures(result, paths)))
     page.write(out, f"code {code_version()}; fixed before the data was looked at: {record['fixed_before']}")
 
@@ -86,8 +84,8 @@ def _figures(result: Verdict, paths: Sequence[PathError]) -> dict[str, list[Draw
     if result.nearest and result.nearest.sizes:
         words = f"size of {result.nearest.effect.title} for each specimen"
         figures["sizes"] = [(draw_sizes(result.nearest), words, "")]
-    if isinstance(laws := result.corrections.law, Laws):
-        figures |= figures_of_laws(laws, result.conditions.split.fitted)
+    if result.law:
+        figures |= figures_of_laws(result.law, result.split.fitted)
     return figures
 
 

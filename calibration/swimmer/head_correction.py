@@ -20,9 +20,8 @@ import numpy as np
 
 from calibration.statistics.fit import Fit
 from calibration.statistics.gls import Gls, Noise, solved
-from calibration.statistics.held_out import errors
 from calibration.statistics.residual_regression import select_forward
-from calibration.statistics.study import Split, groups, leave_one_group_out
+from calibration.statistics.study import Split, errors, groups, leave_one_group_out
 from calibration.swimmer.swimmer import SwimmerModel
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError

@@ -12,7 +12,7 @@ that were made together. Without it, all runs of one N are one session. `robot` 
 has several. Some effects need elapsed_min,
 temperature_C, tank_diameter_cm or course_deg (direction of the path in the lab, where a run is a part of a
 circle). Rows that cannot be used are excluded with number and reason, and so are copies of rows
-(`calibration.swimmer.copied_rows`), and rows that lack a note which nearly all others have. Columns without any
+(`find_copies`), and rows that lack a note which nearly all others have. Columns without any
 value are left out, notes that many rows lack, and columns of other names, unless the name looks like a misspelt
 one.
 
@@ -25,13 +25,23 @@ Which runs are fitted and which are held out for the test is fixed before the da
 session   one whole session is held out, the middle one by name, so that no extrapolation is needed;
 paper     as in the paper: C_t, C_r, C_yr from ω_h and ω_yr of the robots with 3 and 4 tails, prediction for 2 and
           5 tails. The errors of the paper's predictions are 14.8 % and 10 %.
+
+**Copies.** A copied row is no repeat, and makes the noise look smaller than it is. Two measurements under one
+condition differ by noise. An output that is recorded in steps d, with standard deviation s between repeats, is
+equal in two of them with probability
+
+    p = d / (2 √π s),   at most 1,
+
+the density of their difference at 0, times d. A row whose outputs all equal those of an earlier row of the same
+condition is a copy if less than `_CHANCE` such pairs are expected in the whole table: (pairs of repeats) × ∏ p.
+Outputs in coarse steps may agree by chance, and their rows are kept. Outputs are taken as independent.
 """
 
 from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -41,8 +51,7 @@ import pandas as pd
 from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs
 from calibration.statistics.study import divided, middle_session
-from calibration.swimmer.copied_rows import find_copies
-from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, TACHOMETER
+from calibration.swimmer.influences import CAMERA, HEADING, TACHOMETER
 from sim.arrays import Flags, Floats, Integers
 from sim.inputs import RUN as INPUTS
 from sim.inputs import RUN_SYNONYMS as SYNONYMS
@@ -390,3 +399,48 @@ def _paper(data: Measurements) -> tuple[Measurements, Flags]:
 
 
 PROTOCOLS: dict[str, Callable[[Measurements], tuple[Measurements, Flags]]] = {"session": _session, "paper": _paper}
+
+
+_CHANCE = 0.01  # equal pairs that are expected by chance
+_ROUNDING = 1e-9  # relative difference below which two numbers are one, converted from another unit
+_TYPICAL = 0.01  # relative standard deviation that is assumed where no repeats but copies are left
+
+
+def find_copies(inputs: Floats, outputs: Floats) -> dict[int, int]:
+    """Find copied rows: place -> place of the row that it repeats.
+
+    Args:
+        inputs: (n, q) what was set.
+        outputs: (n, k) what was measured.
+    """
+    first: dict[tuple[float, ...], int] = {}
+    copies = {}
+    for place, row in enumerate(np.column_stack([inputs, outputs]).tolist()):
+        earlier = first.setdefault(tuple(row), place)
+        if earlier != place:
+            copies[place] = earlier
+    if not copies:
+        return {}
+    condition = np.unique(inputs, axis=0, return_inverse=True)[1].reshape(-1)
+    sizes = np.bincount(condition)
+    pairs = float((sizes * (sizes - 1) / 2).sum())
+    kept = np.ones(len(inputs), dtype=bool)
+    kept[list(copies)] = False
+    chance = math.prod(_equal(outputs[kept, i], condition[kept].tolist()) for i in range(outputs.shape[1]))
+    return copies if pairs * chance < _CHANCE else {}
+
+
+def _equal(values: Floats, condition: Sequence[int]) -> float:
+    """Estimate the probability that two repeats of an output (n,) are equal."""
+    distinct = np.unique(values)
+    gaps = np.diff(distinct)
+    gaps = gaps[gaps > _ROUNDING * np.abs(distinct[1:])]
+    if not len(gaps):
+        return 1.0
+    groups: dict[int, list[float]] = {}
+    for place, value in zip(condition, values.tolist(), strict=True):
+        groups.setdefault(place, []).append(value)
+    square = sum(((np.array(group) - np.mean(group)) ** 2).sum() for group in groups.values())
+    repeats = len(values) - len(groups)
+    scatter = math.sqrt(square / repeats) if repeats else _TYPICAL * float(np.median(np.abs(values)))
+    return min(1.0, float(gaps.min()) / (2 * math.sqrt(math.pi) * scatter)) if scatter else 1.0

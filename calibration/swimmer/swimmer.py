@@ -18,28 +18,26 @@ import numpy as np
 
 from calibration.statistics.gls import Noise, repeat_covariance
 from calibration.statistics.statistical_model import Parameter, Parameters, Value, by_differences
-from calibration.swimmer.candidate_effects import (
-    CURRENT,
-    SLIP,
-    TRACKED_POINT,
-    Influence,
-    influences,
-    is_odd,
-    reason_untestable,
-    stated_influence,
-)
-from calibration.swimmer.measured_table import Measurements
-from calibration.swimmer.nuisance_numbers import (
+from calibration.swimmer.influences import (
     CAMERA,
     COURSE,
+    CURRENT,
     GROUPS,
     HEADING,
     LENGTH,
     POWERS,
+    SLIP,
     TACHOMETER,
+    TRACKED_POINT,
+    Influence,
+    influences,
+    is_odd,
     nuisance_parameters,
+    reason_untestable,
     robot_number,
+    stated_influence,
 )
+from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.observation import Observation
 from calibration.swimmer.possible_runs import Owned, check_inputs, check_outputs, check_owned, possible_settings
 from sim.arrays import Flags, Floats, Integers

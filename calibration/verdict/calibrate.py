@@ -8,14 +8,14 @@
    of every effect unless it would be far outside its prior (`calibration.attribution.wrong_numbers`). Single
    effects (`calibration.attribution.refits`), effects beside a wrong number, and pairs follow, each only if
    nothing before explains the residual.
-4. The verdict (`calibration.verdict.verdict.reach_verdict`).
+4. The verdict (`calibration.verdict.verdict.Explained`).
 5. If several explanations are left, next runs that would tell them apart (`calibration.verdict.next_runs`).
    If nothing explains the residual, laws that describe it (`describe`). Where none does, the nearest form is
    adopted (`calibration.attribution.nearest`), and a correction of what is left is handed on for steering. If
    something outside the catalogue could imitate what is claimed, laws that fit as well.
 6. Errors on the held-out runs: as given, calibrated, with the effect, with a regression of the residual
    (`calibration.statistics.residual_regression`), and from noise alone. Whether the held-out runs agree with the
-   final model (`calibration.statistics.held_out`).
+   final model (`calibration.statistics.study`).
 7. For use, the model is fitted once more to all runs, the held-out ones included.
 """
 
@@ -26,18 +26,18 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from typing import Any, TypeVar, cast
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
-from calibration.attribution.claim_checks import NumberCheck, check_number, with_checks
+from calibration.attribution.claim_checks import check_number, with_checks
 from calibration.attribution.moves import Move, StatedMove, find_moves, groups_that_may_differ
-from calibration.attribution.nearest import Nearest, adopt_nearest
+from calibration.attribution.nearest import adopt_nearest
 from calibration.attribution.refits import (
     FIRST,
     INDISTINGUISHABLE,
-    Candidate,
+    Rival,
     coefficients_within_range,
     ebic,
     examine,
@@ -54,27 +54,24 @@ from calibration.attribution.wrong_numbers import (
     without_wrong_priors,
 )
 from calibration.statistics.budget import Budget, limited, seconds_left
-from calibration.statistics.fit import Fit, Pull, fit, profile_intervals
-from calibration.statistics.held_out import (
-    FinalRefit,
-    error_interval,
-    errors,
-    final_refit,
-    held_out_p_value,
-    refit_to_all,
-)
-from calibration.statistics.residual_regression import regress_residual
-from calibration.statistics.residual_tests import Directions, Misfit, directions, examine_residual
+from calibration.statistics.fit import Fit, fit, profile_intervals
+from calibration.statistics.residual_regression import Regression, regress_residual
+from calibration.statistics.residual_tests import directions, examine_residual
 from calibration.statistics.shifted import Shifted
 from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values
 from calibration.statistics.study import (
     DRAWS,
     LEVEL,
+    FinalRefit,
     Split,
     Study,
     caveat_of_excluded,
-    count_of_rows,
+    error_interval,
+    errors,
+    final_refit,
     find_outliers,
+    held_out_p_value,
+    refit_to_all,
     split_runs,
 )
 from calibration.statistics.weights import (
@@ -84,27 +81,18 @@ from calibration.statistics.weights import (
     noise_of_any_run,
     rows_of_little_weight,
 )
-from calibration.verdict.next_runs import Rival, next_runs
-from calibration.verdict.sequential_test import Explanation
-from calibration.verdict.verdict import (
-    Conditions,
-    Corrections,
-    Describe,
-    Evidence,
-    Fits,
-    HeldOutErrors,
-    LearntCorrection,
-    Next,
-    Verdict,
-    reach_verdict,
-)
+from calibration.verdict.next_runs import Explanation, next_runs
+from calibration.verdict.verdict import Explained, HeldOutErrors, Verdict
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError
 from sim.io.provenance import fingerprint
 
+if TYPE_CHECKING:
+    from calibration.laws.laws import Laws
+    from calibration.swimmer.head_correction import HeadCorrection
+
 _SEARCH, _DESCRIBED = 0.6, 0.85  # shares of the time after which effects and descriptions are no longer looked for
 _SHARE_OF_TEST = 0.2  # of the time of the first tests, for those of what an effect leaves, with fewer draws
-_LAWS_TOLD_APART = 3  # beside a claim; the more there are, the fewer runs tell all of them apart
 
 Subject = TypeVar("Subject", bound=Experiment)
 
@@ -113,8 +101,8 @@ def calibrate(
     model: Subject,
     *,
     held_out: Flags | None = None,
-    describe: Describe | None = None,
-    correction: Callable[[Subject, Fit, Split], LearntCorrection | None] | None = None,
+    describe: Callable[..., Laws | None] | None = None,
+    correction: Callable[[Subject, Fit, Split], HeadCorrection | None] | None = None,
     level: float = LEVEL,
     seed: int = 0,
     draws: int = DRAWS,
@@ -127,7 +115,7 @@ def calibrate(
         model: its parameters' starts are the model "as given" (uncalibrated).
         held_out: (n,) runs kept for the test, whole sessions; default `study.middle_session`.
         describe: looks for laws where nothing explains the residual, and beside an uncertain claim, such as
-            `calibration.laws.law_fits.find_laws`.
+            `calibration.laws.laws.find_laws`.
         correction: learns a correction of the calibrated model where nothing explains the residual and no law
             describes it, such as `calibration.swimmer.head_correction.learn_head_correction`.
         level: α of every claim.
@@ -141,77 +129,58 @@ def calibrate(
     study, base, uncalibrated = first_fit(model, held_out, level=level, seed=seed, draws=draws, progress=progress)
     model, split = cast(Subject, study.model), study.split
     used = time.process_time() - began
+    laws, learnt = None, None
     with limited(_DESCRIBED * max_seconds - used) as budget:
         with limited(_SEARCH * max_seconds - used):
-            study, explained, moves = _explain_with_moves(study, base)
-        evidence = Evidence(
-            misfit=explained.misfit,
-            draws=draws,
-            candidates=explained.candidates,
-            explaining=explained.best,
-            rival_effects=explained.rival_effects,
-            rival_numbers=explained.rival_numbers,
-            number_check=explained.number_check,
-            untestable=dict(model.untestable),
-        )
-        verdict = reach_verdict(evidence, level, number_explains=explained.number is not None)
-        unexplained, uncertain = verdict == "unexplained", any(c.uncertain for c in explained.best)
-        description = None
+            study, found, moves = _explain_with_moves(study, base)
+        unexplained, uncertain = found.verdict(level) == "unexplained", any(c.uncertain for c in found.best)
         if describe and study.model is model and (unexplained or uncertain):
-            description = describe(study, explained.base, beside_claim=uncertain)
-        described = unexplained and description is not None and description.complete
-        steered = unexplained and not described
-        if steered:
-            nearest = adopt_nearest(
-                study, explained.base, explained.misfit, explained.candidates, explained.tangents
-            )
-            explained = replace(explained, nearest=nearest)
-            verdict = "partial" if nearest else verdict
-        learnt = correction(model, _of_runs(study, explained), split) if correction and steered else None
-        of_all, moves_of_all = _fit_moves(study, model, explained)
-    fixed = {"level": level, "seed": seed, "catalogue": [e.name for e in model.effects], "locked": split.names}
-    regression = regress_residual(model.runs, explained.base.prediction, split.fitted)
-    corrections = Corrections(regression, learnt, description)
-    laws = description.as_good_as(explained.final) if description and uncertain else ()
-    rivals = (
-        description.rivals if description and described else explained.rivals(cast(Experiment, study.model), laws)
-    )
+            laws = describe(study, found.base, beside_claim=uncertain)
+        described = laws if laws and unexplained and laws.complete else None
+        if unexplained and not described:
+            nearest = adopt_nearest(study, found.base, found.misfit, found.candidates, found.tangents)
+            found = replace(found, nearest=nearest)
+            learnt = correction(model, _of_runs(study, found), split) if correction else None
+        of_all, moves_of_all = _fit_moves(study, model, found)
+    moves, with_moves = (moves_of_all, of_all) if of_all else (moves, found.base)
+    regression = regress_residual(model.runs, found.base.prediction, split.fitted)
+    errors = _errors(study, found, uncalibrated, regression, learnt, laws)
+    falls = errors.rms["after"] < errors.rms["before"]
+    as_good = laws.as_good_as(found.final) if laws and uncertain else ()
+    rivals = described.rivals if described else found.rivals(cast(Experiment, study.model), as_good)
     rivals = tuple(replace(r, fit=replace(r.fit, noise=noise_of_any_run(study, r.fit.noise))) for r in rivals)
-    little = rows_of_little_weight(study)
-    excluded = (*model.runs.excluded, *split.reasons)
-    rows = len(model.runs) + count_of_rows(model.runs.excluded)
-    moves, with_moves = (moves_of_all, of_all) if of_all else (moves, explained.base)
-    held_out_errors = _errors(study, explained, uncalibrated, corrections)
-    falls = held_out_errors.rms["after"] < held_out_errors.rms["before"]
-    refit = final_refit(of_all) if of_all else _handed_on(study, explained, falls=falls, moved=learnt is None)
-    return Verdict(
-        verdict=verdict,
-        evidence=evidence,
-        fits=_fits(study, explained, uncalibrated, refit),
-        errors=held_out_errors,
-        nearest=explained.nearest,
-        moves=tuple(StatedMove(move.words(with_moves), move.record(with_moves)) for move in moves),
-        corrections=corrections,
+    title = "intervals" if progress else ""
+    base_intervals = final_intervals = _intervals(study.model, found.base, split.fitted, title)
+    if found.final is not found.base:
+        final_model = found.nearest.model if found.nearest else study.model
+        final_intervals = _intervals(final_model, found.final, split.fitted, title)
+    if found.nearest:
+        final_intervals[found.nearest.effect.name] = found.nearest.interval
+    fixed = {"level": level, "seed": seed, "catalogue": [e.name for e in model.effects], "locked": split.names}
+    verdict = Verdict(
+        verdict=found.verdict(level),
         runs=model.runs,
-        conditions=Conditions(
-            split=split,
-            sessions=model.runs.session_names,
-            not_tried=tuple(budget.not_tried),
-            hash=fingerprint(fixed),
-            excluded=excluded,
-            little_weight=little,
-            rows=rows,
-            caveats=(
-                *model.runs.caveats,
-                *caveat_of_excluded(excluded, rows),
-                *split.caveats,
-                *_caveat_of_time(budget, max_seconds),
-                *caveat_of_weights(little, int(split.kept.sum()), alike(model.runs, little)),
-                *_caveats(model, explained),
-            ),
-        ),
-        next=_next_runs(rivals, seed),
+        split=split,
+        found=found,
+        moves=tuple(StatedMove(move.words(with_moves), move.record(with_moves)) for move in moves),
+        errors=errors,
+        base_intervals=base_intervals,
+        final_intervals=final_intervals,
+        pulls=pulls(found.final, study.model.nuisances),
+        final_refit=final_refit(of_all) if of_all else _handed_on(study, found, falls=falls, moved=learnt is None),
+        regression=regression,
+        learnt=learnt,
+        law=laws,
+        explanations=tuple(map(Explanation.from_rival, rivals)),
+        **_next_runs(rivals, seed),
+        untestable=dict(model.untestable),
+        draws=draws,
+        fixed_before=fingerprint(fixed),
+        little_weight=rows_of_little_weight(study),
+        not_tried=tuple(budget.not_tried),
+        caveats=(),
     )
+    return replace(verdict, caveats=_caveats(verdict, model, budget, max_seconds))
 
 
 def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any) -> tuple[Study, Fit, Floats]:
@@ -228,46 +197,6 @@ def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any)
     model.check(given)
     study = Study(model, split_runs(model.runs, held_out, find_outliers(model.runs, given)), **settings)
     return *fit_weighted(study, model.guess(start, study.split.fitted)), given
-
-
-@dataclass(frozen=True)
-class Explained:
-    """The fit without effects, its residual, and what explains the residual."""
-
-    base: Fit
-    misfit: Misfit  # of the base
-    tangents: Directions  # of the effects
-    candidates: tuple[Candidate, ...]
-    best: tuple[Candidate, ...] = ()  # what explains the residual, best first; more than one: not told apart
-    number: Fit | None = None  # the fit with a wrong nuisance parameter freed, if that explains the residual
-    rival_effects: tuple[Candidate, ...] = ()  # effects that explain as much as the wrong number does
-    rival_numbers: tuple[Pull, ...] = ()  # the wrong numbers, where effects come ahead of them
-    number_check: NumberCheck | None = None  # of the wrong number, where it comes ahead of effects
-    nearest: Nearest | None = None  # the form that is adopted where nothing explains the residual
-    unkept: Fit | None = None  # the best fit with effects, where none explains the residual
-
-    @property
-    def final(self) -> Fit:
-        """The model with the effects of the verdict, with the form that is adopted, or without any."""
-        if self.nearest:
-            return self.nearest.fit
-        if self.best and self.best[0].refit:
-            return self.best[0].refit
-        return self.number or self.base
-
-    def rivals(self, model: Experiment, laws: tuple[Rival, ...]) -> tuple[Rival, ...]:
-        """List explanations that the runs cannot tell apart, best first; none if there are not two.
-
-        Args:
-            laws: that fit as well as the best effect; the first of them come last.
-        """
-        known = [(c.title, c.refit) for c in (*self.best, *self.rival_effects) if c.refit]
-        if self.number and known:
-            wrong = ", ".join(alike[0].parameter.title for alike in self.number.wrong_numbers)
-            number = f"the stated value of {wrong} is wrong", self.number
-            known = [*known, number] if self.best else [number, *known]
-        rivals = (*(Rival(title, refit, model) for title, refit in known), *laws[:_LAWS_TOLD_APART])
-        return rivals if len(rivals) > 1 else ()
 
 
 def _explain_with_moves(study: Study, base: Fit) -> tuple[Study, Explained, tuple[Move, ...]]:
@@ -296,7 +225,7 @@ def _explain_with_moves(study: Study, base: Fit) -> tuple[Study, Explained, tupl
     return study, explained, ()
 
 
-def _fit_moves(study: Study, plain: Experiment, explained: Explained) -> tuple[Fit | None, tuple[Move, ...]]:
+def _fit_moves(study: Study, plain: Experiment, found: Explained) -> tuple[Fit | None, tuple[Move, ...]]:
     """Fit the final model to all runs, the held-out ones included, with the numbers that differ in some of them.
 
     Returns:
@@ -304,7 +233,7 @@ def _fit_moves(study: Study, plain: Experiment, explained: Explained) -> tuple[F
     """
     if not groups_that_may_differ(plain.runs):
         return None, ()
-    final = explained.base if explained.nearest else explained.final
+    final = found.base if found.nearest else found.final
     known = {p.name for p in (*plain.coefficients, *plain.nuisances, *plain.effects)}
     known |= {e.second.name for e in plain.effects if e.second}
     names = tuple(name for name in final.names if name in known)
@@ -313,10 +242,10 @@ def _fit_moves(study: Study, plain: Experiment, explained: Explained) -> tuple[F
     return fitted if moves else None, moves
 
 
-def _of_runs(study: Study, explained: Explained) -> Fit:
+def _of_runs(study: Study, found: Explained) -> Fit:
     """Return the fit that a correction starts from, with the parameters of the model itself, some of every run."""
-    nearest = explained.nearest
-    fitted, model = (nearest.fit, nearest.model) if nearest else (explained.base, study.model)
+    nearest = found.nearest
+    fitted, model = (nearest.fit, nearest.model) if nearest else (found.base, study.model)
     parameters = fitted.parameters
     while isinstance(model, Shifted):
         parameters, model = model.of_runs(parameters), model.inner
@@ -384,28 +313,6 @@ def _duration(seconds: float) -> str:
     return f"{max(seconds, 1):.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
-def _fits(study: Study, explained: Explained, uncalibrated: Floats, refit: FinalRefit) -> Fits:
-    """Add intervals to the fits, and the `refit` to all runs that is handed on."""
-    base, final, used = explained.base, explained.final, study.split.fitted
-    title = "intervals" if study.progress else ""
-    base_intervals = _intervals(study.model, base, used, title)
-    final_intervals = base_intervals
-    if final is not base:
-        model = explained.nearest.model if explained.nearest else study.model
-        final_intervals = _intervals(model, final, used, title)
-    if explained.nearest:
-        final_intervals[explained.nearest.effect.name] = explained.nearest.interval
-    return Fits(
-        uncalibrated=uncalibrated,
-        base=base,
-        base_intervals=base_intervals,
-        final=final,
-        final_intervals=final_intervals,
-        final_refit=refit,
-        pulls=pulls(final, study.model.nuisances),
-    )
-
-
 def _intervals(model: ForwardModel, fitted: Fit, used: Flags, title: str) -> dict[str, tuple[float, float]]:
     """Compute 95 % intervals by profile deviance; by the covariance where the model breaks down at their ends."""
     try:
@@ -414,43 +321,43 @@ def _intervals(model: ForwardModel, fitted: Fit, used: Flags, title: str) -> dic
         return {name: fitted.interval(name) for name in fitted.names}
 
 
-def _handed_on(study: Study, explained: Explained, *, falls: bool, moved: bool) -> FinalRefit:
+def _handed_on(study: Study, found: Explained, *, falls: bool, moved: bool) -> FinalRefit:
     """Fit the final model to all runs, an adopted form only where it lowers the error on the held-out ones."""
-    nearest, final = explained.nearest, explained.final
+    nearest, final = found.nearest, found.final
     if nearest and not falls:
-        nearest, final = None, explained.base
+        nearest, final = None, found.base
     refit = refit_to_all(study.model, final, study.split.kept, moved=moved)
     return nearest.handed_on(refit) if nearest else refit
 
 
-def _next_runs(rivals: tuple[Rival, ...], seed: int) -> Next:
-    """Plan the runs that would tell rivals apart; none if there are no rivals."""
-    if not rivals:
-        return Next()
-    explanations = tuple(map(Explanation.from_rival, rivals))
-    try:
-        return Next(explanations, *next_runs(rivals, seed=seed))
-    except InputError:  # a rival breaks down at runs that could be made
-        return Next(explanations)
+def _next_runs(rivals: tuple[Rival, ...], seed: int) -> dict[str, Any]:
+    """Plan the runs that would tell rivals apart; none without rivals, or if one breaks down at such runs."""
+    with suppress(InputError):
+        if rivals:
+            return dict(zip(("next_runs", "next_batch"), next_runs(rivals, seed=seed), strict=True))
+    return {"next_runs": (), "next_batch": None}
 
 
-def _errors(study: Study, explained: Explained, uncalibrated: Floats, corrections: Corrections) -> HeldOutErrors:
+def _errors(
+    study: Study, found: Explained, uncalibrated: Floats, regression: Regression,
+    learnt: HeadCorrection | None, laws: Laws | None,
+) -> HeldOutErrors:  # fmt: skip
     """State the errors of every model on the held-out runs."""
-    base, final = explained.base, explained.final
+    base, final = found.base, found.final
     runs, test = study.model.runs, study.split.test
     predictions = {
         "uncalibrated": uncalibrated,
         "before": base.prediction,
         "after": final.prediction,
-        "generic": base.prediction + corrections.regression.correction,
+        "generic": base.prediction + regression.correction,
     }
-    if corrections.learnt is not None:
-        predictions["predictive"] = corrections.learnt.prediction
-    if corrections.law is not None:
-        predictions["law"] = corrections.law.prediction
-    if explained.nearest and explained.nearest.sizes:
+    if learnt is not None:
+        predictions["predictive"] = learnt.prediction
+    if laws is not None:
+        predictions["law"] = laws.prediction
+    if found.nearest and found.nearest.sizes:
         with suppress(InputError):  # the simulation may break down at the mean size
-            predictions["new_specimen"] = explained.nearest.of_new_specimen()
+            predictions["new_specimen"] = found.nearest.of_new_specimen()
     stated = {name: errors(runs, prediction, test) for name, prediction in predictions.items()}
     noise = base.noise.run
     return HeldOutErrors(
@@ -462,31 +369,31 @@ def _errors(study: Study, explained: Explained, uncalibrated: Floats, correction
     )
 
 
-def _caveat_of_time(budget: Budget, max_seconds: float) -> tuple[str, ...]:
-    """Say what was not tried because no time was left."""
-    if not budget.not_tried:
-        return ()
+def _caveats(verdict: Verdict, model: ForwardModel, budget: Budget, max_seconds: float) -> tuple[str, ...]:
+    """Say what weakens the conclusion: what was left out or not tried, and why a fit may not be the best one."""
+    runs, split, base, final = verdict.runs, verdict.split, verdict.base, verdict.final
     ended = f"after {max_seconds:.0f} s of processor time" if budget.left > -math.inf else "at Ctrl-C"
-    return (f"provisional: the search ended {ended}, and did not try {', '.join(budget.not_tried)}",)
-
-
-def _caveats(model: ForwardModel, explained: Explained) -> tuple[str, ...]:
-    """Say why a fit may not be the best one."""
-    base, final = explained.base, explained.final
+    not_tried = f"provisional: the search ended {ended}, and did not try {', '.join(budget.not_tried)}"
+    little = verdict.little_weight
     at_bounds = [p.name for p in final.fitted if final.parameters[p.name] in p.bounds]
-    caveats = [f"{name} is at the end of its range: these runs do not determine it" for name in at_bounds]
     vague = [
         p.name
         for place, p in enumerate(final.fitted)
         if p.logarithmic and p.sigma is None and final.half_width(place) > math.log(2) and p.name not in at_bounds
     ]
-    if vague:
-        caveats.append(f"these runs determine {' and '.join(vague)} to no better than a factor of two")
-    if not coefficients_within_range(model, base.parameters):
-        caveats.append(
-            "without effects the coefficients run to the end of their range, so every effect was refitted from "
-            "the model as given, and it is less sure which effect it is"
-        )
-    if not final.converged:
-        caveats.append("the fit did not converge: do not trust its coefficients")
-    return tuple(caveats)
+    outside = not coefficients_within_range(model, base.parameters)
+    of_fits = (
+        (vague, f"these runs determine {' and '.join(vague)} to no better than a factor of two"),
+        (outside, "without effects the coefficients run to the end of their range, so every effect was refitted "
+         "from the model as given, and it is less sure which effect it is"),
+        (not final.converged, "the fit did not converge: do not trust its coefficients"),
+    )  # fmt: skip
+    return (
+        *runs.caveats,
+        *caveat_of_excluded(verdict.excluded, verdict.rows),
+        *split.caveats,
+        *([not_tried] if budget.not_tried else []),
+        *caveat_of_weights(little, int(split.kept.sum()), alike(runs, little)),
+        *(f"{name} is at the end of its range: these runs do not determine it" for name in at_bounds),
+        *(words for holds, words in of_fits if holds),
+    )

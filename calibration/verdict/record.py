@@ -16,7 +16,7 @@ from calibration.attribution.wrong_numbers import notable_gains, notable_pull, o
 from calibration.statistics.fit import Fit, Pull, least_determined
 from calibration.statistics.gls import inverse_root
 from calibration.statistics.statistical_model import Parameter
-from calibration.statistics.study import count_of_rows, summary_of_excluded
+from calibration.statistics.study import count_of_rows
 from calibration.words.render import next_steps, sentence
 from sim.io.provenance import provenance
 from surrogate.domain import COEFFICIENTS
@@ -29,8 +29,8 @@ _REPEATED = 5  # settings that are proposed for repeats where nothing explains t
 _NEAR = 0.5  # share of the residual that the best effect must remove to be named where none explains it
 
 
-def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
-    """Write a verdict as verdict.json has it."""
+def verdict_record(result: Verdict, *, table: str, path: dict[str, Any] | None = None) -> dict[str, Any]:
+    """Write a verdict as verdict.json has it, with the errors on paths."""
     record = facts(result)
     return {
         **{key: record[key] for key in ("verdict", "effects")},
@@ -39,6 +39,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         **record,
         "table": table,
         "provenance": provenance({"table": table}),
+        "path": path,
     }
 
 
@@ -70,9 +71,9 @@ def shown(parameter: Parameter) -> dict[str, Any]:
 
 
 def _fitted(result: Verdict) -> dict[str, Any]:
-    final, refit = result.final, result.fits.final_refit.parameters
+    final, refit = result.final, result.final_refit.parameters
     fitted = {p.name: p for p in (*result.base.fitted, *final.fitted)}
-    intervals = result.fits.final_intervals
+    intervals = result.final_intervals
     return {
         "parameters": {
             name: {
@@ -86,7 +87,7 @@ def _fitted(result: Verdict) -> dict[str, Any]:
         },
         "parameters_without_effects": {
             name: {"value": result.base.parameters[name], "interval": list(interval)}
-            for name, interval in result.fits.base_intervals.items()
+            for name, interval in result.base_intervals.items()
         },
         "least_determined": _least_determined(final),
         "hands_on_a_robot": set(COEFFICIENTS) <= set(result.base.names),
@@ -102,7 +103,7 @@ def _least_determined(final: Fit) -> dict[str, Any] | None:
 
 
 def _claims(result: Verdict) -> dict[str, Any]:
-    evidence, nearest = result.evidence, result.nearest
+    found, nearest = result.found, result.nearest
     return {
         "claims": [
             {"title": c.title, "words": c.words, "effects": [e.name for e in c.claimed]} for c in result.explaining
@@ -111,12 +112,12 @@ def _claims(result: Verdict) -> dict[str, Any]:
         "imitability": [c.imitable for c in result.explaining],
         "transfer_p": [c.transfer for c in result.explaining],
         "imitable": any(c.uncertain for c in result.explaining),
-        "effects_instead": [[e.name for e in c.claimed] for c in evidence.rival_effects],
-        "claims_instead": [c.title for c in evidence.rival_effects],
+        "effects_instead": [[e.name for e in c.claimed] for c in found.rival_effects],
+        "claims_instead": [c.title for c in found.rival_effects],
         "nearest": {**shown(nearest.effect), **nearest.record()} if nearest else None,
         "nearest_candidate": _nearest_candidate(result),
-        "candidates": [_candidate(c) for c in evidence.candidates],
-        "untestable": evidence.untestable,
+        "candidates": [_candidate(c) for c in found.candidates],
+        "untestable": result.untestable,
     }
 
 
@@ -140,25 +141,25 @@ def _candidate(c: Candidate) -> dict[str, Any]:
 
 def _nearest_candidate(result: Verdict) -> dict[str, Any] | None:
     """Find the single effect that removes most of the residual, if one was refitted and removes much."""
-    refits = [(c.refit.deviance, c.effect.title, c.verdict) for c in result.evidence.candidates if c.refit]
+    refits = [(c.refit.deviance, c.effect.title, c.verdict) for c in result.found.candidates if c.refit]
     if not refits:
         return None
     (deviance, title, reason), before = min(refits), result.base.deviance
-    expected = int(result.conditions.split.fitted.sum()) * result.base.prediction.shape[1]
+    expected = int(result.split.fitted.sum()) * result.base.prediction.shape[1]
     share = (before - deviance) / max(before - expected, 1e-9)
     return {"title": title, "removed_share": share, "reason": reason} if share >= _NEAR else None
 
 
 def _numbers(result: Verdict) -> dict[str, Any]:
-    pulls, candidates = result.fits.pulls, result.evidence.candidates
+    pulls, candidates = result.pulls, result.found.candidates
     titles = {p.name: p.title for p in result.base.fitted}
     learnt = [p for p in pulls if p.learnt]
     explained = result.verdict not in ("partial", "unexplained")
     notable = explained and learnt and abs(learnt[0].z) > notable_pull(len(learnt))
     return {
-        "number_check": result.evidence.number_check and result.evidence.number_check.record(),
-        "numbers_instead": [p.parameter.name for p in result.evidence.rival_numbers],
-        "rival_numbers": [_number(p) for p in result.evidence.rival_numbers],
+        "number_check": result.found.number_check and result.found.number_check.record(),
+        "numbers_instead": [p.parameter.name for p in result.found.rival_numbers],
+        "rival_numbers": [_number(p) for p in result.found.rival_numbers],
         "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
         "wrong_number_records": [[_number(p) for p in alike] for alike in result.wrong_numbers],
         "notable_number": learnt[0].words if notable else None,
@@ -202,20 +203,20 @@ def _errors(result: Verdict) -> dict[str, Any]:
         "error_after_interval": list(errors.after_interval),
         "noise_ceiling": errors.noise,
         "errors_by_output": errors.by_output,
-        "locked_test": result.conditions.split.names,
+        "locked_test": result.split.names,
         "locked_p_value": errors.p_value,
         "held_out_runs_agree": result.held_out_runs_agree,
     }
 
 
 def _tests(result: Verdict) -> dict[str, Any]:
-    misfit = result.evidence.misfit
+    misfit = result.found.misfit
     return {
         "p_value": misfit.p_value,
         "p_general": misfit.general_p,
         "p_of_each_test": misfit.p,
         "critical_z": misfit.critical_z,
-        "draws": result.evidence.draws,
+        "draws": result.draws,
         "largest_along": largest_along(misfit, result.runs),
         "largest_departures": _largest_departures(result),
     }
@@ -226,7 +227,7 @@ def _largest_departures(result: Verdict) -> list[dict[str, Any]]:
 
     A departure is the root mean square, over the outputs, of the mean over repeats in its standard deviations.
     """
-    runs, used = result.runs, result.conditions.split.fitted
+    runs, used = result.runs, result.split.fitted
     white = runs.scale[:, None] * (runs.y - result.base.prediction) @ inverse_root(result.base.noise.run).T
     found: dict[tuple[str, ...], float] = {}
     for condition in np.unique(runs.condition[used]):
@@ -239,9 +240,9 @@ def _largest_departures(result: Verdict) -> list[dict[str, Any]]:
 
 
 def _descriptions(result: Verdict) -> dict[str, Any]:
-    learnt, law = result.corrections.learnt, result.corrections.law
+    learnt, law = result.learnt, result.law
     return {
-        "generic_features": list(result.corrections.regression.features),
+        "generic_features": list(result.regression.features),
         "correction_terms": list(learnt.terms) if learnt else [],
         "laws": law.to_dict(result.final if result.explaining else None) if law else None,
         "described": result.described,
@@ -249,22 +250,21 @@ def _descriptions(result: Verdict) -> dict[str, Any]:
 
 
 def _next(result: Verdict) -> dict[str, Any]:
-    plan = result.next
     return {
-        "explanations": [e.record() for e in plan.explanations],
-        "next_runs": [run.record() for run in plan.runs],
-        "next_batch": plan.batch.record() if plan.batch else None,
+        "explanations": [e.record() for e in result.explanations],
+        "next_runs": [run.record() for run in result.next_runs],
+        "next_batch": result.next_batch.record() if result.next_batch else None,
     }
 
 
 def _data(result: Verdict) -> dict[str, Any]:
-    conditions, runs = result.conditions, result.runs
+    runs = result.runs
     scatter = np.sqrt(np.diag(result.base.noise.run)).tolist()
     settings = runs.settings.items()
     return {
         "outputs": list(runs.outputs),
         "number_of_runs": len(runs),
-        "number_of_held_out_runs": int(conditions.split.test.sum()),
+        "number_of_held_out_runs": int(result.split.test.sum()),
         "settings": {name: [float(v.min()), float(v.max()), unit] for name, (v, unit) in settings},
         "drawn_against": [runs.drawn[0], runs.drawn[1][0]],
         "scatter_of_a_run": dict(zip(runs.outputs, scatter, strict=True)),
@@ -272,13 +272,13 @@ def _data(result: Verdict) -> dict[str, Any]:
         "scatter_of_sessions_by_output": dict(
             zip(runs.outputs, np.sqrt(result.final.noise.share).tolist(), strict=True)
         ),
-        "sessions": list(conditions.sessions),
-        "fixed_before": conditions.hash,
-        "rows": conditions.rows,
-        "rows_set_aside": list(conditions.excluded),
-        "number_of_rows_set_aside": count_of_rows(conditions.excluded),
-        "summary_of_rows_set_aside": summary_of_excluded(conditions.excluded, conditions.rows),
-        "rows_of_little_weight": list(conditions.little_weight),
-        "not_tried": list(conditions.not_tried),
-        "limits": list(conditions.caveats),
+        "sessions": list(runs.session_names),
+        "fixed_before": result.fixed_before,
+        "rows": result.rows,
+        "rows_set_aside": list(result.excluded),
+        "number_of_rows_set_aside": count_of_rows(result.excluded),
+        "summary_of_rows_set_aside": result.summary_of_excluded,
+        "rows_of_little_weight": list(result.little_weight),
+        "not_tried": list(result.not_tried),
+        "limits": list(result.caveats),
     }

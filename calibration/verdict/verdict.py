@@ -11,104 +11,87 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING
 
 from calibration.attribution.claim_checks import NumberCheck
 from calibration.attribution.moves import StatedMove
 from calibration.attribution.nearest import Nearest
-from calibration.attribution.refits import Candidate
+from calibration.attribution.refits import Candidate, Rival
 from calibration.attribution.wrong_numbers import wrong_number
 from calibration.statistics.fit import Fit, Pull
-from calibration.statistics.held_out import FinalRefit
 from calibration.statistics.residual_regression import Regression
-from calibration.statistics.residual_tests import Misfit
-from calibration.statistics.statistical_model import Runs
-from calibration.statistics.study import Split, Study, summary_of_excluded
-from calibration.verdict.next_runs import Batch, NextRun, Rival
+from calibration.statistics.residual_tests import Directions, Misfit
+from calibration.statistics.statistical_model import Experiment, Runs
+from calibration.statistics.study import FinalRefit, Split, count_of_rows, summary_of_excluded
+from calibration.verdict.next_runs import Batch, Explanation, NextRun
 from calibration.verdict.record import facts
-from calibration.verdict.sequential_test import Explanation
-from calibration.words.quantities import percent
-from calibration.words.render import sentence
-from sim.arrays import Floats
+from calibration.words.render import errors_in_words, sentence
+
+if TYPE_CHECKING:
+    from calibration.laws.laws import Laws
+    from calibration.swimmer.head_correction import HeadCorrection
 
 _DISAGREES = 0.01  # p of the held-out runs below which they do not agree with the final model
 _LONGEST = 500  # letters of a sentence in a repr
-
-
-class LearntCorrection(Protocol):
-    """A correction that predicts runs that no effect explains."""
-
-    @property
-    def prediction(self) -> Floats:
-        """(n, k), learnt without the held-out runs."""
-        ...
-
-    @property
-    def terms(self) -> tuple[str, ...]:
-        """What it depends on, in words."""
-        ...
-
-
-class Describe(Protocol):
-    """Looks for laws that describe a residual."""
-
-    def __call__(self, study: Study, base: Fit, *, beside_claim: bool) -> Description | None:
-        """Describe what a fit without effects leaves; `beside_claim`: an effect is claimed for it."""
-        ...
-
-
-class Description(Protocol):
-    """Laws that describe runs which no effect explains, or only one that something else could imitate."""
-
-    @property
-    def complete(self) -> bool:
-        """Whether the best law leaves no more than noise."""
-        ...
-
-    @property
-    def prediction(self) -> Floats:
-        """(n, k) of the best law, fitted without the held-out runs; without a law, of the calibrated model."""
-        ...
-
-    @property
-    def rivals(self) -> tuple[Rival, ...]:
-        """Laws that the runs cannot tell apart, best first; none if there are not two."""
-        ...
-
-    def as_good_as(self, claim: Fit) -> tuple[Rival, ...]:
-        """Laws that leave no more than noise and fit as well as a claimed effect, best first."""
-        ...
-
-    def to_dict(self, claim: Fit | None = None) -> dict[str, Any]:
-        """Return the record for verdict.json; beside a claimed effect it has the laws that fit as well."""
-        ...
+_LAWS_TOLD_APART = 3  # beside a claim; the more there are, the fewer runs tell all of them apart
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """The residual of the calibrated model, and what every effect makes of it."""
+class Explained:
+    """The fit without effects, its residual, and what explains the residual."""
 
-    misfit: Misfit  # tests of the residual
-    draws: int  # of its bootstrap
+    base: Fit
+    misfit: Misfit  # of the base
+    tangents: Directions  # of the effects
     candidates: tuple[Candidate, ...]  # all effects of the catalogue
-    explaining: tuple[Candidate, ...]  # what explains the residual, best first; more than one: not told apart
-    rival_effects: tuple[Candidate, ...]  # effects that explain as much as the number that is wrong
-    untestable: dict[str, str]  # effects that these runs cannot test: what is missing
-    rival_numbers: tuple[Pull, ...] = ()  # numbers that explain as much, but would be too far off to come first
+    best: tuple[Candidate, ...] = ()  # what explains the residual, best first; more than one: not told apart
+    number: Fit | None = None  # the fit with a wrong nuisance parameter freed, if that explains the residual
+    rival_effects: tuple[Candidate, ...] = ()  # effects that explain as much as the wrong number does
+    rival_numbers: tuple[Pull, ...] = ()  # the wrong numbers, where effects come ahead of them
     number_check: NumberCheck | None = None  # of the wrong number, where it comes ahead of effects
+    nearest: Nearest | None = None  # the form that is adopted where nothing explains the residual
+    unkept: Fit | None = None  # the best fit with effects, where none explains the residual
 
+    @property
+    def final(self) -> Fit:
+        """The model with the effects of the verdict, with the form that is adopted, or without any."""
+        if self.nearest:
+            return self.nearest.fit
+        if self.best and self.best[0].refit:
+            return self.best[0].refit
+        return self.number or self.base
 
-@dataclass(frozen=True)
-class Fits:
-    """The calibrated model (base), that with the effects of the verdict (final), and its refit to all runs."""
+    def verdict(self, level: float) -> str:
+        """Decide the verdict; this is the rule of the whole calibration.
 
-    uncalibrated: Floats  # (n, k) prediction of the model as given
-    base: Fit  # the calibrated model
-    base_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
-    final: Fit  # that with the effects of the verdict
-    final_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
-    final_refit: FinalRefit  # the final model, fitted to all runs
-    pulls: tuple[Pull, ...]  # of every nuisance parameter in the final model, the farthest first
+        A wrong nuisance parameter comes ahead of every effect that is not better, or it is one of several
+        explanations. Without one, a residual within the noise is "none". Beyond it, the number of explanations
+        that the runs cannot tell apart decides. What new runs say about an "ambiguous" verdict is decided by
+        `calibration.verdict.next_runs.standings`.
+
+        Args:
+            level: α of the residual's p-value.
+        """
+        if self.number and not self.best:
+            return "number"
+        if self.misfit.p_value >= level:
+            return "none"
+        explanations = len(self.best) + bool(self.rival_numbers)
+        return ("partial" if self.nearest else "unexplained", "effect", "ambiguous")[min(explanations, 2)]
+
+    def rivals(self, model: Experiment, laws: tuple[Rival, ...]) -> tuple[Rival, ...]:
+        """List explanations that the runs cannot tell apart, best first; none if there are not two.
+
+        Args:
+            laws: that fit as well as the best effect; the first of them come last.
+        """
+        known = [(c.title, c.refit) for c in (*self.best, *self.rival_effects) if c.refit]
+        if self.number and known:
+            wrong = ", ".join(alike[0].parameter.title for alike in self.number.wrong_numbers)
+            number = f"the stated value of {wrong} is wrong", self.number
+            known = [*known, number] if self.best else [number, *known]
+        rivals = (*(Rival(title, refit, model) for title, refit in known), *laws[:_LAWS_TOLD_APART])
+        return rivals if len(rivals) > 1 else ()
 
 
 @dataclass(frozen=True)
@@ -127,64 +110,6 @@ class HeldOutErrors:
     p_value: float  # agreement of the held-out runs with the final model
 
 
-@dataclass(frozen=True)
-class Corrections:
-    """Descriptions of the residual that do not explain it."""
-
-    regression: Regression  # of the calibrated model's outputs
-    learnt: LearntCorrection | None  # what is handed on where nothing explains or describes the residual
-    law: Description | None = None  # laws, where they were looked for
-
-
-@dataclass(frozen=True)
-class Next:
-    """Explanations that the runs cannot tell apart, and the runs that would; none if there are not two."""
-
-    explanations: tuple[Explanation, ...] = ()  # best first
-    runs: tuple[NextRun, ...] = ()  # single settings, the best first
-    batch: Batch | None = None  # the same, for several runs together
-
-
-@dataclass(frozen=True)
-class Conditions:
-    """What was fixed before the runs were looked at, and what weakens the conclusion."""
-
-    split: Split  # fitted and held-out runs
-    sessions: tuple[str, ...]  # names of all sessions
-    hash: str  # of everything that was fixed
-    excluded: tuple[str, ...]  # rows and columns that were not used, and why
-    rows: int  # of the table, used or not
-    caveats: tuple[str, ...]  # what weakens the conclusion, in words
-    not_tried: tuple[str, ...] = ()  # because no time was left; such a verdict is provisional
-    little_weight: tuple[int, ...] = ()  # rows of the table whose runs have less than half of the usual weight
-
-    @property
-    def summary_of_excluded(self) -> list[str]:
-        """What was excluded, by reason, with the number of rows."""
-        return summary_of_excluded(self.excluded, self.rows)
-
-
-def reach_verdict(evidence: Evidence, level: float, *, number_explains: bool) -> str:
-    """Decide the verdict; this is the rule of the whole calibration.
-
-    A wrong nuisance parameter comes ahead of every effect that is not better, or it is one of several explanations
-    (`Evidence.rival_numbers`). Without one, a residual within the noise is "none". Beyond it, the number of
-    explanations that the runs cannot tell apart decides. What new runs say about an "ambiguous" verdict is decided
-    by `calibration.verdict.sequential_test.standings`. An "unexplained" verdict becomes "partial" where a form is
-    adopted.
-
-    Args:
-        level: α of the residual's p-value.
-        number_explains: whether a wrong nuisance parameter explains the residual.
-    """
-    if number_explains and not evidence.explaining:
-        return "number"
-    if evidence.misfit.p_value >= level:
-        return "none"
-    explanations = len(evidence.explaining) + bool(evidence.rival_numbers)
-    return ("unexplained", "effect", "ambiguous")[min(explanations, 2)]
-
-
 @dataclass(frozen=True, repr=False)
 class Verdict:
     """What runs say about a model; made by `softflagella.calibrate`.
@@ -195,16 +120,28 @@ class Verdict:
         'No effect is missing that these runs can show (p = 0.43).'
     """
 
-    verdict: str  # "none", "number", "effect", "ambiguous", "partial", "unexplained"; see `reach_verdict`
-    evidence: Evidence  # the residual, and what explains it
-    fits: Fits  # the fitted models
-    errors: HeldOutErrors  # on the held-out runs
-    corrections: Corrections  # descriptions of the residual
-    next: Next  # runs to make next
-    conditions: Conditions  # what was fixed before the fit
-    nearest: Nearest | None  # the form that is adopted, of a partial verdict
-    moves: tuple[StatedMove, ...]  # numbers that differ in some runs
+    verdict: str  # "none", "number", "effect", "ambiguous", "partial", "unexplained"; see `Explained.verdict`
     runs: Runs  # that were calibrated with
+    split: Split  # fitted and held-out runs
+    found: Explained  # the residual, and what explains it
+    moves: tuple[StatedMove, ...]  # numbers that differ in some runs
+    errors: HeldOutErrors  # on the held-out runs
+    base_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
+    final_intervals: dict[str, tuple[float, float]]  # the same, of the final model
+    pulls: tuple[Pull, ...]  # of every nuisance parameter in the final model, the farthest first
+    final_refit: FinalRefit  # the final model, fitted to all runs
+    regression: Regression  # of the residual, for comparison
+    learnt: HeadCorrection | None  # the correction that is handed on where nothing explains or describes it
+    law: Laws | None  # laws, where they were looked for
+    explanations: tuple[Explanation, ...]  # that the runs cannot tell apart, best first; none if there are not two
+    next_runs: tuple[NextRun, ...]  # single settings that would, the best first
+    next_batch: Batch | None  # the same, for several runs together
+    untestable: dict[str, str]  # effects that these runs cannot test: what is missing
+    draws: int  # of the bootstrap
+    fixed_before: str  # hash of what was fixed before the runs were looked at
+    little_weight: tuple[int, ...]  # rows of the table whose runs have less than half of the usual weight
+    not_tried: tuple[str, ...]  # because no time was left; such a verdict is provisional
+    caveats: tuple[str, ...]  # what weakens the conclusion, in words
 
     def __repr__(self) -> str:
         said = self.sentence
@@ -213,18 +150,14 @@ class Verdict:
         return f"Verdict {self.verdict!r}{f': {names}' if names else ''}\n  {said}\n  {self.errors_in_words}"
 
     @property
+    def sentence(self) -> str:
+        """The verdict in one sentence with its certainty; a second one for a nuisance parameter that is wrong."""
+        return sentence(facts(self))
+
+    @property
     def errors_in_words(self) -> str:
         """The errors on the held-out runs, in a line."""
-        added = ""
-        if self.described:
-            added = f", with the law {percent(self.errors.rms['law'])}"
-        elif self.effects or self.nearest:
-            added = f", with the {'effects' if self.effects else 'adopted form'} {percent(self.error_after)}"
-        return (
-            f"error on the held-out runs ({self.conditions.split.names}): as given "
-            f"{percent(self.error_uncalibrated)}, calibrated {percent(self.error_before)}{added}; noise of a run "
-            f"{percent(self.noise_ceiling)}"
-        )
+        return errors_in_words(facts(self))
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -234,17 +167,22 @@ class Verdict:
     @property
     def explaining(self) -> tuple[Candidate, ...]:
         """What explains the residual, best first."""
-        return self.evidence.explaining
+        return self.found.best
+
+    @property
+    def nearest(self) -> Nearest | None:
+        """The form that is adopted, of a partial verdict."""
+        return self.found.nearest
 
     @property
     def base(self) -> Fit:
         """The calibrated model, without effects."""
-        return self.fits.base
+        return self.found.base
 
     @property
     def final(self) -> Fit:
         """The model with the effects of the verdict, with the form that is adopted, or without any."""
-        return self.fits.final
+        return self.found.final
 
     @property
     def error_uncalibrated(self) -> float:
@@ -281,9 +219,19 @@ class Verdict:
         return self.errors.noise
 
     @property
-    def next_runs(self) -> tuple[NextRun, ...]:
-        """Runs that would tell several explanations apart."""
-        return self.next.runs
+    def excluded(self) -> tuple[str, ...]:
+        """Rows and columns that were not used, and why."""
+        return (*self.runs.excluded, *self.split.reasons)
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of the table, used or not."""
+        return len(self.runs) + count_of_rows(self.runs.excluded)
+
+    @property
+    def summary_of_excluded(self) -> list[str]:
+        """What was excluded, by reason, with the number of rows."""
+        return summary_of_excluded(self.excluded, self.rows)
 
     @property
     def wrong_numbers(self) -> tuple[tuple[Pull, ...], ...]:
@@ -293,9 +241,9 @@ class Verdict:
         """
         if self.verdict in ("partial", "unexplained"):
             return ()
-        freed = {p.parameter.name: p for p in self.fits.pulls if p.freed}
-        known = tuple((freed[alike[0].parameter.name], *alike[1:]) for alike in self.fits.final.wrong_numbers)
-        further = wrong_number([p for p in self.fits.pulls if not p.freed])
+        freed = {p.parameter.name: p for p in self.pulls if p.freed}
+        known = tuple((freed[alike[0].parameter.name], *alike[1:]) for alike in self.final.wrong_numbers)
+        further = wrong_number([p for p in self.pulls if not p.freed])
         return (*known, further) if further else known
 
     @property
@@ -307,11 +255,6 @@ class Verdict:
     def held_out_runs_agree(self) -> bool:
         """Whether the held-out runs agree with the final model."""
         return self.errors.p_value >= _DISAGREES
-
-    @property
-    def sentence(self) -> str:
-        """The verdict in one sentence with its certainty; a second one for a nuisance parameter that is wrong."""
-        return sentence(facts(self))
 
     @property
     def harmless(self) -> bool:
@@ -328,15 +271,14 @@ class Verdict:
     @property
     def described(self) -> bool:
         """Whether a law describes a residual that nothing explains, and leaves no more than noise."""
-        law = self.corrections.law
-        return self.verdict == "unexplained" and law is not None and law.complete
+        return self.verdict == "unexplained" and self.law is not None and self.law.complete
 
     @property
     def in_form_only(self) -> tuple[str, ...]:
         """Named effects whose whole interval is outside the sizes that their source allows."""
         names = []
         for effect in self.explaining[0].claimed if self.explaining else ():
-            low, high = self.fits.final_intervals[effect.name]
+            low, high = self.final_intervals[effect.name]
             if effect.plausible and (high < effect.plausible[0] or low > effect.plausible[1]):
                 names.append(effect.name)
         return tuple(names)

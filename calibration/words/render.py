@@ -1,7 +1,7 @@
 """Render what a verdict says: each text is a template over the content of verdict.json, and over nothing else.
 
-So a stored verdict.json says again what it said. `sentence.j2` is the verdict with its certainty, `laws.j2` what
-laws say, `next_steps.j2` what a lab does next, `report.j2` the sections of the report.
+So a stored verdict.json says again what it said. `sentence.j2` is the verdict with its certainty, `errors.j2` its
+errors, `laws.j2` what laws say, `next_steps.j2` what a lab does next, `report.j2` the sections of the report.
 """
 
 from __future__ import annotations
@@ -43,6 +43,11 @@ def sentence(record: Record) -> str:
     The first sentence says so if the claim does not lower the error on the held-out runs.
     """
     return _one_line(rendered("sentence.j2", record))
+
+
+def errors_in_words(record: Record) -> str:
+    """Say the errors on the held-out runs, in a line."""
+    return _one_line(rendered("errors.j2", record))
 
 
 def say_laws(laws: Record) -> str:

@@ -14,12 +14,11 @@ import calibration.swimmer.swimmer
 import calibration.swimmer.synthetic_table
 import sim.motion.batches
 from calibration.attribution import moves
-from calibration.laws import law_fits
+from calibration.laws import laws
 from calibration.laws.places import place_named
-from calibration.report.robot_laws import RobotLaws, find_robot_laws
-from calibration.report.robot_verdict import RobotVerdict
-from calibration.swimmer.candidate_effects import influences
+from calibration.report.robot_verdict import RobotLaws, RobotVerdict, find_robot_laws
 from calibration.swimmer.head_correction import learn_head_correction
+from calibration.swimmer.influences import influences
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.possible_runs import Owned
 from calibration.swimmer.swimmer import DIRECT, SwimmerModel
@@ -142,7 +141,7 @@ def verdict_of(verdict: Verdict) -> RobotVerdict:
 def few_places(names: Sequence[str]) -> Iterator[None]:
     """Let laws be looked for at some places only."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(law_fits, "places", lambda **_: tuple(map(place_named, names)))
+        patch.setattr(laws, "places", lambda **_: tuple(map(place_named, names)))
         yield
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from calibration.statistics.gls import Noise
-from calibration.verdict.sequential_test import Explanation
+from calibration.verdict.next_runs import Explanation
 from dataset.data_set import sweep_key
 from dataset.schema import rows_version
 from planner.api.plan import plan

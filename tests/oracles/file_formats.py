@@ -20,7 +20,7 @@ import numpy as np
 
 from calibration.swimmer.camera_tracks import measure_tracks
 from calibration.swimmer.measured_table import read_measurements
-from calibration.verdict.sequential_test import read_explanations
+from calibration.verdict.next_runs import read_explanations
 from dataset.data_set import MANIFEST, SWEEP, batches, read_sweep
 from dataset.design import SWEEP_TOML, load_design
 from dataset.folder import Folder

@@ -12,7 +12,7 @@ from calibration.statistics.fit import Fit, fit
 from calibration.statistics.residual_tests import TESTABLE, Misfit, directions, examine_residual
 from calibration.statistics.statistical_model import parameter, start_values
 from calibration.statistics.study import Study
-from calibration.swimmer.nuisance_numbers import CAMERA, TACHOMETER
+from calibration.swimmer.influences import CAMERA, TACHOMETER
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.record import verdict_record
 from sim.arrays import Floats
@@ -65,11 +65,11 @@ def test_lengths_are_those_of_a_dense_covariance() -> None:
 @pytest.mark.slow
 def test_the_best_tolerance_comes_first_in_the_record() -> None:
     result = calibrated_toy(2)
-    gains = overall_gains(result.evidence.candidates)
+    gains = overall_gains(result.found.candidates)
     assert list(gains.values()) == sorted(gains.values(), reverse=True)
     assert set(gains) == {p.name for p in result.base.fitted if p.sigma is not None}
     assert all(0 <= gain < 0.5 for gain in gains.values())
-    listed = notable_gains(result.evidence.candidates)
+    listed = notable_gains(result.found.candidates)
     assert listed
     for halved in listed:
         assert halved.effect.detectable_exact < halved.halved < halved.today
@@ -77,5 +77,5 @@ def test_the_best_tolerance_comes_first_in_the_record() -> None:
     record = verdict_record(result, table="t")
     assert [entry["name"] for entry in record["halved_tolerances"]] == list(gains)
     first = record["candidates"][0]
-    assert first["smallest_detectable_with_half_of_a_tolerance"] == result.evidence.candidates[0].detectable_halved
+    assert first["smallest_detectable_with_half_of_a_tolerance"] == result.found.candidates[0].detectable_halved
     assert parameter(toy_swimmer(toy_table(2)), next(iter(gains))).title == record["halved_tolerances"][0]["title"]

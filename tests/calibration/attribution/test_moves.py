@@ -18,7 +18,7 @@ from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.statistics.weights import alike
-from calibration.swimmer.candidate_effects import CURRENT
+from calibration.swimmer.influences import CURRENT
 from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.record import facts, verdict_record
 from calibration.words.render import next_steps

@@ -19,8 +19,8 @@ from calibration.statistics.fit import fit
 from calibration.statistics.residual_tests import directions, examine_residual
 from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.statistics.study import DRAWS, Study, find_outliers, split_runs
+from calibration.swimmer.influences import CAMERA, HEADING, LENGTH, TACHOMETER
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, LENGTH, TACHOMETER
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
@@ -55,10 +55,10 @@ def test_a_stiffness_that_was_given_too_high_is_no_inertia(monkeypatch: pytest.M
     softer = replace(TRUTH, youngs_modulus=0.8 * TRUTH.youngs_modulus)
     model = SwimmerModel(START, read_measurements(make_table(softer, seed=5, title="")))
     result = calibrate(model, draws=FEW_DRAWS, progress=False)
-    assert "inertia" in {c.effect.name for c in result.evidence.candidates}
+    assert "inertia" in {c.effect.name for c in result.found.candidates}
     assert "inertia" not in result.effects
     assert result.verdict != "number"
-    stiffness = next(p for p in result.fits.pulls if p.parameter.name == "youngs_modulus")
+    stiffness = next(p for p in result.pulls if p.parameter.name == "youngs_modulus")
     assert stiffness.alone == pytest.approx(math.log(0.8), abs=2 * stiffness.alone_error)
     assert stiffness.z < -1
 
@@ -99,10 +99,10 @@ def test_one_table_in_twenty_has_a_notable_pull_by_chance(count: int, correlatio
 
 def test_a_pull_of_two_and_a_half_among_ten_is_not_mentioned() -> None:
     result = none()
-    learnt = sum(p.learnt for p in result.fits.pulls)
+    learnt = sum(p.learnt for p in result.pulls)
     for z, named in ((0.99 * notable_pull(learnt), False), (1.01 * notable_pull(learnt), True)):
-        pulled = (replace(result.fits.pulls[0], z=z), *result.fits.pulls[1:])
-        sentence = replace(result, fits=replace(result.fits, pulls=pulled)).sentence
+        pulled = (replace(result.pulls[0], z=z), *result.pulls[1:])
+        sentence = replace(result, pulls=pulled).sentence
         assert sentence.startswith(f"{pulled[0].words}.") is named
     assert learnt > 3
     assert 2.2 < notable_pull(learnt) < 3
@@ -129,12 +129,12 @@ def test_a_number_far_beyond_its_tolerance_does_not_come_ahead_of_an_effect(
     result = calibrated(table, few=True)
     assert result.verdict == "ambiguous"
     assert result.effects == ("end_over_end_drag",)
-    (rival,) = result.evidence.rival_numbers
+    (rival,) = result.found.rival_numbers
     assert rival.parameter.name == "head_length"
     assert rival.tolerances > wrong_numbers.IMPLAUSIBLE
     assert f"L (head length) that is {rival.departure} (9 of its tolerances)" in result.sentence
     assert result.sentence.index("end-over-end drag") < result.sentence.index("head length")
-    titles = [e.title for e in result.next.explanations]
+    titles = [e.title for e in result.explanations]
     assert titles == ["head's end-over-end drag", "the stated value of L (head length) is wrong"]
     record = verdict_record(result, table="t")
     assert record["numbers_instead"] == ["head_length"]
@@ -143,7 +143,7 @@ def test_a_number_far_beyond_its_tolerance_does_not_come_ahead_of_an_effect(
     monkeypatch.setattr(wrong_numbers, "IMPLAUSIBLE", 2 * rival.tolerances)
     ahead = calibrated(table, few=True)
     assert ahead.verdict == "number"
-    assert [c.effect.name for c in ahead.evidence.rival_effects] == ["end_over_end_drag"]
+    assert [c.effect.name for c in ahead.found.rival_effects] == ["end_over_end_drag"]
 
 
 def test_an_effect_beside_a_wrong_number_comes_behind_a_single_effect_that_fits_as_well() -> None:
@@ -180,10 +180,10 @@ def test_a_stiffness_far_off_is_named_with_what_looks_like_it(monkeypatch: pytes
     result = calibrate(SwimmerModel(replace(START, sigmas=sigmas), data), draws=FEW_DRAWS, progress=False)
     assert result.verdict == "number"
     assert result.wrong_numbers[0][0].parameter.name == "youngs_modulus"
-    given = result.fits.final_refit.parameters["youngs_modulus"] / START.youngs_modulus
+    given = result.final_refit.parameters["youngs_modulus"] / START.youngs_modulus
     assert given == pytest.approx(share, rel=0.1)
-    corrected = corrected_robot(START, result.fits.final_refit.parameters)
-    assert corrected.youngs_modulus == result.fits.final_refit.parameters["youngs_modulus"]
+    corrected = corrected_robot(START, result.final_refit.parameters)
+    assert corrected.youngs_modulus == result.final_refit.parameters["youngs_modulus"]
 
 
 def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:

@@ -104,7 +104,7 @@ def test_its_error_before_and_after_stands_in_sentence_record_and_report(tmp_pat
 
 def test_a_form_is_adopted_without_a_look_at_the_held_out_runs() -> None:
     model = read_balls(falls("linear drag, differs", 3))
-    test = differing().conditions.split.test
+    test = differing().split.test
     ruined = replace(model, runs=replace(model.runs, y=np.where(test[:, None], model.runs.y + 0.9, model.runs.y)))
     result = calibrate(ruined, draws=200, progress=False)
     before = differing().nearest
@@ -113,12 +113,12 @@ def test_a_form_is_adopted_without_a_look_at_the_held_out_runs() -> None:
     assert result.nearest.size == pytest.approx(before.size, rel=1e-6)
     assert result.held_out_error_falls is False
     assert "the error on the held-out runs does not fall with it" in result.sentence
-    assert "linear_drag" not in {p.name for p in result.fits.final_refit.fitted}
+    assert "linear_drag" not in {p.name for p in result.final_refit.fitted}
     assert next_steps(facts(result)) != next_steps(facts(differing()))
 
 
 def test_a_new_specimen_has_the_mean_size_and_the_spread_in_its_variance() -> None:
-    nearest, refit = differing().nearest, differing().fits.final_refit
+    nearest, refit = differing().nearest, differing().final_refit
     assert nearest is not None
     place = [p.name for p in refit.fitted].index("linear_drag")
     size = refit.parameters["linear_drag"]

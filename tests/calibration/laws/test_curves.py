@@ -11,15 +11,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.laws import law_fits
+from calibration.laws import laws
 from calibration.laws.curves import Curve, _curve, chosen, find_curves, named_curves
 from calibration.laws.group_factors import GroupFactors, _linear_models, _LinearModel
-from calibration.laws.law import dependences
 from calibration.laws.law_model import SIZE, LawModel
+from calibration.laws.laws import dependences
 from calibration.laws.places import place_named
 from calibration.report.figures import draw_dependences
 from calibration.report.report import figures_of_laws
-from calibration.report.robot_laws import find_robot_laws
+from calibration.report.robot_verdict import find_robot_laws
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.gls import SESSION_SHARE, Noise, repeat_covariance
 from calibration.statistics.statistical_model import precisions, start_values
@@ -125,7 +125,7 @@ def test_a_curve_is_found_and_named(kind: str, at: float) -> None:
 def test_a_law_with_a_curve_stands_in_the_sentence_the_record_and_the_picture(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(law_fits, "places", lambda **_: tuple(map(place_named, (PLACE, "Fz_vz"))))
+    monkeypatch.setattr(laws, "places", lambda **_: tuple(map(place_named, (PLACE, "Fz_vz"))))
     with on_the_toy():
         described = find_robot_laws(table_of("threshold"), START, progress=False)
     assert described.laws is not None

@@ -11,13 +11,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.laws.law import NO_LEVER, NO_SESSIONS, UNDETERMINED, Law
-from calibration.laws.law_fits import Laws
 from calibration.laws.law_model import LEVER, SIZE, LawModel, with_law
+from calibration.laws.laws import NO_LEVER, NO_SESSIONS, UNDETERMINED, Law, Laws
 from calibration.laws.places import in_common, place_named, places
 from calibration.laws.readings import EXPONENTS
 from calibration.report.corrected_robot import law_handed_on, robot_with_law
-from calibration.report.robot_laws import RobotLaws, find_robot_laws
+from calibration.report.robot_verdict import RobotLaws, find_robot_laws
 from calibration.statistics.statistical_model import by_differences, start_values
 from sim.effects import catalogue
 from sim.inputs import group_columns, load_robot

@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from calibration.laws.linear_models import LinearModels
-from calibration.statistics.gls import SESSION_SHARE, Noise, repeat_covariance
+from calibration.laws.search import LinearModels
+from calibration.statistics.gls import SESSION_SHARE, Gls, Noise, repeat_covariance
 from sim.arrays import Floats
 
 SESSION = np.repeat([0, 1, 2, 3], [6, 8, 6, 4])
@@ -34,50 +34,45 @@ def residuals(count: int, *, share: float = 0.3, seed: int = 1) -> Floats:
     return np.asarray((rng.normal(size=shape) + sessions) @ np.array([[1.0, 0.4, 0], [0, 0.8, 0.1], [0, 0, 1.3]]))
 
 
-def dense(models: LinearModels, residual: Floats, columns: Floats) -> tuple[float, float, Floats, Floats]:
-    """Fit columns (n, k, q) by the definitions; return the deviance, ρ, all weights, their covariance."""
+def dense(residual: Floats, share: Floats, table: Floats) -> tuple[float, Floats, Floats]:
+    """Fit columns (n, k, q) with ρ by the definitions; return the deviance, all weights, and their covariance."""
     run = repeat_covariance(residual, CONDITION)
-    table = np.concatenate([models.absorbed, columns], -1).reshape(residual.size, -1)
-    prior = np.diag(np.r_[PRECISION, np.zeros(columns.shape[-1])])
-    best = None
-    for share in np.expm1(np.linspace(0, math.log1p(SESSION_SHARE * 9), 200)) / 9:
-        covariance = Noise(run, share).covariance(SESSION)
-        inverse = np.linalg.inv(covariance)
-        normal = table.T @ inverse @ table + prior
-        toward = table.T @ inverse @ residual.ravel()
-        weights = np.linalg.solve(normal, toward)
-        independent = np.kron(np.eye(len(SESSION)), run)
-        determinant = np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(independent)[1]
-        deviance = float(residual.ravel() @ inverse @ residual.ravel() - toward @ weights + determinant)
-        restricted = deviance + np.linalg.slogdet(normal)[1]
-        if best is None or restricted < best[0]:
-            best = restricted, deviance, share, weights, np.linalg.inv(normal)
-    assert best is not None
-    return best[1:]
+    flat = table.reshape(residual.size, -1)
+    covariance = Noise(run, share).covariance(SESSION)
+    inverse = np.linalg.inv(covariance)
+    normal = flat.T @ inverse @ flat + np.diag(np.r_[PRECISION, np.zeros(flat.shape[1] - len(PRECISION))])
+    toward = flat.T @ inverse @ residual.ravel()
+    weights = np.linalg.solve(normal, toward)
+    determinant = np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(np.kron(np.eye(len(SESSION)), run))[1]
+    deviance = residual.ravel() @ inverse @ residual.ravel() - toward @ weights + determinant
+    return float(deviance), weights, np.linalg.inv(normal)
 
 
 @pytest.mark.slow
-def test_gains_weights_and_shares_are_those_of_dense_matrices() -> None:
+def test_gains_and_weights_are_those_of_dense_matrices() -> None:
+    """In the noise that a fit with all columns of the place leaves."""
     models, residual = design(), residuals(60)
     fits = models.fit(residual)
     single = design(np.zeros_like(SESSION)).fit(residual[:2])  # of a single session ρ is the largest
     assert np.concatenate([single.base_share[:, None], single.share], 1) == pytest.approx(SESSION_SHARE)
-    for b, one in enumerate(residual[:1]):
+    absorbed = models.design.columns[..., : len(PRECISION)]
+    for b, one in enumerate(residual[:2]):
         alone = models.fit(one[None])
         np.testing.assert_allclose(fits.gain[b], alone.gain[0], rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(fits.weights[b], alone.weights[0], rtol=1e-7, atol=1e-12)
-        without = dense(models, one, np.empty((*one.shape, 0)))
-        assert fits.base_share[b] == pytest.approx(without[1], abs=0.03)
+        without = dense(one, fits.base_share[b], absorbed)[0]
+        for place in range(PLACES):
+            every = np.concatenate([absorbed, models.columns[:, :, place]], -1)
+            fitted = Gls(every, PRECISION, SESSION, None, CONDITION).products(one).solve(passes=3)
+            np.testing.assert_allclose(fits.share[b, place], fitted.share, rtol=1e-9)
         for m, (place, chosen) in enumerate(MODELS):
-            deviance, share, weights, covariance = dense(models, one, models.columns[:, :, place, list(chosen)])
-            gain = without[0] - deviance - len(chosen) * math.log(one.size)
-            assert fits.gain[b, m] == pytest.approx(gain, abs=0.1)
-            assert fits.share[b, m] == pytest.approx(share, abs=0.03)
+            table = np.concatenate([absorbed, models.columns[:, :, place, list(chosen)]], -1)
+            deviance, weights, covariance = dense(one, fits.share[b, place], table)
             errors = np.sqrt(np.diag(covariance))[-len(chosen) :]
-            np.testing.assert_allclose(fits.errors[b, m, list(chosen)], errors, rtol=0.03)
-            np.testing.assert_allclose(
-                fits.weights[b, m, list(chosen)], weights[-len(chosen) :], atol=0.05 * errors.min()
-            )
+            gain = without - deviance - len(chosen) * math.log(one.size)
+            assert fits.gain[b, m] == pytest.approx(gain, abs=1e-4)
+            np.testing.assert_allclose(fits.errors[b, m, list(chosen)], errors, rtol=1e-5)
+            np.testing.assert_allclose(fits.weights[b, m, list(chosen)], weights[-len(chosen) :], rtol=1e-4)
             absent = [j for j in range(COLUMNS) if j not in chosen]
             assert not fits.weights[b, m, absent].any()
             assert np.isinf(fits.errors[b, m, absent]).all()

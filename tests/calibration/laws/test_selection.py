@@ -10,12 +10,11 @@ import pytest
 from scipy.stats import kstest, norm
 
 import calibration.laws.search
-from calibration.laws.law_fits import Laws
-from calibration.laws.linear_models import LinearModels
+from calibration.laws.laws import Laws
 from calibration.laws.places import places
-from calibration.laws.search import Search, Selection, examine_selection
+from calibration.laws.search import LinearModels, Search, Selection, examine_selection
 from calibration.report.report import sections
-from calibration.report.robot_laws import RobotLaws
+from calibration.report.robot_verdict import RobotLaws
 from calibration.verdict.record import facts
 from calibration.words.quantities import plain
 from sim.arrays import Floats
@@ -98,7 +97,8 @@ def test_simultaneous_intervals_are_those_of_one_weight_where_there_is_one_model
 ) -> None:
     monkeypatch.setattr(calibration.laws.search, "_NULL_DRAWS", 1999)
     one = examine_selection(searched(noise(1), [(0, (0,))]), seed=2).widest
-    assert one == pytest.approx(norm.ppf(0.975), rel=0.1)  # S is known but for its 32 degrees of freedom
+    of_scatter = math.sqrt(32 / 29 * (1 + 1 / 30))  # S of two outputs has 32 degrees of freedom
+    assert one == pytest.approx(of_scatter * norm.ppf(0.975), rel=0.05)
     every = examine_selection(searched(noise(1)), seed=2).widest
     assert 1.3 * one < every < norm.ppf(1 - 0.025 / (2 * len(MODELS))) * 1.15  # below Bonferroni's
 

@@ -10,18 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration.attribution.refits import INDISTINGUISHABLE
-from calibration.laws.law import dependences
-from calibration.laws.law_fits import Laws, find_laws
+from calibration.attribution.refits import INDISTINGUISHABLE, Rival
 from calibration.laws.law_model import SIZE, LawModel, with_law
+from calibration.laws.laws import Laws, dependences, find_laws
 from calibration.laws.places import place_named
 from calibration.laws.readings import EXPONENTS
 from calibration.report.corrected_robot import _slopes, check_given, robot_with_law
 from calibration.report.figures import draw_dependences, draw_place
 from calibration.report.robot_verdict import RobotVerdict
-from calibration.statistics.held_out import refit_to_all
-from calibration.verdict.next_runs import BATCH, Rival, next_runs
-from calibration.verdict.sequential_test import Explanation, standings
+from calibration.statistics.study import refit_to_all
+from calibration.verdict.next_runs import BATCH, Explanation, next_runs, standings
 from dataset.robot_inputs import robot_fields
 from planner.vehicle.calibration_table import read_knowledge
 from sim.effects import effect_named
@@ -65,7 +63,7 @@ def claimed_beside_laws() -> RobotVerdict:
 
 
 def laws_of(verdict: RobotVerdict) -> Laws:
-    laws = verdict.corrections.law
+    laws = verdict.law
     assert isinstance(laws, Laws)
     return laws
 
@@ -88,7 +86,7 @@ def test_a_law_stands_beside_the_verdict_and_its_files_have_its_range_and_covari
     assert verdict.effects == ()
     assert "no effect and no pair of effects of the catalogue explains" in verdict.sentence
     assert "The residual is described by" in verdict.sentence
-    assert verdict.corrections.learnt is None
+    assert verdict.learnt is None
     assert verdict.errors.rms["law"] < 0.7 * verdict.error_before
     assert place in [law.place.name for law in laws_of(verdict).kept]
     record, report, corrected = verdict.save(tmp_path)
@@ -119,12 +117,12 @@ def test_an_uncertain_claim_is_set_beside_the_laws_that_fit_as_well(tmp_path: Pa
     assert all(rival.fit.deviance < claim.deviance + INDISTINGUISHABLE for rival in as_good)
     assert f"It is described as well by {as_good[0].title}; or by {as_good[1].title}" in verdict.sentence
     assert "or by laws at 2 other places." in verdict.sentence
-    titles = [e.title for e in verdict.next.explanations]
+    titles = [e.title for e in verdict.explanations]
     assert titles == ["head's end-over-end drag", *(rival.title for rival in as_good[:3])]
     record, report, corrected = verdict.save(tmp_path)
     assert json.loads(record.read_text())["laws"]["kept"]
-    assert verdict.next.batch is not None
-    assert not verdict.next.batch.worth_making
+    assert verdict.next_batch is not None
+    assert not verdict.next_batch.worth_making
     first, second, *_ = json.loads(record.read_text())["next_steps"]
     assert first.startswith("Test the claim where it matters most: make runs with other")
     assert second.startswith("Plan with the corrected robot")
@@ -175,7 +173,7 @@ def test_the_uncertainty_of_the_exponents_is_that_of_the_load_at_the_robot(place
     verdict = described(place)
     law = next(one for one in laws_of(verdict).kept if one.place.name == place)
     assert set(EXPONENTS) - set(law.fit.names) <= {EXPONENTS[2]}
-    final = refit_to_all(law.model, law.fit, verdict.conditions.split.kept)
+    final = refit_to_all(law.model, law.fit, verdict.split.kept)
     robot = robot_with_law(START, law, final.parameters)
     slopes = next(iter(_slopes(robot, law, final).values()))
     scale = next(iter(robot.effects.values())) if law.place.is_term else 1.0

@@ -11,7 +11,7 @@ import pytest
 from calibration.attribution.wrong_numbers import notable_gains
 from calibration.report.report import write_report
 from calibration.statistics.fit import Pull
-from calibration.swimmer.nuisance_numbers import nuisance_parameters
+from calibration.swimmer.influences import nuisance_parameters
 from calibration.verdict.record import facts, shown, verdict_record
 from calibration.verdict.verdict import Verdict
 from calibration.words.quantities import detectable, direction_in_words, plain, size, with_error
@@ -25,7 +25,7 @@ from tests.page_text import PageText
 
 
 def page(result: Verdict, folder: Path) -> PageText:
-    write_report(result, folder / "report.html", title="t.csv")
+    write_report(result, verdict_record(result, table="t.csv"), folder / "report.html")
     return PageText(folder / "report.html")
 
 
@@ -44,7 +44,7 @@ def test_a_report_is_in_the_words_and_units_of_a_lab_with_what_to_do_next_first(
     assert seen.headings[0] == "What to do next"
     assert "Measure again: " in seen.text
     assert "scale of the camera" in seen.text
-    assert [c.effect.name for c in result.evidence.candidates if f"({c.effect.name})" not in seen.text] == []
+    assert [c.effect.name for c in result.found.candidates if f"({c.effect.name})" not in seen.text] == []
     assert seen.text.count("tail length [cm]") == 2  # of the calibrated and of the final model
     record = verdict_record(result, table="t")
     given = {entry["name"]: entry["given"] for entry in record["numbers_as_given"]}
@@ -60,7 +60,7 @@ def test_the_number_to_measure_better_is_listed_with_what_it_would_show(tmp_path
     title = "Which number, measured better, would show what"
     best = next(p.title for p in result.base.fitted if p.name == facts(result)["halved_tolerances"][0]["name"])
     assert f"by: {best} (" in seen[seen.index(title) :]
-    halved = notable_gains(result.evidence.candidates)[0]
+    halved = notable_gains(result.found.candidates)[0]
     effect = shown(halved.effect.effect) | {"bounds": halved.effect.effect.bounds}
     assert detectable(halved.halved, effect) in seen[seen.index(title) :]
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from calibration.__main__ import main as calibration
 from calibration.report.corrected_robot import calibration_knowledge, corrected_robot, corrected_toml, handed_on
 from calibration.report.robot_verdict import FILES, RobotVerdict
-from calibration.swimmer.candidate_effects import CURRENT
+from calibration.swimmer.influences import CURRENT
 from calibration.swimmer.synthetic_table import make_table
 from planner.__main__ import main as planner
 from planner.api.plan import plan
@@ -61,7 +61,7 @@ def test_a_verdict_says_what_it_found_in_a_few_lines() -> None:
 @pytest.mark.slow
 def test_a_verdict_has_the_corrected_robot_and_writes_its_files_and_errors(tmp_path: Path) -> None:
     verdict = with_effect()
-    assert verdict.corrected == handed_on(START, verdict.fits.final_refit)[0]
+    assert verdict.corrected == handed_on(START, verdict.final_refit)[0]
     assert verdict.corrected.effects[DRAG] == pytest.approx(5.0, rel=0.3)
     paths = verdict.save(tmp_path / "calibrated")
     assert [path.name for path in paths] == list(FILES)
@@ -79,9 +79,9 @@ def test_a_verdict_has_the_corrected_robot_and_writes_its_files_and_errors(tmp_p
 def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -> None:
     result = effect()
     path = tmp_path / "corrected.toml"
-    path.write_text(corrected_toml(START, result.fits.final_refit))
+    path.write_text(corrected_toml(START, result.final_refit))
     robot, knowledge = load_robot(path), read_knowledge(path)
-    fitted = corrected_robot(START, result.fits.final_refit.parameters)
+    fitted = corrected_robot(START, result.final_refit.parameters)
     sigma = dict(zip(knowledge.names, np.sqrt(np.diag(knowledge.covariance)), strict=True))
     assert {"C_t", "C_r", "C_yr", "youngs_modulus", "tail_length", DRAG} <= set(sigma)
     for name in sigma:  # written to the digits that the runs have determined
@@ -98,7 +98,7 @@ def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -
 
 
 def test_a_current_is_handed_on_with_its_error() -> None:
-    delivered = none().fits.final_refit
+    delivered = none().final_refit
     current = replace(delivered.fitted[0], name=CURRENT[1], logarithmic=False)
     handed_on = calibration_knowledge(
         START,

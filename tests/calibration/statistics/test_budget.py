@@ -35,11 +35,11 @@ def test_a_verdict_without_time_is_provisional() -> None:
     table = toy_table(5, **{DRAG: 5.0})
     verdict = calibrated(table, few=FEW_CANDIDATES, max_seconds=1e-9)
     assert verdict.verdict == "unexplained"
-    assert any("end-over-end" in what for what in verdict.conditions.not_tried)
-    assert verdict.conditions.caveats[0].startswith("provisional: the search ended after 0 s of processor time")
-    assert all(c.refit is None for c in verdict.evidence.candidates)
+    assert any("end-over-end" in what for what in verdict.not_tried)
+    assert verdict.caveats[0].startswith("provisional: the search ended after 0 s of processor time")
+    assert all(c.refit is None for c in verdict.found.candidates)
     assert next_steps(facts(verdict))
-    assert not effect().conditions.not_tried
+    assert not effect().not_tried
 
 
 def test_the_first_interrupt_leaves_a_provisional_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,7 +51,7 @@ def test_the_first_interrupt_leaves_a_provisional_verdict(monkeypatch: pytest.Mo
     with stopped_by_interrupt():
         verdict = calibrated(toy_table(5, **{DRAG: 5.0}), few=FEW_CANDIDATES)
     assert verdict.verdict == "unexplained"
-    assert verdict.conditions.caveats[0].startswith("provisional: the search ended at Ctrl-C")
+    assert verdict.caveats[0].startswith("provisional: the search ended at Ctrl-C")
 
 
 def test_further_interrupts_and_those_outside_a_search_end_the_program() -> None:

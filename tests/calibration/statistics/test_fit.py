@@ -12,10 +12,9 @@ from scipy.stats import binom
 
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.gls import repeat_covariance
-from calibration.statistics.held_out import error_interval, errors
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import Parameter, Parameters, Runs, start_values
-from calibration.statistics.study import Study, middle_session
+from calibration.statistics.study import Study, error_interval, errors, middle_session
 from calibration.statistics.weights import (
     caveat_of_weights,
     estimate,

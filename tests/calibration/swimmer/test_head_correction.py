@@ -11,9 +11,10 @@ import pytest
 
 from calibration.__main__ import main
 from calibration.report.corrected_robot import corrected_robot, corrected_toml
+from calibration.swimmer.head_correction import HeadCorrection
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.record import verdict_record
-from calibration.verdict.verdict import LearntCorrection, Verdict
+from calibration.verdict.verdict import Verdict
 from planner.api.plan import plan
 from planner.paths.path import circle
 from planner.vehicle.calibration_table import read_knowledge
@@ -44,10 +45,10 @@ def verdict() -> Verdict:
 
 
 @pytest.fixture
-def learnt() -> tuple[Verdict, LearntCorrection]:
+def learnt() -> tuple[Verdict, HeadCorrection]:
     result = verdict()
-    assert result.corrections.learnt is not None
-    return result, result.corrections.learnt
+    assert result.learnt is not None
+    return result, result.learnt
 
 
 def correction(**changes: object) -> Correction:
@@ -64,7 +65,7 @@ def correction(**changes: object) -> Correction:
 
 @pytest.mark.slow
 def test_what_no_effect_does_is_left_unexplained_and_a_correction_predicts_it(
-    learnt: tuple[Verdict, LearntCorrection],
+    learnt: tuple[Verdict, HeadCorrection],
 ) -> None:
     """No effect is claimed; a correction of no effect's form helps in runs that it was not learnt from."""
     result, correction = learnt
@@ -78,7 +79,7 @@ def test_what_no_effect_does_is_left_unexplained_and_a_correction_predicts_it(
     assert result.error_predictive**2 - result.noise_ceiling**2 < 0.4 * excess
     assert f"{100 * result.error_predictive:.1f} % on runs" in result.sentence
     assert verdict_record(result, table="t")["error_predictive"] == result.error_predictive
-    regression, fitted = result.corrections.regression, result.conditions.split.fitted
+    regression, fitted = result.regression, result.split.fitted
     assert any("ln l" in name for name in regression.features)
     residual = (toy_swimmer(bent_table()).runs.y - result.base.prediction)[fitted]
     assert ((residual - regression.correction[fitted]) ** 2).mean() < 0.7 * (residual**2).mean()
@@ -86,21 +87,21 @@ def test_what_no_effect_does_is_left_unexplained_and_a_correction_predicts_it(
 
 @pytest.mark.slow
 def test_the_corrected_robot_simulates_what_was_predicted_and_states_its_uncertainty(
-    learnt: tuple[Verdict, LearntCorrection], tmp_path: Path
+    learnt: tuple[Verdict, HeadCorrection], tmp_path: Path
 ) -> None:
     """The file's robot, with the table's settings, moves as the correction that was learnt from all runs says."""
     result, correction = learnt
-    (tmp_path / "with.toml").write_text(corrected_toml(START, result.fits.final_refit, correction))
-    (tmp_path / "without.toml").write_text(corrected_toml(START, result.fits.final_refit))
+    (tmp_path / "with.toml").write_text(corrected_toml(START, result.final_refit, correction))
+    (tmp_path / "without.toml").write_text(corrected_toml(START, result.final_refit))
     robot = load_robot(tmp_path / "with.toml")
     assert robot.correction == correction.correction
     model = toy_swimmer(bent_table())
     corrected = SwimmerModel(replace(robot, tail_length=START.tail_length), model.runs, solver=model.solver)
     start = {p.name: p.start for p in (*corrected.coefficients, *corrected.nuisances, *corrected.effects)}
     start["tail_length_offset"] = robot.tail_length - START.tail_length
-    start |= {k: result.fits.final_refit.parameters[k] for k in ("camera_scale", "heading_zero", "tachometer")}
-    residual = (model.runs.y - corrected.predict([start])[0])[result.conditions.split.fitted]
-    uncorrected = (model.runs.y - result.base.prediction)[result.conditions.split.fitted]
+    start |= {k: result.final_refit.parameters[k] for k in ("camera_scale", "heading_zero", "tachometer")}
+    residual = (model.runs.y - corrected.predict([start])[0])[result.split.fitted]
+    uncorrected = (model.runs.y - result.base.prediction)[result.split.fitted]
     assert (residual**2).mean() < 0.6 * (uncorrected**2).mean()
     known, plain = (read_knowledge(tmp_path / f"{name}.toml") for name in ("with", "without"))
     assert {"surface_couple", "anisotropic_head_drag"} <= set(known.names)

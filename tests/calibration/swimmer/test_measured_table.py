@@ -12,8 +12,7 @@ import pandas as pd
 import pytest
 
 from calibration.statistics.gls import repeat_count, repeat_covariance
-from calibration.swimmer.copied_rows import find_copies
-from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.measured_table import find_copies, read_measurements
 from sim.io.errors import InputError
 from tests.calibration.toy_tables import calibrated, none, toy_table
 from tests.processes import LIMIT
@@ -116,11 +115,9 @@ def test_copied_rows_are_no_repeats() -> None:
     assert runs.excluded[0] == "row 97: a copy of an earlier row, equal in all inputs and outputs (row 1)"
     assert len(runs.excluded) == 40
     result, without = calibrated(copied, few=True), none()
-    assert result.evidence.misfit.p_value == without.evidence.misfit.p_value
-    assert result.conditions.summary_of_excluded[0].startswith(
-        "40 of 136 rows (rows 97, 98, 99 and 37 more): a copy"
-    )
-    assert result.conditions.rows == 136
+    assert result.found.misfit.p_value == without.found.misfit.p_value
+    assert result.summary_of_excluded[0].startswith("40 of 136 rows (rows 97, 98, 99 and 37 more): a copy")
+    assert result.rows == 136
     single = table[table["trial"] == 1].assign(session=range(48))
     with pytest.raises(InputError, match="0 repeated runs, without 48 copies of rows"):
         read_measurements(pd.concat([single, single]))

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from calibration.statistics.statistical_model import by_differences, start_values
-from calibration.swimmer.candidate_effects import influences
+from calibration.swimmer.influences import influences
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table

@@ -40,7 +40,7 @@ def test_a_planted_effect_is_found_sized_and_removed(few: bool) -> None:
     result = effect() if few else calibrated(toy_table(5, **{DRAG: SIZE}))
     assert result.verdict == "effect"
     assert result.effects == (DRAG,)
-    assert result.conditions.excluded == ()
+    assert result.excluded == ()
     low, high = result.final.interval(DRAG)
     assert low <= SIZE <= high
     assert result.error_after < 1.25 * result.noise_ceiling
@@ -159,13 +159,13 @@ def test_a_drift_with_time_is_found_where_there_is_a_clock(seed: int) -> None:
     drifting = in_thinning_fluid(table, rate)
     result = calibrated(drifting, few=few)
     assert result.effects == ("viscosity_with_time",)
-    low, high = result.fits.final_intervals["viscosity_with_time"]
+    low, high = result.final_intervals["viscosity_with_time"]
     assert 0.5 * rate < low < rate < high < 2 * rate
     assert result.error_after < result.error_before
     assert result.error_after < 1.25 * result.noise_ceiling
     without_clock = calibrated(drifting.drop(columns="elapsed_min"), few=few)
     assert "viscosity_with_time" not in without_clock.effects
-    missing = without_clock.evidence.untestable["viscosity drifting with time"]
+    missing = without_clock.untestable["viscosity drifting with time"]
     assert missing == "needs elapsed_min, differing between the runs"
 
 
@@ -183,9 +183,9 @@ def test_a_tracked_point_off_the_centre_changes_radius_and_angle_alone() -> None
 def test_an_effect_that_changes_nothing_says_so(tmp_path: Path) -> None:
     """The toy's tails cannot touch: no size of contact shows, and the report has no size for it."""
     result = ambiguous()
-    contact = next(c for c in result.evidence.candidates if c.effect.name == "tail_contact")
+    contact = next(c for c in result.found.candidates if c.effect.name == "tail_contact")
     assert contact.verdict == "it changes nothing in these runs"
-    write_report(result, tmp_path / "report.html", title="t")
+    write_report(result, verdict_record(result, table="t"), tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text()
     assert "–</td>" in text
     assert "e+150" not in text
@@ -196,13 +196,13 @@ def test_the_held_out_session_has_no_say_judges_and_is_used_in_the_end() -> None
     """Ruining it changes the reported errors and the last fit, which has all runs, and nothing else."""
     table, result = toy_table(5, **{DRAG: SIZE}), effect()
     assert result.errors.p_value > 0.01
-    table.loc[table["session"] == result.conditions.split.names, "omega_yr_rad_s"] *= 1.5
+    table.loc[table["session"] == result.split.names, "omega_yr_rad_s"] *= 1.5
     ruined = calibrated(table, few=True)
     assert ruined.final.parameters == result.final.parameters
-    assert ruined.evidence.misfit.p_value == result.evidence.misfit.p_value
+    assert ruined.found.misfit.p_value == result.found.misfit.p_value
     assert ruined.error_after > 1.5 * result.error_after
     assert ruined.errors.p_value < 0.01
-    assert ruined.fits.final_refit.parameters["C_yr"] != pytest.approx(ruined.final.parameters["C_yr"], rel=0.02)
+    assert ruined.final_refit.parameters["C_yr"] != pytest.approx(ruined.final.parameters["C_yr"], rel=0.02)
 
 
 def test_the_result_is_deterministic() -> None:
@@ -220,7 +220,7 @@ def test_p_of_the_locked_session_is_even_for_a_good_model() -> None:
 def test_profile_intervals_are_those_of_the_covariance_where_the_model_is_linear() -> None:
     """And lean to one side where it is not."""
     result = effect()
-    for name, (low, high) in result.fits.final_intervals.items():
+    for name, (low, high) in result.final_intervals.items():
         wald = result.final.interval(name)
         assert low < result.final.parameters[name] < high
         assert (low, high) == pytest.approx(wald, abs=0.35 * (wald[1] - wald[0]))

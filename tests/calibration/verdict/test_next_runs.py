@@ -17,16 +17,23 @@ from scipy.stats import binom
 from calibration.statistics.fit import fit
 from calibration.statistics.gls import Noise
 from calibration.statistics.statistical_model import start_values
-from calibration.verdict.next_runs import BATCH, GIVEN_UP, STOP, Pair, Rival, _greedy, _together, next_runs
-from calibration.verdict.record import verdict_record
-from calibration.verdict.sequential_test import (
+from calibration.verdict.next_runs import (
+    BATCH,
+    GIVEN_UP,
+    STOP,
     Decision,
     Explanation,
+    Pair,
+    Rival,
     Standing,
+    _greedy,
+    _together,
     new_runs,
+    next_runs,
     read_explanations,
     standings,
 )
+from calibration.verdict.record import verdict_record
 from sim.io.errors import InputError
 from tests.calibration.toy_tables import DRAG, TRUTH, ambiguous, toy_swimmer, toy_table
 

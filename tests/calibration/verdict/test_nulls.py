@@ -51,7 +51,7 @@ def test_no_effect_is_claimed_where_there_is_none_and_intervals_cover() -> None:
     assert sum(null.verdict != "none" for null in nulls()) <= most < 0.15 * len(nulls())
     assert all(null.effects == () for null in nulls() if null.verdict == "none")
     for name in COEFFICIENTS:
-        ends = [null.fits.base_intervals[name] for null in nulls()]
+        ends = [null.base_intervals[name] for null in nulls()]
         assert sum(not low < getattr(TRUTH, name) < high for low, high in ends) <= most
         place = nulls()[0].base.names.index(name)
         stated = np.sqrt(np.mean([null.base.covariance[place, place] for null in nulls()]))

@@ -15,6 +15,7 @@ from calibration.report.report import write_report
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
+from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
 from sim.inputs import load_robot
 from sim.io.errors import run_command
@@ -93,7 +94,7 @@ def test_rivals_are_all_named_with_the_runs_that_would_tell_them_apart(tmp_path:
     assert len(result.effects) > 1
     assert result.next_runs
     page = tmp_path / "report.html"
-    write_report(result, page, title="t")
+    write_report(result, verdict_record(result, table="t"), page)
     text = page.read_text()
     assert "Runs to make next" in text
     for run in result.next_runs:
@@ -107,6 +108,6 @@ def test_where_tolerances_are_wide_a_wrong_number_comes_ahead_of_those_rivals() 
     result = calibrated("ambiguous")
     assert result.verdict == "number"
     assert result.effects == ()
-    assert "tail_spin_drag" in {e.name for c in result.evidence.rival_effects for e in c.claimed}
+    assert "tail_spin_drag" in {e.name for c in result.found.rival_effects for e in c.claimed}
     assert "If the number is right, " in result.sentence
-    assert re.fullmatch("the stated value of .* is wrong", result.next.explanations[0].title)
+    assert re.fullmatch("the stated value of .* is wrong", result.explanations[0].title)

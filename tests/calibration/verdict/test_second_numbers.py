@@ -12,7 +12,7 @@ from calibration.statistics.fit import Fit, fit
 from calibration.statistics.residual_tests import Directions, directions, examine_residual
 from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.statistics.study import Study
-from calibration.swimmer.candidate_effects import influences
+from calibration.swimmer.influences import influences
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table

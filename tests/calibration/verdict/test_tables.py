@@ -83,8 +83,8 @@ def test_a_single_session_gives_a_weaker_conclusion() -> None:
         assert len(set(locked[data.condition == condition])) == 1
     result = calibrated(table, few=True)
     assert result.effects == (DRAG,)
-    assert any("1 session" in limit for limit in result.conditions.caveats)
-    assert "block" in result.conditions.split.names
+    assert any("1 session" in limit for limit in result.caveats)
+    assert "block" in result.split.names
     table = toy_table(5).assign(session="one")
     table["R_yr_cm"] *= 1.03  # what shifts all runs of a session is no evidence
     table["omega_h_rpm"] *= 0.98
@@ -99,15 +99,15 @@ def test_two_sessions_kept_whole_are_not_called_blocks() -> None:
     table["session"] = np.where(table["N"].isin((3, 4)), "inner", "outer")
     _, held_out = PROTOCOLS["paper"](read_measurements(table))
     result = calibrated(table[["run", *PAPER]], few=True, held_out=held_out)
-    assert result.conditions.split.names == "outer"
-    assert not any("sessions only" in limit for limit in result.conditions.caveats)
+    assert result.split.names == "outer"
+    assert not any("sessions only" in limit for limit in result.caveats)
 
 
 def test_robots_of_one_kind_are_closed_with_both_limits() -> None:
     table = pd.concat([t[t["N"] == 3] for t in (toy_table(5), toy_table(6))])
     result = calibrated(table, few=True)
     assert result.verdict == "none"
-    caveats = result.conditions.caveats
+    caveats = result.caveats
     assert [("N = 3" in caveat, "1 session only" in caveat) for caveat in caveats] == [
         (True, False),
         (False, True),
@@ -135,8 +135,8 @@ def test_a_slipped_decimal_point_is_named_and_set_aside() -> None:
     table = toy_table(12)
     table.loc[17, "omega_yr_rad_s"] *= 10
     result, without = (calibrated(each, few=True) for each in (table, table.drop(index=17)))
-    assert [line.split(" is ")[0] for line in result.conditions.excluded] == ["row 18: omega_yr"]
-    assert not result.conditions.split.fitted[17]
+    assert [line.split(" is ")[0] for line in result.excluded] == ["row 18: omega_yr"]
+    assert not result.split.fitted[17]
     assert result.verdict == without.verdict
     assert result.noise_ceiling == pytest.approx(without.noise_ceiling, rel=0.05)
 
@@ -150,12 +150,12 @@ def test_mistracked_runs_have_little_weight_and_are_named() -> None:
         table.loc[run, "R_yr_cm"] *= 1 + rng.uniform(0.1, 0.3)
     result = calibrated(table, few=True)
     assert result.effects == clean.effects == (DRAG,)
-    assert clean.conditions.little_weight == ()
-    assert set(result.conditions.little_weight) <= set((mistracked + 1).tolist())
-    assert len(result.conditions.little_weight) >= 2
-    assert any("have a weight below one half" in line for line in result.conditions.caveats)
+    assert clean.little_weight == ()
+    assert set(result.little_weight) <= set((mistracked + 1).tolist())
+    assert len(result.little_weight) >= 2
+    assert any("have a weight below one half" in line for line in result.caveats)
     record = verdict_record(result, table="t")
-    assert record["rows_of_little_weight"] == list(result.conditions.little_weight)
+    assert record["rows_of_little_weight"] == list(result.little_weight)
 
 
 @pytest.mark.slow
@@ -193,7 +193,7 @@ def test_the_papers_protocol_fits_three_and_four_tails_and_predicts_two_and_five
     assert data.outputs == ("omega_h", "omega_yr")
     assert set(data.tails[held_out]) == {2.0, 5.0}
     result = calibrated(table[["run", *PAPER]], few=True, held_out=held_out)
-    assert result.conditions.split.names == "N=2, N=5"
+    assert result.split.names == "N=2, N=5"
     assert DRAG in result.effects
     assert result.error_after < 0.5 * result.error_before
     with pytest.raises(InputError, match="N = 2, 3, 4 and 5"):

@@ -11,7 +11,7 @@ import pytest
 from calibration.attribution.claim_checks import NumberCheck
 from calibration.verdict import calibrate
 from calibration.verdict.record import facts
-from calibration.verdict.verdict import HeldOutErrors, Verdict, reach_verdict
+from calibration.verdict.verdict import Explained, HeldOutErrors, Verdict
 from calibration.words.render import next_steps
 from sim.io.errors import InputError
 from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, ambiguous, calibrated, none, number, toy_table
@@ -26,14 +26,17 @@ from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, ambiguous, calibr
         (0.01, 1, 0, True, "effect"),
         (0.01, 1, 1, True, "ambiguous"),
         (0.01, 0, 0, False, "unexplained"),
+        (0.01, 0, 0, False, "partial"),
         (0.01, 1, 0, False, "effect"),
         (0.01, 2, 0, False, "ambiguous"),
     ],
 )
 def test_the_rule(p_value: float, effects: int, rival_numbers: int, number_explains: bool, verdict: str) -> None:
-    rivals, misfit = (None,) * rival_numbers, SimpleNamespace(p_value=p_value)
-    given: Any = SimpleNamespace(misfit=misfit, explaining=(None,) * effects, rival_numbers=rivals)
-    assert reach_verdict(given, 0.04, number_explains=number_explains) == verdict
+    given: Any = SimpleNamespace(
+        misfit=SimpleNamespace(p_value=p_value), best=(None,) * effects, rival_numbers=(None,) * rival_numbers,
+        number=number_explains, nearest=verdict == "partial",
+    )  # fmt: skip
+    assert Explained.verdict(given, 0.04) == verdict
 
 
 def unexplained(
@@ -71,9 +74,9 @@ def test_what_is_claimed_must_lower_the_error() -> None:
 @pytest.mark.parametrize(("tolerances", "hedged"), [(8.3, True), (4.0, False)])
 def test_a_number_that_is_hardly_an_error_of_measurement_is_hedged(tolerances: float, hedged: bool) -> None:
     said = number()
-    assert said.evidence.number_check is not None
+    assert said.found.number_check is not None
     check = NumberCheck(imitable=0.0, transfer=0.5, tolerances=tolerances)
-    sentence = replace(said, evidence=replace(said.evidence, number_check=check)).sentence
+    sentence = replace(said, found=replace(said.found, number_check=check)).sentence
     assert ("or something outside the catalogue looks like it" in sentence) == hedged
     assert ("off by 8 of its tolerances" in sentence) == hedged
 
@@ -90,12 +93,12 @@ def test_what_breaks_down_at_its_ends_loses_no_verdict(monkeypatch: pytest.Monke
         monkeypatch.setattr(calibrate, name, breaks)
     broken = calibrated(toy_table(1, lengths_cm=(8.0,), **{DRAG: 4.0}), few=few)
     assert broken.verdict == "ambiguous"
-    assert (len(broken.next.explanations), broken.next.runs) == (len(whole.next.explanations), ())
-    assert broken.fits.base_intervals == {name: broken.base.interval(name) for name in broken.base.names}
+    assert (len(broken.explanations), broken.next_runs) == (len(whole.explanations), ())
+    assert broken.base_intervals == {name: broken.base.interval(name) for name in broken.base.names}
 
 
 def test_coefficients_that_the_runs_do_not_determine_are_named() -> None:
     two_tails = toy_table(3, lengths_cm=(10.0, 10.5, 11.0, 11.5), design={"tails": (2,)})
     said = "these runs determine C_t and C_yr to no better than a factor of two"
-    assert said in calibrated(two_tails, few=FEW_CANDIDATES).conditions.caveats
-    assert not any("factor of two" in limit for limit in none().conditions.caveats)
+    assert said in calibrated(two_tails, few=FEW_CANDIDATES).caveats
+    assert not any("factor of two" in limit for limit in none().caveats)

@@ -23,7 +23,6 @@ VERDICTS = {"none": none, "number": number, "effect": effect, "ambiguous": ambig
 def stored(name: str, **changes: Any) -> dict[str, Any]:
     """Return the content of a verdict.json, with some of its entries changed."""
     record: dict[str, Any] = json.loads(json.dumps(verdict_record(VERDICTS[name](), table="t.csv")))
-    record["path"] = None
     assert not changes.keys() - record.keys()
     return record | changes
 
@@ -189,7 +188,7 @@ def test_of_many_laws_the_best_two_are_named_and_the_others_counted() -> None:
 
 def test_the_settings_to_repeat_are_those_of_the_largest_departures() -> None:
     result = none()
-    runs, used = result.runs, result.conditions.split.fitted
+    runs, used = result.runs, result.split.fitted
     off = used & (runs.condition == runs.condition[used][0])
     moved = replace(result, runs=replace(runs, y=runs.y + 0.5 * off[:, None]))
     first, *others = facts(moved)["largest_departures"]

@@ -12,8 +12,7 @@ import pytest
 
 from calibration.statistics import study
 from calibration.swimmer import measured_table
-from calibration.swimmer.copied_rows import find_copies
-from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.measured_table import find_copies, read_measurements
 from sim.arrays import Floats
 from tests.planner.page.page_core import FOLDER, TABLE, answer, answers, opened, typed
 from tests.planner.page.parity import refusal_of

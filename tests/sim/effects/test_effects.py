@@ -63,7 +63,7 @@ def test_adding_an_effect_is_adding_a_file(tmp_path: Path) -> None:
         (tmp_path / "sim" / "effects" / f"{reach}_one.py").write_text(NEW_EFFECT.format(reach=reach))
     code = """
 import numpy as np
-from calibration.swimmer.candidate_effects import influences
+from calibration.swimmer.influences import influences
 from sim.inputs import check_columns
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
