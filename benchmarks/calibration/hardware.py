@@ -123,6 +123,7 @@ def make_table(case: Case, place: int, seed: int) -> pd.DataFrame:
                 )
                 if turned:
                     rows[-1]["v_cm_s"] = values[5] + _CURRENT * math.cos(math.radians(course))
+                    rows[-1]["R_yr_cm"] *= rows[-1]["v_cm_s"] / values[5]  # the radius of the path that is seen
                     rows[-1]["course_deg"] = (course + 90 * (day in case.days)) % 360
     table = pd.DataFrame(rows).sample(frac=1, random_state=seed).sort_values("day", kind="stable")
     return table.assign(elapsed_min=4.0 * np.arange(len(table)) + 1000 * table["day"]).drop(columns="day")
