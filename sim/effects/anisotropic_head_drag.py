@@ -32,11 +32,8 @@ EFFECT = AnisotropicHeadDrag(
     title="anisotropic head drag",
     equation="F_x = −6π μ0 R C_t v_x, F_z = −6π μ0 R C_t (1 + ε) v_z",
     source="Tirado and Garcia de la Torre, J. Chem. Phys. 71, 2581 (1979)",
-    unit="1",
-    null=0.0,
     bounds=(-0.8, 2.0),
     typical=-0.2,
     plausible=(-0.5, 0.5),
-    symmetry="even",
     dissipative=True,
 )

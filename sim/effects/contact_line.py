@@ -34,10 +34,8 @@ EFFECT = ContactLine(
     equation="F = −ε F_0 s v/√(v² + v_s²)",
     source="pinned contact lines: Joanny and de Gennes (1984)",
     unit="0.1 EI/l² of the control example",
-    null=0.0,
     bounds=(0.0, 1.0),
     typical=0.05,
-    symmetry="even",
     dissipative=True,
     similar=False,  # its creep speed is a speed of its own, see `contact_line_speed`
     reach="nonlocal",

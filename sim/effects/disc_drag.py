@@ -33,10 +33,8 @@ EFFECT = DiscDrag(
     equation="M_z = −ε 8π μ0 R³ ω_t",
     source="Happel and Brenner (1973), disc rotating about its axis: torque 32/3 μ R³ ω",
     unit="8π μ0 R³",
-    null=0.0,
     bounds=(0.0, 10.0),
     typical=0.4,
     plausible=(0.0, 4.0),
-    symmetry="even",
     dissipative=True,
 )

@@ -33,10 +33,8 @@ EFFECT = EndOverEndDrag(
     equation="M_y = −ε 8π μ0 R³ ω_yr",
     source="Tirado and Garcia de la Torre, J. Chem. Phys. 73, 1986 (1980)",
     unit="8π μ0 R³",
-    null=0.0,
     bounds=(0.0, 20.0),
     typical=5.0,
     plausible=(0.0, 12.0),
-    symmetry="even",
     dissipative=True,
 )

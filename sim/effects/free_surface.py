@@ -17,12 +17,8 @@ EFFECT = Effect(
     title="images of the tails in the free surface",
     equation="v_k → v_k − ε Σ G(x_k − y*_j) f*_j",
     source="image system of a stress-free plane: Blake (1971); Pozrikidis (1992)",
-    unit="1",
-    null=0.0,
     bounds=(0.0, 1.1),
     typical=1.0,
     plausible=(0.3, 1.1),
-    symmetry="even",
-    dissipative=False,
     reach="nonlocal",
 )

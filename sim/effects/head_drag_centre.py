@@ -34,10 +34,8 @@ EFFECT = HeadDragCentre(
     equation="F = −6π μ0 R C_t v at ε L ahead of the head's centre",
     source="centre of resistance: Happel and Brenner (1965)",
     unit="L, forward",
-    null=0.0,
     bounds=(-0.5, 0.5),
     typical=0.05,
     plausible=(-0.3, 0.3),
-    symmetry="even",
     dissipative=True,
 )

@@ -15,12 +15,8 @@ EFFECT = Effect(
     title="flow between head and tails",
     equation="v → v − ε Σ (G f + rotlet)",
     source="Stokeslet sums: Pozrikidis (1992); regularised: Cortez, Fauci, Medovikov (2005)",
-    unit="1",
-    null=0.0,
     bounds=(0.0, 1.1),
     typical=1.0,
     plausible=(0.5, 1.1),
-    symmetry="even",
-    dissipative=False,
     reach="nonlocal",
 )

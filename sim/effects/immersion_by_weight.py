@@ -45,10 +45,8 @@ EFFECT = ImmersionByWeight(
     equation="β = asin 0.7 + ε s, C_yr ∝ cos β, C_t and C_r ∝ π/2 + β",
     source="Du, Miller, Jawed (arXiv 2103.05712): side force of a head that is wetted up to 0.7 R",
     unit="rad, at the control example",
-    null=0.0,
     bounds=(-0.15, 0.15),
     typical=0.03,
     plausible=(-0.1, 0.1),
-    symmetry="even",
     dissipative=True,
 )

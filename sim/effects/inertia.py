@@ -36,12 +36,9 @@ EFFECT = Inertia(
     title="drag growing with speed (inertia)",
     equation="ζ∥, ζ⊥, R_head × (1 + ε |ω|/ω_control)",
     source="Oseen (1910): drag × (1 + 3/16 Re) for a sphere",
-    unit="1",
-    null=0.0,
     bounds=(0.0, 2.0),
     typical=0.05,
     plausible=(0.0, 0.3),
-    symmetry="even",
     dissipative=True,
     similar=False,  # the control example's speed is a speed of its own
 )

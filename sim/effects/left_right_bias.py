@@ -34,10 +34,8 @@ EFFECT = LeftRightBias(
     equation="M_y = ε μ0 R L² |ω_t|/2",
     source="symmetry: what a mirror-symmetric robot cannot have",
     unit="μ0 R L²/2",
-    null=0.0,
     bounds=(-2.0, 2.0),
     typical=0.05,
     plausible=(-0.5, 0.5),
     symmetry="odd",
-    dissipative=False,
 )

@@ -32,11 +32,9 @@ EFFECT = MotorDroop(
     equation="ω_t − ω_h = ω − ε T/(μ0 l³)",
     source="torque-speed line of a direct-current motor on fixed voltage",
     unit="1/(μ0 l³)",
-    null=0.0,
     bounds=(0.0, 20.0),
     typical=0.5,
     plausible=(0.0, 5.0),
-    symmetry="even",
     dissipative=True,
     similar=False,  # the motor's loss of speed per torque is its own
 )

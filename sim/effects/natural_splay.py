@@ -16,11 +16,8 @@ EFFECT = Effect(
     equation="κ⁰ = ε/l in the plane of the axis",
     source="discrete elastic rods: Bergou et al. (2008), ½ EI |κ − κ⁰|²",
     unit="1/l",
-    null=0.0,
     bounds=(-1.0, 1.0),
     typical=0.1,
     plausible=(-0.5, 0.5),
-    symmetry="even",
-    dissipative=False,
     reach="nonlocal",
 )

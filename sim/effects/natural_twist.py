@@ -16,11 +16,9 @@ EFFECT = Effect(
     equation="τ⁰ = ε/l",
     source="discrete elastic rods: Bergou et al. (2008), ½ GJ (τ − τ⁰)²",
     unit="1/l",
-    null=0.0,
     bounds=(-6.0, 6.0),
     typical=1.0,
     symmetry="odd",
-    dissipative=False,
     reach="nonlocal",
     beside="natural_splay",
 )

@@ -32,11 +32,9 @@ EFFECT = RateDependentModulus(
     equation="M = EI (κ + ε t κ̇)",
     source="Kelvin-Voigt; discrete viscous threads: Bergou et al. (2010)",
     unit="time scale of the control robot",
-    null=0.0,
     bounds=(0.0, 0.5),
     typical=0.05,
     plausible=(0.0, 0.2),
-    symmetry="even",
     dissipative=True,
     similar=False,  # the rubber's time is its own
     reach="nonlocal",

@@ -34,11 +34,8 @@ EFFECT = RootCompliance(
     equation="α = ε s (l/EI) M at the root",
     source="beam on a rotational spring",
     unit="l/EI of the control example",
-    null=0.0,
     bounds=(0.0, 1.0),
     typical=0.1,
     plausible=(0.0, 0.4),
-    symmetry="even",
-    dissipative=False,
     reach="nonlocal",
 )

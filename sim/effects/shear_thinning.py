@@ -18,12 +18,9 @@ EFFECT = Effect(
     title="shear thinning",
     equation="ζ∥, ζ⊥ × (1 + (λ γ̇)²)^(−ε/2), ε = 1 − n",
     source="Carreau (1972)",
-    unit="1",
-    null=0.0,
     bounds=(0.0, 0.9),
     typical=0.3,
     plausible=(0.02, 0.8),
-    symmetry="even",
     dissipative=True,
     similar=False,  # the relaxation time is a time of its own
     reach="nonlocal",

@@ -31,11 +31,8 @@ EFFECT = StratifiedViscosity(
     equation="ζ∥, ζ⊥ × e^(ε y/R)",
     source="resistive force theory with the viscosity at the node",
     unit="1/R",
-    null=0.0,
     bounds=(-0.5, 0.5),
     typical=0.1,
     plausible=(-0.3, 0.3),
-    symmetry="even",
-    dissipative=False,
     reach="nonlocal",
 )

@@ -34,10 +34,7 @@ EFFECT = SurfaceCouple(
     equation="M_y = ε μ0 N a² l ω_t",
     source="estimate; image system of a rotlet under a stress-free plane",
     unit="μ0 a² l",
-    null=0.0,
     bounds=(-3.0, 3.0),
     typical=0.1,
     plausible=(-1.5, 1.5),
-    symmetry="even",
-    dissipative=False,
 )

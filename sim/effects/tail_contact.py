@@ -40,12 +40,9 @@ EFFECT = TailContact(
     equation="f = F(ε) ln(1 + exp((2 r0 − d)/0.008 r0))",
     source="Tong, Choi, Joo and Jawed, Extreme Mech. Lett. 58, 101924 (2023)",
     unit="1: gaps kept to 2 %",
-    null=0.0,
     bounds=(0.0, 1.2),
     typical=1.0,
     plausible=(0.6, 1.2),
-    symmetry="even",
-    dissipative=False,
     reach="nonlocal",
 )
 

@@ -16,12 +16,8 @@ EFFECT = Effect(
     title="flow between the tails",
     equation="v_k → v_k − ε Σ G(x_k − y_j) f_j",
     source="Stokeslet sums: Pozrikidis (1992); regularised: Cortez, Fauci, Medovikov (2005)",
-    unit="1",
-    null=0.0,
     bounds=(0.0, 1.1),
     typical=1.0,
     plausible=(0.5, 1.1),
-    symmetry="even",
-    dissipative=False,
     reach="nonlocal",
 )

@@ -39,10 +39,7 @@ EFFECT = TailSag(
     equation="b = −8 ε (EI/l³) s e_y",
     source="cantilever under its own weight: tip deflection q l⁴/(8 EI)",
     unit="l, at the control example",
-    null=0.0,
     bounds=(-0.4, 0.4),
     typical=0.1,
     plausible=(-0.05, 0.2),
-    symmetry="even",
-    dissipative=False,
 )

@@ -39,10 +39,8 @@ EFFECT = TankWall(
     equation="F = −6π μ0 R C_t v/(1 − 2.104 ε + 2.089 ε³ − 0.948 ε⁵)",
     source="Faxén (1922); Haberman and Sayre (1958)",
     unit="d/D",
-    null=0.0,
     bounds=(0.0, 0.7),
     typical=0.1,
-    symmetry="even",
     dissipative=True,
     drivers=(
         Driver(

@@ -32,11 +32,8 @@ EFFECT = ViscosityDrift(
     title="drift of the viscosity",
     equation="μ = μ0 exp(−ε), ε = β (T − T0)",
     source="Cheng, Ind. Eng. Chem. Res. 47, 3285 (2008): β ≈ 0.086 /K for glycerol at 20 °C",
-    unit="1",
-    null=0.0,
     bounds=(-2.0, 2.0),
     typical=0.086,
-    symmetry="even",
     dissipative=True,
     drivers=(
         Driver(

@@ -66,12 +66,12 @@ class Effect:
     title: str  # what a person calls it
     equation: str  # as text, with the size ε
     source: str  # author and year, or where it follows from
-    unit: str  # of the size ε
-    null: float  # size at which the base model comes back exactly
     bounds: tuple[float, float]  # least and largest size
     typical: float  # a size that is often met
-    symmetry: Literal["even", "odd"]  # whether a reversed motor mirrors the motion ("even")
-    dissipative: bool  # it can only take energy out
+    unit: str = "1"  # of the size ε
+    null: float = 0.0  # size at which the base model comes back exactly
+    symmetry: Literal["even", "odd"] = "even"  # whether a reversed motor mirrors the motion ("even")
+    dissipative: bool = False  # it can only take energy out
     similar: bool = True  # the motion at viscosity f and speed ω is that at viscosity 1 and speed f ω
     reach: Literal["local", "nonlocal"] = "local"  # whether it couples nodes of the tails
     is_drag: bool = False  # of a non-local effect: its number grows with drag

@@ -16,12 +16,8 @@ EFFECT = Effect(
     title="taper of the tails' bending stiffness",
     equation="EI(s) = EI (1 + ε (1 − 2 s/l))",
     source="Euler-Bernoulli beam of variable section",
-    unit="1",
-    null=0.0,
     bounds=(-0.9, 0.9),
     typical=0.2,
     plausible=(0.0, 0.5),
-    symmetry="even",
-    dissipative=False,
     reach="nonlocal",
 )
