@@ -32,7 +32,7 @@ from sim.robot_rows import OneRobot, one_robot, with_units
 MAX_SECONDS = 90.0  # of processor time for the search, without laws
 
 
-@checks_keywords()
+@checks_keywords
 def calibrate(
     table: str | Path | pd.DataFrame,
     robot: OneRobot,
@@ -105,7 +105,7 @@ def calibrate(
     return replace(result, paths=path_errors(wanted, robot, result.corrected, result.knowledge))
 
 
-@checks_keywords()
+@checks_keywords
 def decide(
     table: str | Path | pd.DataFrame, verdict: Verdict | str | Path, robot: OneRobot, *, jobs: int | None = None
 ) -> Decision:
@@ -136,7 +136,7 @@ def decide(
     return decide_between(model, explanations, before, with_law)
 
 
-@checks_keywords()
+@checks_keywords
 def tracks(
     tracks: str | Path | pd.DataFrame,
     runs: str | Path | pd.DataFrame,

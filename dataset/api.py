@@ -19,7 +19,7 @@ from sim.model.robot import Robot
 _SCHEDULER = "DASK_SCHEDULER_ADDRESS"
 
 
-@checks_keywords()
+@checks_keywords
 def sweep(
     config: str | Path | Robot | None,
     out: str | Path,
@@ -73,7 +73,7 @@ def sweep(
     )
 
 
-@checks_keywords()
+@checks_keywords
 def read_sweep(folder: str | Path) -> pd.DataFrame:
     """Read all rows of a finished sweep, in the order of its design; units are in the Parquet schema.
 

@@ -34,7 +34,7 @@ class Scheduled(Protocol):
         """Return its schedule."""
 
 
-@checks_keywords()
+@checks_keywords
 def steady(
     robots: Robots, *, robot: OneRobot | None = None, stability: bool = True, jobs: int | None = None
 ) -> pd.DataFrame:
@@ -86,7 +86,7 @@ def steady(
     return rows.frame(motion)
 
 
-@checks_keywords()
+@checks_keywords
 def response(robots: Robots) -> pd.DataFrame:
     """Simulate the response to a flip of the motor: one row for each robot, direction, preceding dwell and dwell.
 
@@ -168,7 +168,7 @@ def _lab_response(table: pd.DataFrame, robot: Robot) -> pd.DataFrame:
     return pd.DataFrame(lab)
 
 
-@checks_keywords()
+@checks_keywords
 def sensitivities(robots: Robots, parameters: Sequence[str], *, jobs: int | None = None) -> pd.DataFrame:
     """Differentiate the steady motion in inputs and effect sizes, by the implicit function theorem.
 
@@ -200,7 +200,7 @@ def sensitivities(robots: Robots, parameters: Sequence[str], *, jobs: int | None
     return pd.DataFrame(columns)
 
 
-@checks_keywords()
+@checks_keywords
 def replay(schedule: Schedule | Scheduled | str | Path, robot: OneRobot | None = None) -> pd.DataFrame:
     """Simulate a schedule, from rest with straight tails.
 

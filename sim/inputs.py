@@ -107,7 +107,7 @@ def names_robot(source: str | Path) -> bool:
     return str(source) in PRESETS or path.suffix == ".toml" or not (path.suffix or path.exists())
 
 
-@checks_keywords()
+@checks_keywords
 def load_robot(source: str | Path) -> Robot:
     """Load a robot from a preset's name or a robot.toml.
 
@@ -145,7 +145,7 @@ def _read_robot(path: Path) -> Robot:
     return Robot(name=str(name), effects=dict(effects), correction=correction, learnt_from=learnt_from, **values)
 
 
-@checks_keywords()
+@checks_keywords
 def save_robot(robot: Robot, path: str | Path) -> None:
     """Write a robot.toml that `load_robot` reads back to the same robot.
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sim.robot_rows import Robots
 
 
-@checks_keywords(table="lookup")
+@checks_keywords
 def query(
     robots: Robots,
     *,
@@ -67,7 +67,7 @@ def query(
     return rows.frame(answer)
 
 
-@checks_keywords(table="lookup")
+@checks_keywords
 def inverse(
     targets: Mapping[str, Any] | pd.DataFrame | str | Path,
     *,
@@ -114,7 +114,7 @@ def _index(targets: Mapping[str, Any] | pd.DataFrame) -> Any:
     return [0]
 
 
-@checks_keywords(table="lookup")
+@checks_keywords
 def export(folder: str | Path, *, lookup: LookupTable | str | Path | None = None) -> str:
     """Write a trained look-up table for other programs: at most 150 kB, with a reader in C99.
 

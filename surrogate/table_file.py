@@ -60,7 +60,7 @@ def load(path: str | Path | None = None) -> NeuralTable:
     raise InputError(f"{path} is no complete look-up table{lack}; {remedy}")
 
 
-@checks_keywords()
+@checks_keywords
 def load_table(path: str | Path | None = None) -> LookupTable:
     """Read a model file, or the table of one robot (.json); by default the one that comes with the package.
 

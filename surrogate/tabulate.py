@@ -43,7 +43,7 @@ _CHECKED = 24  # dwells of the random schedule
 _RANGE = (0.35, 1.8)  # of their lengths
 
 
-@checks_keywords()
+@checks_keywords
 def tabulate(robot: Robot) -> RobotTable:
     """Simulate one robot's steady motion and its response to flips, in both directions of the motor.
 

@@ -42,7 +42,7 @@ class _Linearised(torch.autograd.Function):
         return parts.sum(1), None, None
 
 
-@checks_keywords()
+@checks_keywords
 def torch_query(
     columns: Inputs, *, lookup: NeuralTable | str | Path | None = None, flag: bool = False
 ) -> dict[str, Tensor]:
@@ -78,7 +78,7 @@ def torch_query(
     return _answered(columns, ask)
 
 
-@checks_keywords()
+@checks_keywords
 def torch_steady(columns: Inputs, *, jobs: int | None = None) -> dict[str, Tensor]:
     """Simulate the steady motion, so that torch can differentiate it once.
 

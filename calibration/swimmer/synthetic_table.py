@@ -24,7 +24,7 @@ from sim.motion.batches import stepped_columns
 from sim.motion.lab_units import RPM, lab_columns
 
 
-@checks_keywords()
+@checks_keywords
 def make_table(
     robot: Robot,
     *,

@@ -25,7 +25,7 @@ from surrogate.interface import LookupTable
 from surrogate.table_file import load_table
 
 
-@checks_keywords()
+@checks_keywords
 def check(
     plan: Plan | Mapping[str, Any] | str | Path,
     track: pd.DataFrame | str | Path,
@@ -58,7 +58,7 @@ def check(
         return tracking_error(dict(content), track if isinstance(track, pd.DataFrame) else read_table(track))
 
 
-@checks_keywords()
+@checks_keywords
 def replan(
     plan: Plan | str | Path,
     track: pd.DataFrame | str | Path,
@@ -101,7 +101,7 @@ def replan(
         return replan_from(plan, track if isinstance(track, pd.DataFrame) else read_table(track))
 
 
-@checks_keywords()
+@checks_keywords
 def swim(
     pilot: Plan | Tracker,
     truth: OneRobot | None = None,

@@ -14,7 +14,7 @@ from planner.vehicle.dwell_choice import Objective
 from sim.io.keywords import checks_keywords
 
 
-@checks_keywords(arrive_seconds="arrive")
+@checks_keywords
 def to_goal(
     start: Sequence[Length],
     goal: Sequence[Length],

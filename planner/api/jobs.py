@@ -35,7 +35,7 @@ from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 
 
-@checks_keywords()
+@checks_keywords
 def tour(
     places: str | Path | Sequence[Sequence[float] | str],
     robot: AnyVehicle,
@@ -69,7 +69,7 @@ def tour(
     return plan_tour(visited, tracked, request, any_start=any_start, back=back, progress=options.get("progress"))
 
 
-@checks_keywords()
+@checks_keywords
 def cover(
     region: Region,
     width: Length,
@@ -109,7 +109,7 @@ def cover(
     return sweep_field(field, across, tracked, request, along, options.get("progress"))
 
 
-@checks_keywords()
+@checks_keywords
 def hold(
     place: Sequence[float] | str,
     robot: AnyVehicle,
@@ -142,7 +142,7 @@ def hold(
     return orbit(centre, tracked, request, duration, options.get("progress"))
 
 
-@checks_keywords()
+@checks_keywords
 def fleet(
     plans: Sequence[Plan],
     apart: float | str,

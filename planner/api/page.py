@@ -20,7 +20,7 @@ from sim.io.keywords import checks_keywords
 from sim.robot_rows import OneRobot, one_robot
 
 
-@checks_keywords()
+@checks_keywords
 def write_page(
     path: str | Path,
     robot: OneRobot = "paper-control",

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from planner.jobs.fleet_plan import FleetPlan
 
 
-@checks_keywords(arrive_seconds="arrive")
+@checks_keywords
 def plan(
     path: Path2D | Drawing | ArrayLike | str | Path,
     robot: AnyVehicle,
@@ -89,7 +89,7 @@ def plan(
     return make_plan(drawn, tracked, request, options.get("progress"))
 
 
-@checks_keywords()
+@checks_keywords
 def write_plan(
     result: Plan | FleetPlan,
     folder: str | Path,

@@ -16,7 +16,7 @@ _NUMBERS = ("end_error_over_l", "end_error_rad", "length_over_l", "margin_over_l
 _POSES = ("start", "goal", "predicted_end")
 
 
-@checks_keywords()
+@checks_keywords
 def load_goal(path: str | Path) -> dict[str, Any]:
     """Read and check the content of a goal.json, which is that of `Trip.to_dict`.
 

@@ -18,7 +18,7 @@ LARGEST = 1e100  # of a number, so that sums and squares of them are finite
 _TABLES = {"reference": 2, "raw_path": 2, "predicted_poses": 3}
 
 
-@checks_keywords()
+@checks_keywords
 def load_plan(path: str | Path) -> dict[str, Any]:
     """Read and check the content of a plan.json, which is that of `Plan.to_dict`.
 

@@ -60,7 +60,7 @@ def is_plan(path: str | Path) -> bool:
         return False
 
 
-@checks_keywords()
+@checks_keywords
 def restore_plan(
     source: Mapping[str, Any] | str | Path, *, lookup: LookupTable | None = None, own_table: bool = False
 ) -> Plan[None]:

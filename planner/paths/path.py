@@ -78,7 +78,7 @@ class Path2D:
         return float(np.linalg.norm(np.diff(self.polyline(), axis=0), axis=1).sum())
 
 
-@checks_keywords()
+@checks_keywords
 def circle(radius: float) -> Path2D:
     """Make a circle about the origin, counter-clockwise from (radius, 0).
 
@@ -91,7 +91,7 @@ def circle(radius: float) -> Path2D:
     return Path2D.of(radius * np.stack([np.cos(angle), np.sin(angle)], 1), closed=True)
 
 
-@checks_keywords()
+@checks_keywords
 def polygon(corners: int, side: float) -> Path2D:
     """Make a regular polygon about the origin, counter-clockwise; it starts in the middle of its lower side.
 

@@ -62,7 +62,7 @@ class Drawing:
         return self.path.scaled(own or given or 1.0)
 
 
-@checks_keywords()
+@checks_keywords
 def read_path(source: str | Path, *, closed: bool | None = None, shape: str | None = None) -> Drawing:
     """Read a path from a table with columns x, y (or x_mm, y_mm and so on), from an SVG file, or from words.
 

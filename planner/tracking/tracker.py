@@ -36,7 +36,6 @@ from planner.tracking.clock import SLACK, Clock
 from planner.tracking.displacement import Displacement
 from planner.tracking.guidance import TrackerGuidance
 from planner.tracking.kalman_filter import NAMES, POSE, Dwell, Estimate, difference
-from sim.io.deprecated import old_attributes
 from sim.io.errors import InputError
 from sim.io.notebook import as_html
 from sim.io.units import format_time
@@ -151,9 +150,6 @@ class Tracker:
         return Command(
             0 if self._finished else self._dwell.sense, self._flip_at, self._finished, self.alarm, self._error()
         )
-
-    if not TYPE_CHECKING:
-        __getattr__ = old_attributes({"feed": "update", "advice": "command"})
 
     def __repr__(self) -> str:
         command, robot = self.command, self._plan.robot

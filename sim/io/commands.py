@@ -25,7 +25,7 @@ from __future__ import annotations
 import ast
 import re
 import sys
-from argparse import SUPPRESS, Action, ArgumentParser, Namespace
+from argparse import SUPPRESS, ArgumentParser
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from importlib.util import find_spec
@@ -34,7 +34,6 @@ from typing import Any, NamedTuple, NoReturn, TypeVar
 
 from sim.io.errors import InputError, run_command
 
-_RENAMED = {"--minimum-dwell": "--min-dwell", "--minimum-seconds": "--min-dwell-s", "--lookup": "--model"}
 _PLAIN: dict[str, dict[str, Any]] = {kind.__name__: {"type": kind} for kind in (str, bool, int, float)}
 F = TypeVar("F", bound=Callable[..., None])
 
@@ -164,16 +163,6 @@ class Parser(ArgumentParser):
         raise InputError(f"{message}; {self.prog} --help lists what can be given")
 
 
-class _Renamed(Action):
-    """An old name of an option: it works, with a warning; `const` is the new one."""
-
-    def __call__(
-        self, parser: ArgumentParser, namespace: Namespace, values: Any, option: str | None = None
-    ) -> None:
-        print(f"warning: {option} is deprecated; use {self.const}", file=sys.stderr)
-        setattr(namespace, self.dest, values)
-
-
 class Command(NamedTuple):
     """A command of a program: a function that is called with what was written."""
 
@@ -240,8 +229,6 @@ def _add(parser: ArgumentParser, parameter: Parameter, name: str, words: dict[st
     elif many:
         words["action"], about = "append", f"{about}; may be given again"
     parser.add_argument(option, *synonyms, dest=parameter.name, help=about, required=parameter.needed, **words)
-    if old := _RENAMED.get(option):
-        parser.add_argument(old, dest=parameter.name, action=_Renamed, const=option, help=SUPPRESS, **words)
 
 
 class Program:

@@ -1,4 +1,4 @@
-"""Keywords of public functions: a wrong one is refused, with a proposal; an old one works for one release."""
+"""Keywords of public functions: a wrong one is refused, with a proposal."""
 
 from __future__ import annotations
 
@@ -8,37 +8,26 @@ from functools import wraps
 from inspect import Parameter, signature, unwrap
 from typing import Any, ParamSpec, TypeVar
 
-from sim.io.deprecated import warn_deprecated
 from sim.io.errors import InputError
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def checks_keywords(**renamed: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Make a function refuse keywords that it does not have with an `InputError` that proposes the nearest.
+def checks_keywords(function: Callable[P, R]) -> Callable[P, R]:
+    """Make a function refuse keywords that it does not have with an `InputError` that proposes the nearest."""
+    known = keywords_of(function)
 
-    Args:
-        renamed: old keywords of the function, and what they are called now.
-    """
+    @wraps(function)
+    def checked(*arguments: P.args, **given: P.kwargs) -> R:
+        for name in given:
+            if name not in known:
+                near = difflib.get_close_matches(name, known, 1)
+                proposal = f"is it {near[0]}?" if near else f"there are {', '.join(known)}"
+                raise InputError(f"{function.__name__} has no keyword {name!r}; {proposal}")
+        return function(*arguments, **given)
 
-    def decorate(function: Callable[P, R]) -> Callable[P, R]:
-        known = keywords_of(function)
-
-        @wraps(function)
-        def checked(*arguments: Any, **given: Any) -> R:
-            for name in [name for name in given if name not in known]:
-                if name not in renamed:
-                    near = difflib.get_close_matches(name, known, 1)
-                    proposal = f"is it {near[0]}?" if near else f"there are {', '.join(known)}"
-                    raise InputError(f"{function.__name__} has no keyword {name!r}; {proposal}")
-                warn_deprecated(f"{function.__name__}({name}=…)", f"{renamed[name]}=…", callers=1)
-                given[renamed[name]] = given.pop(name)
-            return function(*arguments, **given)
-
-        return checked
-
-    return decorate
+    return checked
 
 
 def keywords_of(function: Callable[..., Any]) -> list[str]:

@@ -95,7 +95,7 @@ class Schedule:
         )
 
 
-@checks_keywords()
+@checks_keywords
 def load_schedule(path: str | Path) -> Schedule:
     """Load the schedule in a plan.json.
 

@@ -46,7 +46,7 @@ def split(rows: Integers) -> Integers:
     return np.where(tenth == 8, 1, np.where(tenth == 9, 2, 0))
 
 
-@checks_keywords()
+@checks_keywords
 def train(
     folder: str | Sequence[str],
     settings: Settings | None = None,

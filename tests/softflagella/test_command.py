@@ -71,13 +71,6 @@ def test_wrong_words_end_in_one_line(words: list[str], expected: str, capsys: py
     assert captured.out == ""
 
 
-def test_an_old_option_works_with_a_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["plan", "circle:1.5l", "--robot", "paper-control", "--objective", "flips", "--min-dwell-s", "3"]
-    assert run_command(main, [*words, "--out", str(tmp_path)]) == 0
-    assert "warning: --min-dwell-s is deprecated; use --minimum-seconds\n" in capsys.readouterr().err
-    assert min(sf.load_plan(tmp_path / "plan.json")["dwell_s"]) >= 3
-
-
 def test_effects_are_listed_with_a_sentence_each_and_the_version(capsys: pytest.CaptureFixture[str]) -> None:
     main(["--version"])
     assert capsys.readouterr().out == f"softflagella {sf.__version__}\n"

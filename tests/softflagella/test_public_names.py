@@ -40,12 +40,6 @@ def test_a_wrong_keyword_is_refused_with_a_proposal() -> None:
         sf.plan(sf.circle(2.0), "paper-control", colour="red")  # type: ignore[call-arg]
 
 
-def test_an_old_keyword_works_with_a_warning() -> None:
-    with pytest.warns(DeprecationWarning, match="query\\(table=…\\) is deprecated; use lookup=…"):
-        old = sf.query("paper-control", table=None)  # type: ignore[call-arg]
-    assert old.equals(sf.query("paper-control"))
-
-
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.rest) if n in LONG else n for n in NAMES])
 def test_every_name_has_an_example_that_runs(name: str) -> None:
     thing = getattr(sf, name)

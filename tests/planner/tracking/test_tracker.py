@@ -148,14 +148,6 @@ def test_no_flip_just_before_the_end(late: float) -> None:
         assert command.finished or command.flip_at > last.flip_at + late
 
 
-def test_old_names_warn_and_work() -> None:
-    tracker = Tracker(planned())
-    with pytest.warns(DeprecationWarning, match=r"use Tracker\.update"):
-        assert tracker.feed(0.0) == tracker.command
-    with pytest.warns(DeprecationWarning, match=r"use Tracker\.command"):
-        assert tracker.advice == tracker.command
-
-
 VALUES = st.one_of(st.floats(-1e3, 1e3), st.sampled_from([math.nan, math.inf, -math.inf, 1e300, -1e300, 0.0]))
 
 
