@@ -17,7 +17,7 @@ from sim.io.errors import InputError, naming
 from sim.io.units import format_length, format_time
 
 if TYPE_CHECKING:
-    from planner.planning.planned import Plan
+    from planner.planning.plan import Plan
     from planner.tracking.tracker import Tracker
 
 program = Program("planner", "Plan switching schedules for paths, without simulating.")
@@ -61,7 +61,7 @@ def _progress_bar() -> Iterator[Callable[[float], object]]:
     """Show a bar on a terminal, for plans that take long."""
     from tqdm import tqdm
 
-    from planner.planning.progress import Share
+    from planner.planning.request import Share
 
     style = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}"
     with tqdm(

@@ -7,7 +7,7 @@ carries it along. Against a replay of the whole schedule in time steps the track
 most a few hundredths of l on paths of 12 l, in a tenth of the time.
 
 The covariance of the calibration, the errors of the table, and the unknown phase of the disc give what 95 % of the
-robots that the calibration allows do on the same schedules (`planner.planning.error_growth`). Lengths are in
+robots that the calibration allows do on the same schedules (`planner.planning.errors`). Lengths are in
 metres, unless a name says l; l is the tail length of the robot as given.
 """
 
@@ -22,16 +22,16 @@ import numpy as np
 from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D
 from planner.paths.path_files import read_path
-from planner.planning.error_growth import error_growth
-from planner.planning.planned import Plan
-from planner.planning.request import PlanRequest
-from planner.planning.stated_error import (
+from planner.planning.errors import (
     deviations_open_loop,
+    error_growth,
     flips_between,
     predicted_error,
     rms_in_time,
     stated_error,
 )
+from planner.planning.plan import Plan
+from planner.planning.request import PlanRequest
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle

@@ -12,7 +12,7 @@ from planner.files.plan_json import load_plan
 from planner.files.replan import replan_from, saved_trip
 from planner.files.tracking_error import TrackingError, tracking_error
 from planner.planning.camera import Camera
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from planner.tracking.swim import Swim
 from planner.tracking.swim import swim as swim_under
 from planner.tracking.tracker import Tracker

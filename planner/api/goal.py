@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from typing import Unpack
 
 from planner.api.options import AnyVehicle, GoalOptions, Length, asked, pose_of, seconds_of, swimmer_of
-from planner.goal.to_goal import to_goal as plan_to_goal
 from planner.goal.trip import Trip
+from planner.goal.trip import to_goal as plan_to_goal
 from planner.paths.units import read_length
-from planner.planning.planned import Plan
-from planner.vehicle.dwell_choice import Objective
+from planner.planning.plan import Plan
+from planner.vehicle.zigzag import Objective
 from sim.io.keywords import checks_keywords
 
 

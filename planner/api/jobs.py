@@ -30,7 +30,7 @@ from planner.jobs.region import Field
 from planner.jobs.tour import Visits
 from planner.jobs.tour import tour as plan_tour
 from planner.paths.units import read_degrees
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 

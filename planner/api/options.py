@@ -21,9 +21,9 @@ from planner.paths.units import Swimmer, read_length, read_pose, read_time
 from planner.planning.camera import POSE, Camera
 from planner.planning.request import Corner, PlanRequest
 from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
-from planner.vehicle.dwell_choice import Objective
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import Point, TrackedVehicle, tracked_vehicle
+from planner.vehicle.zigzag import Objective
 from sim.io.errors import InputError
 from sim.io.units import LengthUnit
 from sim.model.robot import Robot

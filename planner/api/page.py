@@ -12,9 +12,8 @@ from planner.api.options import CornerOptions, Length, length_of, request_of, ta
 from planner.page.first_state import NamedPath
 from planner.page.write_page import TITLE
 from planner.page.write_page import write_page as write
-from planner.paths.path import Path2D
+from planner.paths.path import Path2D, shape_of
 from planner.paths.path_files import read_path
-from planner.paths.shapes import shape_of
 from sim.io.errors import naming
 from sim.io.keywords import checks_keywords
 from sim.robot_rows import OneRobot, one_robot

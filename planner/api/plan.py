@@ -14,7 +14,7 @@ from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D, smoothed
 from planner.paths.path_files import Drawing, read_path
 from planner.paths.units import describe, in_lab, in_tails
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from sim.io.errors import InputError, naming
 from sim.io.keywords import checks_keywords
 

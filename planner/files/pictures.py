@@ -11,7 +11,7 @@ from matplotlib.transforms import ScaledTranslation
 from planner.files.plan_picture import schedule_words
 from planner.jobs.fleet_picture import draw_distances, draw_motions
 from planner.jobs.fleet_plan import FleetPlan
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from sim.io.files import whole_file
 from sim.io.units import format_length, format_time
 

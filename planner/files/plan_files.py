@@ -20,7 +20,7 @@ import numpy as np
 from planner.files.plan_picture import plan_svg
 from planner.files.tracker_header import DIRECTIONS, c_part, safe_name, tracker_header
 from planner.paths.units import in_lab
-from planner.planning.planned import KINDS, Plan
+from planner.planning.plan import KINDS, Plan
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_numbers, write_text
 from sim.io.provenance import code_version

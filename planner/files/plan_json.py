@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.planning.planned import GUARANTEE
+from planner.planning.plan import GUARANTEE
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.model.plan_file import read_plan_file

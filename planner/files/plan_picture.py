@@ -7,7 +7,7 @@ from typing import Any
 
 from planner.files.svg_axes import SvgAxes
 from planner.paths.units import in_lab
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from sim.io.units import format_time
 
 

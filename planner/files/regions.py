@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from planner.paths.obstacles import Circle, Polygon, Region
+from planner.paths.path import like_a_shape, shape_of
 from planner.paths.path_files import Drawing, read_path
-from planner.paths.shapes import like_a_shape, shape_of
 from planner.paths.units import Swimmer, in_tails, read_length
 from sim.arrays import Floats
 from sim.io.errors import InputError, naming

@@ -18,11 +18,10 @@ from planner.files.goal_json import load_goal
 from planner.files.plan_json import load_plan
 from planner.files.saved_plan import plan_json, restore_plan
 from planner.files.tracking_error import track_in_tails
-from planner.goal.to_goal import to_goal
-from planner.goal.trip import Trip
+from planner.goal.trip import Trip, to_goal
 from planner.paths.obstacles import FreeSpace
 from planner.paths.units import Swimmer
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.rest import place_reached, rest_of
 from sim.arrays import Floats

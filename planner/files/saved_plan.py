@@ -21,22 +21,18 @@ from planner.files.plan_json import check_numbers, load_plan
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Reference
-from planner.planning.arrival import Arrival
 from planner.planning.camera import DOCUMENTED, Camera
-from planner.planning.declared_path import Declared
-from planner.planning.errors import PlanErrors
-from planner.planning.kept_clear import Detour, KeptClear
-from planner.planning.lap import Lap
+from planner.planning.conditions import Arrival, Detour, KeptClear, Lap
+from planner.planning.declare import Declared
+from planner.planning.errors import PlanErrors, predicted_error
 from planner.planning.line_of_sight import Guidance
-from planner.planning.planned import GUARANTEE, KINDS, Plan
+from planner.planning.plan import GUARANTEE, KINDS, Plan
 from planner.planning.request import PlanRequest
-from planner.planning.stated_error import predicted_error
 from planner.vehicle.calibration_table import CalibrationKnowledge
-from planner.vehicle.dwell_choice import Objective
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.rollout import Switches, trace
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
-from planner.vehicle.zigzag import Zigzag
+from planner.vehicle.zigzag import Objective, Zigzag
 from sim.io.errors import InputError, naming
 from sim.io.keywords import checks_keywords
 from sim.io.reading import ContentError, read_json

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from planner.goal.dubins import ROUNDING
-from planner.planning import feedback_error, line_of_sight
-from planner.planning.planned import Plan
-from planner.tracking import clock, displacement, guidance, kalman_filter, tracker, way_back
+from planner.planning import errors, line_of_sight
+from planner.planning.plan import Plan
+from planner.tracking import guidance, kalman_filter, tracker
 from planner.tracking.guidance import tracked_reference
 from planner.tracking.kalman_filter import prior
 from planner.vehicle.vehicle import BEFORE_KNOTS, STEP
@@ -123,7 +123,7 @@ def _intro() -> str:
 #endif
 #define TRACKER_SLACK {_FLOAT_SLACK!r}
 #else
-#define TRACKER_SLACK {clock.SLACK!r}
+#define TRACKER_SLACK {tracker.SLACK!r}
 #endif
 #ifdef TRACKER_FLOAT
 typedef float tracker_real;
@@ -143,11 +143,11 @@ def _macros() -> str:
         "FIRST_DIRECTION": _PLAN, "STATES": kalman_filter.STATES, "POINTS": _PLAN, "LAP": _PLAN,
         "TIMES": _PLAN, "KNOTS": len(BEFORE_KNOTS),
         "HALVINGS": line_of_sight.HALVINGS, "MOST_LOOKS": line_of_sight.MOST_LOOKS,
-        "KEPT": feedback_error.KEPT, "LOST": tracker.LOST, "WINDOW": tracker.WINDOW,
-        "SEGMENTS": way_back.SEGMENTS, "STRIDE": _PLAN,
-        "AGREED": displacement.AGREED, "FLIPS": displacement.FLIPS, "CONFIRMED": clock.CONFIRMED,
+        "KEPT": errors.KEPT, "LOST": tracker.LOST, "WINDOW": tracker.WINDOW,
+        "SEGMENTS": guidance.SEGMENTS, "STRIDE": _PLAN,
+        "AGREED": tracker.AGREED, "FLIPS": tracker.FLIPS, "CONFIRMED": tracker.CONFIRMED,
     }  # fmt: skip
-    times = {"TIME_SCALE": _PLAN, "LATE": clock.LATE, "EARLY": clock.EARLY}
+    times = {"TIME_SCALE": _PLAN, "LATE": tracker.LATE, "EARLY": tracker.EARLY}
     reals = {
         "TAIL_LENGTH_M": _PLAN,
         "STEP": STEP,
@@ -162,18 +162,18 @@ def _macros() -> str:
         "GATE": tracker.GATE,
         "ALARM_AT": tracker.ALARM_AT,
         "SPREADS": tracker.SPREADS,
-        "WITHIN_NORMAL": feedback_error.WITHIN[0],
-        "WITHIN_UNIFORM": feedback_error.WITHIN[1],
-        "BELOW_NORMAL": feedback_error.BELOW[0],
-        "BELOW_UNIFORM": feedback_error.BELOW[1],
+        "WITHIN_NORMAL": errors.WITHIN[0],
+        "WITHIN_UNIFORM": errors.WITHIN[1],
+        "BELOW_NORMAL": errors.BELOW[0],
+        "BELOW_UNIFORM": errors.BELOW[1],
         **dict.fromkeys(("PIVOT_DISTANCE", "WAY_AHEAD", "LIMIT"), _PLAN),
         "AWAY": guidance.AWAY,
         "STRAIGHT": guidance.STRAIGHT,
-        "ROOM": way_back.ROOM,
-        "LEFT_OUT": way_back.LEFT_OUT,
-        "MODEL": displacement.MODEL,
-        "LARGEST": displacement.LARGEST,
-        "MEAN": displacement.MEAN,
+        "ROOM": guidance.ROOM,
+        "LEFT_OUT": guidance.LEFT_OUT,
+        "MODEL": tracker.MODEL_NOISE,
+        "LARGEST": tracker.LARGEST_MISFIT,
+        "MEAN": tracker.LARGEST_MEAN,
         "WALK": kalman_filter.WALK,
     }
 

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 
 from planner.jobs.plan import make_plan
 from planner.planning.picture import DECLARED, PREDICTED, RAW, REPLAYED, label_points
-from planner.planning.planned import Plan
-from planner.vehicle.dwell_choice import QUICK, longest_dwell
+from planner.planning.plan import Plan
+from planner.vehicle.zigzag import QUICK, longest_dwell
 from sim.io.errors import InputError
 
 _COUNT = 10

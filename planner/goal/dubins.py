@@ -8,6 +8,8 @@ course. All functions take arrays of poses.
 
 from __future__ import annotations
 
+import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +45,12 @@ class DubinsPaths(NamedTuple):
             remaining = remaining - length
             pose = _moved(pose, self.turns[:, i, None] / radius, part)
         return pose
+
+    def sampled(self, radius: float, spacing: float) -> Floats:
+        """Sample poses (m, 3) of a single path at equal steps in each segment, at most `spacing` apart."""
+        ends = np.concatenate([[0.0], np.cumsum(self.lengths[0])])
+        ways = [np.linspace(a, b, math.ceil((b - a) / spacing) + 1)[1:] for a, b in pairwise(ends) if b > a]
+        return np.asarray(self.poses(np.concatenate([[0.0], *ways])[None], radius)[0])
 
 
 def words(start: Floats, goal: Floats, radius: float) -> Floats:

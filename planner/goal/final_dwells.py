@@ -13,8 +13,8 @@ import numpy as np
 
 from planner.paths.distance import distance_to
 from planner.planning.camera import POSE
-from planner.planning.declared_path import Declared
-from planner.planning.setting import Setting
+from planner.planning.declare import Declared
+from planner.planning.solve import Setting
 from planner.vehicle.rollout import Switches, poses_at_flips
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats

@@ -18,7 +18,7 @@ from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, words
 from planner.goal.lattice import Lattice, RouteLimits
 from planner.paths.obstacles import FreeSpace
 from planner.paths.units import Swimmer, in_lab, place_in_lab
-from planner.planning.kept_clear import BlockedError
+from planner.planning.conditions import BlockedError
 from sim.arrays import Floats
 
 COURSES = 24  # tried at a stop whose course is free

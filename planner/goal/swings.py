@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import chain, pairwise
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -20,9 +20,9 @@ from planner.goal.dubins import DubinsPaths, three_arcs
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift, Reference, slips
-from planner.planning.arrival import Swing
-from planner.planning.declared_path import Declared
-from planner.planning.setting import Setting
+from planner.planning.conditions import Swing
+from planner.planning.declare import Declared
+from planner.planning.solve import Setting
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
@@ -137,7 +137,7 @@ class _Track:
             for side in (1, -1):
                 arc = DubinsPaths(self.at(way)[None], np.array([[side, 0, 0]]),
                                   np.array([[2 * math.pi * radius * circles, 0.0, 0.0]]))  # fmt: skip
-                yield _Candidate(way, way, _sampled(arc, radius), circles)
+                yield _Candidate(way, way, arc.sampled(radius, _SPACING), circles)
 
     def swung(self, rest: float, circles: int, radius: float) -> Iterator[_Candidate]:
         """Yield swings that gain `rest` besides their circles, from the end of the track to its beginning."""
@@ -156,7 +156,7 @@ class _Track:
                 turns, lengths = three_arcs(self.at(leaves), self.at(joins_at), radius)
                 parts = lengths[word] + np.array([2 * math.pi * radius * circles, 0.0, 0.0])
                 path = DubinsPaths(self.at(leaves)[None], turns[word][None], parts[None])
-                yield _Candidate(leaves, joins_at, _sampled(path, radius), circles)
+                yield _Candidate(leaves, joins_at, path.sampled(radius, _SPACING), circles)
 
     def joined(self, candidate: _Candidate) -> tuple[Reference, Swing]:
         """Put a candidate into the track."""
@@ -202,11 +202,3 @@ class _Track:
             else:
                 high = middle
         return (low + high) / 2
-
-
-def _sampled(path: DubinsPaths, radius: float) -> Floats:
-    """Sample poses (m, 3) of one path at equal steps, with its joints."""
-    parts = path.lengths[0]
-    ends = np.concatenate([[0.0], np.cumsum(parts)])
-    ways = [np.linspace(a, b, max(math.ceil((b - a) / _SPACING), 1) + 1)[1:] for a, b in pairwise(ends) if b > a]
-    return np.asarray(path.poses(np.concatenate([[0.0], *ways])[None], radius)[0])

@@ -1,23 +1,49 @@
-"""The job to lead from a pose to a pose: words, picture, content of goal.json. Lengths in l, angles in rad."""
+"""to_goal(start, goal, robot): the motor's switching times from one pose to another, around obstacles.
+
+The pivot moves like a car that only drives forward and has a least turn radius. Its shortest track between two
+poses is one of Dubins' words, or a chain of them around obstacles (`planner.goal.route`). The schedule follows
+that track like any other path (`planner.planning.solve`). Its last dwells are then adjusted so that the robot ends
+at the goal with the wanted heading (`planner.goal.final_dwells`). If there is no track that leaves the margin,
+shorter dwells are tried, which need less clearance. Lengths in l, angles in rad.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from planner.goal.final_dwells import Ending
+from planner.goal.lattice import RouteLimits
+from planner.goal.route import COURSES, Lattices, NoWayError, Route, route
+from planner.goal.swings import Delay
 from planner.paths.obstacles import Footprint, FreeSpace
-from planner.paths.units import heading_in_degrees, in_lab, place_in_lab
+from planner.paths.tractrix import Drift, Reference, slips_at_heading
+from planner.paths.units import LONGEST, heading_in_degrees, in_lab, place_in_lab
 from planner.planning.camera import POSE
+from planner.planning.declare import Declared
+from planner.planning.line_of_sight import Start
 from planner.planning.picture import BODY, REPLAYED
-from planner.planning.planned import Job, Plan
+from planner.planning.plan import Job, Plan
+from planner.planning.request import PlanRequest, Progress
+from planner.planning.solve import Setting, Task, solve
+from planner.vehicle.tracked_point import TrackedVehicle
+from planner.vehicle.zigzag import check_least
+from sim.arrays import Floats
+from sim.io.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FORMAT = 1
+_SPACING = 0.02  # l
+_SHORTER = 0.4  # share of the chosen dwell that dwells near the end must keep
+_ZIGZAGS = 1.5  # first margin over the zigzag
+_FARTHEST = 1e6  # l
 
 
 @dataclass(frozen=True)
@@ -89,3 +115,104 @@ class Trip(Job):
             "margin_over_l": 0.0 if kept is None else kept.margin,
             "predicted_clearance_over_l": None if kept is None else kept.clearance,
         }
+
+
+def to_goal(
+    start: Sequence[float],
+    goal: Sequence[float],
+    tracked: TrackedVehicle,
+    request: PlanRequest,
+    via: Sequence[Sequence[float]] = (),
+    progress: Progress | None = None,
+) -> Plan[Trip]:
+    """Plan the motor's switching times from one pose to another.
+
+    Args:
+        start: x, y [l] and heading [rad] of the head's centre, at rest.
+        goal: the same at the end.
+        tracked: the vehicle, whose head's centre is tracked.
+        request: dwells, tolerance, obstacles.
+        via: places x, y that the pivot passes on its way, in this order.
+        progress: called now and then with the share of the path that is done.
+
+    Raises:
+        NoWayError: there is no way to the goal; it is an `InputError`.
+        InputError: a pose is bad.
+    """
+    first, last = _pose(start, "start"), _pose(goal, "goal")
+    places = tuple(_place(place) for place in via)
+    vehicle, robot, space = tracked.vehicle, tracked.robot, request.space
+    least_dwell = check_least(request.least_dwell(robot))
+    body = Footprint.of(robot, -vehicle.pivot_distance)
+    lattices: dict[Drift, Lattices] = {}
+
+    @cache
+    def track(drift: Drift, margin: float) -> Route:
+        limits = RouteLimits(vehicle.pivot_radius, body, space, drift)
+        stops = _stops(first, last, places, vehicle.pivot_distance, drift)
+        return route(stops, limits, margin, lattices.setdefault(drift, {}), robot)
+
+    def source(setting: Setting) -> Declared:
+        way = track(setting.drift, setting.margin or 0.0)
+        if way.length > LONGEST:
+            raise InputError(f"the way is {in_lab(way.length, robot)} long; at most {LONGEST:g} l can be planned")
+        poses = way.poses(_SPACING)
+        if len(poses) < 2:
+            raise InputError("start and goal are the same; nothing to do")
+        # The guaranteed bound is for paths that turn less than the robot can; these arcs turn as much as it can.
+        return Declared(
+            Reference.of_pivot(poses, tracked.rod, drift=setting.drift, heading=first[2]), curvature=0.0
+        )
+
+    task = Task(
+        source=source, changes=(Delay(space),), start=lambda declared: Start(first, declared.reference.first_turn),
+        ending=Ending(last, least_dwell, _SHORTER), zigzags=_ZIGZAGS, longer=False, blocked=NoWayError,
+    )  # fmt: skip
+    plan = solve(task, tracked, request, progress)
+    length = track(plan.drift, 0.0 if plan.kept_clear is None else plan.kept_clear.margin).length
+    return plan.with_job(Trip(last, plan.end, places, length))
+
+
+def _stops(start: POSE, goal: POSE, via: Sequence[tuple[float, float]], back: float, drift: Drift) -> list[Floats]:
+    """Return the pivot's poses to choose from at the start, at each place on the way, and at the goal.
+
+    Args:
+        start, goal: poses of the head's centre.
+        via: places on the way.
+        back: distance from the head's centre back to the pivot.
+        drift: what carries the robot off its heading.
+    """
+    ends = []
+    for x, y, heading in (start, goal):
+        course = heading + float(slips_at_heading(np.array(heading), drift))
+        ends.append(np.array([[x - back * math.cos(heading), y - back * math.sin(heading), course]]))
+    courses = 2 * math.pi * np.arange(COURSES) / COURSES
+    return [ends[0], *(np.stack([0 * courses + x, 0 * courses + y, courses], 1) for x, y in via), ends[1]]
+
+
+def _pose(values: Sequence[float], name: str) -> POSE:
+    """Check a pose that the user gave."""
+    x, y, heading = _finite(values, 3, f"{name}: give x, y and heading")
+    if abs(heading) > math.tau:
+        raise InputError(
+            f"{name}: a heading of {heading:g} is more than one turn; headings are in radians here, so give "
+            f"math.radians({heading:g}) if you mean degrees"
+        )
+    return x, y, heading
+
+
+def _place(values: Sequence[float]) -> tuple[float, float]:
+    """Check a place that the user gave."""
+    x, y = _finite(values, 2, "place on the way: give x and y")
+    return x, y
+
+
+def _finite(values: Sequence[float], count: int, wanted: str) -> list[float]:
+    """Check that there are `count` finite numbers; the message says what is wanted."""
+    try:
+        numbers = [float(value) for value in values]
+    except (TypeError, ValueError):
+        numbers = []
+    if len(numbers) != count or not all(abs(number) < _FARTHEST for number in numbers):
+        raise InputError(f"{wanted}, as finite numbers; not {values}")
+    return numbers

@@ -27,9 +27,8 @@ from planner.paths.path import arc_length
 from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab
 from planner.planning.picture import DECLARED
-from planner.planning.planned import Job, Plan
-from planner.planning.progress import Progress
-from planner.planning.request import PlanRequest
+from planner.planning.plan import Job, Plan
+from planner.planning.request import PlanRequest, Progress
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.arrays import Floats
 from sim.io.errors import InputError

@@ -7,7 +7,7 @@ leave and join, and among all ways of the lattice between them (`planner.goal.la
     length of the way + length of the path that is not followed
 
 smallest: it neither leaves the path early nor goes far from it. The way is then shortened by direct joints, and
-moved as near to the path as the body's margin and the robot's turns allow (`planner.paths.nearest_feasible`). Its
+moved as near to the path as the body's margin and the robot's turns allow (`planner.paths.nearest_path`). Its
 turns are wider than the robot's narrowest one, as those of a path that is followed as drawn. Lengths in l.
 """
 
@@ -25,16 +25,16 @@ from planner.goal.lattice import Lattice, RouteLimits
 from planner.goal.route import AROUND, LEVELS, Route, shortened
 from planner.jobs.hindered import Hindered
 from planner.paths.distance import nearest
-from planner.paths.nearest_feasible import nearest_poses, tracked_points
+from planner.paths.nearest_path import nearest_poses, tracked_points
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D, arc_length
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.tractrix import reference as follow_path
 from planner.paths.units import in_lab, place_in_lab
-from planner.planning.declared_path import Declared
+from planner.planning.conditions import BlockedError, Detour
+from planner.planning.declare import Declared
 from planner.planning.feasible import AS_DRAWN, TIGHTEST
-from planner.planning.kept_clear import BlockedError, Detour
-from planner.planning.setting import Setting
+from planner.planning.solve import Setting
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.arrays import Flags, Floats
 

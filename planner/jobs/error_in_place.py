@@ -4,7 +4,7 @@ The stated error of a plan is a distance from its path, and says nothing about t
 need more: the error in place at a given time. It is a curve over time below which 95 % of the robots that the
 model's uncertainty allows keep both ends of their body, all the time.
 
-*Open loop*: the deviations from which the stated error is computed (`planner.planning.stated_error`), in all
+*Open loop*: the deviations from which the stated error is computed (`planner.planning.errors`), in all
 directions.
 
 *With feedback*: a tracker holds the robot to its path, but not to a time. Across the path the robot is within the
@@ -28,10 +28,8 @@ from planner.draws import normals
 from planner.paths.obstacles import Footprint
 from planner.paths.path import Path2D, arc_length
 from planner.paths.tractrix import reference
-from planner.planning.error_growth import error_growth
-from planner.planning.planned import Plan
-from planner.planning.setting import zigzag_drift
-from planner.planning.stated_error import LEVEL, WOBBLE, deviations_open_loop, flips_between
+from planner.planning.errors import LEVEL, WOBBLE, deviations_open_loop, error_growth, flips_between
+from planner.planning.plan import Plan
 from planner.vehicle.rollout import roll_out
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Mode
@@ -126,7 +124,7 @@ def _changed(tracked: TrackedVehicle, mode: Mode) -> TrackedVehicle:
 def _passing_times(path: Path2D, tracked: TrackedVehicle, dwell: float) -> Floats:
     """Compute the times (K,) at which the pivot of a robot that follows a path passes equal parts of it."""
     straight = zigzag(tracked.vehicle, dwell, tracked.offset)
-    drift = zigzag_drift(tracked, straight)
+    drift = tracked.drift(straight)
     followed = reference(path, tracked.rod, max(_SPACING, path.length / 4000), drift)
     heading = (followed.heading[1:] + followed.heading[:-1]) / 2
     ahead = 1 + drift.current[0] * np.cos(heading) + drift.current[1] * np.sin(heading)

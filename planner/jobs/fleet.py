@@ -26,8 +26,8 @@ from planner.jobs.timed_motion import TimedMotion
 from planner.jobs.timetable import Timetable, Timing, Turn
 from planner.jobs.waiting_circles import WaitingCircle, circle_reference, with_circles
 from planner.paths.obstacles import Footprint, FreeSpace
-from planner.planning.kept_clear import KeptClear
-from planner.planning.planned import Plan
+from planner.planning.conditions import KeptClear
+from planner.planning.plan import Plan
 from sim.io.errors import InputError
 from sim.io.units import format_length
 

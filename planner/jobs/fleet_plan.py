@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from planner.jobs.separation import Approach, Scheduled, approach, instants
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from sim.arrays import Floats
 from sim.io.notebook import as_html
 from sim.io.units import column_units, format_length, format_time

@@ -26,9 +26,8 @@ from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D, circle
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.camera import POSE
-from planner.planning.planned import Job, Plan
-from planner.planning.progress import Progress
-from planner.planning.request import PlanRequest
+from planner.planning.plan import Job, Plan
+from planner.planning.request import PlanRequest, Progress
 from planner.vehicle.rollout import predicted_poses
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.io.errors import InputError

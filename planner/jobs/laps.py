@@ -14,11 +14,11 @@ from dataclasses import replace
 import numpy as np
 
 from planner.goal.final_dwells import flips_after
-from planner.planning.errors import plan_errors
-from planner.planning.lap import OVERLAP, Lap, drift_of_a_lap
-from planner.planning.planned import J, Plan
-from planner.planning.progress import Progress
-from planner.planning.schedule import follow
+from planner.planning.conditions import OVERLAP, Lap
+from planner.planning.errors import drift_of_a_lap, plan_errors
+from planner.planning.line_of_sight import follow
+from planner.planning.plan import J, Plan
+from planner.planning.request import Progress
 from planner.vehicle.rollout import Switches, poses_at_flips
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats

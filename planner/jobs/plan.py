@@ -2,7 +2,7 @@
 
 The look-up table gives the vehicle: both directions, and the memory of the last dwell
 (`planner.vehicle.from_table`). The path that the robot can follow and that is nearest to the drawn one is declared
-(`planner.planning.declared_path`). Its tractrix is the pivot's reference (`planner.paths.tractrix`).
+(`planner.planning.declare`). Its tractrix is the pivot's reference (`planner.paths.tractrix`).
 `planner.planning.solve` follows it. What is not asked for is not loaded.
 """
 
@@ -13,11 +13,10 @@ from functools import cache
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
 from planner.paths.units import check_size
-from planner.planning.declared_path import Declared, declare
+from planner.planning.declare import Declared, declare
 from planner.planning.feasible import Feasibility
-from planner.planning.planned import Plan
-from planner.planning.progress import Progress
-from planner.planning.request import PlanRequest
+from planner.planning.plan import Plan
+from planner.planning.request import PlanRequest, Progress
 from planner.planning.solve import Change, Task, solve
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.io.errors import InputError

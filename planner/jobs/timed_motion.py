@@ -14,7 +14,7 @@ import numpy as np
 from planner.jobs.error_in_place import error_open_loop, error_with_feedback
 from planner.paths.obstacles import Footprint
 from planner.paths.units import Swimmer
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from sim.arrays import Floats
 from sim.mechanics import planar
 

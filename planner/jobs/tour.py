@@ -29,9 +29,8 @@ from planner.paths.obstacles import FreeSpace
 from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.picture import REPLAYED, label_points
-from planner.planning.planned import Job, Plan
-from planner.planning.progress import Progress
-from planner.planning.request import PlanRequest
+from planner.planning.plan import Job, Plan
+from planner.planning.request import PlanRequest, Progress
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.arrays import Floats
 from sim.io.errors import InputError

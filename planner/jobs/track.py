@@ -10,14 +10,12 @@ from planner.goal.route import Route
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift, Reference, slips
 from planner.paths.units import LONGEST, check_size, in_lab
-from planner.planning.declared_path import Declared
-from planner.planning.planned import Plan
-from planner.planning.progress import Progress
-from planner.planning.request import PlanRequest
-from planner.planning.setting import Setting
-from planner.planning.solve import Task, solve
-from planner.vehicle.dwell_choice import dwells_for
+from planner.planning.declare import Declared
+from planner.planning.plan import Plan
+from planner.planning.request import PlanRequest, Progress
+from planner.planning.solve import Setting, Task, solve
 from planner.vehicle.tracked_point import TrackedVehicle
+from planner.vehicle.zigzag import dwells_for
 from sim.arrays import Floats
 from sim.io.errors import InputError
 

@@ -17,10 +17,9 @@ import numpy as np
 
 from planner.goal.final_dwells import Ending
 from planner.paths.tractrix import Reference
-from planner.planning.planned import J, Plan
-from planner.planning.schedule import Start
-from planner.planning.setting import Setting
-from planner.planning.solve import follow_declared
+from planner.planning.line_of_sight import Start
+from planner.planning.plan import J, Plan
+from planner.planning.solve import Setting, follow_declared
 
 ROOM = 0.7  # radius of the narrowest circle over that of a waiting circle
 _SPACING = 0.02  # l, of the reference's points

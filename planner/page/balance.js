@@ -10,7 +10,7 @@ import { inverse, solveDense } from "./math.js";
 const { SOFT, SMALL_DEFLECTION, SMALL_SURGE, TINY, THRUST, THRUST_SOFT, THRUST_POWER } = CONSTANTS.tails;
 const { TORQUE_SOFT, TORQUE_POWER } = CONSTANTS.tails;
 const { STEPS, CORRECTION, ACCEPTED, DIFFERENCE, MIN_SHARE, FIRST_SPIN, MAX_TURN } = CONSTANTS.balance;
-const { LEAST_SURGE } = CONSTANTS.wrench_table;
+const { MIN_SURGE } = CONSTANTS.tails;
 /* Prepare a network {shift, scale, mean, spread, members} from the arrays of a model file. */
 function networkOf({ shape, state }) {
   const parts = (name, k) => {
@@ -204,7 +204,7 @@ function motionSensitivity(head, tails, motion) {
   matrix[3][3] += gain * (number * perp * offset ** 2 * linearTorque(perp * spin));
   const speed = Math.sqrt(vX ** 2 + vZ ** 2);
   const sizes = [
-    Math.sqrt(vX ** 2 + (yaw / 2) ** 2), Math.max(Math.abs(vZ), LEAST_SURGE * speed), Math.abs(yaw),
+    Math.sqrt(vX ** 2 + (yaw / 2) ** 2), Math.max(Math.abs(vZ), MIN_SURGE * speed), Math.abs(yaw),
     Math.min(Math.abs(headSpin), spin) / 3,
   ];
   return inverse(matrix).map((row, i) => row.map((entry) => entry / sizes[i]));

@@ -14,8 +14,8 @@ import { DECLARING, REMEDY, InputError, fixed, general, quoted, tell } from "./w
 
 const { AS_DRAWN, ROOMS, TIGHTEST, LOST, ROUNDED, SMALL, NOISY, FEWEST_POSES, FILLET_ROOM } = CONSTANTS.feasible;
 const { SPACING, MOST_POINTS, MINIMAX, ROUNDING, POINTS_A_POSE } = CONSTANTS.feasible;
-const { LONGEST } = CONSTANTS.paths_units, { WARN, FAR } = CONSTANTS.declared_path;
-const { SCALES, MOST_WORK, SMOOTHINGS, FIRST } = CONSTANTS.remedy;
+const { LONGEST } = CONSTANTS.paths_units, { WARN, FAR } = CONSTANTS.declare;
+const { SCALES, MOST_WORK, SMOOTHINGS, FIRST } = CONSTANTS.declare;
 const CORNERS = ["nearest", "minimax", "fillet", "error"];
 
 /* Ways to change a path, in order of preference: ROUNDED, or shares of ROOMS. */

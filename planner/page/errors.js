@@ -11,8 +11,9 @@ import { BEFORE_KNOTS, COUNT, SHORTEST, STEP, lagAt, lagNoise, lagPlace, pivotRa
 import { zigzagSpeed } from "./vehicle.js";
 
 const { WEYL, FIRST, SECOND, MIDDLE, TAIL } = CONSTANTS.draws;
-const { LEVEL, WOBBLE, DRAWS, BLOCKS, TIGHTEST, PAIRS_AHEAD } = CONSTANTS.stated_error;
-const { WITHIN, KEPT, ZIGZAG, PLACE, COURSE, STRETCH, CAMERA } = CONSTANTS.feedback_error;
+const { LEVEL, WOBBLE, DRAWS, BLOCKS } = CONSTANTS.errors;
+const { TIGHTEST, PAIRS_AHEAD } = CONSTANTS.line_of_sight;
+const { WITHIN, KEPT, ZIGZAG, PLACE, COURSE, STRETCH, CAMERA } = CONSTANTS.errors;
 const NOTHING = [0, 0, 0];
 const UNCHANGED = { twist: [NOTHING, NOTHING], current: [0, 0] };
 let drawn = { key: "" }; // the last numbers: plans ask for the same again and again

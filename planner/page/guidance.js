@@ -8,7 +8,7 @@ import { motionAfter, pivotDistance, pivotRadius, sideOf, speedOf, turnRadius, z
 import { FOLLOWING, InputError, general, tell } from "./words.js";
 
 const { EXACT, LARGEST_STEP, TURNS, MOST_BIAS, HALVINGS, MOST_LOOKS } = CONSTANTS.line_of_sight;
-const { MOST_SWITCHES, PATIENCE, EVERY } = CONSTANTS.schedule;
+const { MOST_SWITCHES, PATIENCE, EVERY } = CONSTANTS.line_of_sight;
 
 /* Compute h at every step of the reference. */
 function hysteresis(reference, vehicle, swing) {

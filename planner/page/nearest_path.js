@@ -7,9 +7,9 @@ import { clip, column, convolved, halfTurn, interp, largest, mean, sum, unwrap }
 import { pathLength, pathOf, polyline, resample } from "./path.js";
 import { STILL } from "./reference.js";
 
-const { SPACING, MOST_POSES, COARSEST, WEIGHTS, ITERATIONS, ALONG } = CONSTANTS.nearest_feasible;
-const { POINTS_A_POSE, ROUNDS, LEAST } = CONSTANTS.nearest_feasible;
-const { EVEN, SHORT, SHORTEST_STEP } = CONSTANTS.pose_equations;
+const { SPACING, MOST_POSES, COARSEST, WEIGHTS, ITERATIONS, ALONG } = CONSTANTS.nearest_path;
+const { POINTS_A_POSE, ROUNDS, LEAST } = CONSTANTS.nearest_path;
+const { EVEN, SHORT, SHORTEST_STEP } = CONSTANTS.nearest_path;
 
 /* Find the path of the tracked point that is nearest to `raw` among those that the robot can follow.
  *

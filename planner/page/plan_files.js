@@ -12,7 +12,7 @@ import { COUNT, lagAt, lagPlace, pivotDistance, pivotRadius, rodOf, turnRadius }
 import { yawRate, zigzagSpeed } from "./vehicle.js";
 import { InputError, general, repr } from "./words.js";
 
-const { WIDE, OWN_TABLE_FROM } = CONSTANTS.planned, { CAMERA } = CONSTANTS.feedback_error;
+const { WIDE, OWN_TABLE_FROM } = CONSTANTS.plan, { CAMERA } = CONSTANTS.errors;
 const { MOST_MS, CHECKPOINTS } = CONSTANTS.plan_files, { LARGEST } = CONSTANTS.tracker_header;
 const { PRIOR, MOST, CURRENT, MOST_CURRENT, MARKER, MOST_MARKER, STATES } = CONSTANTS.kalman_filter;
 const { NEAR, ERRORS } = CONSTANTS.guidance;

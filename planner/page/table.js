@@ -11,9 +11,9 @@ import { clip } from "./math.js";
 import { BEFORE, CURVE } from "./vehicle.js";
 import { InputError } from "./words.js";
 
-const { NOT_OF_HEAD } = CONSTANTS.lookup, { PARTS, SMALL_SURGE, OF_HEAD } = CONSTANTS.response_table;
-const { NORMAL_90, SIZES } = CONSTANTS.curve_errors, { HALVED } = CONSTANTS.intervals, { RELATIVE } = CONSTANTS.errors;
-const { DEGREE, DEGREE_OF_MANY, MANY } = CONSTANTS.support; // of monomials; of so many inputs and more
+const { OF_TAILS } = CONSTANTS.table, { PARTS, SMALL_SURGE, OF_HEAD } = CONSTANTS.response;
+const { NORMAL_90, LAGS } = CONSTANTS.error_modes, { HALVED } = CONSTANTS.intervals, { RELATIVE } = CONSTANTS.errors;
+const { DEGREE, DEGREE_OF_MANY, MANY } = CONSTANTS.domain; // of monomials; of so many inputs and more
 const STEADY = ["v_z", "v_x", "omega_yr_bar"];
 const END = 1.02; // of half an input's range
 const BRANCHES = 0.6; // |ω_yr/ω_t| from which a robot may have several motions
@@ -82,7 +82,7 @@ function motionOf(table, robot) {
   const { head, tails } = headAndTails(robot), kind = networkIndex(robot.N), network = table.wrench[kind];
   if (!table.support[kind] || !network) throw new OutsideError(REASONS.none);
   const { motion, converged } = solveBalance(network, head, tails);
-  const learned = NOT_OF_HEAD.every((name) => within(table.ranges[name], Math.abs(robot[name])));
+  const learned = OF_TAILS.every((name) => within(table.ranges[name], Math.abs(robot[name])));
   if (!converged || !learned) throw new OutsideError(REASONS.unknown);
   const inputs = tailInputs(tails, motion), own = networkInputs(tails, motion, network.shift.length);
   if (!(novelty(table.support[kind], own) <= 1)) throw new OutsideError(REASONS.novel);
@@ -105,7 +105,7 @@ function tableErrorModes({ curveErrors, intervals, ...table }, robot) {
     const sigma = Math.hypot(half, curveErrors.simulator * size);
     return { twist: STEADY.map((_, k) => (k === i ? sigma : 0)), lag: null, memory: null };
   });
-  const local = SIZES.map((name, axis) => (halfWidth(curveErrors.widths, name, features, 1) / NORMAL_90) * speeds[axis]);
+  const local = LAGS.map((name, axis) => (halfWidth(curveErrors.widths, name, features, 1) / NORMAL_90) * speeds[axis]);
   const { shape, values } = curveErrors.curves, whole = (BEFORE.length + 1) * CURVE, first = BEFORE.length * CURVE;
   const curves = Array.from({ length: shape[0] }, (_, k) => {
     const curve = values.slice(k * whole, (k + 1) * whole).map((value, at) => value * local[at % 3]);

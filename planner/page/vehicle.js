@@ -19,7 +19,7 @@ import { InputError, general, quoted } from "./words.js";
 
 const { DWELLS, BEFORE, FORGOTTEN } = CONSTANTS.response;
 const { SHORTEST, STEP, TIMES, BEFORE_KNOTS } = CONSTANTS.vehicle; // STEP between TIMES
-const { QUICK, LONGEST, KEPT, NEARLY, COMPARED, WIDEST, COUNT: GRID, LONGER } = CONSTANTS.dwell_choice;
+const { QUICK, LONGEST, KEPT, NEARLY, COMPARED, WIDEST, COUNT: GRID, LONGER } = CONSTANTS.zigzag;
 const { PAIRS, TRIES } = CONSTANTS.zigzag; // the last simulated pair of dwells is taken
 const CURVE = DWELLS.length * 3; // numbers of a curve
 const COUNT = TIMES.length;

@@ -16,7 +16,7 @@ from planner.page.page import page_text
 from planner.page.table_data import packed_bytes, packed_data, table_data
 from planner.planning.request import PlanRequest
 from planner.vehicle.calibration_table import CalibrationKnowledge
-from planner.vehicle.coefficient_modes import both_directions
+from planner.vehicle.from_table import both_directions
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Mode
 from sim.io.files import write_text

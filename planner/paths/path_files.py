@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.paths.file_kinds import refuse_other_kinds
-from planner.paths.path import Path2D
-from planner.paths.shapes import SHAPES, like_a_shape, nearest_shape, shape_of
+from planner.paths.path import SHAPES, Path2D, like_a_shape, nearest_shape, shape_of
 from planner.paths.svg_drawing import read_svg
 from planner.paths.units import NO_UNIT, Swimmer, in_tails
 from sim.arrays import Floats

@@ -20,13 +20,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.paths.units import in_lab
-from planner.planning.arrival import Arrival
-from planner.planning.planned import Plan
-from planner.planning.progress import Progress
-from planner.planning.request import PlanRequest
+from planner.planning.conditions import Arrival
+from planner.planning.plan import Plan
+from planner.planning.request import PlanRequest, Progress
 from planner.planning.solve import Task, by_dwell
-from planner.vehicle.dwell_choice import check_least, longest_dwell, net_speeds
 from planner.vehicle.tracked_point import TrackedVehicle
+from planner.vehicle.zigzag import check_least, longest_dwell, net_speeds
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.units import format_time

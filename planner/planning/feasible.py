@@ -2,7 +2,8 @@
 
 A candidate is accepted if its pivot turns no tighter than the robot can, with a margin, and if it keeps the shape
 of the drawn path. The nearest path is sought several times, each time with a wider turn: a wider turn leaves more
-margin, and the coarser poses that belong to it converge where finer ones do not. Lengths in l.
+margin, and the coarser poses that belong to it converge where finer ones do not. Or corners are rounded by arcs.
+Lengths in l.
 """
 
 from __future__ import annotations
@@ -13,13 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.paths.distance import two_sided
-from planner.paths.fillets import CORNER, fillet, kinks, largest_fillet
-from planner.paths.nearest_feasible import nearest_path, pose_spacing
-from planner.paths.path import Path2D, smoothed
+from planner.paths.nearest_path import nearest_path, pose_spacing
+from planner.paths.path import Path2D, smoothed, steps_of
 from planner.paths.tractrix import Drift, Reference, reference
 from planner.paths.units import Swimmer, extent, place_in_lab
-from planner.planning.progress import DECLARING, Progress, tell
-from planner.planning.request import Corner
+from planner.planning.request import DECLARING, Corner, Progress, tell
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
 from sim.io.errors import InputError
@@ -39,6 +38,7 @@ _MOST_POINTS = 150_000
 _MINIMAX = 3.4  # cost of the minimax distance over that of the root mean square
 _ROUNDING = 1e-9  # relative
 _POINTS_A_POSE = 80  # points of a reference that cost as much as one pose of the nearest path
+CORNER = math.radians(15.0)  # larger kinks are corners; smaller ones belong to curves
 
 
 class Feasibility(NamedTuple):
@@ -49,7 +49,7 @@ class Feasibility(NamedTuple):
     rod: float  # from the pivot to the tracked point
     drift: Drift  # what carries the robot off its heading
     corner: Corner  # what to do with places that are too tight
-    time_weight: float = 0.0  # as in `planner.paths.nearest_feasible` [l²]
+    time_weight: float = 0.0  # as in `planner.paths.nearest_path` [l²]
 
     @property
     def ways(self) -> tuple[Way, ...]:
@@ -181,3 +181,51 @@ def _rounded(raw: Path2D, feasibility: Feasibility) -> Path2D:
         middle = (low + high) / 2
         low, high = (low, middle) if tightest(middle) <= limit else (middle, high)
     return fillet(raw, high)
+
+
+def kinks(path: Path2D) -> Floats:
+    """Compute the signed turning angle [rad] at every point; zero at the ends of an open path."""
+    edges = np.diff(path.polyline(), axis=0)
+    direction = np.arctan2(edges[:, 1], edges[:, 0])
+    if path.closed:
+        turn = direction - np.roll(direction, 1)
+    else:
+        turn = np.concatenate([[0.0], np.diff(direction), [0.0]])
+    return np.asarray((turn + math.pi) % (2 * math.pi) - math.pi)
+
+
+def largest_fillet(path: Path2D) -> float:
+    """Compute the largest radius that fits all corners; infinite without corners."""
+    angle = np.abs(kinks(path))
+    reach = np.where(angle > CORNER, np.tan(angle / 2), 0.0)
+    edges = np.linalg.norm(np.diff(path.polyline(), axis=0), axis=1)
+    both = reach[: len(edges)] + np.roll(reach, -1)[: len(edges)]
+    fits = edges[both > 0] / both[both > 0]
+    return float(fits.min()) if len(fits) else math.inf
+
+
+def fillet(path: Path2D, radius: float) -> Path2D:
+    """Replace corners by arcs of `radius`, tangent to the edges; at most `largest_fillet`."""
+    angle = kinks(path)
+    corner = np.abs(angle) > CORNER
+    if radius == 0 or not corner.any():
+        return path
+    points = path.points
+    count = len(points)
+    reach = np.where(corner, radius * np.tan(np.abs(angle) / 2), 0.0)
+    edges = np.diff(path.polyline(), axis=0)
+    lengths = np.linalg.norm(edges, axis=1)
+    rounded: list[Floats] = []
+    for i in range(count):
+        if not corner[i]:
+            rounded.append(points[i : i + 1])
+            continue
+        into = edges[i - 1] / lengths[i - 1]
+        start = points[i] - reach[i] * into
+        inward = math.copysign(1.0, angle[i]) * np.array([-into[1], into[0]])
+        centre = start + radius * inward
+        steps = np.linspace(0, angle[i], max(8, steps_of(abs(angle[i]), math.radians(2))))
+        spoke = start - centre
+        c, s = np.cos(steps), np.sin(steps)
+        rounded.append(centre + np.stack([c * spoke[0] - s * spoke[1], s * spoke[0] + c * spoke[1]], 1))
+    return Path2D(np.concatenate(rounded), path.closed)

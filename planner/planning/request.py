@@ -1,19 +1,27 @@
-"""All that a user asks of a plan, besides path and robot. Lengths in l, times in μ0 l⁴/EI."""
+"""All that a user asks of a plan, besides path and robot; and what the plan tells while it is made.
+
+Lengths in l, times in μ0 l⁴/EI.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
 from planner.paths.obstacles import FreeSpace
 from planner.paths.units import Swimmer
 from planner.planning.camera import DOCUMENTED, Camera
-from planner.vehicle.dwell_choice import QUICK, Objective
 from planner.vehicle.tracked_point import Point
+from planner.vehicle.zigzag import QUICK, Objective
 from sim.io.errors import InputError
 
 Corner = Literal["nearest", "minimax", "fillet", "error"]
+DECLARING = "finding the nearest path that can be followed"
+REMEDY = "too tight: looking for a change that helps"
+FOLLOWING = "following the path"
+Progress = Callable[[float], object]  # called with a Share
 
 
 @dataclass(frozen=True)
@@ -47,3 +55,18 @@ class PlanRequest:
         if not (math.isfinite(seconds) and seconds > 0):
             raise InputError(f"minimum dwell {seconds:g} s; give a number above 0")
         return max(seconds / robot.time_scale, QUICK if dwell is None else dwell)
+
+
+class Share(float):
+    """The share of the path that has been followed, with the stage of the plan and the share of the stage."""
+
+    stage: str
+    done: float
+
+
+def tell(progress: Progress | None, stage: str, done: float) -> None:
+    """Tell how far a stage is."""
+    if progress is not None:
+        share = Share(done if stage == FOLLOWING else 0.0)
+        share.stage, share.done = stage, done
+        progress(share)

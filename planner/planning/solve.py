@@ -17,26 +17,24 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
+from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab, time_in_lab
-from planner.planning.declared_path import Declared
+from planner.planning.conditions import BlockedError, KeptClear
+from planner.planning.declare import Declared
 from planner.planning.errors import plan_errors
-from planner.planning.kept_clear import BlockedError, KeptClear
-from planner.planning.line_of_sight import Guidance
-from planner.planning.planned import Plan
-from planner.planning.progress import Progress
-from planner.planning.request import PlanRequest
-from planner.planning.schedule import Start, follow
-from planner.planning.setting import Setting
-from planner.planning.stated_error import guaranteed
-from planner.vehicle.coefficient_modes import OWN_TABLE
-from planner.vehicle.dwell_choice import check_least, dwells_for, longer_dwells, nearly_fastest
+from planner.planning.line_of_sight import Guidance, Start, follow, guaranteed, look_ahead
+from planner.planning.plan import Plan
+from planner.planning.request import PlanRequest, Progress
+from planner.vehicle.from_table import OWN_TABLE
 from planner.vehicle.rollout import Switches
 from planner.vehicle.tracked_point import TrackedVehicle
+from planner.vehicle.zigzag import Zigzag, check_least, dwells_for, longer_dwells, nearly_fastest, zigzag
 from sim.io.errors import InputError
 
 _MARGINS = 6  # tried for each dwell
@@ -46,6 +44,33 @@ _OTHERS = 4  # longer, and shorter dwells that are tried where the path is block
 _WORTH = 0.8  # of the stated error: a longer dwell, which swings further, must leave at most this
 _LENGTHENED_FROM = 1.2  # stated error over predicted error, below which fewer flips gain nothing
 _SAVED = 3.0  # dwells that corners and the end of a path may save
+
+
+class Setting(NamedTuple):
+    """A vehicle with one shortest dwell, and what its reference keeps to. Lengths in l, times in μ0 l⁴/EI."""
+
+    tracked: TrackedVehicle
+    dwell: float
+    straight: Zigzag
+    drift: Drift
+    margin: float | None = None  # around the body; None: no error is known yet
+    longer: float = 0.0  # length that a swing must add
+
+    @staticmethod
+    def of(tracked: TrackedVehicle, dwell: float, longer: float = 0.0) -> Setting:
+        """Compute straight motion and drift with a shortest dwell.
+
+        Raises:
+            InputError: with such dwells the robot does not get ahead.
+        """
+        straight = zigzag(tracked.vehicle, dwell, tracked.offset)
+        return Setting(tracked, dwell, straight, tracked.drift(straight), longer=longer)
+
+    def guidance(self, declared: Declared) -> Guidance:
+        """Choose look-ahead and hysteresis for a declared path."""
+        ahead = look_ahead(self.tracked.vehicle, declared.curvature, self.straight)
+        return Guidance(self.dwell, ahead, self.straight.hysteresis(ahead))
+
 
 Change = Callable[[Declared, Setting], Declared]  # a constraint: transforms the reference, or returns its argument
 Ending = Callable[[Switches, Declared, Setting], Switches]  # changes the last dwells

@@ -10,8 +10,11 @@ with a the distance from the pivot to the tracked point, a′ the learned one, a
 straight line ε goes to −r, on a curve it lags behind. The reference is turned by ε about the tracked point.
 
 A robot that is farther from its reference than `limit`, or turned away from the wanted heading by more than AWAY,
-gets a way back (`planner.tracking.way_back`). The pivot follows it by line of sight. Where it ends the robot is on
-the reference again. `planner/c/guidance.h` does the same in C.
+gets a way back: a shortest Dubins track of the pivot from where it is to a pose of the remaining path. The cost of
+a target is the length of the track, and LEFT_OUT times the length of the path that is left out before it. Targets
+are tried at equal strides along the path, then one by one about the best. The pivot follows the way by line of
+sight. Where it ends the robot is on the reference again. `planner/c/guidance.h` and `way_back.h` do the same in C.
+Lengths in l.
 """
 
 from __future__ import annotations
@@ -21,13 +24,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.goal.dubins import TURNS, DubinsPaths, words
 from planner.paths.tractrix import Reference
-from planner.planning.lap import OVERLAP
-from planner.planning.line_of_sight import LineOfSight
-from planner.planning.planned import Plan
-from planner.planning.stated_error import look_ahead
-from planner.tracking.way_back import ROOM, SEGMENTS, STRIDE, Way, shortest_way
-from sim.arrays import Floats
+from planner.planning.conditions import OVERLAP
+from planner.planning.line_of_sight import LineOfSight, look_ahead
+from planner.planning.plan import Plan
+from sim.arrays import Floats, Integers
 
 SHORTEST_ROD = 1e-9  # l
 AWAY = 1.0  # rad
@@ -35,6 +37,10 @@ STRAIGHT = 1e-6  # l; shorter arcs do not decide to which side the robot turns f
 _NEAR = 0.5  # of the pivot's turn radius: the distance within which the guidance steers back to its reference
 _ERRORS = 4.0  # or of the largest predicted error
 POSE = tuple[float, float, float]
+LEFT_OUT = 0.1  # of a length of the path: what it costs to leave it out
+STRIDE = 0.5  # between two targets, in radii
+ROOM = 0.95  # the share of its largest curvature that the robot uses on the way
+SEGMENTS = 3
 
 
 class LearnedDrift(NamedTuple):
@@ -167,14 +173,15 @@ class TrackerGuidance(LineOfSight):
         y = np.array(self._y[rows]) + rod * (np.sin(heading) - np.sin(heading + lean))
         left_out = np.array(self._arc[rows]) - self._arc[place]
         start = self._pivot(pose)
-        way = shortest_way(start, np.stack([x, y, course], 1), left_out, self._stride, self._radius())
-        at = min(place + way.target, self._last)
-        turns = round((way.course - course[way.target]) / (2 * math.pi))
-        self._way = Way(way.segments, at)
+        targets, radius = np.stack([x, y, course], 1), self._radius()
+        track, target = shortest_way(start, targets, left_out, self._stride, radius)
+        at = min(place + target, self._last)
+        self._way = Way.of(track, radius, at)
+        turns = round((self._way.course - course[target]) / (2 * math.pi))
         self._leg, self._along = 0, 0.0
         self.place, self.share = at, 0.0
         self._turns = 2 * math.pi * turns
-        self._lean = float(lean[way.target]) + self._turns
+        self._lean = float(lean[target]) + self._turns
 
     @property
     def first_turn(self) -> int:
@@ -266,3 +273,79 @@ def stride(plan: Plan) -> int:
     arc = plan.declared.reference.arc
     spacing = float(arc[-1]) / (len(arc) - 1)
     return max(round(STRIDE * plan.tracked.vehicle.pivot_radius / max(spacing, 1e-9)), 1)
+
+
+class Segment(NamedTuple):
+    """An arc or a straight line: where it starts, its curvature and its length."""
+
+    x: float
+    y: float
+    course: float
+    curvature: float
+    length: float
+
+    def project(self, x: float, y: float, near: float) -> tuple[float, float]:
+        """Return the progress along the segment, and the distance to its left; on an arc, nearest to `near`."""
+        if self.curvature == 0:
+            c, s = math.cos(self.course), math.sin(self.course)
+            ahead, aside = x - self.x, y - self.y
+            return c * ahead + s * aside, c * aside - s * ahead
+        side = 1.0 if self.curvature > 0 else -1.0
+        ahead = x - (self.x - math.sin(self.course) / self.curvature)
+        aside = y - (self.y + math.cos(self.course) / self.curvature)
+        turned = math.atan2(aside, ahead) + side * math.pi / 2 - self.course - self.curvature * near
+        turned -= 2 * math.pi * math.floor((turned + math.pi) / (2 * math.pi))
+        error = 1 / self.curvature - side * math.sqrt(ahead * ahead + aside * aside)
+        return near + turned / self.curvature, error
+
+
+class Way(NamedTuple):
+    """A track of three segments, and the step of the path at which it ends."""
+
+    segments: list[Segment]
+    target: int
+
+    @staticmethod
+    def of(track: DubinsPaths, radius: float, target: int) -> Way:
+        """Make a way of a single track with arcs of `radius`."""
+        lengths, curvatures = track.lengths[0], track.turns[0] / radius
+        starts = track.poses((np.cumsum(lengths) - lengths)[None], radius)[0]
+        rows = np.column_stack([starts, curvatures, lengths]).tolist()
+        return Way([Segment(*row) for row in rows], target)
+
+    @property
+    def course(self) -> float:
+        """The course at the end."""
+        last = self.segments[-1]
+        return last.course + last.curvature * last.length
+
+
+def shortest_way(
+    start: tuple[float, float, float],
+    targets: Floats,
+    left_out: Floats,
+    stride: int,
+    radius: float,
+    worth: float = LEFT_OUT,
+) -> tuple[DubinsPaths, int]:
+    """Find the cheapest way, a single track, and the target where it ends.
+
+    Args:
+        start: place and course of the pivot.
+        targets: its poses (m, 3) on the remaining path.
+        left_out: length (m,) of the path before each.
+        stride: targets between two that are tried first.
+        radius: of the arcs.
+        worth: what a length that is left out costs.
+    """
+
+    def best(rows: Integers) -> tuple[int, Floats, int]:
+        lengths = words(np.array(start), targets[rows], radius)
+        total = lengths.sum(-1)
+        word = total.argmin(-1)
+        row = int((total.min(-1) + worth * left_out[rows]).argmin())
+        return int(rows[row]), lengths[row, word[row]], int(word[row])
+
+    coarse = best(np.arange(0, len(targets), stride))[0]
+    target, lengths, word = best(np.arange(max(coarse - stride + 1, 0), min(coarse + stride, len(targets))))
+    return DubinsPaths(np.array([start]), TURNS[word : word + 1], lengths[None]), target

@@ -9,26 +9,25 @@
     marker angle     by which it is turned on the robot, to the left: headings are those of the marker
 
 A dwell moves the pose by lag and arc of the robot as estimated so far. The estimates follow a random walk, a small
-step in each dwell, so that changes are tracked. All derivatives are exact, and only arithmetic, sin, cos and sqrt
-are used: `planner/c/estimate.h` does the same in C. Lengths in l, times in μ0 l⁴/EI.
+step in each dwell, so that changes are tracked. All derivatives are exact. `planner/c/estimate.h` does the same in
+C, one measured number after the other. Vectors in the plane are complex numbers. Lengths in l, times in μ0 l⁴/EI.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from operator import mul
 from typing import NamedTuple
 
 import numpy as np
 
 from planner.planning.line_of_sight import arc_terms
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from planner.tracking.guidance import LearnedDrift, TrackerGuidance
 from planner.vehicle.vehicle import interpolated
+from sim.arrays import Floats
 
 POSE = tuple[float, float, float]
-ROWS = list[list[float]]
 NAMES = ("x", "y", "heading", "yaw rate, left", "yaw rate, right", "surge", "sway", "lag angle",
          "current x", "current y", "marker, forward", "marker, left", "marker, angle")  # fmt: skip
 STATES = len(NAMES)
@@ -40,6 +39,7 @@ CURRENT = 0.07  # standard deviation of a current beside the plan's, in net spee
 MOST_CURRENT = 0.5  # of the net speed
 MARKER = (0.05, 0.05, 0.2)  # standard deviations of the marker's place [l] and angle [rad] before the first pose
 MOST_MARKER = (0.5, 0.5, 1.0)
+_PROCESS = np.diag([*[WALK**2] * 3, *(change**2 for change in CHANGES), *[0.0] * 6])
 
 
 class Dwell(NamedTuple):
@@ -49,6 +49,22 @@ class Dwell(NamedTuple):
     sense: int
     before: float | None
     length: float
+
+
+class Change(NamedTuple):
+    """What a time in a dwell adds to a pose, and its derivatives."""
+
+    move: POSE
+    by_pose: Floats  # (3, 3), of the pose after it by the pose before it
+    by_state: Floats  # (3, 13), of what is added
+
+    def after(self, D: Floats) -> Floats:
+        """Compute derivatives (3, 13) of the pose after the change from those before it."""
+        return np.asarray(self.by_pose @ D + self.by_state)
+
+    def before(self, D: Floats) -> Floats:
+        """Compute derivatives (3, 13) of the pose before the change from those after it."""
+        return np.asarray((2 * np.eye(3) - self.by_pose) @ (D - self.by_state))  # by_pose − 1 is nilpotent
 
 
 class Estimate:
@@ -62,24 +78,25 @@ class Estimate:
     """
 
     def __init__(self, plan: Plan, law: TrackerGuidance, noise: tuple[float, float], start: POSE | None = None):
-        self._twist: ROWS = plan.tracked.vehicle.twist.tolist()
+        self._twist: list[list[float]] = plan.tracked.vehicle.twist.tolist()
         self._current: list[float] = plan.tracked.vehicle.current.tolist()
         self._speed, self._drift = float(plan.straight.speed), float(plan.straight.drift)
         self._law = law
-        self.noise = (noise[0] ** 2, noise[0] ** 2, noise[1] ** 2)  # variances
-        self._most = most(plan)
-        self.state: list[float] = [*plan.start, *[0.0] * (STATES - 3)]
+        self.noise = np.square([noise[0], noise[0], noise[1]])  # variances
+        self._most = np.array(most(plan))
+        self.state = np.array([*plan.start, *[0.0] * (STATES - 3)])
         self.covariance = prior(plan)
         if start is not None:
             self.relocate(start)
 
     @property
     def pose(self) -> POSE:
-        return self.state[0], self.state[1], self.state[2]
+        x, y, heading = self.state[:3].tolist()
+        return x, y, heading
 
     def apply(self) -> None:
         """Let the guidance law use the learned robot."""
-        state = self.state
+        state = self.state.tolist()
         current_x, current_y = self._current[0] + state[8], self._current[1] + state[9]
         self._law.update_vehicle([self._learned(0), self._learned(1)], state[7], [current_x, current_y])
         speed = self._speed * (1 + state[5])
@@ -88,39 +105,42 @@ class Estimate:
 
     def advance(self, dwell: Dwell) -> None:
         """Advance to the flip at the end of a dwell."""
-        change = self._change(self.state[2], dwell, dwell.length)
-        self.covariance = _propagated(self.covariance, _after(_identity(), change))
-        for i in range(3):
-            self.state[i] += change.move[i]
+        change = self._change(self.pose[2], dwell, dwell.length)
+        F = np.eye(STATES)
+        F[:3] = change.after(F[:3])
+        self.covariance = F @ self.covariance @ F.T + _PROCESS
+        self.state[:3] += change.move
 
-    def seen_from(self, when: float, now: Dwell, past: Sequence[Dwell]) -> tuple[POSE, ROWS] | None:
+    def seen_from(
+        self, when: float, now: Dwell, past: Sequence[Dwell], base: POSE | None = None
+    ) -> tuple[POSE, Floats] | None:
         """Predict what is seen at `when`, and its derivatives (3, 13) in the state; None if it is too long ago.
 
         Args: as for `pose_at`.
         """
-        prediction = self.pose_at(when, now, past)
+        prediction = self.pose_at(when, now, past, base)
         if prediction is None:
             return None
         (x, y, heading), D = prediction
-        c, s, (forward, left, angle) = math.cos(heading), math.sin(heading), self.state[10:]
-        marker_x, marker_y = c * forward - s * left, s * forward + c * left
-        for k in range(STATES):
-            D[0][k], D[1][k] = D[0][k] - marker_y * D[2][k], D[1][k] + marker_x * D[2][k]
-        D[0][10], D[0][11] = D[0][10] + c, D[0][11] - s
-        D[1][10], D[1][11] = D[1][10] + s, D[1][11] + c
-        D[2][12] += 1
-        return (x + marker_x, y + marker_y, heading + angle), D
+        axis, (forward, left, angle) = _direction(heading), self.state[10:].tolist()
+        marker = axis * complex(forward, left)
+        H = _levered(marker) @ D
+        H[:, 10:] += [[axis.real, -axis.imag, 0.0], [axis.imag, axis.real, 0.0], [0.0, 0.0, 1.0]]
+        return (x + marker.real, y + marker.imag, heading + angle), H
 
-    def pose_at(self, when: float, now: Dwell, past: Sequence[Dwell]) -> tuple[POSE, ROWS] | None:
+    def pose_at(
+        self, when: float, now: Dwell, past: Sequence[Dwell], base: POSE | None = None
+    ) -> tuple[POSE, Floats] | None:
         """Predict the pose at `when`, and its derivatives (3, 13) in the state; None if it is too long ago.
 
         Args:
             when: the time.
             now: the present dwell; its length does not count.
             past: the dwells before it, the latest last.
+            base: pose at the last flip; default: the estimated one.
         """
-        x, y, heading = self.pose
-        D, dwell, back = _identity(), now, len(past)
+        x, y, heading = self.pose if base is None else base
+        D, dwell, back = np.eye(3, STATES), now, len(past)
         while when < dwell.start:
             if back == 0:
                 return None
@@ -129,16 +149,13 @@ class Estimate:
             heading -= self._change(0.0, dwell, dwell.length).move[2]
             change = self._change(heading, dwell, dwell.length)
             x, y = x - change.move[0], y - change.move[1]
-            D = _before(D, change)
+            D = change.before(D)
         change = self._change(heading, dwell, when - dwell.start)
-        x, y, heading = x + change.move[0], y + change.move[1], heading + change.move[2]
-        return (x, y, heading), _after(D, change)
+        return (x + change.move[0], y + change.move[1], heading + change.move[2]), change.after(D)
 
     def residual(self, pose: POSE, when: float, now: Dwell, past: Sequence[Dwell], base: POSE) -> POSE | None:
         """Subtract from a pose what would be seen if the robot had been at `base` at the last flip."""
-        own, self.state[:3] = self.state[:3], base
-        prediction = self.seen_from(when, now, past)
-        self.state[:3] = own
+        prediction = self.seen_from(when, now, past, base)
         return None if prediction is None else difference(pose, prediction[0])
 
     def turned_back(self, pose: POSE, when: float, now: Dwell, past: Sequence[Dwell]) -> POSE | None:
@@ -147,10 +164,10 @@ class Estimate:
         if prediction is None:
             return None
         (x, y, heading), turn = self.pose, pose[2] - prediction[0][2]
-        c, s, dx, dy = math.cos(turn), math.sin(turn), x - prediction[0][0], y - prediction[0][1]
-        return pose[0] + c * dx - s * dy, pose[1] + s * dx + c * dy, heading + turn
+        moved = _direction(turn) * complex(x - prediction[0][0], y - prediction[0][1])
+        return pose[0] + moved.real, pose[1] + moved.imag, heading + turn
 
-    def spread(self, D: ROWS, direction: float, lever: float) -> float:
+    def spread(self, D: Floats, direction: float, lever: float) -> float:
         """Compute the standard deviation of a point in a direction.
 
         Args:
@@ -158,9 +175,8 @@ class Estimate:
             direction: in the lab [rad].
             lever: what a turn of the robot by one rad moves the point in this direction.
         """
-        x, y = math.cos(direction), math.sin(direction)
-        g = [x * D[0][k] + y * D[1][k] + lever * D[2][k] for k in range(STATES)]
-        return math.sqrt(max(_dot([_dot(row, g) for row in self.covariance], g), 0.0))
+        g = np.array([math.cos(direction), math.sin(direction), lever]) @ D
+        return math.sqrt(max(float(g @ self.covariance @ g), 0.0))
 
     def moved(self, pose: POSE, dwell: Dwell) -> POSE:
         """Return the pose after a dwell that began at `pose`."""
@@ -170,12 +186,10 @@ class Estimate:
     def relocate(self, pose: POSE) -> None:
         """Put the robot at another pose, known like one of the marker; what was learned stays."""
         self.state[:3] = pose
-        for i in range(3):
-            for j in range(STATES):
-                self.covariance[i][j] = self.covariance[j][i] = 0.0
-            self.covariance[i][i] = self.noise[i] + self.covariance[10 + i][10 + i]
+        self.covariance[:3], self.covariance[:, :3] = 0.0, 0.0
+        self.covariance[:3, :3] = np.diag(self.noise + self.covariance.diagonal()[10:])
 
-    def update(self, residual: POSE, H: ROWS, largest: float) -> float:
+    def update(self, residual: POSE, H: Floats, largest: float) -> float:
         """Update the state with a measured pose, unless its squared residual exceeds `largest`.
 
         Args:
@@ -186,76 +200,52 @@ class Estimate:
         Returns:
             The squared size of the residual in its standard deviations: χ² with three degrees of freedom.
         """
-        P, size = [row[:] for row in self.covariance], 0.0
-        moved = [0.0] * STATES
-        for m in range(3):
-            h = H[m]
-            gain = [_dot(row, h) for row in P]
-            spread = _dot(h, gain) + self.noise[m]
-            innovation = residual[m] - _dot(h, moved)
-            size += innovation * innovation / spread
-            for i in range(STATES):
-                moved[i] += gain[i] * innovation / spread
-                for j in range(STATES):
-                    P[i][j] -= gain[i] * gain[j] / spread
+        innovation, PH = np.array(residual), self.covariance @ H.T
+        weight = np.linalg.inv(H @ PH + np.diag(self.noise))
+        with np.errstate(over="ignore", invalid="ignore"):  # a pose may be as far away as numbers go
+            size = float(innovation @ weight @ innovation)
         if size <= largest:
-            self.covariance = P
-            for i in range(STATES):
-                self.state[i] += moved[i]
-            for i, limit in enumerate(self._most):
-                self.state[3 + i] = min(max(self.state[3 + i], -limit), limit)
+            self.covariance -= PH @ weight @ PH.T
+            self.state += PH @ weight @ innovation
+            self.state[3:] = np.clip(self.state[3:], -self._most, self._most)
         return size
 
     def _learned(self, side: int) -> list[float]:
         """Return the learned twist of a direction."""
         forward, left, rate = self._twist[side]
-        return [forward * (1 + self.state[5]), left * (1 + self.state[6]), rate * (1 + self.state[3 + side])]
+        errors = self.state.tolist()
+        return [forward * (1 + errors[5]), left * (1 + errors[6]), rate * (1 + errors[3 + side])]
 
     def _sideways(self) -> float:
         """Compute the mean leftward speed, beside the plan's, that comes from unequal turns."""
         (_, left, fast), (_, right, slow) = self._twist
-        a, b = fast * (1 + self.state[3]), -slow * (1 + self.state[4])
-        learned = (b * left + a * right) * (1 + self.state[6]) / (a + b)
+        a, b = self._learned(0)[2], -self._learned(1)[2]
+        learned = (b * left + a * right) * (1 + float(self.state[6])) / (a + b)
         return learned - (-slow * left + fast * right) / (fast - slow)
 
-    def _change(self, heading: float, dwell: Dwell, time: float) -> _Change:
+    def _change(self, heading: float, dwell: Dwell, time: float) -> Change:
         """Compute what a time in a dwell that began with `heading` adds to the pose."""
-        state, sense = self.state, dwell.sense
+        state, sense = self.state.tolist(), dwell.sense
         side = 0 if sense > 0 else 1
         z, x, turned = self._law.lag_after(side, dwell.before, time)
         turned += sense * state[7]
         forward, left, rate = self._learned(side)
         along, across, angle = arc_terms(rate, time)
         more = 1 + state[3 + side]
-        along_r, across_r = (time * math.cos(angle) - along) / more, (time * math.sin(angle) - across) / more
-        ahead_r, aside_r = along_r * forward - across_r * left, across_r * forward + along_r * left
-        c, s = math.cos(heading), math.sin(heading)
-        lag_x, lag_y = c * z - s * x, s * z + c * x
-        c, s = math.cos(heading + turned), math.sin(heading + turned)
-        surge_x, surge_y = (c * along - s * across) * forward, (s * along + c * across) * forward
-        sway_x, sway_y = -(c * across + s * along) * left, (c * along - s * across) * left
-        arc_x, arc_y = surge_x + sway_x, surge_y + sway_y
-        B = [[0.0] * STATES for _ in range(3)]
-        B[0][3 + side], B[1][3 + side] = c * ahead_r - s * aside_r, s * ahead_r + c * aside_r
-        B[2][3 + side] = angle / more
-        B[0][5], B[1][5] = surge_x / (1 + state[5]), surge_y / (1 + state[5])
-        B[0][6], B[1][6] = sway_x / (1 + state[6]), sway_y / (1 + state[6])
-        B[0][7], B[1][7], B[2][7] = -sense * arc_y, sense * arc_x, float(sense)
-        B[0][8] = B[1][9] = time
-        x, y = lag_x + arc_x, lag_y + arc_y
-        current_x, current_y = self._current[0] + state[8], self._current[1] + state[9]
-        return _Change((x + current_x * time, y + current_y * time, turned + angle), (-y, x), B)
+        axis = _direction(heading + turned)
+        surge, sway = axis * complex(along, across) * forward, axis * complex(along, across) * 1j * left
+        by_rate = complex(time * math.cos(angle) - along, time * math.sin(angle) - across) / more
+        place = _direction(heading) * complex(z, x) + surge + sway
+        plane, turn = np.zeros(STATES, dtype=complex), np.zeros(STATES)
+        plane[3 + side] = axis * by_rate * complex(forward, left)
+        plane[5:10] = surge / (1 + state[5]), sway / (1 + state[6]), 1j * sense * (surge + sway), time, 1j * time
+        turn[3 + side], turn[7] = angle / more, sense
+        drift = time * complex(self._current[0] + state[8], self._current[1] + state[9])
+        move = (place + drift).real, (place + drift).imag, turned + angle
+        return Change(move, _levered(place), np.stack([plane.real, plane.imag, turn]))
 
 
-class _Change(NamedTuple):
-    """What is added to a pose; its derivatives in the heading before (x, y), and in the state (3, 13)."""
-
-    move: POSE
-    lever: tuple[float, float]
-    B: ROWS
-
-
-def prior(plan: Plan) -> ROWS:
+def prior(plan: Plan) -> Floats:
     """Compute the covariance (13, 13) before the first pose, from what is uncertain of the start and the plan."""
     vehicle = plan.tracked.vehicle
     P = np.diag([0.02**2, 0.02**2, 0.03**2, *(s**2 for s in PRIOR), 1e-6, 1e-12, 1e-12,
@@ -272,9 +262,8 @@ def prior(plan: Plan) -> ROWS:
             direction[7] = interpolated(mode.lag[0], dwell, dwell)[2]
         direction[8:10] = mode.current
         P += np.outer(direction, direction)
-    P[8, 8] += (CURRENT * plan.straight.net_speed) ** 2
-    P[9, 9] += (CURRENT * plan.straight.net_speed) ** 2
-    return [[float(value) for value in row] for row in P]
+    P[[8, 9], [8, 9]] += (CURRENT * plan.straight.net_speed) ** 2
+    return P
 
 
 def most(plan: Plan) -> tuple[float, ...]:
@@ -290,45 +279,10 @@ def difference(pose: POSE, expected: POSE) -> POSE:
     return pose[0] - expected[0], pose[1] - expected[1], angle
 
 
-def _identity() -> ROWS:
-    return [[float(i == j) for j in range(STATES)] for i in range(3)]
+def _direction(angle: float) -> complex:
+    return complex(math.cos(angle), math.sin(angle))
 
 
-def _after(D: ROWS, change: _Change) -> ROWS:
-    """Compute derivatives of the pose after a change from those before it."""
-    B, lever = change.B, change.lever
-    return [
-        [D[0][k] + B[0][k] + lever[0] * D[2][k] for k in range(STATES)],
-        [D[1][k] + B[1][k] + lever[1] * D[2][k] for k in range(STATES)],
-        [D[2][k] + B[2][k] for k in range(STATES)],
-    ]
-
-
-def _before(D: ROWS, change: _Change) -> ROWS:
-    """Compute derivatives of the pose before a change from those after it."""
-    B, lever = change.B, change.lever
-    turned = [D[2][k] - B[2][k] for k in range(STATES)]
-    return [
-        [D[0][k] - B[0][k] - lever[0] * turned[k] for k in range(STATES)],
-        [D[1][k] - B[1][k] - lever[1] * turned[k] for k in range(STATES)],
-        turned,
-    ]
-
-
-def _propagated(P: ROWS, F: ROWS) -> ROWS:
-    """Propagate a covariance: the first three rows of the transition are F, the others keep the state."""
-    n = STATES
-    half = [[sum(F[i][k] * P[k][j] for k in range(n)) for j in range(n)] for i in range(3)] + P[3:]
-    full = [row[:] for row in half]
-    for i in range(n):
-        for j in range(3):
-            full[i][j] = _dot(half[i], F[j])
-    for i in range(3):
-        full[i][i] += WALK**2
-    for i, change in enumerate(CHANGES):
-        full[3 + i][3 + i] += change**2
-    return full
-
-
-def _dot(a: list[float], b: list[float]) -> float:
-    return sum(map(mul, a, b))
+def _levered(arm: complex) -> Floats:
+    """Return the derivatives (3, 3) of a pose at the end of an arm by the pose at its beginning."""
+    return np.array([[1.0, 0.0, -arm.imag], [0.0, 1.0, arm.real], [0.0, 0.0, 1.0]])

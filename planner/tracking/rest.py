@@ -1,10 +1,17 @@
 """The rest of a plan from where a robot is: a way back to the path, and the path that is left.
 
-The place that the robot has reached follows from its track (`planner.tracking.reached`). Where the robot is near
-that place and turned along the path, the rest begins there. Elsewhere it gets the tracker's way back
-(`planner.tracking.way_back`), or with obstacles a way among them (`planner.goal.route`). Way and path together are
-the declared path of the new plan, so its errors are stated from where the robot is. It keeps dwell and guidance of
-the old plan. Lengths in l.
+The place that the robot has reached follows from its track so far. Along the track a place of the path is chosen
+for each pose, so that the sum of their mismatches is least. Places never go back, and never advance faster than
+the robot can swim. So where a robot was carried to another part of its path, it has reached the place where it was
+taken away: the last one at less than FARTHEST from a pose. The mismatch is the distance of the pivots, at most
+FARTHEST, and TURNED (1 − cos Δ) for headings that differ by Δ. Where the track begins in the middle of the path,
+the length that is left out before counts LEFT_OUT, as on a way back. The least sum is found by dynamic
+programming.
+
+Where the robot is near that place and turned along the path, the rest begins there. Elsewhere it gets the
+tracker's way back (`planner.tracking.guidance`), or with obstacles a way among them (`planner.goal.route`). Way
+and path together are the declared path of the new plan, so its errors are stated from where the robot is. It keeps
+dwell and guidance of the old plan. Lengths in l.
 """
 
 from __future__ import annotations
@@ -13,6 +20,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
 
 from planner.goal.dubins import words
 from planner.goal.lattice import RouteLimits
@@ -23,16 +31,13 @@ from planner.paths.path import Path2D, arc_length, resample
 from planner.paths.tractrix import Drift, Reference, slips_at_heading
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.camera import POSE
-from planner.planning.declared_path import Declared
-from planner.planning.kept_clear import KeptClear
-from planner.planning.planned import Job, Plan
-from planner.planning.schedule import Start
-from planner.planning.setting import Setting
-from planner.planning.solve import follow_declared
-from planner.tracking.guidance import TrackerGuidance, stride
-from planner.tracking.reached import reached
-from planner.tracking.way_back import ROOM, SEGMENTS, shortest_way
-from sim.arrays import Floats
+from planner.planning.conditions import KeptClear
+from planner.planning.declare import Declared
+from planner.planning.line_of_sight import Start
+from planner.planning.plan import Job, Plan
+from planner.planning.solve import Setting, follow_declared
+from planner.tracking.guidance import LEFT_OUT, ROOM, SEGMENTS, TrackerGuidance, shortest_way, stride
+from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
 
 _SPACING = 0.02  # of a way
@@ -41,6 +46,11 @@ _NEAR = 0.02  # l, rad: what is near in any case
 _ROUNDING = 1e-9  # the start may be the place with the largest error
 _CANDIDATES = 12  # places of the path, a turn radius apart, to which a way among obstacles may lead
 _GUESS = 0.2  # what a length along the drawn path counts beside the distance from it
+FARTHEST = 1.0
+TURNED = 0.5
+FASTER = 1.5  # times the robot's largest speed
+_MOST_POSES = 2000
+_MOST_PLACES = 4000
 
 
 @dataclass(frozen=True)
@@ -131,8 +141,9 @@ def _shortest(plan: Plan, start: POSE, place: int, drift: Drift) -> tuple[Floats
     reference = plan.declared.reference
     targets = reference.part(place, -1).courses(drift)
     left_out = reference.arc[place:-1] - reference.arc[place]
-    way = shortest_way(start, targets, left_out, stride(plan), _radius(plan), _WORTH)
-    return way.poses(_SPACING), place + way.target
+    radius = _radius(plan)
+    track, target = shortest_way(start, targets, left_out, stride(plan), radius, _WORTH)
+    return track.sampled(radius, _SPACING), place + target
 
 
 def _radius(plan: Plan) -> float:
@@ -206,3 +217,46 @@ def _drawn(plan: Plan, way: Floats, join: int) -> Path2D:
     apart = np.hypot(*(path - declared[join]).T) + _GUESS * np.abs(arc - guess)
     rest = path[int(apart.argmin()) :]
     return Path2D.of(np.concatenate([way[:-1], rest if len(rest) > 1 else path[-2:]]), closed=False)
+
+
+def reached(reference: Reference, times: Floats, pivots: Floats, speed: float) -> int:
+    """Return the point of the reference that the robot has reached.
+
+    Args:
+        reference: the pivot's.
+        times: (N,), not falling.
+        pivots: (N, 3), places and headings of the pivot at these times.
+        speed: the largest of the robot.
+    """
+    rows = np.unique(np.linspace(0, len(times) - 1, min(len(times), _MOST_POSES)).round().astype(int))
+    every = math.ceil(len(reference.q) / _MOST_PLACES)
+    places = np.unique(np.append(np.arange(0, len(reference.q), every), len(reference.q) - 1))
+    arc = reference.arc[places] - reference.arc[0]
+    spacing = float(np.diff(arc).max())
+    # Arc lengths are nearly equal from place to place, so that a number of places stands for a length.
+    ahead = np.ceil(FASTER * speed * np.diff(times[rows]) / max(spacing, 1e-9)).astype(int) + 1
+    mismatch = _mismatch(reference, places, pivots[rows[0]])
+    total = LEFT_OUT * arc + mismatch
+    best, last = int(total.argmin()), rows[0]
+    for row, most in zip(rows[1:].tolist(), ahead.tolist(), strict=True):
+        mismatch = _mismatch(reference, places, pivots[row])
+        total = _least_before(total, min(most, len(places))) + mismatch
+        place = int(total.argmin())
+        if mismatch[place] < FARTHEST:
+            best, last = place, row
+    coarse = int(places[best])
+    near = np.arange(max(coarse - every, 0), min(coarse + every + 1, len(reference.q)))
+    return int(near[int(_mismatch(reference, near, pivots[last]).argmin())])
+
+
+def _mismatch(reference: Reference, places: Integers, pivot: Floats) -> Floats:
+    x, y, heading = pivot.tolist()
+    q = reference.q[places]
+    apart = np.minimum(np.hypot(q[:, 0] - x, q[:, 1] - y), FARTHEST)
+    return np.asarray(apart + TURNED * (1 - np.cos(reference.heading[places] - heading)))
+
+
+def _least_before(total: Floats, most: int) -> Floats:
+    """Find the least of each entry and of `most` entries before it."""
+    size = most + 1
+    return np.asarray(minimum_filter1d(total, size, mode="constant", cval=np.inf, origin=(size - 1) // 2))

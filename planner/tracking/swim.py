@@ -14,7 +14,7 @@ import numpy as np
 
 from planner.paths.distance import distance_to
 from planner.planning.camera import POSE, Camera
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from planner.tracking.tracker import Command
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats

@@ -8,32 +8,40 @@ Every call returns the direction of the motor and the time of the next flip. At 
 since the last call: the one that was announced. A call at its time or later, also one with a pose, counts as this
 flip, so the motor must turn in the returned direction. The tracker estimates thirteen numbers of the robot
 (`planner.tracking.kalman_filter`). A pose may be late: it is compared with the predicted pose at its own time.
-Implausible poses, values that are not finite, and times that cannot be (`planner.tracking.clock`) are ignored.
-Long gaps between poses only increase the error. Implausible poses that agree with each other are those of a robot
-that has been moved (`planner.tracking.displacement`). From afar the tracker plans a way back
-(`planner.tracking.guidance`). A plan that repeats is followed lap after lap, until `finish_lap` is called.
+Implausible poses, and values that are not finite, are ignored. Long gaps between poses only increase the error.
+From afar the tracker plans a way back (`planner.tracking.guidance`). A plan that repeats is followed lap after
+lap, until `finish_lap` is called.
+
+*Clock.* A caller tells the time at each flip, so a time much later than the announced flip is a fault of the
+clock. So is one that goes back by more than EARLY. Such a time is refused. Where CONFIRMED refused times run on
+together, the clock was set: the tracker then moves its own times with it.
+
+*Displacement.* Poses that the filter rejects are compared with each other: a second pose is kept that moves with
+every dwell as this robot would move. A rejected pose that agrees with it counts for it, another one against it.
+Where AGREED more count for it than against, over FLIPS flips or more, the robot is there: it has been moved.
+Another robot flips at other times, so its poses do not agree.
 
 The alarm means that the robot is incompatible with the model. It compares WINDOW accepted poses with the predicted
 ones: for a robot of the model the sum of their squared residuals is below a limit with probability 1 −
 FALSE_ALARM. It is also raised when LOST poses in a row were rejected.
 
-The next flip is the root of the same equation as in planning (`planner.planning.schedule`), from the estimated
-pose and with the estimated robot. It is never before the shortest dwell, whatever the input.
+The next flip is the root of the same equation as in planning (`planner.planning.line_of_sight`), from the
+estimated pose and with the estimated robot. It is never before the shortest dwell, whatever the input.
 
 Poses are those of the head's centre in l and rad; times in μ0 l⁴/EI. `planner.tracking.pipe` has seconds.
+`planner/c/tracker.h`, `clock.h` and `displacement.h` do the same in C.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planner.paths.units import heading_in_degrees, in_lab
-from planner.planning.feedback_error import KEPT, bound
-from planner.planning.planned import Plan
-from planner.tracking.clock import SLACK, Clock
-from planner.tracking.displacement import Displacement
+from planner.planning.errors import KEPT, bound
+from planner.planning.plan import Plan
 from planner.tracking.guidance import TrackerGuidance
 from planner.tracking.kalman_filter import NAMES, POSE, Dwell, Estimate, difference
 from sim.io.errors import InputError
@@ -49,6 +57,17 @@ ALARM_AT = 173.6174364561601  # quantile 1 − FALSE_ALARM of χ² with 3 × WIN
 GATE = 21.107513466160444  # quantile 0.9999 of χ² with 3 degrees of freedom
 LOST = 10  # consecutive rejected poses after which there is an alarm
 SPREADS = 0.5  # of the filter's standard deviation, which allows for changes (docs/results.md)
+SLACK = 1e-6  # time units; a time this close before the announced flip is the flip's own, rounded
+LATE = 10.0  # how late a flip may be told
+EARLY = 2.0  # how much earlier than the last time a late message may be; it is taken for the last time
+CONFIRMED = 3
+AGREED = 6
+FLIPS = 4
+LARGEST_MISFIT = (
+    21.1  # squared size of a residual above which a pose does not agree: χ² with three degrees of freedom
+)
+MODEL_NOISE = 0.005  # standard deviation of what the model adds to a pose in some dwells [l, rad]
+LARGEST_MEAN = 5.0  # mean squared size above which the poses are not those of this robot
 
 
 class Command(NamedTuple):
@@ -295,3 +314,91 @@ class Tracker:
         if self._scored == WINDOW:
             self.alarm = self._score > ALARM_AT
             self._score, self._scored = 0.0, 0
+
+
+class Clock:
+    """The present time, and the times that were refused."""
+
+    def __init__(self, now: float):
+        self.now = now
+        self.believed = True  # whether the last time was
+        self._first = self._last = 0.0  # of those that were refused and run on together
+        self._count = 0
+        self.set_by = 0.0  # what was added to the tracker's times in all
+
+    def tell(self, now: float, flip_at: float) -> float:
+        """Hear the time.
+
+        Args:
+            now: the time.
+            flip_at: of the announced flip.
+
+        Returns:
+            What must be added to all times since the clock was set; 0 if it was not.
+        """
+        if not math.isfinite(now):
+            self.believed = False
+            return 0.0
+        self.believed = self.now - EARLY <= now <= flip_at + LATE
+        if self.believed:
+            self.now, self._count = max(self.now, now), 0
+            return 0.0
+        if self._count > 0 and self._last < now <= self._last + LATE:
+            self._count, self._last = self._count + 1, now
+        else:
+            self._count, self._first, self._last = 1, now, now
+        if self._count < CONFIRMED:
+            return 0.0
+        shift = self._first - self.now  # as if the first had come at once: no flip comes too early
+        self.now, self.believed, self._count = now, True, 0
+        self.set_by += shift
+        return shift
+
+
+class Displacement:
+    """The second pose, at the last flip, and what counts for it."""
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget all rejected poses."""
+        self.pose: POSE = (0.0, 0.0, 0.0)
+        self._agreed = self._flips = self._seen = 0
+        self._score = 0.0
+
+    def advance(self, estimate: Estimate, dwell: Dwell) -> None:
+        """Advance to the flip at the end of a dwell."""
+        if self._agreed > 0:
+            self.pose = estimate.moved(self.pose, dwell)
+            self._flips += 1
+
+    def see(self, estimate: Estimate, pose: POSE, when: float, now: Dwell, past: Sequence[Dwell]) -> bool:
+        """Compare a rejected pose with the others; tell whether the robot has been moved to `self.pose`."""
+        variance = [2 * noise + MODEL_NOISE * MODEL_NOISE for noise in estimate.noise]
+        if self._agreed > 0:
+            residual = estimate.residual(pose, when, now, past, self.pose)
+            if residual is None:
+                return False
+            size = sum(part * part / spread for part, spread in zip(residual, variance, strict=True))
+            if size <= LARGEST_MISFIT:
+                self._agreed, self._seen, self._score = self._agreed + 1, self._seen + 1, self._score + size
+                x, y, heading = (old + part / self._seen for old, part in zip(self.pose, residual, strict=True))
+                self.pose = x, y, heading
+            else:
+                self._agreed -= 1
+        if self._agreed == 0:
+            self._begin(estimate, pose, when, now, past)
+        if self._agreed < AGREED or self._flips < FLIPS:
+            return False
+        if self._score <= LARGEST_MEAN * self._seen:
+            return True
+        self._begin(estimate, pose, when, now, past)
+        return False
+
+    def _begin(self, estimate: Estimate, pose: POSE, when: float, now: Dwell, past: Sequence[Dwell]) -> None:
+        """Begin with one rejected pose: that at the last flip from which the robot would be seen there."""
+        self.forget()
+        begun = estimate.turned_back(pose, when, now, past)
+        if begun is not None:
+            self.pose, self._agreed, self._seen = begun, 1, 1

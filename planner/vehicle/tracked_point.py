@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
+import numpy as np
+
+from planner.paths.tractrix import Drift
+from planner.paths.units import time_in_lab
 from planner.vehicle.calibration_table import COEFFICIENTS, UNMEASURED, CalibrationKnowledge
-from planner.vehicle.coefficient_modes import Motion, coefficient_modes
-from planner.vehicle.from_table import default_table, table_vehicle
+from planner.vehicle.from_table import Motion, coefficient_modes, default_table, table_vehicle
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.vehicle import Mode, Vehicle
+from planner.vehicle.zigzag import Zigzag
 from sim.io.errors import InputError
 from sim.model.robot import Robot
 from surrogate.interface import LookupTable
@@ -32,6 +36,26 @@ class TrackedVehicle(NamedTuple):
     def rod(self) -> float:
         """Distance from the pivot to the tracked point."""
         return self.vehicle.pivot_distance + self.offset
+
+    def drift(self, straight: Zigzag) -> Drift:
+        """Return what carries the robot off its heading in straight motion, as shares of its net speed.
+
+        Raises:
+            InputError: with such dwells the robot does not get ahead.
+        """
+        vehicle = self.vehicle
+        if straight.speed <= 0:
+            dwell = min(straight.dwells)
+            turn = dwell * float(np.abs(vehicle.twist[:, 2]).max())
+            remedy = "shorter ones: it turns too far" if turn > 1.0 else "longer ones: it is still accelerating"
+            raise InputError(
+                f"with dwells of {time_in_lab(dwell, self.robot)} the robot does not get ahead; allow {remedy} in "
+                "each dwell"
+            )
+        sideways = straight.drift / straight.speed
+        x, y = (vehicle.current / straight.speed).tolist()
+        # A mirror-symmetric robot has no drift: what is left is rounding.
+        return Drift(0.0 if abs(sideways) < 1e-9 else sideways, (x, y))
 
     @property
     def calibrated(self) -> bool:

@@ -1,4 +1,4 @@
-"""The quickest motion from rest to a pose by brute force, without obstacles: an oracle for `planner.goal.to_goal`.
+"""The quickest motion from rest to a pose by brute force, without obstacles: an oracle for `planner.goal.trip`.
 
 The optimum: the sum of all dwells is minimised with the end pose as a constraint (SLSQP). It starts from every one
 of Dubins' words, with short and long dwells on its straight segments, in both directions. The best is taken.
@@ -14,9 +14,9 @@ from scipy.optimize import minimize
 
 from planner.goal.dubins import TURNS, words
 from planner.goal.final_dwells import flips_after
-from planner.vehicle.dwell_choice import QUICK
 from planner.vehicle.rollout import Switches
 from planner.vehicle.vehicle import Vehicle
+from planner.vehicle.zigzag import QUICK
 from sim.arrays import Floats
 
 _STEP = 1e-4

@@ -1,4 +1,4 @@
-"""Random tasks, as arguments of `planner.goal.to_goal.to_goal`, and the clearance of a replayed plan."""
+"""Random tasks, as arguments of `planner.goal.trip.to_goal`, and the clearance of a replayed plan."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from planner.paths.obstacles import Circle, Footprint, Polygon
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from sim.motion.replay import replay
 
 

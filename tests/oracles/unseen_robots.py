@@ -9,9 +9,8 @@ import numpy as np
 
 from planner.api.plan import plan
 from planner.paths.path import Path2D, circle, polygon
-from planner.planning.errors import plan_errors
-from planner.planning.planned import Plan
-from planner.planning.stated_error import WOBBLE, predicted_error
+from planner.planning.errors import WOBBLE, plan_errors, predicted_error
+from planner.planning.plan import Plan
 from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.rollout import trace
 from sim.model.presets import PRESETS

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from planner.files.tracker_header import tracker_header
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from planner.tracking.kalman_filter import STATES
 from planner.tracking.tracker import Command
 from tests.processes import LIMIT

@@ -12,9 +12,8 @@ from planner.api.plan import plan
 from planner.goal.trip import Trip
 from planner.jobs.plan import make_plan
 from planner.paths.obstacles import Circle, FreeSpace
-from planner.paths.path import Path2D
-from planner.paths.shapes import shape_of
-from planner.planning.planned import Plan
+from planner.paths.path import Path2D, shape_of
+from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.tracked_point import Point, TrackedVehicle, tracked_vehicle

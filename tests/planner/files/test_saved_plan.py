@@ -20,7 +20,7 @@ from planner.files.plan_files import write_plan
 from planner.files.plan_json import load_plan
 from planner.files.saved_plan import is_plan, restore_plan
 from planner.paths.path import circle
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from planner.tracking.tracker import Tracker
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.inputs import save_robot

@@ -18,7 +18,7 @@ from planner.goal.swings import NoRoomError, swung
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import STILL, Drift, reference
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.rollout import Switches, poses_at_flips
 from sim.arrays import Floats

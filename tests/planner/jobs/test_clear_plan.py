@@ -19,8 +19,8 @@ from planner.jobs.waiting_circles import WaitingCircle, circle_reference, with_c
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.path import Path2D, circle
 from planner.planning.arrive import EXACT
-from planner.planning.declared_path import TIGHTEST
-from planner.planning.planned import Plan
+from planner.planning.declare import TIGHTEST
+from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker

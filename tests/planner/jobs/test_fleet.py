@@ -17,7 +17,7 @@ from planner.jobs.separation import Places, Scheduled, distances, instants, line
 from planner.jobs.timed_motion import Body
 from planner.paths.obstacles import Circle, Footprint, FreeSpace
 from planner.paths.path import Path2D
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker

@@ -18,7 +18,7 @@ from planner.jobs.laps import looped
 from planner.jobs.plan import make_plan
 from planner.paths.obstacles import Circle, Footprint, FreeSpace
 from planner.paths.path import Path2D, circle
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.guidance import TrackerGuidance
 from planner.tracking.pipe import answers

@@ -20,11 +20,10 @@ from planner.jobs.travel_times import Travel
 from planner.paths.distance import distance_to
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.tractrix import STILL
-from planner.planning.declared_path import TIGHTEST
+from planner.planning.declare import TIGHTEST
 from planner.planning.request import PlanRequest
-from planner.vehicle.dwell_choice import dwells_for
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
-from planner.vehicle.zigzag import zigzag
+from planner.vehicle.zigzag import dwells_for, zigzag
 from sim.io.errors import InputError, run_command
 from sim.motion.replay import replay
 from tests.planner.plans import CONTROL, tracked

@@ -12,7 +12,7 @@ import numpy as np
 from planner.api.plan import plan
 from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D, circle, polygon
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.tracked_point import Point, TrackedVehicle

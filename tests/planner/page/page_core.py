@@ -24,7 +24,7 @@ from planner.page.constants import constants_module
 from planner.page.first_state import robot_fields
 from planner.page.table_data import table_data
 from planner.paths.tractrix import Reference
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Vehicle
 from sim.io.errors import InputError

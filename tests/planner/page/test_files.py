@@ -19,9 +19,8 @@ from planner.files.saved_plan import restore_plan
 from planner.files.tracker_header import DIRECTIONS, c_part, header_template
 from planner.files.tracking_error import tracking_error
 from planner.page.first_state import first_options, slider_ends
-from planner.paths.path import circle
-from planner.paths.shapes import shape_of
-from planner.planning.planned import Plan
+from planner.paths.path import circle, shape_of
+from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from sim.inputs import load_robot
 from sim.io.errors import InputError

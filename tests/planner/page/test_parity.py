@@ -13,7 +13,7 @@ from planner.api.plan import plan
 from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D, circle, polygon
 from planner.paths.path_files import read_path
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from sim.inputs import load_robot
 from sim.io.errors import InputError

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import softflagella as sf
-from planner.vehicle.coefficient_modes import both_directions
+from planner.vehicle.from_table import both_directions
 from sim.io.errors import run_command
 from softflagella.__main__ import main
 from tests.planner.page.cases import EFFECT, one_robot, shipped

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from planner.api.plan import plan
 from planner.paths.distance import distance_to, nearest, two_sided
-from planner.paths.fillets import fillet, largest_fillet
-from planner.paths.nearest_feasible import nearest_path
+from planner.paths.nearest_path import nearest_path
 from planner.paths.path import Path2D, circle, polygon, resample, smoothed
 from planner.paths.tractrix import STILL, Drift, Reference, reference
+from planner.planning.feasible import fillet, largest_fillet
 from sim.io.errors import InputError
 from tests.planner.plans import CONTROL
 

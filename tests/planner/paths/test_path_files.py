@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 from planner.files.regions import read_region
-from planner.paths.fillets import CORNER, kinks
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
-from planner.paths.path import Path2D, polygon
+from planner.paths.path import SHAPES, Path2D, polygon
 from planner.paths.path_files import Drawing, read_path
-from planner.paths.shapes import SHAPES
 from planner.paths.svg_drawing import METRES_PER_PIXEL, read_svg
 from planner.paths.units import (
     check_size,
@@ -22,6 +20,7 @@ from planner.paths.units import (
     place_in_lab,
     read_time,
 )
+from planner.planning.feasible import CORNER, kinks
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from tests.planner.paths.svg_cases import ALIKE, REFUSED

@@ -14,14 +14,10 @@ from planner.api.plan import plan
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon, smoothed
 from planner.paths.tractrix import STILL, Drift, reference
-from planner.planning import remedy
-from planner.planning.declared_path import declare
+from planner.planning.declare import MOST_WORK, declare, remedy
 from planner.planning.feasible import Feasibility, changed, cost, feasible
-from planner.planning.line_of_sight import hysteresis
-from planner.planning.progress import DECLARING, REMEDY, Share
-from planner.planning.request import Corner
-from planner.planning.schedule import follow
-from planner.planning.stated_error import guaranteed, look_ahead
+from planner.planning.line_of_sight import follow, guaranteed, hysteresis, look_ahead
+from planner.planning.request import DECLARING, REMEDY, Corner, Share
 from planner.vehicle.rollout import poses_at_flips, trace
 from sim.io.errors import InputError
 from sim.mechanics import planar
@@ -169,7 +165,7 @@ def test_the_smoothing_that_a_noisy_path_is_told_works(noise: float) -> None:
 
 
 def test_a_declared_path_far_from_the_drawn_one_says_so_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planner.planning.declared_path.FAR", 0.02)
+    monkeypatch.setattr("planner.planning.declare.FAR", 0.02)
     triangle = plan(polygon(3, 4.0), CONTROL, objective="flips")
     assert triangle.warnings[0].startswith("the declared path leaves the drawn one by up to")
 
@@ -214,12 +210,12 @@ def test_the_search_is_bounded_and_says_that_it_goes_on(name: str, monkeypatch: 
         work.append(cost(raw, feasibility, way))
         return changed(raw, feasibility, way, *rest)
 
-    monkeypatch.setattr(remedy, "changed", counted)
+    monkeypatch.setattr("planner.planning.declare.changed", counted)
     told: list[Share] = []
     with pytest.raises(InputError) as caught:
         declare(TIGHT[name], five_tails(), lambda share: told.append(cast(Share, share)))
     assert "\n" not in str(caught.value)
-    assert 0 < sum(work) <= remedy.MOST_WORK
+    assert 0 < sum(work) <= MOST_WORK
     shares = [share.done for share in told if share.stage == REMEDY]
     assert len(shares) > 4 * len(work)  # several times while one way is tried
     assert shares == sorted(shares)
@@ -246,7 +242,7 @@ def test_what_is_advised_is_accepted(name: str, corner: Corner) -> None:
             return
     except InputError:  # corners are not allowed
         return
-    advice = remedy.remedy(path, task)
+    advice = remedy(path, task)
     if "scale the path by" in advice:
         changed_path = path.scaled(advised(advice))
     elif "--smooth" in advice:
@@ -258,7 +254,7 @@ def test_what_is_advised_is_accepted(name: str, corner: Corner) -> None:
 
 
 def test_without_work_the_answer_is_the_best_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(remedy, "MOST_WORK", 0.0)
-    assert remedy.remedy(circle(0.2), five_tails()) == "scale the path by 5"  # followed as drawn
-    assert "which moves it by up to" in remedy.remedy(SPIKE, five_tails())
-    assert remedy.remedy(star(0.7, 0.25), five_tails()).startswith("draw it with wider turns")
+    monkeypatch.setattr("planner.planning.declare.MOST_WORK", 0.0)
+    assert remedy(circle(0.2), five_tails()) == "scale the path by 5"  # followed as drawn
+    assert "which moves it by up to" in remedy(SPIKE, five_tails())
+    assert remedy(star(0.7, 0.25), five_tails()).startswith("draw it with wider turns")

@@ -18,9 +18,9 @@ from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.request import PlanRequest
 from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
-from planner.vehicle.dwell_choice import dwells_for, longest_dwell
 from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.rollout import trace
+from planner.vehicle.zigzag import dwells_for, longest_dwell
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot

@@ -12,10 +12,10 @@ from planner.jobs.cover import Coverage
 from planner.jobs.hold import Orbit
 from planner.jobs.tour import Visits
 from planner.planning import solve
-from planner.planning.kept_clear import BlockedError
-from planner.planning.planned import KINDS
+from planner.planning.conditions import BlockedError
+from planner.planning.plan import KINDS
 from planner.planning.request import PlanRequest
-from planner.vehicle.dwell_choice import dwells_for, longer_dwells
+from planner.vehicle.zigzag import dwells_for, longer_dwells
 from sim.io.errors import InputError
 from tests.planner.plans import CONTROL, tracked
 

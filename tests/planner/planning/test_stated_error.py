@@ -17,18 +17,18 @@ from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Reference, reference
 from planner.planning.camera import Camera
-from planner.planning.error_growth import ErrorGrowth, error_growth
-from planner.planning.feedback_error import feedback_error
-from planner.planning.schedule import follow
-from planner.planning.stated_error import (
+from planner.planning.errors import (
     WOBBLE,
+    ErrorGrowth,
     Predicted,
+    error_growth,
+    feedback_error,
     flips_between,
-    look_ahead,
     predicted_error,
     rms_in_time,
     stated_error,
 )
+from planner.planning.line_of_sight import follow, look_ahead
 from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.rollout import Rollout, Switches, roll_out, trace

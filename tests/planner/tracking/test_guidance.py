@@ -13,12 +13,11 @@ import pytest
 from planner.api.plan import plan
 from planner.goal.dubins import shortest_paths
 from planner.planning.camera import POSE, Camera
-from planner.planning.planned import Plan
-from planner.tracking.guidance import LearnedDrift, TrackerGuidance
+from planner.planning.plan import Plan
+from planner.tracking.guidance import LearnedDrift, TrackerGuidance, Way, shortest_way
 from planner.tracking.swim import Swim, swim
 from planner.tracking.tracker import Tracker
-from planner.tracking.way_back import shortest_way
-from planner.vehicle.dwell_choice import Objective
+from planner.vehicle.zigzag import Objective
 from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker
 from tests.planner.plans import CONTROL, planned
@@ -144,7 +143,8 @@ def test_from_anywhere_it_is_back_in_little_more_than_the_least_time(seeds: rang
 
 def test_the_way_leads_to_the_target_and_is_short() -> None:
     targets = np.stack([np.linspace(0, 9, 901), np.zeros(901), np.zeros(901)], 1)
-    way = shortest_way((4.0, 1.5, math.pi / 2), targets, np.linspace(0, 9, 901), 18, 0.4)
+    track, target = shortest_way((4.0, 1.5, math.pi / 2), targets, np.linspace(0, 9, 901), 18, 0.4)
+    way = Way.of(track, 0.4, target)
     last = way.segments[-1]
     x, y, _ = targets[way.target]
     ends = [last.project(x, y, last.length)]

@@ -12,9 +12,8 @@ from planner.paths.distance import distance_to
 from planner.paths.obstacles import Footprint
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Reference, reference
-from planner.planning.planned import Plan
-from planner.tracking.reached import reached
-from planner.tracking.rest import Remainder, rest_of
+from planner.planning.plan import Plan
+from planner.tracking.rest import Remainder, reached, rest_of
 from planner.vehicle.rollout import predicted_poses
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError

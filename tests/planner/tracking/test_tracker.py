@@ -14,13 +14,12 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from planner.planning.camera import POSE, Camera
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from planner.tracking import tracker
-from planner.tracking.clock import CONFIRMED, EARLY, LATE, Clock
 from planner.tracking.guidance import TrackerGuidance
 from planner.tracking.kalman_filter import MOST, STATES, Dwell, Estimate
 from planner.tracking.swim import swim
-from planner.tracking.tracker import Tracker
+from planner.tracking.tracker import CONFIRMED, EARLY, LATE, Clock, Tracker
 from planner.vehicle.vehicle import Vehicle
 from sim.mechanics import planar
 from tests.planner.plans import planned as plan_of
@@ -239,21 +238,21 @@ NOW = Dwell(2.8, -1, 1.1, 0.0)
 @pytest.fixture
 def estimate() -> Estimate:
     found = Estimate(planned(), TrackerGuidance(planned()), (0.01, 0.01))
-    found.state = list(STATE)
+    found.state = np.array(STATE)
     return found
 
 
 def differences(estimate: Estimate, seen: Callable[[], np.ndarray]) -> np.ndarray:
-    """Compute the derivatives (3, 10) by central differences."""
+    """Compute the derivatives (3, 13) by central differences."""
     columns = []
     for k in range(STATES):
         ends = []
         for step in (1e-5, -1e-5):
-            estimate.state = list(STATE)
+            estimate.state = np.array(STATE)
             estimate.state[k] += step
             ends.append(seen())
         columns.append((ends[0] - ends[1]) / 2e-5)
-    estimate.state = list(STATE)
+    estimate.state = np.array(STATE)
     return np.array(columns).T
 
 
@@ -267,7 +266,7 @@ def test_derivatives_of_an_expected_pose(estimate: Estimate, when: float) -> Non
         assert again is not None
         return np.array(again[0])
 
-    assert np.array(expected[1]) == pytest.approx(differences(estimate, seen), abs=1e-8)
+    assert expected[1] == pytest.approx(differences(estimate, seen), abs=1e-8)
     assert estimate.seen_from(0.5, NOW, PAST[1:]) is None  # before the dwells that are kept
 
 
@@ -295,19 +294,19 @@ def test_counting_back_and_going_forward_end_at_the_same_pose(estimate: Estimate
     assert pose == pytest.approx(state[:3], abs=1e-9)
 
 
-def test_an_update_is_that_of_the_textbook(estimate: Estimate) -> None:
-    """One pose by three single numbers equals one step with matrices."""
-    P = np.array(estimate.covariance)
+def test_an_update_is_that_of_three_numbers_one_after_the_other(estimate: Estimate) -> None:
+    P, moved, size, left = estimate.covariance.copy(), np.zeros(STATES), 0.0, (0.01, -0.02, 0.015)
     found = estimate.seen_from(3.0, NOW, PAST)
     assert found is not None
-    H = np.array(found[1])
-    left = (0.01, -0.02, 0.015)
-    size = estimate.update(left, found[1], 1e9)
-    S = H @ P @ H.T + np.diag([1e-4] * 3)
-    gain = P @ H.T @ np.linalg.inv(S)
-    assert size == pytest.approx(float(np.array(left) @ np.linalg.solve(S, left)), rel=1e-9)
-    assert np.array(estimate.state) == pytest.approx(np.array(STATE) + gain @ left, abs=1e-12)
-    assert np.array(estimate.covariance) == pytest.approx(P - gain @ H @ P, abs=1e-12)
+    for h, residual in zip(found[1], left, strict=True):
+        gain, innovation = P @ h, residual - h @ moved
+        spread = h @ gain + 1e-4
+        size += innovation**2 / spread
+        moved += gain * innovation / spread
+        P = P - np.outer(gain, gain) / spread
+    assert estimate.update(left, found[1], 1e9) == pytest.approx(size, rel=1e-9)
+    assert estimate.state == pytest.approx(np.array(STATE) + moved, abs=1e-12)
+    assert estimate.covariance == pytest.approx(P, abs=1e-12)
 
 
 def test_the_guidance_swims_with_the_learned_robot(estimate: Estimate) -> None:
@@ -323,7 +322,6 @@ def test_the_guidance_swims_with_the_learned_robot(estimate: Estimate) -> None:
 
 
 def test_numbers_stay_within_bounds(estimate: Estimate) -> None:
-    H = [[0.0] * STATES for _ in range(3)]
-    H[0][3] = H[1][4] = H[2][5] = 1.0
+    H = np.eye(3, STATES, 3)
     estimate.update((9.0, -9.0, 9.0), H, 1e9)
-    assert [estimate.state[3], estimate.state[4], estimate.state[5]] == pytest.approx([MOST[0], -MOST[1], MOST[2]])
+    assert estimate.state[3:6] == pytest.approx([MOST[0], -MOST[1], MOST[2]])

@@ -14,7 +14,7 @@ import softflagella as sf
 from planner.api.plan import plan
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.rollout import Switches, poses_at_flips
 from planner.vehicle.vehicle import Vehicle

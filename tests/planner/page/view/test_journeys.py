@@ -16,7 +16,7 @@ from planner.api.plan import plan
 from planner.files.tracking_error import tracking_error
 from planner.page.write_page import write_page
 from planner.paths.path import circle
-from planner.planning.planned import Plan
+from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.rollout import predicted_poses
 from sim.inputs import load_robot

@@ -15,16 +15,12 @@ from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
 from planner.paths.units import heading_in_degrees, in_lab, time_in_lab
-from planner.planning.arrival import Arrival
 from planner.planning.camera import POSE
-from planner.planning.declared_path import Declared
-from planner.planning.errors import PlanErrors, plan_errors
-from planner.planning.feedback_error import feedback_error
-from planner.planning.kept_clear import KeptClear
-from planner.planning.lap import Lap
+from planner.planning.conditions import Arrival, KeptClear, Lap
+from planner.planning.declare import Declared
+from planner.planning.errors import PlanErrors, feedback_error, plan_errors
 from planner.planning.line_of_sight import Guidance
 from planner.planning.request import PlanRequest
-from planner.planning.setting import zigzag_drift
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.rollout import Switches, predicted_poses, trace_smoothly
 from planner.vehicle.tracked_point import TrackedVehicle
@@ -161,7 +157,7 @@ class Plan(Generic[J]):
     @property
     def drift(self) -> Drift:
         """What carries the robot off its heading in straight motion."""
-        return zigzag_drift(self.tracked, self.straight)
+        return self.tracked.drift(self.straight)
 
     @property
     def poses(self) -> Floats:

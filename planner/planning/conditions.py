@@ -1,0 +1,161 @@
+"""What a plan keeps to besides its path: free space and ways around, the time of its arrival, laps.
+
+A lap has an even number of dwells, so each begins in the same direction of the motor. Lengths in l, angles in rad,
+times in μ0 l⁴/EI.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from planner.paths.obstacles import FreeSpace
+from planner.paths.units import Swimmer, in_lab, place_in_lab
+from sim.io.errors import InputError
+from sim.io.units import format_time
+
+_SHOWN = 1e-5  # l and rad; smaller differences are rounding
+OVERLAP = 10.0  # radii of the pivot's circle, of the next lap that a tracker sees
+
+
+class Swing(NamedTuple):
+    """A detour that takes time: waiting circles end where they begin, a swing ends further along the path."""
+
+    x: float  # where the tracked point leaves the path
+    y: float  # of that place
+    longer: float  # by how much the pivot's track is longer
+    circles: int  # waiting circles in it
+
+    def line(self, robot: Swimmer) -> str:
+        """Say in one sentence where the swing is."""
+        place = place_in_lab(self.x, self.y, robot)
+        what = {0: "a swing", 1: "a waiting circle"}.get(self.circles, f"{self.circles} waiting circles")
+        return f"{what} at {place}, {in_lab(self.longer, robot)} more"
+
+
+class Arrival(NamedTuple):
+    """The duration that was asked for, and what it is compared with."""
+
+    wished: float  # as it was asked for
+    fastest: float  # duration of the fastest plan
+
+    def line(self, duration: float, robot: Swimmer) -> str:
+        """Say in one sentence how near the duration of a plan comes to the wish."""
+        wished, missed, fastest = (
+            format_time(time * robot.time_scale)
+            for time in (self.wished, abs(duration - self.wished), self.fastest)
+        )
+        return f"arrives after {wished} as asked, to within {missed}; the fastest plan takes {fastest}"
+
+    def to_dict(self, swing: Swing | None, robot: Swimmer) -> dict[str, Any]:
+        """Return the content for plan.json."""
+        scale = robot.time_scale
+        return {
+            "wished_s": self.wished * scale,
+            "fastest_s": self.fastest * scale,
+            "swing": None if swing is None else [swing.x, swing.y, swing.longer, swing.circles],
+        }
+
+    @staticmethod
+    def from_dict(content: Mapping[str, Any], robot: Swimmer) -> tuple[Arrival, Swing | None]:
+        """Read the content of a plan.json."""
+        wished, fastest = (float(content[name]) / robot.time_scale for name in ("wished_s", "fastest_s"))
+        swing = None
+        if content["swing"] is not None:
+            x, y, longer, circles = content["swing"]
+            swing = Swing(float(x), float(y), float(longer), int(circles))
+        return Arrival(wished, fastest), swing
+
+
+class BlockedError(InputError):
+    """There is no way around what stands on the path; `hopeless`: not even without a margin."""
+
+    hopeless = False
+
+
+class Detour(NamedTuple):
+    """A way around an obstacle: places and lengths of the tracked point's way."""
+
+    leaves: tuple[float, float]  # x, y where it leaves the path
+    joins: tuple[float, float]  # x, y where it joins the path again
+    length: float  # between the two
+    replaced: float  # of the part of the path that is not followed
+    farthest: float  # largest distance of the tracked point from the path
+
+    def line(self, robot: Swimmer) -> str:
+        """Say in one sentence where the way around leaves the path and joins it again."""
+        leaves, joins = (place_in_lab(*place, robot) for place in (self.leaves, self.joins))
+        return (
+            f"the path is blocked: the way around leaves it at {leaves} and joins it at {joins}, "
+            f"{in_lab(self.length, robot)} instead of {in_lab(self.replaced, robot)}, up to "
+            f"{in_lab(self.farthest, robot)} away from it"
+        )
+
+
+@dataclass(frozen=True)
+class KeptClear:
+    """How a plan keeps clear of walls and regions."""
+
+    free_space: FreeSpace  # walls and regions
+    margin: float  # kept around the body on the declared path; at least the stated error
+    clearance: float  # smallest, of the body on the predicted track
+    detours: tuple[Detour, ...]  # in the order of the path
+
+    def lines(self, robot: Swimmer) -> list[str]:
+        """Say how the plan keeps clear, a sentence for each detour and one for the margin."""
+        margin, clearance = (in_lab(value, robot) for value in (self.margin, self.clearance))
+        last = f"margin {margin} around the body; predicted clearance {clearance}"
+        return [*(detour.line(robot) for detour in self.detours), last]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content for plan.json."""
+        return {
+            **self.free_space.to_dict(),
+            "margin_over_l": self.margin,
+            "predicted_clearance_over_l": self.clearance,
+            "detours": [
+                {
+                    "leaves": detour.leaves,
+                    "joins": detour.joins,
+                    "length_over_l": detour.length,
+                    "replaced_over_l": detour.replaced,
+                    "farthest_over_l": detour.farthest,
+                }
+                for detour in self.detours
+            ],
+        }
+
+
+class Lap(NamedTuple):
+    """What a lap leaves behind: differences of the pose from that a lap before."""
+
+    closes: float  # distance, as predicted
+    closes_turn: float  # angle, as predicted
+    drift: float  # distance that 95 % of the robots keep to that the model's uncertainty allows, open loop
+    drift_turn: float  # angle of the same robots
+
+    def line(self, robot: Swimmer) -> str:
+        """Say in one sentence how well the laps repeat."""
+        closes, drift = in_lab(max(self.closes, _SHOWN), robot), in_lab(self.drift, robot)
+        turned, drift_turn = (math.degrees(angle) for angle in (max(self.closes_turn, _SHOWN), self.drift_turn))
+        return (
+            f"repeat it: a lap ends where it began, to within {closes} and {turned:.1g} degrees as predicted; "
+            f"95 % of robots drift by up to {drift} and {drift_turn:.2g} degrees a lap without feedback"
+        )
+
+    def to_dict(self) -> dict[str, float]:
+        """Return the content for plan.json."""
+        return {
+            "closes_over_l": self.closes,
+            "closes_rad": self.closes_turn,
+            "drift_over_l": self.drift,
+            "drift_rad": self.drift_turn,
+        }
+
+    @staticmethod
+    def from_dict(content: Mapping[str, Any]) -> Lap:
+        """Read the content of a plan.json."""
+        names = ("closes_over_l", "closes_rad", "drift_over_l", "drift_rad")
+        return Lap(*(float(content[name]) for name in names))
