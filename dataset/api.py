@@ -1,4 +1,4 @@
-"""Sweeps: the functions behind `softflagella.sweep` and `read_sweep`."""
+"""Simulate a sweep, whatever describes it: the function behind `softflagella.sweep`."""
 
 from __future__ import annotations
 
@@ -7,10 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from dataset.build import build
-from dataset.data_set import read
 from dataset.design import SWEEP_TOML, design_around, load_design
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
@@ -71,20 +68,3 @@ def sweep(
     return build(
         design, out, jobs=jobs, backend="local" if local else where, address=scheduler, force=force, resume=resume
     )
-
-
-@checks_keywords
-def read_sweep(folder: str | Path) -> pd.DataFrame:
-    """Read all rows of a finished sweep, in the order of its design; units are in the Parquet schema.
-
-    Args:
-        folder: written by `sweep`.
-
-    Raises:
-        InputError: there is no finished sweep, or its files are damaged.
-
-    Example:
-        >>> import softflagella as sf
-        >>> table = sf.read_sweep("data/sweep")  # doctest: +SKIP
-    """
-    return read(folder)

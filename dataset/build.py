@@ -32,8 +32,8 @@ from dataset.data_set import (
     MANIFEST,
     SWEEP,
     check_version,
+    read_design,
     read_manifest,
-    read_sweep,
     sweep_key,
     write_manifest,
 )
@@ -106,7 +106,7 @@ def mend(
         UnfinishedError: as for `build`.
     """
     there = Folder(folder)
-    sweep, design = read_sweep(there)
+    sweep, design = read_design(there)
     check_version(there, sweep["code"])
     if sweep["rows_by"] != _source(simulate):
         raise InputError(
@@ -192,7 +192,7 @@ class _Build:
         """Write what the folder is for, unless that is written already; refuse one that holds something else."""
         address, names = self.folder.address, [name for name in self.folder.names() if not name.startswith(".")]
         if SWEEP in names:
-            sweep, _ = read_sweep(self.folder)
+            sweep, _ = read_design(self.folder)
             if sweep["key"] != self._key:
                 check_version(self.folder, sweep["code"])
                 raise InputError(

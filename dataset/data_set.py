@@ -29,6 +29,7 @@ from dataset.schema import rows_version, schema
 from dataset.shards import ROWS, BadFileError, Part, record_batches, rows_named
 from sim.effects import catalogue
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from sim.io.provenance import fingerprint, provenance
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def _damage(folder: Folder, what: str) -> InputError:
     return InputError(f"{what}; repair it with softflagella dataset verify {quote(folder.address)} --mend")
 
 
-def read_sweep(folder: Folder) -> tuple[dict[str, Any], SweepDesign]:
+def read_design(folder: Folder) -> tuple[dict[str, Any], SweepDesign]:
     """Read the sweep.json of a folder, and make its design, of one row.
 
     Raises:
@@ -188,17 +189,22 @@ def batches(
             raise _damage(folder, f"{folder.path(part.name)}: {bad}") from None
 
 
-def read(address: str | Path, columns: Sequence[str] | None = None) -> pd.DataFrame:
-    """Read all rows of a finished data set, in the order of the design.
+@checks_keywords
+def read(folder: str | Path, columns: Sequence[str] | None = None) -> pd.DataFrame:
+    """Read all rows of a finished data set, in the order of its design; units are in the Parquet schema.
 
     Args:
-        address: a folder or URL.
+        folder: or URL, written by `softflagella.sweep`.
         columns: names; default all.
 
     Raises:
-        InputError: as for `batches`.
+        InputError: there is no finished data set, or its files are damaged.
+
+    Example:
+        >>> import softflagella as sf
+        >>> table = sf.read_sweep("data/sweep")  # doctest: +SKIP
     """
-    return pa.Table.from_batches(batches(address, columns, rows=2**20)).replace_schema_metadata(None).to_pandas()
+    return pa.Table.from_batches(batches(folder, columns, rows=2**20)).replace_schema_metadata(None).to_pandas()
 
 
 def usable(rows: pd.DataFrame) -> pd.DataFrame:

@@ -46,7 +46,6 @@ class Indices:
 
     inputs: tuple[str, ...]
     first: Floats  # (K,)
-    first_bounds: Floats  # (K, 2)
     total: Floats  # (K,)
     total_bounds: Floats  # (K, 2)
     explained: float  # share of the variance that the polynomials explain in held-out rows
@@ -71,11 +70,11 @@ def sobol_indices(inputs: Mapping[str, Floats], output: Floats, *, seed: int = 0
     y = output[kept]
     first, total = _shares(_fit(basis, y), powers)
     drawn = [_shares(c, powers) for c in _resampled(basis, y, rng)]
-    bounds = np.quantile(np.array(drawn), [0.025, 0.975], axis=0)  # (2, first and total, K)
+    bounds = np.quantile(np.array([share for _, share in drawn]), [0.025, 0.975], axis=0)  # (2, K)
     held_out = rng.permutation(len(y)) < len(y) // 5
     residual = y[held_out] - basis[held_out] @ _fit(basis[~held_out], y[~held_out])
     explained = 1 - float(np.var(residual) / np.var(y[held_out]))
-    return Indices(names, first, bounds[:, 0].T, total, bounds[:, 1].T, explained, degree)
+    return Indices(names, first, total, bounds.T, explained, degree)
 
 
 def _powers(inputs: int, degree: int) -> np.ndarray:

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from dataset.data_set import batches, check_version, read_manifest, read_sweep
+from dataset.data_set import batches, check_version, read_design, read_manifest
 from dataset.design import SweepDesign
 from dataset.folder import Folder
 from dataset.schema import COST, arrow_table, schema
@@ -38,7 +38,7 @@ def verify(folder: str | Path, *, rows: int = 8) -> str:
     there = Folder(folder)
     manifest, address = read_manifest(folder), there.address
     check_version(there, manifest["code_version"])
-    design = read_sweep(there)[1].with_rows(manifest["rows"])
+    design = read_design(there)[1].with_rows(manifest["rows"])
     if design.config() != manifest["config"]:
         raise InputError(f"{address}: sweep.json is not that of the manifest; repair it with --mend")
     chosen = np.sort(np.random.default_rng(1).choice(design.rows, min(rows, design.rows), replace=False))

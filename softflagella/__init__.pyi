@@ -6,8 +6,8 @@ from calibration.report.robot_verdict import RobotVerdict as RobotVerdict
 from calibration.swimmer.synthetic_table import make_table as make_table
 from calibration.verdict.next_runs import Decision as Decision
 from calibration.verdict.verdict import Verdict as Verdict
-from dataset.api import read_sweep as read_sweep
 from dataset.api import sweep as sweep
+from dataset.data_set import read
 from planner.api.follow import check as check
 from planner.api.follow import replan as replan
 from planner.api.follow import swim as swim
@@ -54,10 +54,10 @@ from sim.model.effect import Effect as Effect
 from sim.model.robot import Robot as Robot
 from sim.model.schedule import Schedule as Schedule
 from sim.model.schedule import load_schedule as load_schedule
-from surrogate.api import export as export
 from surrogate.api import inverse as inverse
 from surrogate.api import query as query
 from surrogate.interface import LookupTable as LookupTable
+from surrogate.small_copy import export as export
 from surrogate.table_file import load_table as load_table
 from surrogate.tabulate import tabulate as tabulate
 from surrogate.tensors import torch_query as torch_query
@@ -65,6 +65,7 @@ from surrogate.tensors import torch_steady as torch_steady
 from surrogate.training.train import train as train
 
 effects = catalogue
+read_sweep = read
 Vehicle = MeasuredVehicle
 __all__: list[str]
 

@@ -146,11 +146,11 @@ def _export(model: str | None = None, *, small: str) -> None:
         model: look-up table (default: the one that comes with the package).
         small: FOLDER, at most 150 kB, for a microcontroller, with a reader in C.
     """
-    from surrogate.small_copy import save_small_copy
+    from surrogate.small_copy import export
     from surrogate.table_file import load
 
     table = load(model)
-    print(save_small_copy(table, small))
+    print(export(small, lookup=table))
     print(f"model {table.identity} -> {small}")
 
 

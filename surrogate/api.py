@@ -1,4 +1,4 @@
-"""Ask look-up tables about robots: `softflagella.query` and `inverse`; write them for other programs: `export`."""
+"""Ask look-up tables about robots: `softflagella.query` and `inverse`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from sim.io.errors import InputError, naming
+from sim.io.errors import naming
 from sim.io.keywords import checks_keywords
 from sim.io.tables import read_table
 from sim.model.groups import DWELL
@@ -16,9 +16,7 @@ from sim.robot_rows import OneRobot, robot_rows, with_units
 from surrogate.answers import answer_rows
 from surrogate.interface import LookupTable
 from surrogate.inverse import inverse_table
-from surrogate.small_copy import save_small_copy
-from surrogate.table import NeuralTable
-from surrogate.table_file import load_table
+from surrogate.table_file import as_table, trained_table
 
 if TYPE_CHECKING:
     from sim.robot_rows import Robots
@@ -58,11 +56,11 @@ def query(
         >>> motion[["robot", "R_yr_cm", "v_cm_s"]].round(2).values.tolist()
         [['paper-control', 10.36, 0.23], ['paper-triangle', 10.11, 0.36]]
     """
-    rows, table = robot_rows(robots, robot, DWELL), _table(lookup)
+    rows, table = robot_rows(robots, robot, DWELL), as_table(lookup)
     answer = answer_rows(rows, table, flag=flag, certify=certify)
     if derivatives is not False:
         names = () if derivatives is True else derivatives
-        slopes = _trained(table).derivatives(rows.columns, names, flag=True)
+        slopes = trained_table(table).derivatives(rows.columns, names, flag=True)
         answer |= {f"{output}_per_{name}": s for output, part in slopes.items() for name, s in part.items()}
     return rows.frame(answer)
 
@@ -102,7 +100,7 @@ def inverse(
     points = pd.DataFrame(dict(targets), index=_index(targets))
     names = [name.strip() for name in free.split(",")] if isinstance(free, str) else free
     with naming(file):
-        table = inverse_table(_trained(lookup), points, names, where=str(file or "the table"))
+        table = inverse_table(trained_table(lookup), points, names, where=str(file or "the table"))
     table.attrs["targets"] = len(points)
     return with_units(table)
 
@@ -112,38 +110,3 @@ def _index(targets: Mapping[str, Any] | pd.DataFrame) -> Any:
     if isinstance(targets, pd.DataFrame) or any(hasattr(values, "__len__") for values in targets.values()):
         return None
     return [0]
-
-
-@checks_keywords
-def export(folder: str | Path, *, lookup: LookupTable | str | Path | None = None) -> str:
-    """Write a trained look-up table for other programs: at most 150 kB, with a reader in C99.
-
-    Args:
-        folder: it is made if it is missing.
-        lookup: a trained table, or its file; default: the one that comes with the package.
-
-    Returns:
-        What the copy loses in accuracy, in words.
-
-    Raises:
-        InputError: the table is that of one robot, or the files cannot be written.
-
-    Example:
-        >>> import tempfile
-        >>> import softflagella as sf
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     print(sf.export(folder)[:3])
-        148
-    """
-    return save_small_copy(_trained(lookup), folder)
-
-
-def _table(table: LookupTable | str | Path | None) -> LookupTable:
-    return load_table(table) if table is None or isinstance(table, str | Path) else table
-
-
-def _trained(table: LookupTable | str | Path | None) -> NeuralTable:
-    lookup = _table(table)
-    if not isinstance(lookup, NeuralTable):
-        raise InputError("this is the table of a single robot; give a trained one")
-    return lookup

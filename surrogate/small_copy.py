@@ -27,15 +27,18 @@ from sim.arrays import Flags, Floats
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_text
+from sim.io.keywords import checks_keywords
 from sim.model.groups import DWELL
 from sim.model.response import DWELLS
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.domain import ROBOT
 from surrogate.errors import COMPARED, RESPONSE_OUTPUTS, error_scale, relative_errors
+from surrogate.interface import LookupTable
 from surrogate.motions import WrenchTable
 from surrogate.network import Ensemble
 from surrogate.response import Basis, memory_at_equal_dwells, put_flips
 from surrogate.table import NeuralTable
+from surrogate.table_file import trained_table
 from surrogate.training.simulated import draw_robots
 
 MAX_BYTES = 150_000
@@ -221,12 +224,28 @@ _UNITS = {
 }  # fmt: skip
 
 
-def save_small_copy(table: NeuralTable, folder: str | Path) -> str:
-    """Write the files of the small copy into a folder, all or none; return the losses in words.
+@checks_keywords
+def export(folder: str | Path, *, lookup: LookupTable | str | Path | None = None) -> str:
+    """Write a trained look-up table for other programs: at most 150 kB, with a reader in C99; all files or none.
+
+    Args:
+        folder: it is made if it is missing.
+        lookup: a trained table, or its file; default: the one that comes with the package.
+
+    Returns:
+        What the copy loses in accuracy, in words.
 
     Raises:
-        InputError: no copy fits into MAX_BYTES.
+        InputError: the table is that of one robot or too large, or the files cannot be written.
+
+    Example:
+        >>> import tempfile
+        >>> import softflagella as sf
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     print(sf.export(folder)[:3])
+        148
     """
+    table = trained_table(lookup)
     small = make_small_copy(table)
     losses = measure_losses(table, small)
     vectors = make_vectors(table, small)

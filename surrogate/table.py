@@ -294,11 +294,12 @@ class NeuralTable:
         return motions.features
 
     def _ends(self, motions: Motions, result: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Return the ends of the intervals of a result."""
+        """Return the ends of the intervals of a result, in its order."""
         if self.intervals is None:
             raise InputError("this look-up table has no intervals; train it again")
         ends = self.intervals.ends(self.width_features(motions), motions.couples, motions.outputs)
-        return {name: end for name, end in ends.items() if name.rpartition("_")[0] in result}
+        return {f"{name}_{end}": ends[f"{name}_{end}"] for end in ("low", "high") for name in result
+                if f"{name}_{end}" in ends}  # fmt: skip
 
     def _refusal(self, values: Mapping[str, Floats], row: int, reason: str) -> OutsideError:
         words = ""

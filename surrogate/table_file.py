@@ -80,6 +80,23 @@ def load_table(path: str | Path | None = None) -> LookupTable:
     return load_robot_table(path) if path is not None and Path(path).suffix == ".json" else load(path)
 
 
+def as_table(table: LookupTable | str | Path | None) -> LookupTable:
+    """Return a table that is given by itself, by its file, or by nothing: the one that comes with the package."""
+    return load_table(table) if table is None or isinstance(table, str | Path) else table
+
+
+def trained_table(table: LookupTable | str | Path | None) -> NeuralTable:
+    """Return `as_table`.
+
+    Raises:
+        InputError: it is the table of a single robot.
+    """
+    lookup = as_table(table)
+    if not isinstance(lookup, NeuralTable):
+        raise InputError("this is the table of a single robot; give a trained one")
+    return lookup
+
+
 def _lookup(content: dict[str, Any]) -> NeuralTable:
     intervals, errors = content["intervals"], content.get(CURVE_ERRORS)
     wrench, curves = (

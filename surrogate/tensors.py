@@ -19,8 +19,8 @@ from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.motion.batches import sensitivity_columns
-from surrogate.table import NeuralTable
-from surrogate.table_file import load
+from surrogate.interface import LookupTable
+from surrogate.table_file import trained_table
 
 Inputs = Mapping[str, Tensor | Floats | float]
 Answer = tuple[Mapping[str, Floats], Mapping[str, Mapping[str, Floats]]]  # values, and derivatives by input
@@ -44,7 +44,7 @@ class _Linearised(torch.autograd.Function):
 
 @checks_keywords
 def torch_query(
-    columns: Inputs, *, lookup: NeuralTable | str | Path | None = None, flag: bool = False
+    columns: Inputs, *, lookup: LookupTable | str | Path | None = None, flag: bool = False
 ) -> dict[str, Tensor]:
     """Ask a trained look-up table, so that torch can differentiate the answer once.
 
@@ -68,7 +68,7 @@ def torch_query(
         >>> round(C_yr.grad.item(), 3)
         0.025
     """
-    table = lookup if isinstance(lookup, NeuralTable) else load(lookup)
+    table = trained_table(lookup)
 
     def ask(robots: dict[str, Floats], names: Sequence[str]) -> Answer:
         values = table.query(robots, flag=flag)

@@ -45,7 +45,7 @@ EVERY = 5.0  # s of wall time between two states of a network
 _SHARE = 20.0  # and at least this many times as long as writing one took
 _ENDING = ".state"
 State = dict[str, Any]  # tensors and plain values
-Bar = Any  # tqdm is generic for type checkers only
+Show = Callable[[Any], None]  # the network of now on the progress bar
 Residual = Callable[..., Tensor]  # y (K, m, O), and data of the same m rows -> r (K, m, D)
 _POWER = 0.25
 _SOFTEST, _HARDEST = 0.1, 5e-4  # ε
@@ -295,40 +295,32 @@ def fit(
             "initial": _steps(state, settings),
         }
         with tqdm(total=total, **shown) as bar:
-            watch = Watch(problem, checkpoint, bar, unit)
+
+            def show(trained: TrainableEnsemble) -> None:
+                """Advance the bar and show the error that 95 % of the learned rows do not reach."""
+                if not bar.disable:
+                    with torch.no_grad():
+                        error = problem.errors(trained, problem.every()).mean(0).quantile(_LEVEL)
+                    words = f"{100 * _LEVEL:.0f} % of the rows within {100 * float(error):.3g} {unit}"
+                    bar.set_postfix_str(words, refresh=False)
+                    bar.update()
+
             if state["stage"] != "BFGS":
-                _adam(network, problem, settings, watch, state)
+                _adam(network, problem, settings, checkpoint, show, state)
             for k in range(state.get("member", 0), settings.members):
-                _polish(network, k, problem, settings.iterations, watch, state)
+                _polish(network, k, problem, settings.iterations, checkpoint, show, state)
         checkpoint.write(lambda: {"stage": "done", "network": network.state_dict()}, now=True)
     network.to("cpu").requires_grad_(False)
 
 
-@dataclass(frozen=True)
-class Watch:
-    """Progress and states of one network."""
-
-    problem: Problem
-    checkpoint: Checkpoint
-    bar: Bar
-    unit: str
-
-    def look(self, network: TrainableEnsemble) -> None:
-        """Advance the bar and show the error that 95 % of the learned rows do not reach."""
-        if self.bar.disable:
-            return
-        with torch.no_grad():
-            error = self.problem.errors(network, self.problem.every()).mean(0).quantile(_LEVEL)
-        words = f"{100 * _LEVEL:.0f} % of the rows within {100 * float(error):.3g} {self.unit}"
-        self.bar.set_postfix_str(words, refresh=False)
-        self.bar.update()
-
-    def keep(self, state: Callable[[], State]) -> None:
-        """Write the state, if it is time."""
-        self.checkpoint.write(state)
-
-
-def _adam(network: TrainableEnsemble, problem: Problem, settings: Settings, watch: Watch, state: State) -> None:
+def _adam(
+    network: TrainableEnsemble,
+    problem: Problem,
+    settings: Settings,
+    checkpoint: Checkpoint,
+    show: Show,
+    state: State,
+) -> None:
     """Train in small batches, all members side by side."""
     network.requires_grad_(True)
     generator = torch.Generator().manual_seed(settings.seed)
@@ -348,14 +340,15 @@ def _adam(network: TrainableEnsemble, problem: Problem, settings: Settings, watc
             problem.loss(network, rows, soft).backward()  # type: ignore[no-untyped-call]
             adam.step()
             schedule.step()
-        watch.look(network)
+        show(network)
         now = {"stage": "Adam", "epoch": epoch + 1, "generator": generator.get_state()}
-        watch.keep(lambda now=now: now | _states({"network": network, **parts}))  # type: ignore[misc]
+        checkpoint.write(lambda now=now: now | _states({"network": network, **parts}))  # type: ignore[misc]
 
 
 def _polish(
-    network: TrainableEnsemble, k: int, problem: Problem, iterations: int, watch: Watch, state: State
-) -> None:
+    network: TrainableEnsemble, k: int, problem: Problem, iterations: int, checkpoint: Checkpoint, show: Show,
+    state: State,
+) -> None:  # fmt: skip
     """Train one member on all rows at once."""
     alone = network.member(k).requires_grad_(True)
     parameters, everything = list(alone.parameters()), problem.every()
@@ -375,11 +368,11 @@ def _polish(
         moved = minimiser.step()
         if i % _STAGE == 0 or i == iterations:
             vector_to_parameters(minimiser.x, parameters)
-            watch.look(alone)
+            show(alone)
         if not moved:
             break
         now = {"stage": "BFGS", "member": k, "iteration": i}
-        watch.keep(lambda now=now: now | _states({"network": network, "minimiser": minimiser}))  # type: ignore[misc]
+        checkpoint.write(lambda now=now: now | _states({"network": network, "minimiser": minimiser}))  # type: ignore[misc]
     vector_to_parameters(minimiser.x, parameters)
     network.replace_member(k, alone)
 

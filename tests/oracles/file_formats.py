@@ -21,7 +21,7 @@ import numpy as np
 from calibration.swimmer.camera_tracks import measure_tracks
 from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.next_runs import read_explanations
-from dataset.data_set import MANIFEST, SWEEP, batches, read_sweep
+from dataset.data_set import MANIFEST, SWEEP, batches, read_design
 from dataset.design import SWEEP_TOML, load_design
 from dataset.folder import Folder
 from dataset.schema import schema
@@ -150,7 +150,7 @@ def _read_rows(path: Path) -> None:
 
 
 def _read_sweep(path: Path) -> None:
-    _, design = read_sweep(Folder(path.parent))
+    _, design = read_design(Folder(path.parent))
     _finite(*design.with_rows(4).points().values())
 
 

@@ -29,7 +29,6 @@ from surrogate.training.networks import (
     Settings,
     TrainableEnsemble,
     TrainingContext,
-    Watch,
     _adam,
     device_named,
     fit,
@@ -193,9 +192,8 @@ def test_no_tensor_of_the_training_stays_on_the_processor() -> None:
     with OneDevice(), pytest.raises(AssertionError):
         network.standardised(problem()[0])
     own = Problem(x, (y,), torch.ones(len(x), dtype=x.dtype, device="meta"), lambda y, wanted: y - wanted)
-    bar = type("Bar", (), {"disable": True})
     with OneDevice():
-        _adam(network, own, SMALL, Watch(own, Checkpoint(None), bar, "%"), {"stage": "start"})
+        _adam(network, own, SMALL, Checkpoint(None), lambda _: None, {"stage": "start"})
         assert own.loss(network.member(1), own.every(), 0.1).device.type == "meta"
         assert own.errors(network, own.every()).device.type == "meta"
     assert {part.device.type for part in network.state_dict().values()} == {"meta"}

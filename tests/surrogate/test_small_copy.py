@@ -17,7 +17,7 @@ from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.__main__ import main
 from surrogate.domain import ROBOT
 from surrogate.errors import RESPONSE_OUTPUTS, error_scale
-from surrogate.small_copy import MAX_BYTES, make_small_copy, measure_losses, save_small_copy
+from surrogate.small_copy import MAX_BYTES, export, make_small_copy, measure_losses
 from surrogate.table_file import load
 from surrogate.training.simulated import draw_robots
 from tests.planner.compiled import compile_c
@@ -47,7 +47,7 @@ int answer(const double *in, double *out)
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("small")
-    save_small_copy(load(), made)
+    export(made)
     return made
 
 
@@ -151,7 +151,7 @@ def test_the_reader_in_c_says_when_it_does_not_know(folder: Path) -> None:
 
 
 def test_a_table_that_learned_some_tails_only(tmp_path: Path) -> None:
-    save_small_copy(table(), tmp_path)  # three and more tails, two members
+    export(tmp_path, lookup=table())  # three and more tails, two members
     made, wanted = library(tmp_path), vectors(tmp_path)
     assert (wanted["N"] > 2).all()
     found, states = answers(made, wanted)

@@ -25,6 +25,7 @@ def test_a_model_comes_back_as_it_was(tmp_path: Path) -> None:
     assert (again.domain, again.errors) == (table().domain, table().errors)
     robots = rows(256, 13, wide=False).robots
     answer, wanted = (t.query(robots, intervals=True, flag=True) for t in (again, table()))
+    assert list(answer) == list(wanted)
     for name, values in wanted.items():
         assert answer[name] == pytest.approx(values, rel=1e-10, nan_ok=True), name
 
