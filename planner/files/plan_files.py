@@ -11,6 +11,7 @@ rounds to 0 ms is rejected, because 0 has this other meaning.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -105,18 +106,39 @@ def milliseconds(seconds: np.ndarray) -> list[int]:
 
 def controller_header(result: Plan, identity: str) -> str:
     """Write schedule.h as text."""
-    entries = milliseconds(result.seconds)
+    entries, checkpoints = milliseconds(result.seconds), _checkpoints(result)
     lines = [", ".join(map(str, entries[i : i + 12])) for i in range(0, len(entries), 12)]
-    body = ",\n    ".join(lines)
-    x, y, heading = result.start
-    cm = 100 * result.robot.tail_length
-    checkpoints = _checkpoints(result)
-    places = ",\n    ".join(checkpoints)
-    return f"""/* Plan {identity}.
- * Motor schedule for robot "{safe_name(result)}": turn in FIRST_DIRECTION for the first entry,
+    (x, y, heading), cm = result.start, 100 * result.robot.tail_length
+    parts = {
+        "IDENTITY": identity,
+        "NAME": safe_name(result),
+        "AFTER": _after(result),
+        "MODEL": result.tracked.model,
+        "STATED": _stated(result),
+        "FIRST_DIRECTION": str(result.first_direction),
+        "COUNT": f"{len(entries)}{_repeats(result)}",
+        "TOTAL": str(sum(entries)),
+        "MOTOR": _motor(result),
+        "X_CM": f"{cm * x:.4f}",
+        "Y_CM": f"{cm * y:.4f}",
+        "DEGREES": f"{np.degrees(heading):.3f}",
+        "X": f"{x:.6f}",
+        "Y": f"{y:.6f}",
+        "HEADING": f"{heading:.6f}",
+        "CHECKPOINTS": str(len(checkpoints)),
+        "entries": ",\n    ".join(lines),
+        "places": ",\n    ".join(checkpoints),
+    }
+    return re.sub(r"@(\w+)@", lambda mark: parts[mark[1]], schedule_template())
+
+
+def schedule_template() -> str:
+    """Return schedule.h with @NAME@ in place of each part that a plan decides."""
+    return f"""/* Plan @IDENTITY@.
+ * Motor schedule for robot "@NAME@": turn in FIRST_DIRECTION for the first entry,
  * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
- * lengthens the dwell before it. {_after(result)} Look-up table {result.tracked.model}.
-{_stated(result)}
+ * lengthens the dwell before it. @AFTER@ Look-up table @MODEL@.
+@STATED@
 {DIRECTIONS}
  * Put the head's centre at START_X_CM, START_Y_CM with heading START_HEADING_DEG, at rest: in cm and degrees,
  * counter-clockwise from the x axis, seen from above. START_X and START_Y are the same in tail lengths,
@@ -125,24 +147,24 @@ def controller_header(result: Plan, identity: str) -> str:
 #ifndef SCHEDULE_H
 #define SCHEDULE_H
 #include <stdint.h>
-#define SCHEDULE_FIRST_DIRECTION ({result.first_direction})
-#define SCHEDULE_COUNT {len(entries)}{_repeats(result)}
-#define SCHEDULE_TOTAL_MS {sum(entries)}UL
-{_motor(result)}#define SCHEDULE_START_X_CM {cm * x:.4f}
-#define SCHEDULE_START_Y_CM {cm * y:.4f}
-#define SCHEDULE_START_HEADING_DEG {np.degrees(heading):.3f}
-#define SCHEDULE_START_X {x:.6f}
-#define SCHEDULE_START_Y {y:.6f}
-#define SCHEDULE_START_HEADING {heading:.6f}
-#define SCHEDULE_CHECKPOINTS {len(checkpoints)}
+#define SCHEDULE_FIRST_DIRECTION (@FIRST_DIRECTION@)
+#define SCHEDULE_COUNT @COUNT@
+#define SCHEDULE_TOTAL_MS @TOTAL@UL
+@MOTOR@#define SCHEDULE_START_X_CM @X_CM@
+#define SCHEDULE_START_Y_CM @Y_CM@
+#define SCHEDULE_START_HEADING_DEG @DEGREES@
+#define SCHEDULE_START_X @X@
+#define SCHEDULE_START_Y @Y@
+#define SCHEDULE_START_HEADING @HEADING@
+#define SCHEDULE_CHECKPOINTS @CHECKPOINTS@
 
 {c_part("schedule_flash.h")}
 static const uint16_t SCHEDULE_TABLE(schedule_ms)[SCHEDULE_COUNT] SCHEDULE_FLASH = {{
-    {body}
+    @entries@
 }};
 typedef struct {{ uint32_t ms; float x, y, heading; }} schedule_checkpoint;
 static const schedule_checkpoint SCHEDULE_TABLE(schedule_checkpoints)[SCHEDULE_CHECKPOINTS] SCHEDULE_FLASH = {{
-    {places}
+    @places@
 }};
 {c_part("schedule.h")}#endif
 """

@@ -21,9 +21,11 @@ _NAMES = {  # of each module; a leading underscore is left out
     "planner.files.plan_files": "MOST_MS CHECKPOINTS",
     "planner.files.tracker_header": "LARGEST",
     "planner.paths.distance": "TIE",
+    "planner.paths.file_kinds": "KINDS",
     "planner.paths.nearest_path": "SPACING MOST_POSES COARSEST WEIGHTS ITERATIONS ALONG POINTS_A_POSE ROUNDS "
     "LEAST EVEN SHORT SHORTEST_STEP",
     "planner.paths.path": "CIRCLE_POINTS LARGEST MOST_SMOOTHED EVEN",
+    "planner.paths.svg_names": "NAMES",
     "planner.paths.tractrix": "LAPS MOST_SLIP",
     "planner.planning.declare": "WARN FAR SCALES MOST_WORK SMOOTHINGS FIRST",
     "planner.planning.errors": "LEVEL WOBBLE DRAWS BLOCKS WITHIN KEPT ZIGZAG PLACE COURSE STRETCH",

@@ -5,14 +5,14 @@
 
 const LETTERS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%:()*+-;,=.?@^_/{|}~";
 
-/* Read what `packed_data` has written, from the object that its JSON stands for. */
-async function readData({ numbers, ...plain }) {
+/* Read what `packed_data` has written, from the object that its JSON stands for; flat: tensors become their values. */
+async function readData({ numbers, ...plain }, flat = false) {
   const byPlace = new Uint8Array(await inflated(numbers).arrayBuffer()), count = byPlace.length / 8;
   const bytes = new Uint8Array(8 * count);
   for (let place = 0; place < 8; place++) {
     for (let i = 0; i < count; i++) bytes[8 * i + place] = byPlace[place * count + i];
   }
-  return withTensors(plain, new Float64Array(bytes.buffer));
+  return withTensors(plain, new Float64Array(bytes.buffer), flat);
 }
 
 /* What `packed_bytes` has written, as the body of a response. */
@@ -33,14 +33,15 @@ function base85Bytes(text) {
   return new Uint8Array(bytes.buffer, 0, 4 * whole - (5 * whole - text.length));
 }
 
-function withTensors(part, numbers) {
-  if (Array.isArray(part)) return part.map((value) => withTensors(value, numbers));
+function withTensors(part, numbers, flat) {
+  if (Array.isArray(part)) return part.map((value) => withTensors(value, numbers, flat));
   if (part === null || typeof part !== "object") return part;
   if ("tensor" in part) {
     const size = part.tensor.reduce((product, length) => product * length, 1);
-    return { shape: part.tensor, values: numbers.subarray(part.at, part.at + size) };
+    const values = numbers.subarray(part.at, part.at + size);
+    return flat ? values : { shape: part.tensor, values };
   }
-  return Object.fromEntries(Object.entries(part).map(([name, value]) => [name, withTensors(value, numbers)]));
+  return Object.fromEntries(Object.entries(part).map(([name, value]) => [name, withTensors(value, numbers, flat)]));
 }
 
 export { inflated, readData };

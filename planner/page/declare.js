@@ -175,7 +175,7 @@ function remedy(raw, feasibility, progress = null) {
   const search = new Search(feasibility, progress), { robot } = feasibility;
   const noise = smoothingOfNoise(raw, feasibility.vehicle);
   if (noise !== null) {
-    const smooth = search.smoothing(raw, noise, LOST);
+    const smooth = search.smoothing(raw, noise);
     if (smooth === null) {
       return "it looks noisy, and no smoothing was found that keeps its shape: draw it with less noise";
     }
@@ -187,7 +187,7 @@ function remedy(raw, feasibility, progress = null) {
   }
   const scale = search.scale(raw);
   if (scale !== null) return `scale the path by ${general(scale, 3)}`;
-  const smooth = search.smoothing(raw, FIRST * turnRadius(feasibility.vehicle), LOST);
+  const smooth = search.smoothing(raw, FIRST * turnRadius(feasibility.vehicle));
   if (smooth === null) {
     return "draw it with wider turns: neither a larger scale nor smoothing was found to help";
   }
@@ -201,41 +201,27 @@ function remedy(raw, feasibility, progress = null) {
 class Search {
   constructor(feasibility, progress) {
     this.feasibility = feasibility;
-    this.progress = progress;
     this.work = 0;
-  }
-
-  /* Count work, unless it is more than is left. */
-  allowed(work) {
-    if (this.work + work > MOST_WORK) return false;
-    this.work += work;
-    this.tell();
-    return true;
-  }
-
-  /* Tell that the search goes on. */
-  tell() {
-    tell(this.progress, REMEDY, this.work / MOST_WORK);
-  }
-
-  /* The path as drawn (null), and every other way to change it, the cheapest first. */
-  ways() {
-    return [null, ...[...waysOf(this.feasibility)].reverse().filter((_, i) => i % 2 === 0)];
+    this.tell = () => tell(progress, REMEDY, this.work / MOST_WORK);
+    // the path as drawn (null), and every other way to change it, the cheapest first
+    this.ways = [null, ...waysOf(feasibility).toReversed().filter((_, i) => i % 2 === 0)];
   }
 
   /* Try one way; false where no work is left for it, too. */
   works(path, way) {
     if (way === null) return asDrawn(path, this.feasibility) !== null;
-    if (smoothingOfNoise(path, this.feasibility.vehicle) !== null) return false;
-    if (!this.allowed(costOf(path, this.feasibility, way))) return false;
-    return changed(path, this.feasibility, way, () => this.tell()) !== null;
+    const work = costOf(path, this.feasibility, way);
+    if (smoothingOfNoise(path, this.feasibility.vehicle) !== null || this.work + work > MOST_WORK) return false;
+    this.work += work;
+    this.tell();
+    return changed(path, this.feasibility, way, this.tell) !== null;
   }
 
   /* Find a small one of SCALES at which the path is accepted, by bisection; null if there is none. */
   scale(raw) {
     const whole = pathLength(raw), scales = SCALES.filter((scale) => whole * scale < LONGEST);
     let best = scales.length;
-    for (const way of this.ways()) {
+    for (const way of this.ways) {
       let low = 0, high = best;
       while (low < high) {
         const middle = Math.floor((low + high) / 2);
@@ -246,16 +232,15 @@ class Search {
     return best < scales.length ? scales[best] : null;
   }
 
-  /* Find a length over which the path, smoothed, is accepted: {length, path, moved}; null if there is none.
-   *
-   * first: length to begin with. most: share of the path's extent by which smoothing may move it. */
-  smoothing(raw, first, most) {
+  /* Find a length over which the path, smoothed, is accepted: {length, path, moved}; null if there is none. first: length
+   * to begin with. */
+  smoothing(raw, first) {
     for (const share of SMOOTHINGS) {
       const length = Number(general(first * share, 2));
       if (!(length < pathLength(raw) / 2)) return null;
       const { path, moved } = smoothed(raw, length);
-      if (moved > most * Math.max(...extent(raw))) return null;
-      if (this.ways().some((way) => this.works(path, way))) return { length, path, moved };
+      if (moved > LOST * Math.max(...extent(raw))) return null;
+      if (this.ways.some((way) => this.works(path, way))) return { length, path, moved };
     }
     return null;
   }

@@ -16,16 +16,16 @@ const { TIGHTEST, PAIRS_AHEAD } = CONSTANTS.line_of_sight;
 const { WITHIN, KEPT, ZIGZAG, PLACE, COURSE, STRETCH, CAMERA } = CONSTANTS.errors;
 const NOTHING = [0, 0, 0];
 const UNCHANGED = { twist: [NOTHING, NOTHING], current: [0, 0] };
-let drawn = { key: "" }; // the last numbers: plans ask for the same again and again
+let drawn = { seed: null, numbers: [] }; // the last numbers: plans ask for the same again and again
 
-/* Draw the first `count` numbers of a seed. */
+/* Draw the first `count` numbers of a seed, or more. */
 function normals(seed, count) {
-  const key = `${seed} ${count}`, start = mixed((seed + 1) % 2 ** 32);
-  if (drawn.key === key) return drawn.numbers;
+  const start = mixed((seed + 1) % 2 ** 32), known = drawn.seed === seed ? drawn.numbers : [];
+  if (known.length >= count) return known;
   const numbers = Float64Array.from({ length: count }, (_, i) => {
-    return normalQuantile((mixed(mixed(Math.imul(i + 1, WEYL)) ^ start) + 0.5) / 2 ** 32);
+    return known[i] ?? normalQuantile((mixed(mixed(Math.imul(i + 1, WEYL)) ^ start) + 0.5) / 2 ** 32);
   });
-  drawn = { key, numbers };
+  drawn = { seed, numbers };
   return numbers;
 }
 
@@ -45,9 +45,9 @@ function normalQuantile(u) {
   return ((middle ? q : Math.sign(q)) * above) / below;
 }
 
-/* Propagate the modes of a vehicle, and those of its disc's phase, to some flips of a schedule, given by rising
- * numbers from 0 to that of all dwells: of each mode {x, y}, columns over the flips. */
-function errorGrowth(vehicle, { dwells, firstDirection }, { poses, changes }, flips) {
+/* Propagate modes of a vehicle, and those of its disc's phase, to some flips of a schedule, given by rising numbers from
+ * 0 to that of all dwells: {modes, phases}, of each mode {x, y}, columns over the flips. */
+function errorGrowth(vehicle, modes, { dwells, firstDirection }, { poses, changes }, flips) {
   const from = firstDirection < 0 ? 1 : 0, sides = Array.from(dwells, (_, i) => (i + from) % 2);
   const circles = sides.map((side, i) => arc(vehicle.twist[side], dwells[i]));
   const places = sides.map((_, i) => lagPlace(i ? dwells[i - 1] : dwells[i], dwells[i]));
@@ -58,13 +58,14 @@ function errorGrowth(vehicle, { dwells, firstDirection }, { poses, changes }, fl
     const grown = { x: [0], y: [0] };
     let x = 0, y = 0, turned = 0;
     for (let i = 0, next = 1; i < dwells.length; i++) {
-      const lag = added(i), circle = turns ? arc(twist[sides[i]], dwells[i]) : circles[i];
-      const moved = compose([lags[i][0] + lag[0], lags[i][1] + lag[1], lags[i][2] + lag[2]], circle);
-      const ahead = moved[0] - changes[i][0], left = moved[1] - changes[i][1];
+      const lag = added(i), circle = turns ? arc(twist[sides[i]], dwells[i]) : circles[i], late = lags[i][2] + lag[2];
+      const cosine = Math.cos(late), sine = Math.sin(late), change = changes[i];
+      const ahead = lags[i][0] + lag[0] + (cosine * circle[0] - sine * circle[1]) - change[0];
+      const left = lags[i][1] + lag[1] + (sine * circle[0] + cosine * circle[1]) - change[1];
       const c = Math.cos(poses[i][2]), s = Math.sin(poses[i][2]);
       x += c * ahead - s * left + currentX * dwells[i] - turned * (poses[i + 1][1] - poses[i][1]);
       y += s * ahead + c * left + currentY * dwells[i] + turned * (poses[i + 1][0] - poses[i][0]);
-      turned += moved[2] - changes[i][2];
+      turned += late + circle[2] - change[2];
       if (flips[next] !== i + 1) continue;
       grown.x.push(x);
       grown.y.push(y);
@@ -73,9 +74,10 @@ function errorGrowth(vehicle, { dwells, firstDirection }, { poses, changes }, fl
     return grown;
   };
   const lagOf = ({ lag }) => (i) => (lag ? lagAt(lag[sides[i]], places[i]) : NOTHING);
-  const ofModes = vehicle.modes.map((mode) => growth(mode, lagOf(mode)));
-  const phases = phaseLags(vehicle, sides, dwells).map((lag) => growth(UNCHANGED, (i) => lag[i]));
-  return [...ofModes, ...phases];
+  return {
+    modes: modes.map((mode) => growth(mode, lagOf(mode))),
+    phases: phaseLags(vehicle, sides, dwells).map((lag) => growth(UNCHANGED, (i) => lag[i])),
+  };
 }
 
 /* What the four modes of the disc's phase add to the lags of the dwells. */
@@ -139,27 +141,25 @@ function flipsBetween(count) {
 
 /* The quantile LEVEL of the largest distance from the declared path over random vehicles. growth: at the flips. */
 function statedError(growth, flips, predicted, seed = 0) {
-  const { low, high, normal } = extremes(predicted, flips), last = low.length - 1, modes = growth.length;
-  const z = normals(seed, DRAWS * modes), across = new Float64Array(modes * (last + 1));
-  const onward = Float64Array.from(growth, ({ x, y }) => x[last + 1] * normal[last][1] - y[last + 1] * normal[last][0]);
-  growth.forEach(({ x, y }, p) => {
-    normal.forEach(([aside, ahead], block) => {
-      across[block * modes + p] = x[block + 1] * aside + y[block + 1] * ahead;
-    });
+  const { low, high, normal } = extremes(predicted, flips), blocks = low.length, last = blocks - 1, wide = blocks + 1;
+  const z = normals(seed, DRAWS * growth.length), across = new Float64Array(growth.length * wide);
+  growth.forEach(({ x, y }, p) => { // across the path at the end of each block, and along it at its end
+    normal.forEach(([aside, ahead], block) => (across[p * wide + block] = x[block + 1] * aside + y[block + 1] * ahead));
+    across[p * wide + blocks] = x[blocks] * normal[last][1] - y[blocks] * normal[last][0];
   });
-  const product = (at, values, from) => {
-    let total = 0;
-    for (let p = 0; p < modes; p++) total += z[at + p] * values[from + p];
-    return total;
-  };
+  const moved = new Float64Array(wide);
   const worst = new Float64Array(DRAWS).map((_, draw) => {
     let off = 0, most = 0;
-    for (let block = 0; block <= last; block++) {
-      const aside = product(draw * modes, across, block * modes);
-      off = Math.max(Math.abs(high[block] + aside), Math.abs(low[block] + aside));
+    moved.fill(0);
+    for (let p = 0; p < growth.length; p++) {
+      const size = z[draw * growth.length + p];
+      for (let block = 0; block < wide; block++) moved[block] += size * across[p * wide + block];
+    }
+    for (let block = 0; block < blocks; block++) {
+      off = Math.max(Math.abs(high[block] + moved[block]), Math.abs(low[block] + moved[block]));
       most = Math.max(most, off);
     }
-    const beyond = predicted.closed ? 0 : Math.max(product(draw * modes, onward, 0), 0); // past the end of an open path
+    const beyond = predicted.closed ? 0 : Math.max(moved[blocks], 0); // past the end of an open path
     return Math.max(most, Math.hypot(off, beyond));
   });
   return quantile(worst.sort(), LEVEL) + WOBBLE;
@@ -205,47 +205,63 @@ function inTime(distance, dwells) {
   return distance[(at ?? order[order.length - 1]) + 1];
 }
 
-/* Compute the errors of a schedule: {track, motion, stated, feedback, guaranteed, closure, predictedRms,
- * predictedMax, drawnRms, drawnMax, tableShare}.
+/* A schedule with what is predicted of it; its stated error is drawn when it is asked for.
  *
- * drawn: the path as drawn. declared: see declare.js. switches: the schedule. guaranteed: bound on the error without
- * uncertainty. seed: of the random robots. straight: straight motion with the shortest dwell. */
-function planErrors(tracked, drawn, declared, switches, guaranteed, seed, straight) {
-  const { vehicle } = tracked, path = declared.reference.p, { dwells } = switches;
-  const { rolled: { track, motion }, predicted, growth, flips } = deviations(tracked, drawn, declared, switches);
-  const stated = statedError(growth, flips, predicted, seed), fromDrawn = distanceTo(polyline(drawn), track);
-  const [endX, endY] = track[track.length - 1], [startX, startY] = path[0];
-  const squares = growth.map(({ x, y }) => x.reduce((total, value, i) => total + value ** 2 + y[i] ** 2, 0));
-  const ofTable = squares.filter((_, p) => vehicle.modes[p]?.name.startsWith("table: "));
-  return {
-    track,
-    motion,
-    stated,
-    feedback: feedbackError(predicted.distance, dwells, zigzagSpeed(straight), tracked.robot.timeScale, stated),
-    guaranteed,
-    closure: drawn.closed ? Math.hypot(endX - startX, endY - startY) : null,
-    predictedRms: rmsInTime(predicted.distance, dwells),
-    predictedMax: largest(predicted.distance),
-    drawnRms: rmsInTime(fromDrawn, dwells),
-    drawnMax: largest(fromDrawn),
-    tableShare: sum(ofTable) / Math.max(sum(squares), 1e-300),
-  };
+ * parts: tracked, drawn, declared (see declare.js), switches, straight (motion with the shortest dwell), guaranteed
+ * (bound on the error without uncertainty) and seed (of the random robots). */
+class Followed {
+  constructor(parts) {
+    const { tracked: { vehicle, offset }, declared, switches, drawn } = Object.assign(this, parts);
+    this.rolled = rollOut(vehicle, switches, offset);
+    this.predicted = predictedError(declared.reference.p, this.rolled.track, drawn.closed);
+    this.predictedMax = largest(this.predicted.distance);
+    this.flips = flipsBetween(switches.dwells.length);
+  }
+
+  growthOf(modes) {
+    return errorGrowth(this.tracked.vehicle, modes, this.switches, this.rolled, this.flips);
+  }
+
+  get growth() {
+    return (this.grown ??= this.growthOf(this.tracked.vehicle.modes));
+  }
+
+  get stated() {
+    const { modes, phases } = this.growth;
+    return (this.known ??= statedError([...modes, ...phases], this.flips, this.predicted, this.seed));
+  }
+
+  /* The stated error if the coefficients are those of another robot; null: calibrated, or not known. */
+  get unmeasured() {
+    const { tracked: { unmeasured }, growth: { modes, phases } } = this;
+    if (!unmeasured.length) return null;
+    return statedError([...modes, ...this.growthOf(unmeasured).modes, ...phases], this.flips, this.predicted);
+  }
+
+  /* The errors: {track, motion, stated, feedback, guaranteed, closure, predictedRms, predictedMax, drawnRms, drawnMax,
+   * tableShare}. */
+  get errors() {
+    const { tracked, declared, drawn, straight, switches: { dwells }, rolled: { track, motion }, predicted, stated } = this;
+    const fromDrawn = distanceTo(polyline(drawn), track), path = declared.reference.p;
+    const [endX, endY] = track[track.length - 1], [startX, startY] = path[0];
+    const squares = [...this.growth.modes, ...this.growth.phases].map(({ x, y }) => {
+      return x.reduce((total, value, i) => total + value ** 2 + y[i] ** 2, 0);
+    });
+    const ofTable = squares.filter((_, p) => tracked.vehicle.modes[p]?.name.startsWith("table: "));
+    return {
+      track,
+      motion,
+      stated,
+      feedback: feedbackError(predicted.distance, dwells, zigzagSpeed(straight), tracked.robot.timeScale, stated),
+      guaranteed: this.guaranteed,
+      closure: drawn.closed ? Math.hypot(endX - startX, endY - startY) : null,
+      predictedRms: rmsInTime(predicted.distance, dwells),
+      predictedMax: this.predictedMax,
+      drawnRms: rmsInTime(fromDrawn, dwells),
+      drawnMax: largest(fromDrawn),
+      tableShare: sum(ofTable) / Math.max(sum(squares), 1e-300),
+    };
+  }
 }
 
-/* The predicted track, its distances from the declared path, and the growth of deviations along a schedule. */
-function deviations({ vehicle, offset }, drawn, declared, switches) {
-  const rolled = rollOut(vehicle, switches, offset), flips = flipsBetween(switches.dwells.length);
-  const predicted = predictedError(declared.reference.p, rolled.track, drawn.closed);
-  return { rolled, predicted, flips, growth: errorGrowth(vehicle, switches, rolled, flips) };
-}
-
-/* The stated error if the coefficients are those of another robot; null: calibrated, or not known. */
-function unmeasuredError({ tracked, drawn, declared, switches }) {
-  const { vehicle, unmeasured } = tracked;
-  if (!unmeasured.length) return null;
-  const guessed = { ...tracked, vehicle: { ...vehicle, modes: [...vehicle.modes, ...unmeasured] } };
-  const { predicted, growth, flips } = deviations(guessed, drawn, declared, switches);
-  return statedError(growth, flips, predicted);
-}
-
-export { lookAhead, guaranteedError, planErrors, unmeasuredError };
+export { lookAhead, guaranteedError, Followed };

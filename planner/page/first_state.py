@@ -7,8 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D
 from planner.planning.request import PlanRequest
+from planner.vehicle.tracked_point import TrackedVehicle
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
@@ -29,6 +33,8 @@ CAMEL = {
 }
 _ROUND = 2  # digits of the ends of sliders
 _TURNS = 2.5  # turn radii: the first size of a shape
+_MOST_DWELLS = 2000  # of a plan that is written into the page
+_DECIMALS = 3  # of its picture, in cm and rad
 
 
 class NamedPath(NamedTuple):
@@ -108,6 +114,54 @@ def shapes_of(turn_radius: float, paths: Sequence[NamedPath]) -> list[dict[str, 
         {"name": "eight", "words": "figure of eight", "size": 3 * size, "sizeWords": "Width"},
         {"name": "wave", "words": "wave", "size": 5 * size, "sizeWords": "Length"},
     ]
+
+
+def first_plan(path: Path2D, tracked: TrackedVehicle, request: PlanRequest) -> dict[str, Any] | None:
+    """Make the plan that the page shows until its own planner has made it.
+
+    Names are those of `pictured` in worker.js; lengths in cm, times in s. One pose for each dwell is enough for a
+    picture.
+
+    Args:
+        path: the first path [l].
+        tracked: the robot and its tracked point.
+        request: what is asked of the plan.
+
+    Returns:
+        The plan; None: there is none, and the page says why, or it is too long to be written into the page.
+    """
+    try:
+        plan = make_plan(path, tracked, request)
+    except InputError:
+        return None
+    if len(plan.dwells) > _MOST_DWELLS:
+        return None
+    second, cm = plan.robot.time_scale, 100 * plan.robot.tail_length
+    start, *poses = (plan.poses * [cm, cm, 1.0]).tolist()
+    lengths = {
+        "offset": tracked.offset,
+        "stated": plan.stated_error,
+        "unmeasured": plan.unmeasured_error,
+        "feedback": plan.feedback_error,
+        "guaranteed": plan.errors.guaranteed,
+        "predictedRms": plan.predicted_rms,
+        "predictedMax": plan.predicted_max,
+        "offDrawn": plan.declared.off_drawn,
+        "missed": plan.declared.missed,
+        "netSpeed": plan.straight.speed / second,
+    }
+    return {name: None if length is None else cm * length for name, length in lengths.items()} | {
+        "reference": np.round(cm * plan.reference, _DECIMALS).tolist(),
+        "closed": path.closed,
+        "motion": [start, *np.round(poses, _DECIMALS).tolist()],
+        "samples": 1,
+        "dwells": np.round(plan.seconds, 4).tolist(),
+        "firstDirection": plan.first_direction,
+        "minimumDwell": plan.minimum_dwell * second,
+        "calibrated": tracked.calibrated,
+        "warnings": list(plan.warnings),
+        "timeScale": second,
+    }
 
 
 def first_options(request: PlanRequest, robot: Robot, smooth: float | None) -> dict[str, Any]:

@@ -89,6 +89,11 @@ function column(rows, index) {
   return Float64Array.from(rows, (row) => row[index]);
 }
 
+/* Lowest and highest value of each coordinate of points. */
+function bounds(points) {
+  return [0, 1].map((axis) => [smallest(column(points, axis)), largest(column(points, axis))]);
+}
+
 /* The last place of rising knots whose value is at most x; −1 if there is none. */
 function placeBelow(knots, x) {
   let low = -1, high = knots.length;
@@ -179,44 +184,41 @@ function inverse(matrix) {
   return unit;
 }
 
-/* Evaluate the cubic spline through values at knots, at least four, at some places; both flat, one row of `width`
- * numbers for each knot and place. flatEnd: the slope at the last knot is zero, rather than the third derivative
- * continuous at the knot before, as it is at the second knot. */
-function splineAt(knots, values, width, places, flatEnd = false) {
-  const slopes = splineSlopes(knots, values, width, flatEnd), answer = new Float64Array(places.length * width);
-  places.forEach((place, row) => {
-    const segment = clip(placeBelow(knots, place), 0, knots.length - 2);
-    const h = knots[segment + 1] - knots[segment], t = (place - knots[segment]) / h;
-    const atFirst = (1 + 2 * t) * (1 - t) ** 2, atSecond = t ** 2 * (3 - 2 * t), bent = h * t * (1 - t);
-    for (let i = 0; i < width; i++) {
-      const at = segment * width + i, ends = atFirst * values[at] + atSecond * values[at + width];
-      answer[row * width + i] = ends + bent * ((1 - t) * slopes[segment][i] - t * slopes[segment + 1][i]);
-    }
-  });
-  return answer;
-}
-
-/* The slopes at the knots, one row for each. */
-function splineSlopes(knots, values, width, flatEnd) {
-  const h = differences(knots), last = h.length, columns = Array.from({ length: width }, (_, k) => k);
-  const secant = (i, k) => (values[(i + 1) * width + k] - values[i * width + k]) / h[i];
-  const notAKnot = (i, j, k) => { // step i of the end, and its neighbour j
-    const total = h[i] + h[j];
-    return ((h[i] + 2 * total) * h[j] * secant(i, k) + h[i] ** 2 * secant(j, k)) / total;
+/* The cubic spline through values at knots, at least four: rows of the matrix that gives its values at some places.
+ *
+ * flatEnd: the slope at the last knot is zero, rather than the third derivative continuous at the knot before, as it is
+ * at the second knot. */
+function splineMatrix(knots, places, flatEnd = false) {
+  const h = differences(knots), last = h.length, zeros = () => new Float64Array(last + 1);
+  const matrix = Array.from(knots, zeros), slopes = Array.from(knots, zeros); // matrix · slopes = secants
+  const add = (row, i, share) => { // of the secant of step i
+    row[i + 1] += share / h[i];
+    row[i] -= share / h[i];
   };
-  const matrix = Array.from({ length: last + 1 }, () => new Float64Array(last + 1)), right = [];
+  const notAKnot = (row, i, j) => { // step i of the end, and its neighbour j
+    const total = h[i] + h[j];
+    add(row, i, ((h[i] + 2 * total) * h[j]) / total);
+    add(row, j, h[i] ** 2 / total);
+  };
   for (let i = 1; i < last; i++) {
     matrix[i].set([h[i], 2 * (h[i - 1] + h[i]), h[i - 1]], i - 1);
-    right[i] = columns.map((k) => 3 * (h[i] * secant(i - 1, k) + h[i - 1] * secant(i, k)));
+    add(slopes[i], i - 1, 3 * h[i]);
+    add(slopes[i], i, 3 * h[i - 1]);
   }
   matrix[0].set([h[1], h[0] + h[1]]);
-  right[0] = columns.map((k) => notAKnot(0, 1, k));
+  notAKnot(slopes[0], 0, 1);
   matrix[last].set(flatEnd ? [0, 1] : [h[last - 1] + h[last - 2], h[last - 2]], last - 1);
-  right[last] = columns.map((k) => (flatEnd ? 0 : notAKnot(last - 1, last - 2, k)));
-  solveDense(matrix, right);
-  return right;
+  if (!flatEnd) notAKnot(slopes[last], last - 1, last - 2);
+  solveDense(matrix, slopes);
+  return Array.from(places, (place) => {
+    const i = clip(placeBelow(knots, place), 0, last - 1), t = (place - knots[i]) / h[i], bent = h[i] * t * (1 - t);
+    const row = slopes[i].map((slope, k) => bent * ((1 - t) * slope - t * slopes[i + 1][k]));
+    row[i] += (1 + 2 * t) * (1 - t) ** 2;
+    row[i + 1] += t ** 2 * (3 - 2 * t);
+    return row;
+  });
 }
 
 export { TAU, MIRROR, mod, halfTurn, clip, sum, mean, largest, smallest, largestSize, median, quantile, runningSum };
-export { differences, linspace, geomspace, column, placeBelow, interp, unwrap, convolved, compose, inversePose, arc };
-export { solveDense, inverse, splineAt };
+export { differences, linspace, geomspace, column, bounds, placeBelow, interp, unwrap, convolved, compose };
+export { inversePose, arc, solveDense, inverse, splineMatrix };

@@ -1,9 +1,9 @@
 /* The feasible path nearest to the path as drawn: poses of the pivot by Gauss-Newton steps.
  *
  * Poses are columns {x, y, heading}; a task is {target, sides, shares, distance, radius, drift, spacing, timeWeight,
- * turn}, with `sides` the columns alongX, alongY, acrossX and acrossY. Lengths in l, angles in rad. */
+ * turn}, with `sides` the columns of directions along the path and across it. Lengths in l, angles in rad. */
 import { CONSTANTS } from "./constants.js";
-import { clip, column, convolved, halfTurn, interp, largest, mean, sum, unwrap } from "./math.js";
+import { clip, column, convolved, halfTurn, interp, largest, mean, unwrap } from "./math.js";
 import { pathLength, pathOf, polyline, resample } from "./path.js";
 import { STILL } from "./reference.js";
 
@@ -96,12 +96,8 @@ function sidesOf(target, closed) {
     const before = target[i ? i - 1 : closed ? last : 0], after = target[i < last ? i + 1 : closed ? 0 : last];
     return Math.atan2(after[1] - before[1], after[0] - before[0]);
   });
-  return {
-    alongX: angle.map((value) => ALONG * Math.cos(value)),
-    alongY: angle.map((value) => ALONG * Math.sin(value)),
-    acrossX: angle.map((value) => -Math.sin(value)),
-    acrossY: angle.map((value) => Math.cos(value)),
-  };
+  const c = angle.map(Math.cos), s = angle.map(Math.sin), along = (value) => ALONG * value;
+  return [[c.map(along), s.map(along)], [s.map((value) => -value), c]];
 }
 
 /* Find poses whose largest distance from the target is small. */
@@ -128,24 +124,18 @@ function distances(poses, { target, distance }) {
 /* Minimise by Gauss-Newton with Levenberg's damping, for one weight of the constraints. */
 function descend(poses, task, weight) {
   const place = places(poses.x.length, task.turn !== null);
-  let damping = 1e-3, system = normalEquations(poses, task, weight);
+  let damping = 1e-3, system = normalEquations(poses, task, weight, place);
   for (let round = 0; round < ITERATIONS; round++) {
-    const sorted = sortedEquations(system, place);
-    let tried = null, candidate = null;
-    while (damping < 1e6 && !tried) {
-      const step = dampedStep(sorted, damping);
-      if (step === null) {
-        damping *= 10;
-        continue;
-      }
-      const moved = stepped(poses, step, place);
-      candidate = normalEquations(moved, task, weight);
-      if (candidate.cost < system.cost) tried = moved;
-      else damping *= 6;
+    let moved = null, candidate = null;
+    for (; damping < 1e6; damping *= candidate ? 6 : 10) {
+      const step = dampedStep(system, damping);
+      if (step !== null) moved = stepped(poses, step, place);
+      candidate = step && normalEquations(moved, task, weight, place);
+      if (candidate?.cost < system.cost) break;
     }
-    if (!tried) return poses;
+    if (!(candidate?.cost < system.cost)) return poses;
     const gained = system.cost - candidate.cost;
-    poses = tried;
+    poses = moved;
     system = candidate;
     damping = Math.max(damping / 5, 1e-9);
     if (gained < 1e-3 * system.cost) break;
@@ -155,13 +145,11 @@ function descend(poses, task, weight) {
 
 /* Poses after a step, which is sorted by `place`. */
 function stepped({ x, y, heading }, step, place) {
-  return {
-    x: x.map((value, i) => value - step[3 * place[i]]),
-    y: y.map((value, i) => value - step[3 * place[i] + 1]),
-    heading: heading.map((value, i) => value - step[3 * place[i] + 2]),
-  };
+  const [newX, newY, newHeading] = [x, y, heading].map((values, axis) => values.map((value, i) => {
+    return value - step[3 * place[i] + axis];
+  }));
+  return { x: newX, y: newY, heading: newHeading };
 }
-
 
 /* Repeat the first pose of a lap at its end. */
 function wholeLap({ x, y, heading }, turn) {
@@ -172,102 +160,65 @@ function wholeLap({ x, y, heading }, turn) {
   };
 }
 
-/* The linearised least squares: cost; gradient [3][m], half of the cost's; diagonal [3][3][m], blocks of the
- * poses, upper triangle; across [3][3][k], blocks of neighbours, row of the first, column of the second. */
-function normalEquations(poses, task, weight) {
-  const count = poses.x.length, steps = task.turn === null ? count - 1 : count;
-  const columns = (length) => Array.from({ length: 3 }, () => new Float64Array(length));
-  const gradient = columns(count), diagonal = [0, 1, 2].map(() => columns(count));
-  const across = [0, 1, 2].map(() => columns(steps)), costs = new Float64Array(steps);
-  const cost = addDistances(poses, task, gradient, diagonal);
-  for (let i = 0; i < steps; i++) {
-    const j = (i + 1) % count;
-    costs[i] = addStep(poses, i, j, j ? 0 : task.turn, task, weight, gradient, diagonal, across);
-  }
-  return { cost: cost + sum(costs), gradient, diagonal, across };
-}
-
-/* Add the squared distances from the target; return their sum. */
-function addDistances(poses, task, gradient, diagonal) {
-  const { target, sides, shares, distance } = task, count = shares.length;
-  let total = 0;
-  for (const [sideX, sideY] of [[sides.alongX, sides.alongY], [sides.acrossX, sides.acrossY]]) {
-    const costs = new Float64Array(count);
-    for (let m = 0; m < count; m++) {
-      const aheadX = distance * Math.cos(poses.heading[m]), aheadY = distance * Math.sin(poses.heading[m]);
-      const offX = poses.x[m] + aheadX - target[m][0], offY = poses.y[m] + aheadY - target[m][1];
-      const residual = sideX[m] * offX + sideY[m] * offY, weighted = shares[m] * residual;
-      const slopes = [sideX[m], sideY[m], sideY[m] * aheadX - sideX[m] * aheadY];
-      costs[m] = weighted * residual;
-      for (let i = 0; i < 3; i++) {
-        gradient[i][m] += slopes[i] * weighted;
-        for (let j = i; j < 3; j++) diagonal[i][j][m] += shares[m] * slopes[i] * slopes[j];
+/* The linearised least squares: {cost, band, right, width}.
+ *
+ * The matrix is symmetric. band[row][d] is its entry in column `row`, d rows below the diagonal. place: where each pose
+ * stands, in poses. Residuals are the distances from the target, and of each step its slip, what it turns further than
+ * the robot can, what it is too short and uneven, and the root of the time that it takes. */
+function normalEquations({ x, y, heading }, task, weight, place) {
+  const { target, sides, shares, distance, radius, drift, spacing, timeWeight, turn } = task, count = x.length;
+  const width = turn === null ? 5 : 8, right = new Float64Array(3 * count);
+  const band = new Float64Array(3 * count * (width + 1));
+  const row = new Float64Array(6), at = new Int32Array(6), late = timeWeight / spacing, least = SHORTEST_STEP * spacing;
+  let cost = 0;
+  const add = (residual, numbers) => {
+    cost += residual * residual;
+    for (let a = 0; a < numbers; a++) {
+      right[at[a]] += row[a] * residual;
+      for (let b = 0; b < numbers; b++) {
+        if (at[b] >= at[a]) band[at[a] * (width + 1) + at[b] - at[a]] += row[a] * row[b];
       }
     }
-    total += sum(costs);
-  }
-  return total;
-}
-
-/* Add the residuals of the step from pose i to pose j, which is `turn` further in a lap; return their cost. */
-function addStep(poses, i, j, turn, task, weight, gradient, diagonal, across) {
-  const { x, y, heading } = poses, next = heading[j] + turn;
-  const dx = x[j] - x[i], dy = y[j] - y[i], middle = (next + heading[i]) / 2;
-  const c = Math.cos(middle), s = Math.sin(middle), forward = c * dx + s * dy, aside = c * dy - s * dx;
-  const part = stepPart(forward, aside, next - heading[i], c, s, task, weight), { ff, fg, gg, ft, tt } = part;
-  // second derivatives by x and y of the step, in the lab
-  const xx = c * c * ff - 2 * c * s * fg + s * s * gg;
-  const xy = c * s * (ff - gg) + (c * c - s * s) * fg;
-  const yy = s * s * ff + 2 * c * s * fg + c * c * gg;
-  // by x, y and the mean heading, which adds g dφ to f and −f dφ to g
-  const swingF = aside / 2, swingG = -forward / 2;
-  const byF = ff * swingF + fg * swingG, byG = fg * swingF + gg * swingG;
-  const xSwing = c * byF - s * byG, ySwing = s * byF + c * byG, swing = byF * swingF + byG * swingG;
-  // by x, y, mean heading and the turn
-  const xTurn = c * ft, yTurn = s * ft, swingTurn = swingF * ft;
-  const fromX = c * part.f - s * part.g, fromY = s * part.f + c * part.g;
-  const fromSwing = swingF * part.f + swingG * part.g;
-  for (const [at, sign] of [[i, -1], [j, 1]]) {
-    gradient[0][at] += sign * fromX;
-    gradient[1][at] += sign * fromY;
-    gradient[2][at] += fromSwing + sign * part.t;
-    diagonal[0][0][at] += xx;
-    diagonal[0][1][at] += xy;
-    diagonal[1][1][at] += yy;
-    diagonal[0][2][at] += sign * xSwing + xTurn;
-    diagonal[1][2][at] += sign * ySwing + yTurn;
-    diagonal[2][2][at] += swing + 2 * sign * swingTurn + tt;
-  }
-  const blocks = [
-    [-xx, -xy, -xSwing - xTurn],
-    [-xy, -yy, -ySwing - yTurn],
-    [xSwing - xTurn, ySwing - yTurn, swing - tt],
-  ];
-  for (let a = 0; a < 3; a++) for (let b = 0; b < 3; b++) across[a][b][i] = blocks[a][b];
-  return part.cost;
-}
-
-/* What the residuals of a step add: cost, and derivatives by forward part f, sideways part g and turn t. */
-function stepPart(forward, aside, turn, c, s, task, weight) {
-  const { radius, spacing } = task, [cx, cy] = task.drift.current;
-  const slip = (task.drift.sideways - cx * s + cy * c) / (1 + cx * c + cy * s);
-  const sideways = weight * (aside - slip * forward), sense = Math.sign(turn);
-  const over = Math.max(sense * turn * radius - forward, 0); // turns further than it can
-  const turning = weight ** 2 * over, bent = over > 0 ? weight ** 2 : 0;
-  const least = SHORTEST_STEP * spacing, short = Math.max(least - forward, 0);
-  const uneven = EVEN * (forward - spacing), late = task.timeWeight / spacing; // times the length
-  const length = Math.max(forward, least), going = forward >= least ? 1 : 0;
-  return {
-    cost: sideways ** 2 + turning * over + SHORT ** 2 * short ** 2 + uneven ** 2 + late * length,
-    f: -weight * slip * sideways - turning - SHORT ** 2 * short + EVEN * uneven + (late / 2) * going,
-    g: weight * sideways,
-    t: radius * sense * turning,
-    ff: weight ** 2 * slip ** 2 + bent + (short > 0 ? SHORT ** 2 : 0) + EVEN ** 2 + ((late / 4) * going) / length,
-    fg: -(weight ** 2) * slip,
-    gg: weight ** 2,
-    ft: -radius * sense * bent,
-    tt: radius ** 2 * bent,
   };
+  const settle = (first, pose) => {
+    for (let axis = 0; axis < 3; axis++) at[first + axis] = 3 * place[pose] + axis;
+  };
+  for (let m = 0; m < count; m++) {
+    const aheadX = distance * Math.cos(heading[m]), aheadY = distance * Math.sin(heading[m]);
+    const offX = x[m] + aheadX - target[m][0], offY = y[m] + aheadY - target[m][1], root = Math.sqrt(shares[m]);
+    settle(0, m);
+    for (const [sidesX, sidesY] of sides) {
+      row[0] = root * sidesX[m];
+      row[1] = root * sidesY[m];
+      row[2] = row[1] * aheadX - row[0] * aheadY;
+      add(row[0] * offX + row[1] * offY, 3);
+    }
+  }
+  for (let i = 0; i < (turn === null ? count - 1 : count); i++) {
+    const j = (i + 1) % count, next = heading[j] + (j ? 0 : turn), middle = (next + heading[i]) / 2;
+    const dx = x[j] - x[i], dy = y[j] - y[i], c = Math.cos(middle), s = Math.sin(middle), [cx, cy] = drift.current;
+    const forward = c * dx + s * dy, aside = c * dy - s * dx, turned = next - heading[i], sense = Math.sign(turned);
+    const addStep = (residual, byForward, byAside, byTurn) => { // and its derivatives
+      row[3] = c * byForward - s * byAside;
+      row[4] = s * byForward + c * byAside;
+      row[5] = (aside * byForward - forward * byAside) / 2;
+      row[0] = -row[3];
+      row[1] = -row[4];
+      row[2] = row[5] - byTurn;
+      row[5] += byTurn;
+      add(residual, 6);
+    };
+    settle(0, i);
+    settle(3, j);
+    const slip = (drift.sideways - cx * s + cy * c) / (1 + cx * c + cy * s), over = sense * turned * radius - forward;
+    addStep(weight * (aside - slip * forward), -weight * slip, weight, 0);
+    if (over > 0) addStep(weight * over, -weight, 0, weight * radius * sense);
+    if (forward < least) addStep(SHORT * (least - forward), -SHORT, 0, 0);
+    addStep(EVEN * (forward - spacing), EVEN, 0, 0);
+    const time = Math.sqrt(late * Math.max(forward, least));
+    if (late) addStep(time, forward >= least ? late / 2 / time : 0, 0, 0);
+  }
+  return { cost, band, right, width };
 }
 
 /* Order the poses in the system so that neighbours are near one another: the place of each. */
@@ -275,34 +226,6 @@ function places(count, closed) {
   const place = new Int32Array(count), half = Math.floor((count + 1) / 2);
   for (let i = 0; i < count; i++) place[i] = !closed ? i : i < half ? 2 * i : 2 * (count - 1 - i) + 1;
   return place;
-}
-
-/* Assemble the normal matrix and the right side, sorted by `place`: {band, right, width}.
- *
- * The matrix is symmetric. band[row][d] is its entry in column `row`, d rows below the diagonal. */
-function sortedEquations(system, place) {
-  const count = place.length, steps = system.across[0][0].length;
-  let apart = 0;
-  for (let i = 0; i < steps; i++) apart = Math.max(apart, Math.abs(place[(i + 1) % count] - place[i]));
-  const width = 3 * apart + 2, right = new Float64Array(3 * count);
-  const band = new Float64Array(3 * count * (width + 1));
-  const entry = (pose, i, below) => (3 * pose + i) * (width + 1) + below;
-  for (let m = 0; m < count; m++) {
-    for (let i = 0; i < 3; i++) {
-      right[3 * place[m] + i] = system.gradient[i][m];
-      for (let j = i; j < 3; j++) band[entry(place[m], i, j - i)] = system.diagonal[i][j][m];
-    }
-  }
-  for (let k = 0; k < steps; k++) {
-    const first = place[k], second = place[(k + 1) % count], later = second > first;
-    const low = Math.min(first, second), rows = 3 * Math.abs(second - first);
-    for (let i = 0; i < 3; i++) {
-      for (let j = 0; j < 3; j++) { // row j of the later pose, column i of the earlier one
-        band[entry(low, i, rows + j - i)] = later ? system.across[i][j][k] : system.across[j][i][k];
-      }
-    }
-  }
-  return { band, right, width };
 }
 
 /* Solve the damped normal equations by Cholesky's method; null where they are not positive definite. */

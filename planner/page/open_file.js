@@ -3,15 +3,17 @@
  * An opened path is {kind: "path", paths: [{points, closed, name}], unit}: unit is the size of its unit in cm, null:
  * the numbers have no unit. A track is {kind: "track", table}, a table of runs {kind: "runs", table}, a robot {kind:
  * "robot", fields}. */
-import { refuseOtherKinds } from "./file_kinds.js";
+import { CONSTANTS } from "./constants.js";
 import { readRobot } from "./robot.js";
-import { areOfRuns } from "./runs.js";
+import { areOfRuns } from "./measured.js";
 import { checkPlanId } from "./seals.js";
 import { readDrawing } from "./svg_drawing.js";
 import { numbersOf, parseWords, readTablePath, textsOf } from "./tables.js";
 import { splitName } from "./units.js";
 import { InputError } from "./words.js";
 
+const { KINDS } = CONSTANTS.file_kinds; // kind: its endings, and how it begins
+const HEAD = 4096; // bytes that tell
 const FORMAT = 2; // of plan.json
 const TRACK = ["heading", "time"]; // what a path does not have
 const PATH = ["x", "y"]; // what a table of runs does not have
@@ -39,6 +41,17 @@ function openFile({ name, bytes, tree }) {
   }
   const { path, unit } = readTablePath(table, name);
   return { kind: "path", unit: unit === null ? null : 100 * unit, paths: [{ ...path, name: stem }] };
+}
+
+/* Refuse a file that is neither a table nor a drawing. bytes: its content. */
+function refuseOtherKinds(name, bytes) {
+  const head = String.fromCharCode(...bytes.subarray(0, HEAD)).replace(/^\xef\xbb\xbf/, "").trimStart();
+  const ending = /\.([^.]*)$/.exec(name)?.[1].toLowerCase(), kinds = Object.keys(KINDS);
+  const kind = kinds.find((each) => new RegExp(KINDS[each][1], "iy").test(head)) ??
+    kinds.find((each) => KINDS[each][0].split(" ").includes(ending));
+  if (kind === undefined || (kind === "JSON" && ending === "json")) return; // plan.json
+  const words = "give a table with columns x and y, such as CSV, or an SVG drawing";
+  throw new InputError(`${name}: ${kind} is not read; ${words}`);
 }
 
 /* The drawn path of a plan.json, which may have more: walls, laps, an arrival. */

@@ -3,7 +3,7 @@
  * A path is {points, closed}: rows [x, y], and whether the last point is joined to the first. Lengths are in tail
  * lengths l, but any unit works; angles in rad. */
 import { CONSTANTS } from "./constants.js";
-import { TAU, column, convolved, differences, halfTurn, interp, largest, linspace, runningSum } from "./math.js";
+import { TAU, bounds, column, convolved, differences, halfTurn, interp, largest, linspace, runningSum } from "./math.js";
 import { smallest, sum } from "./math.js";
 import { formatLength, inLab, inTails } from "./units.js";
 import { InputError, general, repr } from "./words.js";
@@ -98,7 +98,7 @@ function arcLength(line) {
 
 /* Width and height of a path. */
 function extent({ points }) {
-  return [0, 1].map((axis) => largest(column(points, axis)) - smallest(column(points, axis)));
+  return bounds(points).map(([low, high]) => high - low);
 }
 
 /* Refuse a path that no schedule can be meant for. turnRadius: of the robot's circle. */

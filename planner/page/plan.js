@@ -1,11 +1,10 @@
 /* From a path and a robot to a plan, without simulating.
  *
- * A plan is {tracked, objective, drawn, declared, straight, guidance, switches, errors}. Lengths in l, times in
+ * A plan is {tracked, objective, drawn, declared, straight, guidance, switches, errors, unmeasured}. Lengths in l, times in
  * μ0 l⁴/EI, unless a name says its unit. */
 import { CONSTANTS } from "./constants.js";
 import { declare } from "./declare.js";
-import { guaranteedError, lookAhead, planErrors, unmeasuredError } from "./errors.js";
-import { trackedVehicle } from "./from_table.js";
+import { Followed, guaranteedError, lookAhead } from "./errors.js";
 import { follow } from "./guidance.js";
 import { sum } from "./math.js";
 import { checkSize } from "./path.js";
@@ -36,15 +35,15 @@ function leastDwell({ minimumSeconds, minimumDwell }, robot) {
   return Math.max(minimumSeconds / robot.timeScale, minimumDwell ?? QUICK);
 }
 
-/* Plan the motor's switching times for a path {points, closed} and a robot that a table knows. */
-function planPath(path, robot, table, options = {}, progress = null) {
-  const request = planRequest(options);
-  const plan = makePlan(path, trackedVehicle(robot, table, request.point), request, progress);
-  return { ...plan, unmeasured: unmeasuredError(plan) };
-}
-
 /* Plan for a path, a vehicle with its tracked point and a request. progress: called now and then. */
 function makePlan(drawn, tracked, request, progress = null) {
+  const chosen = followedPath(drawn, tracked, request, progress), { declared, straight, guidance, switches } = chosen;
+  const { errors, unmeasured } = chosen, { objective } = request;
+  return { tracked, objective, drawn, declared, straight, guidance, switches, errors, unmeasured };
+}
+
+/* The schedule that a request chooses, as in errors.js. */
+function followedPath(drawn, tracked, request, progress = null) {
   const { vehicle, robot } = tracked, declaredPaths = new Map();
   checkSize(drawn, robot, turnRadius(vehicle));
   const { dwell: given, objective, corner, timeWeight, tolerance, seed } = request;
@@ -63,9 +62,8 @@ function makePlan(drawn, tracked, request, progress = null) {
     const declared = declaredPath(driftOf(tracked, straight, dwell));
     const guidance = chooseGuidance(vehicle, declared, straight, dwell);
     const switches = follow(declared.reference, vehicle, guidance, tracked.offset, progress);
-    const bound = guaranteedError(vehicle, rodOf(tracked), straight.swing, guidance.ahead);
-    const errors = planErrors(tracked, drawn, declared, switches, bound, seed, straight);
-    return { tracked, objective, drawn, declared, straight, guidance, switches, errors };
+    const guaranteed = guaranteedError(vehicle, rodOf(tracked), straight.swing, guidance.ahead);
+    return new Followed({ tracked, drawn, declared, straight, guidance, switches, guaranteed, seed });
   };
   if (given === null && objective === "time") {
     const drift = driftOf(tracked, zigzag(vehicle, dwells[0], tracked.offset), dwells[0]);
@@ -76,7 +74,7 @@ function makePlan(drawn, tracked, request, progress = null) {
   if (given === null && objective === "error") {
     first = leastStated(first, longerDwells(vehicle, first.guidance.dwell), withDwell);
   }
-  if (tolerance === null || first.errors.stated <= tolerance) return first;
+  if (tolerance === null || first.stated <= tolerance) return first;
   return shortened(first, dwells, withDwell, tolerance);
 }
 
@@ -96,11 +94,11 @@ function quickest({ vehicle, offset }, declared, fastest, least) {
 /* Lengthen the dwells where this makes the stated error smaller by a fifth or more. */
 function leastStated(first, longer, withDwell) {
   let best = first;
-  if (first.errors.stated < LENGTHENED_FROM * first.errors.predictedMax) return best;
+  if (first.stated < LENGTHENED_FROM * first.predictedMax) return best;
   for (const dwell of longer) {
     const candidate = refusing(() => withDwell(dwell), () => null); // null: too long for this path
-    if (candidate === null || candidate.errors.predictedMax >= best.errors.stated) break;
-    if (candidate.errors.stated < WORTH * best.errors.stated) best = candidate;
+    if (candidate === null || candidate.predictedMax >= best.stated) break;
+    if (candidate.stated < WORTH * best.stated) best = candidate;
   }
   return best;
 }
@@ -110,15 +108,15 @@ function shortened(first, dwells, withDwell, tolerance) {
   let best = first, kept = null, low = 0, high = dwells.length;
   while (high - low > 1) {
     const middle = (low + high) >> 1, candidate = withDwell(dwells[middle]);
-    if (candidate.errors.stated < best.errors.stated) best = candidate;
-    if (candidate.errors.stated <= tolerance) [kept, high] = [candidate, middle];
+    if (candidate.stated < best.stated) best = candidate;
+    if (candidate.stated <= tolerance) [kept, high] = [candidate, middle];
     else low = middle;
   }
   if (kept !== null) return kept;
   const { robot } = first.tracked;
   throw new InputError(
     `tolerance ${inLab(tolerance, robot)} cannot be kept: the smallest stated error is `
-    + `${inLab(best.errors.stated, robot)}, with dwells from ${timeInLab(best.guidance.dwell, robot)}; `
+    + `${inLab(best.stated, robot)}, with dwells from ${timeInLab(best.guidance.dwell, robot)}; `
     + `allow more, or make a table of this robot with ${OWN_TABLE}`,
     "options",
   );
@@ -145,4 +143,4 @@ function chooseGuidance(vehicle, declared, straight, dwell) {
   return { dwell, ahead, swing: zigzagHysteresis(straight, ahead) };
 }
 
-export { planRequest, planPath, makePlan };
+export { planRequest, makePlan, followedPath };

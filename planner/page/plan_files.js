@@ -121,15 +121,14 @@ function pythonJson(value) {
   return `{${Object.entries(value).map(([name, entry]) => `${pythonJson(name)}: ${pythonJson(entry)}`).join(", ")}}`;
 }
 
-/* The files by name. parts: {codeVersion, directions, flash, schedule, tracker}, the version of the program, parts of
- * schedule.h that the planner's C code gives, and the template of tracker.h, with @NAME@ in place of what a plan
- * decides. */
+/* The files by name. parts: {codeVersion, schedule, tracker}, the version of the program and the templates of both
+ * headers, with @NAME@ in place of what a plan decides. */
 function planFiles(plan, parts) {
   const { id, text } = planRecord(plan, parts.codeVersion);
   return {
     "plan.json": `${text}\n`,
     "plan.csv": planTable(plan, id),
-    "schedule.h": controllerHeader(plan, id, parts),
+    "schedule.h": controllerHeader(plan, id, parts.schedule),
     "tracker.h": trackerHeader(plan, id, parts.tracker),
   };
 }
@@ -166,45 +165,22 @@ function milliseconds(seconds) {
 }
 
 /* Write schedule.h as text. */
-function controllerHeader(plan, id, { directions, flash, schedule }) {
+function controllerHeader(plan, id, template) {
   const { robot, model } = plan.tracked, seconds = planSeconds(plan), entries = milliseconds(seconds);
-  const [x, y, heading] = plan.switches.poses[0], cm = 100 * robot.tailLength;
-  const places = checkpoints(plan, seconds), total = sum(entries);
-  return `/* Plan ${id}.
- * Motor schedule for robot "${safeName(robot)}": turn in FIRST_DIRECTION for the first entry,
- * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
- * lengthens the dwell before it. Stop after the last entry. Look-up table ${model}.
-${statedWithin(plan)}
-${directions}
- * Put the head's centre at START_X_CM, START_Y_CM with heading START_HEADING_DEG, at rest: in cm and degrees,
- * counter-clockwise from the x axis, seen from above. START_X and START_Y are the same in tail lengths,
- * START_HEADING in rad. Checkpoints say where it should be later, in tail lengths and rad.
- * C99 or C++11. Include it in one file only, since it holds the tables. */
-#ifndef SCHEDULE_H
-#define SCHEDULE_H
-#include <stdint.h>
-#define SCHEDULE_FIRST_DIRECTION (${plan.switches.firstDirection})
-#define SCHEDULE_COUNT ${entries.length}
-#define SCHEDULE_TOTAL_MS ${total}UL
-#define SCHEDULE_MOTOR_RPM ${((robot.motorSpeed * 30) / Math.PI).toFixed(3)}
-#define SCHEDULE_START_X_CM ${(cm * x).toFixed(4)}
-#define SCHEDULE_START_Y_CM ${(cm * y).toFixed(4)}
-#define SCHEDULE_START_HEADING_DEG ${(DEGREES * heading).toFixed(3)}
-#define SCHEDULE_START_X ${x.toFixed(6)}
-#define SCHEDULE_START_Y ${y.toFixed(6)}
-#define SCHEDULE_START_HEADING ${heading.toFixed(6)}
-#define SCHEDULE_CHECKPOINTS ${places.length}
+  const [x, y, heading] = plan.switches.poses[0], cm = 100 * robot.tailLength, places = checkpoints(plan, seconds);
+  return filled(template, {
+    IDENTITY: id, NAME: safeName(robot), AFTER: "Stop after the last entry.", MODEL: model, STATED: statedWithin(plan),
+    FIRST_DIRECTION: plan.switches.firstDirection, COUNT: entries.length, TOTAL: sum(entries),
+    MOTOR: `#define SCHEDULE_MOTOR_RPM ${((robot.motorSpeed * 30) / Math.PI).toFixed(3)}\n`,
+    X_CM: (cm * x).toFixed(4), Y_CM: (cm * y).toFixed(4), DEGREES: (DEGREES * heading).toFixed(3),
+    X: x.toFixed(6), Y: y.toFixed(6), HEADING: heading.toFixed(6), CHECKPOINTS: places.length,
+    entries: linesOf(entries).join(",\n    "), places: places.join(",\n    "),
+  });
+}
 
-${flash}
-static const uint16_t SCHEDULE_TABLE(schedule_ms)[SCHEDULE_COUNT] SCHEDULE_FLASH = {
-    ${linesOf(entries).join(",\n    ")}
-};
-typedef struct { uint32_t ms; float x, y, heading; } schedule_checkpoint;
-static const schedule_checkpoint SCHEDULE_TABLE(schedule_checkpoints)[SCHEDULE_CHECKPOINTS] SCHEDULE_FLASH = {
-    ${places.join(",\n    ")}
-};
-${schedule}#endif
-`;
+/* A template with its parts in place of @NAME@. */
+function filled(template, parts) {
+  return template.replace(/@(\w+)@/g, (_, mark) => parts[mark]);
 }
 
 /* Say how far from the path the robot may get. */
@@ -269,7 +245,7 @@ function trackerHeader(plan, id, template) {
     lag_left: table(inUnits(vehicle.lag[0])),
     lag_right: table(inUnits(vehicle.lag[1])),
   };
-  return template.replace(/@(\w+)@/g, (_, mark) => parts[mark]);
+  return filled(template, parts);
 }
 
 function mapped(values, write) {

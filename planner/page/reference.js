@@ -10,7 +10,7 @@ import { InputError } from "./words.js";
 const { LAPS, MOST_SLIP } = CONSTANTS.tractrix;
 const { TIE } = CONSTANTS.distance; // difference of distances that are equal
 const STILL = { sideways: 0, current: [0, 0] };
-const RUN = 8; // segments in a smallest box
+const RUN = 16; // segments in a box
 const MOST_FILLED = 4000; // points that are added to a polyline
 
 /* Compute the tractrix of a path: {p, q, heading, arc, curvature, closed}, p of the tracked point, q of the pivot.
@@ -99,81 +99,46 @@ function distanceTo(line, points) {
 
 /* Find the place on a polyline that is nearest to each point: columns distance, segment and share of it.
  *
- * Of segments whose distances differ by less than TIE the lowest number counts. */
+ * Of segments whose distances differ by less than TIE the lowest number counts. Segments are looked at in runs, each in
+ * its box; the place that was found last is a good guess of the next. */
 function nearest(line, points) {
-  const boxes = new Boxes(line), count = points.length;
-  const distance = new Float64Array(count), segment = new Int32Array(count), share = new Float64Array(count);
-  let last = 0;
-  points.forEach(([x, y], i) => {
-    const square = boxes.leastSquare(x, y, last);
-    last = segment[i] = boxes.firstWithin(x, y, (Math.sqrt(square) + TIE) ** 2);
-    distance[i] = Math.sqrt(boxes.squareTo(last, x, y));
-    share[i] = boxes.share;
+  const xs = column(line, 0), ys = column(line, 1), count = line.length - 1, runs = Math.ceil(count / RUN);
+  const [left, right, low, high] = [xs, ys].flatMap((values) => [Math.min, Math.max].map((end) => {
+    return Float64Array.from({ length: runs }, (_, run) => end(...values.subarray(run * RUN, (run + 1) * RUN + 1)));
+  }));
+  const distance = new Float64Array(points.length), share = new Float64Array(points.length);
+  const segment = new Int32Array(points.length);
+  let nearest = 0, part = 0; // of the segment that was looked at last
+  const squareTo = (i, x, y) => {
+    const dx = xs[i + 1] - xs[i], dy = ys[i + 1] - ys[i], square = dx * dx + dy * dy;
+    const along = square > 0 ? ((x - xs[i]) * dx + (y - ys[i]) * dy) / square : 0;
+    part = along < 0 ? 0 : along > 1 ? 1 : along;
+    const awayX = x - xs[i] - part * dx, awayY = y - ys[i] - part * dy;
+    return awayX * awayX + awayY * awayY;
+  };
+  const near = (run, x, y, reach) => { // whether a part of the run may be as near as that
+    const awayX = Math.max(left[run] - x, x - right[run], 0), awayY = Math.max(low[run] - y, y - high[run], 0);
+    return (awayX * awayX + awayY * awayY) * (1 - 1e-12) <= reach;
+  };
+  points.forEach(([x, y], k) => {
+    let least = squareTo(nearest, x, y);
+    for (let run = 0; run < runs; run++) {
+      if (!near(run, x, y, least)) continue;
+      for (let i = run * RUN; i < Math.min((run + 1) * RUN, count); i++) least = Math.min(least, squareTo(i, x, y));
+    }
+    const reach = (Math.sqrt(least) + TIE) ** 2;
+    for (let i = 0; i < count; i++) {
+      if (i % RUN === 0 && !near(i / RUN, x, y, reach)) i += RUN - 1;
+      else if (squareTo(i, x, y) <= reach) {
+        nearest = i;
+        break;
+      }
+    }
+    segment[k] = nearest;
+    distance[k] = Math.sqrt(squareTo(nearest, x, y));
+    share[k] = part;
   });
   return { distance, segment, share };
-}
-
-/* A tree of boxes around a polyline: those of the lowest level hold RUN segments each, all others two of the level below. */
-class Boxes {
-  constructor(line) {
-    this.x = column(line, 0);
-    this.y = column(line, 1);
-    this.count = line.length - 1;
-    const runs = Array.from({ length: Math.ceil(this.count / RUN) }, (_, i) => {
-      const x = this.x.subarray(i * RUN, (i + 1) * RUN + 1), y = this.y.subarray(i * RUN, (i + 1) * RUN + 1);
-      return [Math.min(...x), Math.max(...x), Math.min(...y), Math.max(...y)];
-    });
-    this.levels = [Float64Array.from(runs.flat())];
-    for (let below = this.levels[0]; below.length > 4; below = this.levels[this.levels.length - 1]) {
-      this.levels.push(Float64Array.from({ length: 4 * Math.ceil(below.length / 8) }, (_, at) => {
-        const one = 8 * (at >> 2) + (at & 3), other = one + 4 < below.length ? one + 4 : one;
-        return at & 1 ? Math.max(below[one], below[other]) : Math.min(below[one], below[other]);
-      }));
-    }
-  }
-
-  /* The squared distance of a place from a segment; leaves the share of the segment where it is nearest. */
-  squareTo(segment, x, y) {
-    const fromX = this.x[segment], fromY = this.y[segment], dx = this.x[segment + 1] - fromX;
-    const dy = this.y[segment + 1] - fromY, square = dx * dx + dy * dy;
-    const along = square > 0 ? ((x - fromX) * dx + (y - fromY) * dy) / square : 0;
-    this.share = along < 0 ? 0 : along > 1 ? 1 : along;
-    const awayX = x - fromX - this.share * dx, awayY = y - fromY - this.share * dy;
-    return awayX * awayX + awayY * awayY;
-  }
-
-  /* The smallest squared distance from any segment; `guess` is a segment that is probably near. */
-  leastSquare(x, y, guess, level = this.levels.length - 1, i = 0, known = this.squareTo(guess, x, y)) {
-    let least = known;
-    if (!(this.squareOf(level, i, x, y) <= least)) return least;
-    if (level) {
-      least = this.leastSquare(x, y, guess, level - 1, 2 * i, least);
-      return 8 * i + 4 < this.levels[level - 1].length ? this.leastSquare(x, y, guess, level - 1, 2 * i + 1, least) : least;
-    }
-    const end = Math.min((i + 1) * RUN, this.count);
-    for (let segment = i * RUN; segment < end; segment++) least = Math.min(least, this.squareTo(segment, x, y));
-    return least;
-  }
-
-  /* The lowest number of a segment that is not further than the root of `reach`; −1: there is none. */
-  firstWithin(x, y, reach, level = this.levels.length - 1, i = 0) {
-    if (!(this.squareOf(level, i, x, y) <= reach)) return -1;
-    if (level) {
-      const first = this.firstWithin(x, y, reach, level - 1, 2 * i);
-      return first >= 0 || 8 * i + 4 >= this.levels[level - 1].length ? first
-        : this.firstWithin(x, y, reach, level - 1, 2 * i + 1);
-    }
-    const end = Math.min((i + 1) * RUN, this.count);
-    for (let segment = i * RUN; segment < end; segment++) if (this.squareTo(segment, x, y) <= reach) return segment;
-    return -1;
-  }
-
-  /* The squared distance of a place from a box, and a little less, for rounding. */
-  squareOf(level, i, x, y) {
-    const box = this.levels[level], at = 4 * i;
-    const awayX = Math.max(box[at] - x, x - box[at + 1], 0), awayY = Math.max(box[at + 2] - y, y - box[at + 3], 0);
-    return (awayX * awayX + awayY * awayY) * (1 - 1e-12);
-  }
 }
 
 /* The largest distance of any point of the first polyline from the second, and the reverse. */
@@ -189,4 +154,4 @@ function filled(line) {
   return pointsAt(line, lengths, Float64Array.from(new Set([...linspace(0, end, count), ...lengths])).sort());
 }
 
-export { STILL, reference, TIE, distanceTo, nearest, twoSided };
+export { STILL, reference, distanceTo, nearest, twoSided };

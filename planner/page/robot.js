@@ -7,7 +7,7 @@
  * them as `groups`; a file with effects, a correction or a calibration is refused: Python makes its vehicle. */
 import { CONSTANTS } from "./constants.js";
 import { isWhole } from "./seals.js";
-import { UNITS, fromSi, splitName, toSi, unitsOfKind } from "./units.js";
+import { UNITS, fromSi, splitName, toSi } from "./units.js";
 import { InputError, closeMatch, general, naming, quoted, repr } from "./words.js";
 
 const { MOST_TAILS, LEAST_SLENDERNESS } = CONSTANTS.groups;
@@ -18,7 +18,7 @@ const POSITIVE = {
 };
 const LOCKED = ["effects", "correction", "learnt_from", "calibration"];
 const MOST_SETTINGS = 2 ** 20; // characters of a robot
-const TOKENS = /"(?:[^"\\\n]|\\.)*"|'[^'\n]*'|\[|\]|,|[^\s,[\]"'#]+/g; // of a value, between blanks and comments
+const WORDS = /"(?:[^"\\\n]|\\.)*"|'[^'\n]*'|[^\s,[\]"'#]+/g; // of a value
 const DECIMAL = /^[+-]?(?:0|[1-9](?:_?\d)*)(?:\.\d(?:_?\d)*)?(?:[eE][+-]?\d(?:_?\d)*)?$/;
 const DECIMAL_COMMA = /^[ \t]*[\w-]+[ \t]*=[ \t]*([+-]?\d{1,20}),(\d{1,20})[ \t]*(?:#.*)?$/m;
 
@@ -117,30 +117,16 @@ function unclosed(text) {
   return bare.split("[").length > bare.split("]").length;
 }
 
-/* A value of TOML; undefined: it is none. */
+/* A value of TOML, read as JSON; undefined: it is none. */
 function valueOf(text) {
-  const words = text.match(TOKENS) ?? [];
-  if (words.join("") !== text.replace(/("(?:[^"\\]|\\.)*"|'[^']*')|\s+/g, "$1")) return undefined;
-  if (words[0] === "[") {
-    const inner = words.slice(1, -1).join(" ").split(",").map((word) => word.trim());
-    if (inner[inner.length - 1] === "") inner.pop();
-    const values = inner.map(valueOf);
-    return words[words.length - 1] === "]" && !values.includes(undefined) ? values : undefined;
-  }
-  const [word] = words;
-  if (words.length !== 1) return undefined;
-  if (word[0] === "'") return word.slice(1, -1);
-  if (word[0] === '"') return textOf(word);
-  if (word === "true" || word === "false") return word === "true";
-  if (/^[+-]?(?:inf|nan)$/.test(word)) return Number(word.replace("inf", "Infinity").replace(/.?nan/, "NaN"));
-  return DECIMAL.test(word) ? Number(word.replaceAll("_", "")) : undefined;
-}
-
-/* A text in double quotes, whose escapes are those of JSON and \UXXXXXXXX. */
-function textOf(word) {
   const wide = (_, hex) => JSON.stringify(String.fromCodePoint(Math.min(parseInt(hex, 16), 0x10ffff))).slice(1, -1);
+  const json = text.replace(WORDS, (word) => {
+    if (word[0] === '"') return word.replace(/\\U([\da-fA-F]{8})/g, wide);
+    if (word[0] === "'") return JSON.stringify(word.slice(1, -1));
+    return word === "true" || word === "false" || !DECIMAL.test(word) ? word : String(Number(word.replaceAll("_", "")));
+  });
   try {
-    return JSON.parse(word.replace(/\\U([\da-fA-F]{8})/g, wide));
+    return JSON.parse(json.replace(/,\s*\]$/, "]")) ?? undefined;
   } catch {
     return undefined;
   }
@@ -186,27 +172,20 @@ function keyOf({ quantity, unit }, other = unit) {
   return other ? `${quantity}_${other}` : quantity;
 }
 
-/* Say what is wrong with a key: it has no unit, or there is no such number; name what may be meant. */
+/* Say what is wrong with a key, and name what may be meant. */
 function unknown(table, key) {
-  const bare = key.endsWith(SIGMA) ? key.slice(0, -SIGMA.length) : key, { quantity, unit } = splitName(bare);
+  const { quantity } = splitName(key.endsWith(SIGMA) ? key.slice(0, -SIGMA.length) : key);
   const entries = ENTRIES.filter((entry) => entry.table === table);
-  const tables = [...new Set(ENTRIES.map((entry) => entry.table))];
-  const named = entries.find((entry) => entry.unit && entry.quantity === bare);
-  if (named) {
-    const units = unitsOfKind(UNITS.get(named.unit).kind).map((unit) => keyOf(named, unit));
-    return `[${table}] ${key} has no unit; give one of ${units.join(", ")}`;
+  const near = closeMatch(quantity, entries.map((entry) => entry.quantity));
+  if (!entries.length) {
+    const tables = new Set(ENTRIES.map((entry) => entry.table));
+    return `unknown entry [${table}] ${key}; a robot has [${[...tables].join("], [")}]`;
   }
-  if (!key) return `${table} is in no table; a robot has [${tables.join("], [")}]`;
-  if (!entries.length) return `unknown entry [${table}] ${key}; a robot has [${tables.join("], [")}]`;
-  if (key !== bare && entryOf(table, bare)) {
-    return `unknown entry [${table}] ${key}; this number takes no standard deviation`;
+  if (near && near !== quantity) {
+    return `unknown entry [${table}] ${key}; is it ${keyOf(entries.find((entry) => entry.quantity === near))}?`;
   }
-  const near = closeMatch(quantity.replace("diameter", "radius"), entries.map((entry) => entry.quantity));
-  const entry = entries.find((each) => each.quantity === near), same = unit?.kind === UNITS.get(entry?.unit)?.kind;
-  const meant = entry && keyOf(entry, entry.unit && same ? unit.suffix : entry.unit);
-  const all = `[${table}] has ${entries.map((each) => keyOf(each)).join(", ")}, in any usual unit`;
-  const half = quantity.endsWith("diameter") ? `give ${meant}, half of it` : `is it ${meant}?`;
-  return `unknown entry [${table}] ${key}; ${entry ? half : all}`;
+  return `unknown entry [${table}] ${key}; [${table}] has ${entries.map((entry) => keyOf(entry)).join(", ")}, in any `
+    + "usual unit";
 }
 
 /* Convert a number of the file to SI units. */

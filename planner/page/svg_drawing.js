@@ -4,8 +4,7 @@
  * low, high}; a shape is {kind, id, segments, clips}; a rule of a style sheet {kind, names, given, weight}. */
 import { differences, largestSize, unwrap } from "./math.js";
 import { pathOf, stepsOf } from "./path.js";
-import { NAMES } from "./svg_names.js";
-import { NUMBER, Lengths, fitted, moved, numbersIn, pointsOn, product, shapeSegments } from "./svg_shapes.js";
+import { NAMES, NUMBER, Lengths, fitted, moved, numbersIn, pointsOn, product, shapeSegments } from "./svg_shapes.js";
 import { transformed, transformOf } from "./svg_shapes.js";
 import { InputError, naming, quoted } from "./words.js";
 
@@ -28,9 +27,8 @@ function readStyleSheet(text, known) {
       const found = SELECTOR.exec(selector);
       if (!found || IMPORTANT.test(body.trim().replace(/;+$/, ""))) {
         throw new InputError(
-          `<style> sets ${Object.keys(given).join(", ")} of ${quoted(selector)}; read are kinds, classes ` +
-          `and ids, ` +
-            "without !important; write attributes instead",
+          `<style> sets ${Object.keys(given).join(", ")} of ${quoted(selector)}; read are kinds, classes and ids, without `
+          + "!important; write attributes instead",
         );
       }
       const names = found[2].match(/[.#][^.#]+/g) ?? [], ids = names.filter((name) => name.startsWith("#")).length;
@@ -133,9 +131,8 @@ class TreeReader {
     for (const key of ["d", "points"]) this.count += element.attributes[key]?.match(NUMBER)?.length ?? 0;
     if (this.count > MOST_NUMBERS || this.open.length > DEEPEST) {
       throw new InputError(
-        `the drawing has more than ${MOST_NUMBERS} shapes and coordinates, or groups in more than ` +
-        `${DEEPEST} levels; ` +
-          "simplify it",
+        `the drawing has more than ${MOST_NUMBERS} shapes and coordinates, or groups in more than ${DEEPEST} levels; `
+        + "simplify it",
       );
     }
   }

@@ -1,16 +1,19 @@
-/* Segments of a drawing's paths, from the words of attributes; numbers, lengths, transforms and views.
+/* Segments of a drawing's shapes, from the words of attributes; numbers, lengths, transforms and views.
  *
- * A segment is {kind, points}: its points are those that a transform moves. A line or move has its end; "close" too;
- * a Bézier curve its start and control points; an arc has start, end, centre, and the points of the ellipse at 0 and
- * at a quarter turn, and its sweep [rad]. Matrices are [a, b, c, d, e, f] as in SVG. */
+ * Every shape is read as data of a path. A segment is {kind, points}: its points are those that a transform moves. A
+ * line or move has its end; "close" too; a Bézier curve its start and control points; an arc has start, end, centre,
+ * and the points of the ellipse at 0 and at a quarter turn, and its sweep [rad]. Matrices are [a, b, c, d, e, f] as in
+ * SVG. */
+import { CONSTANTS } from "./constants.js";
 import { TAU, mod } from "./math.js";
-import { NAMES } from "./svg_names.js";
 import { InputError, quoted } from "./words.js";
 
-const COMMAND = /[MmZzLlHhVvCcSsQqTtAa]/y;
-const BLANK = /[ ,\t\n\f\r]+/y;
-const FLOAT = /[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?/y;
-const COORDINATES = { l: 1, t: 1, c: 3, s: 2, q: 2 }; // of a command, after one another
+const { NAMES } = CONSTANTS.svg_names;
+const N = "[-+]?(?:\\d+\\.?\\d*|\\.\\d+)(?:[eE][-+]?\\d+)?";
+const [COMMAND, FLOAT, FLAG, END] = ["[MmZzLlHhVvCcSsQqTtAa]", N, "[01]", "$"].map((word) => {
+  return new RegExp(`[ ,\\t\\n\\f\\r]*(${word})`, "y");
+});
+const PLACES = { m: 1, l: 1, t: 1, c: 3, s: 2, q: 2 }; // of a command, after one another
 
 /* Multiply two matrices: the second is applied first. */
 function product([a, b, c, d, e, f], [g, h, i, j, k, l]) {
@@ -79,141 +82,54 @@ function arcTo(start, [rx, ry, degrees, large, clockwise], end) {
 
 /* The segments of the data of a path, all of them. */
 function pathSegments(data) {
-  const reader = new Reader(data), segments = [];
-  let command = reader.command();
-  while (command !== null && reader.take(command, segments)) command = reader.command();
-  if (command !== null || reader.left()) {
+  const segments = [];
+  let at = 0, here = null, first = null, control = null; // ends of the last segment and move; of a curve, its last control
+  const refuse = () => {
     throw new InputError(`the data of a path are not read, ${quoted(data.slice(0, 40))}; correct them`);
+  };
+  const take = (form) => {
+    form.lastIndex = at;
+    const [, word] = form.exec(data) ?? refuse();
+    at = form.lastIndex;
+    return word;
+  };
+  const comes = (form) => {
+    form.lastIndex = at;
+    return form.test(data);
+  };
+  const number = () => Number(take(FLOAT));
+  const add = (segment, end, turning = null) => {
+    segments.push(segment);
+    [here, control] = [end, turning];
+  };
+  while (!comes(END)) {
+    const command = take(COMMAND), kind = command.toLowerCase(), relative = kind === command;
+    if (!here && kind !== "m") refuse();
+    if (kind === "z") add({ kind: "close", points: [first] }, first);
+    for (let begins = true; kind !== "z" && (begins || comes(FLOAT)); begins = false) {
+      const [x, y] = relative && here ? here : [0, 0], place = () => [x + number(), y + number()];
+      if (kind === "a") {
+        const radii = [number(), number()].map(Math.abs), turn = number(), flags = [FLAG, FLAG].map(take);
+        const end = place();
+        add(arcTo(here, [...radii, turn, ...flags.map((flag) => flag === "1")], end), end);
+      } else if (kind === "h" || kind === "v") {
+        const end = kind === "h" ? [x + number(), here[1]] : [here[0], y + number()];
+        add({ kind: "line", points: [end] }, end);
+      } else {
+        const places = Array.from({ length: PLACES[kind] }, place), end = places[places.length - 1];
+        if (kind === "m" && begins) first = end;
+        if (kind === "m" || kind === "l") add({ kind: kind === "m" && begins ? "move" : "line", points: places }, end);
+        else {
+          const smooth = control ? [2 * here[0] - control[0], 2 * here[1] - control[1]] : here;
+          const points = [here, ...(kind === "s" || kind === "t" ? [smooth] : []), ...places];
+          add({ kind: "curve", points }, end, points[points.length - 2]);
+        }
+      }
+    }
   }
   return segments;
 }
 
-class Reader {
-  constructor(data) {
-    this.data = data;
-    this.at = 0;
-    this.here = null; // end of the last segment
-    this.first = null; // end of the last move
-    this.control = null; // last control point of a curve
-  }
-
-  match(pattern) {
-    for (const form of [BLANK, pattern]) {
-      form.lastIndex = this.at;
-      const found = form.exec(this.data);
-      if (found && form === pattern) {
-        this.at += found[0].length;
-        return found[0];
-      }
-      if (found) this.at += found[0].length;
-    }
-    return null;
-  }
-
-  command() {
-    return this.match(COMMAND);
-  }
-
-  /* Tell whether something is left that is no blank. */
-  left() {
-    this.match(/$/y);
-    return this.at < this.data.length;
-  }
-
-  more() {
-    const before = this.at, number = this.match(FLOAT);
-    this.at = before;
-    return number !== null;
-  }
-
-  number() {
-    const text = this.match(FLOAT);
-    return text === null ? null : Number(text);
-  }
-
-  /* Some coordinate pairs; null where one is missing. */
-  places(count, relative) {
-    const places = [];
-    for (let i = 0; i < count; i++) {
-      const x = this.number(), y = this.number();
-      if (x === null || y === null) return null;
-      places.push(relative && this.here ? [x + this.here[0], y + this.here[1]] : [x, y]);
-    }
-    return places;
-  }
-
-  add(segments, kind, points, control = null) {
-    segments.push({ kind, points });
-    this.here = points[points.length - 1];
-    this.control = control;
-  }
-
-  /* Read what follows a command; false where the data are broken. */
-  take(command, segments) {
-    const kind = command.toLowerCase(), relative = kind === command;
-    if (kind === "z") {
-      if (this.more()) return false;
-      if (this.first) this.add(segments, "close", [this.first]);
-      return true;
-    }
-    if (kind === "m") return this.takeMove(segments, relative);
-    if (this.here === null) return false;
-    if (kind === "a") return this.takeArcs(segments, relative);
-    do {
-      if (!(kind === "h" || kind === "v" ? this.takeAxis(segments, kind, relative)
-        : this.takeCurve(segments, kind, relative))) return false;
-    } while (this.more());
-    return true;
-  }
-
-  takeMove(segments, relative) {
-    for (let kind = "move"; kind === "move" || this.more(); kind = "line") {
-      const places = this.places(1, relative);
-      if (places === null) return false;
-      this.add(segments, kind, places);
-      if (kind === "move") [this.first] = places;
-    }
-    return true;
-  }
-
-  takeAxis(segments, kind, relative) {
-    const value = this.number(), axis = kind === "h" ? 0 : 1;
-    if (value === null) return false;
-    const end = [...this.here];
-    end[axis] = relative ? end[axis] + value : value;
-    this.add(segments, "line", [end]);
-    return true;
-  }
-
-  takeCurve(segments, kind, relative) {
-    const places = this.places(COORDINATES[kind], relative), { here, control } = this;
-    if (places === null) return false;
-    if (kind === "l") {
-      this.add(segments, "line", places);
-      return true;
-    }
-    const smooth = control ? [2 * here[0] - control[0], 2 * here[1] - control[1]] : here;
-    const points = [here, ...(kind === "s" || kind === "t" ? [smooth] : []), ...places];
-    this.add(segments, "curve", points, points[points.length - 2]);
-    return true;
-  }
-
-  takeArcs(segments, relative) {
-    do {
-      const numbers = [this.number(), this.number(), this.number()];
-      const flags = [this.match(/[01]/y), this.match(/[01]/y)];
-      const places = this.places(1, relative);
-      if (places === null || numbers.includes(null) || flags.includes(null)) return false;
-      const [rx, ry, turn] = numbers, [large, clockwise] = flags.map((flag) => flag === "1");
-      segments.push(arcTo(this.here, [Math.abs(rx), Math.abs(ry), turn, large, clockwise], places[0]));
-      [this.here] = places;
-      this.control = null;
-    } while (this.more());
-    return true;
-  }
-}
-
-const N = "[-+]?(?:\\d+\\.?\\d*|\\.\\d+)(?:[eE][-+]?\\d+)?";
 const NUMBER = new RegExp(N, "g");
 const LENGTH = new RegExp(`^(${N})\\s*([a-zA-Z]*|%)$`);
 const FUNCTION = /[\s,]*([a-zA-Z]+)\s*\(([^()]*)\)/g;
@@ -261,63 +177,33 @@ function numbersIn(own, name) {
 
 /* The segments of a shape, before its transform; null: it shows nothing. */
 function shapeSegments(kind, own, lengths, view) {
-  if (kind === "path") return pathSegments(own.d ?? "");
-  if (kind === "polyline" || kind === "polygon") return polySegments(kind, numbersIn(own, "points"));
-  const names = Object.keys(NAMES.lengths);
-  const given = Object.fromEntries(names.map((name) => [name, lengths.read(own, name, view)]));
-  const { x, y, width, height, cx, cy, r, x1, y1, x2, y2 } = given, rx = given.rx ?? given.ry, ry = given.ry ?? rx;
-  if (kind === "line") {
-    return [{ kind: "move", points: [[x1 ?? 0, y1 ?? 0]] }, { kind: "line", points: [[x2 ?? 0, y2 ?? 0]] }];
-  }
-  if (kind === "rect") return rectSegments(x ?? 0, y ?? 0, width ?? 0, height ?? 0, rx ?? 0, ry ?? 0);
-  return kind === "circle" ? roundSegments(cx ?? 0, cy ?? 0, r ?? 0, r ?? 0)
-    : roundSegments(cx ?? 0, cy ?? 0, rx ?? 0, ry ?? 0);
+  const data = kind === "path" ? own.d ?? "" : shapeData(kind, own, lengths, view);
+  return data === null ? null : pathSegments(data);
 }
 
-function polySegments(kind, numbers) {
-  const segments = [];
-  if (numbers.length % 2) throw new InputError(`a ${kind} has an odd number of coordinates; correct its points`);
-  for (let i = 0; i < numbers.length; i += 2) {
-    segments.push({ kind: i ? "line" : "move", points: [[numbers[i], numbers[i + 1]]] });
+/* A shape as data of a path; null: it shows nothing. */
+function shapeData(kind, own, lengths, view) {
+  if (kind === "polyline" || kind === "polygon") {
+    const numbers = numbersIn(own, "points");
+    if (numbers.length % 2) throw new InputError(`a ${kind} has an odd number of coordinates; correct its points`);
+    return numbers.length ? `M${numbers}${kind === "polygon" ? "Z" : ""}` : "";
   }
-  if (kind === "polygon" && segments.length) segments.push({ kind: "close", points: segments[0].points });
-  return segments;
+  const given = Object.keys(NAMES.lengths).map((name) => [name, lengths.read(own, name, view)]);
+  const { rx, ry, ...sizes } = Object.fromEntries(given), numbers = Object.values(sizes).map((size) => size ?? 0);
+  const [x, y, width, height, cx, cy, r, x1, y1, x2, y2] = numbers;
+  if (kind === "line") return `M${x1},${y1}L${x2},${y2}`;
+  const [a, b] = kind === "circle" ? [r, r] : [rx ?? ry ?? 0, ry ?? rx ?? 0];
+  if (kind === "rect") return rectData(x, y, width, height, Math.min(a, width / 2), Math.min(b, height / 2));
+  const quarters = [[cx, cy + b], [cx - a, cy], [cx, cy - b], [cx + a, cy]].map((end) => `A${a},${b},0,0,1,${end}`);
+  return Math.min(a, b) > 0 ? `M${cx + a},${cy}${quarters.join("")}Z` : null;
 }
 
-function rectSegments(x, y, width, height, rx, ry) {
+function rectData(x, y, width, height, a, b) {
   if (Math.min(width, height) <= 0) return null;
-  const a = rx && ry ? Math.min(rx, width / 2) : 0, b = rx && ry ? Math.min(ry, height / 2) : 0;
-  const right = x + width, low = y + height, segments = [];
-  if (!(a > 0 && b > 0)) {
-    const corners = [[x, y], [right, y], [right, low], [x, low]];
-    corners.forEach((point, i) => segments.push({ kind: i ? "line" : "move", points: [point] }));
-    return [...segments, { kind: "close", points: [[x, y]] }];
-  }
-  const round = (start, end, centre) => segments.push({
-    kind: "arc", sweep: TAU / 4,
-    points: [start, end, centre, [centre[0] + a, centre[1]], [centre[0], centre[1] + b]],
-  });
-  segments.push({ kind: "move", points: [[x + a, y]] }, { kind: "line", points: [[right - a, y]] });
-  round([right - a, y], [right, y + b], [right - a, y + b]);
-  segments.push({ kind: "line", points: [[right, low - b]] });
-  round([right, low - b], [right - a, low], [right - a, low - b]);
-  segments.push({ kind: "line", points: [[x + a, low]] });
-  round([x + a, low], [x, low - b], [x + a, low - b]);
-  segments.push({ kind: "line", points: [[x, y + b]] });
-  round([x, y + b], [x + a, y], [x + a, y + b]);
-  return [...segments, { kind: "close", points: [[x + a, y]] }];
-}
-
-/* Four quarters of an ellipse. */
-function roundSegments(x, y, a, b) {
-  if (Math.min(a, b) <= 0) return null;
-  const at = (turn) => [x + a * Math.cos(turn), y + b * Math.sin(turn)];
-  const segments = [{ kind: "move", points: [at(0)] }];
-  for (let i = 0; i < 4; i++) {
-    const points = [at((i * TAU) / 4), at(((i + 1) * TAU) / 4), [x, y], [x + a, y], [x, y + b]];
-    segments.push({ kind: "arc", points, sweep: TAU / 4 });
-  }
-  return [...segments, { kind: "close", points: [at(0)] }];
+  const right = x + width, low = y + height, round = (...end) => `A${a},${b},0,0,1,${end}`;
+  if (Math.min(a, b) <= 0) return `M${x},${y}H${right}V${low}H${x}Z`;
+  return `M${x + a},${y}H${right - a}${round(right, y + b)}V${low - b}${round(right - a, low)}H${x + a}`
+    + `${round(x, low - b)}V${y + b}${round(x + a, y)}Z`;
 }
 
 /* The matrix of the attribute `transform`. */
@@ -334,31 +220,31 @@ function transformOf(text) {
   return matrix;
 }
 
+const MATRICES = { // of the functions of a transform; angles in degrees
+  matrix: (...matrix) => matrix,
+  translate: (x, y = 0) => [1, 0, 0, 1, x, y],
+  translatex: (x) => [1, 0, 0, 1, x, 0],
+  translatey: (y) => [1, 0, 0, 1, 0, y],
+  scale: (x, y = x) => [x, 0, 0, y, 0, 0],
+  scalex: (x) => [x, 0, 0, 1, 0, 0],
+  scaley: (y) => [1, 0, 0, y, 0, 0],
+  skew: (x, y = 0) => [1, Math.tan((y * TAU) / 360), Math.tan((x * TAU) / 360), 1, 0, 0],
+  skewx: (x) => MATRICES.skew(x),
+  skewy: (y) => MATRICES.skew(0, y),
+  rotate: (angle, x = 0, y = 0) => {
+    const c = Math.cos((angle * TAU) / 360), s = Math.sin((angle * TAU) / 360);
+    return product(product([1, 0, 0, 1, x, y], [c, s, -s, c, 0, 0]), [1, 0, 0, 1, -x, -y]);
+  },
+};
+
 /* The matrix of one function of a transform; null: it is not known. */
 function oneTransform(name, inside) {
   const given = inside.trim().split(/[\s,]+/).map((word) => LENGTH.exec(word));
   const kinds = (NAMES.transforms[name] ?? []).find(({ length }) => length === given.length);
   const unit = (word, i) => NAMES.units[kinds[i]][word[2].toLowerCase()];
   const values = given.map((word, i) => word && kinds && Number(word[1]) * unit(word, i));
-  if (!kinds || !values.every((value) => typeof value === "number" && !Number.isNaN(value))) return null;
-  const [p, q, r] = values, [tan, tan2] = [p, q ?? 0].map((degrees) => Math.tan((degrees * TAU) / 360));
-  if (name === "matrix") return values;
-  if (name === "translate") return [1, 0, 0, 1, p, q ?? 0];
-  if (name === "scale") return [p, 0, 0, q ?? p, 0, 0];
-  if (name === "translatex") return [1, 0, 0, 1, p, 0];
-  if (name === "translatey") return [1, 0, 0, 1, 0, p];
-  if (name === "scalex") return [p, 0, 0, 1, 0, 0];
-  if (name === "scaley") return [1, 0, 0, p, 0, 0];
-  if (name === "skewx") return [1, 0, tan, 1, 0, 0];
-  if (name === "skewy") return [1, tan, 0, 1, 0, 0];
-  if (name === "skew") return [1, tan2, tan, 1, 0, 0];
-  const c = Math.cos((p * TAU) / 360), s = Math.sin((p * TAU) / 360);
-  return about([c, s, -s, c, 0, 0], q ?? 0, r ?? 0);
-}
-
-/* A matrix about another point than the origin. */
-function about(matrix, x, y) {
-  return product(product([1, 0, 0, 1, x, y], matrix), [1, 0, 0, 1, -x, -y]);
+  const known = kinds && values.every((value) => typeof value === "number" && !Number.isNaN(value));
+  return known ? MATRICES[name](...values) : null;
 }
 
 /* Fit the viewBox (left, top, width, height) of an <svg> into its place and size. */
@@ -377,4 +263,4 @@ function fitted(aspect, place, size, box) {
   return [scale[0], 0, 0, scale[1], ...at];
 }
 
-export { product, moved, transformed, pointsOn, Lengths, NUMBER, fitted, numbersIn, shapeSegments, transformOf };
+export { NAMES, product, moved, transformed, pointsOn, Lengths, NUMBER, fitted, numbersIn, shapeSegments, transformOf };

@@ -14,7 +14,7 @@
  * head's centre at the flips and the end. Lengths in l, times in μ0 l⁴/EI, angles in rad. */
 import { CONSTANTS } from "./constants.js";
 import { arc, clip, column, compose, geomspace, interp, largest, largestSize, mean, placeBelow } from "./math.js";
-import { splineAt } from "./math.js";
+import { splineMatrix } from "./math.js";
 import { InputError, general, quoted } from "./words.js";
 
 const { DWELLS, BEFORE, FORGOTTEN } = CONSTANTS.response;
@@ -23,6 +23,8 @@ const { QUICK, LONGEST, KEPT, NEARLY, COMPARED, WIDEST, COUNT: GRID, LONGER } = 
 const { PAIRS, TRIES } = CONSTANTS.zigzag; // the last simulated pair of dwells is taken
 const CURVE = DWELLS.length * 3; // numbers of a curve
 const COUNT = TIMES.length;
+const RESAMPLE = splineMatrix(DWELLS.map(Math.log), TIMES.map((time) => Math.log(Math.max(time, DWELLS[0]))))
+  .map((row, i) => row.map((share) => share * Math.min(TIMES[i] / DWELLS[0], 1)));
 const SAMPLES = 8; // of the track in each dwell
 const OBJECTIVES = ["error", "time", "flips"];
 const POINTS = ["head_centre", "head_tip", "pivot"];
@@ -55,13 +57,11 @@ function lagPlace(before, time) {
 
 /* Interpolate lags of a flat table at a place. */
 function lagAt(table, { first, share, part }) {
-  const lag = [0, 0, 0];
-  for (let axis = 0; axis < 3; axis++) {
-    const near = first + axis, far = near + 3 * COUNT;
-    const shorter = (1 - share) * table[near] + share * table[near + 3];
-    lag[axis] = (1 - part) * shorter + part * ((1 - share) * table[far] + share * table[far + 3]);
-  }
-  return lag;
+  const at = (axis) => {
+    const near = first + axis, far = near + 3 * COUNT, shorter = (1 - share) * table[near] + share * table[near + 3];
+    return (1 - part) * shorter + part * ((1 - share) * table[far] + share * table[far + 3]);
+  };
+  return [at(0), at(1), at(2)];
 }
 
 /* The step of TIMES below a time, and the share of the way to the next one. */
@@ -124,21 +124,28 @@ function trackedPoint(robot, { vehicle, unmeasured, calibrated, ownTable }, poin
 
 /* Resample a flat curve over DWELLS at TIMES. Below the shortest dwell it is a straight line to zero. */
 function resampled(curve) {
-  const places = TIMES.map((time) => Math.log(Math.max(time, DWELLS[0])));
-  const spline = splineAt(DWELLS.map(Math.log), curve, 3, places);
-  return spline.map((value, at) => value * Math.min(TIMES[Math.floor(at / 3)] / DWELLS[0], 1));
+  return product(RESAMPLE, [0, 1, 2].map((axis) => curve.filter((_, at) => at % 3 === axis)));
+}
+
+/* The flat table of a matrix times columns. */
+function product(matrix, columns) {
+  const table = new Float64Array(matrix.length * columns.length);
+  matrix.forEach((row, i) => columns.forEach((values, k) => {
+    let total = 0;
+    for (let j = 0; j < row.length; j++) total += row[j] * values[j];
+    table[i * columns.length + k] = total;
+  }));
+  return table;
 }
 
 /* Lags after dwells of BEFORE_KNOTS, from flat curves of the lag and of the memory after dwells `before`. */
 function lagTable(lag, memory, before = BEFORE) {
-  const knots = [...before, FORGOTTEN].map(Math.log), known = new Float64Array((before.length + 1) * CURVE);
-  known.set(memory);
-  const fine = splineAt(knots, known, CURVE, BEFORE_KNOTS.map(Math.log), true);
-  const table = new Float64Array(BEFORE_KNOTS.length * COUNT * 3);
-  for (let k = 0; k < BEFORE_KNOTS.length; k++) {
-    table.set(resampled(lag.map((value, at) => value + fine[k * CURVE + at])), k * COUNT * 3);
-  }
-  return table;
+  const shares = splineMatrix([...before, FORGOTTEN].map(Math.log), BEFORE_KNOTS.map(Math.log), true);
+  const after = Array.from(before, (_, j) => resampled(memory.slice(j * CURVE, (j + 1) * CURVE))), long = resampled(lag);
+  return Float64Array.from({ length: BEFORE_KNOTS.length * 3 * COUNT }, (_, at) => {
+    const row = shares[Math.floor(at / long.length)], place = at % long.length;
+    return after.reduce((total, values, j) => total + row[j] * values[place], long[place]);
+  });
 }
 
 /* What a vehicle does on a schedule: changes of the pose in each dwell; poses of the head's centre at the flips and

@@ -87,26 +87,23 @@ function quoted(text) {
   return quote + text.replace(/[^\S ]|\p{C}/gu, hidden).replaceAll(quote, `\\${quote}`) + quote;
 }
 
-/* The known word that is most like a given one, of at least this likeness; null if there is none. Likeness is twice
- * the number of letters in common blocks, the longest first, over the letters of both words. */
-function closeMatch(word, known, least = 0.6) {
-  const alike = (other) => (2 * common(other, word)) / Math.max(word.length + other.length, 1);
-  const [best] = Array.from(known).sort((one, other) => alike(other) - alike(one));
-  return best !== undefined && alike(best) >= least ? best : null;
+/* The known word that is most like a given one: at most a third of its letters differ; null if there is none. */
+function closeMatch(word, known) {
+  const far = Array.from(known, (other) => editsBetween(word, other)), least = Math.min(...far);
+  return least <= word.length / 3 ? known[far.indexOf(least)] : null;
 }
 
-function common(first, second) {
-  let [length, at, other] = [0, 0, 0];
-  for (let i = 0; i < first.length; i++) {
-    for (let j = 0; j < second.length; j++) {
-      let count = 0;
-      while (i + count < first.length && first[i + count] === second[j + count]) count++;
-      if (count > length) [length, at, other] = [count, i, j];
+/* The number of letters to insert, remove or replace (Levenshtein's distance). */
+function editsBetween(word, other) {
+  let row = Array.from({ length: other.length + 1 }, (_, j) => j);
+  for (const [i, letter] of Array.from(word).entries()) {
+    const above = row;
+    row = [i + 1];
+    for (let j = 0; j < other.length; j++) {
+      row.push(Math.min(row[j] + 1, above[j + 1] + 1, above[j] + (letter === other[j] ? 0 : 1)));
     }
   }
-  if (!length) return 0;
-  const before = common(first.slice(0, at), second.slice(0, other));
-  return before + length + common(first.slice(at + length), second.slice(other + length));
+  return row[other.length];
 }
 
 export { InputError, refusing, naming, DECLARING, REMEDY, FOLLOWING, tell, inPage, repr, general, fixed, quoted };

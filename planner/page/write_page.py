@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from planner.files.tracker_header import DIRECTIONS, c_part, header_template
-from planner.page.first_state import NamedPath, first_options, robots_of, shapes_of, slider_ends
+from planner.files.plan_files import schedule_template
+from planner.files.tracker_header import header_template
+from planner.page.first_state import NamedPath, first_options, first_plan, robots_of, shapes_of, slider_ends
 from planner.page.page import page_text
 from planner.page.table_data import packed_bytes, packed_data, table_data
+from planner.paths.path import circle
 from planner.planning.request import PlanRequest
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.from_table import both_directions
@@ -60,6 +62,7 @@ def write_page(
     known = knowledge or CalibrationKnowledge()
     why = _locked(robot, lookup, known)
     shapes = shapes_of(tracked.vehicle.turn_radius * robot.tail_length, paths)
+    first = paths[0].path if paths else circle(shapes[0]["size"] / 100)
     data = {
         "robots": robots_of(robot)[: 1 if why else None],
         "limits": slider_ends(robot, lookup.domain),
@@ -68,16 +71,14 @@ def write_page(
             "robot": robot.name,
             "shape": shapes[0]["name"],
             "options": first_options(request, robot, smooth),
+            "plan": first_plan(first.scaled(1 / robot.tail_length), tracked, request),
         },
         "locked": {"name": robot.name, "why": why} if why else None,
         "planner": {
             "table": _planner_data(lookup, robot, tracked, why),
             "files": {
                 "codeVersion": code_version(),
-                "directions": DIRECTIONS,
-                "flash": c_part("schedule_flash.h"),
-                "schedule": c_part("schedule.h"),
-                "tracker": packed_bytes(header_template().encode()),
+                "headers": packed_bytes(f"{schedule_template()}\f{header_template()}".encode()),
             },
         },
     }
@@ -114,7 +115,8 @@ def _shorter(mode: Mode) -> Mode:
 
 
 def _mode_data(mode: Mode) -> dict[str, Any]:
-    return {"name": mode.name, "twist": mode.twist, "lag": mode.lag, "current": mode.current}
+    lag = None if mode.lag is None else list(mode.lag)
+    return {"name": mode.name, "twist": mode.twist.tolist(), "lag": lag, "current": mode.current.tolist()}
 
 
 def _planner_data(lookup: LookupTable, robot: Robot, tracked: TrackedVehicle, why: str) -> Any:
@@ -129,20 +131,22 @@ def _planner_data(lookup: LookupTable, robot: Robot, tracked: TrackedVehicle, wh
         "ownTable": tracked.own_table,
         "calibrated": tracked.calibrated,
         "groups": robot.group_values(),
+        "unmeasured": [_mode_data(_shorter(mode)) for mode in tracked.unmeasured],
         "vehicle": {
-            "twist": vehicle.twist,
+            "twist": vehicle.twist.tolist(),
             "curves": [
                 {name: getattr(curves, name)[i] for name in ("lag", "memory", "rest", "spread")} for i in (0, 1)
             ],
             "before": curves.before,
-            "phaseRate": vehicle.phase_rate,
+            "phaseRate": vehicle.phase_rate.tolist(),
             "errors": [
-                {"twist": twist, "lag": lag, "memory": memory} if lag.any() or memory.any() else {"twist": twist}
+                {"twist": twist.tolist(), "lag": lag, "memory": memory}
+                if lag.any() or memory.any()
+                else {"twist": twist.tolist(), "lag": None, "memory": None}
                 for twist, lag, memory in zip(errors.twist, errors.lag, errors.memory, strict=True)
             ],
             "modes": [_mode_data(mode) for mode in vehicle.modes if not mode.name.startswith("table: ")],
-            "unmeasured": [_mode_data(_shorter(mode)) for mode in tracked.unmeasured],
-            "current": vehicle.current,
+            "current": vehicle.current.tolist(),
             "tailGap": vehicle.tail_gap,
             "leastGap": vehicle.least_gap,
         },

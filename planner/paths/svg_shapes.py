@@ -1,7 +1,7 @@
 """Numbers, lengths, transforms, views and outlines of SVG drawings, from the words of their attributes.
 
 svgelements reads data of paths, makes outlines, and multiplies transforms; what it would leave out in silence is
-refused here. Names and units are in planner/page/svg_names.js, which the page reads, too.
+refused here.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ from typing import Any
 from svgelements import Ellipse, Matrix, Polygon, Polyline, Rect, SimpleLine
 from svgelements import Path as SvgPath
 
-from planner.paths.shared_names import shared_names
+from planner.paths.svg_names import NAMES
 from sim.io.errors import InputError
 
-NAMES = shared_names("svg_names.js")
 _N = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 NUMBER = re.compile(_N)
 _LENGTH = re.compile(rf"({_N})\s*([a-zA-Z]*|%)")

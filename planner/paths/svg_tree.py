@@ -19,7 +19,8 @@ from svgelements import Close, Line, Matrix, Move
 from svgelements import Path as SvgPath
 
 from planner.paths.style_sheet import declarations, declared, read_style_sheet
-from planner.paths.svg_shapes import NAMES, NUMBER, Lengths, View, fitted, numbers, outline, transform_of
+from planner.paths.svg_names import NAMES
+from planner.paths.svg_shapes import NUMBER, Lengths, View, fitted, numbers, outline, transform_of
 from sim.arrays import Floats
 from sim.io.errors import InputError
 

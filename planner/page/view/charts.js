@@ -1,8 +1,7 @@
 /* Small charts: dwells over time, and error over time of a measured track. Drawn in pixels. */
-
-import { figure } from "./dom.js";
+import { largest } from "../math.js";
+import { digits, figure } from "./dom.js";
 import { lineData } from "./scene.js";
-import { digits } from "./words.js";
 
 const EDGE = { left: 46, right: 10, top: 10, bottom: 18 };
 
@@ -10,7 +9,7 @@ const EDGE = { left: 46, right: 10, top: 10, bottom: 18 };
 function chart(svg, { times, values, words, unit, limit = null, steps = false }) {
   const width = svg.clientWidth || 600, height = svg.clientHeight || 64;
   const first = times[0], span = Math.max(times[times.length - 1] - first, 1e-12);
-  const high = Math.max(limit ?? 0, ...extremes(values)) || 1;
+  const high = Math.max(limit ?? 0, largest(values)) || 1;
   const x = (time) => EDGE.left + ((width - EDGE.left - EDGE.right) * (time - first)) / span;
   const y = (value) => height - EDGE.bottom - ((height - EDGE.top - EDGE.bottom) * value) / high;
   const points = steps
@@ -34,12 +33,6 @@ function chart(svg, { times, values, words, unit, limit = null, steps = false })
   return x;
 }
 
-function extremes(values) {
-  let high = 0;
-  for (const value of values) high = Math.max(high, value);
-  return [high];
-}
-
 /* The line that marks a time in a chart of this height. */
 function marker(svg, x) {
   svg.querySelector(".time")?.remove();
@@ -51,14 +44,12 @@ function marker(svg, x) {
 /* Draw stated error over time for several dwells; `take(dwell)` is called with the one that is chosen. */
 function tradeOff(rows, chosen, take) {
   const width = 320, height = 190;
-  const svg = figure("svg", {
-    viewBox: `0 0 ${width} ${height}`, role: "group", "aria-label": "Stated error over time",
-  });
+  const about = { viewBox: `0 0 ${width} ${height}`, role: "group", "aria-label": "Stated error over time" };
   const minutes = rows.map((row) => row.seconds / 60), errors = rows.map((row) => row.stated);
-  const [low, high] = [0, Math.max(...minutes) * 1.05], most = Math.max(...errors) * 1.1;
-  const x = (value) => 44 + ((width - 60) * (value - low)) / (high - low),
-    y = (value) => height - 34 - ((height - 50) * value) / most;
-  svg.append(
+  const high = Math.max(...minutes) * 1.05, most = Math.max(...errors) * 1.1;
+  const x = (value) => 44 + ((width - 60) * value) / high, y = (value) => height - 34 - ((height - 50) * value) / most;
+  const svg = figure(
+    "svg", about,
     figure("path", { class: "grid", d: `M44,${y(0)}H${width - 16}M44,${y(0)}V${y(most)}` }),
     figure("path", { class: "curve", d: lineData(rows.map((_, i) => [x(minutes[i]), y(errors[i])])) }),
     figure("text", { x: width - 16, y: height - 6, "text-anchor": "end" }, "time [min]"),
@@ -74,16 +65,11 @@ function tradeOff(rows, chosen, take) {
       event.preventDefault();
       choose();
     };
-    svg.append(
-      figure(
-        "circle",
-        {
-          class: "dot", cx: x(minutes[i]), cy: y(errors[i]), r: row.dwell === chosen ? 8 : 6, tabindex: 0,
-          role: "button", "aria-label": words, click: choose, keydown: key,
-        },
-        figure("title", {}, words),
-      ),
-    );
+    const dot = {
+      class: "dot", cx: x(minutes[i]), cy: y(errors[i]), r: row.dwell === chosen ? 8 : 6, tabindex: 0, role: "button",
+      "aria-label": words, click: choose, keydown: key,
+    };
+    svg.append(figure("circle", dot, figure("title", {}, words)));
   });
   return svg;
 }

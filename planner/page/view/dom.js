@@ -1,4 +1,5 @@
-/* Elements of HTML and SVG. Text is always set as text, never as markup. */
+/* Elements of HTML and SVG, whose text is always set as text, never as markup; numbers for readers, lengths in cm and
+ * times in s, min or h; the picture as a file of its own. */
 
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -46,4 +47,61 @@ function save(name, text, type = "text/plain") {
   setTimeout(() => URL.revokeObjectURL(address), 10_000);
 }
 
-export { byId, describe, element, figure, save, say };
+const LEAST = 0.001; // cm: the grid of points
+
+/* A number to three digits, without an exponent where that is readable. */
+function digits(value, count = 3) {
+  if (!Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size >= 1e6 || size < 1e-4) return value.toExponential(count - 1).replace("-", "−");
+  const places = Math.max(0, count - 1 - Math.floor(Math.log10(size)));
+  return value.toFixed(Math.min(places, 8)).replace("-", "−");
+}
+
+function duration(seconds) {
+  if (seconds < 90) return `${digits(seconds)} s`;
+  if (seconds < 5400) return `${digits(seconds / 60)} min`;
+  return `${digits(seconds / 3600)} h`;
+}
+
+/* Minutes and seconds of a clock: 3:07.5 */
+function clock(seconds) {
+  const tenths = Math.round(10 * seconds);
+  return `${Math.floor(tenths / 600)}:${((tenths % 600) / 10).toFixed(1).padStart(4, "0")}`;
+}
+
+function degrees(radians) {
+  return digits((radians * 180) / Math.PI);
+}
+
+/* A length in cm; with `tails`, in tail lengths behind it. */
+function length(centimetres, tailLength, tails) {
+  if (centimetres < LEAST) return `below ${LEAST} cm`;
+  return tails ? `${digits(centimetres)} cm (${digits(centimetres / tailLength)} l)` : `${digits(centimetres)} cm`;
+}
+
+/* Write an SVG element with its styles as text. Colours are those of light paper. */
+function pictureText(svg, title, style) {
+  const copy = svg.cloneNode(true);
+  const [width, height] = [svg.clientWidth, svg.clientHeight];
+  copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
+  copy.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  for (const name of ["tabindex", "aria-labelledby", "aria-busy", "data-mode"]) copy.removeAttribute(name);
+  const rules = document.createElementNS("http://www.w3.org/2000/svg", "style");
+  rules.textContent = drawingRules(style);
+  const name = document.createElementNS("http://www.w3.org/2000/svg", "title");
+  name.textContent = title;
+  copy.prepend(name, rules);
+  return `<?xml version="1.0" encoding="UTF-8"?>\n${new XMLSerializer().serializeToString(copy)}\n`;
+}
+
+/* The rules of the page that concern lines and letters: those before the first condition. */
+function drawingRules(style) {
+  return (
+    style.slice(0, style.indexOf("@media")) +
+    style.slice(style.indexOf("svg text"), style.indexOf("/* end of lines */")).replace("0.75rem", "12px")
+  );
+}
+
+export { byId, clock, degrees, describe, digits, duration, element, figure, length, pictureText, save, say };

@@ -1,22 +1,17 @@
 /* The page: what the user changes, what is planned for it, and what is shown. */
-
-import { byId, element, save, say } from "./dom.js";
 import { inflated } from "../data.js";
+import { runningSum, sum } from "../math.js";
+import { inPage } from "../words.js";
 import { chart, marker, tradeOff } from "./charts.js";
-import { showCorners } from "./corner_table.js";
-import { connect } from "./controls.js";
-import { askUnit } from "./imports.js";
-import { showTrack } from "./measured.js";
-import { FileProblem, oneFile } from "./one_file.js";
-import { PathEditor, WORDS } from "./path_editor.js";
-import { pictureText } from "./picture.js";
+import { byId, element, pictureText, save, say } from "./dom.js";
+import { PathEditor, showCorners, WORDS } from "./editor.js";
+import { askUnit, FileProblem, oneFile } from "./files.js";
+import { connect, RobotForm, showMotion, showResults, summary } from "./panels.js";
 import { PlanView } from "./plan_view.js";
 import { PlannerClient } from "./planner_client.js";
 import { Player } from "./player.js";
-import { showResults, summary } from "./results.js";
-import { RobotForm, showMotion } from "./robot_form.js";
-import { Runs } from "./runs.js";
-import { History, addressOf, fromAddress, labValues, onGrid, pointsRefusal, wishOf } from "./state.js";
+import { Runs, showTrack } from "./runs.js";
+import { addressOf, fromAddress, History, labValues, onGrid, pointsRefusal, wishOf } from "./state.js";
 
 const PAUSE = 120; // ms after the last change until a plan begins
 
@@ -56,6 +51,9 @@ class Page {
     this.notice = problem;
     connect(this);
     this.refresh();
+    const { plan } = this.data.first; // that Python has made
+    if (plan && state === this.initial) this.planned({ answer: plan }, this.wish());
+    this.planNow();
   }
 
   /* The state that the address holds: {state, problem}. */
@@ -173,6 +171,7 @@ class Page {
   }
 
   async planNow() {
+    clearTimeout(this.timer);
     this.timer = null;
     this.writeAddress();
     const wish = this.wish();
@@ -181,12 +180,12 @@ class Page {
     this.client.plan(wish, {
       began: () => this.began(),
       progress: ({ stage, done }) => say(byId("progress"), `Planning: ${stage}, ${Math.round(100 * done)} %`),
-      done: (answer) => this.planned(answer),
+      done: (answer) => this.planned(answer, wish),
     });
   }
 
   began() {
-    this.old = true;
+    this.old = this.plannedFor !== this.state;
     clearTimeout(this.slow);
     this.slow = setTimeout(() => {
       byId("stop").hidden = false;
@@ -202,7 +201,7 @@ class Page {
     this.mark();
   }
 
-  planned(answer) {
+  planned(answer, { robot }) {
     this.ended();
     if (!answer.broken) this.problem("");
     say(byId("options-problem"), "", true);
@@ -213,23 +212,20 @@ class Page {
       this.show();
       return;
     }
-    this.plan = answer.answer;
+    const again = this.plannedFor === this.state;
+    this.plan = shown(answer.answer, robot);
+    this.plannedFor = this.state;
     this.old = false;
     say(byId("message"), summary(this.plan));
     showResults(this.plan, byId("tails").checked);
     this.scale = chart(byId("strip"), {
-      times: this.ends(), values: [...this.plan.dwells], words: "dwell from flip to flip, over time", unit: "s",
+      times: runningSum(this.plan.dwells), values: [...this.plan.dwells], words: "dwell from flip to flip, over time", unit: "s",
       steps: true,
     });
-    this.player.take(this.plan);
+    this.player.take(this.plan, again);
     this.show();
     if (this.track) this.compare();
     if (byId("trade").open) this.tradeOff();
-  }
-
-  ends() {
-    let end = 0;
-    return [0, ...Array.from(this.plan.dwells, (dwell) => (end += dwell))];
   }
 
   problem(words) {
@@ -386,6 +382,21 @@ class Page {
     this.offerNext();
     this.view.place();
   }
+}
+
+/* A plan with what the picture needs besides the planner's numbers; robot: its fields. */
+function shown(plan, robot) {
+  const { motion, samples, offset, dwells, warnings } = plan, cm = (length) => 100 * length;
+  const track = motion.map(([x, y, heading]) => [x + offset * Math.cos(heading), y + offset * Math.sin(heading)]);
+  return {
+    ...plan, track, flips: track.filter((_, i) => i % samples === 0), start: motion[0], seconds: sum(dwells),
+    warnings: warnings.map((words) => inPage(words, robot)),
+    tailLength: cm(robot.tailLength),
+    body: {
+      headLength: cm(robot.headLength), headRadius: cm(robot.headRadius), tailLength: cm(robot.tailLength),
+      tailRadius: cm(robot.tailRadius), discOffset: cm(robot.discOffset ?? robot.headRadius), tails: robot.tails,
+    },
+  };
 }
 
 inflated(byId("planner").textContent.trim()).text()

@@ -1,8 +1,7 @@
 /* The large picture and its lens: layers, zoom, pan; by mouse, pen, finger and keyboard. */
-
 import { byId, figure } from "./dom.js";
-import { axes, flips, planLayers, poseTransform, robotShape } from "./scene.js";
-import { fitted, lensPlace, panned, placeAt, transform, viewport, zoomed } from "./viewport.js";
+import { axes, fitted, flips, lensPlace, panned, placeAt, planLayers, poseTransform, robotShape } from "./scene.js";
+import { transform, viewport, zoomed } from "./scene.js";
 
 const LENS = 10; // times larger than the picture
 const LENS_MARGIN = 10; // pixels from the edges, as in page.css

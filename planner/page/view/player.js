@@ -1,7 +1,6 @@
 /* Playing a plan: time, speed, the robot's pose, the state of its motor. Lengths in cm, times in s. */
-
-import { byId, element } from "./dom.js";
-import { clock } from "./words.js";
+import { clip, placeBelow, runningSum } from "../math.js";
+import { byId, clock, element } from "./dom.js";
 
 const SPEEDS = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
 const WISHED = 40; // seconds that the whole plan takes at the first speed
@@ -17,14 +16,14 @@ class Player {
     byId("time").addEventListener("input", () => this.show());
   }
 
-  /* Take a plan. The time goes back to its start; the first plan starts by itself unless less motion is wanted. */
-  take(plan) {
+  /* Take a plan. The time goes back to its start, unless it is the same plan again; the first plan starts by itself
+   * unless less motion is wanted. */
+  take(plan, again) {
     const first = this.plan === null;
     this.plan = plan;
-    this.ends = [0];
-    for (const dwell of plan.dwells) this.ends.push(this.ends[this.ends.length - 1] + dwell);
+    this.ends = runningSum(plan.dwells);
     byId("time").max = this.end;
-    byId("time").value = 0;
+    if (!again) byId("time").value = 0;
     if (first) {
       byId("speed").value = SPEEDS.find((speed) => this.end / speed <= WISHED) ?? SPEEDS[SPEEDS.length - 1];
       this.toggle(!matchMedia("(prefers-reduced-motion: reduce)").matches);
@@ -74,13 +73,8 @@ class Player {
 
 /* The pose at a time, and the number of the dwell: linear between the samples of the track. */
 function poseAt(plan, ends, time) {
-  let low = 0, high = plan.dwells.length - 1;
-  while (low < high) {
-    const middle = (low + high + 1) >> 1;
-    if (ends[middle] <= time) low = middle;
-    else high = middle - 1;
-  }
-  const share = Math.min(Math.max((time - ends[low]) / plan.dwells[low], 0), 1) * plan.samples;
+  const low = clip(placeBelow(ends, time), 0, plan.dwells.length - 1);
+  const share = clip((time - ends[low]) / plan.dwells[low], 0, 1) * plan.samples;
   const sample = Math.min(Math.floor(share), plan.samples - 1);
   const before = plan.motion[low * plan.samples + sample], after = plan.motion[low * plan.samples + sample + 1];
   const pose = before.map((value, k) => value + (share - sample) * (after[k] - value));

@@ -1,7 +1,38 @@
-/* A table of runs: each run beside the look-up table's answer, what is missing, and the command that calibrates. */
+/* What was measured: a track over the plan with its errors, and runs beside the look-up table's answers. */
+import { chart } from "./charts.js";
+import { byId, describe, digits, duration, element, figure, length, say } from "./dom.js";
 
-import { byId, element, say } from "./dom.js";
-import { digits } from "./words.js";
+/* Show a track's errors; `actions` has fit(how), saveTrack() and remove(). */
+function showTrack(track, plan, tails, actions) {
+  const size = (value) => length(value, plan.tailLength, tails);
+  const { error } = track;
+  const [worstX, worstY] = error.worst.place;
+  const list = element("dl");
+  const within = error.largest <= error.stated;
+  describe(list, [
+    ["Track", `${track.name}${track.shift ? ` (moved: ${track.shift})` : ""}`],
+    ...(track.ofPlan ? [["Of plan", `${track.ofPlan}, as the file says; compared with the plan above`]] : []),
+    ["From the path to follow", `${size(error.rms)} rms, ${size(error.largest)} at most`],
+    ["Stated error", `${size(error.stated)}: the track is ${within ? "within" : "above"} it`],
+    ["From the drawn path", `${size(error.rawRms)} rms, ${size(error.rawLargest)} at most`],
+    ["Largest error", `at ${duration(error.worst.time)}, x ${digits(worstX)} cm, y ${digits(worstY)} cm`],
+  ]);
+  const picture = figure("svg", {
+    class: "chart", width: "100%", height: 90, role: "img", "aria-label": "Distance from the path over time",
+  });
+  const button = (words, click) => element("button", { type: "button", click }, words);
+  const buttons = element(
+    "div", { class: "row" }, button("Begin at time 0", () => actions.fit("time")),
+    button("Lay on the plan (rigid motion)", () => actions.fit("rigid")),
+    button("As measured", () => actions.fit("none")), button("Save track.csv", actions.saveTrack),
+    button("Remove", actions.remove),
+  );
+  byId("measured").replaceChildren(list, picture, buttons);
+  chart(picture, {
+    times: error.times, values: error.distances, words: "distance from the path over time", unit: "cm",
+    limit: error.stated,
+  });
+}
 
 const PLAIN = /^[\w@%+=:,./-]+$/; // a word that a shell takes as it is
 /* Quantity and unit of a column. */
@@ -33,7 +64,7 @@ class Runs {
     const { name, table } = this.opened;
     await this.ask({ table, name, robot }, ({ answer, refusal }) => {
       if (!this.opened || this.compared !== key) return;
-      say(byId("runs-problem"), refusal ?? answer.refused ?? "", true);
+      say(byId("runs-problem"), refusal ?? "", true);
       byId("runs").replaceChildren(...(refusal ? [] : this.parts(name, answer)));
     });
   }
@@ -66,13 +97,13 @@ class Runs {
         copied.textContent = "The browser does not let the page copy: the command is selected, press Ctrl-C.";
       }
     };
+    const button = (words, click) => element("button", { type: "button", click }, words);
     return [
-      element("p", {}, "Save robot.toml beside the table. The fit itself is made by the command:"),
+      element("p", {}, "Save robot.toml beside the table. The fit, and the search for copied rows, are made by the command:"),
       element("pre", {}, code),
       element(
-        "div", { class: "row" }, element("button", { type: "button", click: copy }, "Copy the command"),
-        element("button", { type: "button", click: this.saveRobot }, "Save robot.toml"),
-        element("button", { type: "button", click: () => this.remove() }, "Remove the runs"), copied,
+        "div", { class: "row" }, button("Copy the command", copy), button("Save robot.toml", this.saveRobot),
+        button("Remove the runs", () => this.remove()), copied,
       ),
     ];
   }
@@ -102,25 +133,15 @@ function signed(percent) {
 }
 
 function tableOf({ columns, rows }) {
-  const fixed = ["row", "N", "l [cm]", "motor [rpm]"];
-  const parts = columns.flatMap(() => ["measured", "table", "%"]);
   const heads = [
-    ...fixed.map((words) => element("th", { scope: "col", rowspan: 2 }, words)),
+    ...["row", "N", "l [cm]", "motor [rpm]"].map((words) => element("th", { scope: "col", rowspan: 2 }, words)),
     ...columns.map((column) => element("th", { scope: "colgroup", colspan: 3 }, WORDS[column])),
   ];
-  return element(
-    "div",
-    { class: "wide runs", tabindex: 0, role: "region", "aria-label": "Runs beside the look-up table" },
-    element(
-      "table",
-      {},
-      element(
-        "thead", {}, element("tr", {}, ...heads),
-        element("tr", {}, ...parts.map((words) => element("th", { scope: "col" }, words))),
-      ),
-      element("tbody", {}, ...rows.map((run) => rowOf(run, columns.length))),
-    ),
-  );
+  const parts = columns.flatMap(() => ["measured", "table", "%"]).map((words) => element("th", { scope: "col" }, words));
+  const head = element("thead", {}, element("tr", {}, heads), element("tr", {}, parts));
+  const body = element("tbody", {}, rows.map((run) => rowOf(run, columns.length)));
+  const about = { class: "wide runs", tabindex: 0, role: "region", "aria-label": "Runs beside the look-up table" };
+  return element("div", about, element("table", {}, head, body));
 }
 
 function rowOf({ row, inputs, measured, answer, percent, outside }, count) {
@@ -140,4 +161,4 @@ function listed(title, sentences) {
   return [element("h4", {}, title), list];
 }
 
-export { Runs };
+export { Runs, showTrack };

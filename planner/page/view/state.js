@@ -6,7 +6,6 @@
  *            page are in whole thousandths, those of a file are as in the file
  *   options  those of OPTIONS
  * The address holds, after #, a version and what differs from the page's own first state. */
-
 import { closeMatch } from "../words.js";
 
 const VERSION = 1;
@@ -87,111 +86,66 @@ function wishOf({ robot, path, options }, given) {
 
 /* Write a state as the part of an address behind #, without what is as in `initial`. */
 function addressOf(state, initial) {
-  const parts = [`v=${VERSION}`];
-  if (state.robot.name !== initial.robot.name) parts.push(`robot=${encodeURIComponent(state.robot.name)}`);
-  for (const { key } of FIELDS) {
-    const value = state.robot.values[key];
-    if (value !== initial.robot.values[key]) parts.push(`${key}=${value === null ? "none" : value}`);
+  const parts = [], { shape, size, points, closed, name } = state.path;
+  const add = (key, value, first) => {
+    if (value !== first) parts.push(`${key}=${encodeURIComponent(value ?? "none")}`);
+  };
+  add("robot", state.robot.name, initial.robot.name);
+  for (const { key } of FIELDS) add(key, state.robot.values[key], initial.robot.values[key]);
+  if (JSON.stringify(state.path) !== JSON.stringify(initial.path)) {
+    if (!points) add("path", `${shape}:${size}`);
+    else if (JSON.stringify(points) === JSON.stringify(onGrid(points))) add("points", packed(points));
+    else add("places", points.join("~"));
+    if (closed) add("closed", 1);
+    add("name", name || undefined);
   }
-  const { shape, size, points, closed, name } = state.path;
-  if (points) {
-    parts.push(isOnGrid(points) ? `points=${packed(points)}` : `places=${points.map(String).join("~")}`);
-    if (closed) parts.push("closed=1");
-    if (name) parts.push(`name=${encodeURIComponent(name)}`);
-  } else if (shape !== initial.path.shape || size !== initial.path.size) {
-    parts.push(`path=${encodeURIComponent(`${shape}:${size}`)}`);
-  }
-  for (const key of Object.keys(OPTIONS)) {
-    if (state.options[key] !== initial.options[key]) parts.push(`${key}=${state.options[key] ?? "none"}`);
-  }
-  return parts.length === 1 ? "" : parts.join("&");
+  for (const key of Object.keys(OPTIONS)) add(key, state.options[key], initial.options[key]);
+  return parts.length ? [`v=${VERSION}`, ...parts].join("&") : "";
 }
 
 /* Read an address; return {state, problem}. A problem is a sentence, and the state is then `initial`. */
 function fromAddress(text, initial, shapes) {
   if (text === "") return { state: initial, problem: "" };
   try {
-    const parts = new Map(text.split("&").map((part) => splitPart(part)));
-    if (parts.get("v") !== String(VERSION)) throw new Error("it is of another version of this page");
-    parts.delete("v");
-    const robot = readRobot(parts, initial.robot);
-    const path = readPath(parts, initial.path, shapes);
-    const options = readOptions(parts, initial.options);
-    if (parts.size) throw new Error(`it has an unknown part, ${[...parts.keys()][0]}`);
-    return { state: { robot, path, options }, problem: "" };
+    return { state: readState(new Map(new URLSearchParams(text)), initial, shapes), problem: "" };
   } catch (broken) {
     const problem = `The link cannot be read: ${broken.message}. The page shows its own first plan.`;
     return { state: initial, problem };
   }
 }
 
-function splitPart(part) {
-  const at = part.indexOf("=");
-  if (at < 1) throw new Error("it is cut off or damaged");
-  return [part.slice(0, at), part.slice(at + 1)];
-}
-
-function taken(parts, key) {
-  const value = parts.get(key);
-  parts.delete(key);
-  return value;
-}
-
-function readRobot(parts, robot) {
-  const name = taken(parts, "robot");
-  const values = { ...robot.values };
-  for (const { key, optional } of FIELDS) {
-    const text = taken(parts, key);
-    if (text !== undefined) values[key] = text === "none" && optional ? null : number(key, text);
-  }
-  return { name: name === undefined ? robot.name : decoded(name), values };
-}
-
-function readPath(parts, path, shapes) {
-  const points = taken(parts, "points");
-  const places = taken(parts, "places");
-  const closed = taken(parts, "closed") === "1";
-  const name = decoded(taken(parts, "name") ?? "");
-  const words = taken(parts, "path");
-  if (points !== undefined) return { points: unpacked(points), closed, name };
-  if (places !== undefined) return { points: listed(places), closed, name };
-  if (words === undefined) return path;
-  const at = decoded(words).lastIndexOf(":");
-  const [shape, size] = [decoded(words).slice(0, at), number("path", decoded(words).slice(at + 1))];
-  if (!shapes.includes(shape)) {
-    const near = closeMatch(shape, shapes);
-    throw new Error(`it has an unknown shape, ${shape}${near === null ? "" : ` (is it ${near}?)`}`);
-  }
-  return { shape, size };
-}
-
-function readOptions(parts, options) {
-  const read = { ...options };
+function readState(parts, initial, shapes) {
+  const values = { ...initial.robot.values }, options = { ...initial.options };
+  const known = ["v", "robot", "points", "places", "closed", "name", "path", ...Object.keys(values), ...Object.keys(OPTIONS)];
+  const unknown = [...parts.keys()].find((key) => !known.includes(key));
+  if (parts.get("v") !== String(VERSION)) throw new Error("it is of another version of this page");
+  if (unknown !== undefined) throw new Error(`it has an unknown part, ${unknown}`);
+  if ([...parts.values()].join("").includes("\ufffd")) throw new Error("it is cut off or damaged");
+  for (const { key, optional } of FIELDS) if (parts.has(key)) values[key] = number(key, parts.get(key), optional);
   for (const [key, standard] of Object.entries(OPTIONS)) {
-    const text = taken(parts, key);
-    if (text === undefined) continue;
-    if (typeof standard === "string") read[key] = decoded(text);
-    else read[key] = text === "none" ? null : number(key, text);
+    if (parts.has(key)) options[key] = typeof standard === "string" ? parts.get(key) : number(key, parts.get(key), true);
   }
-  return read;
+  return {
+    robot: { name: parts.get("robot") ?? initial.robot.name, values }, options,
+    path: readPath(Object.fromEntries(parts), initial.path, shapes),
+  };
 }
 
-function decoded(text) {
-  try {
-    return decodeURIComponent(text);
-  } catch {
-    throw new Error("it is cut off or damaged");
-  }
+function readPath({ points, places, closed, name = "", path }, initial, shapes) {
+  if (points ?? places) return { points: points ? unpacked(points) : listed(places), closed: closed === "1", name };
+  if (path === undefined) return initial;
+  const at = path.lastIndexOf(":"), shape = path.slice(0, at), size = number("path", path.slice(at + 1));
+  if (shapes.includes(shape)) return { shape, size };
+  const near = closeMatch(shape, shapes);
+  throw new Error(`it has an unknown shape, ${shape}${near === null ? "" : ` (is it ${near}?)`}`);
 }
 
-function number(key, text) {
+/* Read a number; null: "none", which only some may be. */
+function number(key, text, optional = false) {
   const value = Number(text);
+  if (optional && text === "none") return null;
   if (text.trim() === "" || !Number.isFinite(value)) throw new Error(`${key} is no number`);
   return value;
-}
-
-function isOnGrid(points) {
-  return points.every((point) => point.every((value) => value === Math.round(value * THOUSANDTHS) / THOUSANDTHS));
 }
 
 /* Write thousandths as differences in base 36: "a.-3~1.0" has the points (10, -3) and (11, -3) thousandths. */
@@ -267,4 +221,4 @@ class History {
   }
 }
 
-export { FIELDS, History, addressOf, fromAddress, labValues, onGrid, pointsRefusal, siValues, wishOf };
+export { FIELDS, OPTIONS, History, addressOf, fromAddress, labValues, onGrid, pointsRefusal, siValues, wishOf };

@@ -100,7 +100,7 @@ def test_a_browser_reads_the_same_trees() -> None:
     program = chromium()
     from playwright.sync_api import sync_playwright
 
-    source = "\n".join((FOLDER / name).read_text() for name in ("words.js", "view/drawing.js"))
+    source = "\n".join((FOLDER / name).read_text() for name in ("words.js", "view/files.js"))
     source = "\n".join(line for line in source.splitlines() if not line.startswith(("import ", "export ")))
     read = f"""(texts) => {{ {source}
       return texts.map((text) => refusing(() => drawingTree(text, "a.svg"), ({{ message }}) => message)); }}"""

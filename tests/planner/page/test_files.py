@@ -13,10 +13,10 @@ import pandas as pd
 import pytest
 
 import softflagella as sf
-from planner.files.plan_files import write_plan
+from planner.files.plan_files import schedule_template, write_plan
 from planner.files.plan_json import load_plan
 from planner.files.saved_plan import restore_plan
-from planner.files.tracker_header import DIRECTIONS, c_part, header_template
+from planner.files.tracker_header import header_template
 from planner.files.tracking_error import tracking_error
 from planner.page.first_state import first_options, slider_ends
 from planner.paths.path import circle, shape_of
@@ -32,13 +32,12 @@ from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml
 from sim.model.uncertainty import Sigma
 from tests.planner.page.cases import CONTROL, PATHS, followed, planned, shipped
-from tests.planner.page.page_core import TABLE, answer, answers, call, check_near, opened, page_options, to_page
+from tests.planner.page.page_core import TABLE, answer, answers, call, check_near, opened, to_page
 from tests.planner.page.parity import check_header, refusal_of
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
 
-PARTS = {"codeVersion": code_version(), "directions": DIRECTIONS, "flash": c_part("schedule_flash.h"),
-         "schedule": c_part("schedule.h"), "tracker": header_template()}  # fmt: skip
+PARTS = {"codeVersion": code_version(), "schedule": schedule_template(), "tracker": header_template()}
 PLANS: dict[str, tuple[str, str, float, dict[str, Any]]] = {
     "circle": ("circle", "symmetric", 0.0, {"objective": "flips"}),
     "bend": ("bend", "biased", CONTROL.head_length / 2 / CONTROL.tail_length, {"objective": "flips"}),
@@ -82,8 +81,9 @@ def test_warnings() -> None:
 
 
 def test_a_plan_of_the_page_is_restored() -> None:
-    options = page_options({"objective": "flips"})
-    made = call("plan.js", "planPath", PATHS["wave"], CONTROL, TABLE, options)
+    request = call("plan.js", "planRequest", {"objective": "flips"})
+    tracked = call("from_table.js", "trackedVehicle", CONTROL, TABLE, "head_centre")
+    made = call("plan.js", "makePlan", PATHS["wave"], tracked, request)
     theirs = json.loads(answer("plan_files.js", "planRecord", made)["text"])
     restored = restore_plan(theirs, lookup=shipped())
     check_near([restored.predicted_max, restored.predicted_rms],
@@ -103,7 +103,7 @@ def compared(content: dict[str, Any], frame: pd.DataFrame, how: str = "none") ->
     plans = frame.get("plan_id", pd.Series(dtype=str)).unique().tolist()
     numbers = frame.drop(columns="plan_id", errors="ignore")
     table = {"names": list(numbers), "columns": [numbers[name].to_list() for name in numbers], "plans": plans}
-    return answer("track.js", "comparedTrack", content, table, how)
+    return answer("measured.js", "comparedTrack", content, table, how)
 
 
 @pytest.mark.parametrize("noise", [0.0, 2.0])

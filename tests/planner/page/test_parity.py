@@ -154,9 +154,10 @@ def difference(found: dict[str, Any], wanted: dict[str, Any]) -> float:
 
 def plan_call(case: Case) -> tuple[Any, ...]:
     path, robot, options = case
-    if isinstance(robot, Robot):
-        return "plan.js", "planPath", path, robot, TABLE, page_options(options)
     request = call("plan.js", "planRequest", page_options(options))
+    if isinstance(robot, Robot):
+        point = options.get("point", "head_centre")
+        return "plan.js", "makePlan", path, call("from_table.js", "trackedVehicle", robot, TABLE, point), request
     return "plan.js", "makePlan", path, tracked_of(VEHICLES[robot[0]], robot[1]), request
 
 

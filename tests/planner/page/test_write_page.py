@@ -40,6 +40,10 @@ def test_paths_and_options_are_what_the_page_begins_with(tmp_path: Path) -> None
     options: dict[str, Any] = {"objective": "flips", "tolerance": 0.5, "title": "<Tank & 1>"}
     page = sf.write_page(tmp_path / "page.html", paths={"mine": sf.circle(2.0)}, **options)
     data = data_of(page)
+    first = data["first"].pop("plan")
+    wanted = sf.plan(sf.circle(2.0), sf.load_robot("paper-control"), objective="flips", tolerance=0.5)
+    assert first["stated"] == pytest.approx(11 * wanted.stated_error)
+    assert np.array(first["motion"]) == pytest.approx(wanted.poses * [11, 11, 1], abs=1e-3)
     assert data["first"] == {"robot": "paper-control", "shape": "mine", "options": {
         "objective": "flips", "corner": "nearest", "point": "head_centre", "minimumSeconds": None,
         "tolerance": pytest.approx(5.5), "timeWeight": 0.0, "smooth": None}}  # fmt: skip

@@ -56,7 +56,10 @@ def check_plans(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
 
 def test_the_page_opens_with_a_plan_and_a_saved_link_opens_with_the_same(browser: Any, address: str) -> None:
     with opened_page(browser, address) as page:
+        first = page.evaluate("[document.body.dataset.busy, ...['message', 'facts', 'warnings'].map("
+                              "(part) => document.getElementById(part).innerText)]")  # fmt: skip
         assert "dwells: if the coefficients are exact, 95 of 100 such robots stay within" in planned(page)
+        assert first == ["1", *(text_of(page, part) for part in ("#message", "#facts", "#warnings"))]
         assert page.get_attribute("#play", "aria-pressed") == "false"  # less motion is wanted
         for part in ("#message", "#next", "#view", "#play", ".legend", "#shape"):
             box = page.locator(part).bounding_box()

@@ -1,10 +1,15 @@
-/* Names that readers of drawings know: of elements, of attributes and properties, of transforms and units.
- *
- * planner/paths/svg_shapes.py reads this file, too, so its value is JSON. `unread` are attributes and properties
- * that move, scale or hide, with the values that do nothing. `lengths` belong to a view's width (0), height (1) or
- * diagonal (2). `transforms` take numbers (1), lengths (x) and angles (a); `units` are those of each, `pixels` the
- * sizes of units. */
-const NAMES = {
+"""Names that readers of drawings know, the page's too: of elements, attributes, properties, transforms and units.
+
+`unread` are attributes and properties that move, scale or hide, with the values that do nothing. `lengths` belong
+to a view's width (0), height (1) or diagonal (2). `transforms` take numbers (1), lengths (x) and angles (a);
+`units` are those of each, `pixels` the sizes of units.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+NAMES: dict[str, Any] = {
   "shapes": ["path", "line", "polyline", "polygon", "rect", "circle", "ellipse"],
   "groups": ["svg", "g", "a", "switch", "use", "symbol"],
   "undrawn": ["defs", "clipPath", "mask", "marker", "pattern", "linearGradient", "radialGradient", "meshgradient",
@@ -33,6 +38,4 @@ const NAMES = {
   },
   "pixels": {"": 1, "px": 1, "pt": 1.3333333333333333, "pc": 16, "in": 96, "cm": 37.79527559055118,
     "mm": 3.7795275590551185, "q": 0.9448818897637796}
-};
-
-export { NAMES };
+}  # fmt: skip

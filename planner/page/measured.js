@@ -1,24 +1,27 @@
-/* Measured tables, one run a row: which rows cannot be right, runs beside the look-up table's answers, and what is
- * needed.
+/* What was measured: tracks beside the plan, and tables of runs, one run a row, beside the look-up table's answers.
  *
- * Where a calibration refuses a table for the number of its runs, this reader goes on. Lengths in cm, spins in rpm. */
-import { largest, median, smallest, solveDense, sum } from "./math.js";
+ * The error of a track is the distance of the tracked point from the declared path, weighted by time; tracks are in cm
+ * and s. Of runs it is said which rows cannot be right, and what is needed; where a calibration refuses a table for the
+ * number of its runs, this reader goes on; copied rows, gaps of the notes and outputs that follow from others are left
+ * to the calibration. Lengths in cm, spins in rpm. */
+import { largest, median, smallest, sum } from "./math.js";
+import { distanceTo } from "./reference.js";
 import { groupValues, makeRobot } from "./robot.js";
 import { query } from "./table.js";
 import { convertColumns, labColumns, splitName, toSi } from "./units.js";
-import { InputError, closeMatch, general, inPage, naming, quoted, refusing } from "./words.js";
+import { InputError, closeMatch, general, inPage, naming, quoted, refusing, repr } from "./words.js";
 
 const INPUTS = ["N", "l_cm", "omega_rpm"];
 const OUTPUTS = { // output: its column, and its sign relative to the motor's (0: a magnitude)
-  omega_h: { column: "omega_h_rpm", unit: "rpm", sign: -1, sense: "the head turns against the motor" },
-  omega_t: { column: "omega_t_rpm", unit: "rpm", sign: 1, sense: "the tails turn with the motor" },
+  omega_h: { column: "omega_h_rpm", sign: -1, sense: "the head turns against the motor" },
+  omega_t: { column: "omega_t_rpm", sign: 1, sense: "the tails turn with the motor" },
   omega_yr: {
-    column: "omega_yr_rad_s", unit: "rad_s", sign: 1,
+    column: "omega_yr_rad_s", sign: 1,
     sense: "a positive motor turns the robot to the left (counter-clockwise) seen from above",
   },
-  R_yr: { column: "R_yr_cm", unit: "cm", sign: 0 },
-  theta: { column: "theta_deg", unit: "deg", sign: 0 },
-  v: { column: "v_cm_s", unit: "cm_s", sign: 0 },
+  R_yr: { column: "R_yr_cm", sign: 0 },
+  theta: { column: "theta_deg", sign: 0 },
+  v: { column: "v_cm_s", sign: 0 },
 };
 const PLANAR = ["omega_yr", "R_yr", "theta", "v"]; // outputs beyond the spins
 const POSITIVE = ["N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s"];
@@ -29,20 +32,15 @@ const SYNONYMS = new Map(
   }),
 );
 const NOTED = ["elapsed_min", "temperature_C", "tank_diameter_cm", "course_deg"];
-const SIGMAS = { // column: its factor to a share or to rad
-  camera_scale_sigma_percent: 0.01, heading_zero_sigma_deg: Math.PI / 180, tachometer_sigma_percent: 0.01,
-};
+const SIGMAS = ["camera_scale_sigma_percent", "heading_zero_sigma_deg", "tachometer_sigma_percent"];
 const ERRORS = [
   "omega_yr_error", "R_yr_error", "theta_error", "v_error", "drift_x_cm_s", "drift_y_cm_s", "drift_error",
 ];
 const KNOWN = [
   ...INPUTS, ...Object.values(OUTPUTS).map(({ column }) => column), "run", "trial", "session", ...NOTED,
-  ...ERRORS, ...Object.keys(SIGMAS),
+  ...ERRORS, ...SIGMAS,
 ];
 const LARGEST = 1e9; // of a value
-const GAPS = 0.1; // share of the usable rows that may lack a note
-const OWN = 1e-3; // share of an output's scatter that must be independent of the other outputs
-const LARGEST_SIGMA = 0.5;
 const FEWEST_RUNS = 24;
 const FEWEST_REPEATS = 8;
 
@@ -50,7 +48,7 @@ const FEWEST_REPEATS = 8;
  *
  * The answer has `outputs` (names), `columns` (numbers of inputs and outputs by their column), `names` (of all
  * columns), `usable` (places of rows), `sessions` (names, of usable runs), `repeats`, `converted` and `excluded`
- * (in words), and `refusal`, why a calibration refuses runs that are enough. */
+ * (in words). */
 function readMeasurements(given, where) {
   return naming(where, () => measurementsOf(given, where));
 }
@@ -59,7 +57,7 @@ function measurementsOf(given, where) {
   const first = convertColumns(given, INPUTS, where, SYNONYMS), outputColumns = Object.values(OUTPUTS);
   const lacking = INPUTS.find((name) => !first.table.names.includes(name));
   if (lacking) throw new InputError(`the table has no column '${lacking}'; it needs ${INPUTS.join(", ")}`);
-  const others = [...outputColumns.map(({ column }) => column), ...NOTED, ...Object.keys(SIGMAS)];
+  const others = [...outputColumns.map(({ column }) => column), ...NOTED, ...SIGMAS];
   const { table: whole, notes } = convertColumns(first.table, others, where, SYNONYMS);
   const unknown = whole.names.filter((name) => !KNOWN.includes(name));
   for (const name of unknown) {
@@ -80,8 +78,6 @@ function measurementsOf(given, where) {
   const used = [...INPUTS, ...outputs.map((name) => OUTPUTS[name].column)];
   const columns = Object.fromEntries(used.map((name) => [name, column(name)]));
   const reasons = reasonsOf(table, columns, outputs);
-  const sparse = markGaps(reasons, table);
-  markCopies(reasons, columns);
   const usable = reasons.flatMap((reason, row) => (reason ? [] : [row]));
   if (!usable.length) {
     const first = `${rowName(table, 0)}: ${reasons[0]}`;
@@ -91,22 +87,15 @@ function measurementsOf(given, where) {
   const names = usable.map((row) => session?.[row] ?? `N = ${columns.N[row]}`);
   const conditions = usable.map((row) => INPUTS.map((name) => columns[name][row]).join());
   const repeats = usable.length - new Set(conditions).size;
-  const runs = {
+  const excluded = [
+    ...reasons.flatMap((reason, row) => (reason ? [`${rowName(table, row)}: ${reason}`] : [])),
+    ...empty.map((name) => `column ${name}: without any value, left out`),
+    ...unknown.map((name) => `column ${name}: not known, left out`),
+  ];
+  return {
     outputs, columns, usable, repeats, names: table.names, sessions: [...new Set(names)].sort(),
-    converted: [...first.notes, ...notes],
-    excluded: reasons.flatMap((reason, row) => (reason ? [`${rowName(table, row)}: ${reason}`] : [])),
-    refusal: null,
+    converted: [...first.notes, ...notes], excluded,
   };
-  if (usable.length >= FEWEST_RUNS && repeats >= FEWEST_REPEATS) {
-    const { refusal, follows } = independent(runs, conditions);
-    runs.excluded.push(...follows);
-    runs.refusal = refusal ?? sigmaRefusal(table, usable);
-  }
-  runs.excluded.push(...empty.map((name) => `column ${name}: without any value, left out`));
-  const many = `without a value in more than ${100 * GAPS} % of the rows, left out`;
-  runs.excluded.push(...sparse.map((name) => `column ${name}: ${many}`));
-  runs.excluded.push(...unknown.map((name) => `column ${name}: not known, left out`));
-  return runs;
 }
 
 /* Names of columns that have nothing but missing values and blanks. */
@@ -122,30 +111,6 @@ function without({ names, columns, texts, lines }, left) {
 /* Name a row by its number and by its line in the file. */
 function rowName({ lines }, row) {
   return `row ${row + 1} (line ${lines[row]})`;
-}
-
-/* Give a reason to every usable row that lacks a note, and return the notes that many rows lack. */
-function markGaps(reasons, table) {
-  const usable = reasons.flatMap((reason, row) => (reason ? [] : [row]));
-  return NOTED.filter((name) => {
-    const at = table.names.indexOf(name);
-    const gaps = usable.filter((row) => !Number.isFinite(table.columns[at]?.[row]));
-    if (at < 0 || gaps.length > GAPS * usable.length) return at >= 0;
-    for (const row of gaps) reasons[row] ||= `${name} = ${table.texts[at][row]} is not a finite number`;
-    return false;
-  });
-}
-
-/* Give a reason to every usable row that is a copy of an earlier one. */
-function markCopies(reasons, columns) {
-  const usable = reasons.flatMap((reason, row) => (reason ? [] : [row]));
-  const used = (names) => names.map((name) => usable.map((row) => columns[name][row]));
-  const outputs = Object.keys(columns).filter((name) => !INPUTS.includes(name));
-  if (!usable.length) return;
-  for (const [place, earlier] of findCopies(used(INPUTS), used(outputs))) {
-    reasons[usable[place]] =
-      `a copy of an earlier row, equal in all inputs and outputs (row ${usable[earlier] + 1})`;
-  }
 }
 
 /* Say why each row cannot be used; empty where it can. */
@@ -176,61 +141,6 @@ function reasonsOf(table, columns, outputs) {
   return reasons;
 }
 
-/* Choose outputs that were measured: repeats differ, and not just as other outputs do. */
-function independent({ outputs, columns, usable }, conditions) {
-  const y = outputs.map((name) => {
-    const { column, unit } = OUTPUTS[name], factor = toSi(1, unit);
-    return usable.map((row) => {
-      const value = columns[column][row] * factor;
-      return name === "theta" ? value : Math.log(Math.abs(value));
-    });
-  });
-  const run = repeatCovariance(y, conditions), kept = [], follows = [];
-  for (const [i, name] of outputs.entries()) {
-    const { column } = OUTPUTS[name];
-    if (!(run[i][i] > 1e-12)) {
-      const words = `${column} does not differ between repeats; give measured values, unrounded, or leave it out`;
-      return { refusal: words, follows: [] };
-    }
-    if (run[i][i] - explained(run, kept, i) < OWN * run[i][i]) {
-      const others = kept.map((j) => OUTPUTS[outputs[j]].column).join(", ");
-      follows.push(`column ${column}: follows from ${others}, so it is not counted twice`);
-    } else kept.push(i);
-  }
-  return { refusal: null, follows };
-}
-
-/* The part of the variance of output i that other outputs explain. */
-function explained(run, others, i) {
-  if (!others.length) return 0;
-  const weights = others.map((j) => [run[j][i]]);
-  solveDense(others.map((j) => others.map((k) => run[j][k])), weights);
-  return sum(others.map((j, k) => run[i][j] * weights[k][0]));
-}
-
-/* Estimate the covariance of outputs from their scatter about the mean of each condition. */
-function repeatCovariance(y, conditions) {
-  const away = y.map((values) => centred(values, conditions)), free = conditions.length - new Set(conditions).size;
-  return away.map((a) => away.map((b) => sum(a.map((value, i) => value * b[i])) / free));
-}
-
-/* Subtract from values the mean of those of the same condition. */
-function centred(values, conditions) {
-  const totals = new Map(), add = ([count, total], value) => [count + 1, total + value];
-  conditions.forEach((name, i) => totals.set(name, add(totals.get(name) ?? [0, 0], values[i])));
-  return values.map((value, i) => value - totals.get(conditions[i])[1] / totals.get(conditions[i])[0]);
-}
-
-/* Say which standard deviation of the way of measuring a calibration refuses; null: none. */
-function sigmaRefusal(table, usable) {
-  const bad = Object.entries(SIGMAS).find(([name, factor]) => {
-    if (!table.names.includes(name)) return false;
-    const values = new Set(usable.map((row) => table.columns[table.names.indexOf(name)][row])), [value] = values;
-    return values.size !== 1 || !(0 <= value * factor && value * factor <= LARGEST_SIGMA);
-  });
-  return bad ? `${bad[0]} must be one number, the same in all rows, at least 0 and not large` : null;
-}
-
 /* Whether columns of these names are those of runs, if not of all that a table of runs needs. */
 function areOfRuns(names) {
   const wanted = [...INPUTS, ...Object.values(OUTPUTS).map(({ column }) => column)];
@@ -239,46 +149,6 @@ function areOfRuns(names) {
     const quantity = splitName(name).quantity.toLowerCase();
     return quantities.has(quantity) || (SYNONYMS.has(quantity) && quantity !== "heading");
   });
-}
-
-const CHANCE = 0.01; // equal pairs that are expected by chance
-const ROUNDING = 1e-9; // relative difference below which two numbers are one
-const TYPICAL = 0.01; // relative standard deviation where no repeats but copies are left
-
-/* Find copied rows: pairs of a place and the place of the row that it repeats.
- *
- * inputs, outputs: lists of columns. */
-function findCopies(inputs, outputs) {
-  const count = inputs[0].length, first = new Map(), copies = new Map();
-  const words = (columns, place) => columns.map((column) => column[place]).join();
-  for (let place = 0; place < count; place++) {
-    const row = words([...inputs, ...outputs], place);
-    if (first.has(row)) copies.set(place, first.get(row));
-    else first.set(row, place);
-  }
-  if (!copies.size) return [];
-  const condition = Array.from({ length: count }, (_, place) => words(inputs, place));
-  const seen = new Map(), pairs = sum(condition.map((name) => {
-    seen.set(name, (seen.get(name) ?? 0) + 1);
-    return seen.get(name) - 1;
-  }));
-  const kept = condition.map((_, place) => place).filter((place) => !copies.has(place));
-  const places = kept.map((place) => condition[place]);
-  const chances = outputs.map((column) => equal(kept.map((place) => column[place]), places));
-  return pairs * chances.reduce((product, chance) => product * chance, 1) < CHANCE ? [...copies] : [];
-}
-
-/* Estimate the probability that two repeats of an output are equal. */
-function equal(values, condition) {
-  const distinct = [...new Set(values)].sort((a, b) => a - b);
-  const gaps = distinct.slice(1).flatMap((value, i) => {
-    const gap = value - distinct[i];
-    return gap > ROUNDING * Math.abs(value) ? [gap] : [];
-  });
-  if (!gaps.length) return 1;
-  const [[variance]] = repeatCovariance([values], condition); // NaN without repeats
-  const scatter = variance >= 0 ? Math.sqrt(variance) : TYPICAL * median(values.map(Math.abs));
-  return scatter ? Math.min(1, smallest(gaps) / (2 * Math.sqrt(Math.PI) * scatter)) : 1;
 }
 
 const FEWEST_SESSIONS = 3;
@@ -298,7 +168,7 @@ const USES = { // columns that may be left out, and what they are good for
  * replaces tails, tail length and motor speed. lookup: as readTable gives it; null: there is none.
  * The answer has `columns` (names of the outputs' columns), `rows` ({row, inputs, measured, answer, percent,
  * outside}: of usable runs, answer null and outside in words where the look-up table has none), `medians` of the
- * differences in per cent, and lists in words: `excluded`, `converted`, `missing`, `needed`, `refused`. */
+ * differences in per cent, and lists in words: `excluded`, `converted`, `missing`, `needed`. */
 function comparedRuns(table, name, fields, lookup) {
   if (!lookup) {
     throw new InputError(
@@ -324,7 +194,6 @@ function comparedRuns(table, name, fields, lookup) {
     converted: runs.converted,
     missing: missingColumns(runs),
     needed: neededRuns(runs),
-    refused: runs.refusal,
   };
 }
 
@@ -386,4 +255,112 @@ function isOne(values) {
   return largest(values) === smallest(values);
 }
 
-export { findCopies, readMeasurements, areOfRuns, comparedRuns };
+const FARTHEST = 1e100; // of a number
+const COLUMNS = ["time_bar", "x_over_l", "y_over_l", "heading_rad"];
+const LAB = ["time_s", "x_cm", "y_cm", "heading_deg"]; // or in other units
+const ALIKE = 1e-3; // of a place and of the tail length, largest difference of the same place in cm and in l
+const HOW = {
+  none: "", time: "its first time is 0", rigid: "its first pose is that of the plan, its first time 0",
+};
+
+/* Compare a track with a plan, as measured ("none"), from time 0 ("time"), or laid on the plan's start ("rigid").
+ *
+ * plan: content of plan.json. table: {names, columns} of the head's centre, as replays or labs have them, and
+ * `plans`, the ids in it. The page plans anew, with other last digits, so the id of another plan is told, not
+ * refused. */
+function comparedTrack(plan, table, how) {
+  const moved = movedTrack(columnsInTails(table, plan.robot), plan, how), [time, x, y, heading] = moved;
+  checkTrack(moved);
+  const { tail_length_m: tail, time_scale_s: second } = plan.robot, cm = 100 * tail, offset = plan.offset_over_l ?? 0;
+  const track = Array.from(x, (value, i) => [
+    value + Math.cos(heading[i]) * offset, y[i] + Math.sin(heading[i]) * offset,
+  ]);
+  const declared = distanceTo(plan.reference, track), raw = distanceTo(plan.raw_path, track), last = x.length - 1;
+  const weights = time.map((_, i) => {
+    const early = time[Math.max(i - 1, 0)], late = time[Math.min(i + 1, last)];
+    return Math.max((late - early) / (i > 0 && i < last ? 2 : 1), 0);
+  });
+  const total = Math.max(sum(weights), 1e-300);
+  const rms = (away) => cm * Math.sqrt(sum(away.map((value, i) => (weights[i] / total) * value ** 2)));
+  const worst = declared.indexOf(largest(declared)), place = ([atX, atY]) => [atX * cm, atY * cm];
+  return {
+    points: track.map(place),
+    shift: HOW[how],
+    ofPlan: (table.plans ?? []).find((id) => id !== plan.id) ?? "",
+    csv: trackTable(moved, cm, second),
+    error: {
+      rms: rms(declared), largest: cm * largest(declared), rawRms: rms(raw), rawLargest: cm * largest(raw),
+      stated: cm * plan.stated_error_over_l,
+      times: Array.from(time, (value) => value * second),
+      distances: Array.from(declared, (value) => value * cm),
+      worst: { time: time[worst] * second, place: place(track[worst]) },
+    },
+  };
+}
+
+function checkTrack([time, ...others]) {
+  if (![time, ...others].every((values) => values.every((value) => Math.abs(value) < FARTHEST))) {
+    throw new InputError("the track has a value that is not a finite number; correct the file");
+  }
+  if (time.length < 2 || !(largest(time) - smallest(time) > 0)) {
+    throw new InputError("the track has no two times; give a row for each time, in order");
+  }
+  const back = time.findIndex((value, i) => i > 0 && value < time[i - 1]);
+  if (back < 0) return;
+  throw new InputError(`the track's time goes back at row ${back + 1}; give a row for each time, in order`);
+}
+
+/* Time, x, y and heading in the units of a replay. */
+function columnsInTails(table, robot) {
+  const replayed = COLUMNS.every((name) => table.names.includes(name)), cm = 100 * robot.tail_length_m;
+  const kept = (values) => values.filter((_, i) => !replayed || !COLUMNS.includes(table.names[i]));
+  const lab = convertColumns({ names: kept(table.names), columns: kept(table.columns) }, LAB, "the track").table;
+  const inLab = (name) => lab.columns[lab.names.indexOf(name)];
+  if (replayed) {
+    const [time, ...pose] = COLUMNS.map((name) => table.columns[table.names.indexOf(name)]);
+    for (const [i, axis] of ["x", "y"].entries()) {
+      const inCm = inLab(`${axis}_cm`);
+      if (inCm && !pose[i].every((value, k) => Math.abs(value * cm - inCm[k]) <= ALIKE * (cm + Math.abs(inCm[k])))) {
+        throw new InputError(
+          `${axis}_over_l and ${axis}_cm of the track disagree with the plan's tail length, ${general(cm)} cm: it is the `
+          + "track of another robot",
+        );
+      }
+    }
+    return [time, ...pose];
+  }
+  const missing = LAB.find((name) => !lab.names.includes(name));
+  if (missing) {
+    throw new InputError(
+      `the track has no column '${missing}'; it needs time_s, x_cm, y_cm and heading_deg, or in other units`,
+    );
+  }
+  const scales = [robot.time_scale_s, cm, cm, 180 / Math.PI];
+  return LAB.map((name, i) => inLab(name).map((value) => value / scales[i]));
+}
+
+/* Move a track in time; with "rigid" in the plane, too, so that it begins with the pose of the plan. */
+function movedTrack([time, x, y, heading], plan, how) {
+  if (!(how in HOW)) throw new InputError(`a track cannot be moved by ${how}`);
+  if (how === "none") return [time, x, y, heading];
+  const times = time.map((value) => value - time[0]);
+  if (how === "time") return [times, x, y, heading];
+  const { x_over_l: startX, y_over_l: startY, heading_rad: start } = plan.start, turn = start - heading[0];
+  const cos = Math.cos(turn), sin = Math.sin(turn);
+  return [
+    times,
+    x.map((value, i) => startX + cos * (value - x[0]) - sin * (y[i] - y[0])),
+    x.map((value, i) => startY + sin * (value - x[0]) + cos * (y[i] - y[0])),
+    heading.map((value) => value + turn),
+  ];
+}
+
+/* The track in the columns that `planner check` reads. */
+function trackTable([time, x, y, heading], cm, second) {
+  const rows = Array.from(time, (value, i) => {
+    return [value * second, x[i] * cm, y[i] * cm, (heading[i] * 180) / Math.PI].map(repr).join(",");
+  });
+  return `time_s,x_cm,y_cm,heading_deg\n${rows.join("\n")}\n`;
+}
+
+export { readMeasurements, areOfRuns, comparedRuns, comparedTrack };

@@ -1,8 +1,7 @@
-/* Drawing a stroke, and setting and moving corners, with the pointer. Places in cm. */
-
-import { figure } from "./dom.js";
-import { lineData } from "./scene.js";
-import { pixelOf, tickStep } from "./viewport.js";
+/* Drawing a stroke, setting and moving corners with the pointer, and corners as a table of numbers. Places in cm. */
+import { bounds } from "../math.js";
+import { element, figure } from "./dom.js";
+import { lineData, pixelOf, tickStep } from "./scene.js";
 
 const HANDLES = 80; // corners at most that are shown to be moved
 const NEAR = 14; // pixels from a corner that count as on it
@@ -149,4 +148,54 @@ function closes(stroke) {
   return Math.hypot(end[0] - x, end[1] - y) < JOINS * size;
 }
 
-export { HANDLES, PathEditor, WORDS, closes };
+/* Fill `host` with the corners; `changed(points)` takes new ones. Focus stays where it is. */
+function showCorners(host, points, changed) {
+  if (points.length > HANDLES) {
+    const words = `The path has ${points.length} points: more than can be typed or moved.`;
+    host.replaceChildren(element("p", { class: "soft" }, words));
+    return;
+  }
+  const focused = host.contains(document.activeElement) ? document.activeElement.getAttribute("aria-label") : null;
+  const names = ["corner", "x [cm]", "y [cm]", ""].map((words) => element("th", { scope: "col" }, words));
+  const rows = element("tbody", {}, points.map((_, i) => row(points, i, changed)));
+  const add = element("button", { type: "button", click: () => changed([...points, after(points)]) }, "Add a corner");
+  const table = element("table", {}, element("thead", {}, element("tr", {}, names)), rows);
+  host.replaceChildren(element("div", { class: "wide" }, table), add);
+  if (focused !== null) host.querySelector(`[aria-label="${focused}"]`)?.focus();
+}
+
+function row(points, i, changed) {
+  const cells = [0, 1].map((axis) => {
+    const set = ({ target }) => {
+      if (Number.isFinite(target.valueAsNumber)) changed(points.with(i, points[i].with(axis, target.valueAsNumber)));
+      else target.value = points[i][axis];
+    };
+    const name = `corner ${i + 1}, ${"xy"[axis]} in cm`;
+    return element("input", { type: "number", step: "any", value: points[i][axis], change: set, "aria-label": name });
+  });
+  const remove = element("button", {
+    type: "button", click: () => changed(points.toSpliced(i, 1)), disabled: points.length < 3,
+    "aria-label": `remove corner ${i + 1}`,
+  }, "×");
+  const number = element("th", { scope: "row" }, String(i + 1));
+  return element("tr", {}, number, [...cells, remove].map((cell) => element("td", {}, cell)));
+}
+
+/* The next corner: as far from the last one as that is from the one before. */
+function after(points) {
+  const [before, last] = points.slice(-2);
+  return [2 * last[0] - before[0], 2 * last[1] - before[1]].map((value) => Math.round(value * 1000) / 1000);
+}
+
+/* Move, scale and turn points about their middle. */
+function transformed(points, { right, up, scale, turn }) {
+  const middle = bounds(points).map(([low, high]) => (low + high) / 2);
+  const angle = (turn * Math.PI) / 180;
+  const [cos, sin] = [scale * Math.cos(angle), scale * Math.sin(angle)];
+  return points.map(([x, y]) => {
+    const [dx, dy] = [x - middle[0], y - middle[1]];
+    return [middle[0] + right + cos * dx - sin * dy, middle[1] + up + sin * dx + cos * dy];
+  });
+}
+
+export { closes, HANDLES, PathEditor, showCorners, transformed, WORDS };

@@ -1,0 +1,120 @@
+/* The one file that a user drops or chooses: what is wrong with it, a drawing as a tree of plain objects, and the
+ * question for the unit of a path that does not say it, or for one of several paths. */
+import { bounds } from "../math.js";
+import { InputError, refusing } from "../words.js";
+import { byId, digits, element, say } from "./dom.js";
+
+const MOST_BYTES = 20e6;
+
+/* Read it: {name, bytes, tree}, the tree of a drawing, or {refusal}; null: there is none. */
+async function oneFile(files) {
+  if (files.length === 0) return null;
+  if (files.length > 1) return { refusal: "Give one file at a time." };
+  const [{ name, size }] = files;
+  if (size > MOST_BYTES) {
+    const limit = `${MOST_BYTES / 1e6} MB`;
+    return { refusal: `${name} has ${Math.round(size / 1e6)} MB; the page reads up to ${limit}.` };
+  }
+  const bytes = await files[0].arrayBuffer().catch(() => null); // null: of a folder, or of a file that is gone
+  if (bytes === null) return { refusal: `${name} cannot be read; give a file.` };
+  if (!/\.svg$/i.test(name)) return { name, bytes };
+  return refusing(() => ({ name, tree: drawingTree(textOf(bytes, name), name) }), ({ message }) => ({ refusal: message }));
+}
+
+function textOf(bytes, name) {
+  try {
+    return new TextDecoder("utf-8", { fatal: true }).decode(bytes);
+  } catch {
+    throw new InputError(`${name} is no text in UTF-8`);
+  }
+}
+
+/* What is wrong with the last file, beside the part of the page that it is for; the next file takes it away. */
+class FileProblem {
+  constructor() {
+    this.place = null;
+    this.words = "";
+  }
+
+  /* Say it beside a part, such as path; empty words: nothing is wrong. */
+  tell(part, words) {
+    if (this.place?.textContent === this.words) say(this.place, "", true);
+    this.place = byId(`${part}-problem`);
+    this.words = words;
+    if (words) say(this.place, words, true);
+  }
+}
+
+const MOST_TEXT = 16 * 2 ** 20;
+const DEEPEST = 200; // levels; the planner refuses fewer
+const LIVE = /http:\/\/www\.w3\.org\/(?=2000\/svg|1999\/xhtml)/g;
+
+/* Read the text of a drawing: {tag, attributes, children, text} of its elements, "{namespace}name" where they have
+ * one. */
+function drawingTree(text, name) {
+  if (text.length > MOST_TEXT) throw new InputError(`${name} has more than 16 MiB; such a file is not read`);
+  if (text.includes("<?xml-stylesheet")) {
+    throw new InputError(`${name}: <?xml-stylesheet> is not read; save the drawing with its style`);
+  }
+  const page = new DOMParser().parseFromString(text.replace(LIVE, "inert:"), "application/xml");
+  const broken = page.querySelector("parsererror");
+  if (broken) {
+    const [why] = broken.textContent.replace(/^.*?following errors:/, "").split("\n");
+    throw new InputError(`${name} is not SVG: ${why.trim()}`);
+  }
+  return plain(page.documentElement, DEEPEST);
+}
+
+function plain(element, levels) {
+  const live = (words) => words.replaceAll("inert:", "http://www.w3.org/");
+  const named = ({ namespaceURI, localName }) => (namespaceURI ? `{${live(namespaceURI)}}${localName}` : localName);
+  const given = Array.from(element.attributes).filter(({ name }) => !/^xmlns(?::|$)/.test(name));
+  return {
+    tag: named(element),
+    attributes: Object.fromEntries(given.map((attribute) => [named(attribute), live(attribute.value)])),
+    children: levels ? Array.from(element.children, (child) => plain(child, levels - 1)) : [],
+    text: Array.from(element.childNodes, (node) => ([3, 4].includes(node.nodeType) ? node.data : "")).join(""),
+  };
+}
+
+const UNITS = { mm: 0.1, cm: 1, m: 100, in: 2.54 };
+
+/* Ask; the promise resolves with {points [cm], closed, name}, or null if the user takes none. */
+function askUnit({ paths, unit }, tailLength) {
+  if (unit !== null && paths.length === 1) return Promise.resolve(inUnit(paths[0], unit));
+  const dialog = byId("unit-dialog");
+  const scales = unit === null ? { ...UNITS, "tail lengths": tailLength } : { "as the file says": unit };
+  const choice = (group, value, words, checked) =>
+    element("label", { class: "choice" }, element("input", { type: "radio", name: group, value, checked }), words);
+  const size = (scale) => {
+    const [width, height] = bounds(paths[0].points).map(([low, high]) => digits((high - low) * scale));
+    return `${width} × ${height} cm`;
+  };
+  const units = Object.entries(scales).map(([name, scale], i) =>
+    choice("unit", scale, `${name}: ${size(scale)}`, i === (unit === null ? 1 : 0)),
+  );
+  const names =
+    paths.length > 1 ? paths.map((path, i) => choice("path", i, path.name || `path ${i + 1}`, i === 0)) : [];
+  byId("unit-title").textContent = unit === null ? "Which unit has this file?" : "Which path of this file?";
+  byId("unit-words").textContent =
+    unit === null ? "The file does not say its unit. Width and height would be:" : "";
+  byId("unit-choices").replaceChildren(...units, ...names);
+  dialog.showModal();
+  return new Promise((resolve) => {
+    dialog.addEventListener(
+      "close",
+      () => {
+        const chosen = (name) => dialog.querySelector(`[name=${name}]:checked`)?.value;
+        const path = paths[Number(chosen("path") ?? 0)];
+        resolve(dialog.returnValue === "take" ? inUnit(path, Number(chosen("unit"))) : null);
+      },
+      { once: true },
+    );
+  });
+}
+
+function inUnit({ points, closed, name }, scale) {
+  return { points: points.map((point) => point.map((value) => value * scale)), closed, name };
+}
+
+export { askUnit, drawingTree, FileProblem, oneFile };

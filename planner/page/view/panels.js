@@ -1,0 +1,219 @@
+/* The parts beside the picture: what the plan says, the robot's fields in laboratory units, and what each control
+ * changes. */
+import { byId, degrees, describe, digits, duration, element, length, say } from "./dom.js";
+import { transformed } from "./editor.js";
+import { FIELDS, labValues, OPTIONS } from "./state.js";
+
+/* The sentence that a screen reader is told when a plan is finished. */
+function summary(plan) {
+  const time = duration(plan.seconds);
+  const within = (size) => `95 of 100 such robots stay within ${length(size)} of the path to follow`;
+  const exact = plan.calibrated ? "" : "if the coefficients are exact, ";
+  const guessed = plan.unmeasured === null ? "" : ` With coefficients of another robot: ${length(plan.unmeasured)}.`;
+  return `${time}, ${plan.dwells.length} dwells: ${exact}${within(plan.stated)}.${guessed}`;
+}
+
+/* Show the numbers of a plan; with `tails` also in tail lengths and time units. */
+function showResults(plan, tails) {
+  const size = (value) => length(value, plan.tailLength, tails);
+  const time = (value) => duration(value) + (tails ? ` (${digits(value / plan.timeScale)} time units)` : "");
+  const [x, y, heading] = plan.start;
+  const pairs = [
+    ["Start pose", `x ${digits(x)} cm, y ${digits(y)} cm, heading ${degrees(heading)} degrees, at rest`],
+    ["Time", `${time(plan.seconds)}, ${plan.dwells.length} dwells`],
+    ["Net speed along a straight path", `${digits(60 * plan.netSpeed)} cm/min`],
+    ["Shortest dwell", time(plan.minimumDwell)],
+    ["Predicted error", `${size(plan.predictedRms)} rms, ${size(plan.predictedMax)} at most`],
+    [`Stated error${plan.calibrated ? "" : " if the coefficients are exact"}`, size(plan.stated)],
+    ...(plan.unmeasured === null ? [] : [["With coefficients of another robot", size(plan.unmeasured)]]),
+    ["With a tracker and a camera", size(plan.feedback)],
+    ["Path to follow from the drawn one", `${size(plan.offDrawn)} at most`],
+    ["Drawn points from the path to follow", `${size(plan.missed)} at most`],
+  ];
+  if (plan.guaranteed !== null) pairs.push(["Bound for an exact vehicle", size(plan.guaranteed)]);
+  describe(byId("facts"), pairs);
+  byId("warnings").replaceChildren(...plan.warnings.map((words) => element("li", {}, words)));
+}
+
+class RobotForm {
+  /* `limits` has the slider's ends of each field; `changed(values, key)` takes new values, `settled()` the end. */
+  constructor(limits, changed, settled) {
+    this.changed = changed;
+    this.settled = settled;
+    this.inputs = new Map();
+    for (const field of FIELDS)
+      byId(field.first ? "first-fields" : "more-fields").append(this.field(field, limits[field.key]));
+  }
+
+  field({ key, words, unit, step, optional }, [low, high]) {
+    const name = unit ? `${words} in ${unit}` : words, set = ({ target }) => this.set(key, target.value, optional);
+    const common = { input: set, change: this.settled };
+    const inputs = [
+      { type: "number", step: "any", "aria-label": name, "aria-describedby": "robot-problem" },
+      { type: "range", min: low, max: high, step, "aria-label": `${name}, slider` },
+    ].map((own) => element("input", { ...common, ...own }));
+    const [number, slider] = inputs, unitWords = element("span", { "aria-hidden": "true" }, unit);
+    this.inputs.set(key, inputs);
+    return element("label", {}, words, element("span", { class: "field" }, number, unitWords, slider));
+  }
+
+  set(key, text, optional) {
+    const value = text.trim() === "" ? null : Number(text);
+    if (value === null && !optional) return;
+    this.values = { ...this.values, [key]: value };
+    this.changed(this.values, key);
+  }
+
+  /* Show values; the field in which somebody types keeps its text. */
+  show(values) {
+    this.values = values;
+    for (const [key, inputs] of this.inputs) {
+      for (const input of inputs)
+        if (input !== document.activeElement || input.type === "range") input.value = sixDigits(values[key]);
+    }
+  }
+}
+
+/* What a field shows of a value; the plan has all its digits. */
+function sixDigits(value) {
+  return value === null || value === undefined ? "" : Number(value.toPrecision(6));
+}
+
+/* Show the motion of the robot [cm, s, rad], or why there is none. */
+function showMotion(answer) {
+  say(byId("robot-problem"), answer.refusal ?? "", true);
+  if (answer.refusal) {
+    byId("motion").replaceChildren();
+    return;
+  }
+  const { turnRadius, slip, yawRate, speed, tailGap, omegaBar } = answer.answer;
+  describe(byId("motion"), [
+    ["Turn radius", length(turnRadius)], ["Yaw rate", `${digits(yawRate)} rad/s`],
+    ["Speed round the circle", `${digits(60 * speed)} cm/min`], ["Slip angle", `${degrees(slip)} degrees`],
+    ["Gap of the tails", `${digits(tailGap)} tail diameters`], ["Motor speed ω̄", digits(omegaBar)],
+  ]);
+}
+
+const SAVES = {
+  "schedule.h": "the dwells, for a microcontroller", "tracker.h": "the plan with feedback, for a microcontroller",
+  "plan.csv": "the dwells as a table", "plan.json": "all of the plan, for softflagella", "path.csv": "the path in cm",
+  "robot.toml": "the robot, for softflagella", "plan.svg": "this picture",
+};
+
+/* Fill the lists, and connect every control to the page. */
+function connect(page) {
+  const { data } = page, choice = (value, words) => element("option", { value }, words);
+  const none = (words) => element("option", { value: "", disabled: true }, words);
+  byId("robot-name").append(none("changed"), ...data.robots.map(({ name }) => choice(name, name)));
+  byId("shape").append(none("own path"), ...data.shapes.map(({ name, words }) => choice(name, words ?? name)));
+  byId("saves").append(...Object.entries(SAVES).map(([name, title]) => {
+    return element("button", { type: "button", title, click: () => page.saveFile(name) }, name);
+  }));
+  if (data.locked) {
+    byId("robot-fields").hidden = true;
+    say(byId("locked"), data.locked.why);
+  }
+  connectButtons(page);
+  connectFields(page);
+  connectWindow(page);
+  page.mode("move");
+}
+
+/* Let elements, given by their ids, listen to a kind of event. */
+function listen(kind, listeners) {
+  for (const [id, listener] of Object.entries(listeners)) byId(id).addEventListener(kind, listener);
+}
+
+function connectButtons(page) {
+  const points = () => page.editor.path.points;
+  listen("click", {
+    next: () => (page.state.path.points ? page.saveFile("schedule.h") : byId("draw").click()),
+    undo: () => page.step("undo"),
+    redo: () => page.step("redo"),
+    open: () => byId("pick").click(),
+    new: () => {
+      document.querySelector("[value=corners]").checked = true;
+      page.mode("corners", true);
+    },
+    close: () => page.setPoints(points(), !page.drawn.closed),
+    reverse: () => page.setPoints(points().toReversed(), page.drawn.closed),
+    "smooth-path": () => page.smooth(points(), page.drawn.closed, page.state.path.name),
+    all: () => page.view.fit(),
+    stop: () => {
+      page.client.stop();
+      page.ended();
+      say(byId("message"), "Stopped. The picture shows the last plan that was made.");
+    },
+    link: async () => {
+      page.writeAddress();
+      byId("address").textContent = location.href;
+      await navigator.clipboard?.writeText(location.href).catch(() => {});
+    },
+    print: () => print(),
+  });
+  byId("rigid").addEventListener("submit", (event) => {
+    event.preventDefault();
+    const names = ["right", "up", "scale", "turn"], { elements } = event.target;
+    const numbers = Object.fromEntries(names.map((name) => [name, elements[name].valueAsNumber]));
+    if (Object.values(numbers).every(Number.isFinite) && numbers.scale > 0) {
+      page.view.moved = false;
+      page.setPoints(transformed(points(), numbers), page.drawn.closed);
+    } else say(byId("path-problem"), "Give numbers, and a scale above 0.", true);
+  });
+}
+
+function connectFields(page) {
+  const option = ({ target: { id, type, value, valueAsNumber } }) => {
+    const none = id === "timeWeight" ? 0 : null;
+    page.setOption(id, type !== "number" ? value : value.trim() === "" ? none : valueAsNumber);
+  };
+  listen("change", Object.fromEntries(Object.keys(OPTIONS).map((key) => [key, option])));
+  listen("change", {
+    "robot-name": ({ target: { value: name } }) => {
+      page.change({ robot: { name, values: labValues(page.robots.get(name).fields) } });
+    },
+    shape: ({ target: { value } }) => {
+      page.view.moved = false;
+      page.change({ path: page.ofShape(page.data.shapes.find((shape) => shape.name === value)) });
+    },
+    size: () => page.history.settle(),
+    snap: ({ target }) => (page.editor.snaps = target.checked),
+    tails: ({ target }) => page.plan && showResults(page.plan, target.checked),
+    pick: async ({ target }) => {
+      const files = [...target.files];
+      target.value = "";
+      await page.openFiles(files);
+    },
+  });
+  byId("size").addEventListener("input", ({ target: { valueAsNumber: size } }) => {
+    page.view.moved = false;
+    if (size > 0) page.change({ path: { ...page.state.path, size } }, "size");
+    else say(byId("path-problem"), "Give a size above 0.", true);
+  });
+  for (const input of document.querySelectorAll("[name=mode]")) {
+    input.addEventListener("change", () => page.mode(input.value));
+  }
+  byId("view").addEventListener("dblclick", (event) => page.editor.remove(page.view.placeOf(event)));
+  byId("trade").addEventListener("toggle", () => byId("trade").open && page.tradeOff());
+}
+
+function connectWindow(page) {
+  const broken = (words) => page.problem(`The page has made an error: ${words}`);
+  addEventListener("error", (event) => broken(event.message));
+  addEventListener("unhandledrejection", ({ reason }) => broken(reason?.message ?? reason));
+  addEventListener("hashchange", () => page.newAddress());
+  addEventListener("beforeprint", () => (byId("address").textContent = location.href));
+  document.addEventListener("change", () => page.writeAddress());
+  document.addEventListener("keydown", (event) => {
+    if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z") return;
+    event.preventDefault();
+    page.step(event.shiftKey ? "redo" : "undo");
+  });
+  document.addEventListener("dragover", (event) => event.preventDefault());
+  document.addEventListener("drop", (event) => {
+    event.preventDefault();
+    page.openFiles([...event.dataTransfer.files]);
+  });
+}
+
+export { connect, RobotForm, showMotion, showResults, summary };
