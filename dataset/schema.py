@@ -27,7 +27,7 @@ from sim.effects import catalogue
 from sim.io.provenance import code_version
 from sim.model.groups import MOTOR_SPEED
 from sim.model.response import BEFORE, DWELLS
-from sim.model.slopes import SLOPE_INPUTS, SLOPE_OUTPUTS
+from sim.model.sweepable import SLOPE_INPUTS, SLOPE_OUTPUTS
 
 
 class Column(NamedTuple):

@@ -19,7 +19,7 @@ from sim.effects.tail_contact import least_gap
 from sim.inputs import check_columns
 from sim.model.groups import Groups
 from sim.model.response import LAG_PARTS
-from sim.model.slopes import SLOPE_INPUTS
+from sim.model.sweepable import SLOPE_INPUTS
 from sim.motion.response import responses
 from sim.motion.sensitivity import sensitivities as derivatives
 from sim.motion.steady import steady

@@ -19,9 +19,8 @@ from sim.io.files import write_text
 from sim.io.keywords import checks_keywords
 from sim.io.reading import read_toml
 from sim.io.units import to_si
-from sim.model.correction import read_correction
+from sim.model.correction import read_correction, read_learnt_range
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, checked_values
-from sim.model.learnt_range import read_learnt_range
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import read_robot, robot_toml

@@ -19,8 +19,8 @@ from sim.model.groups import Groups
 from sim.motion.batches import one_thread, split
 from sim.motion.response import responses
 from sim.motion.steady import steady
-from sim.motion.switching import switch_response
 from sim.motion.warm import compile_once
+from tests.oracles.switching import switch_response
 
 
 def main(count: str = "128") -> None:

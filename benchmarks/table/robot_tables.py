@@ -35,11 +35,12 @@ from sim.model.robot import Robot
 from sim.motion.resolution import Resolution
 from sim.motion.run import Run
 from sim.motion.settling import steady_state
-from sim.motion.switching import MEMORY, steady_twist
+from sim.motion.stepped_response import steady_twist
 from sim.motion.warm import compile_once
 from sim.solve.assembly import bodies, reversed_bodies
 from surrogate.robot_table import RobotTable
 from surrogate.tabulate import tabulate
+from tests.oracles.switching import MEMORY
 
 AT = (8, 13, 18, 22)  # of DWELLS: 0.54, 1.0, 1.9, 3.1
 _MESHES = (Resolution(16, 48), Resolution(24, 72))

@@ -21,7 +21,7 @@ over those of the mean,
 A side force with a lever is handed on as what it is at the disc, a force and a couple, so that the uncertainty of
 its lever is that of the couple: δM/M = δε/ε + δλ/λ. Noted inputs are at the means of the runs.
 
-The range of the runs goes into the table [learnt_from] (`sim.model.learnt_range`).
+The range of the runs goes into the table [learnt_from] (`sim.model.correction`).
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.io.seals import sealed
 from sim.io.units import from_si, to_si
-from sim.model.learnt_range import learnt_range
+from sim.model.correction import learnt_range
 from sim.model.power_law import force_law
 from sim.model.presets import CONTROL
 from sim.model.robot import Robot

@@ -25,8 +25,7 @@ from calibration.statistics.study import Split, errors, groups, leave_one_group_
 from calibration.swimmer.swimmer import SwimmerModel
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError
-from sim.model.correction import Correction, monomials
-from sim.model.learnt_range import inputs_of
+from sim.model.correction import Correction, inputs_of, monomials
 
 Powers = tuple[tuple[int, ...], ...]
 

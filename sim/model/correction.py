@@ -1,4 +1,4 @@
-"""A correction of the load on the head, learnt from runs that no effect explains.
+"""A correction of the load on the head, learnt from runs that no effect explains, and the range of such runs.
 
     C_t → C_t exp(g_1),   C_r → C_r exp(g_2),   C_yr → C_yr exp(g_3),   ε_k → ε_k + g_k
 
@@ -12,13 +12,18 @@ where b is the largest size that is allowed. So it changes drag, and the simulat
 motion, and the response to a flip, which was not measured, with the same drag. Left and right turns stay mirror
 images.
 
-A correction holds between the runs that it was learnt from (`sim.model.learnt_range`). A robot outside is refused.
+A correction and a law (`sim.model.power_law`) describe the runs that they were learnt from, and say nothing of
+others. So a robot outside the runs, by more than a small margin, is refused. In a robot.toml the range of a law is
+
+    [learnt_from]
+    low = [2.0, 1.9, -6.1]     # N, ln l/R, ln ω̄ (R/l)⁴
+    high = [5.0, 3.2, -4.7]
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -26,12 +31,78 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.io.errors import InputError
-from sim.model.learnt_range import INPUTS, LearntRange, inputs_of
 
+INPUTS = ("N", "ln l/R", "ln ω̄ (R/l)⁴")
+_MARGIN = (0.5, 0.1, 0.1)  # of the inputs, beyond the runs
 MOST = {"C_t": 1.5, "C_r": 1.5, "C_yr": 1.5, "surface_couple": 2.0, "anisotropic_head_drag": 0.6}  # b
 _LARGEST = 1e9  # of any number: powers of larger ones overflow
 KNOBS = tuple(MOST)  # what a correction may change
 _FACTORS = ("C_t", "C_r", "C_yr")  # what it multiplies; it adds to the others
+
+
+@dataclass(frozen=True)
+class LearntRange:
+    """Smallest and largest inputs of the runs, in the order of INPUTS."""
+
+    low: tuple[float, ...]  # three numbers
+    high: tuple[float, ...]  # three numbers
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that are no range."""
+        if {len(self.low), len(self.high)} != {len(INPUTS)}:
+            raise InputError(f"the range of the runs needs three numbers each: {', '.join(INPUTS)}")
+        if not (np.abs([*self.low, *self.high]) < _LARGEST).all():
+            raise InputError(f"the range of the runs: its numbers must be finite, below {_LARGEST:g}")
+        if any(low > high for low, high in zip(self.low, self.high, strict=True)):
+            raise InputError("the range of the runs: low must not be above high")
+
+    def check(self, values: Mapping[str, float], what: str) -> None:
+        """Refuse a robot outside the runs.
+
+        Args:
+            values: groups of the robot, by column name.
+            what: was learnt, in words, with the table of the robot's file that has it.
+
+        Raises:
+            InputError: the robot is outside.
+        """
+        inputs = inputs_of(values)
+        for name, value, low, high, margin in zip(INPUTS, inputs, self.low, self.high, _MARGIN, strict=True):
+            if not low - margin <= value <= high + margin:
+                raise InputError(
+                    f"{name} = {value:.3g} is outside the runs that the robot's {what} was learnt from "
+                    f"({low:.3g} to {high:.3g}): make runs there, or leave the {what} out of its file"
+                )
+
+
+def inputs_of(values: Mapping[str, float]) -> tuple[float, float, float]:
+    """Compute INPUTS of a robot from its groups."""
+    slender = math.log(values["l_over_R"])
+    return float(values["N"]), slender, math.log(abs(values["omega_bar"])) - 4 * slender
+
+
+def learnt_range(robots: Iterable[Mapping[str, float]]) -> LearntRange:
+    """Compute the range of robots from their groups, each by column name."""
+    inputs = np.array([inputs_of(values) for values in robots])
+    return LearntRange(tuple(inputs.min(0).round(6).tolist()), tuple(inputs.max(0).round(6).tolist()))
+
+
+def read_learnt_range(table: Any, place: str) -> LearntRange:
+    """Read the table [learnt_from] of a robot.toml.
+
+    Raises:
+        InputError: the table is no range.
+    """
+    try:
+        if set(table) != {"low", "high"}:
+            raise InputError(f"{place}: [learnt_from] needs the lines low and high, and no others")
+        low, high = (tuple(float(value) for value in table[name]) for name in ("low", "high"))
+    except (TypeError, ValueError, OverflowError) as broken:
+        raise InputError(f"{place}: [learnt_from] cannot be read: {broken}") from None
+    try:
+        return LearntRange(low, high)
+    except InputError as wrong:
+        raise InputError(f"{place}: [learnt_from] {wrong}") from None
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,8 @@ import numpy as np
 from sim.io.errors import InputError
 from sim.io.notebook import as_html
 from sim.io.units import format_length, from_si
-from sim.model.correction import Correction
+from sim.model.correction import Correction, LearntRange
 from sim.model.groups import Groups, check_finite, check_positive, check_slenderness, check_tails
-from sim.model.learnt_range import LearntRange
 from sim.model.uncertainty import DEFAULTS, Sigma
 
 

@@ -1,6 +1,8 @@
 """Inputs of a robot that can be swept, by the name of their option, and how a range is written.
 
-No numbers are computed here, so that a command line can list its options at once.
+SLOPE_INPUTS, groups of `sim.model.groups`, and SLOPE_OUTPUTS are the names in derivatives of the steady motion,
+which `sim.motion.sensitivity` gives and data sets store; effects can be inputs, too. No numbers are computed here,
+so that a command line can list its options at once.
 """
 
 from __future__ import annotations
@@ -9,8 +11,9 @@ import math
 from pathlib import Path
 
 from sim.io.errors import InputError
-from sim.model.slopes import SLOPE_INPUTS
 
+SLOPE_INPUTS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "a_over_R")
+SLOPE_OUTPUTS = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_rad")
 _EFFECTS = Path(__file__).parents[1] / "effects"
 # Name of an input -> what it is.
 SWEEPABLE = {

@@ -17,7 +17,7 @@ from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.linear.complex_step import derivative
 from sim.model.groups import Groups
-from sim.model.slopes import SLOPE_INPUTS, SLOPE_OUTPUTS
+from sim.model.sweepable import SLOPE_INPUTS, SLOPE_OUTPUTS
 from sim.motion.orbits import solve_orbits
 from sim.solve.assembly import numbers
 from sim.solve.refinement import MANY

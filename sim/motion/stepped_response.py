@@ -7,6 +7,8 @@ Curves are means over two phases of the disc, half a tail spacing apart, and the
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from sim.arrays import Floats
@@ -15,7 +17,11 @@ from sim.model.body import Body
 from sim.motion.resolution import Resolution
 from sim.motion.run import Run
 from sim.motion.settling import steady_state
-from sim.motion.switching import steady_twist
+from sim.solve.march import PHASE, SURGE, SWAY, YAW
+
+_ADAPTS = 0.5  # time units after which time steps have forgotten that they began on an orbit of another mesh
+_WINDOW = 0.5  # shortest averaging time of the steady circle
+_APPROACH = 0.9  # of the angle that is left; the steps to its end must not become tiny
 
 
 def stepped_response(
@@ -111,3 +117,28 @@ def _poses(run: Run, dwells: Floats, sense: float) -> Floats:
         now = time
         poses[i] = planar.between(start, run.pose)
     return poses if sense > 0 else poses * planar.MIRROR
+
+
+def steady_twist(
+    run: Run, tails: int, sense: float, *, adapts: float = _ADAPTS, window: float = _WINDOW
+) -> tuple[Floats, float]:
+    """Average forward, leftward and yaw rate for a positive motor; return the time of a turn by one spacing, too.
+
+    Velocities repeat with the spacing of the tails: means over a whole number of spacings. The spin may change
+    within a turn (near a free surface, say), so the end is approached by the angle of the disc.
+
+    Args:
+        adapts: time units before the averaging.
+        window: shortest averaging time.
+    """
+    run.go(adapts)
+    before, spacing, time = run.state.pose.copy(), 2 * np.pi / tails, 0.0
+    angle = spacing * max(1, math.ceil(window * abs(run.omega_t) / spacing))
+    for share in (_APPROACH, _APPROACH, 1.0):
+        remaining = angle - abs(run.state.pose[PHASE] - before[PHASE])
+        step = share * max(remaining, 0.0) / max(abs(run.omega_t), 1e-300)
+        run.go(step)
+        time += step
+    change = (run.state.pose - before) / time
+    turn = spacing / max(abs(change[PHASE]), 1e-300)
+    return np.array([change[SURGE], sense * change[SWAY], sense * change[YAW]]), turn

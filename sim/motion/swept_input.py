@@ -1,7 +1,7 @@
 """One input of a robot that is swept through a range, while all other dimensionless groups keep their values.
 
-`speed` is the motor's in rpm. All others are dimensionless: the groups of `sim.model.slopes.SLOPE_INPUTS` and the
-sizes of effects.
+`speed` is the motor's in rpm. All others are dimensionless: the groups of `sim.model.sweepable.SLOPE_INPUTS` and
+the sizes of effects.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from sim.io.errors import InputError
 from sim.model.body import Body
 from sim.model.groups import Groups
 from sim.model.robot import Robot
-from sim.model.slopes import SLOPE_INPUTS
+from sim.model.sweepable import SLOPE_INPUTS
 from sim.motion.lab_units import RPM
 from sim.solve.assembly import bodies
 

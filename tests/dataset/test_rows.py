@@ -10,7 +10,7 @@ import pytest
 from dataset.schema import COST
 from dataset.simulate import simulate
 from sim.model.presets import PRESETS
-from sim.model.slopes import SLOPE_INPUTS
+from sim.model.sweepable import SLOPE_INPUTS
 from sim.motion import response, run, settling, steady
 from sim.motion.orbits import Orbits
 from sim.solve.refinement import LOST, NO_START

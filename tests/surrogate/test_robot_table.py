@@ -22,10 +22,10 @@ from sim.motion.longer_memory import longer_memory
 from sim.motion.replay import replay
 from sim.motion.response import responses
 from sim.motion.steady import steady
-from sim.motion.switching import switch_response
 from surrogate.robot_table import RobotTable, load_robot_table
 from surrogate.table_file import load_table
 from surrogate.tabulate import tabulate
+from tests.oracles.switching import switch_response
 from tests.surrogate.small import refusal, robot_table
 
 pytestmark = pytest.mark.slow

@@ -16,8 +16,8 @@ from sim.effects import catalogue, effect_named
 from sim.effects.tail_contact import least_gap
 from sim.io.errors import InputError
 from sim.motion.steady import orbits, steady
-from sim.motion.switching import switch_response
 from sim.solve.assembly import assemble, numbers
+from tests.oracles.switching import switch_response
 from tests.processes import LIMIT
 from tests.sim.robots import CONTROL_VALUES, control
 

@@ -15,7 +15,7 @@ from sim.linear.complex_step import angle, derivative, length, magnitude, sign
 from sim.linear.dense import factor_dense, solve_factored
 from sim.linear.gmres import combine, extend, new_krylov, start
 from sim.linear.spectral import differentiation, interpolation, with_phases
-from sim.model.slopes import SLOPE_INPUTS
+from sim.model.sweepable import SLOPE_INPUTS
 from sim.solve.assembly import numbers
 from tests.sim.robots import control
 

@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.model.groups import Groups
-from sim.model.slopes import SLOPE_INPUTS, SLOPE_OUTPUTS
+from sim.model.sweepable import SLOPE_INPUTS, SLOPE_OUTPUTS
 from sim.motion.batches import run_batches, sensitivity_columns, split
 from sim.motion.sensitivity import sensitivities
 from sim.motion.steady import orbits

@@ -12,8 +12,7 @@ from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
-from sim.model.slopes import SLOPE_INPUTS
-from sim.model.sweepable import SWEEPABLE, read_range
+from sim.model.sweepable import SLOPE_INPUTS, SWEEPABLE, read_range
 from sim.motion.branch_report import branch_table, draw_branches, largest_hysteresis
 from sim.motion.branches import Branch, Branches, Motion, find_branches
 from sim.motion.continuation import Point, first_point, follow, locate

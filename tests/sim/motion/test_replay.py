@@ -14,7 +14,7 @@ from sim.motion.replay import replay, replay_error
 from sim.motion.resolution import Resolution
 from sim.motion.response import responses
 from sim.motion.steady import steady
-from sim.motion.switching import switch_response
+from tests.oracles.switching import switch_response
 from tests.sim.robots import CONTROL_VALUES, control
 
 

@@ -16,8 +16,8 @@ from sim.motion.resolution import Resolution
 from sim.motion.response import responses
 from sim.motion.steady import steady
 from sim.motion.stepped_response import stepped_response
-from sim.motion.switching import switch_response
 from sim.solve.assembly import reversed_bodies
+from tests.oracles.switching import switch_response
 from tests.sim.robots import CONTROL_VALUES, control, first_body
 
 FINE = Resolution(24, 72)

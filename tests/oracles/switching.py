@@ -1,4 +1,4 @@
-"""Flips of the motor: response to one switch, and net motion when ω flips every half-period T.
+"""Flips of the motor by time steps: response to one switch, and net motion when ω flips every half-period T.
 
 After a flip the tails need about 0.7 time units to turn over, and meanwhile the robot lags the circle
 that its new steady motion would draw. With g(T) the pose change over a dwell T, in the pose at the flip,
@@ -25,7 +25,6 @@ Units: l, μ0 l⁴/EI.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,14 +41,11 @@ from sim.motion.run import Run
 from sim.motion.settling import steady_state
 from sim.motion.steady import check_groups, steady
 from sim.motion.steady_motion import Steady
+from sim.motion.stepped_response import steady_twist
 from sim.solve.assembly import bodies, reversed_bodies
-from sim.solve.march import PHASE, SURGE, SWAY, YAW
 
 MEMORY = 1.2  # time units after which a flip is forgotten: the tails turn over in about 0.7
 _AVERAGED = 2  # half-periods that the mean is taken over, where there are as many
-_ADAPTS = 0.5  # time units after which time steps have forgotten that they began on an orbit of another mesh
-_WINDOW = 0.5  # shortest averaging time of the steady circle
-_APPROACH = 0.9  # of the angle that is left; the steps to its end must not become tiny
 
 
 @dataclass(frozen=True)
@@ -112,31 +108,6 @@ def _lag(body: Body, reverse: Body, tails: int, dwell: float, even: bool, resolu
         if copy.failed:
             return np.full(3, np.nan)
     return planar.compose(np.mean(changes, 0), planar.inverse(planar.arc(twist, dwell)))
-
-
-def steady_twist(
-    run: Run, tails: int, sense: float, *, adapts: float = _ADAPTS, window: float = _WINDOW
-) -> tuple[Floats, float]:
-    """Average forward, leftward and yaw rate for a positive motor; return the time of a turn by one spacing, too.
-
-    Velocities repeat with the spacing of the tails: means over a whole number of spacings. The spin may change
-    within a turn (near a free surface, say), so the end is approached by the angle of the disc.
-
-    Args:
-        adapts: time units before the averaging.
-        window: shortest averaging time.
-    """
-    run.go(adapts)
-    before, spacing, time = run.state.pose.copy(), 2 * np.pi / tails, 0.0
-    angle = spacing * max(1, math.ceil(window * abs(run.omega_t) / spacing))
-    for share in (_APPROACH, _APPROACH, 1.0):
-        remaining = angle - abs(run.state.pose[PHASE] - before[PHASE])
-        step = share * max(remaining, 0.0) / max(abs(run.omega_t), 1e-300)
-        run.go(step)
-        time += step
-    change = (run.state.pose - before) / time
-    turn = spacing / max(abs(change[PHASE]), 1e-300)
-    return np.array([change[SURGE], sense * change[SWAY], sense * change[YAW]]), turn
 
 
 def _change(run: Run, dwell: float, even: bool, sense: float) -> Floats:
