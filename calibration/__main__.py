@@ -33,7 +33,6 @@ def _calibrate(
     """Fit a table, find what the model lacks, correct the robot.
 
     Args:
-        out: folder.
         paths: a path, as for softflagella plan, on which the error is stated before and after (default:
             square:3l).
         no_path: state no error on a path, which takes some seconds, up to two minutes where the parts of the robot
@@ -80,9 +79,6 @@ def _laws(table: str, *, robot: str, out: str, seed: int = 0, jobs: int | None =
     """Describe a residual that no effect explains: where a term acts, and on which inputs it depends.
 
     Args:
-        table: CSV or Parquet of measured runs.
-        robot: robot.toml or the name of a preset.
-        out: folder.
         seed: of the bootstrap (default: 0).
         jobs: threads (default: all processors).
     """
@@ -114,7 +110,6 @@ def _adopt(verdict: str, *, name: str, law: str = "", out: str) -> None:
         verdict: verdict.json or laws.json.
         name: of the effect, such as speed_dependent_side_force.
         law: PLACE, which of the laws that were kept (default: the best).
-        out: folder.
     """
     import sim.effects
     from calibration.report.adoption import adopt_law
@@ -131,7 +126,6 @@ def _simulate(
     """Make a table from the simulator, to try the calibration on.
 
     Args:
-        robot: robot.toml or the name of a preset.
         out: CSV.
         effects: NAME=SIZE, hidden effect.
         seed: of the noise (default: 0).

@@ -44,7 +44,6 @@ def _report(data: str, *, out: str = "reports/dataset.html") -> None:
     """The sweep at a glance, one page.
 
     Args:
-        data: folder or URL of a data set.
         out: page.
     """
     from dataset.report import write_report
@@ -66,7 +65,6 @@ def _verify(
     """Check a data set against schema and simulator.
 
     Args:
-        data: folder or URL of a data set.
         rows: rows to simulate again.
         mend: repair first: remove damaged files, simulate missing rows.
         rows_by: MODULE.FUNCTION of yours that made the rows, with --mend.

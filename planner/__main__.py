@@ -6,17 +6,16 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
-from functools import partial
-from importlib import import_module
 from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
-from planner.paths.units import heading_in_degrees, in_lab, place_in_lab, read_length, read_pose
+from planner.paths.units import in_lab, read_length, read_pose
 from sim.io.commands import Program
 from sim.io.errors import InputError, naming
 from sim.io.units import format_length, format_time
 
 if TYPE_CHECKING:
+    from planner.jobs.fleet_plan import FleetPlan
     from planner.planning.plan import Plan
     from planner.tracking.tracker import Tracker
 
@@ -24,35 +23,16 @@ program = Program("planner", "Plan switching schedules for paths, without simula
 main = program.main
 BAR_AFTER = 1.0  # s
 ROBOT = "--robot --vehicle"  # options that mean the same
-_GOAL = "planner.api.goal:to_goal"
-_TOUR, _COVER, _HOLD = (f"planner.api.jobs:{job}" for job in ("tour", "cover", "hold"))
 
 
-def say(result: Plan) -> None:
-    """Print warnings, start, dwells and errors."""
-    for warning in result.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
-    robot = result.robot
-    x, y, heading = result.start
-    place = place_in_lab(x, y, robot)
-    print(f"start: put the head's centre at {place}, heading {heading_in_degrees(heading)}, at rest")
-    shortest = format_time(result.minimum_dwell * robot.time_scale)
-    print(
-        f"{len(result.dwells)} dwells of {shortest} ({result.minimum_dwell:.2f} time units) or more, "
-        f"{format_time(float(result.seconds.sum()))} in all"
-    )
-    print(result.error_line)
-    for line in result.lines():
-        print(line)
-
-
-def _write(result: Plan, out: str, *lines: str, **pictures: Any) -> None:
-    """Write a plan, and print what there is to say of it and its files."""
-    from planner.api.plan import write_plan
+def _write(result: Plan | FleetPlan, out: str, *lines: str, **pictures: Any) -> None:
+    """Write a plan, and print warnings, what there is to say of it, and its files."""
+    from planner.files.plan_files import write_plan
 
     files = write_plan(result, out, **pictures)
-    say(result)
-    for line in (*lines, f"-> {', '.join(map(str, files))}"):
+    for warning in result.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    for line in (*result.lines(), *lines, f"-> {', '.join(map(str, files))}"):
         print(line)
 
 
@@ -76,20 +56,19 @@ def _progress_bar() -> Iterator[Callable[[float], object]]:
         yield show
 
 
-@program.command("plan", of="planner.api.plan:plan", robot=ROBOT)
+@program.command("plan", of="planner.api:plan", robot=ROBOT)
 def _plan(path: str, *, robot: str, out: str, trade_off: bool = False, **given: Any) -> None:
     """Plan the switching times for a path.
 
     Args:
         trade_off: draw error against time and flips, for ten dwells.
-        out: folder.
     """
     result = _planned(path, robot, **given)
     pictures = {}
     if trade_off:
-        from planner.files import trade_off as pictured
+        from planner.files.pictures import draw_trade_off
 
-        pictures["trade_off.svg"] = pictured.draw_trade_off(pictured.trade_off(result))
+        pictures["trade_off.svg"] = draw_trade_off(result)
     errors = result.errors
     rms, largest, missed = (
         in_lab(value, result.robot) for value in (errors.drawn_rms, errors.drawn_max, result.declared.missed)
@@ -98,15 +77,14 @@ def _plan(path: str, *, robot: str, out: str, trade_off: bool = False, **given: 
     _write(result, out, f"{drawn}declared path", pictures=pictures)
 
 
-def _job(target: str, out: str, given: Mapping[str, Any]) -> None:
-    """Plan with a public function, and write what it returns."""
-    module, _, name = target.partition(":")
+def _planned_by(word: str, given: Mapping[str, Any]) -> Plan:
+    """Plan as a command does, with its public function and a bar."""
     with _progress_bar() as progress:
-        result = getattr(import_module(module), name)(progress=progress, **given)
-    _write(result, out)
+        plan: Plan = program.commands[word].call(progress=progress, **given)
+    return plan
 
 
-@program.command("goal", of=_GOAL, robot=ROBOT)
+@program.command("goal", of="planner.api:to_goal", robot=ROBOT)
 def _goal(
     *, goal: tuple[str, str, str], start: tuple[str, str, str] = ("0", "0", "0"), out: str, **given: Any
 ) -> None:
@@ -115,43 +93,26 @@ def _goal(
     Args:
         goal: X Y DEGREES, of the head's centre at the end.
         start: X Y DEGREES, of the head's centre at the start, at rest (default: 0 0 0).
-        out: folder.
     """
-    _job(_GOAL, out, {"start": start, "goal": goal, **given})
+    _write(_planned_by("goal", {"start": start, "goal": goal, **given}), out)
 
 
-@program.command("tour", of=_TOUR, robot=ROBOT, back="return")
+@program.command("tour", of="planner.api:tour", robot=ROBOT, back="return")
 def _tour(*, out: str, **given: Any) -> None:
-    """Visit places in the order that takes the robot the least time.
-
-    Args:
-        out: folder.
-    """
-    _job(_TOUR, out, given)
+    """Visit places in the order that takes the robot the least time."""
+    _write(_planned_by("tour", given), out)
 
 
-@program.command("cover", of=_COVER, robot=ROBOT, width="--width", holes="hole")
+@program.command("cover", of="planner.api:cover", robot=ROBOT, width="--width", holes="hole")
 def _cover(*, out: str, **given: Any) -> None:
-    """Sweep a region with a camera, magnet or sampler under the robot.
-
-    Args:
-        out: folder.
-    """
-    _job(_COVER, out, given)
+    """Sweep a region with a camera, magnet or sampler under the robot."""
+    _write(_planned_by("cover", given), out)
 
 
-@program.command("hold", of=_HOLD, robot=ROBOT, seconds="for")
+@program.command("hold", of="planner.api:hold", robot=ROBOT, seconds="for")
 def _hold(*, out: str, **given: Any) -> None:
-    """Stay about a place, on the smallest orbit that the robot can keep.
-
-    Args:
-        out: folder.
-    """
-    _job(_HOLD, out, given)
-
-
-def _from_rest(plan: Callable[..., Any], start: Sequence[str] = ("0", "0", "0"), **given: Any) -> Any:
-    return plan(start, **given)
+    """Stay about a place, on the smallest orbit that the robot can keep."""
+    _write(_planned_by("hold", given), out)
 
 
 @program.command("fleet")
@@ -162,44 +123,31 @@ def _fleet(fleet: str, *, apart: str | None = None, feedback: bool = False, out:
         fleet: TOML with a table [[member]] for each robot: robot, and path, goal, places or region.
         apart: least distance between bodies, such as 10cm (default: apart of the file).
         feedback: the poses will be measured for a tracker.
-        out: folder.
     """
-    from planner.api import goal, jobs, plan
-    from planner.files.fleet_files import distance_apart, read_fleet, write_fleet
+    from planner.files.fleet_files import distance_apart, read_fleet
     from planner.jobs.fleet import Member
     from planner.jobs.fleet import fleet as keep_apart
 
     asked = read_fleet(fleet)
     if (apart := apart or asked.apart) is None:
         raise InputError(f"{fleet}: how far apart? give --apart 10cm, or apart in the file")
-    plans: dict[str, Callable[..., Any]] = {
-        "plan": plan.plan,
-        "goal": partial(_from_rest, goal.to_goal),
-        "tour": jobs.tour,
-        "cover": jobs.cover,
-    }
     members = []
     for robot in asked.robots:
         with naming(f"{fleet}: {robot.name}"):
             command = program.commands[robot.command]
-            given = vars(
-                command.parser(robot.command).parse_args([*robot.words[:2], "--out", out, *robot.words[2:]])
-            )
-            options = {name: value for name, value in given.items() if name not in ("out", "trade_off")}
-            if feedback:
-                options["feedback"] = True
-            members.append(Member(robot.name, plans[robot.command](**options), robot.delay))
+            given = vars(command.parser(robot.command).parse_args(["--out", out, *robot.words]))
+            options = {
+                name: given[name] for name in given.keys() - {"out", "trade_off", *(["feedback"] * feedback)}
+            }
+            plan = command.call(**options, **({"feedback": True} if feedback else {}))
+            members.append(Member(robot.name, plan, robot.delay))
     distance = distance_apart(apart, asked.unit, [member.plan.robot for member in members])
     with _progress_bar() as progress:
         result = keep_apart(members, distance, feedback=feedback or asked.feedback, progress=progress)
-    files = write_fleet(result, out)
-    for warning in result.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
-    for line in (*result.lines(), f"-> {', '.join(map(str, files))}"):
-        print(line)
+    _write(result, out)
 
 
-@program.command("track", of="planner.api.plan:plan", robot=ROBOT)
+@program.command("track", of="planner.api:plan", robot=ROBOT)
 def _track(
     path: str,
     *,
@@ -251,27 +199,23 @@ def _track(
 
 def _planned(path: str, robot: str | None, **given: Any) -> Plan:
     """Plan for a path, with a bar and a line on the path."""
-    from planner.api.plan import plan
-
     if robot is None:
         raise InputError(f"{path} is no saved plan, so --robot is needed: a robot.toml or a preset")
-    with _progress_bar() as progress:
-        return plan(path, robot, progress=progress, tell=print, **given)
+    return _planned_by("plan", {"path": path, "robot": robot, "tell": print, **given})
 
 
 def _saved(path: str, *, unit: str | None = None, lookup: str | None = None, own_table: bool = False,
            **planning: Any) -> Plan:  # fmt: skip
     """Make a saved plan again; options of planning are refused beside it."""
     from planner.files.saved_plan import restore_plan
-    from surrogate.table_file import load_table
 
     for name in (name for name, value in planning.items() if value is not None):
         option = f"--{name.replace('_', '-')}"
         raise InputError(f"{option}: {path} is planned already; leave {option} out, or plan again")
-    return restore_plan(path, lookup=None if lookup is None else load_table(lookup), own_table=own_table)
+    return restore_plan(path, lookup=lookup, own_table=own_table)
 
 
-@program.command("page", of="planner.api.page:write_page", path="", robot="--robot", paths="path")
+@program.command("page", of="planner.api:write_page", path="", robot="--robot", paths="path")
 def _page(*, out: str, paths: Sequence[str] = (), **given: Any) -> None:
     """Write one HTML file that plans: draw a path in the browser, take the schedule along.
 
@@ -279,13 +223,11 @@ def _page(*, out: str, paths: Sequence[str] = (), **given: Any) -> None:
         paths: a path that the page offers: CSV, SVG, or a shape such as circle:20cm.
         out: the page, HTML.
     """
-    from planner.api.page import write_page
-
-    page = write_page(out, paths=paths, **given)
+    page = program.commands["page"].call(path=out, paths=paths, **given)
     print(f"{page.stat().st_size / 1e6:.2f} MB, opens in a browser -> {page}")
 
 
-@program.command("replan", of="planner.api.follow:replan")
+@program.command("replan", of="planner.api:replan")
 def _replan(plan: str, track: str, *, out: str, **given: Any) -> None:
     """Plan the rest of a saved plan from where a robot is now.
 
@@ -293,11 +235,8 @@ def _replan(plan: str, track: str, *, out: str, **given: Any) -> None:
         plan: plan.json, its folder, or a goal.json, tour.json or cover.json beside it.
         track: table of the robot so far: time_s, x_cm, y_cm, heading_deg; in its last row the robot is now, at
             rest.
-        out: folder.
     """
-    from planner.api.follow import replan
-
-    _write(replan(plan, track, **given), out)
+    _write(program.commands["replan"].call(plan=plan, track=track, **given), out)
 
 
 @program.command("replay")
@@ -313,7 +252,6 @@ def _replay(
     """Simulate a planned schedule, and compare the track with the plan.
 
     Args:
-        plan: plan.json.
         robot: another robot that carries the plan out: a robot.toml or a preset (default: the plan's).
         out: CSV with the track; needed unless --shapes is given.
         error: estimate the error of the track, which takes more than half as long again.
@@ -322,11 +260,9 @@ def _replay(
     """
     from tqdm import tqdm
 
-    from planner.files.plan_json import load_plan
-    from planner.files.tracking_error import tracking_error
+    from planner.api import check
     from sim.inputs import load_robot
     from sim.io.files import write_csv
-    from sim.io.units import format_time
     from sim.model.plan_file import read_plan_file
     from sim.model.schedule import load_schedule
     from sim.motion.replay import replay, replay_error
@@ -361,13 +297,12 @@ def _replay(
     place = f"({end.x_over_l:.3f}, {end.y_over_l:.3f}) l"
     if "x_cm" in track:
         place = f"({end.x_cm:.2f}, {end.y_cm:.2f}) cm = {place}"
-    time = format_time(end.time_s)
-    print(f"{len(schedule.dwells)} dwells, {time}, ends at {place}{own_error} -> {out}")
+    print(f"{len(schedule.dwells)} dwells, {format_time(end.time_s)}, ends at {place}{own_error} -> {out}")
     if "reference" in read_plan_file(plan):  # a schedule alone has no path
-        print(tracking_error(load_plan(plan), track).line)
+        print(check(plan, track).line)
 
 
-@program.command("check", of="planner.api.follow:check")
+@program.command("check", of="planner.api:check")
 def _check(plan: str, track: str, *, out: str | None = None) -> None:
     """Tracking error of a replayed track.
 
@@ -376,24 +311,16 @@ def _check(plan: str, track: str, *, out: str | None = None) -> None:
         track: table written by softflagella replay, or with time_s, x_cm, y_cm, heading_deg.
         out: overlay picture, PNG.
     """
-    from planner.api.follow import check
-    from planner.files.plan_json import load_plan
+    from planner.api import check
+    from planner.files.saved_plan import load_plan
 
     content = load_plan(plan)
     error = check(content, track)
     print(error.line)
     if out is not None:
-        from matplotlib.figure import Figure
+        from planner.files.tracks import write_overlay
 
-        from planner.files.tracking_error import draw_overlay
-        from sim.io.files import whole_file
-
-        figure = Figure(figsize=(6, 6))
-        axes = figure.add_subplot()
-        draw_overlay(axes, content, error, content["robot"]["name"])
-        axes.legend(fontsize=8, frameon=False)
-        with whole_file(out) as part:
-            figure.savefig(part, format="png", dpi=130, bbox_inches="tight")
+        write_overlay(out, content, error)
         print(f"-> {out}")
 
 

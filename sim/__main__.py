@@ -77,7 +77,6 @@ def _branches(
     """All steady motions along an input: folds, Hopf points, stability, hysteresis.
 
     Args:
-        robot: robot.toml or the name of a preset.
         speed: LOW:HIGH, sweep the motor's speed [rpm], such as 20:200; where LOW is negative, --INPUT=LOW:HIGH.
         steps: values in a slow sweep by time steps.
         out: folder, or the name of a page, FILE.html.
@@ -123,7 +122,6 @@ def _film(plan: str, *, out: str, speed: float | None = None, width: int = 640) 
     """Film of a plan: the robot from above with its bent tails, simulated.
 
     Args:
-        plan: plan.json.
         out: the film: .gif, .webp, or .mp4 where ffmpeg is installed.
         speed: how many times faster than the robot (default: so that the film takes about 15 s).
         width: pixels.

@@ -9,29 +9,21 @@ from importlib import import_module
 from sim.io.commands import Command, Program
 from sim.io.errors import run_command
 
+_IMPORTANT = (
+    ("sim", "robot steady branches effects"),
+    ("planner", "plan goal tour cover hold fleet track page replan"),
+    ("dataset", "sweep"),
+    ("surrogate", "train"),
+    ("calibration", "tracks calibrate"),
+    ("planner", "replay check"),
+    ("sim", "film"),
+    ("surrogate", "query"),
+    ("softflagella", "demo"),
+)
 WORDS = {  # the most important commands -> package and command
-    "robot": ("sim", "robot"),
-    "steady": ("sim", "steady"),
-    "branches": ("sim", "branches"),
-    "effects": ("sim", "effects"),
-    "plan": ("planner", "plan"),
-    "goal": ("planner", "goal"),
-    "tour": ("planner", "tour"),
-    "cover": ("planner", "cover"),
-    "hold": ("planner", "hold"),
-    "fleet": ("planner", "fleet"),
-    "track": ("planner", "track"),
-    "page": ("planner", "page"),
-    "replan": ("planner", "replan"),
-    "sweep": ("dataset", "build"),
-    "train": ("surrogate", "train"),
-    "tracks": ("calibration", "tracks"),
-    "calibrate": ("calibration", "calibrate"),
-    "replay": ("planner", "replay"),
-    "check": ("planner", "check"),
-    "film": ("sim", "film"),
-    "query": ("surrogate", "query"),
-    "demo": ("softflagella", "demo"),
+    word: (package, "build" if word == "sweep" else word)
+    for package, words in _IMPORTANT
+    for word in words.split()
 }
 PACKAGES = {
     "sim": "simulate robots: steady motion, branches, films, presets",

@@ -19,14 +19,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import pandas as pd
 from tqdm import tqdm
 
 from calibration.report.corrected_robot import corrected_robot, corrected_toml
@@ -39,37 +37,29 @@ from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
 from dataset.data_set import read
-from planner.files.plan_json import load_plan
-from planner.files.tracking_error import TrackingError, tracking_error
-from planner.paths.path import polygon
+from planner.api import check, plan
+from planner.files.saved_plan import load_plan
+from planner.paths.path import Path2D, polygon
 from sim.io.files import whole_file, write_csv, write_text
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml
 from sim.motion.batches import available_jobs
+from sim.motion.replay import replay
 from sim.motion.response import responses
 from sim.motion.steady import steady
 from sim.motion.steady_motion import Steady
 from sim.motion.warm import compile_once
 from softflagella.demo_figures import draw_plans
-from softflagella.demo_files import ROBOT_PAGE
-from softflagella.demo_page import Results, write_page
-from softflagella.replanning import Steered, steer
+from softflagella.demo_page import ROBOT_PAGE, Results, Swum, write_page
 from surrogate.table_file import load
+from surrogate.tabulate import tabulate
 
-
-@dataclass(frozen=True)
-class Case:
-    name: str
-    robot: str
-    path: str
-
-
-CASES = (
-    Case("circle", "paper-control", "circle:1.5l"),
-    Case("square", "paper-control", "square:3l"),
-    Case("triangle", "paper-triangle", "triangle:4l"),
-)
+CASES = {  # name of the path -> robot, path
+    "circle": ("paper-control", "circle:1.5l"),
+    "square": ("paper-control", "square:3l"),
+    "triangle": ("paper-triangle", "triangle:4l"),
+}
 # The robot behind the two tables; calibration starts from the paper's coefficients.
 HIDDEN = {"C_t": 3.1, "C_r": 2.4, "C_yr": 4.4}
 HIDDEN_EFFECT = {"end_over_end_drag": 5.0}
@@ -89,7 +79,7 @@ def run_demo(out: str | Path) -> None:
     robot, motions = _look(folder)
     print("2/4 plan circle, square and triangle without simulating, and replay them")
     plans = _plan_and_replay(folder)
-    paths = [word for case in CASES for word in ("--path", case.path)]
+    paths = [word for _, path in CASES.values() for word in ("--path", path)]
     _command("page", *paths, "--out", str(page_path.parent / ROBOT_PAGE))
     print("3/4 a small sweep and a look-up table trained on it")
     data, model = folder / "sweep", folder / "model.safetensors"
@@ -149,19 +139,18 @@ def _look(folder: Path) -> tuple[Robot, list[Steady]]:
     return robot, [steady(replace(groups, omega_bar=s * groups.omega_bar)) for s in (1.0, -1.0)]
 
 
-def _plan_and_replay(folder: Path) -> dict[str, tuple[dict[str, Any], TrackingError]]:
+def _plan_and_replay(folder: Path) -> dict[str, Swum]:
     """Plan and replay all paths; return each plan with its tracking error."""
-    for case in CASES:
-        _command("plan", case.path, "--robot", case.robot, "--out", str(folder / case.name))
-    threads = {name: "1" for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS")}
-    os.environ.update(threads)
+    for name, (robot, path) in CASES.items():
+        _command("plan", path, "--robot", robot, "--out", str(folder / name))
+    os.environ.update({name: "1" for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS")})
 
-    def replay_one(case: Case) -> None:
-        plan, track = folder / case.name / "plan.json", folder / case.name / "track.csv"
+    def replay_one(name: str) -> None:
+        plan, track = folder / name / "plan.json", folder / name / "track.csv"
         _command("replay", str(plan), "--out", str(track), "--no-error", quiet=True)
 
-    for case in CASES:
-        print(f"  softflagella replay {shlex.quote(str(folder / case.name / 'plan.json'))} --out …/track.csv")
+    for name in CASES:
+        print(f"  softflagella replay {shlex.quote(str(folder / name / 'plan.json'))} --out …/track.csv")
     with (
         ThreadPoolExecutor(min(available_jobs(), len(CASES))) as pool,
         tqdm(total=len(CASES), desc="replay", unit="plan") as bar,
@@ -169,17 +158,16 @@ def _plan_and_replay(folder: Path) -> dict[str, tuple[dict[str, Any], TrackingEr
         for _ in pool.map(replay_one, reversed(CASES)):
             bar.update()
     result = {}
-    for case in CASES:
-        plan = load_plan(folder / case.name / "plan.json")
-        error = tracking_error(plan, pd.read_csv(folder / case.name / "track.csv"))
-        print(f"  {case.name}: {error.line}")
-        result[case.name] = (plan, error)
+    for name in CASES:
+        planned = load_plan(folder / name / "plan.json")
+        result[name] = planned, check(planned, folder / name / "track.csv")
+        print(f"  {name}: {result[name][1].line}")
     with whole_file(folder / "plans.png") as part:  # of the README
         draw_plans(result).savefig(part, format="png", dpi=90, bbox_inches="tight")
     return result
 
 
-def _steer(verdict: Verdict) -> dict[str, Steered]:
+def _steer(verdict: Verdict) -> dict[str, Swum]:
     """Plan a square with the calibrated, the corrected and the true model, and run the plans on the true robot."""
     start = replace(PRESETS["paper-measured"], tails=2).with_motor(10.0)
     truth = replace(start, **HIDDEN, effects=HIDDEN_EFFECT)  # type: ignore[arg-type]
@@ -189,10 +177,30 @@ def _steer(verdict: Verdict) -> dict[str, Steered]:
         "truth known": truth,
     }
     steered = steer(models, truth, polygon(4, 3.0))
-    for label, run in steered.items():
-        mm = 1000 * start.tail_length * run.error.rms
+    for label, (_, error) in steered.items():
+        mm = 1000 * start.tail_length * error.rms
         print(f"  square planned with the model {label}: {mm:.1f} mm rms on the true robot")
     return steered
+
+
+def steer(models: Mapping[str, Robot], truth: Robot, path: Path2D) -> dict[str, Swum]:
+    """Plan a path with each of several models of a robot, and run the schedules on the true robot, open loop.
+
+    With a wrong yaw rate the robot drifts from the path with every dwell. So errors of a few percent in the model
+    can lead to errors as large as the path.
+
+    Args:
+        models: by label; the same robot with other coefficients, numbers and effects.
+        truth: the robot that swims.
+        path: to be planned.
+    """
+    runs = {}
+    for label, model in models.items():
+        planned = plan(path, model, lookup=tabulate(model))
+        track = replay([planned.schedule(truth)])[0]
+        track[["x_over_l", "y_over_l"]] *= truth.tail_length / model.tail_length
+        runs[label] = (planned.to_dict(), check(planned, track))
+    return runs
 
 
 def _calibrate(folder: Path, name: str) -> tuple[Verdict, Measurements]:

@@ -12,7 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dataset.figures import plain_logarithms
-from planner.files.tracking_error import TrackingError, draw_overlay
+from planner.files.tracks import TrackingError, draw_overlay
+from planner.planning.picture import band
 from sim.arrays import Floats
 from sim.io.page_figures import BLUE, GREEN, INK, ORANGE, PALE, RED, SOFT, VIOLET
 from sim.model.response import DWELLS
@@ -20,17 +21,16 @@ from sim.model.robot import Robot
 from sim.motion.lab_units import RPM, lab_columns
 from sim.motion.robot_views import draw_from_above, draw_from_behind, scene
 from sim.motion.steady_motion import Steady
-from softflagella.replanning import Steered
 
 _WIDTH = 4.4  # inches: two of them stand beside each other
 _NARROW = 3.0  # three
 _TAILS = {1: SOFT, 2: BLUE, 3: ORANGE, 4: GREEN, 5: VIOLET}
 _LEFT, _RIGHT = BLUE, ORANGE  # of the directions of the motor, and of the turns that they make
 _MAGNIFIED = 40.0  # s of the schedule that are magnified
-_QUANTITIES = {  # column of a motion in lab units -> what it is called, its unit, factor to it
-    "omega_yr_rad_s": ("yaw rate", "rad/s", 1.0),
-    "R_yr_cm": ("turn radius", "cm", 1.0),
-    "theta_deg": ("slip angle", "°", 1.0),
+_QUANTITIES = {  # column of a motion in lab units -> what it is called, and its unit
+    "omega_yr_rad_s": ("yaw rate", "rad/s"),
+    "R_yr_cm": ("turn radius", "cm"),
+    "theta_deg": ("slip angle", "°"),
 }
 
 
@@ -51,12 +51,9 @@ def draw_robot(robot: Robot) -> list[tuple[Figure, str, str]]:
         figure.axes[0].set_aspect("equal")
         figure.axes[0].axis("off")
         figure.tight_layout(pad=0.1)
+    from_above = "the robot from above, to scale, with its axes, heading and path"
     return [
-        (
-            above,
-            "the robot from above, to scale, with its axes, heading and path",
-            "From above, to scale. Motor at +1.",
-        ),
+        (above, from_above, "From above, to scale. Motor at +1."),
         (behind, "the robot from behind, with the senses of its spins", "From behind. Motor at +1."),
     ]
 
@@ -85,16 +82,16 @@ def draw_circles(robot: Robot, motions: Sequence[Steady]) -> Figure:
     return _finished(figure)
 
 
-def draw_path(plan: dict[str, Any], error: TrackingError) -> Figure:
-    """Draw the path as given, the declared path with its stated error, and the replayed track, in cm."""
+def draw_path(plan: Mapping[str, Any], error: TrackingError, label: str = "replayed") -> Figure:
+    """Draw the path as given, the declared path with its stated error, and a track, in cm."""
     cm = 100 * plan["robot"]["tail_length_m"]
     figure = Figure(figsize=(_NARROW, 3.4))
     axes = figure.add_subplot()
     declared = cm * np.array(plan["reference"])
-    axes.fill(*_band(declared, cm * error.stated).T, color=BLUE, alpha=0.3, lw=0, label="stated error")
+    axes.fill(*band(declared, cm * error.stated).T, color=BLUE, alpha=0.3, lw=0, label="stated error")
     axes.plot(*(cm * np.array(plan["raw_path"])).T, color=PALE, lw=1.4, label="path as given")
     axes.plot(*declared.T, color=INK, lw=1.2, label="declared path")
-    axes.plot(*(cm * error.track).T, color=RED, lw=0.8, label="replayed")
+    axes.plot(*(cm * error.track).T, color=RED, lw=0.8, label=label)
     axes.plot(*(cm * error.track[0]), "o", color=RED, ms=4)
     axes.set_aspect("equal")
     _label(axes, "x [cm]", "y [cm]")
@@ -111,14 +108,6 @@ def draw_plans(plans: Mapping[str, tuple[dict[str, Any], TrackingError]]) -> Fig
     figure.axes[0].legend(fontsize=7, frameon=False, loc="center")
     figure.tight_layout()
     return figure
-
-
-def _band(line: Floats, width: float) -> Floats:
-    """Return the outline (2K, 2) of a band about a line."""
-    tangent = np.gradient(line, axis=0)
-    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12)
-    left = width * np.stack([-tangent[:, 1], tangent[:, 0]], 1)
-    return np.concatenate([line + left, (line - left)[::-1]])
 
 
 def draw_schedule(plan: dict[str, Any], track: pd.DataFrame) -> Figure:
@@ -190,17 +179,14 @@ def draw_sweep(lab: pd.DataFrame) -> list[tuple[Figure, str, str]]:
     )
     figures = []
     for name, label, output, logarithmic in panels:
-        words, unit, factor = _QUANTITIES[output]
+        words, unit = _QUANTITIES[output]
         figure = Figure(figsize=(_WIDTH, 3.1))
         axes = figure.add_subplot()
         for tails, part in lab.groupby("N"):
             colour = _TAILS.get(int(str(tails)), RED)
-            axes.plot(part[name], factor * part[output].abs(), ".", ms=5, color=colour, label=f"N = {tails}")
+            axes.plot(part[name], part[output].abs(), ".", ms=5, color=colour, label=f"N = {tails}")
         if logarithmic:
-            axes.set_xscale("log")
-            axes.set_yscale("log")
-            plain_logarithms(axes.xaxis)
-            plain_logarithms(axes.yaxis)
+            _logarithmic(axes)
         _label(axes, label, f"{words} [{unit}]")
         _legend_above(axes, columns=4)
         figures.append((_finished(figure), f"{words} against {label}", f"{words} against {label.split(' [')[0]}"))
@@ -227,19 +213,15 @@ def draw_net_speed(robot: Robot, net_speed: Floats) -> Figure:
 def draw_parity(simulated: pd.DataFrame, predicted: pd.DataFrame) -> list[tuple[Figure, str, str]]:
     """Draw predictions of the look-up table against the simulator, a figure for each quantity, with its error."""
     figures = []
-    for name in ("omega_yr_rad_s", "R_yr_cm", "theta_deg"):
-        words, unit, factor = _QUANTITIES[name]
-        truth, answer = (np.abs(factor * table[name].to_numpy(float)) for table in (simulated, predicted))
+    for name, (words, unit) in _QUANTITIES.items():
+        truth, answer = (np.abs(table[name].to_numpy(float)) for table in (simulated, predicted))
         figure = Figure(figsize=(_NARROW, 2.7))
         axes = figure.add_subplot()
         axes.plot(truth, answer, ".", ms=4, color=BLUE)
         ends = [np.nanmin(truth), np.nanmax(truth)]
         axes.plot(ends, ends, color=INK, lw=0.7)
         if name == "omega_yr_rad_s":
-            axes.set_xscale("log")
-            axes.set_yscale("log")
-            plain_logarithms(axes.xaxis)
-            plain_logarithms(axes.yaxis)
+            _logarithmic(axes)
         off = np.abs(answer - truth)
         error = f"{np.nanmedian(off):.1g}°" if name == "theta_deg" else f"{100 * np.nanmedian(off / truth):.1g} %"
         _label(axes, f"simulated {words} [{unit}]", f"look-up table [{unit}]")
@@ -249,18 +231,11 @@ def draw_parity(simulated: pd.DataFrame, predicted: pd.DataFrame) -> list[tuple[
     return figures
 
 
-def draw_steered(run: Steered) -> Figure:
-    """Draw the track of the true robot under a plan, with the path as given and the declared one, in cm."""
-    cm = 100 * run.plan["robot"]["tail_length_m"]
-    figure = Figure(figsize=(_NARROW, 3.2))
-    axes = figure.add_subplot()
-    axes.plot(*(cm * np.array(run.plan["raw_path"])).T, color=PALE, lw=1.2, label="as given")
-    axes.plot(*(cm * np.array(run.plan["reference"])).T, color=INK, lw=1.0, label="declared")
-    axes.plot(*(cm * run.track).T, color=RED, lw=0.7, label="swum")
-    axes.set_aspect("equal")
-    _label(axes, "x [cm]", "y [cm]")
-    _legend_above(axes)
-    return _finished(figure)
+def _logarithmic(axes: Axes) -> None:
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    plain_logarithms(axes.xaxis)
+    plain_logarithms(axes.yaxis)
 
 
 def _label(axes: Axes, x: str, y: str) -> None:

@@ -6,6 +6,8 @@ a checkout of the repository.
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +21,7 @@ from calibration.swimmer.measured_table import Measurements
 from calibration.verdict.verdict import Verdict
 from calibration.words.quantities import plain
 from dataset.report import usable_rows
-from planner.files.tracking_error import TrackingError
+from planner.files.tracks import TrackingError
 from sim.arrays import Floats
 from sim.io.pages import Page
 from sim.io.provenance import code_version
@@ -36,15 +38,30 @@ from softflagella.demo_figures import (
     draw_path,
     draw_robot,
     draw_schedule,
-    draw_steered,
     draw_sweep,
     in_lab_units,
 )
-from softflagella.demo_files import PLAN_FILES, ROBOT_PAGE, ROBOT_PICTURE, documentation, header_excerpt
-from softflagella.replanning import Steered, gap_closed
 from surrogate.table import NeuralTable
 from surrogate.table_file import load
 
+_DOCS = Path(__file__).parents[1] / "docs"
+_PAGES = (  # of the documentation: name without suffix, title, what it is
+    ("tutorial/schedule", "From a robot to a schedule", "the first tutorial, ten minutes"),
+    ("tutorial/calibration", "Calibrating the model", "the second tutorial"),
+    ("howto/tank", "Calibrate your tank", "which runs to make"),
+    ("reference/signs", "Signs and frames", "which way +1 turns, and a check on the bench"),
+    ("howto/tracker", "Keep a robot on its path with a camera", "a schedule with feedback"),
+)
+ROBOT_PAGE = "robot.html"  # the page that plans, beside the demo's page
+ROBOT_PICTURE = _DOCS / "page.png"  # of it; there is none without a checkout
+PLAN_FILES = {
+    "schedule.h": "the schedule for a microcontroller, open loop",
+    "tracker.h": "the same with feedback from a camera",
+    "plan.csv": "dwells and poses as a table",
+    "plan.json": "everything about the plan",
+    "plan.svg": "a drawing of it",
+    "track.csv": "the replayed track",
+}
 _ERRORS = {  # column of a look-up table -> what it is called
     "omega_t_bar": "tail spin",
     "omega_yr_bar": "yaw rate",
@@ -54,6 +71,9 @@ _ERRORS = {  # column of a look-up table -> what it is called
 }
 
 
+Swum = tuple[dict[str, Any], TrackingError]  # a plan.json, and how a robot swam it
+
+
 @dataclass(frozen=True)
 class Results:
     """What the demo found, in the order of its steps."""
@@ -61,11 +81,11 @@ class Results:
     robot: Robot
     motions: Sequence[Steady]  # for both directions of the motor
     net_speed: Floats  # (D,) of equal dwells, see `sim.model.response`
-    plans: dict[str, tuple[dict[str, Any], TrackingError]]  # by the name of the path: plan.json and its replay
+    plans: dict[str, Swum]  # by the name of the path
     rows: pd.DataFrame  # of the sweep
     small: NeuralTable  # trained on them
     loops: dict[str, tuple[Verdict, Measurements]]  # calibrations by name; the folder's name has dashes
-    steered: dict[str, Steered]  # by the name of the model
+    steered: dict[str, Swum]  # by the name of the model
     seconds: float
 
 
@@ -311,21 +331,19 @@ def _add_calibration(page: Page, results: Results, name: str) -> None:
     )
 
 
-def _add_steered(page: Page, steered: dict[str, Steered]) -> None:
+def _add_steered(page: Page, steered: Mapping[str, Swum]) -> None:
     page.section("Planning again: what the correction is worth")
-    mm = {label: 1000 * run.plan["robot"]["tail_length_m"] * run.error.rms for label, run in steered.items()}
-    closed = gap_closed(*(run.error.rms for run in steered.values()))
+    before, after, best = (error.rms for _, error in steered.values())
     page.text(
         "A square, planned without simulating with three models of the robot with the hidden effect, and swum "
-        f"open loop by that robot. The correction closes {100 * closed:.0f} % of the gap between the calibrated "
-        "model and the truth."
+        f"open loop by that robot. The correction closes {100 * (before - after) / (before - best):.0f} % of the "
+        "gap between the calibrated model and the truth."
     )
-    page.figures(
-        [
-            (draw_steered(run), f"track under the plan with the model {label}", f"{label}: {mm[label]:.1f} mm rms")
-            for label, run in steered.items()
-        ]
-    )
+    figures = []
+    for label, (plan, error) in steered.items():
+        rms = f"{label}: {1000 * plan['robot']['tail_length_m'] * error.rms:.1f} mm rms"
+        figures.append((draw_path(plan, error, "swum"), f"track under the plan with the model {label}", rms))
+    page.figures(figures)
 
 
 def _add_own_robot(page: Page, folder: Path) -> None:
@@ -354,3 +372,22 @@ def _add_own_robot(page: Page, folder: Path) -> None:
         page.links(links)
     else:
         page.text("The documentation is in the folder docs of the repository.")
+
+
+def header_excerpt(header: str) -> list[str]:
+    """Return the numbers that a schedule.h defines, and the first line of its dwells."""
+    lines = header.splitlines()
+    defined = [line for line in lines if re.match(r"#define SCHEDULE_\w+ [-(\d]", line)]
+    dwells = next(place for place, line in enumerate(lines) if line.strip()[:1].isdigit())
+    return [*defined, *lines[dwells - 1 : dwells + 1], "    …"]
+
+
+def documentation(folder: Path) -> list[tuple[str, str, str]]:
+    """List pages of the documentation, relative to a folder: HTML if it was built; none without a checkout."""
+    built = _DOCS / "_build" / "html"
+    root, suffix = (built, ".html") if (built / "index.html").is_file() else (_DOCS, ".md")
+    return [
+        (os.path.relpath(path, folder), title, words)
+        for name, title, words in _PAGES
+        if (path := root / f"{name}{suffix}").is_file()
+    ]

@@ -107,11 +107,7 @@ def _inverse(targets: str, *, out: str, **given: Any) -> None:
 
 @program.command("errors")
 def _errors(*, lookup: str | None = None) -> None:
-    """Print the stored held-out errors.
-
-    Args:
-        lookup: look-up table (default: the one that comes with the package).
-    """
+    """Print the stored held-out errors."""
     from surrogate.errors import error_table
     from surrogate.table_file import load
 
@@ -126,7 +122,6 @@ def _robot(robot: str, *, out: str) -> None:
     """Simulate the table of one robot, effects included.
 
     Args:
-        robot: robot.toml or the name of a preset.
         out: JSON.
     """
     from sim.inputs import load_robot

@@ -18,7 +18,7 @@ from calibration.statistics.statistical_model import start_values
 from calibration.verdict.record import verdict_record
 from dataset.build import build
 from dataset.design import Axis, load_design
-from planner.files.plan_json import load_plan
+from planner.files.saved_plan import load_plan
 from sim.inputs import load_robot
 from sim.io.errors import run_command
 from sim.io.units import format_time

@@ -24,7 +24,7 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.common import heading, in_parallel, per_cent, row
 from benchmarks.planner.stated_errors import random_path
-from planner.api.plan import plan
+from planner.api import plan
 from planner.paths.path import circle
 from planner.planning.camera import Camera
 from planner.tracking.swim import Swim, swim

@@ -13,8 +13,8 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from planner.api.plan import plan
-from planner.files.tracking_error import tracking_error
+from planner.api import plan
+from planner.files.tracks import tracking_error
 from planner.paths.path import circle, polygon
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay

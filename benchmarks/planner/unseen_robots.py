@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.common import heading, in_parallel, per_cent, row, two_quantiles
-from planner.files.tracking_error import tracking_error
+from planner.files.tracks import tracking_error
 from sim.io.errors import InputError
 from sim.motion.replay import replay, replay_error
 from sim.motion.warm import compile_once

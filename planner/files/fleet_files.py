@@ -103,6 +103,7 @@ def _robot(path: str | Path, number: int, entry: Mapping[str, Any]) -> FleetRobo
             words += _option(folder, key, value)
     (job,) = jobs
     if job == "goal":
+        words += [] if "start" in entry else ["--start", "0", "0", "0"]
         words += _option(folder, "goal", entry["goal"])
     elif job == "places":
         words += ["--", *_places(folder, entry["places"])]

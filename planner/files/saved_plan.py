@@ -1,15 +1,17 @@
-"""A plan made again from its plan.json, so that it can be tracked, drawn and planned on from.
+"""The content of plan.json and goal.json, and a plan made again from it, to be tracked or planned on.
 
-The file has the schedule, the declared path with the pivot's headings, the guidance, the errors, and the robot's
-groups, scales and calibration. The vehicle is asked for again of a look-up table: that of the package, or the
-robot's own, simulated where the plan was made with one and kept beside plan.json.
+plan.json has the schedule, the declared path with the pivot's headings, the guidance, the errors, and the robot's
+groups, scales and calibration (`Plan.to_dict`). The vehicle is asked for again of a look-up table: that of the
+package, or the robot's own, simulated where the plan was made with one and kept beside plan.json. goal.json has
+the trip (`Trip.to_dict`) and the identity of the plan beside it.
 """
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
@@ -17,7 +19,7 @@ from typing import Any, get_args
 import numpy as np
 
 from planner.files.own_table import table_for
-from planner.files.plan_json import check_numbers, load_plan
+from planner.goal.trip import FORMAT, Trip
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Reference
@@ -36,37 +38,100 @@ from planner.vehicle.zigzag import Objective, Zigzag
 from sim.io.errors import InputError, naming
 from sim.io.keywords import checks_keywords
 from sim.io.reading import ContentError, read_json
-from sim.model.plan_file import check_format
+from sim.model.plan_file import check_format, read_plan_file
 from sim.model.robot import Robot
 from surrogate.interface import LookupTable
+from surrogate.table_file import load_table
 
 _JOBS = tuple(f"{kind}.json" for kind in KINDS)  # beside the plan.json whose id they name
 _GROUPS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "N", "a_over_R")
+_LARGEST = 1e100  # of a number, so that sums and squares of them are finite
 
 
-def is_plan(path: str | Path) -> bool:
-    """Tell whether a file is JSON, or a folder has a plan.json: then it is no path to plan, but a plan."""
-    place = Path(path)
-    if place.is_dir():
-        return (place / "plan.json").is_file()
-    try:
-        with open(place, "rb") as file:
-            return file.read(512).removeprefix(b"\xef\xbb\xbf").lstrip()[:1] == b"{"
-    except (OSError, ValueError):
-        return False
+@checks_keywords
+def load_plan(path: str | Path) -> dict[str, Any]:
+    """Read and check the content of a plan.json, which is that of `Plan.to_dict`.
+
+    Args:
+        path: the file, written by `write_plan`.
+
+    Raises:
+        InputError: the file is no plan.json of this version, or it has a value that cannot be.
+
+    Example:
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> from softflagella import circle, load_plan, load_robot, plan, write_plan
+        >>> result = plan(circle(2.0), load_robot("paper-control"))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     paths = write_plan(result, folder)
+        ...     load_plan(paths[0])["id"] == result.to_dict()["id"]
+        True
+    """
+    content = read_plan_file(path)
+    _check_plan(content, path)
+    return content
+
+
+@checks_keywords
+def load_goal(path: str | Path) -> dict[str, Any]:
+    """Read and check the content of a goal.json, which is that of `Trip.to_dict`.
+
+    Args:
+        path: the file, written by `write_plan`.
+
+    Returns:
+        The content, and in `plan_id` the `id` of the plan.json that was written with it.
+
+    Raises:
+        InputError: the file is no goal.json of this version, or it has a value that cannot be.
+
+    Example:
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> from softflagella import load_goal, load_plan, to_goal, write_plan
+        >>> trip = to_goal((0, 0, 0), (3, 1, 1), "paper-control")
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     paths = write_plan(trip, folder)
+        ...     goal = load_goal(Path(folder, "goal.json"))
+        ...     goal["goal"], goal["plan_id"] == load_plan(Path(folder, "plan.json"))["id"]
+        ([3.0, 1.0, 1.0], True)
+    """
+    with _checking(path, "goal.json"):
+        content = read_json(path)
+        if content["format"] != FORMAT:
+            raise InputError(f"format {content['format']}, this version reads {FORMAT}")
+        for key in ("end_error_over_l", "end_error_rad", "length_over_l", "margin_over_l"):
+            _check(content, key)
+        if content["predicted_clearance_over_l"] is not None:
+            _check(content, "predicted_clearance_over_l")
+        for key in ("start", "goal", "predicted_end"):
+            _check(content, key, 3)
+        _check(content, "via", 2, rows=0)
+        FreeSpace.from_dict(content)
+        if not isinstance(content["plan_id"], str):
+            raise InputError("plan_id must be text")
+    return dict(content)
 
 
 @checks_keywords
 def restore_plan(
-    source: Mapping[str, Any] | str | Path, *, lookup: LookupTable | None = None, own_table: bool = False
-) -> Plan[None]:
+    source: Mapping[str, Any] | str | Path,
+    *,
+    lookup: LookupTable | str | Path | None = None,
+    own_table: bool = False,
+) -> Plan:
     """Make a plan again from its plan.json, to track it or to go on from where a robot is.
 
     Args:
         source: a plan.json, a goal.json, tour.json or cover.json beside it, their folder, or the content that
             `load_plan` returns.
-        lookup: the look-up table with which the plan was made. Default: that of the package, or the robot's own.
+        lookup: the look-up table with which the plan was made, or its file. Default: that of the package, or the
+            robot's own.
         own_table: simulate the robot's own table in any case.
+
+    Returns:
+        The plan; of a trip whose goal.json is beside it, with the trip as its `job`.
 
     Raises:
         InputError: the file is no plan, or its robot cannot be simulated.
@@ -84,7 +149,7 @@ def restore_plan(
     if isinstance(source, Mapping):
         name, kept, content = "the plan", None, dict(source)
         check_format(content, name)
-        check_numbers(content, name)
+        _check_plan(content, name)
     else:
         path = plan_json(source)
         name, kept, content = str(path), str(path), load_plan(path)
@@ -93,8 +158,8 @@ def restore_plan(
             robot = _robot(content["robot"])
             knowledge = CalibrationKnowledge.from_dict(content.get("calibration", {}), name)
             own = own_table or bool(content.get("own_table", False))
-            table = lookup
-            if lookup is None and isinstance(robot, Robot):
+            table = load_table(lookup) if isinstance(lookup, str | Path) else lookup
+            if table is None and isinstance(robot, Robot):
                 table = table_for(robot, kept, knowledge, own=own)
             tracked = tracked_vehicle(robot, table, content["point"], knowledge)
             plan = _plan(content, tracked)
@@ -105,7 +170,24 @@ def restore_plan(
     if tracked.model != content.get("model") and not tracked.own_table:
         made = content.get("model")
         print(f"warning: {name} was made with look-up table {made}; this one is {tracked.model}", file=sys.stderr)
-    return plan
+    beside = None if kept is None else Path(kept).with_name("goal.json")
+    if beside is None or not beside.is_file() or (goal := load_goal(beside))["plan_id"] != content["id"]:
+        return plan
+    x, y, heading = map(float, goal["goal"])
+    via = tuple((float(x), float(y)) for x, y in goal["via"])
+    return plan.with_job(Trip((x, y, heading), plan.end, via, float(goal["length_over_l"])))
+
+
+def is_plan(path: str | Path) -> bool:
+    """Tell whether a file is JSON, or a folder has a plan.json: then it is no path to plan, but a plan."""
+    place = Path(path)
+    if place.is_dir():
+        return (place / "plan.json").is_file()
+    try:
+        with open(place, "rb") as file:
+            return file.read(512).removeprefix(b"\xef\xbb\xbf").lstrip()[:1] == b"{"
+    except (OSError, ValueError):
+        return False
 
 
 def plan_json(source: str | Path) -> Path:
@@ -234,3 +316,54 @@ def _kept_clear(content: Mapping[str, Any]) -> KeptClear:
         detours.append(Detour((float(x), float(y)), (float(join_x), float(join_y)), *lengths))
     margin, clearance = float(content["margin_over_l"]), float(content["predicted_clearance_over_l"])
     return KeptClear(FreeSpace.from_dict(content), margin, clearance, tuple(detours))
+
+
+def _check_plan(content: Mapping[str, Any], name: str | Path) -> None:
+    """Check the errors and tables of a plan.json; `name` is that of the file in messages."""
+    with _checking(name, "plan.json"):
+        errors = [
+            f"{each}_over_l" for each in ("stated_error", "feedback_error", "predicted_rms", "predicted_max")
+        ]
+        for key in (*errors, "offset_over_l", "minimum_dwell_bar"):
+            _check(content, key)
+        if content[GUARANTEE] is not None:
+            _check(content, GUARANTEE)
+        for key, width in (("reference", 2), ("raw_path", 2), ("predicted_poses", 3)):
+            _check(content, key, width, rows=2)
+        content["point"]
+
+
+@contextmanager
+def _checking(name: str | Path, kind: str) -> Iterator[None]:
+    """Name the file in refusals, and refuse content that lacks an entry, or has one of another type."""
+    try:
+        yield
+        return
+    except ContentError as unreadable:
+        reason = str(unreadable).removeprefix(f"{name} ")
+    except InputError as impossible:
+        raise InputError(f"{name}: {impossible}; plan again") from None
+    except (KeyError, TypeError, ValueError, OverflowError) as broken:
+        reason = str(broken)
+    raise InputError(f"{name} is not a {kind} of the planner ({reason}); plan again")
+
+
+def _check(content: Mapping[str, Any], key: str, width: int | None = None, *, rows: int | None = None) -> None:
+    """Check an entry: a number, `width` numbers, or a table of as many columns with so many rows or more.
+
+    Raises:
+        InputError: it is something else, or a number is not finite.
+        KeyError: there is no such entry.
+    """
+    given, wanted = content[key], "a finite number" if width is None else f"{width} finite numbers"
+    try:
+        values = np.array(given, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        values = np.array(math.nan)
+    shape: tuple[int, ...] = () if width is None else (width,)
+    if rows is not None:
+        wanted = f"{rows} or more rows of {wanted}"
+        shape = (max(rows, len(given) if isinstance(given, list) else 0), *shape)
+        values = values.reshape(shape) if not values.size and not shape[0] else values
+    if values.shape != shape or not (np.abs(values) < _LARGEST).all():
+        raise InputError(f"{key} must be {wanted} below {_LARGEST:g}")

@@ -7,8 +7,9 @@ leave and join, and among all ways of the lattice between them (`planner.goal.la
     length of the way + length of the path that is not followed
 
 smallest: it neither leaves the path early nor goes far from it. The way is then shortened by direct joints, and
-moved as near to the path as the body's margin and the robot's turns allow (`planner.paths.nearest_path`). Its
-turns are wider than the robot's narrowest one, as those of a path that is followed as drawn. Lengths in l.
+moved as near to the path as the body's margin, a residual of the least squares (`Hindered`), and the robot's
+turns allow (`planner.paths.nearest_path`). Its turns are wider than the robot's narrowest one, as those of a
+path that is followed as drawn. Lengths in l.
 """
 
 from __future__ import annotations
@@ -23,7 +24,6 @@ import numpy as np
 from planner.goal.dubins import shortest_paths
 from planner.goal.lattice import Lattice, RouteLimits
 from planner.goal.route import AROUND, LEVELS, Route, shortened
-from planner.jobs.hindered import Hindered
 from planner.paths.distance import nearest
 from planner.paths.nearest_path import nearest_poses, tracked_points
 from planner.paths.obstacles import Footprint, FreeSpace
@@ -48,6 +48,7 @@ _BESIDE = 3.0  # radii of the path before and behind a way around that may move,
 _OFF = 0.02  # from the path: farther points belong to a way around
 _FAR = 0.05  # that it reaches at least
 _APART = 1.0  # between two ways around
+_DIFFERENCE = 1e-4  # l, for derivatives of distances
 
 
 class Around:
@@ -334,3 +335,41 @@ def _runs(flags: Flags) -> list[tuple[int, int]]:
     """List first and last index of each run of true flags."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True))
+
+
+class Hindered:
+    """Residuals of poses where the body comes nearer than a margin to what it must keep clear of.
+
+    Args:
+        body: with the pivot as origin.
+        space: walls and regions.
+        margin: around the body.
+        headings: at the first and at the last pose, which stay.
+    """
+
+    def __init__(self, body: Footprint, space: FreeSpace, margin: float, headings: Floats):
+        self._body, self._space, self._headings = body, space, headings
+        self._least = margin + body.radius
+
+    def __call__(self, poses: Floats) -> tuple[Floats, Floats]:
+        """Compute residuals (m, discs + 1) and derivatives (m, discs + 1, 3)."""
+        centres = self._body.centres(poses)
+        count, discs = centres.shape[:2]
+        residual, slopes = np.zeros((count, discs + 1)), np.zeros((count, discs + 1, 3))
+        room = self._space.distance(centres.reshape(-1, 2)).reshape(count, discs)
+        rows, columns = np.nonzero(room < self._least)
+        points = centres[rows, columns]
+        gradient = np.stack(
+            [
+                (self._space.distance(points + step) - self._space.distance(points - step)) / (2 * _DIFFERENCE)
+                for step in _DIFFERENCE * np.eye(2)
+            ],
+            1,
+        )
+        sideways = np.stack([-np.sin(poses[rows, 2]), np.cos(poses[rows, 2])], 1)
+        residual[rows, columns] = self._least - room[rows, columns]
+        slopes[rows, columns, :2] = -gradient
+        slopes[rows, columns, 2] = -(gradient * sideways).sum(1) * self._body.places[columns]
+        for end, heading in zip((0, -1), self._headings.tolist(), strict=True):
+            residual[end, discs], slopes[end, discs, 2] = poses[end, 2] - heading, 1.0
+        return residual, slopes

@@ -1,10 +1,11 @@
-"""Plans of robots that keep apart in one tank, and how they show themselves: text, picture, content of fleet.json.
+"""Plans of robots that keep apart in one tank: text, pictures, content of fleet.json.
 
 Robots have different units, so that lengths are in metres and times in seconds.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from planner.jobs.separation import Approach, Scheduled, approach, instants
+from planner.planning.picture import draw_regions, label_points
 from planner.planning.plan import Plan
 from sim.arrays import Floats
 from sim.io.notebook import as_html
@@ -24,6 +26,9 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 CLOSE = 2.8  # l between bodies: nearer, flow may move a robot by more than 5 % (docs/results.md)
+_COLOURS = ("#2a7fba", "#c8452f", "#3f8f4f", "#8a5ca8", "#b8860b", "#4d4d4d")
+_MARKS = 6  # of time on all tracks, at most
+_INTERVALS_MIN = (0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600)
 
 
 class Nearest(NamedTuple):
@@ -66,7 +71,7 @@ class FleetPlan:
     @property
     def circles(self) -> tuple[int, ...]:
         """How many waiting circles each robot makes."""
-        return tuple(len(each.circles) for each in self.scheduled)
+        return tuple(each.circles for each in self.scheduled)
 
     @property
     def duration_s(self) -> float:
@@ -156,15 +161,50 @@ class FleetPlan:
         return as_html(repr(self), self.plot)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw all predicted tracks with marks of time, on axes in cm.
+        """Draw the predicted tracks on axes in cm: bodies at the start, dots at round times.
 
         Args:
             ax: default: axes of a new figure.
         """
-        from planner.jobs.fleet_picture import draw_motions  # loads matplotlib
         from sim.io.notebook import given_axes
 
-        return draw_motions(given_axes(ax), self.names, self.scheduled)
+        axes = given_axes(ax)
+        minutes = self.duration_s / 60
+        interval = next((each for each in _INTERVALS_MIN if minutes / each <= _MARKS), minutes / _MARKS)
+        marks = np.asarray(np.arange(1, math.floor(minutes / interval) + 1) * interval, dtype=float)
+        labels: list[tuple[Floats, str, str]] = []
+        for k, each in enumerate(self.scheduled):
+            colour, plan = _COLOURS[k % len(_COLOURS)], each.motion.plan
+            if plan.kept_clear is not None:
+                draw_regions(axes, plan.kept_clear.free_space, plan.robot.tail_length)
+            poses = each.places(np.linspace(each.begin, each.end, 2000)).poses
+            axes.plot(*(100 * poses[:, :2].T), color=colour, lw=1.0, label=self.names[k])
+            ends = 100 * each.motion.body.ends(poses[0])
+            axes.plot(*ends.T, color=colour, lw=4, alpha=0.35, solid_capstyle="round")
+            shown = marks[(60 * marks > each.begin) & (60 * marks < each.end)]
+            places = 100 * each.places(60 * shown).poses[:, :2]
+            axes.plot(*places.T, "o", color=colour, ms=4)
+            labels += [(place, f"{minute:g}", colour) for minute, place in zip(shown, places, strict=True)]
+        axes.set_aspect("equal")
+        if labels:
+            points, words, colours = zip(*labels, strict=True)
+            label_points(axes, np.array(points), words, colours, 7)
+        axes.set_xlabel("x [cm]")
+        axes.set_ylabel("y [cm]")
+        return axes
+
+    def plot_distances(self, axes: Axes) -> None:
+        """Draw the distance of each pair over time, the errors in place as an area, and the distance asked for."""
+        times, table = self.distances
+        for k, ((first, second), (predicted, sure)) in enumerate(table.items()):
+            colour = _COLOURS[k % len(_COLOURS)]
+            label = f"{self.names[first]}, {self.names[second]}" if len(table) > 1 else "between bodies"
+            axes.plot(times / 60, 100 * predicted, color=colour, lw=1.0, label=label)
+            axes.fill_between(times / 60, 100 * sure, 100 * predicted, color=colour, alpha=0.2, lw=0)
+        axes.axhline(100 * self.apart_m, color="#1a1a1a", lw=1.0, ls="--", label="asked for")
+        axes.set_ylim(bottom=0)
+        axes.set_xlabel("time [min]")
+        axes.set_ylabel("distance [cm]")
 
     def to_frame(self) -> pd.DataFrame:
         """Tabulate the predicted distance between bodies over time, a column for each pair."""
@@ -189,7 +229,7 @@ class FleetPlan:
                     "plan_id": each.motion.plan.to_dict()["id"],
                     "begin_s": each.begin,
                     "end_s": each.end,
-                    "waiting_circles": len(each.circles),
+                    "waiting_circles": each.circles,
                     "error_in_place_m": float(each.motion.error(np.array([each.motion.duration]))[0]),
                 }
                 for name, each in zip(self.names, self.scheduled, strict=True)

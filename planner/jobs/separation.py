@@ -1,8 +1,9 @@
-"""Distances between the bodies of robots that move at the same time. Lengths in m, times in s.
+"""Where robots are at any time of their plans, and how near their bodies come. Lengths in m, times in s.
 
-A body is a line with a width (`planner.jobs.timed_motion.Body`), so the distance of two bodies is that of their
-lines, less their widths. Robots are apart at an instant if this distance, less the errors in place of both, is at
-least the distance asked for.
+A body is a line along the axis, from head to the ends of straight tails, with a width on all sides; it covers the
+discs of `planner.paths.obstacles.Footprint`. The distance of two bodies is that of their lines, less their
+widths. Robots are apart at an instant if this distance, less the errors in place of both
+(`planner.jobs.error_in_place`), is at least the distance asked for.
 """
 
 from __future__ import annotations
@@ -10,20 +11,94 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planner.jobs.timed_motion import Body, TimedMotion
-from planner.jobs.waiting_circles import WaitingCircle
-from sim.arrays import Floats
+from planner.jobs.error_in_place import error_open_loop, error_with_feedback
+from planner.paths.obstacles import Footprint
+from planner.paths.units import Swimmer
+from planner.planning.plan import Plan
+from sim.arrays import Flags, Floats
+from sim.mechanics import planar
 
 _ROWS = 200  # of a table of pairs at once
 _FINER = 6  # instants in a dwell
 _MOST = 40_000  # instants
 
-Truth = NDArray[np.bool_]
+
+@dataclass(frozen=True)
+class Body:
+    """A line along the robot's axis, with a width. Lengths in m."""
+
+    front: float  # end of the line, forward from the head's centre
+    back: float  # other end, negative
+    radius: float  # of the body around the line
+
+    @staticmethod
+    def of(robot: Swimmer) -> Body:
+        """Cover head and straight tails."""
+        discs, length = Footprint.of(robot, 0.0), robot.tail_length
+        return Body(float(discs.places.max()) * length, float(discs.places.min()) * length, discs.radius * length)
+
+    @property
+    def reach(self) -> float:
+        """Largest distance of a point of the body from the head's centre."""
+        return max(self.front, -self.back) + self.radius
+
+    def ends(self, poses: Floats) -> Floats:
+        """Compute the ends (..., 2, 2) of the line at poses (..., 3) of the head's centre."""
+        axis = np.stack([np.cos(poses[..., 2]), np.sin(poses[..., 2])], -1)
+        return np.asarray(poses[..., None, :2] + np.array([[self.front], [self.back]]) * axis[..., None, :])
+
+
+@dataclass(frozen=True)
+class TimedMotion:
+    """A plan in time, from the start of its motor."""
+
+    plan: Plan  # in l and μ0 l⁴/EI
+    feedback: bool  # the pose is measured for a tracker
+
+    @property
+    def duration(self) -> float:
+        """Time until the motor stops [s]."""
+        return self.plan.duration * self.plan.robot.time_scale
+
+    @cached_property
+    def body(self) -> Body:
+        """What must keep apart from other bodies."""
+        return Body.of(self.plan.robot)
+
+    def poses(self, times: Floats) -> Floats:
+        """Predict the poses (K, 3) of the head's centre [m, rad] at times (K,) [s]; it rests before and after."""
+        plan = self.plan
+        vehicle, switches, robot = plan.tracked.vehicle, plan.switches, plan.robot
+        ends = np.concatenate([[0.0], np.cumsum(plan.dwells)])
+        own = np.clip(times / robot.time_scale, 0.0, ends[-1])
+        dwell = np.clip(np.searchsorted(ends, own, side="right") - 1, 0, len(plan.dwells) - 1)
+        elapsed, before = own - ends[dwell], plan.dwells[dwell - 1]
+        changes = np.empty((len(own), 3))
+        for parity, sense in enumerate((switches.first_direction, -switches.first_direction)):
+            rows = dwell % 2 == parity
+            changes[rows] = vehicle.motion(sense, before[rows], elapsed[rows])
+        first = dwell == 0
+        changes[first] = vehicle.motion(switches.first_direction, None, elapsed[first])
+        poses = planar.compose(switches.poses[dwell], changes)
+        poses[:, :2] += vehicle.current * elapsed[:, None]
+        return np.asarray(poses * [robot.tail_length, robot.tail_length, 1.0])
+
+    def error(self, times: Floats) -> Floats:
+        """Return the error in place (K,) [m] at times (K,) [s]; a robot that has not begun is where it was put."""
+        known, error = self._band
+        return np.where(times <= 0, 0.0, np.interp(times, known, error))
+
+    @cached_property
+    def _band(self) -> tuple[Floats, Floats]:
+        """Times [s] and errors in place [m]."""
+        robot = self.plan.robot
+        times, error = (error_with_feedback if self.feedback else error_open_loop)(self.plan)
+        return times * robot.time_scale, error * robot.tail_length
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +107,7 @@ class Scheduled:
 
     motion: TimedMotion  # that is carried out
     begin: float  # [s]
-    circles: tuple[WaitingCircle, ...] = ()  # that the motion has more than the plan it was made from
+    circles: int = 0  # waiting circles that the motion has more than the plan it was made from
 
     @property
     def end(self) -> float:
@@ -43,13 +118,6 @@ class Scheduled:
         """Return poses and errors at times (K,) of the fleet."""
         own = times - self.begin
         return Places(self.motion.body, self.motion.poses(own), self.motion.error(own))
-
-
-def instants(scheduled: Sequence[Scheduled]) -> Floats:
-    """Choose times (K,) from 0 to the end of the last motion, several in the shortest dwell of any robot."""
-    last = max(each.end for each in scheduled)
-    dwell = min(each.motion.plan.minimum_dwell * each.motion.plan.robot.time_scale for each in scheduled)
-    return np.linspace(0.0, last, min(math.ceil(_FINER * last / dwell), _MOST) + 1)
 
 
 @dataclass(frozen=True)
@@ -63,6 +131,13 @@ class Places:
     def middles(self) -> Floats:
         """Return the middles (K, 2) of the body's line."""
         return self.body.ends(self.poses).mean(-2)
+
+
+def instants(scheduled: Sequence[Scheduled]) -> Floats:
+    """Choose times (K,) from 0 to the end of the last motion, several in the shortest dwell of any robot."""
+    last = max(each.end for each in scheduled)
+    dwell = min(each.motion.plan.minimum_dwell * each.motion.plan.robot.time_scale for each in scheduled)
+    return np.linspace(0.0, last, min(math.ceil(_FINER * last / dwell), _MOST) + 1)
 
 
 def distances(first: Places, second: Places) -> Floats:
@@ -87,7 +162,7 @@ def approach(first: Scheduled, second: Scheduled) -> Approach:
     return Approach(times, predicted, predicted - one.error - other.error)
 
 
-def too_near(first: Places, second: Places, apart: float) -> Truth:
+def too_near(first: Places, second: Places, apart: float) -> Flags:
     """Tell for all pairs of poses (I, J) whether bodies may be nearer than `apart`."""
     ends, other_ends = first.body.ends(first.poses), second.body.ends(second.poses)
     middles, others = first.middles(), second.middles()

@@ -6,23 +6,40 @@ leads to (i, n + L). States in which another robot may be too near are left out.
 Among all ways through this table the one with the fewest circles is taken, and among those the one that ends
 first. Such tables for robots on given paths are those of O'Donnell and Lozano-Pérez (1989), Proc. IEEE Int. Conf.
 Robotics and Automation. Lengths in m, times in s.
+
+A waiting circle is a whole turn of the pivot, after which it is where it was, with the same course. It becomes a
+part of the declared path, so the guidance leads the robot around it and back, open loop as well as with a
+tracker, and the stated error includes it. A time of arrival that was asked for is not kept. The circle is wider
+than the robot's narrowest one, by 1/ROOM.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from planner.jobs.separation import Places, Scheduled, Truth, too_near
-from planner.jobs.timed_motion import TimedMotion
-from planner.jobs.waiting_circles import WaitingCircle
-from sim.arrays import Floats
+from planner.goal.final_dwells import Ending
+from planner.jobs.separation import Places, Scheduled, TimedMotion, too_near
+from planner.paths.tractrix import Reference
+from planner.planning.line_of_sight import Start
+from planner.planning.plan import J, Plan
+from planner.planning.solve import Setting, follow_declared
+from sim.arrays import Flags, Floats
 
 MOST_CIRCLES = 6
+ROOM = 0.7  # radius of the narrowest circle over that of a waiting circle
+_SPACING = 0.02  # l, of the reference's points
+
+
+class WaitingCircle(NamedTuple):
+    """A whole turn at a place of the path."""
+
+    place: int  # index of a point of the reference
+    side: int  # +1: to the left, −1: to the right
 
 
 class Turn(NamedTuple):
@@ -72,7 +89,7 @@ class Timetable:
         waits = np.logical_and.accumulate(free[0])
         waits &= self.step * np.arange(self._steps) >= self.earliest
         rests = np.logical_and.accumulate(free[-1][::-1])[::-1]
-        entries: list[dict[int, Truth]] = [{0: waits}]
+        entries: list[dict[int, Flags]] = [{0: waits}]
         layers = [self._reached(entries[0])]
         possible = None
         while not (layers[-1][-1] & rests).any():
@@ -85,7 +102,7 @@ class Timetable:
         last = int((layers[-1][-1] & rests).argmax())
         return self._traced(last, layers, entries, turns, possible or [])
 
-    def _unhindered(self, own: Places) -> Truth:
+    def _unhindered(self, own: Places) -> Flags:
         """Tell at which steps of time (K, H) the others are apart from poses (K,) of this robot."""
         free = np.ones((len(own.poses), self._steps), dtype=bool)
         for other in self.others:
@@ -95,7 +112,7 @@ class Timetable:
             free &= ~near[:, np.clip(np.arange(self._steps) - first, 0, last - first)]
         return free
 
-    def _turn_possible(self, turn: Turn) -> Truth:
+    def _turn_possible(self, turn: Turn) -> Flags:
         """Tell at which steps of time (H,) a circle may begin."""
         error = np.full(len(turn.poses), float(self.motion.error(np.array([turn.time]))[0]))
         free = self._unhindered(Places(self.motion.body, turn.poses, error))
@@ -105,7 +122,7 @@ class Timetable:
         possible[self._steps - len(free) :] = False
         return possible
 
-    def _reached(self, entries: dict[int, Truth]) -> Truth:
+    def _reached(self, entries: dict[int, Flags]) -> Flags:
         """Find the states (I, H) that are reached without circles from those that are entered at some rows."""
         reached = np.zeros_like(self._free)
         for i, free in enumerate(self._free):
@@ -115,9 +132,9 @@ class Timetable:
                 reached[i] |= entries[i] & free
         return reached
 
-    def _after_turns(self, reached: Truth, turns: Sequence[Turn], possible: list[Truth]) -> dict[int, Truth]:
+    def _after_turns(self, reached: Flags, turns: Sequence[Turn], possible: list[Flags]) -> dict[int, Flags]:
         """Find the states that are entered by one circle more."""
-        entries: dict[int, Truth] = {}
+        entries: dict[int, Flags] = {}
         for turn, allowed in zip(turns, possible, strict=True):
             row = self._row(turn)
             entry = entries.setdefault(row, np.zeros(self._steps, dtype=bool))
@@ -125,8 +142,8 @@ class Timetable:
         return entries
 
     def _traced(
-        self, step: int, layers: list[Truth], entries: list[dict[int, Truth]], turns: Sequence[Turn],
-        possible: list[Truth],
+        self, step: int, layers: list[Flags], entries: list[dict[int, Flags]], turns: Sequence[Turn],
+        possible: list[Flags],
     ) -> Timing:  # fmt: skip
         """Follow the table back from the end of the motion at a step of time."""
         row, circles = len(self._own) - 1, []
@@ -145,8 +162,57 @@ class Timetable:
     def _row(self, turn: Turn) -> int:
         return min(round(turn.time / self.step), len(self._own) - 1)
 
-    def _later(self, entry: Truth, turn: Turn) -> Truth:
+    def _later(self, entry: Flags, turn: Turn) -> Flags:
         """Shift states (H,) by the length of a circle."""
         later = np.zeros_like(entry)
         later[len(turn.poses) :] = entry[: -len(turn.poses)]
         return later
+
+
+def circle_reference(plan: Plan, circle: WaitingCircle) -> Reference:
+    """Make the reference of a waiting circle; it begins and ends at the place, and ends a whole turn further."""
+    reference, tracked = plan.declared.reference, plan.tracked
+    drift = plan.drift
+    radius = tracked.vehicle.pivot_radius / ROOM
+    count = math.ceil(2 * math.pi * radius / _SPACING)
+    ((x, y, course),) = reference.part(circle.place, circle.place + 1).courses(drift).tolist()
+    courses = course + circle.side * 2 * math.pi * np.arange(count + 1) / count
+    left = circle.side * radius * np.array([-math.sin(course), math.cos(course)])
+    arms = circle.side * radius * np.stack([np.sin(courses), -np.cos(courses)], 1)
+    poses = np.column_stack([np.array([x, y]) + left + arms, courses])
+    return Reference.of_pivot(poses, tracked.rod, drift, float(reference.heading[circle.place]))
+
+
+def with_circles(plan: Plan[J], circles: Sequence[WaitingCircle]) -> Plan[J]:
+    """Plan again with waiting circles.
+
+    Args:
+        plan: the plan without them.
+        circles: where to wait; those at the same place follow each other.
+
+    Raises:
+        InputError: the robot has no room for a circle.
+    """
+    if not circles:
+        return plan
+    goal, setting = plan.ends_at, Setting(plan.tracked, plan.minimum_dwell, plan.straight, plan.drift)
+    declared = plan.declared.moved(_inserted(plan, circles), plan.drawn)
+    if goal is None:
+        circling = follow_declared(declared, setting, plan.request, drawn=plan.drawn)
+    else:
+        circling = follow_declared(
+            declared, setting, plan.request, drawn=plan.drawn, guidance=plan.guidance,
+            start=Start(plan.start, plan.first_direction), ending=Ending(goal, plan.minimum_dwell),
+        )  # fmt: skip
+    return replace(plan, declared=circling.declared, guidance=circling.guidance, switches=circling.switches,
+                   errors=circling.errors, arrival=None)  # fmt: skip
+
+
+def _inserted(plan: Plan, circles: Sequence[WaitingCircle]) -> Reference:
+    """Insert circles into the reference of a plan."""
+    reference = plan.declared.reference
+    parts, begin = [], 0
+    for circle in sorted(circles):
+        parts += [reference.part(begin, circle.place), circle_reference(plan, circle).part(0, -1)]
+        begin = circle.place
+    return Reference.joined(*parts, reference.part(begin), closed=reference.closed)

@@ -1,7 +1,7 @@
 """tour(places, robot): the order in which a robot visits places, and one plan that visits them all.
 
 The tracked point passes every place; its heading there is free. The order is the one in which this vehicle needs
-the least time (`planner.jobs.travel_times`, `planner.jobs.shortest_order`), with COURSES directions of motion at
+the least time (`planner.jobs.travel`, `planner.jobs.shortest_order`), with COURSES directions of motion at
 each place. The directions of this order and of its rivals are then refined, and the quickest of them is taken.
 Where places are nearer to each other than a turn, a direction that is a few degrees off costs a whole circle, so
 COURSES is large. The tracks between the places are joined to one reference, which is
@@ -22,8 +22,7 @@ import numpy as np
 
 from planner.goal.route import Route
 from planner.jobs.shortest_order import EXACT, best_options, shortest_order
-from planner.jobs.track import pivot_poses, plan_track, preferred_setting
-from planner.jobs.travel_times import SLACK, Travel
+from planner.jobs.travel import SLACK, Travel, pivot_poses, plan_track, preferred_setting
 from planner.paths.distance import distance_to
 from planner.paths.obstacles import FreeSpace
 from planner.paths.tractrix import Drift

@@ -18,8 +18,7 @@ from sim.model.robot_toml import ENTRIES
 
 _NAMES = {  # of each module; a leading underscore is left out
     "planner.draws": "WEYL FIRST SECOND MIDDLE TAIL",
-    "planner.files.plan_files": "MOST_MS CHECKPOINTS",
-    "planner.files.tracker_header": "LARGEST",
+    "planner.files.headers": "LARGEST MOST_MS CHECKPOINTS",
     "planner.paths.distance": "TIE",
     "planner.paths.file_kinds": "KINDS",
     "planner.paths.nearest_path": "SPACING MOST_POSES COARSEST WEIGHTS ITERATIONS ALONG POINTS_A_POSE ROUNDS "

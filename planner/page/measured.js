@@ -255,7 +255,7 @@ function isOne(values) {
   return largest(values) === smallest(values);
 }
 
-const FARTHEST = 1e100; // of a number
+const FARTHEST = 1e6; // l, of a place; time units, of a time
 const COLUMNS = ["time_bar", "x_over_l", "y_over_l", "heading_rad"];
 const LAB = ["time_s", "x_cm", "y_cm", "heading_deg"]; // or in other units
 const ALIKE = 1e-3; // of a place and of the tail length, largest difference of the same place in cm and in l
@@ -299,8 +299,9 @@ function comparedTrack(plan, table, how) {
 }
 
 function checkTrack([time, ...others]) {
-  if (![time, ...others].every((values) => values.every((value) => Math.abs(value) < FARTHEST))) {
-    throw new InputError("the track has a value that is not a finite number; correct the file");
+  const bad = time.findIndex((_, row) => ![time, ...others].every((values) => Math.abs(values[row]) < FARTHEST));
+  if (bad >= 0) {
+    throw new InputError(`row ${bad + 1} of the track has a value that is not a finite number; correct the file`);
   }
   if (time.length < 2 || !(largest(time) - smallest(time) > 0)) {
     throw new InputError("the track has no two times; give a row for each time, in order");

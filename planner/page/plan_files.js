@@ -13,7 +13,7 @@ import { yawRate, zigzagSpeed } from "./vehicle.js";
 import { InputError, general, repr } from "./words.js";
 
 const { WIDE, OWN_TABLE_FROM } = CONSTANTS.plan, { CAMERA } = CONSTANTS.errors;
-const { MOST_MS, CHECKPOINTS } = CONSTANTS.plan_files, { LARGEST } = CONSTANTS.tracker_header;
+const { MOST_MS, CHECKPOINTS, LARGEST } = CONSTANTS.headers;
 const { PRIOR, MOST, CURRENT, MOST_CURRENT, MARKER, MOST_MARKER, STATES } = CONSTANTS.kalman_filter;
 const { NEAR, ERRORS } = CONSTANTS.guidance;
 const FORMAT = 2;

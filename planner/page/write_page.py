@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.files.plan_files import schedule_template
-from planner.files.tracker_header import header_template
+from planner.files.headers import header_template, schedule_template
 from planner.page.first_state import NamedPath, first_options, first_plan, robots_of, shapes_of, slider_ends
 from planner.page.page import page_text
 from planner.page.table_data import packed_bytes, packed_data, table_data

@@ -32,7 +32,7 @@ def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float, tail_l
         tail_length: l in m.
     """
     cm = 100 * tail_length
-    edges = cm * _band(declared, stated)
+    edges = cm * band(declared, stated)
     axes.fill(
         *edges.T, color="#2a7fba", alpha=0.25, lw=0, label=f"stated error {format_length(stated * tail_length)}"
     )
@@ -93,7 +93,8 @@ def label_points(axes: Axes, points: Floats, words: Sequence[str], colours: Sequ
                       fontsize=size, color=colour)  # fmt: skip
 
 
-def _band(polyline: Floats, width: float) -> Floats:
+def band(polyline: Floats, width: float) -> Floats:
+    """Return the outline (2 n, 2) of a band about a line (n, 2), `width` wide on each side."""
     tangent = np.gradient(polyline, axis=0)
     norm = np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12)
     left = np.stack([-tangent[:, 1], tangent[:, 0]], 1) / norm * width

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
-from planner.paths.units import heading_in_degrees, in_lab, time_in_lab
+from planner.paths.units import heading_in_degrees, in_lab, place_in_lab, time_in_lab
 from planner.planning.camera import POSE
 from planner.planning.conditions import Arrival, KeptClear, Lap
 from planner.planning.declare import Declared
@@ -293,17 +293,10 @@ class Plan(Generic[J]):
         return schedule if robot is None else schedule.swum_by(robot)
 
     def __repr__(self) -> str:
-        robot, (x, y, heading) = self.robot, self.start
-        cm = 100 * robot.tail_length
-        path = f"{'closed path' if self.drawn.closed else 'path'} of {in_lab(self.drawn.length, robot)}"
-        dwells = f"{len(self.dwells)} dwells of {self.minimum_dwell * robot.time_scale:.3g} s or more"
-        lines = [
-            f"Plan for {robot.name!r}: {path}, {dwells}, {format_time(float(self.seconds.sum()))}",
-            *(f"  {part}" for part in self.error_line.splitlines()),
-            f"  start at x = {x * cm:.4g} cm, y = {y * cm:.4g} cm, heading {heading_in_degrees(heading)}, "
-            f"motor {self.first_direction:+d}",
-        ]
-        lines += [f"  {line}" for line in self.lines()]
+        path = f"{'closed path' if self.drawn.closed else 'path'} of {in_lab(self.drawn.length, self.robot)}"
+        start, dwells, *further = self.lines()
+        title = f"Plan for {self.robot.name!r}: {path}, {dwells}, motor {self.first_direction:+d} first"
+        lines = [title, *(f"  {line}" for line in (start, *further))]
         if self.warnings:
             count = "1 warning" if len(self.warnings) == 1 else f"{len(self.warnings)} warnings, the first"
             lines.append(f"  {count}: {textwrap.shorten(self.warnings[0], 120, placeholder=' …')}")
@@ -331,14 +324,23 @@ class Plan(Generic[J]):
         return ax
 
     def lines(self) -> list[str]:
-        """Say what the plan keeps clear of, when it arrives, and what it does for its job."""
-        lines = [] if self.kept_clear is None else self.kept_clear.lines(self.robot)
+        """Say where the robot starts, how long the schedule is, its errors, and what it does for its job."""
+        robot, (x, y, heading) = self.robot, self.start
+        shortest, whole = (format_time(time * robot.time_scale) for time in (self.minimum_dwell, self.duration))
+        lines = [
+            f"start: put the head's centre at {place_in_lab(x, y, robot)}, heading {heading_in_degrees(heading)}, "
+            "at rest",
+            f"{len(self.dwells)} dwells of {shortest} ({self.minimum_dwell:.2f} time units) or more, {whole} "
+            "in all",
+            *self.error_line.splitlines(),
+            *([] if self.kept_clear is None else self.kept_clear.lines(robot)),
+        ]
         if self.declared.swing is not None:
-            lines.append(self.declared.swing.line(self.robot))
+            lines.append(self.declared.swing.line(robot))
         if self.arrival is not None:
-            lines.append(self.arrival.line(self.duration, self.robot))
+            lines.append(self.arrival.line(self.duration, robot))
         if self.lap is not None:
-            lines.append(self.lap.line(self.robot))
+            lines.append(self.lap.line(robot))
         return lines if self.job is None else [*lines, *self.job.lines(self)]
 
     def columns(self) -> dict[str, NDArray[Any]]:

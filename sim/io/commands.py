@@ -28,12 +28,21 @@ import sys
 from argparse import SUPPRESS, ArgumentParser
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn, TypeVar
 
 from sim.io.errors import InputError, run_command
 
+_HELP = {  # of parameters that no docstring describes
+    "out": "folder",
+    "robot": "robot.toml or the name of a preset",
+    "plan": "plan.json",
+    "data": "folder or URL of a data set",
+    "table": "CSV or Parquet of measured runs",
+    "lookup": "look-up table (default: the one that comes with the package)",
+}
 _PLAIN: dict[str, dict[str, Any]] = {kind.__name__: {"type": kind} for kind in (str, bool, int, float)}
 F = TypeVar("F", bound=Callable[..., None])
 
@@ -183,6 +192,11 @@ class Command(NamedTuple):
         theirs = read_function(Path(str(find_spec(module).origin)), name)  # type: ignore[union-attr]
         return theirs | {name: each for name, each in own.items() if each.help is not None or name not in theirs}
 
+    def call(self, **given: Any) -> Any:
+        """Call the public function."""
+        module, _, name = self.of.partition(":")
+        return getattr(import_module(module), name)(**given)
+
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Add the arguments to a parser."""
         for parameter in self.parameters().values():
@@ -208,7 +222,10 @@ class Command(NamedTuple):
 
 def _add(parser: ArgumentParser, parameter: Parameter, name: str, words: dict[str, Any]) -> None:
     """Add a parameter to a parser, as a positional argument or as an option."""
-    about, default = (parameter.help or "").replace("%", "%%"), parameter.default  # % is argparse's own sign
+    about, default = (
+        (parameter.help or _HELP.get(parameter.name, "")).replace("%", "%%"),
+        parameter.default,
+    )  # % is argparse's own sign
     if default not in (None, "") and not isinstance(default, bool) and "default" not in about.lower():
         about = f"{about} (default: {default})".lstrip()
     many, flag = words.pop("many", False), words.get("type") is bool

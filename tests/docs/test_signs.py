@@ -12,7 +12,7 @@ import pytest
 
 import softflagella as sf
 from calibration.swimmer.camera_tracks import measure_tracks
-from planner.files.tracker_header import DIRECTIONS
+from planner.files.headers import DIRECTIONS
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule

@@ -18,7 +18,7 @@ from calibration.statistics.gls import Noise
 from calibration.verdict.next_runs import Explanation
 from dataset.data_set import sweep_key
 from dataset.schema import rows_version
-from planner.api.plan import plan
+from planner.api import plan
 from planner.files.plan_files import write_plan
 from planner.paths.path import circle
 from planner.vehicle.calibration_table import CalibrationKnowledge, knowledge_toml

@@ -26,11 +26,9 @@ from dataset.design import SWEEP_TOML, load_design
 from dataset.folder import Folder
 from dataset.schema import schema
 from dataset.shards import BadFileError, checked_part, file_name
-from planner.files.goal_json import load_goal
-from planner.files.plan_json import load_plan
-from planner.files.regions import read_region
-from planner.files.saved_plan import restore_plan
-from planner.files.tracking_error import tracking_error
+from planner.files.saved_plan import load_goal, load_plan, restore_plan
+from planner.files.tracks import tracking_error
+from planner.options import read_region
 from planner.paths.path_files import read_path
 from planner.tracking.tracker import Tracker
 from planner.vehicle.calibration_table import read_knowledge

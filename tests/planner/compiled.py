@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.files.tracker_header import tracker_header
+from planner.files.headers import tracker_header
 from planner.planning.plan import Plan
 from planner.tracking.kalman_filter import STATES
 from planner.tracking.tracker import Command

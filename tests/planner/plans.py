@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.api.plan import plan
+from planner.api import plan
 from planner.goal.trip import Trip
 from planner.jobs.plan import make_plan
 from planner.paths.obstacles import Circle, FreeSpace

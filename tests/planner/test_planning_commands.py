@@ -14,7 +14,7 @@ import pytest
 
 from planner.__main__ import main
 from planner.files.plan_files import write_plan
-from planner.files.tracking_error import tracking_error
+from planner.files.tracks import tracking_error
 from planner.tracking.tracker import Tracker
 from sim.inputs import save_robot
 from sim.io.errors import run_command

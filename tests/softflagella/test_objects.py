@@ -86,7 +86,7 @@ def test_a_plan_says_what_it_holds() -> None:
     assert number(r"predicted error # mm", text) == pytest.approx(10 * CM * plan.predicted_rms, rel=0.01)
     assert number(r"with feedback # mm", text) == pytest.approx(10 * CM * plan.feedback_error, rel=0.01)
     assert number(r"heading # degrees", text) == pytest.approx(math.degrees(plan.start[2]), abs=0.06)
-    assert number(r"x = # cm", text) == pytest.approx(plan.start[0] * CM, rel=0.01)
+    assert number(r"centre at \(#,", text) == pytest.approx(plan.start[0] * CM, rel=0.01)
     assert f"motor {plan.first_direction:+d}" in text
 
 

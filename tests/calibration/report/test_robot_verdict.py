@@ -18,9 +18,9 @@ from calibration.report.robot_verdict import FILES, RobotVerdict
 from calibration.swimmer.influences import CURRENT
 from calibration.swimmer.synthetic_table import make_table
 from planner.__main__ import main as planner
-from planner.api.plan import plan
-from planner.files.plan_json import load_plan
-from planner.files.tracking_error import tracking_error
+from planner.api import plan
+from planner.files.saved_plan import load_plan
+from planner.files.tracks import tracking_error
 from planner.paths.path import circle
 from planner.vehicle.calibration_table import read_knowledge
 from sim.inputs import load_robot, save_robot

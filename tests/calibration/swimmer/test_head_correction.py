@@ -15,7 +15,7 @@ from calibration.swimmer.head_correction import HeadCorrection
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
-from planner.api.plan import plan
+from planner.api import plan
 from planner.paths.path import circle
 from planner.vehicle.calibration_table import read_knowledge
 from planner.vehicle.from_table import table_vehicle

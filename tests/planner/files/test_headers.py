@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.api.plan import plan
-from planner.files.plan_files import controller_header, milliseconds
-from planner.files.tracker_header import rounded, table_bytes, tracker_header
+from planner.api import plan
+from planner.files.headers import milliseconds, rounded, schedule_header, table_bytes, tracker_header
 from planner.planning.camera import Camera
 from planner.planning.plan import Plan
 from planner.tracking.swim import swim
@@ -74,7 +73,7 @@ def test_the_tracker_is_the_same_in_every_language_and_memory(
 @pytest.mark.parametrize(("language", "memory"), [("c99", "constants"), *OTHERS])
 def test_the_schedule_is_the_same_in_every_language_and_memory(language: str, memory: str, tmp_path: Path) -> None:
     result = bent()
-    (tmp_path / "schedule.h").write_text(controller_header(result, "test"))
+    (tmp_path / "schedule.h").write_text(schedule_header(result, "test"))
     shutil.copy(SOURCES / "schedule.c", tmp_path / "main.c")
     compile_c(tmp_path / "main.c", tmp_path / "main", *MEMORIES[memory], language=language)
     done = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True, timeout=LIMIT)
@@ -96,7 +95,7 @@ def avr(folder: Path, device: str, *flags: str) -> Path:
     if compiler is None:
         pytest.skip("no avr-gcc on this machine (Debian: gcc-avr, avr-libc)")
     (folder / "tracker.h").write_text(tracker_header(bent(), "test"))
-    (folder / "schedule.h").write_text(controller_header(bent(), "test"))
+    (folder / "schedule.h").write_text(schedule_header(bent(), "test"))
     shutil.copy(SOURCES / "firmware.c", folder / "main.c")
     words = [compiler, "-std=gnu99", f"-mmcu={device}", *WARNINGS[:3], "-Os", "-DF_CPU=16000000UL", *flags]
     subprocess.run([*words, "-o", folder / "main.elf", folder / "main.c", "-lm"], check=True, timeout=LIMIT)

@@ -14,9 +14,10 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from planner.files.plan_files import milliseconds, write_plan
-from planner.files.svg_axes import SvgAxes
-from planner.files.tracking_error import tracking_error
+from planner.files.headers import milliseconds
+from planner.files.plan_files import write_plan
+from planner.files.plan_svg import SvgAxes
+from planner.files.tracks import tracking_error
 from planner.vehicle.rollout import Switches, poses_at_flips, trace
 from sim.io.errors import InputError
 from sim.model.schedule import load_schedule

@@ -14,9 +14,8 @@ import numpy as np
 import pytest
 
 from planner.files.fleet_files import distance_apart, read_fleet
-from planner.files.goal_json import load_goal
 from planner.files.plan_files import write_plan
-from planner.files.plan_json import load_plan
+from planner.files.saved_plan import load_goal, load_plan
 from planner.goal.trip import FORMAT as GOAL_FORMAT
 from sim.io.errors import InputError, run_command
 from sim.model.plan_file import FORMAT, plan_id
@@ -62,9 +61,9 @@ def test_a_changed_number_is_noticed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({"reference": []}, "reference must have two or more rows"),
-        ({"reference": [["nan", 0.0], [1.0, 1.0]]}, "reference must have two or more rows"),
-        ({"stated_error_over_l": "nan"}, "no finite number"),
+        ({"reference": []}, "plan.json: reference must be 2 or more rows of 2 finite numbers"),
+        ({"reference": [["nan", 0.0], [1.0, 1.0]]}, "reference must be 2 or more rows of 2 finite numbers"),
+        ({"stated_error_over_l": "nan"}, "stated_error_over_l must be a finite number"),
         ({"robot": 3}, "not a plan.json"),
     ],
 )
@@ -138,15 +137,16 @@ def test_a_goal_reads_back(tmp_path: Path) -> None:
     [
         ({"format": 99}, f"format 99, this version reads {GOAL_FORMAT}"),
         ({"format": FORMAT, "reference": []}, f"format {FORMAT}"),
-        ({"goal": [1.0, 2.0]}, "should have 3 numbers"),
-        ({"goal": [1.0, 2.0, float("nan")]}, "nan is no finite number"),
-        ({"margin_over_l": float("inf")}, "inf is no finite number"),
-        ({"margin_over_l": "wide"}, "not a goal.json"),
-        ({"via": 3}, "not a goal.json"),
+        ({"goal": [1.0, 2.0]}, "goal.json: goal must be 3 finite numbers"),
+        ({"goal": [1.0, 2.0, float("nan")]}, "goal must be 3 finite numbers"),
+        ({"margin_over_l": float("inf")}, "margin_over_l must be a finite number"),
+        ({"margin_over_l": "wide"}, "margin_over_l must be a finite number"),
+        ({"via": 3}, "via must be 0 or more rows of 2 finite numbers"),
+        ({"via": [[1, 2, 3]]}, "via must be 0 or more rows of 2 finite numbers"),
         ({"keep_out": [{"circle": [0, 0, -1]}]}, "radius above 0"),
         ({"keep_out": [{"square": [0, 0, 1]}]}, "not a goal.json"),
         ({"walls": [[0, 0], [1, 1]]}, "three or more points"),
-        ({"plan_id": 3}, "plan_id is no text"),
+        ({"plan_id": 3}, "plan_id must be text"),
     ],
 )
 def test_edited_goals_are_refused(tmp_path: Path, changes: dict[str, Any], expected: str) -> None:

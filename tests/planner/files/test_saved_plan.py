@@ -14,11 +14,10 @@ import pytest
 
 import softflagella as sf
 from planner.__main__ import main
-from planner.api.plan import plan
+from planner.api import plan
 from planner.files.own_table import table_for
 from planner.files.plan_files import write_plan
-from planner.files.plan_json import load_plan
-from planner.files.saved_plan import is_plan, restore_plan
+from planner.files.saved_plan import is_plan, load_plan, restore_plan
 from planner.paths.path import circle
 from planner.planning.plan import Plan
 from planner.tracking.tracker import Tracker
@@ -121,8 +120,8 @@ def test_the_files_of_jobs_and_their_folder_lead_to_the_plan(tmp_path: Path) -> 
         ({"calibration": {"names": ["C_t"]}}, "calibration"),
         ({"minimum_dwell_bar": 0.0}, "not above 0"),
         ({"format": 1}, "has format 1"),
-        ({"stated_error_over_l": 1e200}, "stated_error_over_l = 1e\\+200 is no finite number below 1e\\+100"),
-        ({"reference": [[0.0, 0.0], [1e200, 0.0]]}, "reference must have two or more rows"),
+        ({"stated_error_over_l": 1e200}, "stated_error_over_l must be a finite number below 1e\\+100"),
+        ({"reference": [[0.0, 0.0], [1e200, 0.0]]}, "reference must be 2 or more rows of 2 finite numbers"),
         ({"off_drawn_over_l": 1.0, "guidance": {"heading_rad": [1e300, -1e300]}}, "lacks what is needed"),
         ({"robot": {"groups": {"omega_bar": 10.0}}}, "lacks what is needed"),
     ],

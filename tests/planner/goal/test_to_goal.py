@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.files.plan_json import load_plan
+from planner.files.saved_plan import load_plan
 from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, three_arcs, words
 from planner.goal.lattice import RouteLimits
 from planner.goal.route import COURSES, NoWayError, route

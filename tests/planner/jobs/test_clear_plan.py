@@ -10,16 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.files.plan_json import load_plan
-from planner.files.saved_plan import restore_plan
-from planner.files.tracking_error import tracking_error
-from planner.jobs.hindered import Hindered
+from planner.files.saved_plan import load_plan, restore_plan
+from planner.files.tracks import tracking_error
+from planner.jobs.detours import Hindered
 from planner.jobs.plan import make_plan
-from planner.jobs.waiting_circles import WaitingCircle, circle_reference, with_circles
+from planner.jobs.timetable import WaitingCircle, circle_reference, with_circles
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.path import Path2D, circle
 from planner.planning.arrive import EXACT
-from planner.planning.declare import TIGHTEST
+from planner.planning.feasible import TIGHTEST
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.swim import swim

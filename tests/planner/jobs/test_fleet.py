@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.jobs.fleet import Member, NoTimingError, fleet
+from planner.jobs.fleet import Member, NoTimingError, Priorities, fleet
 from planner.jobs.fleet_plan import FleetPlan
 from planner.jobs.plan import make_plan
-from planner.jobs.priorities import Priorities
-from planner.jobs.separation import Places, Scheduled, distances, instants, line_distance, too_near
-from planner.jobs.timed_motion import Body
+from planner.jobs.separation import Body, Places, Scheduled, distances, instants, line_distance, too_near
 from planner.paths.obstacles import Circle, Footprint, FreeSpace
 from planner.paths.path import Path2D
 from planner.planning.plan import Plan

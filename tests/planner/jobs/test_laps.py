@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import planner.jobs.laps
+from planner.files.headers import rounded
 from planner.files.saved_plan import restore_plan
-from planner.files.tracker_header import rounded
 from planner.jobs.hold import Orbit, hold
 from planner.jobs.laps import looped
 from planner.jobs.plan import make_plan

@@ -12,15 +12,14 @@ import numpy as np
 import pytest
 
 from planner.jobs import shortest_order as module
-from planner.jobs.cover import cover
-from planner.jobs.region import Field, lanes, share_covered
+from planner.jobs.cover import Field, cover, lanes, share_covered
 from planner.jobs.shortest_order import EXACT, shortest_order
 from planner.jobs.tour import tour
-from planner.jobs.travel_times import Travel
+from planner.jobs.travel import Travel
 from planner.paths.distance import distance_to
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.tractrix import STILL
-from planner.planning.declare import TIGHTEST
+from planner.planning.feasible import TIGHTEST
 from planner.planning.request import PlanRequest
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import dwells_for, zigzag

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.api.plan import plan
+from planner.api import plan
 from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import Plan

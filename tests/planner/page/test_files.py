@@ -13,11 +13,10 @@ import pandas as pd
 import pytest
 
 import softflagella as sf
-from planner.files.plan_files import schedule_template, write_plan
-from planner.files.plan_json import load_plan
-from planner.files.saved_plan import restore_plan
-from planner.files.tracker_header import header_template
-from planner.files.tracking_error import tracking_error
+from planner.files.headers import header_template, schedule_template
+from planner.files.plan_files import write_plan
+from planner.files.saved_plan import load_plan, restore_plan
+from planner.files.tracks import tracking_error
 from planner.page.first_state import first_options, slider_ends
 from planner.paths.path import circle, shape_of
 from planner.planning.plan import Plan

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from planner.api.plan import plan
+from planner.api import plan
 from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D, circle, polygon
 from planner.paths.path_files import read_path

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.files.regions import read_region
+from planner.options import read_region
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.path import SHAPES, Path2D, polygon
 from planner.paths.path_files import Drawing, read_path

@@ -10,10 +10,9 @@ from typing import Any, get_type_hints
 import numpy as np
 import pytest
 
-from planner.__main__ import say
-from planner.api.options import PathOptions
-from planner.api.plan import plan
-from planner.files.plan_files import controller_header
+from planner.api import plan
+from planner.files.headers import schedule_header
+from planner.options import PathOptions
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.request import PlanRequest
@@ -196,19 +195,18 @@ def test_long_paths_are_planned_with_the_least_stated_error_and_propose_the_robo
     assert not any("own table" in words for words in own.warnings)
 
 
-def test_errors_that_are_not_calibrated_say_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_errors_that_are_not_calibrated_say_so() -> None:
     known = CalibrationKnowledge(COEFFICIENTS, 1e-4 * np.eye(3))
     guessed, found = planned(), plan(circle(2.0), CONTROL, knowledge=known)
     assert guessed.error_line.startswith("if the coefficients are exact: predicted error")
     assert "with the coefficients of another robot: stated error" in guessed.error_line
     assert found.error_line.startswith("predicted error")
     assert guessed.error_line.replace("\n", "\n  ") in repr(guessed)
-    say(guessed)
-    assert guessed.error_line in capsys.readouterr().out
+    assert guessed.error_line in "\n".join(guessed.lines())
     assert guessed.to_dict()["stated_error_unmeasured_over_l"] == guessed.unmeasured_error
     assert found.to_dict()["stated_error_unmeasured_over_l"] is None
-    assert "if its coefficients are exact" in controller_header(guessed, "p1")
-    assert "exact" not in controller_header(found, "p1")
+    assert "if its coefficients are exact" in schedule_header(guessed, "p1")
+    assert "exact" not in schedule_header(found, "p1")
 
 
 def test_robots_with_the_coefficients_of_another_stay_within_the_error_of_unmeasured_ones() -> None:

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from planner.__main__ import main
-from planner.files.plan_json import load_plan
-from planner.files.saved_plan import restore_plan
+from planner.files.saved_plan import load_plan, restore_plan
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Reference, reference

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.api.plan import plan
+from planner.api import plan
 from planner.goal.dubins import shortest_paths
 from planner.planning.camera import POSE, Camera
 from planner.planning.plan import Plan

@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from planner.api.plan import plan
-from planner.files.tracking_error import tracking_error
+from planner.api import plan
+from planner.files.tracks import tracking_error
 from planner.page.write_page import write_page
 from planner.paths.path import circle
 from planner.planning.plan import Plan

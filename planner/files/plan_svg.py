@@ -1,18 +1,23 @@
-"""Axes of equal scale that write themselves as SVG, for pictures of plans.
+"""plan.svg: the plan over its path, with the stated error.
 
-They take those calls of matplotlib's axes that `planner.planning.picture` makes. To import matplotlib takes longer
-than to plan a path. Left out: axes of unequal scale, and everything that these pictures do not need.
+To import matplotlib takes longer than to plan a path. So the picture is drawn on axes of equal scale that write
+themselves as SVG. They take those calls of matplotlib's axes that `planner.planning.picture` makes.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from html import escape
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from planner.paths.units import in_lab
+from planner.planning.plan import Plan
 from sim.arrays import Floats
+from sim.io.units import format_time
 
 _SIZE = 440.0  # of the longer side of the frame, in px
 _LEAST = np.array([400.0, 100.0])  # width and height of the frame, in px
@@ -20,6 +25,20 @@ _LEFT, _TOP, _RIGHT, _BELOW, _ROW = 60.0, 50.0, 20.0, 60.0, 18.0  # margins, and
 _MARGIN = 0.05  # of the drawing around what is drawn
 _MOST_TICKS = 6
 _TEXT = 'font-family="DejaVu Sans, Verdana, sans-serif" fill="#1a1a1a"'
+
+
+def plan_svg(result: Plan, identity: str) -> str:
+    """Return plan.svg as text; `identity` names the plan."""
+    axes: Any = SvgAxes()
+    replace(result, job=None).plot(axes)
+    rms, stated = (in_lab(error, result.robot) for error in (result.predicted_rms, result.stated_error))
+    axes.set_title(f"{schedule_words(result)}\npredicted error {rms} rms, stated error {stated}")
+    return str(axes.text(identity))
+
+
+def schedule_words(result: Plan) -> str:
+    """Name the robot, the number of dwells and their duration."""
+    return f"{result.robot.name}: {len(result.dwells)} dwells, {format_time(float(result.seconds.sum()))}"
 
 
 class SvgAxes:

@@ -1,24 +1,33 @@
-"""A replayed (or measured) track against its plan: tracking error and an overlay.
+"""Replayed and measured tracks against their plans: the tracking error, an overlay, and the rest of a plan.
 
-The error is the distance of the tracked point from the declared path, weighted by time. The distance from the path
-as given is computed, too. A track holds the head's centre and the heading. The tracked point follows from them.
+A track is a camera's table: time_s, x_cm, y_cm and heading_deg of the head's centre, or in other units, or the
+columns of a replay. The error is the distance of the tracked point from the declared path, weighted by time; that
+from the path as given is computed, too. Of a trip to a goal the way from the last pose to the goal is planned
+again, through the places that are left; of any other plan the rest of its path (`planner.tracking.rest`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
-from planner.files.plan_json import LARGEST
+from planner.goal.trip import to_goal
 from planner.paths.distance import distance_to, two_sided
+from planner.paths.obstacles import FreeSpace
 from planner.paths.units import length_in_lab
+from planner.planning.plan import Plan
+from planner.planning.request import PlanRequest
+from planner.tracking.rest import place_reached, rest_of
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.quantities import convert_columns, numbers_of
+from sim.io.tables import read_table
 from sim.io.units import format_length
 from sim.mechanics import planar
 
@@ -28,6 +37,7 @@ if TYPE_CHECKING:
 _COLUMNS = ("time_bar", "x_over_l", "y_over_l", "heading_rad")
 _ALIKE = 1e-3  # of a place and of the tail length, largest difference of the same place in cm and in l
 _LAB = ("time_s", "x_cm", "y_cm", "heading_deg")  # or in other units
+_LARGEST = 1e6  # l, of a place; time units, of a time
 
 
 @dataclass(frozen=True)
@@ -65,7 +75,7 @@ class TrackingError:
         )
 
 
-def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
+def tracking_error(plan: Mapping[str, Any], track: pd.DataFrame) -> TrackingError:
     """Compare a track with its plan.
 
     Args:
@@ -82,22 +92,15 @@ def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
         raise InputError(
             f"the track is of plan {min(others)}, not of {plan['id']}; compare it with its own plan.json"
         )
-    track = track_in_tails(track, plan["robot"])
-    values = {name: numbers_of(track[name]).to_numpy() for name in _COLUMNS}
-    pose = np.stack([values["x_over_l"], values["y_over_l"], values["heading_rad"]], 1)
-    if not (np.abs([*pose.T, values["time_bar"]]) < LARGEST).all():
-        raise InputError("the track has a value that is not a finite number; correct the file")
-    if len(pose) < 2 or not np.ptp(values["time_bar"]) > 0:
+    times, poses = poses_of(track, plan["robot"])
+    if not np.ptp(times) > 0:
         raise InputError("the track has no two times; give a row for each time, in order")
-    back = np.flatnonzero(np.diff(values["time_bar"]) < 0)
-    if len(back):
-        raise InputError(f"the track's time goes back at row {back[0] + 2}; give a row for each time, in order")
     offset = np.array([plan.get("offset_over_l", 0.0), 0.0, 0.0])
-    tracked = planar.compose(pose, offset)[:, :2]
+    tracked = planar.compose(poses, offset)[:, :2]
     declared = distance_to(np.array(plan["reference"]), tracked)
     raw = distance_to(np.array(plan["raw_path"]), tracked)
-    weight = np.gradient(values["time_bar"])
-    weight = np.maximum(weight, 0) / max(float(np.maximum(weight, 0).sum()), 1e-300)
+    weight = np.gradient(times)
+    weight = weight / weight.sum()
     return TrackingError(
         rms=float(np.sqrt((weight * declared**2).sum())),
         largest=float(declared.max()),
@@ -108,6 +111,64 @@ def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
         track=tracked,
         tail_length=float(plan["robot"]["tail_length_m"]),
     )
+
+
+def replan_from(plan: Plan, track: pd.DataFrame) -> Plan:
+    """Plan the rest of a plan from the last pose of a track, at rest there; of a trip, the way to its goal.
+
+    Raises:
+        InputError: the track cannot be used, it has reached the end, or no way leads on.
+    """
+    robot = {"tail_length_m": plan.robot.tail_length, "time_scale_s": plan.robot.time_scale}
+    times, poses = poses_of(track, robot, running=True)
+    if plan.ends_at is None:
+        return rest_of(plan, times, poses)
+    place, q, kept = place_reached(plan, times, poses), plan.declared.reference.q, plan.kept_clear
+    left: list[Sequence[float]] = []
+    passed = 0
+    for via in plan.job.via:
+        passed += int(np.hypot(*(q[passed:] - np.array(via)).T).argmin())
+        left += [via] if passed > place else []
+    x, y, heading = poses[-1].tolist()
+    request = PlanRequest(
+        objective=plan.request.objective,
+        minimum_dwell=plan.minimum_dwell,
+        camera=plan.request.camera,
+        space=FreeSpace() if kept is None else kept.free_space,
+        feedback=kept is not None and kept.margin < plan.stated_error,
+    )
+    return to_goal((x, y, math.remainder(heading, math.tau)), plan.ends_at, plan.tracked, request, left)
+
+
+def read_track(track: pd.DataFrame | str | Path) -> pd.DataFrame:
+    """Read the table of a track from its file."""
+    return track if isinstance(track, pd.DataFrame) else read_table(track)
+
+
+def poses_of(track: pd.DataFrame, robot: Mapping[str, Any], *, running: bool = False) -> tuple[Floats, Floats]:
+    """Return times (N,) and poses (N, 3) of a track, in time units, l and rad.
+
+    Args:
+        track: the table.
+        robot: its `tail_length_m` and `time_scale_s`.
+        running: the last row may be incomplete, since it is still being written.
+
+    Raises:
+        InputError: a column is missing, a value is no finite number, or times go back.
+    """
+    table = track_in_tails(track, robot)
+    rows = np.stack([numbers_of(table[name]).to_numpy() for name in _COLUMNS], 1)
+    if running and len(rows) > 1 and np.isnan(rows[-1]).any():
+        rows = rows[:-1]
+    bad = np.flatnonzero(~(np.abs(rows) < _LARGEST).all(1))
+    if len(bad):
+        raise InputError(
+            f"row {bad[0] + 1} of the track has a value that is not a finite number; correct the file"
+        )
+    back = np.flatnonzero(np.diff(rows[:, 0]) < 0)
+    if len(back):
+        raise InputError(f"the track's time goes back at row {back[0] + 2}; give a row for each time, in order")
+    return rows[:, 0], rows[:, 1:]
 
 
 def track_in_tails(track: pd.DataFrame, robot: Mapping[str, Any]) -> pd.DataFrame:
@@ -146,7 +207,7 @@ def track_in_tails(track: pd.DataFrame, robot: Mapping[str, Any]) -> pd.DataFram
     )
 
 
-def draw_overlay(axes: Axes, plan: dict[str, Any], error: TrackingError, title: str) -> None:
+def draw_overlay(axes: Axes, plan: Mapping[str, Any], error: TrackingError, title: str) -> None:
     """Draw a track over the declared and the raw path, on axes in cm."""
     from planner.planning.picture import REPLAYED, draw_tracks
 
@@ -155,3 +216,17 @@ def draw_overlay(axes: Axes, plan: dict[str, Any], error: TrackingError, title: 
     axes.plot(*(100 * length * error.track.T), color=REPLAYED, lw=0.8, label="track")
     rms, largest = format_length(error.rms * length), format_length(error.largest * length)
     axes.set_title(f"{title}\n{rms} rms, {largest} at most\nfrom the declared path", fontsize=10, parse_math=False)
+
+
+def write_overlay(path: str | Path, plan: Mapping[str, Any], error: TrackingError) -> None:
+    """Write a PNG of a track over its plan."""
+    from matplotlib.figure import Figure
+
+    from sim.io.files import whole_file
+
+    figure = Figure(figsize=(6, 6))
+    axes = figure.add_subplot()
+    draw_overlay(axes, plan, error, plan["robot"]["name"])
+    axes.legend(fontsize=8, frameon=False)
+    with whole_file(path) as part:
+        figure.savefig(part, format="png", dpi=130, bbox_inches="tight")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.api.options import places_of, pose_of, request_of, seconds_of
+from planner.options import places_of, pose_of, request_of, seconds_of
 from planner.paths.obstacles import Circle
 from planner.planning.camera import Camera
 from sim.io.errors import InputError

@@ -1,31 +1,41 @@
-"""How long this vehicle takes between poses: Dubins' words, with its own speeds on straight lines and in turns.
+"""How this vehicle travels between poses that a job has chosen: time, track, and the plan of the whole track.
 
-In a turn the motor rarely flips, so the pivot moves nearly at its own speed; on a straight line the robot zigzags
-and loses speed with every flip. Among obstacles the quickest of the first WORDS words that is free counts; where
-none is free, a way around is assumed to take DETOUR turn radii more. Poses whose body is not free are not reached.
-Times in μ0 l⁴/EI, lengths in l.
+Tracks are Dubins' words of the pivot. In a turn the motor rarely flips, so the pivot moves nearly at its own
+speed; on a straight line the robot zigzags and loses speed with every flip. Among obstacles the quickest of the
+first WORDS words that is free counts; where none is free, a way around is assumed to take DETOUR turn radii more.
+Poses whose body is not free are not reached. Times in μ0 l⁴/EI, lengths in l.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from planner.goal.dubins import TURNS, DubinsPaths, words
 from planner.goal.lattice import RouteLimits
+from planner.goal.route import Route
 from planner.paths.obstacles import Footprint, FreeSpace
-from planner.paths.tractrix import Drift
+from planner.paths.path import Path2D
+from planner.paths.tractrix import Drift, Reference, slips
+from planner.paths.units import LONGEST, check_size, in_lab
+from planner.planning.declare import Declared
 from planner.planning.feasible import AS_DRAWN
+from planner.planning.plan import Plan
+from planner.planning.request import PlanRequest, Progress
+from planner.planning.solve import Setting, Task, solve
 from planner.vehicle.tracked_point import TrackedVehicle
-from planner.vehicle.zigzag import Zigzag
+from planner.vehicle.zigzag import Zigzag, dwells_for
 from sim.arrays import Floats, Integers
+from sim.io.errors import InputError
 
 WORDS = 3  # tried among obstacles
 DETOUR = 6.0  # turn radii that a blocked track counts longer
 _BLOCK = 50_000  # pairs of poses at once
 _STEP = 0.15  # l, between the places where a track is checked
 SLACK = 0.02  # l, by which clearances between these places may be smaller
+_SPACING = 0.02  # l, of the reference's points
 
 
 @dataclass(frozen=True)
@@ -90,3 +100,44 @@ class Travel:
 
     def _speed(self, turns: Integers) -> Floats:
         return np.where(turns == 0, self.straight, self.turning)
+
+
+def preferred_setting(tracked: TrackedVehicle, request: PlanRequest) -> Setting:
+    """Return the vehicle with the dwell that the objective prefers."""
+    least = request.least_dwell(tracked.robot)
+    return Setting.of(tracked, request.dwell or dwells_for(tracked.vehicle, request.objective, least)[0])
+
+
+def pivot_poses(places: Floats, courses: Floats, tracked: TrackedVehicle, drift: Drift) -> Floats:
+    """Return the pivot's poses (..., 3), place and course, where the tracked point is at places (..., 2)."""
+    heading = courses - slips(courses, drift)
+    axis = np.stack([np.cos(heading), np.sin(heading)], -1)
+    return np.concatenate([places - tracked.rod * axis, courses[..., None]], -1)
+
+
+def plan_track(
+    track: Callable[[Drift], Route], preferred: Setting, request: PlanRequest, progress: Progress | None
+) -> Plan[None]:
+    """Plan for the pivot's track that a job gives for a drift.
+
+    Raises:
+        InputError: the track is too long, or there is no way around an obstacle.
+    """
+    tracked, space = preferred.tracked, request.space
+
+    def source(setting: Setting) -> Declared:
+        reference = Reference.of_pivot(track(setting.drift).poses(_SPACING), tracked.rod, setting.drift)
+        return Declared(reference, float(np.abs(reference.curvature).max()))
+
+    drawn = Path2D(source(preferred).reference.p, False)
+    if drawn.length > LONGEST:
+        length = in_lab(drawn.length, tracked.robot)
+        raise InputError(f"the path is {length} long; at most {LONGEST:g} l can be planned")
+    check_size(drawn, tracked.robot, tracked.vehicle.turn_radius)
+    if space.empty:
+        return solve(Task(source=source, drawn=drawn), tracked, request, progress)
+    from planner.jobs.detours import Around
+
+    return solve(
+        Task(source=source, changes=(Around(tracked, space, drawn),), drawn=drawn), tracked, request, progress
+    )
