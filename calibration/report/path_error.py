@@ -2,7 +2,7 @@
 
 A path is planned for the robot as given and for the corrected robot, each with a look-up table of its own. The
 corrected robot is what is known best, so both schedules are carried out by it: its steady motion and its response
-to a flip after each dwell are simulated (`surrogate.one_robot`) and composed dwell by dwell, and a fitted current
+to a flip after each dwell are simulated (`surrogate.tabulate`) and composed dwell by dwell, and a fitted current
 carries it along. Against a replay of the whole schedule in time steps the tracks differ by at
 most a few hundredths of l on paths of 12 l, in a tenth of the time.
 
