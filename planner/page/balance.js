@@ -210,7 +210,6 @@ function motionSensitivity(head, tails, motion) {
   return inverse(matrix).map((row, i) => row.map((entry) => entry / sizes[i]));
 }
 
-
 /* The motion with torque and thrust of linear theory and the side forces of straight tails. */
 function firstGuess({ speed, gain, resistance }, { perp, parallel, offset, number }) {
   let spin = FIRST_SPIN * speed;

@@ -123,7 +123,6 @@ function rounded(raw, { vehicle, rod, drift }) {
   return fillet(raw, high);
 }
 
-
 /* Choose the path that the robot will follow: {reference, curvature, offDrawn, missed, warnings}.
  *
  * curvature: largest of the pivot's reference. offDrawn: largest distance of a declared point from the drawn path;
@@ -168,7 +167,6 @@ function tooTight(raw, feasibility, progress) {
     `the nearest path that it can follow has lost the shape; ${remedy(raw, feasibility, progress)}`
   );
 }
-
 
 /* Say what helps a path that is too tight. */
 function remedy(raw, feasibility, progress = null) {
