@@ -24,7 +24,8 @@ _LAST = 30  # dwells that are changed
 _DROPPED = 4  # at most this many are left out
 _REACHED = 1e-4  # l and rad
 _STEP = 1e-4  # time units, for derivatives
-_EVALUATIONS = 40
+_CONVERGED = 1e-3  # relative gain of the cost in a step, below which the search ends
+_MOST_EVALUATIONS = 200  # about thirty are needed
 _GOAL = 1e7  # time units that a squared distance [l² or rad²] from the goal costs
 _FAR = 3e4  # the same for a distance [l] from the track, beyond the largest one of the schedule
 
@@ -86,8 +87,8 @@ class _Ending:
             self._slopes,
             bounds=(self._least, np.inf),
             x_scale=self._least,
-            max_nfev=_EVALUATIONS,
-            ftol=1e-5,
+            max_nfev=_MOST_EVALUATIONS,
+            ftol=_CONVERGED,
         ).x
         residuals = self._at(solution)[0]
         missed = float(np.abs(residuals[:3]).max()) / math.sqrt(_GOAL)

@@ -328,8 +328,8 @@ class Plan(Generic[J]):
         robot, (x, y, heading) = self.robot, self.start
         shortest, whole = (format_time(time * robot.time_scale) for time in (self.minimum_dwell, self.duration))
         lines = [
-            f"start: put the head's centre at {place_in_lab(x, y, robot)}, heading {heading_in_degrees(heading)}, "
-            "at rest",
+            f"start: put {self.tracked.origin} at {place_in_lab(x, y, robot)}, heading "
+            f"{heading_in_degrees(heading)}, at rest",
             f"{len(self.dwells)} dwells of {shortest} ({self.minimum_dwell:.2f} time units) or more, {whole} "
             "in all",
             *self.error_line.splitlines(),

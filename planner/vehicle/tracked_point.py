@@ -58,6 +58,11 @@ class TrackedVehicle(NamedTuple):
         return Drift(0.0 if abs(sideways) < 1e-9 else sideways, (x, y))
 
     @property
+    def origin(self) -> str:
+        """Name the point whose poses count."""
+        return "the vehicle's point" if isinstance(self.robot, MeasuredVehicle) else "the head's centre"
+
+    @property
     def calibrated(self) -> bool:
         """Whether the errors are measured: of the coefficients of the head, or of the vehicle itself."""
         return isinstance(self.robot, MeasuredVehicle) or set(COEFFICIENTS) <= set(self.knowledge.names)

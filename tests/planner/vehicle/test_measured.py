@@ -193,6 +193,7 @@ def test_a_vehicle_swims_as_planned_and_cannot_be_simulated(tmp_path: Path) -> N
     swum = sf.swim(result)
     assert swum.finished
     assert "coefficients" not in result.error_line
+    assert "start: put the vehicle's point at" in repr(result)
     assert swum.within(result.feedback_error) > 0.9
     with pytest.raises(InputError, match="measured vehicle; only robots"):
         result.schedule()
