@@ -263,18 +263,8 @@ def planner_tour(made: Path, out: Path) -> str:
 
 def planner_cover(made: Path, out: Path) -> str:
     (out / "tank.csv").write_text("x,y\n0,0\n3,0\n3,2\n0,2\n")
-    words = [
-        out / "tank.csv",
-        "--unit",
-        "l",
-        "--width",
-        "0.6",
-        "--robot",
-        made / "robot.toml",
-        "--objective",
-        "flips",
-    ]
-    done("planner", "cover", *words, "--out", out / "swept")
+    words = ["--unit", "l", "--width", "0.6", "--robot", made / "robot.toml", "--objective", "flips"]
+    done("planner", "cover", out / "tank.csv", *words, "--out", out / "swept")
     assert names(out / "swept") > FILES
     return "covers 100.0 %"
 

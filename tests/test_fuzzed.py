@@ -99,19 +99,8 @@ CIRCLE = pd.DataFrame({"x": 2 * np.cos(np.linspace(0, 5, 60)), "y": 2 * np.sin(n
 
 
 def planned(folder: Path, path: object, *options: object, capsys: pytest.CaptureFixture[str]) -> None:
-    words = [
-        "planner",
-        "plan",
-        path,
-        "--robot",
-        "paper-control",
-        "--objective",
-        "flips",
-        "--out",
-        folder / "p",
-        *options,
-    ]
-    answered(words, capsys)
+    words = f"--robot paper-control --objective flips --out {folder / 'p'}".split()
+    answered(["planner", "plan", path, *words, *options], capsys)
 
 
 @pytest.mark.rest

@@ -7,16 +7,18 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 
 import calibration.swimmer.swimmer
 import calibration.swimmer.synthetic_table
-import sim.motion.batches
 from calibration.attribution import moves
 from calibration.laws import laws
 from calibration.laws.places import place_named
 from calibration.report.robot_verdict import RobotLaws, RobotVerdict, find_robot_laws
+from calibration.statistics.fit import Fit, fit
+from calibration.statistics.statistical_model import start_values
 from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.influences import influences
 from calibration.swimmer.measured_table import read_measurements
@@ -25,6 +27,7 @@ from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
+from sim.arrays import Flags
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from tests.calibration import toy
@@ -48,18 +51,12 @@ def install_toy(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(SwimmerModel, "guess", lambda model, start, used: start)
     patch.setitem(calibrate.__kwdefaults__, "draws", FEW_DRAWS)
     patch.setattr(moves, "_DRAWS", FEW_DRAWS)
-    for name in ("steady", "sensitivities", "settle"):  # what all of the simulator's batches call
-        patch.setattr(sim.motion.batches, name, refuse_to_simulate)
 
 
 def install_few_candidates(patch: pytest.MonkeyPatch, names: Sequence[str] = FEW_CANDIDATES) -> None:
     """Let every SwimmerModel search a few effects only, where the number of candidates is not the subject."""
     few = {name: influence for name, influence in influences().items() if name in names}
     patch.setattr(calibration.swimmer.swimmer, "influences", lambda: few)
-
-
-def refuse_to_simulate(*_: object, **__: object) -> None:
-    raise AssertionError("a test on the toy simulated")
 
 
 @contextmanager
@@ -84,6 +81,12 @@ def toy_table(
 
 def toy_swimmer(table: pd.DataFrame, robot: Robot = START, own: Owned | None = None) -> SwimmerModel:
     return SwimmerModel(robot, read_measurements(table), solver=toy.SOLVER, own=own or {})
+
+
+def fit_all(model: Any, used: Flags | None = None, *effects: str) -> Fit:
+    """Fit the coefficients, nuisance parameters and these effects to all runs, or to those used."""
+    names = (*(p.name for p in (*model.coefficients, *model.nuisances)), *effects)
+    return fit(model, start_values(model), names, np.ones(len(model.runs), bool) if used is None else used)
 
 
 def calibrated(

@@ -48,19 +48,17 @@ def in_days(table: pd.DataFrame, column: str = "session") -> pd.DataFrame:
     return table.assign(**{column: [f"day {d}" for d in day]})
 
 
-def of_two(
-    column: str, other: str, seed: int, lengths_cm: tuple[float, ...] = TWO_CM, **changed: float
-) -> pd.DataFrame:
+def of_two(column: str, other: str, lengths_cm: tuple[float, ...] = TWO_CM, **changed: float) -> pd.DataFrame:
     """A table in days, or on robots, of which those called `other` are of another truth."""
-    table = in_days(toy_table(seed, lengths_cm=lengths_cm), column)
-    moved = in_days(toy_table(seed, lengths_cm=lengths_cm, truth=replace(TRUTH, **changed)), column)
+    table = in_days(toy_table(3, lengths_cm=lengths_cm), column)
+    moved = in_days(toy_table(3, lengths_cm=lengths_cm, truth=replace(TRUTH, **changed)), column)
     return table.where(table[column] != other, moved)
 
 
 @shared
 def moved_on(day: int, **changed: float) -> RobotVerdict:
     lengths, robot = (LENGTHS_CM, START) if day == 2 else (TWO_CM, KNOWN)
-    table = of_two("session", f"day {day}", 3, lengths, **changed)
+    table = of_two("session", f"day {day}", lengths, **changed)
     with on_the_toy(few=True):
         return calibrate(table, robot, laws=False, progress=False)
 
@@ -78,9 +76,7 @@ def test_the_noise_of_repeats_in_several_sessions_is_without_the_shifts_of_sessi
     condition, session = np.repeat(np.arange(60), 2), in_days(pd.DataFrame({"run": range(120)}))["session"]
     session = session.str[-1].astype(int).to_numpy() - 1
     noise, shift = 0.02 * rng.normal(size=(2000, 120, 1)), np.array([0.3, -0.2, 0.5, 0.0])[session][:, None]
-    design = np.column_stack([factor[:, None] == np.unique(factor) for factor in (condition, session)]).astype(
-        float
-    )
+    design = 1.0 * np.column_stack([factor[:, None] == np.unique(factor) for factor in (condition, session)])
     assert repeat_count(design) == 120 - 60 - 3
     estimates = repeat_covariance(noise + shift + condition[:, None], design)[:, 0, 0]
     assert estimates.mean() == pytest.approx(0.02**2, rel=0.02)
@@ -138,16 +134,15 @@ def test_nothing_differs_where_nothing_did() -> None:
 @pytest.mark.slow
 def test_an_effect_in_all_sessions_is_no_move() -> None:
     with on_the_toy(few=True):
-        result = calibrate(
-            in_days(toy_table(5, lengths_cm=TWO_CM, **{DRAG: 5.0})), KNOWN, laws=False, progress=False
-        )
+        table = in_days(toy_table(5, lengths_cm=TWO_CM, **{DRAG: 5.0}))
+        result = calibrate(table, KNOWN, laws=False, progress=False)
     assert result.effects == (DRAG,)
     assert result.moves == ()
 
 
 @pytest.mark.slow
 def test_another_robot_is_named() -> None:
-    table = of_two("robot", "day 2", 3, C_yr=0.85 * TRUTH.C_yr)
+    table = of_two("robot", "day 2", C_yr=0.85 * TRUTH.C_yr)
     table["robot"] = table["robot"].where(table["robot"] == "day 2", "A").replace({"day 2": "B"})
     with on_the_toy(few=True):
         turned = in_days(table.iloc[::-1].reset_index(drop=True))

@@ -1,39 +1,46 @@
-"""Nuisance parameters that are off: no physics within their tolerance, a finding of their own beyond it."""
+"""Claims: what could imitate them, whether they carry over, and nuisance parameters that are off instead."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import binom
 
+import calibration.attribution.claim_checks
 from calibration.attribution import wrong_numbers
-from calibration.attribution.refits import examine
-from calibration.attribution.wrong_numbers import as_good_as_number, beside_wrong_numbers, notable_pull, pulls
+from calibration.attribution.claim_checks import (
+    SEEN,
+    absorbable_shares,
+    fitted_again,
+    imitability,
+    transfer_p,
+)
+from calibration.attribution.refits import IMITABLE, SURE, Candidate, ebic
+from calibration.attribution.wrong_numbers import notable_pull, pulls
 from calibration.report.corrected_robot import corrected_robot
-from calibration.statistics.fit import fit
-from calibration.statistics.residual_tests import directions, examine_residual
-from calibration.statistics.statistical_model import by_differences, start_values
-from calibration.statistics.study import DRAWS, Study, find_outliers, split_runs
+from calibration.statistics.fit import Fit, fit
+from calibration.statistics.statistical_model import by_differences, parameter, start_values
+from calibration.statistics.study import DRAWS, Study
 from calibration.swimmer.influences import CAMERA, HEADING, LENGTH, TACHOMETER
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.swimmer import SwimmerModel
+from calibration.swimmer.swimmer import COEFFICIENTS, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record
+from sim.arrays import Flags, Floats
 from sim.io.errors import InputError
 from sim.model.uncertainty import Sigma
 from tests.calibration.toy_tables import (
     DRAG,
-    FEW_CANDIDATES,
     FEW_DRAWS,
     START,
     TRUTH,
     calibrated,
+    fit_all,
     install_few_candidates,
     none,
     number,
@@ -41,6 +48,76 @@ from tests.calibration.toy_tables import (
     toy_swimmer,
     toy_table,
 )
+
+SIZE = 3.0
+PLAIN = toy_swimmer(toy_table(8))
+EVERY = np.ones(len(PLAIN.runs), dtype=bool)
+
+
+def planted(share: Floats | float) -> SwimmerModel:
+    """The model with runs that have the drag by this share (n,)."""
+    model = PLAIN
+    truth = {**start_values(model), **{name: getattr(TRUTH, name) for name in COEFFICIENTS}}
+    clean, present = model.predict([truth, {**truth, DRAG: SIZE}])
+    y = model.runs.y + np.broadcast_to(share, len(clean))[:, None] * (present - clean)
+    return replace(model, runs=replace(model.runs, y=y))
+
+
+def claimed(model: SwimmerModel) -> Fit:
+    start = {**start_values(model), DRAG: SIZE}
+    return fit(model, start, (*COEFFICIENTS, DRAG), EVERY, title="")
+
+
+def transferred(model: SwimmerModel, used: Flags) -> float:
+    return transfer_p(Study.fitted_to(model, used, seed=1), claimed(model))
+
+
+def test_a_strong_claim_is_hard_to_imitate_and_a_weak_one_is_not() -> None:
+    model = toy_swimmer(toy_table(2, **{DRAG: 5.0}), TRUTH)
+    shares = absorbable_shares(Study.fitted_to(model, EVERY, seed=1), fit_all(model, EVERY, DRAG), (DRAG,))
+    assert ((shares > -1e-9) & (shares < 1)).all()
+    assert imitability(shares, SEEN / 2) > IMITABLE > imitability(shares, 20 * SEEN)
+    assert imitability(np.array([1.0, 0.5]), 10.0) == 0.5  # what is absorbed whole leaves nothing to notice
+    assert imitability(np.array([0.5]), SEEN - 0.1) == 1.0
+
+
+def test_an_effect_carries_over_from_short_tails_and_few_and_a_mimic_does_not() -> None:
+    runs, near = PLAIN.runs, fitted_again(PLAIN.runs, EVERY)
+    assert set(np.unique(runs.tails[near])) == {2, 3, 4}
+    assert set(np.unique(runs.length[near].round(3))) == {0.05, 0.08}
+    assert near.sum() == len(near) // 2
+    for further, carries in ((1.0, True), (3.0, False)):
+        model = planted(np.where(near, 1.0, further))
+        assert (transferred(model, EVERY) >= SURE) == carries
+    alike = (runs.length < 0.06) & (runs.tails <= 4)
+    assert transferred(planted(1.0), alike) == 1.0  # they say nothing
+
+
+def test_a_claim_that_does_not_carry_over_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(calibration.attribution.claim_checks, "transfer_p", lambda *_, **__: 0.001)
+    with on_the_toy(few=True):
+        uncertain = calibrate(planted(2.0), draws=FEW_DRAWS, progress=False)
+    assert uncertain.effects == (DRAG,)
+    assert "or something outside the catalogue" in uncertain.sentence
+    assert verdict_record(uncertain, table="")["transfer_p"] == [0.001]
+
+
+def test_an_effect_beside_a_wrong_number_is_in_doubt_and_pairs_pay_for_their_number() -> None:
+    """Two effects cost one parameter more, and the logarithm of how many pairs there are."""
+    model = PLAIN
+    refit = claimed(planted(1.0))
+    effect = parameter(model, DRAG)
+    sure = Candidate(effect, (effect,), 8.0, 1.0, 1.0, 1.0, "kept", refit, None, 1.0, 0.1)
+    pull: Any = object()
+    freed = replace(refit, wrong_numbers=((pull,),))
+    assert not sure.uncertain
+    assert replace(sure, claimed=(parameter(model, "disc_drag"), effect)).uncertain
+    assert replace(sure, refit=freed).uncertain
+    study = Study.fitted_to(model, EVERY)
+    cost = ebic(study, refit, 2) - ebic(study, refit, 1)
+    assert cost == pytest.approx(2 * math.log((len(model.effects) - 1) / 2))
+    assert ebic(study, freed, 2) - ebic(study, refit, 2) == pytest.approx(math.log(study.values))
+
 
 EXACT = {
     name: Sigma(0.0, False)
@@ -72,7 +149,7 @@ def test_numbers_drawn_from_their_priors_are_no_effects() -> None:
     for seed in range(count):
         values = {n: float(getattr(TRUTH, n) or TRUTH.head_radius) for n in names}
         drawn = {n: v * math.exp(rng.normal() * START.sigma(n).of(v) / v) for n, v in values.items()}
-        table = toy_table(seed, truth=replace(TRUTH, **drawn))  # type: ignore[arg-type]
+        table = toy_table(seed, truth=replace(TRUTH, **drawn))
         table["l_cm"] += rng.normal(scale=0.1)
         table["R_yr_cm"] *= math.exp(rng.normal(scale=0.01))
         table["theta_deg"] += rng.normal() * np.sign(table["omega_rpm"])
@@ -121,9 +198,17 @@ def test_a_number_beyond_its_tolerance_is_a_finding_of_its_own() -> None:
     assert result.error_after < 1.25 * result.noise_ceiling
 
 
-def test_a_number_far_beyond_its_tolerance_does_not_come_ahead_of_an_effect(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_effect_beside_a_wrong_number_is_found_with_it() -> None:
+    """Both are off; neither alone explains the runs."""
+    table = toy_table(1, **{DRAG: 1.5})
+    table["R_yr_cm"] *= 1.08
+    result = calibrated(table, few=True)
+    assert result.effects == (DRAG,)
+    assert CAMERA in {p.parameter.name for p in result.wrong_numbers[0]}
+    assert result.error_after < 1.25 * result.noise_ceiling
+
+
+def test_a_number_far_beyond_its_tolerance_is_behind_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     """A head's length nine of its tolerances off explains as much as the effect that was there."""
     table = toy_table(2, **{DRAG: 0.58})
     result = calibrated(table, few=True)
@@ -144,30 +229,6 @@ def test_a_number_far_beyond_its_tolerance_does_not_come_ahead_of_an_effect(
     ahead = calibrated(table, few=True)
     assert ahead.verdict == "number"
     assert [c.effect.name for c in ahead.found.rival_effects] == ["end_over_end_drag"]
-
-
-def test_an_effect_beside_a_wrong_number_comes_behind_a_single_effect_that_fits_as_well() -> None:
-    """Both are off: the pair is found. Were there a single effect that fits as well, it would not be."""
-    table = toy_table(1, **{DRAG: 1.5})
-    table["R_yr_cm"] *= 1.08
-    with on_the_toy(few=True):
-        model = toy_swimmer(table)
-        assert len(model.effects) == len(FEW_CANDIDATES)
-    start = start_values(model)
-    split = split_runs(model.runs, None, find_outliers(model.runs, model.predict([start])[0]))
-    study = Study(model, split, draws=FEW_DRAWS, progress=False)
-    names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
-    base = fit(model, start, names, split.fitted, title="")
-    tangents = directions(model, base.parameters, model.effects)
-    candidates = examine(study, base, examine_residual(study, base, tangents), tangents)
-    (pair,) = beside_wrong_numbers(study, base, candidates, tangents)
-    assert pair.effect.name == "end_over_end_drag"
-    assert pair.kept
-    assert pair.refit is not None
-    single = next(c for c in candidates if c.refit)
-    assert single.refit is not None
-    as_good = replace(single, refit=replace(single.refit, deviance=pair.refit.deviance))
-    assert beside_wrong_numbers(study, base, [*candidates, as_good], tangents) == []
 
 
 @pytest.mark.rest
@@ -192,14 +253,8 @@ def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
     speed = table["R_yr_cm"] * table["omega_yr_rad_s"].abs()
     table["v_cm_s"] = speed * np.random.default_rng(0).uniform(0.9, 1.1, len(table))
     model = toy_swimmer(table)
-    at = {
-        **start_values(model),
-        "tracked_point": 0.2,
-        CAMERA: 1.03,
-        HEADING: 0.02,
-        LENGTH: 0.001,
-        TACHOMETER: 1.01,
-    }
+    off = {CAMERA: 1.03, HEADING: 0.02, LENGTH: 0.001, TACHOMETER: 1.01}
+    at = {**start_values(model), "tracked_point": 0.2, **off}
     names = [p.name for p in model.nuisances]
     assert len(names) == 10
     ours, J = model.derivatives(at, names)
@@ -212,19 +267,15 @@ def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
 def test_pulls_are_those_of_the_textbook() -> None:
     """One number, one measurement: x = y σ²/(σ² + s²), pull y/√(σ² + s²), alone y."""
     model = toy_swimmer(toy_table(8))
-    used = np.ones(len(model.runs), bool)
-    names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
-    bound = fit(model, start_values(model), names, used, title="")
+    bound = fit_all(model)
     for pull in pulls(bound, model.nuisances):
         if pull.learnt:
-            sigma = pull.parameter.sigma
-            assert sigma is not None
-            assert pull.z == pytest.approx(pull.alone / math.hypot(sigma, pull.alone_error), rel=1e-6)
-            assert pull.change == pytest.approx(
-                pull.alone * sigma**2 / (sigma**2 + pull.alone_error**2), rel=1e-6, abs=1e-12
-            )
+            total = math.hypot(pull.parameter.sigma, pull.alone_error)
+            assert pull.z == pytest.approx(pull.alone / total, rel=1e-6)
+            change = pull.alone * (pull.parameter.sigma / total) ** 2
+            assert pull.change == pytest.approx(change, rel=1e-6, abs=1e-12)
     bound_pull = {p.parameter.name: p for p in pulls(bound, model.nuisances)}[CAMERA]
-    free = fit(model, bound.parameters, names, used, wrong_numbers=((bound_pull,),), title="")
+    free = fit(model, bound.parameters, bound.names, EVERY, wrong_numbers=((bound_pull,),), title="")
     alone = {p.parameter.name: p for p in pulls(free, model.nuisances)}[CAMERA]
     assert alone.freed
     assert alone.change == pytest.approx(bound_pull.alone, abs=0.1 * bound_pull.alone_error)
@@ -238,17 +289,3 @@ def test_exact_numbers_are_not_fitted_and_the_table_states_its_own() -> None:
     for bad in (-1.0, np.arange(len(table), dtype=float)):
         with pytest.raises(InputError, match="camera_scale_sigma_percent"):
             read_measurements(table.assign(camera_scale_sigma_percent=bad))
-
-
-@pytest.mark.parametrize(
-    ("deviances", "expected"), [((12.0, 6.0), [6.0, 12.0]), ((13.0, 6.0), [6.0]), ((7.0,), [])]
-)
-def test_effects_that_cannot_be_told_from_the_best_rival_of_a_number_are_rivals(
-    deviances: tuple[float, ...], expected: list[float]
-) -> None:
-    """The number leaves 0; an effect is as good up to 6.63, and so is what cannot be told from the best effect."""
-    passed = SimpleNamespace(p_value=0.5)
-    fits: list[Any] = [SimpleNamespace(deviance=d, converged=True) for d in deviances]
-    candidates: list[Any] = [SimpleNamespace(refit=each, refit_misfit=passed) for each in fits]
-    number: Any = SimpleNamespace(deviance=0.0)
-    assert [c.refit.deviance for c in as_good_as_number(candidates, number, 0.04)] == expected

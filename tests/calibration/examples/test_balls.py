@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from calibration.attribution.nearest import sizes_of, varying
-from calibration.examples.balls import AIR, GRAVITY, Balls, main, read_balls
+from calibration.examples.balls import AIR, GRAVITY, main, read_balls
 from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import facts, verdict_record
@@ -67,7 +67,6 @@ def test_a_form_whose_size_differs_is_adopted_and_not_claimed() -> None:
     result = differing()
     nearest = result.nearest
     assert (result.verdict, result.effects) == ("partial", ())
-    assert nearest is not None
     assert nearest.effect.name == "linear_drag"
     assert result.error_after < 1.5 * result.noise_ceiling < 0.5 * result.error_before
     true_sizes = 0.4 * np.exp(0.6 * hidden_normals(3))
@@ -75,6 +74,10 @@ def test_a_form_whose_size_differs_is_adopted_and_not_claimed() -> None:
     assert low < np.exp(np.log(true_sizes).mean()) < high
     inside = [low < size < high for size, (_, low, high) in zip(true_sizes, nearest.sizes.values(), strict=True)]
     assert sum(inside) >= len(inside) - 2
+    refit = result.final_refit  # of a new specimen: the mean size, with the spread in its variance
+    place = [p.name for p in refit.fitted].index("linear_drag")
+    assert refit.covariance[place, place] > (nearest.spread * refit.parameters["linear_drag"]) ** 2
+    assert not any(" of " in name for name in refit.parameters)
 
 
 def hidden_normals(seed: int) -> np.ndarray:
@@ -108,8 +111,6 @@ def test_a_form_is_adopted_without_a_look_at_the_held_out_runs() -> None:
     ruined = replace(model, runs=replace(model.runs, y=np.where(test[:, None], model.runs.y + 0.9, model.runs.y)))
     result = calibrate(ruined, draws=200, progress=False)
     before = differing().nearest
-    assert result.nearest is not None
-    assert before is not None
     assert result.nearest.size == pytest.approx(before.size, rel=1e-6)
     assert result.held_out_error_falls is False
     assert "the error on the held-out runs does not fall with it" in result.sentence
@@ -117,19 +118,12 @@ def test_a_form_is_adopted_without_a_look_at_the_held_out_runs() -> None:
     assert next_steps(facts(result)) != next_steps(facts(differing()))
 
 
-def test_a_new_specimen_has_the_mean_size_and_the_spread_in_its_variance() -> None:
-    nearest, refit = differing().nearest, differing().final_refit
-    assert nearest is not None
-    place = [p.name for p in refit.fitted].index("linear_drag")
-    size = refit.parameters["linear_drag"]
-    assert refit.covariance[place, place] > (nearest.spread * size) ** 2
-    assert not any(" of " in name for name in refit.parameters)
-
-
 @pytest.mark.parametrize("truth", [*NULLS, *OUTSIDE])
 def test_nothing_is_adopted_where_no_form_is_like_it(truth: str) -> None:
     for seed in (0, 1):
-        assert verdict(truth, seed, without=("quadratic_drag",)).nearest is None
+        result = verdict(truth, seed, without=("quadratic_drag",))
+        assert result.nearest is None
+        assert verdict_record(result, table="t")["nearest"] is None
 
 
 @pytest.mark.parametrize("truth", ["linear drag, one rate", "quadratic drag, one C_D"])
@@ -150,10 +144,6 @@ def test_adoptions_are_right_or_rare(truth: str) -> None:
     assert sum(not r.held_out_error_falls for r in adopted) <= 1
 
 
-def test_the_record_of_other_verdicts_has_none() -> None:
-    assert verdict_record(verdict("nothing", 0, without=("quadratic_drag",)), table="t")["nearest"] is None
-
-
 @pytest.mark.skipif(not MEASURED.exists(), reason="the measured table of falling balls is not here")
 @pytest.mark.parametrize("without", [(), ("quadratic_drag",)])
 def test_of_real_balls_drag_is_adopted(without: tuple[str, ...]) -> None:
@@ -172,21 +162,16 @@ def test_of_real_balls_drag_is_adopted(without: tuple[str, ...]) -> None:
         (lambda t: t[t["ball"] == "ball 0"], "1 balls in 2 drops"),
     ],
 )
-def test_tables_that_cannot_be_used_are_refused(change, said: str) -> None:  # type: ignore[no-untyped-def]
+def test_tables_that_cannot_be_used_are_refused(change, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_balls(change(falls("nothing", 0)))
 
 
-def test_a_row_with_a_gap_is_left_out_by_its_number() -> None:
+def test_a_row_with_a_gap_is_left_out_by_its_number_and_an_effect_that_is_not_there_refused() -> None:
     table = falls("nothing", 0)
-    table.loc[4, "speed_m_s"] = np.nan
-    model = read_balls(table)
-    assert isinstance(model, Balls)
-    assert model.runs.excluded == ("row 5: a number is missing or not above 0",)
-    assert 5 not in model.runs.rows
-
-
-def test_an_effect_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    falls("nothing", 0).to_csv(tmp_path / "falls.csv")
     with pytest.raises(InputError, match="no effect 'drag'"):
-        read_balls(tmp_path / "falls.csv", ["drag"])
+        read_balls(table, ["drag"])
+    table.loc[4, "speed_m_s"] = np.nan
+    runs = read_balls(table).runs
+    assert runs.excluded == ("row 5: a number is missing or not above 0",)
+    assert 5 not in runs.rows

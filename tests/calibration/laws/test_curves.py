@@ -116,7 +116,6 @@ def test_a_curve_is_found_and_named(kind: str, at: float) -> None:
     assert (leaves_more.contradicted, leaves_more.rejected) == (True, False)
     assert (leaves_more.words, leaves_more.named) == ("", ())
     if kind == "resonance":
-        assert curve.turn is not None
         assert curve.turn[0] == "maximum"
         assert 30 / math.pi * curve.turn[1] == pytest.approx(112, abs=5)
 
@@ -128,9 +127,7 @@ def test_a_law_with_a_curve_stands_in_the_sentence_the_record_and_the_picture(
     monkeypatch.setattr(laws, "places", lambda **_: tuple(map(place_named, (PLACE, "Fz_vz"))))
     with on_the_toy():
         described = find_robot_laws(table_of("threshold"), START, progress=False)
-    assert described.laws is not None
     law = described.laws.curved
-    assert law is not None
     assert law.place.name == PLACE
     assert "is no power law" in described.sentence
     assert "like a threshold at 9" in described.sentence

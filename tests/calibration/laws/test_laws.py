@@ -1,4 +1,4 @@
-"""Laws that no effect of the catalogue states, in tables of the toy robot."""
+"""Laws that no effect of the catalogue states, in tables of the toy robot, and their exponents in words."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,10 +15,12 @@ import pytest
 from calibration.laws.law_model import LEVER, SIZE, LawModel, with_law
 from calibration.laws.laws import NO_LEVER, NO_SESSIONS, UNDETERMINED, Law, Laws
 from calibration.laws.places import in_common, place_named, places
-from calibration.laws.readings import EXPONENTS
+from calibration.laws.readings import EXPONENTS, in_words, logarithms, motion_patterns, readings
 from calibration.report.corrected_robot import law_handed_on, robot_with_law
 from calibration.report.robot_verdict import RobotLaws, find_robot_laws
 from calibration.statistics.statistical_model import by_differences, start_values
+from calibration.swimmer.measured_table import read_measurements
+from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.inputs import group_columns, load_robot
 from tests.calibration import toy
@@ -43,7 +46,6 @@ WARMER = 0.05  # of C_yr, per kelvin
 
 
 def laws_in(described: RobotLaws) -> Laws:
-    assert described.laws is not None
     return described.laws
 
 
@@ -80,14 +82,13 @@ def test_derivatives_are_those_by_differences() -> None:
 def test_a_law_is_found_at_its_place_with_its_exponents(name: str, places: tuple[str, ...]) -> None:
     described = laws_of_toy(4, places=places, **LAWS[name])
     selection = laws_in(described).selection
-    assert selection is not None
     if not places:
         assert selection.models == {1: 86, 2: 228, 3: 218, 4: 71}  # of 71 terms and 5 factors of three inputs
     kept = {law.place.name: law for law in laws_in(described).kept}
     assert name in kept
     law = kept[name]
     (effect,) = LAWS[name]
-    for exponent, true in zip(EXPONENTS, catalogue()[effect].powers.__dict__.values(), strict=True):  # type: ignore[attr-defined]
+    for exponent, true in zip(EXPONENTS, catalogue()[effect].powers.__dict__.values(), strict=True):
         low, high = law.fit.interval(exponent)
         margin = high - low  # the interval is one of 95 %
         assert low - margin / 2 < true < high + margin / 2
@@ -134,9 +135,7 @@ def test_a_law_depends_on_what_the_table_notes() -> None:
         robot = replace(TRUTH, C_yr=TRUTH.C_yr * float(np.exp(WARMER * kelvin)))
         table = toy_table(seed, truth=robot, lengths_cm=(6.0, 9.0))
         tables.append(table.assign(temperature_C=20.0 + kelvin))
-    table = pd.concat(tables, ignore_index=True)
-    table["run"] = np.arange(1, len(table) + 1)
-    described = described_by(table)
+    described = described_by(pd.concat(tables, ignore_index=True).assign(run=range(1, 1 + sum(map(len, tables)))))
     law = laws_in(described).kept[0]
     assert law.place.name == "Cyr"
     low, high = law.fit.interval("law_temperature_K")
@@ -175,11 +174,9 @@ def test_a_factor_in_the_speed_of_the_robot_is_read_from_the_inputs() -> None:
             swims = abs(still["omega_yr_rad_s"]) * still["R_yr_cm"]
             robot = replace(TRUTH, C_yr=TRUTH.C_yr * float(swims / 4.0) ** -0.5)
         parts.append(toy_table(100 + seed, truth=robot, lengths_cm=(length,), design=cell))
-    table = pd.concat(parts, ignore_index=True)
-    table["run"] = np.arange(len(table))
+    table = pd.concat(parts, ignore_index=True).assign(run=range(sum(map(len, parts))))
     law = next(law for law in laws_in(described_by(table)).kept if law.place.name == "Cyr")
     power = re.search(r"\|v\|\^(-[\d.]+) \((-[\d.]+) to (-[\d.]+)\)", law.words)
-    assert power is not None
     _, low, high = map(float, power.groups())
     assert low < -0.5 < high
 
@@ -221,16 +218,11 @@ def test_what_the_runs_do_not_exclude_stays_in_the_set() -> None:
     ("names", "said"),
     [
         (("Fz_wt", "Fz_vx"), "are a force along the axis"),
-        (("Fz_wt", "Cr"), ""),
-        (("Ct", "Fx_wt"), "act on the head"),
         (("Ct", "Cyr"), "act on the head"),
         (("tail_drag", "tail_stiffness"), "act on the tails"),
-        (("Fx_wt_at_l", "tail_drag_along"), "act on the tails"),
         (("Fx_wt_at_l", "Fx_wt"), ""),
-        (("Fx_wt_at_L", "Fx_wt"), "act on the head, driven by the spin of the tails ω_t"),
         (("Fx_wt_at_L", "Fx_wt_odd"), "act on the head, driven by the spin of the tails ω_t"),
     ],
-    ids=lambda value: "+".join(value) if isinstance(value, tuple) else "",
 )
 def test_what_they_have_in_common_is_said(names: tuple[str, ...], said: str) -> None:
     assert in_common([place_named(name) for name in names]) == said
@@ -241,3 +233,86 @@ def test_places_have_names_of_their_own() -> None:
     assert len(places(both_directions=False)) == 40
     with pytest.raises(KeyError):
         place_named("no such place")
+
+
+NARROW = np.diag([0.01, 0.02, 0.03]) ** 2
+
+
+SPEED = {"|v|": (0.85, -0.31, 0.60)}
+
+
+def said(
+    exponents: tuple[float, ...], covariance: Floats = NARROW, inputs: str = "ωlN", motion: Any = None
+) -> str:
+    errors = 1.96 * np.sqrt(np.diag(covariance))
+    intervals = [(value - error, value + error) for value, error in zip(exponents, errors, strict=True)]
+    return in_words(list(inputs), np.array(exponents), covariance, intervals, motion or {})
+
+
+def test_the_power_is_that_of_generalised_least_squares() -> None:
+    (reading,) = readings(["ω", "l"], np.array([0.11, 0.40]), NARROW[:2, :2])
+    weights = np.array([1.0, 4.0]) / np.array([0.01, 0.02]) ** 2
+    assert reading.power == pytest.approx((weights @ [0.11, 0.40]) / (weights @ [1.0, 4.0]))
+    assert reading.error == pytest.approx((weights @ [1.0, 4.0]) ** -0.5)
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (
+            said((0.105, 0.41, 0.02)),
+            ("in proportion to ω̄^0.10 (0.09 to 0.11)", "independent of N within"),
+        ),
+        (
+            said((0.5, 0.01, 0.02)),
+            ("in proportion to ω^0.50 (0.48 to 0.52), independent of l and N within",),
+        ),
+        (said((0.3, -0.6, 0.02)), ("ω^0.30 (0.28 to 0.32) l^-0.60 (-0.64 to -0.56)", "independent of N within")),
+        (said((0.2, 0.4, 0.01), np.diag([0.4, 0.05, 0.03]) ** 2), ("l^", "ω̄^", "or as well to")),
+        (said((0.3,), NARROW[1:2, 1:2], "l"), ("in proportion to l^0.30 (0.26 to 0.34)",)),
+        (said((0.001, 0.002, 0.003)), ("independent of ω, l and N within the intervals",)),
+    ],
+    ids=["dimensionless speed", "one input", "no quantity", "several quantities", "inputs alike", "no dependence"],
+)
+def test_exponents_are_said_as_powers_of_quantities(words: str, parts: tuple[str, ...]) -> None:
+    assert all(part in words for part in parts), words
+    assert said((), np.zeros((0, 0)), "") == ""
+
+
+def test_the_motion_is_named_beside_the_inputs_where_no_quantity_of_the_inputs_is_nearer() -> None:
+    words = said((0.43, -0.15, 0.30), motion=SPEED)
+    assert words.startswith(
+        "in proportion to ω^0.43 (0.41 to 0.45) l^-0.15 (-0.19 to -0.11) N^0.30 (0.24 to 0.36)"
+    )
+    assert ", or as well to |v|^0.50 (0.48 to 0.53)" in words
+    assert "|v|" not in said((0.105, 0.41, 0.02), motion=SPEED)
+    assert "|v|" not in said((0.43, 0.15, 0.30), motion=SPEED)
+    assert "|v|" not in said((0.001, 0.002, 0.003), motion=SPEED)
+    assert "|v|" in said((0.43, -0.15, 0.30), 400 * NARROW, motion=SPEED)
+    assert "|v|" not in said((0.43, 0.0, 0.0), 400 * NARROW, motion=SPEED)
+
+
+@pytest.mark.parametrize("with_speed", [False, True])
+def test_the_motion_follows_the_inputs_as_its_exponents_say(with_speed: bool) -> None:
+    """The slopes of a plane, here by the normal equations, from the outputs of a table with little noise."""
+    table = toy_table(1, lengths_cm=(5.0, 7.0, 9.0, 11.0), design={"noise": 1e-4, "session_noise": 0.0})
+    if with_speed:
+        noise = np.exp(np.random.default_rng(0).normal(scale=1e-4, size=len(table)))
+        table["v_cm_s"] = table["omega_yr_rad_s"].abs() * table["R_yr_cm"] * noise
+    runs = read_measurements(table)
+    patterns = motion_patterns(logarithms(runs), runs.outputs, runs.y)
+    assert set(patterns) == {"ω_h", "ω_t", "ω_yr", "|v|"}
+    speed = np.log(np.abs(table["omega_yr_rad_s"]) * table["R_yr_cm"]).to_numpy()
+    inputs = np.log(np.stack([table["omega_rpm"].abs(), table["l_cm"], table["N"]], 1))
+    plane = np.column_stack([np.ones(len(inputs)), inputs])
+    assert patterns["|v|"] == pytest.approx(np.linalg.solve(plane.T @ plane, plane.T @ speed)[1:], abs=1e-3)
+
+
+def test_what_is_no_power_law_is_no_pattern() -> None:
+    speeds = np.linspace(50.0, 150.0, 40)
+    inputs = np.column_stack([np.log(speeds), np.zeros(40), np.zeros(40)])
+    resonance = 1 / (1 + ((speeds - 100) / 20) ** 2)
+    spins = np.column_stack([np.log(resonance), 0.7 * np.log(speeds)])
+    patterns = motion_patterns(inputs, ("omega_h", "omega_t"), spins)
+    assert set(patterns) == {"ω_t"}
+    assert patterns["ω_t"] == pytest.approx((0.7, 0.0, 0.0))

@@ -29,15 +29,9 @@ LAWS = {
 
 
 def record(place: str) -> dict[str, Any]:
-    name, size = LAWS[place]
     runs = {"N": [2, 5], "l_cm": [5.0, 15.0], "omega_rpm": [143.0, 143.0]}
-    return {
-        "place": place,
-        "words": f"words of {place}",
-        "effect": {"name": name, "size": size},
-        "error": 0.026,
-        "runs": runs,
-    }
+    effect = dict(zip(("name", "size"), LAWS[place], strict=True))
+    return {"place": place, "words": f"words of {place}", "effect": effect, "error": 0.026, "runs": runs}
 
 
 def verdict(folder: Path) -> Path:
@@ -49,17 +43,13 @@ def verdict(folder: Path) -> Path:
 
 def module(path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
     loaded = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(loaded)
     return loaded
 
 
 @pytest.mark.parametrize("place", LAWS)
-def test_the_file_is_an_effect_with_the_law_s_formula(
-    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_file_is_an_effect_with_the_law_s_formula(place: str, tmp_path: Path, monkeypatch: Any) -> None:
     effect_file, test_file = adopt_law(verdict(tmp_path), "new_effect", tmp_path / "out", place=place)
     effect = module(effect_file).EFFECT
     name, size = LAWS[place]

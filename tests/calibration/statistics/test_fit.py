@@ -1,20 +1,36 @@
-"""Fits: their weights where runs were mis-tracked, the noise that is left, and where their search ends."""
+"""Fits: what is held out, weights of mis-tracked runs, the noise that is left, and where a search ends."""
 
 from __future__ import annotations
 
+import math
+import os
+import signal
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import product
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import binom
 
+from calibration.attribution import refits
+from calibration.statistics.budget import limited, limited_as_one, skipped, spent, stopped_by_interrupt
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.gls import repeat_covariance
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import Parameter, Parameters, Runs, start_values
-from calibration.statistics.study import Study, error_interval, errors, middle_session
+from calibration.statistics.study import (
+    Study,
+    caveat_of_excluded,
+    count_of_rows,
+    error_interval,
+    errors,
+    find_outliers,
+    middle_session,
+    summary_of_excluded,
+)
 from calibration.statistics.weights import (
     caveat_of_weights,
     estimate,
@@ -22,7 +38,10 @@ from calibration.statistics.weights import (
     noise_of_any_run,
     rows_of_little_weight,
 )
+from calibration.verdict.record import facts
+from calibration.words.render import next_steps
 from sim.arrays import Flags, Floats, Integers
+from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, calibrated, effect, toy_table
 
 COUNT, NOISE = 192, 0.025
 TRUTH = {"a": 2.0, "b": 0.5}
@@ -175,8 +194,6 @@ def test_a_departure_of_whole_conditions_costs_no_weight_in_any_order_of_the_run
     residual[local] += 0.1
     order = np.random.default_rng(0).permutation(len(condition))
     one, other = estimate(residual, condition), estimate(residual[order], condition[order])
-    assert one is not None
-    assert other is not None
     weights = one.weights(residual, condition)
     assert weights[local & ~bad].mean() > 0.9
     assert other.run == pytest.approx(one.run, rel=1e-6, abs=1e-12)
@@ -186,49 +203,37 @@ def test_a_departure_of_whole_conditions_costs_no_weight_in_any_order_of_the_run
 FEW = 60
 
 
-@dataclass
 class Valley:
-    """One output y = x + curvature (b − a²) + 0.01 a: a narrow bent valley, along which a fit creeps."""
-
-    offset: float  # of the data, which no parameter can remove
-    calls: list[float] = field(default_factory=list)
+    """Outputs 0.01 a² and 10 (b − a²): a narrow bent valley, along which a fit creeps."""
 
     coefficients = (Parameter("a", "a", 3.0, (-50.0, 50.0), 1.0), Parameter("b", "b", 9.0, (-5e3, 5e3), 1.0))
-    nuisances: tuple[Parameter, ...] = ()
-    effects: tuple[Parameter, ...] = ()
-    untestable: dict[str, str] = field(default_factory=dict)
+    nuisances = effects = ()
 
-    @property
-    def runs(self) -> Runs:
+    def __init__(self, offset: float):
+        """Take an offset of the data, which no parameter can remove."""
+        self.calls: list[float] = []
         half = np.arange(FEW) // 2
         y = 0.1 * np.random.default_rng(3).normal(size=(FEW, 2))
-        y[:, 0] += self.offset * np.where(half % 2, 1.0, -1.0)
-        return runs_of(y, session=half % 3)
+        y[:, 0] += offset * np.where(half % 2, 1.0, -1.0)
+        self.runs = runs_of(y, session=half % 3)
 
     def predict(self, sets: list[Parameters], *, title: str = "") -> Floats:
-        return np.array([self._at(p["a"], p["b"]) for p in sets])
+        return np.array([np.tile([0.01 * p["a"] ** 2, 10 * (p["b"] - p["a"] ** 2)], (FEW, 1)) for p in sets])
 
-    def derivatives(
-        self, parameters: Parameters, names: list[str], *, title: str = "", quick: bool = False
-    ) -> tuple[Floats, Floats]:
-        a, b = parameters["a"], parameters["b"]
-        self.calls.append(a)
-        slopes = {"a": np.array([0.02 * a, -20 * a]), "b": np.array([0.0, 10.0])}
+    def derivatives(self, parameters: Parameters, names: list[str], **_: Any) -> tuple[Floats, Floats]:
+        self.calls.append(a := parameters["a"])
+        slopes = {"a": [0.02 * a, -20 * a], "b": [0.0, 10.0]}
         table = np.array([np.tile(slopes[name], (FEW, 1)) for name in names]).reshape(-1, FEW, 2)
-        return self._at(a, b), np.moveaxis(table, 0, -1)
-
-    def _at(self, a: float, b: float) -> Floats:
-        return np.tile([0.01 * a**2, 10 * (b - a**2)], (FEW, 1))
+        return self.predict([parameters])[0], np.moveaxis(table, 0, -1)
 
 
-def valley_fit(model: Valley, target: float = np.inf) -> Fit:
-    used = np.ones(FEW, dtype=bool)
-    return fit(model, {"a": 3.0, "b": 9.0}, ("a", "b"), used, target=target, title="")  # type: ignore[arg-type]
+def valley_fit(model: Any, target: float = np.inf) -> Fit:
+    return fit(model, {"a": 3.0, "b": 9.0}, ("a", "b"), np.ones(FEW, bool), target=target, title="")
 
 
 def test_the_search_of_a_fit_ends_where_it_cannot_reach_the_noise_and_nowhere_else() -> None:
     free, ended = Valley(5.0), Valley(5.0)
-    target = Study.fitted_to(free, np.ones(FEW, bool)).noise_at_most(2)  # type: ignore[arg-type]
+    target = Study.fitted_to(free, np.ones(FEW, bool)).noise_at_most(2)
     best, given_up = valley_fit(free), valley_fit(ended, target)
     assert len(ended.calls) < len(free.calls)
     assert given_up.deviance == pytest.approx(best.deviance, rel=0.05)
@@ -253,3 +258,113 @@ def test_noise_alone_stays_below_the_deviance_that_ends_a_search_also_with_few_r
     assert np.mean(np.array(deviances) > values + 6 * np.sqrt(2 * values)) > 0.2
     assert np.mean(np.array(deviances) > most) < 0.01
     assert most < 4 * np.mean(deviances)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "held_out"),
+    [
+        ([32] * 4, [2]),
+        ([7] * 12, [6]),
+        ([1] * 96, [44, 45, 46, 47, 48, 49, 50, 51]),  # one run, whose error says nothing, used to be held out
+        ([30, 30, 2, 30, 30], [1, 2]),
+    ],
+    ids=["four", "twelve", "of one run each", "a short one in the middle"],
+)
+def test_neighbours_join_short_sessions(sizes: list[int], held_out: list[int]) -> None:
+    session = np.repeat(np.arange(len(sizes)), sizes)
+    held = middle_session(runs_of(np.zeros((len(session), 1)), session))
+    assert sorted(set(session[held].tolist())) == held_out
+    assert not set(session[held]) & set(session[~held])
+
+
+def test_runs_that_were_mistracked_are_excluded_and_clean_ones_are_not() -> None:
+    def pairs(seed: int) -> Any:
+        """200 conditions of two runs, with two outputs of unit noise."""
+        y = np.random.default_rng(seed).normal(size=(400, 2))
+        condition = np.repeat(np.arange(200), 2)
+        return SimpleNamespace(y=y, condition=condition, rows=np.arange(400), outputs=("R_yr", "theta"))
+
+    runs, effect = pairs(0), pairs(1)
+    mistracked = np.arange(0, 400, 40)
+    assert not find_outliers(runs, np.zeros_like(runs.y))[0].any()
+    runs.y[mistracked, 1] += 16.0
+    bad, reasons = find_outliers(runs, np.zeros_like(runs.y))
+    assert set(np.flatnonzero(bad)) <= set(mistracked)
+    assert bad.sum() >= 8
+    assert all("theta is" in reason for reason in reasons)
+    assert runs.y[~bad].std(0) == pytest.approx([1, 1], abs=0.12)
+    effect.y[:200] += 15.0  # it changes all repeats
+    assert not find_outliers(effect, np.zeros_like(effect.y))[0].any()
+
+
+def test_excluded_rows_of_one_reason_are_one_line() -> None:
+    sign = "has the wrong sign for its omega_rpm: the head turns against the motor"
+    excluded = (
+        "row 9: theta_deg = nan is not a finite number",
+        *(f"row {i}: omega_h_rpm = {i / 7:g} {sign}" for i in (2, 3, 5, 8)),
+        *(f"row {i}: a copy of an earlier row, equal in all inputs and outputs (row {i - 10})" for i in (11, 12)),
+        *(f"row {i}: R_yr is {i} standard deviations from its repeat" for i in (14, 17)),
+        "column colour: not known, left out",
+    )
+    assert summary_of_excluded(excluded, 40) == [
+        f"4 of 40 rows (rows 2, 3, 5 and 1 more): omega_h_rpm {sign}",
+        "2 of 40 rows (rows 11, 12): a copy of an earlier row, equal in all inputs and outputs",
+        "2 of 40 rows (rows 14, 17): R_yr is standard deviations from its repeat",
+        "row 9: theta_deg = nan is not a finite number",
+        "column colour: not known, left out",
+    ]
+    assert summary_of_excluded((), 40) == []
+    assert count_of_rows(excluded) == 9
+    lines = [f"row {i}: N = {why}" for i, why in enumerate(("2.5 is not a whole number", "7 is not above 0"))]
+    assert summary_of_excluded(tuple(lines), 9) == lines  # they differ in more than a value
+    assert caveat_of_excluded(excluded, 45) == ()  # a fifth
+    assert caveat_of_excluded(excluded, 44)[0].startswith("9 of 44 rows (20 %) were excluded")
+
+
+def test_limits_end_with_those_around_them() -> None:
+    with limited(1e6) as outer:
+        with limited(-1.0):
+            assert spent()
+            assert skipped("a drag")
+            assert skipped("a drag")
+        assert not skipped("a couple")
+        with limited_as_one():
+            outer.end = 0.0
+            assert spent()
+    assert outer.not_tried == ["a drag"]
+    assert not spent()
+
+
+@pytest.mark.parametrize("seconds", [1e-9, math.inf], ids=["without time", "interrupted"])
+def test_a_search_that_ends_early_leaves_a_provisional_verdict(
+    seconds: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*arguments: Any, **options: Any) -> Any:
+        os.kill(os.getpid(), signal.SIGINT)
+        return fit(*arguments, **options)
+
+    if seconds > 1:
+        monkeypatch.setattr(refits, "fit", interrupted)
+    with stopped_by_interrupt():
+        verdict = calibrated(toy_table(5, **{DRAG: 5.0}), few=FEW_CANDIDATES, max_seconds=seconds)
+    ended = "after 0 s of processor time" if seconds < 1 else "at Ctrl-C"
+    assert verdict.verdict == "unexplained"
+    assert verdict.caveats[0].startswith(f"provisional: the search ended {ended}")
+    assert next_steps(facts(verdict))
+    if seconds < 1:
+        assert any("end-over-end" in what for what in verdict.not_tried)
+        assert all(c.refit is None for c in verdict.found.candidates)
+        assert not effect().not_tried
+
+
+def test_further_interrupts_and_those_outside_a_search_end_the_program() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with stopped_by_interrupt():
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+        with limited(1e6):
+            os.kill(os.getpid(), signal.SIGINT)
+            assert spent()
+            with pytest.raises(KeyboardInterrupt):
+                os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is before

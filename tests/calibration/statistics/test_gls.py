@@ -1,12 +1,19 @@
-"""Generalised least squares against dense matrices."""
+"""Generalised least squares and the tests of the residual, against dense matrices."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from calibration.statistics.gls import Gls, Noise, eliminated, inverse_root, repeat_covariance, solved
+from calibration.statistics.residual_tests import TESTABLE, Directions, _kernel, directions, examine_residual
+from calibration.statistics.statistical_model import changes, features, precisions
+from calibration.statistics.study import Study, middle_session
+from calibration.swimmer.influences import CAMERA, TACHOMETER
 from sim.arrays import Floats
+from tests.calibration.toy_tables import fit_all, toy_swimmer, toy_table
 
 SESSION = np.array([0, 0, 1, 1, 1, 2, 2, 2])
 SCALE = np.sqrt([1.0, 0.1, 1.0, 0.4, 0.02, 1.0, 2.0, 1.0])
@@ -50,23 +57,19 @@ def test_draws_have_the_covariance_of_runs_sessions_and_priors() -> None:
     rng = np.random.default_rng(0)
     columns, run, share = rng.normal(size=(8, 2, 2)), np.array([[1.0, 0.4], [0.4, 0.8]]), np.array([0.5, 0.1])
     drawn = Gls(columns, np.array([0.0, 4.0]), SESSION, SCALE).draw(rng, run, np.tile(share, (40_000, 1)))
-    expected = dense(run, share)
-    expected += np.outer(columns[..., 1], columns[..., 1]) / 4
+    expected = dense(run, share) + np.outer(columns[..., 1], columns[..., 1]) / 4
     scatter = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     assert np.cov(drawn.reshape(len(drawn), -1).T) / scatter == pytest.approx(expected / scatter, abs=0.03)
 
 
-@pytest.mark.parametrize("scale", [None, np.sqrt([1.0, 0.1, 1.0, 0.4, 0.02])], ids=["equal", "weighted"])
+@pytest.mark.parametrize("scale", [None, SCALE], ids=["equal", "weighted"])
 def test_whitener_is_the_inverse_root_of_the_block_covariance(scale: Floats | None) -> None:
-    rng = np.random.default_rng(0)
-    root = rng.normal(size=(3, 3))
+    root = np.random.default_rng(0).normal(size=(3, 3))
     noise = Noise(root @ root.T + np.eye(3), np.array([0.7, 0.0, 0.3]))
-    session = np.array([0, 0, 1, 1, 1])
-    factors = np.zeros((5, 5)) if scale is None else np.diag(scale**-2) - np.eye(5)
-    covariance = noise.covariance(session) + np.kron(factors, noise.run)
-    whiten = noise.whitener(session, scale)
-    W = whiten(np.eye(15).reshape(5, 3, 15))
-    assert W @ covariance @ W.T == pytest.approx(np.eye(15), abs=1e-10)
+    factors = np.zeros((8, 8)) if scale is None else np.diag(scale**-2) - np.eye(8)
+    W = noise.whitener(SESSION, scale)(np.eye(24).reshape(8, 3, 24))
+    covariance = noise.covariance(SESSION) + np.kron(factors, noise.run)
+    assert W @ covariance @ W.T == pytest.approx(np.eye(24), abs=1e-10)
 
 
 def test_noise_is_recovered_from_repeats_and_sessions() -> None:
@@ -89,3 +92,72 @@ def test_noise_is_recovered_from_repeats_and_sessions() -> None:
         shares.append(linear.products(scatter + shift, covariances[-1]).share(passes=3))
     assert np.sqrt(np.diag(np.mean(covariances, 0))) == pytest.approx([0.03, 0.05], rel=0.02)
     assert np.mean(shares, 0) == pytest.approx([0.25, 0.15], rel=0.12)
+
+
+def test_scores_along_features_are_those_of_least_squares() -> None:
+    """One output along one feature: its coefficient over its error, with coefficients and numbers beside it."""
+    model = toy_swimmer(toy_table(8))
+    used = ~middle_session(model.runs)
+    fitted = fit_all(model, used)
+    none = Directions.plain(np.zeros((*model.runs.y.shape, 0)))
+    scores = examine_residual(Study.fitted_to(model, used, draws=50), fitted, none).scores
+    _, table = features(model.runs, used)
+    J = fitted.jacobian[used]
+    residual = (model.runs.y - fitted.prediction)[used] + J @ changes(fitted.fitted, fitted.parameters)
+    noise = Noise(repeat_covariance(residual, model.runs.condition[used]), scores.share)
+    white = noise.whitener(model.runs.session[used])
+    prior = np.diag(np.sqrt(precisions(fitted.fitted)))
+    for output, feature in ((0, 0), (2, 3), (4, 1)):
+        feature_column = np.zeros_like(residual)
+        feature_column[:, output] = table[used][:, feature]
+        columns = np.concatenate([J, feature_column[..., None]], -1)
+        rows = np.concatenate([white(columns), np.pad(prior, ((0, 0), (0, 1)))])
+        values = np.concatenate([white(residual), np.zeros(len(prior))])
+        step = np.linalg.lstsq(rows, values, rcond=None)[0]
+        error = np.sqrt(np.linalg.inv(rows.T @ rows)[-1, -1])
+        assert scores.shapes[output, feature] == pytest.approx(step[-1] / error, rel=1e-6)
+
+
+def test_the_kernel_of_repeats_is_that_of_all_runs() -> None:
+    """Runs with equal inputs share a row of the kernel: 20,000 runs of 96 conditions used to take gigabytes."""
+    rng = np.random.default_rng(0)
+    inputs = rng.normal(size=(20, 3))[rng.integers(0, 20, 200)]
+    white = rng.normal(size=(4, 200, 5))
+    distance = ((inputs[:, None] - inputs[None]) ** 2).sum(-1)
+    expected = np.einsum("bnk,nm,bmk->b", white, np.exp(-distance / 2), white)
+    places, kernel = _kernel(inputs)
+    assert places.shape == (20, 200)
+    added = places @ white
+    assert np.einsum("bik,ij,bjk->b", added, kernel, added) == pytest.approx(expected, rel=1e-12)
+
+
+def test_lengths_are_those_of_a_dense_covariance_also_with_one_tolerance_halved() -> None:
+    """Σ + G P Gᵀ formed and the coefficients projected out; of one session, so that ρ is 1 for every effect."""
+    model = toy_swimmer(toy_table(3).assign(session="one"))
+    used = np.ones(len(model.runs), dtype=bool)
+    fitted = fit_all(model, used)
+    tangents = directions(model, fitted.parameters, model.effects)
+    misfit = examine_residual(Study.fitted_to(model, used, seed=1), fitted, tangents, draws=200)
+    chosen = [
+        next(m for m in np.flatnonzero(tangents.owner == j) if tangents.second[m] == second or np.isnan(second))
+        for j, second in enumerate(misfit.second)
+    ]
+    flat = fitted.jacobian.reshape(used.size * 5, -1)
+    bound = [p.sigma is not None for p in fitted.fitted]
+
+    def lengths(halved: str) -> Floats:
+        covariance = replace(fitted.noise, share=1.0).covariance(model.runs.session)
+        for p, column in zip(fitted.fitted, flat.T, strict=True):
+            sigma = (p.sigma or 0.0) * (0.5 if p.name == halved else 1.0)
+            covariance += sigma**2 * np.outer(column, column)
+        white = np.linalg.inv(np.linalg.cholesky(covariance))
+        free, seen = white @ flat[:, ~np.array(bound)], white @ tangents.table[..., chosen].reshape(len(flat), -1)
+        return np.asarray(np.linalg.norm(seen - free @ np.linalg.lstsq(free, seen, rcond=None)[0], axis=0))
+
+    today, seen = lengths(""), np.asarray(misfit.scores.survived) > TESTABLE
+    assert seen.sum() > 5
+    assert misfit.scores.length[seen] == pytest.approx(today[seen], rel=1e-4)
+    for name in (CAMERA, TACHOMETER, "disc_offset"):
+        halved = lengths(name)
+        assert misfit.halved_length[name][seen] == pytest.approx(halved[seen], rel=1e-4), name
+        assert (halved[seen] >= today[seen] * (1 - 1e-9)).all()

@@ -11,7 +11,6 @@ import pytest
 
 from calibration.__main__ import main
 from calibration.report.corrected_robot import corrected_robot, corrected_toml
-from calibration.swimmer.head_correction import HeadCorrection
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
@@ -44,13 +43,6 @@ def verdict() -> Verdict:
     return calibrated(bent_table(), few=(DRAG, "surface_couple", "anisotropic_head_drag"))
 
 
-@pytest.fixture
-def learnt() -> tuple[Verdict, HeadCorrection]:
-    result = verdict()
-    assert result.learnt is not None
-    return result, result.learnt
-
-
 def correction(**changes: object) -> Correction:
     """C_yr grows by 10 % for each 0.2 of ln l."""
     x = np.array([CONTROL.tails, np.log(CONTROL.tail_length / CONTROL.head_radius), 0.0])
@@ -60,21 +52,18 @@ def correction(**changes: object) -> Correction:
         tuple(x.tolist()), (1.0, 0.2, 1.0), tuple(low.tolist()), tuple(high.tolist()),
         ((0, 0, 0), (0, 1, 0)), {"C_yr": (0.2, 0.1), "surface_couple": (0.05, 0.0)}, 0.03, 0.05,
     )  # fmt: skip
-    return replace(plain, **changes)  # type: ignore[arg-type]
+    return replace(plain, **changes)
 
 
 @pytest.mark.slow
-def test_what_no_effect_does_is_left_unexplained_and_a_correction_predicts_it(
-    learnt: tuple[Verdict, HeadCorrection],
-) -> None:
+def test_what_no_effect_does_is_left_unexplained_and_a_correction_predicts_it() -> None:
     """No effect is claimed; a correction of no effect's form helps in runs that it was not learnt from."""
-    result, correction = learnt
+    result, correction = verdict(), verdict().learnt
     assert result.verdict == "unexplained"
     assert result.effects == ()
     assert corrected_robot(START, result.final.parameters).effects == {}
     assert "no effect and no pair" in result.sentence
     assert any("ln l/R" in term for term in correction.terms)
-    assert result.error_predictive is not None
     excess = result.error_before**2 - result.noise_ceiling**2
     assert result.error_predictive**2 - result.noise_ceiling**2 < 0.4 * excess
     assert f"{100 * result.error_predictive:.1f} % on runs" in result.sentence
@@ -86,11 +75,9 @@ def test_what_no_effect_does_is_left_unexplained_and_a_correction_predicts_it(
 
 
 @pytest.mark.slow
-def test_the_corrected_robot_simulates_what_was_predicted_and_states_its_uncertainty(
-    learnt: tuple[Verdict, HeadCorrection], tmp_path: Path
-) -> None:
+def test_the_corrected_robot_simulates_what_was_predicted_and_states_its_uncertainty(tmp_path: Path) -> None:
     """The file's robot, with the table's settings, moves as the correction that was learnt from all runs says."""
-    result, correction = learnt
+    result, correction = verdict(), verdict().learnt
     (tmp_path / "with.toml").write_text(corrected_toml(START, result.final_refit, correction))
     (tmp_path / "without.toml").write_text(corrected_toml(START, result.final_refit))
     robot = load_robot(tmp_path / "with.toml")
@@ -133,7 +120,7 @@ def test_outside_its_range_it_refuses() -> None:
         {"tail_length": 2 * CONTROL.tail_length},
         {"motor_speed": 2 * CONTROL.motor_speed},
     ):
-        robot = replace(CONTROL, correction=correction(), **change)  # type: ignore[arg-type]
+        robot = replace(CONTROL, correction=correction(), **change)
         with pytest.raises(InputError, match="outside the runs that the robot's correction was learnt from"):
             plan(circle(2.0), robot)
 

@@ -79,9 +79,8 @@ def rows(*, digits: int, outputs: int, seed: int = 0, noise: float = 0.025) -> t
     """48 conditions, two runs each: inputs, and outputs about 2 to 9 with so many digits behind the point."""
     rng = np.random.default_rng(seed)
     mean = np.repeat(rng.uniform(2, 9, (48, outputs)), 2, 0)
-    return np.repeat(np.arange(48.0), 2)[:, None], (mean * np.exp(noise * rng.normal(size=mean.shape))).round(
-        digits
-    )
+    outputs_of_runs = (mean * np.exp(noise * rng.normal(size=mean.shape))).round(digits)
+    return np.repeat(np.arange(48.0), 2)[:, None], outputs_of_runs
 
 
 def test_a_copied_block_is_found_and_nothing_else() -> None:

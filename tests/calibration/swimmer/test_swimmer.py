@@ -1,9 +1,11 @@
-"""The swimmer as a model: derivatives, observation, what it refuses."""
+"""The swimmer as a model: derivatives, observation, what it refuses; and runs that a lab can make next."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -11,7 +13,8 @@ import pytest
 
 from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.swimmer.influences import influences
-from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.measured_table import OUTPUTS, read_measurements
+from calibration.swimmer.possible_runs import UNITS, owned, possible_settings
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
@@ -19,7 +22,7 @@ from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from surrogate.table_file import load
 from tests.calibration import toy
-from tests.calibration.toy_tables import START, TRUTH, toy_swimmer, toy_table
+from tests.calibration.toy_tables import START, TRUTH, calibrated, toy_swimmer, toy_table
 
 FRICTION, SPEED = "contact_line", "contact_line_speed"  # of the contact line
 
@@ -107,11 +110,8 @@ def test_a_current_shows_in_the_speed_along_its_heading_and_in_the_radius(table:
         ("l_cm", 0.01, "head radii"),
         ("omega_rpm", 1000.0, "ω̄"),
         ("omega_rpm", np.pi / 30, "add up to 9"),
-        ("R_yr_cm", 1000.0, "R_yr_cm is .* times what"),
-        ("theta_deg", np.pi / 180, "theta_deg is 0.0175 times"),
-        ("omega_yr_rad_s", 1e-3, "omega_yr_rad_s is 0.001"),
     ],
-    ids=["l in mm", "l in m", "krpm", "rad/s", "R in µm", "θ in rad", "ω_yr in krad/s"],
+    ids=["l in mm", "l in m", "krpm", "rad/s"],
 )
 def test_wrong_units_are_refused(table: pd.DataFrame, column: str, factor: float, expected: str) -> None:
     rows = table.assign(**{column: table[column] * factor}).drop(columns="v_cm_s")
@@ -136,7 +136,6 @@ def test_the_first_guess_is_found_from_any_start(table: pd.DataFrame) -> None:
 
 def test_derivatives_along_the_friction_of_the_contact_line_and_its_speed() -> None:
     second = influences()[FRICTION].parameter.second
-    assert second is not None
     assert second.name == SPEED
     table = make_table(TRUTH, seed=2, tails=(2, 3), lengths_cm=(6.0, 9.0), title="")
     model = SwimmerModel(START, read_measurements(table))
@@ -155,10 +154,78 @@ def test_a_motion_that_does_not_settle_is_refused_and_named() -> None:
         make_table(thins, seed=0, tails=(2,), lengths_cm=(11.0,), motor_rpm=(100.0,), trials=1, title="")
 
 
-def test_faults_of_one_tail_have_the_derivatives_of_the_prediction(table: pd.DataFrame) -> None:
-    model = SwimmerModel(START, read_measurements(table), solver=toy.SOLVER)
-    sizes = {"one_tail_shorter": 0.2, "one_tail_softer": 0.3, "one_tail_missing": 0.5}
-    at = {**start_values(model), **sizes}
-    _, J = model.derivatives(at, list(sizes))
-    assert pytest.approx(by_differences(model, at, list(sizes))[1], abs=2e-3, rel=0.02) == J
-    assert (np.abs(J).max((0, 1)) > 0.02).all()
+def test_without_a_word_it_is_what_the_table_has_and_a_lab_gets_only_what_it_has() -> None:
+    runs = toy_swimmer(toy_table(3)).runs
+    grid = possible_settings(runs, {})
+    assert set(grid[:, 0]) == {2, 3, 4, 5}
+    assert set(grid[:, 1]) == {5, 8, 11}
+    assert np.abs(grid[:, 2]).max() == pytest.approx(np.abs(runs.omega).max() * 30 / math.pi)
+    assert len(np.unique(grid, axis=0)) == len(grid) == 4 * 3 * 6
+    one_length = toy_swimmer(toy_table(3, lengths_cm=(8.0,))).runs
+    assert len(possible_settings(one_length, {})) == 4 * 6
+    lab = owned(["N=2,4", "l_cm=5,7", "omega_rpm=60"])
+    expected = set(product((2, 4), (5, 7), (60, -60)))
+    assert {tuple(row) for row in possible_settings(runs, lab).tolist()} == expected
+    lengths = tuple(np.linspace(5.0, 13.0, 17))  # of which six are proposed
+    grid = possible_settings(toy_swimmer(toy_table(3, lengths_cm=lengths)).runs, {})
+    assert set(grid[:, 1]) <= set(lengths)
+    assert len(np.unique(grid[:, 1])) == 6
+    assert (grid[:, 1].min(), grid[:, 1].max()) == (5.0, 13.0)
+
+
+def test_settings_are_those_of_the_lab_to_the_last_digit() -> None:
+    lab = {"l_cm": (5.25, 7.0), "omega_rpm": (57.46,)}
+    model, settings = toy_swimmer(toy_table(3), START, lab).possible()
+    assert {s["l_cm"] for s in settings} == {5.25, 7.0}
+    assert {s["omega_rpm"] for s in settings} == {57.46, -57.46}
+    assert model.runs.length == pytest.approx([s["l_cm"] / 100 for s in settings])
+    assert model.runs.omega == pytest.approx([s["omega_rpm"] * math.pi / 30 for s in settings])
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        ("l_cm", "write COLUMN=VALUE"),
+        ("l_cm=5,", "write COLUMN=VALUE"),
+        ("length=5", "none of N, l_cm, omega_rpm"),
+        ("l_cm=-5", "must be positive"),
+        ("omega_rpm=nan", "must be positive"),
+        ("N=2.5", "integer from 1"),
+        ("N=1000", "integer from 1"),
+    ],
+    ids=["no value", "half a list", "column", "negative", "nan", "half a tail", "many tails"],
+)
+def test_what_cannot_be_set_is_refused(entry: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        owned([entry])
+
+
+def refused(table: pd.DataFrame, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        calibrated(table)
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_an_output_in_another_unit_is_refused_with_that_unit(name: str) -> None:
+    column = OUTPUTS[name][0]
+    for unit, factor in UNITS[name].items():
+        table = toy_table(4)
+        if column not in table:
+            table[column] = np.abs(table["omega_yr_rad_s"]) * table["R_yr_cm"]
+            table[column] *= np.exp(0.02 * np.random.default_rng(0).normal(size=len(table)))
+        table[column] *= factor
+        if name.startswith("omega_") and name != "omega_yr":  # the other spin would be refused as their sum
+            table = table.drop(columns={"omega_h": "omega_t_rpm", "omega_t": "omega_h_rpm"}[name])
+        refused(table, f"{column} is .* times what the robot as given does: it seems to be in {unit}")
+
+
+def test_an_output_ten_times_too_small_and_spins_in_another_unit_are_refused() -> None:
+    table = toy_table(4)
+    for column in ("omega_yr_rad_s", "R_yr_cm", "theta_deg"):
+        small = table.assign(**{column: table[column] / 10})
+        refused(small, f"{column} is 0.* times what the robot as given does")
+    for factor, meant, stated in ((math.pi / 30, "rad/s", "rpm"), (30 / math.pi, "rpm", "rad/s")):
+        table = toy_table(4, lengths_cm=(5.0, 5.5, 6.0))
+        for column in ("omega_rpm", "omega_h_rpm", "omega_t_rpm"):
+            table[column] *= factor
+        refused(table, f"the spins of motor, head and tails are all in {meant} where {stated} is stated")

@@ -14,9 +14,7 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
-from calibration.statistics.fit import fit
 from calibration.statistics.gls import Noise
-from calibration.statistics.statistical_model import start_values
 from calibration.verdict.next_runs import (
     BATCH,
     GIVEN_UP,
@@ -24,26 +22,16 @@ from calibration.verdict.next_runs import (
     Decision,
     Explanation,
     Pair,
-    Rival,
     Standing,
     _greedy,
     _together,
     new_runs,
-    next_runs,
     read_explanations,
     standings,
 )
 from calibration.verdict.record import verdict_record
 from sim.io.errors import InputError
-from tests.calibration.toy_tables import DRAG, TRUTH, ambiguous, toy_swimmer, toy_table
-
-
-@pytest.fixture
-def verdict_file(tmp_path: Path) -> Path:
-    """The verdict.json of a table of one tail length."""
-    path = tmp_path / "verdict.json"
-    path.write_text(json.dumps(verdict_record(ambiguous(), table="t")))
-    return path
+from tests.calibration.toy_tables import DRAG, ambiguous, toy_swimmer, toy_table
 
 
 @pytest.mark.slow
@@ -56,10 +44,11 @@ def verdict_file(tmp_path: Path) -> Path:
     ids=["other lengths", "the old length"],
 )
 def test_new_runs_decide_for_the_truth_or_nothing(
-    seed: int, lengths_cm: tuple[float, ...], given_up: list[bool], said: str, verdict_file: Path
+    seed: int, lengths_cm: tuple[float, ...], given_up: list[bool], said: str, tmp_path: Path
 ) -> None:
     table = toy_table(1, lengths_cm=(8.0,), **{DRAG: 4.0})
-    explanations, before = read_explanations(verdict_file)
+    (tmp_path / "verdict.json").write_text(json.dumps(verdict_record(ambiguous(), table="t")))
+    explanations, before = read_explanations(tmp_path / "verdict.json")
     assert len(explanations) == 2
     more = toy_table(seed, lengths_cm=lengths_cm, **{DRAG: 4.0}).assign(session="new")
     chosen = more.sample(8, random_state=1 if seed == 2 else 3)
@@ -172,15 +161,3 @@ def test_a_batch_serves_all_pairs_of_rivals() -> None:
     assert set(chosen) == {0, 1}
     assert chosen.count(1) > chosen.count(0)
     assert strength == pytest.approx(min(9 * chosen.count(0), 4 * chosen.count(1)))
-
-
-def test_a_batch_is_stated_with_its_settings_and_where_to_stop() -> None:
-    model = toy_swimmer(toy_table(2, **{DRAG: 5.0}), TRUTH)
-    used = np.ones(len(model.runs), bool)
-    common = tuple(p.name for p in (*model.coefficients, *model.nuisances))
-    fits = [fit(model, start_values(model), (*common, n), used, title="") for n in (DRAG, "disc_drag")]
-    batch = next_runs([Rival("", fitted, model) for fitted in fits])[1]
-    assert len(batch.settings) == BATCH
-    assert batch.stop == pytest.approx(2 * math.log(STOP))
-    assert 0 <= batch.decides <= 1
-    assert {"N", "l_cm", "omega_rpm"} == set(batch.settings[0])

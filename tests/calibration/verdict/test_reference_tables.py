@@ -1,4 +1,4 @@
-"""Measured tables that come with the tests: each gets the verdict that belongs to what was hidden in it."""
+"""Tables that come with the tests, and measured ones where they are on the machine: each gets its verdict."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from calibration.__main__ import main
+from calibration.examples.spheres import median_error, read_spheres
 from calibration.report.report import write_report
+from calibration.statistics.gls import repeat_covariance
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
@@ -20,10 +23,8 @@ from calibration.verdict.verdict import Verdict
 from sim.inputs import load_robot
 from sim.io.errors import run_command
 from sim.model.uncertainty import DEFAULTS, Sigma
-from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, FEW_DRAWS, install_few_candidates
+from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, FEW_DRAWS, START, install_few_candidates
 from tests.reference.make import GIVEN, HERE, TABLES
-
-pytestmark = pytest.mark.slow
 
 
 def calibrated(name: str, draws: int = FEW_DRAWS) -> Verdict:
@@ -38,6 +39,7 @@ def test_the_files_are_what_make_writes(name: str) -> None:
     pd.testing.assert_frame_equal(pd.read_csv(HERE / f"{name}.csv"), TABLES[name](), rtol=1e-4, check_dtype=False)
 
 
+@pytest.mark.slow
 def test_nothing_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     install_few_candidates(monkeypatch)
     result = calibrated("none")
@@ -47,6 +49,7 @@ def test_nothing_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
         assert result.final.parameters[name] == pytest.approx(truth, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("few", [True, pytest.param(False, marks=pytest.mark.rates)], ids=["few", "all"])
 def test_one_effect_is_named_sized_and_handed_on(
     few: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -111,3 +114,48 @@ def test_where_tolerances_are_wide_a_wrong_number_comes_ahead_of_those_rivals() 
     assert "tail_spin_drag" in {e.name for c in result.found.rival_effects for e in c.claimed}
     assert "If the number is right, " in result.sentence
     assert re.fullmatch("the stated value of .* is wrong", result.explanations[0].title)
+
+
+MEASURED = Path(__file__).parents[4] / "shared" / "measured"
+measured = pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured tables are not on this machine")
+
+
+@measured
+@pytest.mark.parametrize("name", ["run01.csv", "run02.csv"])
+def test_measured_tables_are_read_whole(name: str) -> None:
+    data = read_measurements(MEASURED / name)
+    assert len(data) == 192
+    assert data.excluded == ()
+    assert data.session_names == ("N = 2", "N = 3", "N = 4", "N = 5")
+    spread = np.sqrt(np.diag(repeat_covariance(data.y, data.condition)))
+    assert ((spread > 0.01) & (spread < 0.05)).all()
+
+
+@measured
+def test_spheres_in_glycerine_need_the_wall() -> None:
+    """5.1 % to 1.3 %; inertia does as well, so the verdict names both. One bead of ZK2026 is odd."""
+    source = MEASURED / "published" / "falling_sphere_glycerine.csv"
+    model = read_spheres(source, "KW2023")
+    result = calibrate(model, progress=False)
+    assert set(result.effects) >= {"wall"}
+    assert result.verdict == "ambiguous"
+    assert median_error(model, result, {}) == pytest.approx(0.051, abs=0.002)
+    assert median_error(model, result, {"wall": 1.0}) == pytest.approx(0.0135, abs=0.002)
+    assert calibrate(read_spheres(source, "ZK2026"), progress=False).verdict == "unexplained"
+
+
+@measured
+@pytest.mark.rates
+@pytest.mark.parametrize(
+    ("name", "effect", "size"),
+    [
+        ("run04.csv", "natural_curvature", -0.295),
+        ("run05.csv", "viscosity_with_time", 0.0444),
+    ],
+)
+def test_what_came_out_of_the_measured_tables(name: str, effect: str, size: float) -> None:
+    """docs/results-calibration.md; the others take longer and are written down there."""
+    result = calibrate(SwimmerModel(START, read_measurements(MEASURED / name)), progress=False)
+    assert result.effects == (effect,)
+    assert result.final.parameters[effect] == pytest.approx(size, rel=0.05)
+    assert result.error_after < 1.15 * result.noise_ceiling

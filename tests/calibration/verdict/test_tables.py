@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -36,8 +36,6 @@ def commanded(table: pd.DataFrame, folder: Path) -> int:
         (lambda t: t.drop(columns="omega_rpm"), "no column 'omega_rpm'"),
         (lambda t: t.assign(omega_h_rad_s=1), "omega_h_rpm and omega_h_rad_s are the same quantity"),
         (lambda t: t.drop(columns=["omega_yr_rad_s", "R_yr_cm", "theta_deg"]), "at least two outputs"),
-        (lambda t: t.drop(columns=["omega_h_rpm", "omega_t_rpm", "R_yr_cm", "theta_deg"]), "at least two outputs"),
-        (lambda t: t.head(10), "usable runs"),
         (lambda t: t[t["trial"] == 1].assign(session=range(48)), "0 repeated runs, too few"),
         (lambda t: t.assign(omega_h_rpm=-t["omega_h_rpm"]), "wrong sign .*: the head turns against the motor"),
         (lambda t: t.assign(omega_yr_rad_s=-t["omega_yr_rad_s"]), "wrong sign .* to the left"),
@@ -48,13 +46,10 @@ def commanded(table: pd.DataFrame, folder: Path) -> int:
         (lambda t: t.assign(l_cm=np.nan), "0 usable runs"),
         (lambda t: t.assign(omega_yr_rad_s=np.nan, R_yr_cm=np.nan, theta_deg=np.nan), "without any value: om"),
     ],
-    ids=["column", "twice", "spins alone", "one output", "ten rows", "no repeats", "sign of the spin",
+    ids=["column", "twice", "spins alone", "no repeats", "sign of the spin",
          "sign of the yaw", "constant", "unit", "three rows", "words", "no lengths", "empty outputs"],
 )  # fmt: skip
-def test_bad_tables_are_refused(
-    change: Callable[[pd.DataFrame], pd.DataFrame], expected: str, tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+def test_bad_tables_are_refused(change: Any, expected: str, tmp_path: Path, capsys: Any) -> None:
     assert commanded(change(toy_table(1)), tmp_path) == 2
     (error,) = capsys.readouterr().err.splitlines()
     assert re.search(expected, error)
@@ -107,12 +102,9 @@ def test_robots_of_one_kind_are_closed_with_both_limits() -> None:
     table = pd.concat([t[t["N"] == 3] for t in (toy_table(5), toy_table(6))])
     result = calibrated(table, few=True)
     assert result.verdict == "none"
-    caveats = result.caveats
-    assert [("N = 3" in caveat, "1 session only" in caveat) for caveat in caveats] == [
-        (True, False),
-        (False, True),
-    ]
-    assert verdict_record(result, table="t")["limits"] == list(caveats)
+    kind, session = result.caveats
+    assert ("N = 3" in kind, "1 session only" in session) == (True, True)
+    assert verdict_record(result, table="t")["limits"] == [kind, session]
 
 
 @pytest.mark.parametrize(
@@ -146,8 +138,7 @@ def test_mistracked_runs_have_little_weight_and_are_named() -> None:
     clean = effect()
     rng = np.random.default_rng(0)
     mistracked = np.flatnonzero(rng.random(len(table)) < 0.05)
-    for run in mistracked:
-        table.loc[run, "R_yr_cm"] *= 1 + rng.uniform(0.1, 0.3)
+    table.loc[mistracked, "R_yr_cm"] *= 1 + rng.uniform(0.1, 0.3, len(mistracked))
     result = calibrated(table, few=True)
     assert result.effects == clean.effects == (DRAG,)
     assert clean.little_weight == ()
@@ -160,9 +151,7 @@ def test_mistracked_runs_have_little_weight_and_are_named() -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("toy_model", "few_candidates")
-def test_half_of_a_table_does_not_go_missing_without_a_word(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_half_of_a_table_does_not_go_missing_without_a_word(tmp_path: Path, capsys: Any) -> None:
     """The spins of the camera without their sign: one line named row 1."""
     table = toy_table(3)
     table["omega_h_rpm"] = table["omega_h_rpm"].abs()

@@ -74,7 +74,6 @@ def test_what_is_claimed_must_lower_the_error() -> None:
 @pytest.mark.parametrize(("tolerances", "hedged"), [(8.3, True), (4.0, False)])
 def test_a_number_that_is_hardly_an_error_of_measurement_is_hedged(tolerances: float, hedged: bool) -> None:
     said = number()
-    assert said.found.number_check is not None
     check = NumberCheck(imitable=0.0, transfer=0.5, tolerances=tolerances)
     sentence = replace(said, found=replace(said.found, number_check=check)).sentence
     assert ("or something outside the catalogue looks like it" in sentence) == hedged
