@@ -11,7 +11,6 @@ import numpy as np
 
 from planner.paths.file_kinds import refuse_other_kinds
 from planner.paths.path import SHAPES, Path2D, like_a_shape, nearest_shape, shape_of
-from planner.paths.svg_drawing import read_svg
 from planner.paths.units import NO_UNIT, Swimmer, in_tails
 from sim.arrays import Floats
 from sim.io.errors import InputError, naming
@@ -92,6 +91,8 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
         raise InputError(f"{words}: no such file or shape; {f'is it {near}? ' if near else ''}shapes are {SHAPES}")
     with naming(source):
         if Path(source).suffix.lower() == ".svg":
+            from planner.paths.svg_drawing import read_svg  # loads svgelements, which only a drawing needs
+
             return Drawing(*read_svg(Path(source), closed, shape))
         refuse_other_kinds(Path(source))
         if shape is not None:

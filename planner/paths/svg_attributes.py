@@ -1,4 +1,4 @@
-"""Numbers, lengths, transforms, views and outlines of SVG drawings, from the words of their attributes.
+"""Attributes of SVG drawings: numbers, lengths, transforms, views, outlines, and style sheets.
 
 svgelements reads data of paths, makes outlines, and multiplies transforms; what it would leave out in silence is
 refused here.
@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from svgelements import Ellipse, Matrix, Polygon, Polyline, Rect, SimpleLine
@@ -26,8 +27,12 @@ _POINT = re.compile(r"(?<=\d)\.(?!\d)")  # of "5.", which svgelements does not r
 _ASPECT = re.compile(r"(?:none|x(Min|Mid|Max)Y(Min|Mid|Max))(?:\s+(?:meet|(slice)))?")
 _SHARES = {None: 0.0, "Min": 0.0, "Mid": 0.5, "Max": 1.0}
 _BROKEN = (AttributeError, TypeError, ValueError, ArithmeticError, LookupError)  # data of a path, to svgelements
-
 View = tuple[float | None, float | None]  # width and height that percentages belong to
+_COMMENT = re.compile(r"/\*.*?\*/|<!--|-->", re.DOTALL)
+_NO_RULE = re.compile(r"@(?:charset|namespace)[^;{}]*;|@font-face\s*\{[^{}]*\}", re.IGNORECASE)
+_RULE = re.compile(r"([^{}]*)\{([^{}]*)\}")
+_SELECTOR = re.compile(r"(\*|[\w-]*)((?:[.#][\w-]+)*)")
+_IMPORTANT = re.compile(r"\s*!\s*important$", re.IGNORECASE)
 
 
 class Lengths:
@@ -144,3 +149,59 @@ def _path(data: str) -> SvgPath:
         return SvgPath(_POINT.sub(".0", data))
     except _BROKEN:
         raise InputError(f"the data of a path are not read, {data[:40]!r}; correct them") from None
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Declarations for elements of a kind, with classes and ids."""
+
+    kind: str  # empty or *: any
+    names: tuple[str, ...]  # .class and #id
+    declared: dict[str, str]
+
+    @property
+    def weight(self) -> tuple[int, int, bool]:
+        """What decides between rules: ids, classes, kind."""
+        ids = sum(name.startswith("#") for name in self.names)
+        return ids, len(self.names) - ids, self.kind not in ("", "*")
+
+
+def read_style_sheet(text: str, known: Collection[str]) -> list[Rule]:
+    """Read the rules that declare one of the `known` properties, the weakest first.
+
+    Raises:
+        InputError: such a rule has a selector of another kind, or is marked as important.
+    """
+    text = _NO_RULE.sub("", _COMMENT.sub("", text))
+    rest = _RULE.sub("", text).strip()
+    if rest:
+        raise InputError(f"<style> is not read from {rest[:30]!r} on; write attributes instead")
+    rules = []
+    for selectors, body in _RULE.findall(text):
+        given = {name: value for name, value in declarations(body).items() if name in known}
+        for selector in map(str.strip, selectors.split(",")):
+            found = _SELECTOR.fullmatch(selector)
+            if given and (found is None or _IMPORTANT.search(body.strip().rstrip(";"))):
+                raise InputError(
+                    f"<style> sets {', '.join(given)} of {selector!r}; read are kinds, classes and ids, "
+                    "without !important; write attributes instead"
+                )
+            if given and found:
+                rules.append(Rule(found[1], tuple(re.findall(r"[.#][\w-]+", found[2])), given))
+    return sorted(rules, key=lambda rule: rule.weight)
+
+
+def declared(rules: list[Rule], kind: str, attributes: Mapping[str, str]) -> dict[str, str]:
+    """Return what rules declare for an element."""
+    names = {f".{name}" for name in attributes.get("class", "").split()} | {f"#{attributes.get('id')}"}
+    found: dict[str, str] = {}
+    for rule in rules:
+        if rule.kind in ("", "*", kind) and names.issuperset(rule.names):
+            found |= rule.declared
+    return found
+
+
+def declarations(text: str) -> dict[str, str]:
+    """Read the declarations of a rule, or of the attribute style."""
+    parts = (part.partition(":") for part in _COMMENT.sub("", text).split(";"))
+    return {name.strip().lower(): _IMPORTANT.sub("", value.strip()) for name, colon, value in parts if colon}
