@@ -22,7 +22,7 @@ from numba.np.arrayobj import make_array, populate_array
 
 from sim import lanes as plain
 
-LINE = 8  # numbers in a line of the cache, and of one robot in a vector
+LINE = 8  # numbers in a line of the cache
 
 
 class Lanes(types.Type):
@@ -271,8 +271,6 @@ def _view(typingctx: Any, array: Any, width: Any) -> Any:
 
 @overload(plain.lanes, strict=False)
 def _lanes(array: Any, width: Any) -> Any:
-    if len(width) == 1:
-        return lambda array, width: array.reshape(array.shape[:-1])
     return lambda array, width: _view(array, width)
 
 
@@ -307,11 +305,34 @@ def _lane_of(value: Any, i: Any) -> Any:
     return (lambda value, i: _lane(value, i)) if isinstance(value, Lanes) else (lambda value, i: value)
 
 
+@overload(plain.count_lanes, strict=False)
+def _count_lanes(value: Any) -> Any:
+    count = value.width if isinstance(value, Lanes) else 1
+    return lambda value: count
+
+
 @overload(plain.with_lane, strict=False)
 def _lane_set(value: Any, i: Any, number: Any) -> Any:
     if isinstance(value, Lanes):
         return lambda value, i, number: _with_lane(value, i, number)
     return lambda value, i, number: number
+
+
+@intrinsic
+def _named_like(typingctx: Any, like: Any, values: Any) -> Any:
+    kind = types.NamedUniTuple(values.dtype, len(like), like.instance_class)
+
+    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        first = make_array(sig.args[1])(context, builder, args[1]).data
+        places = (builder.gep(first, [context.get_constant(types.intp, i)]) for i in range(len(kind)))
+        return context.make_tuple(builder, kind, [builder.load(place, align=8) for place in places])
+
+    return signature(kind, like, values), code
+
+
+@overload(plain.named_like, strict=False)
+def _under_names(like: Any, values: Any) -> Any:
+    return lambda like, values: _named_like(like, values)
 
 
 @overload(plain.fma, strict=False)
@@ -346,3 +367,37 @@ def _is_somewhere(condition: Any) -> Any:
     if isinstance(condition, Lanes):
         return lambda condition: _somewhere(condition)
     return lambda condition: condition != 0
+
+
+def _place(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    """Return the address of entry (i, j); numba's own allows for negative i and j, which takes longer."""
+    matrix = make_array(sig.args[0])(context, builder, args[0])
+    columns = unpack_tuple(builder, matrix.shape)[1]
+    return builder.gep(matrix.data, [builder.add(builder.mul(args[1], columns), args[2])])
+
+
+@intrinsic
+def _load(typingctx: Any, matrix: Any, i: Any, j: Any) -> Any:
+    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.load(_place(context, builder, sig, args), align=8)
+
+    return signature(matrix.dtype, matrix, types.intp, types.intp), code
+
+
+@intrinsic
+def _store(typingctx: Any, matrix: Any, i: Any, j: Any, value: Any) -> Any:
+    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        builder.store(args[3], _place(context, builder, sig, args), align=8)
+        return context.get_dummy_value()
+
+    return signature(types.void, matrix, types.intp, types.intp, value), code
+
+
+@overload(plain.load, strict=False)
+def _loaded(matrix: Any, i: Any, j: Any) -> Any:
+    return (lambda matrix, i, j: _load(matrix, i, j)) if matrix.layout == "C" else None
+
+
+@overload(plain.store, strict=False)
+def _stored(matrix: Any, i: Any, j: Any, value: Any) -> Any:
+    return (lambda matrix, i, j, value: _store(matrix, i, j, value)) if matrix.layout == "C" else None

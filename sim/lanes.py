@@ -1,15 +1,15 @@
 """Numbers of several robots at once: each number of a formula is a vector with one lane for each robot.
 
-A compiled loop works on arrays of plain numbers, one robot, or on arrays of vectors with W lanes, a group of W
-robots. Its source is the same, since vectors are added, multiplied and compared like numbers. A lane never sees
-another lane. So the result of a robot depends neither on its neighbours in a group nor on W: operations are those
-of IEEE 754, in the order of the source, and products are only fused where the source says so (`fma`). Such loops
-are compiled by `sim.compiling.compiled_exactly`.
+A compiled loop works on arrays of vectors with W lanes, a group of W robots. Vectors are added, multiplied and
+compared like numbers; so a formula for one robot is one for a group as well. A lane never sees another lane. So
+the result of a robot depends neither on its neighbours in a group nor on W: operations are those of IEEE 754, in
+the order of the source, and products are only fused where the source says so (`fma`). Such loops are compiled by
+`sim.compiling.compiled_exactly`.
 
 A condition on lanes is a vector of 1 (true) and 0 (false), by which `choose` picks.
 
 The functions of this file are for compiled loops. `sim.lane_code` gives their machine code; what stands here is
-what they do to plain numbers. W is the length of a tuple (`GROUP`, `ALONE`), so that it is part of a type.
+what they do to plain numbers. W is the length of a tuple (`GROUP`, `HALF_GROUP`), so that it is part of a type.
 """
 
 from __future__ import annotations
@@ -19,11 +19,10 @@ from typing import Any
 import numpy as np
 
 GROUP, HALF_GROUP = (0,) * 8, (0,) * 4  # the widest registers hold eight numbers, others four
-ALONE = (0,)
 
 
 def lanes(array: Any, width: Any) -> Any:
-    """View an array of numbers (…, W) as an array (…) of vectors, or of numbers if W = 1; `width` has length W."""
+    """View an array of numbers (…, W) as an array (…) of vectors; `width` has length W."""
     raise TypeError("lanes are for compiled loops alone")
 
 
@@ -42,9 +41,19 @@ def lane(value: Any, i: int) -> Any:
     return value
 
 
+def count_lanes(value: Any) -> int:
+    """Count the lanes of a vector."""
+    return 1
+
+
 def with_lane(value: Any, i: int, number: Any) -> Any:
     """Return the vector with another number in lane i."""
     return number
+
+
+def named_like(like: Any, values: Any) -> Any:
+    """Return the entries of an array (K,) under the names of a named tuple of K entries."""
+    return type(like)(*values)
 
 
 def fma(a: Any, b: Any, c: Any) -> Any:
@@ -77,36 +86,11 @@ def somewhere(condition: Any) -> bool:
     return bool(condition != 0)
 
 
-def columns_at_once(matrix: Any) -> int:
-    """Return how many neighbours of a row `load` reads: eight numbers, or one vector of several lanes."""
-    return 1
-
-
 def load(matrix: Any, i: int, j: int) -> Any:
-    """Return entry (i, j) and the next ones of the row that are read at once; `matrix` is in C order."""
+    """Return entry (i, j) of a matrix in C order; i and j are not negative."""
     return matrix[i, j]
 
 
 def store(matrix: Any, i: int, j: int, value: Any) -> None:
-    """Set entry (i, j) and the next ones of the row that are written at once; `matrix` is in C order."""
+    """Set entry (i, j) of a matrix in C order; i and j are not negative."""
     matrix[i, j] = value
-
-
-def load_some(matrix: Any, i: int, j: int, left: int) -> Any:
-    """Return what `load` returns, but read `left` columns only, at least one; the others are zero."""
-    return matrix[i, j]
-
-
-def store_some(matrix: Any, i: int, j: int, value: Any, left: int) -> None:
-    """Set what `store` sets, but in `left` columns only, at least one."""
-    matrix[i, j] = value
-
-
-def spread(value: Any) -> Any:
-    """Return an entry as a factor of what `load` returns."""
-    return value
-
-
-def nothing(matrix: Any) -> Any:
-    """Return zero, as `load` would."""
-    return 0.0

@@ -19,7 +19,7 @@ from numba.core.caching import _CacheLocator
 from numba.extending import register_jitable, typeof_impl
 from tqdm import tqdm
 
-from sim import compiling, lane_rows  # noqa: F401  (it teaches numba)
+from sim import compiling, lane_code  # noqa: F401  (it teaches numba)
 from sim.called_code import LoopCache, LoopCompiler
 from sim.compiling import Loop, folder_of_package, package_root, take_formulas
 

@@ -23,8 +23,8 @@ from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.motion.batches import one_thread
 from sim.motion.orbits import Perturbed, solve_orbits
-from sim.motion.stability import growth, growth_of_orbit
-from sim.solve.assembly import bodies, numbers
+from sim.motion.stability import growths, growths_on_mesh
+from sim.solve.assembly import bodies, numbers, row
 from sim.solve.refinement import FEW, MESHES, SOLVED, refined_orbit
 from tests.oracles.stepped_growth import stepped_growth
 
@@ -79,8 +79,9 @@ def agreement(title: str, selected: list[Groups]) -> None:
         orbit = refined_orbit(body, groups.N, FEW)
         if orbit.ended != SOLVED:
             continue
-        final = growth_of_orbit(body, groups.N, orbit)
-        edges = MESHES[1] if final == growth(body, groups.N, orbit.x[1], orbit.u[1]) else MESHES[2]
+        final = growths(row(body), groups.N, [orbit])[0]
+        coarse = growths_on_mesh(row(body), groups.N, orbit.x[1][None], orbit.u[1][None])[0]
+        edges = MESHES[1] if final == coarse else MESHES[2]
         revolutions = min(_FOLLOWED / abs(final), _MOST_REVOLUTIONS)
         measured = stepped_growth(body, groups.N, revolutions, edges=edges)
         away.append(abs(final - measured) / max(abs(measured), 0.1))

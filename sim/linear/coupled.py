@@ -1,4 +1,4 @@
-"""Chains that are coupled in time: block-pentadiagonal systems with dense blocks and a border, for one robot.
+"""Chains that are coupled in time: block-pentadiagonal systems with dense blocks and a border.
 
 On a periodic orbit the velocity of a node at one phase depends on its position at all phases,
 ẋ_m = ω_m Σ_j D_mj x_j. So the blocks of one node in all M chains (`sim.linear.chains`) form one dense block of 3 M

@@ -1,22 +1,25 @@
-"""GMRES in compiled loops. The caller multiplies with the matrix; this file keeps the basis.
+"""GMRES for a group of systems, one in each lane (`sim.lanes`). The caller multiplies; this file keeps the basis.
 
     start(krylov, b)                             b: right-hand side, preconditioned
     for i in range(most):
         w = (preconditioned matrix) krylov.basis[i]
-        left = extend(krylov, i, w)              norm of the residual over the norm of b
-    x = combine(krylov, i + 1)
+        left = extend(krylov, i, w, going)       norm of the residual
+    solution(krylov, i + 1, x)
 
+A lane that is not going any more keeps its solution: further vectors get zero coefficients.
 Source: Saad and Schultz (1986); Arnoldi with modified Gram-Schmidt, least squares by Givens rotations.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.compiling import compiled_exactly
+from sim.lanes import choose, empty, less, zeros
+from sim.linear.lane_arrays import divide, scalar_product, subtract_multiple
 
 
 class Krylov(NamedTuple):
@@ -28,57 +31,54 @@ class Krylov(NamedTuple):
     right: Floats
 
 
-@compiled
-def new_krylov(size: int, most: int) -> Krylov:
-    """Allocate room for `most` steps on vectors of `size` entries."""
-    return Krylov(np.zeros((most + 1, size)), np.zeros((most, most)), np.zeros((most, 2)), np.zeros(most + 1))
+@compiled_exactly
+def new_krylov(like: Floats, size: int, most: int) -> Krylov:
+    """Allocate room for `most` steps on vectors of `size` entries, of the kind of number that `like` holds."""
+    return Krylov(
+        empty(like, (most + 1, size)), zeros(like, (most, most)), zeros(like, (most, 2)), zeros(like, (most + 1,))
+    )
 
 
-@compiled
-def start(krylov: Krylov, b: Floats) -> float:
+@compiled_exactly
+def start(krylov: Krylov, b: Floats) -> Any:
     """Begin with the right-hand side b; returns its norm."""
-    norm = np.sqrt(np.dot(b, b))
-    krylov.right[:] = 0.0
+    norm = np.sqrt(scalar_product(b, b))
     krylov.right[0] = norm
-    krylov.basis[0] = b / norm if norm > 0 else b
-    return float(norm)
+    divide(krylov.basis[0], b, choose(less(0.0, norm), norm, 1.0))
+    return norm
 
 
-@compiled
-def extend(krylov: Krylov, i: int, w: Floats) -> float:
-    """Take in w, the image of basis vector i; w is changed. Returns the norm of the residual over that of b."""
+@compiled_exactly
+def extend(krylov: Krylov, i: int, w: Floats, going: Any) -> Any:
+    """Take in w, the image of basis vector i, where `going` is 1; w is changed. Returns the residual's norm."""
     basis, triangle, rotation, right = krylov
-    column = np.zeros(i + 2)
     for j in range(i + 1):
-        column[j] = np.dot(basis[j], w)
-        w -= column[j] * basis[j]
-    length = np.sqrt(np.dot(w, w))
-    column[i + 1] = length
-    basis[i + 1] = w / length if length > 0 else w
+        triangle[j, i] = scalar_product(basis[j], w)
+        subtract_multiple(w, triangle[j, i], basis[j])
+    length = np.sqrt(scalar_product(w, w))
+    divide(basis[i + 1], w, choose(less(0.0, length), length, 1.0))
     for j in range(i):
-        cos, sin = rotation[j, 0], rotation[j, 1]
-        column[j], column[j + 1] = cos * column[j] + sin * column[j + 1], cos * column[j + 1] - sin * column[j]
-    radius = np.hypot(column[i], column[i + 1])
-    cos, sin = (column[i] / radius, column[i + 1] / radius) if radius > 0 else (1.0, 0.0)
+        cos, sin, upper, lower = rotation[j, 0], rotation[j, 1], triangle[j, i], triangle[j + 1, i]
+        triangle[j, i], triangle[j + 1, i] = cos * upper + sin * lower, cos * lower - sin * upper
+    radius = np.sqrt(triangle[i, i] * triangle[i, i] + length * length)
+    turns = less(0.0, radius)
+    cos, sin = choose(turns, triangle[i, i] / radius, 1.0), choose(turns, length / radius, 0.0)
     rotation[i, 0], rotation[i, 1] = cos, sin
-    triangle[: i + 1, i] = column[: i + 1]
-    triangle[i, i] = radius
-    right[i + 1] = -sin * right[i]
-    right[i] = cos * right[i]
-    norm = np.sqrt(np.dot(right[: i + 2], right[: i + 2]))  # rotations keep it: that of b
-    return float(abs(right[i + 1]) / norm) if norm > 0 else 0.0
+    triangle[i, i] = choose(turns, radius, 1.0)
+    left = -sin * right[i]
+    right[i + 1] = choose(going, left, 0.0)
+    right[i] = choose(going, choose(turns, cos * right[i], 0.0), 0.0)
+    return abs(left)
 
 
-@compiled
-def combine(krylov: Krylov, count: int) -> Floats:
-    """Combine the first `count` basis vectors to the solution."""
-    y = np.zeros(count)
+@compiled_exactly
+def solution(krylov: Krylov, count: int, x: Floats) -> None:
+    """Combine the first `count` basis vectors to the solution x."""
+    right = krylov.right
     for i in range(count - 1, -1, -1):
-        total = krylov.right[i]
         for j in range(i + 1, count):
-            total -= krylov.triangle[i, j] * y[j]
-        y[i] = total / krylov.triangle[i, i] if krylov.triangle[i, i] != 0 else 0.0
-    x = np.zeros(krylov.basis.shape[1])
+            right[i] -= krylov.triangle[i, j] * right[j]
+        right[i] = right[i] / krylov.triangle[i, i]
+    x[:] = 0.0
     for i in range(count):
-        x += y[i] * krylov.basis[i]
-    return x
+        subtract_multiple(x, -right[i], krylov.basis[i])

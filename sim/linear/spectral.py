@@ -6,11 +6,12 @@ Source: Trefethen, *Spectral Methods in MATLAB* (2000), ch. 3.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from sim.arrays import Floats
 from sim.compiling import compiled_exactly
-from sim.lanes import zeros
 
 
 @compiled_exactly
@@ -26,30 +27,23 @@ def differentiation(phases: int) -> Floats:
     return matrix
 
 
-@compiled_exactly
 def interpolation(phases: int, at: Floats) -> Floats:
     """Interpolate to angles `at` (F,) from the first phase: the matrix (F, M)."""
-    matrix = np.zeros((len(at), phases))
-    for i in range(len(at)):
-        for j in range(phases):
-            away = at[i] - 2 * np.pi * j / phases
-            total = 1.0
-            for k in range(1, (phases + 1) // 2):
-                total += 2 * np.cos(k * away)
-            if phases % 2 == 0:
-                total += np.cos(phases // 2 * away)
-            matrix[i, j] = total / phases
-    return matrix
+    away = at[:, None] - 2 * np.pi * np.arange(phases) / phases
+    matrix = np.ones_like(away)
+    for k in range(1, (phases + 1) // 2):
+        matrix += 2 * np.cos(k * away)
+    if phases % 2 == 0:
+        matrix += np.cos(phases // 2 * away)
+    return matrix / phases
 
 
-@compiled_exactly
+@cache
+def _between_phases(given: int, wanted: int) -> Floats:
+    """Interpolate from one number of equal phases to another: the matrix (M', M)."""
+    return interpolation(given, 2 * np.pi * np.arange(wanted) / wanted)
+
+
 def with_phases(a: Floats, wanted: int) -> Floats:
-    """Resample a periodic array (K, M, c) at `wanted` phases."""
-    matrix = interpolation(a.shape[1], 2 * np.pi * np.arange(wanted) / wanted)
-    out = zeros(a, (a.shape[0], wanted, a.shape[2]))
-    for k in range(a.shape[0]):
-        for i in range(wanted):
-            for j in range(a.shape[1]):
-                for c in range(a.shape[2]):
-                    out[k, i, c] += matrix[i, j] * a[k, j, c]
-    return out
+    """Resample periodic arrays (…, M, c) at `wanted` phases."""
+    return np.asarray(_between_phases(a.shape[-2], wanted) @ a)

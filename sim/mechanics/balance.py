@@ -52,8 +52,8 @@ def motor_gain(body: Body) -> Any:
     return 1.0 + body.droop * body.resistance[3, 3]
 
 
-@compiled_exactly
-def tail_spin(body: Body, u: Floats) -> float:
+@formula
+def tail_spin(body: Body, u: Any) -> Any:
     """Compute ω_t for the velocities u = (v_x, v_z, ω_yr, ω_h)."""
     return body.omega + motor_gain(body) * u[3]
 

@@ -42,3 +42,13 @@ def tail_gap(x: Floats, offset: float, radius: float) -> float:
                     smallest = min(smallest, ax * ax + ay * ay + az * az)
                 px, py, pz = qx, qy, qz
     return np.sqrt(smallest) / (2 * radius)
+
+
+@compiled
+def smallest_gaps(shapes: Floats, offset: Floats, radius: Floats) -> Floats:
+    """Compute the smallest `tail_gap` of B robots with a/l and r0/l (B,) over S shapes, (B, S, n, N, 3)."""
+    gaps = np.full(len(shapes), np.inf)
+    for i in range(len(shapes)):
+        for k in range(shapes.shape[1]):
+            gaps[i] = min(gaps[i], tail_gap(shapes[i, k], offset[i], radius[i]))
+    return gaps

@@ -8,7 +8,7 @@ Arrays are (node, tail, component). Units: l, μ0 l⁴/EI, EI/l².
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -46,30 +46,28 @@ def new_geometry(like: Floats, n: int, tails: int) -> Geometry:
     )
 
 
-@compiled_exactly
-def straight(n: int, tails: int, offset: float) -> Floats:
-    """Return the free nodes (n, M, 3) of straight tails."""
-    x = np.zeros((n, tails, 3))
-    x[:, :, 0] = offset
-    for k in range(n):
-        x[k, :, 2] = -(k + 1) / n
+def straight(n: int, tails: int, offset: Any) -> Floats:
+    """Return the free nodes (n, M, 3) of straight tails; (B, n, M, 3) for B robots with offsets (B,)."""
+    x = np.zeros((*np.shape(offset), n, tails, 3))
+    x[..., 0] = np.expand_dims(offset, (-1, -2))
+    x[..., 2] = -np.arange(1, n + 1)[:, None] / n
     return x
 
 
 @compiled_exactly
-def turned_edges(x: Floats, dx: Floats, offset: float) -> Floats:
-    """Compute the free nodes (n, M, 3) after a correction dx that turns the edges.
+def turned_edges(x: Floats, share: Any, dx: Floats, offset: float) -> Floats:
+    """Compute the free nodes (n, M, 3) after a correction share · dx that turns the edges.
 
-    If dx were added to the positions, edges that turn would also become longer, by a term of second order. Here
-    every edge gets its new direction, and its length changes only by the first-order term of dx.
+    If it were added to the positions, edges that turn would also become longer, by a term of second order. Here
+    every edge gets its new direction, and its length changes only by the first-order term of the correction.
     """
     n, tails, _ = x.shape
-    out = np.empty_like(x)
+    out = zeros(x, x.shape)
     for m in range(tails):
         below, below_dx, moved = (offset, 0.0, 0.0), ZERO, (offset, 0.0, 0.0)
         for k in range(n):
             node, node_dx = vector(x, k, m), vector(dx, k, m)
-            edge, change = minus(node, below), minus(node_dx, below_dx)
+            edge, change = minus(node, below), times(share, minus(node_dx, below_dx))
             length = np.sqrt(dot(edge, edge))
             turned = plus(edge, change)
             wanted = length + dot(edge, change) / length

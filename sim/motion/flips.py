@@ -1,7 +1,6 @@
-"""What robots do after flips of their motors, by transients (`sim.solve.transient`).
+"""What robots do after flips of their motors, by transients (`sim.solve.transient`), and the orbits around a flip.
 
-Robots whose effects are local are followed in groups with a robot in each lane (`sim.lanes`), the others one by
-one. A robot's course does not depend on its group. Units: l, μ0 l⁴/EI.
+A robot's course does not depend on the others. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -12,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.lanes import ALONE
-from sim.motion.grouping import NONE, by_kind, group_width
-from sim.solve.assembly import are_local, unpacked
-from sim.solve.transient import lag_at, transient
-from sim.solve.transient_groups import Jump, follow
+from sim.solve.assembly import are_local
+from sim.solve.grouping import NAMES, by_kind, group_width
+from sim.solve.refinement import OnMesh, coarse_orbits, orbits_on_mesh
+from sim.solve.transient import Jump, follow
 
+_LEAST_INSTANTS = {1: 3, 2: 3}  # by N; with more tails the phase at the flip hardly matters
 NO_MARKS = np.empty(0)
 
 
@@ -52,28 +51,38 @@ def follow_flips(
     """
     courses: list[Course | None] = [None] * len(flips)
     made = {i: flip for i, flip in enumerate(flips) if flip is not None}
-    local = [i for i, flip in made.items() if are_local(flip.row[None])[0]]
-    local.sort(key=lambda i: -abs(made[i].row[0]))  # fast motors take more steps: the last lanes end together
-    for robots in by_kind(local, lambda i: (made[i].x.shape, len(made[i].u))):
+    order = sorted(made, key=lambda i: -abs(made[i].row[0]))  # fast motors take more steps: the last end together
+    for robots in by_kind(
+        order, lambda i: (made[i].x.shape, len(made[i].u), bool(are_local(made[i].row[None])[0]))
+    ):
         jump = Jump(*(np.array(part) for part in zip(*(made[i] for i in robots), strict=True)))
-        found = follow(jump, NONE, marks, times, tolerance, ALONE if len(robots) == 1 else group_width())
+        found = follow(jump, NAMES, marks, times, tolerance, group_width())
         for at, i in enumerate(robots):
             if found.solved[at]:
                 courses[i] = Course(found.lag[at], found.shapes[at], found.end[at])
-    for i in sorted(made.keys() - set(local)):
-        courses[i] = follow_alone(made[i], times, tolerance, marks)
     return courses
 
 
-def follow_alone(flip: Flip, times: Floats, tolerance: float, marks: Floats = NO_MARKS) -> Course | None:
-    """Follow one robot, with plain numbers, whatever its effects; see `follow_flips`."""
-    body, x = unpacked(flip.row[None])[0], flip.x.copy()
-    early = marks[marks <= flip.until]
-    course = transient(body, x, flip.u.copy(), flip.twist, flip.until, early, tolerance)
-    if not course.solved:
-        return None
-    shapes = np.full((len(marks), *x.shape), np.nan)
-    shapes[: len(early)] = course.shapes
-    lag = lag_at(course, times)
-    lag[times > flip.until] = np.nan
-    return Course(lag, shapes, x)
+def orbits_with_phases(
+    rows: Floats, tails: int, meshes: Sequence[int], instants: Sequence[Sequence[int]] | None = None
+) -> list[list[OnMesh | None]]:
+    """Solve for the orbits of B robots on some meshes; None where there is no solution.
+
+    Args:
+        rows: the robots' numbers (`sim.solve.assembly.numbers`), (B, K).
+        tails: N.
+        meshes: edges of a tail.
+        instants: of a turn, for every robot on every mesh; by default as many as the orbit and the response need.
+
+    Returns:
+        A list of B orbits for every mesh.
+    """
+    coarse = coarse_orbits(rows, tails)
+    enough = [_enough(len(orbit.u), tails) for orbit in coarse]
+    counts = [enough] * len(meshes) if instants is None else instants
+    return [orbits_on_mesh(rows, tails, *one) for one in zip(meshes, [coarse] * len(meshes), counts, strict=True)]
+
+
+def _enough(instants: int, tails: int) -> int:
+    """Choose a number of instants, at least as many as an orbit has; odd where the phase at the flip matters."""
+    return max(instants, _LEAST_INSTANTS[tails]) | 1 if tails in _LEAST_INSTANTS else instants

@@ -16,11 +16,10 @@ from sim.arrays import Floats
 from sim.mechanics import planar
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN
-from sim.motion.flips import Flip, follow_flips
-from sim.motion.orbit_groups import OnMesh
-from sim.motion.phased_orbits import orbits_with_phases
+from sim.motion.flips import Flip, follow_flips, orbits_with_phases
 from sim.motion.run import REVERSED
 from sim.solve.assembly import numbers, reversed_numbers
+from sim.solve.refinement import OnMesh
 
 _EDGES = 6
 _NO_TIMES = np.empty(0)

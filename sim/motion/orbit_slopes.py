@@ -1,7 +1,8 @@
-"""Derivatives of the mean motions of many robots along directions in their numbers.
+"""Derivatives of the mean motions of many robots in their numbers, by the implicit function theorem.
 
-Robots whose effects are local, and stay so along the directions, share groups with a robot in each lane
-(`sim.lanes`). Units: l, μ0 l⁴/EI.
+The orbit z(p) satisfies F(z, p) = 0, so dz/dp = −(∂F/∂z)⁻¹ ∂F/∂p. The matrix is that of Newton's method. A
+parameter costs one more right-hand side, by central differences. Differences of orbits would cost two more
+solutions. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -11,11 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from sim.arrays import Floats
-from sim.motion.grouping import NONE, grouped, in_lanes, numbers_in_lanes
-from sim.solve.assembly import are_local, unpacked
-from sim.solve.derivative import orbit_slopes
-from sim.solve.derivative_groups import slopes_of_group
-from sim.solve.orbit import mean_motion, residual_on_orbit
+from sim.solve.assembly import are_local, batch
+from sim.solve.grouping import by_kind, group_width
+from sim.solve.orbit import mean_motion, residuals_on_orbits, solve_at_orbits
 from sim.solve.refinement import MESHES, Orbit, extrapolate
 
 WIDTH = 1e-5  # finite-difference step in a robot's numbers; the balance depends almost linearly on them
@@ -29,34 +28,27 @@ def slopes_of_orbits(rows: Floats, directions: Floats, orbits: Sequence[Orbit]) 
         directions: in the numbers, (B, K, K').
         orbits: of the robots, all solved.
     """
+    slopes = np.empty((len(MESHES), len(rows), directions.shape[1], 5))
+    local, width = are_local(rows), len(group_width())
+    for alike in by_kind(range(len(rows)), lambda i: (orbits[i].x[0].shape, bool(local[i]))):
+        for first in range(0, len(alike), width):
+            robots = alike[first : first + width]
+            for mesh in range(len(MESHES)):
+                x, u = (np.stack([(orbits[i].x, orbits[i].u)[c][mesh] for i in robots]) for c in (0, 1))
+                slopes[mesh, robots] = _slopes(rows[robots], directions[robots], x, u)
+    return extrapolate(slopes)
+
+
+def _slopes(rows: Floats, directions: Floats, x: Floats, u: Floats) -> Floats:
+    """Compute the derivatives of the means on one mesh, (B, K, 5), at x (B, n, M, 3) and u (B, P, 4)."""
     count = directions.shape[1]
-    slopes = np.empty((len(rows), len(MESHES), count, 5))
-    stay_local = are_local(rows) & ~(directions[:, :, -len(NONE) :] != 0).any((1, 2))
-    for robots, width in grouped(np.flatnonzero(stay_local).tolist(), lambda i: orbits[i].x[0].shape):
-        numbers = numbers_in_lanes(rows[robots], width)
-        along = in_lanes([directions[i, :, : -len(NONE)] for i in robots], width)
-        for mesh in range(len(MESHES)):
-            x = in_lanes([orbits[i].x[mesh] for i in robots], width)
-            u = in_lanes([orbits[i].u[mesh] for i in robots], width)
-            found = slopes_of_group(numbers, NONE, along, WIDTH, x, u, width)
-            for lane, i in enumerate(robots):
-                slopes[i, mesh] = found[..., lane]
-    for i in np.flatnonzero(~stay_local).tolist():
-        slopes[i] = _alone(rows[i], directions[i], orbits[i])
-    limits = [extrapolate(of_robot.reshape(len(MESHES), -1)) for of_robot in slopes]
-    return np.array(limits).reshape(len(rows), count, 5)
-
-
-def _alone(row: Floats, directions: Floats, orbit: Orbit) -> Floats:
-    """Compute the derivatives of the means of one robot on all meshes, (3, K, 5)."""
-    body = unpacked(row[None])[0]
-    moved = list(zip(unpacked(row - WIDTH * directions), unpacked(row + WIDTH * directions), strict=True))
-    slopes = np.empty((len(MESHES), len(directions), 5))
-    for mesh, (x, u) in enumerate(zip(orbit.x, orbit.u, strict=True)):
-        ends = [[residual_on_orbit(robot, x, u) for robot in pair] for pair in moved]
-        r, t = (np.array([above[c] - below[c] for below, above in ends]) / (2 * WIDTH) for c in (0, 1))
-        changes = orbit_slopes(body, r, t, x, u)
-        for k, (below, above) in enumerate(moved):
-            rise = mean_motion(above, u + WIDTH * changes[k]) - mean_motion(below, u - WIDTH * changes[k])
-            slopes[mesh, k] = rise / (2 * WIDTH)
-    return slopes
+    ends = [(rows[:, None] + way * WIDTH * directions).reshape(-1, rows.shape[1]) for way in (-1, 1)]
+    shapes, velocities = np.repeat(x, count, 0), np.repeat(u, count, 0)
+    below, above = (residuals_on_orbits(end, shapes, velocities) for end in ends)
+    r, t = ((low - high) / (2 * WIDTH) for low, high in zip(below[:2], above[:2], strict=True))
+    _, du = solve_at_orbits(rows, x, u, r.reshape(-1, count, *x.shape[1:]), t.reshape(-1, count, *u.shape[1:]))
+    changes = WIDTH * du.reshape(velocities.shape)
+    fall, rise = (
+        mean_motion(batch(end), velocities + way * changes) for way, end in zip((-1, 1), ends, strict=True)
+    )
+    return ((rise - fall) / (2 * WIDTH)).reshape(-1, count, 5)

@@ -1,6 +1,6 @@
 """Orbits of many robots: mean motion, whether it was found, the gap between the tails, and derivatives.
 
-Robots whose effects are local are solved for in groups (`sim.motion.orbit_groups`), the others one by one.
+A batch of robots is solved for together (`sim.solve.refinement`).
 """
 
 from __future__ import annotations
@@ -11,13 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Integers
-from sim.motion.grouping import slices
-from sim.motion.growths import growths
-from sim.motion.orbit_groups import orbits_in_groups
 from sim.motion.orbit_slopes import slopes_of_orbits
-from sim.solve.assembly import are_local, unpacked
-from sim.solve.orbit import smallest_gap
-from sim.solve.refinement import FEW, SOLVED, refined_orbit
+from sim.motion.stability import growths
+from sim.solve.assembly import CONTACT
+from sim.solve.grouping import by_kind, slices
+from sim.solve.orbit import smallest_gaps
+from sim.solve.refinement import FEW, SOLVED, refined_orbits
 
 _NEAR = 1.1  # gap from which tails cannot touch, given the error of the gap
 
@@ -72,15 +71,12 @@ def _solve_at_once(
     count = 0 if directions is None else directions.shape[1]
     slopes = np.full((len(rows), count, 5), np.nan)
     gap, grows = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
-    local = np.flatnonzero(are_local(rows))
-    grouped = dict(zip(local.tolist(), orbits_in_groups(rows[local], tails, phases), strict=True))
-    bodies = unpacked(rows)
-    orbits = [grouped.get(i) or refined_orbit(body, tails, phases) for i, body in enumerate(bodies)]
+    orbits = refined_orbits(rows, tails, phases)
     solved = [i for i, orbit in enumerate(orbits) if orbit.ended == SOLVED]
-    for i in solved:
-        gap[i] = smallest_gap(bodies[i], orbits[i].x[2], tails)
+    for robots in by_kind(solved, lambda i: orbits[i].x[2].shape):
+        gap[robots] = smallest_gaps(rows[robots], np.stack([orbits[i].x[2] for i in robots]), tails)
     if perturbed is not Perturbed.NONE:
-        touching = np.array([body.nonlocal_terms.tail_contact != 0 for body in bodies]) & (gap < _NEAR)
+        touching = (rows[:, CONTACT] != 0) & (gap < _NEAR)
         wanted = [i for i in solved if perturbed is Perturbed.ALL or touching[i]]
         grows[wanted] = growths(rows[wanted], tails, [orbits[i] for i in wanted])
     if directions is not None and count:

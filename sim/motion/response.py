@@ -18,16 +18,15 @@ from sim.mechanics import planar
 from sim.mechanics.geometry import straight
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, SETTLED, Responses
-from sim.motion.flips import Flip, follow_flips
-from sim.motion.grouping import slices
+from sim.motion.flips import Flip, follow_flips, orbits_with_phases
 from sim.motion.net_speed import net_speeds, twists
-from sim.motion.orbit_groups import OnMesh
-from sim.motion.phased_orbits import orbits_with_phases
 from sim.motion.run import REVERSED
 from sim.motion.steady import check_groups, steady
 from sim.motion.steady_motion import Steady
 from sim.motion.stepped_response import stepped_response
 from sim.solve.assembly import numbers, reversed_numbers, unpacked
+from sim.solve.grouping import slices
+from sim.solve.refinement import OnMesh
 
 _SAME = 1.2  # time units from which the memory is constant
 MESHES = (6, 9)  # edges

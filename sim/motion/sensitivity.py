@@ -1,6 +1,6 @@
 """Derivatives of the steady motion in every input and effect size, by the implicit function theorem.
 
-The orbit depends on a robot's numbers (`sim.solve.derivative`). These depend on its inputs and effect sizes
+The orbit depends on a robot's numbers (`sim.motion.orbit_slopes`). These depend on its inputs and effect sizes
 (`sim.solve.assembly`), and that part is differentiated by the complex step (`sim.linear.complex_step`). So an
 effect needs no code for its derivative. Derivatives are extrapolated in the mesh, like the means.
 """

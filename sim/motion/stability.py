@@ -9,24 +9,26 @@ The growth is computed on the mesh of 8 edges, where decay is up to 3 % slower t
 and on as many phases as the orbit has. Products of harmonics that these phases do not resolve can be mistaken for
 a slow perturbation, and change the growth by up to a fifth if the robot yaws fast. So a growth above DOUBTFUL, and
 that of a robot with |ω_yr| > QUICK |ω_t|, is computed again on 12 edges and more than twice as many phases, an odd
-number in an N-th of a turn. Robots with contact are left out of that; it would take ten seconds.
+number in an N-th of a turn. Robots with contact are left out of that; it would take seconds.
 
 Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from sim.arrays import Complex, Floats
-from sim.linear.spectral import with_phases
-from sim.mechanics.tail_contact import has_contact
+from sim.linear.spectral import differentiation, with_phases
 from sim.model.body import Body
+from sim.solve.assembly import CONTACT, are_local, batch, row
 from sim.solve.floquet import arnoldi
-from sim.solve.orbit import mean_motion, solve_orbit
+from sim.solve.grouping import NAMES, by_kind, from_groups, group_width, in_groups, wanted_lanes
+from sim.solve.orbit import mean_motion, solve_orbits_in_place
 from sim.solve.refinement import ROUGH, Orbit
 
 QUICK = 0.4  # |ω_yr/ω_t| from which a robot yaws fast
@@ -36,11 +38,36 @@ _CONVERGED = 1e-3  # relative residual of an eigenvalue up to which it has conve
 _SIGN_KNOWN = 1.0  # the same from which not even the sign of its real part is known
 
 
-def growth_of_orbit(body: Body, tails: int, orbit: Orbit) -> float:
-    """Compute the growth on an orbit of a robot with N tails; NaN if it cannot be computed."""
-    value = growth(body, tails, orbit.x[1], orbit.u[1])
-    again = is_doubtful(orbit.means, value) and not has_contact(body)
-    return growth_on_more_phases(body, tails, orbit) if again else value
+def growths(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats:
+    """Compute the growth (B,) of robots with N tails; NaN where it cannot be computed.
+
+    Args:
+        rows: the robots' numbers (`sim.solve.assembly.numbers`), (B, K).
+        tails: N.
+        orbits: of the robots, all solved.
+    """
+    found = np.full(len(rows), np.nan)
+    for robots in _alike(range(len(rows)), rows, orbits):
+        x, u = (np.stack([(orbits[i].x, orbits[i].u)[c][1] for i in robots]) for c in (0, 1))
+        found[robots] = growths_on_mesh(rows[robots], tails, x, u)
+    means = np.array([orbit.means for orbit in orbits]).reshape(-1, 5)
+    doubtful = np.flatnonzero(is_doubtful(means, found) & (rows[:, CONTACT] == 0)).tolist()
+    for robots in _alike(doubtful, rows, orbits):
+        found[robots] = growths_on_more_phases(rows[robots], tails, [orbits[i] for i in robots])
+    return found
+
+
+def _alike(robots: Iterable[int], rows: Floats, orbits: Sequence[Orbit]) -> list[list[int]]:
+    """Sort robots by phases, sense of the motor and reach of their effects."""
+    local = are_local(rows)
+    return by_kind(robots, lambda i: (len(orbits[i].u[1]), rows[i, 0] < 0, bool(local[i])))
+
+
+def growths_on_mesh(rows: Floats, tails: int, x: Floats, u: Floats) -> Floats:
+    """Compute the growths (B,) on orbits x (B, n, M, 3), u (B, P, 4) of motors with one sense; NaN: unknown."""
+    means = mean_motion(batch(rows), u)
+    projected = _projected(rows, tails, x, u, np.abs(means[:, 0]), few_vectors(tails))
+    return largest_growths(projected, means[:, 0], means[:, 1])
 
 
 def is_doubtful(means: Floats, value: Any) -> Any:
@@ -49,26 +76,63 @@ def is_doubtful(means: Floats, value: Any) -> Any:
     return yaws_fast | np.isnan(value) | (value > DOUBTFUL)
 
 
-def growth_on_more_phases(body: Body, tails: int, orbit: Orbit) -> float:
-    """Compute the growth on the third mesh, from eigenvalues that have converged; NaN if it cannot be computed."""
-    instants = 2 * len(orbit.u[2]) + 1
-    x, u = with_phases(orbit.x[2], tails * instants), with_phases(orbit.u[2][None], instants)[0].copy()
-    _, size = solve_orbit(body, x, u, ROUGH)
-    values = exponents(body, tails, x, u) if size < ROUGH else np.empty(0)
-    return in_motor_revolutions(values.real.max(), body, u) if len(values) else np.nan
+def growths_on_more_phases(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats:
+    """Compute the growths (B,) on the third mesh, from eigenvalues that have converged; NaN: unknown."""
+    instants = 2 * len(orbits[0].u[2]) + 1
+    x = with_phases(np.stack([orbit.x[2] for orbit in orbits]), tails * instants)
+    u = with_phases(np.stack([orbit.u[2] for orbit in orbits]), instants)
+    solved = solve_orbits_in_place(rows, x, u, ROUGH) < ROUGH
+    rates = np.array([values.real.max(initial=-np.inf) for values in _exponents(rows, tails, x, u)])
+    growth = _in_motor_revolutions(rates, mean_motion(batch(rows), u))
+    return np.where(solved & np.isfinite(growth), growth, np.nan)
 
 
-def growth(body: Body, tails: int, x: Floats, u: Floats) -> float:
-    """Compute the growth on an orbit x (n, M, 3), u (P, 4) of N tails; NaN if it cannot be computed."""
-    means = mean_motion(body, u)
-    projected = _projected(body, tails, x, u, abs(means[0]), few_vectors(tails))
-    return float(largest_growths(projected[None], means[:1], means[1:2])[0])
+def _projected(rows: Floats, tails: int, x: Floats, u: Floats, shifts: Floats, count: int) -> Floats:
+    """Project with at most `count` vectors, see `_project`."""
+    first = first_perturbation(tails, *x.shape[1:3])
+    return _project(rows, x, u, shifts, first, min(count, first.size - 1))
 
 
-def _projected(body: Body, tails: int, x: Floats, u: Floats, shift: float, count: int) -> Floats:
-    """Project with at most `count` vectors, see `sim.solve.floquet.arnoldi`."""
-    first = first_perturbation(tails, *x.shape[:2])
-    return arnoldi(body, x, u, shift, first, min(count, x.size - 1))
+def _project(rows: Floats, x: Floats, u: Floats, shifts: Floats, first: Floats, count: int) -> Floats:
+    """Project −(J + s B)⁻¹ B on a Krylov space for each of B robots.
+
+    Args:
+        rows: the robots' numbers (`sim.solve.assembly.numbers`), (B, K'); all motors have one sense.
+        x, u: the orbits, (B, n, M, 3) and (B, P, 4).
+        shifts: s, above 0, (B,).
+        first: first vector of all robots, (n, M, 3).
+        count: number of vectors K, fewer than the 3 n M unknowns.
+
+    Returns:
+        The Hessenberg matrices with the parts of their last vectors outside the space, (B, K + 1, K).
+    """
+    by_phase = _damped_differentiation(x.shape[2], float(np.sign(rows[0, 0])))
+    shapes, wanted = in_groups(_without_highest(x)), wanted_lanes(np.ones(len(rows), bool))
+    projected = np.zeros((len(shapes), count + 1, count, shapes.shape[-1]))
+    first = first.ravel() / np.linalg.norm(first)
+    arnoldi(
+        in_groups(rows), NAMES, shapes, in_groups(u), in_groups(shifts), by_phase, first, wanted, projected,
+        group_width(),
+    )  # fmt: skip
+    return from_groups(projected, len(rows))
+
+
+def _damped_differentiation(columns: int, sense: float) -> Floats:
+    """Differentiate in φ, (M, M); the component (−1)^m decays if the motor turns with `sense`."""
+    matrix = differentiation(columns)
+    if columns % 2 == 0:
+        signs = (-1.0) ** np.arange(columns)
+        matrix += 0.5 * sense * signs[:, None] * signs
+    return matrix
+
+
+def _without_highest(x: Floats) -> Floats:
+    """Remove the component (−1)^m of x (…, n, M, 3), if M is even."""
+    columns = x.shape[-2]
+    if columns % 2:
+        return x
+    signs = (-1.0) ** np.arange(columns)[:, None]
+    return np.asarray(x - signs * (signs * x).sum(-2, keepdims=True) / columns)
 
 
 def largest_growths(projected: Floats, omega_t: Floats, omega_h: Floats) -> Floats:
@@ -78,7 +142,7 @@ def largest_growths(projected: Floats, omega_t: Floats, omega_h: Floats) -> Floa
     DOUBTFUL, only eigenvalues larger than their residuals count.
 
     Args:
-        projected: Hessenberg matrices, see `sim.solve.floquet.arnoldi`, (B, K + 1, K).
+        projected: Hessenberg matrices, see `_project`, (B, K + 1, K).
         omega_t, omega_h: mean spins of the orbits, (B,).
 
     Returns:
@@ -100,11 +164,19 @@ def exponents(body: Body, tails: int, x: Floats, u: Floats) -> Complex:
     Returns:
         Those that have converged, in any order; none if they cannot be computed.
     """
-    shift = abs(mean_motion(body, u)[0])
-    projected = _projected(body, tails, x, u, shift, 2 * tails + _MORE_VECTORS)
-    if not np.isfinite(projected[-1, -1]):
-        return np.empty(0, complex)
-    return _exponents_with_residuals_below(_CONVERGED, projected, shift)
+    return _exponents(row(body), tails, x[None], u[None])[0]
+
+
+def _exponents(rows: Floats, tails: int, x: Floats, u: Floats) -> list[Complex]:
+    """Compute what `exponents` does, for B robots whose motors have one sense."""
+    shifts = np.abs(mean_motion(batch(rows), u)[:, 0])
+    projected = _projected(rows, tails, x, u, shifts, 2 * tails + _MORE_VECTORS)
+    return [
+        _exponents_with_residuals_below(_CONVERGED, matrix, shift)
+        if np.isfinite(matrix[-1, -1])
+        else np.empty(0, complex)
+        for matrix, shift in zip(projected, shifts, strict=True)
+    ]
 
 
 def _exponents_with_residuals_below(limit: float, projected: Floats, shift: float) -> Complex:
@@ -116,8 +188,12 @@ def _exponents_with_residuals_below(limit: float, projected: Floats, shift: floa
 
 def in_motor_revolutions(exponent: float, body: Body, u: Floats) -> float:
     """Convert a growth in a unit of time to that in one motor revolution, on an orbit with velocities u (P, 4)."""
-    omega_t, omega_h = mean_motion(body, u)[:2]
-    return float(2 * np.pi * exponent / abs(omega_t - omega_h))
+    return float(_in_motor_revolutions(exponent, mean_motion(body, u)))
+
+
+def _in_motor_revolutions(exponents: Any, means: Floats) -> Any:
+    """Convert growths (…) in a unit of time to those in one motor revolution, for orbits with `means` (…, 5)."""
+    return 2 * np.pi * exponents / np.abs(means[..., 0] - means[..., 1])
 
 
 def few_vectors(tails: int) -> int:

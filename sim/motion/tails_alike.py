@@ -19,11 +19,10 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.linear.spectral import with_phases
+from sim.mechanics.geometry import turned_edges
 from sim.model.body import Body
-from sim.solve.newton import move
-from sim.solve.orbit import mean_motion, residual_on_orbit, turns_forward
+from sim.solve.orbit import mean_motion, residual_on_orbit, solve_at_orbit, turns_forward
 from sim.solve.refinement import orbit_on_mesh
-from sim.solve.tangent import solve_at_orbit
 
 EDGES = 12
 _LEAST_PHASES = 24
@@ -66,9 +65,7 @@ class TailsAlike:
 
     def resampled(self, x: Floats, u: Floats, s: float) -> Floats:
         """Interpolate an orbit x (n, M', 3), u (P', 4) to the phases of this curve."""
-        return self.pack(
-            with_phases(x, self._shape[1]), with_phases(np.ascontiguousarray(u)[None], self.instants)[0], s
-        )
+        return self.pack(with_phases(x, self._shape[1]), with_phases(u, self.instants), s)
 
     def correction(self, y: Floats, row: Floats, defect: float) -> Floats:
         """See `sim.motion.continuation.Equations`."""
@@ -82,9 +79,9 @@ class TailsAlike:
         """See `sim.motion.continuation.Equations`; with non-local effects edges are turned, not stretched."""
         x, u = self.unpack(y)
         dx, du = self.unpack(dy)
-        x = x.copy()
         s = float(y[-1] + dy[-1])
-        move(self.body_at(s), x, np.ascontiguousarray(dx))
+        body = self.body_at(s)
+        x = turned_edges(x, 1.0, dx, body.offset) if any(body.nonlocal_terms) else x + dx
         return self.pack(x, u + du, s)
 
     def is_valid(self, y: Floats) -> bool:

@@ -24,6 +24,7 @@ from sim.model.scaled_effect import LOCAL_DRAG
 # Numbers of the non-local effects, by their names; plain numbers in compiled loops.
 _NONLOCAL = {e.term: e for e in (*catalogue().values(), *LOCAL_DRAG.values()) if e.reach == "nonlocal"}
 Nonlocal = namedtuple("Nonlocal", list(_NONLOCAL))  # type: ignore[misc]
+CONTACT = Nonlocal._fields.index("tail_contact") - len(Nonlocal._fields)  # its place in a robot's numbers
 _SHAPES = {"resistance": (4, 5), "tail_load": (3,)}  # of the entries that are not single numbers
 
 
@@ -95,8 +96,16 @@ def are_local(rows: Floats) -> Flags:
     return np.asarray(~(rows[:, -len(Nonlocal._fields) :] != 0).any(1))
 
 
+def without_further(rows: Floats) -> Floats:
+    """Return the `numbers` (B, K) of the same robots with no other non-local effect than contact."""
+    plain = rows.copy()
+    plain[:, -len(Nonlocal._fields) :] = 0.0
+    plain[:, CONTACT] = rows[:, CONTACT]
+    return plain
+
+
 def bodies(groups: Groups) -> list[Body]:
-    """Return the robots for the compiled loops, one by one."""
+    """Return the robots one by one, with plain numbers."""
     return unpacked(numbers(groups))
 
 
@@ -110,8 +119,25 @@ def reversed_bodies(groups: Groups) -> list[Body]:
     return unpacked(reversed_numbers(groups))
 
 
+def batch(rows: Floats) -> Body:
+    """Return B robots as one `Body` of arrays that end with (B,), from their `numbers` (B, K)."""
+    parts: list[Floats] = []
+    at = 0
+    for name in Body._fields[:-1]:
+        shape = _SHAPES.get(name, ())
+        part = np.ascontiguousarray(rows[:, at : at + math.prod(shape)].T)
+        at += len(part)
+        parts.append(part.reshape(*shape, len(rows)))
+    return Body._make([*parts, Nonlocal(*np.ascontiguousarray(rows[:, at:].T))])
+
+
+def row(body: Body) -> Floats:
+    """Return the `numbers` of one robot, (1, K)."""
+    return np.concatenate([np.ravel(part) for part in body])[None]
+
+
 def unpacked(rows: Floats) -> list[Body]:
-    """Return robots for the compiled loops from their `numbers`, (B, K)."""
+    """Return robots one by one, with plain numbers, from their `numbers`, (B, K)."""
     columns: list[Any] = []
     at = 0
     for name in Body._fields[:-1]:

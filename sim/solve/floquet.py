@@ -10,6 +10,7 @@ q is collocated at the phases of the orbit, and ẋ in Newton's equations change
 The phase of the disc is a label, not an unknown, and the pose does not occur. So there is no neutral direction.
 With a shift s, Arnoldi's method is applied to −(J + s B)⁻¹ B, whose eigenvalues are 1/(σ − s). J + s B is the
 matrix of `sim.solve.newton` for ẋ = ω_t ∂x/∂φ + s (x − x*), factorised once; each vector costs one solution.
+Robots are in lanes (`sim.solve.grouping`).
 
 If M is even, the trigonometric interpolant has a component (−1)^m without a derivative. A perturbation of this
 form would neither turn nor decay with its neighbours, and could look unstable. Here it decays at the
@@ -20,111 +21,115 @@ Source: Saad, *Numerical Methods for Large Eigenvalue Problems* (2011), ch. 6 fo
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled, compiled_exactly
-from sim.lanes import zeros
+from sim.compiling import compiled_exactly
+from sim.lanes import choose, lanes, less, somewhere, zeros
 from sim.linear.blocks import block, put, vector
-from sim.linear.spectral import differentiation
+from sim.linear.lane_arrays import choose_all, combine, divide, largest_entry, scalar_product, subtract_multiple
 from sim.linear.vectors import applied
 from sim.model.body import Body
 from sim.solve.linearise import linearise
-from sim.solve.newton import Workspace, new_workspace, solve_linear
-from sim.solve.orbit import FIRST_PHASE
-from sim.solve.rates import Rates
-from sim.solve.residual import fill_residual, is_local
+from sim.solve.newton import Workspace, new_unknowns, new_workspace, solve_linear
+from sim.solve.rates import Rates, in_transient
+from sim.solve.residual import fill_residual
+from sim.solve.robots_in_lanes import body_in_lanes, reaches_further
 
 _TOLERANCE = 1e-3  # of GMRES
-CANCELS = 0.1  # smaller parts of a vector are made orthogonal again
+_CANCELS = 0.1  # smaller parts of a vector are made orthogonal again
 _STEP = 1e-6  # finite-difference step of the largest entry, in l
 
 
-@compiled
-def arnoldi(body: Body, x: Floats, u: Floats, shift: float, first: Floats, count: int) -> Floats:
-    """Project −(J + s B)⁻¹ B on a Krylov space.
+@compiled_exactly
+def arnoldi(
+    numbers: Floats, names: Any, x: Floats, u: Floats, shifts: Floats, by_phase: Floats, first: Floats,
+    wanted: Floats, projected: Floats, width: Any,
+) -> None:  # fmt: skip
+    """Fill `projected` (G, K + 1, K, W) for orbits x (G, n, M, 3, W), u (G, P, 4, W) with shifts (G, W).
 
     Args:
-        x, u: the orbit, (n, M, 3) and (P, 4).
-        shift: s, above 0.
-        first: first vector, (n, M, 3).
-        count: number of vectors K, fewer than the 3 n M unknowns.
-
-    Returns:
-        The Hessenberg matrix with the part of its last vector outside the space, (K + 1, K).
+        numbers: of the robots, (G, K', W).
+        names: of the non-local effects.
+        by_phase: d/dφ, (M, M).
+        first: a unit vector, (3 n M,).
+        wanted: 1 in the lanes that are wanted, (G, W).
+        width: of the groups, see `sim.lanes`.
     """
-    x, matrix = without_highest(x), damped_differentiation(x.shape[1], np.sign(body.omega))
-    rates = Rates(shift, FIRST_PHASE, matrix, x)
-    work = new_workspace(rates, x, u)
-    linearise(body, rates, x, u, work.room, work.equations)
-    basis, projected = np.zeros((count + 1, x.size)), np.zeros((count + 1, count))
-    basis[0] = first.copy().reshape(x.size) / np.sqrt(np.sum(first * first))
-    dx, du = np.empty_like(x), np.empty_like(u)
-    for i in range(count):
-        _by_rate(body, rates, x, u, work, basis[i].reshape(x.shape), dx, du)
-        solve_linear(body, rates, x, u, work, i == 0, _TOLERANCE, dx, du)
-        image = dx.reshape(x.size)
-        before, size = np.inf, np.sqrt(np.dot(image, image))
-        while size < CANCELS * before:  # Gram-Schmidt, again where digits cancelled
-            parts = np.dot(basis[: i + 1], image)
-            projected[: i + 1, i] += parts
-            image -= np.dot(parts, basis[: i + 1])
-            before, size = size, np.sqrt(np.dot(image, image))
-        projected[i + 1, i] = size
-        basis[i + 1] = image / size
-    return projected
+    given, shapes, velocities, shift = (
+        lanes(numbers, width),
+        lanes(x, width),
+        lanes(u, width),
+        lanes(shifts, width),
+    )
+    going, out = lanes(wanted, width), lanes(projected, width)
+    count = out.shape[2]
+    basis = zeros(shapes, (count + 1, first.size))
+    image, du = zeros(shapes, shapes[0].shape), zeros(shapes, velocities[0].shape)
+    vector_of_image = image.reshape(image.size)
+    work = new_workspace(in_transient(shift[0], by_phase, shapes[0]), shapes[0], velocities[0])
+    for g in range(len(given)):
+        body, at_x, at_u, where, matrix = (
+            body_in_lanes(given[g], names),
+            shapes[g],
+            velocities[g],
+            going[g],
+            out[g],
+        )
+        rates = in_transient(shift[g], by_phase, at_x)
+        linearise(body, rates, at_x, at_u, work.room, work.equations)
+        for k in range(first.size):
+            basis[0, k] = 0.0 * shift[g] + first[k]
+        for i in range(count):
+            _by_rate(body, rates, at_x, at_u, where, work, basis[i], image, du)
+            solve_linear(body, rates, at_x, at_u, work, i == 0, _TOLERANCE, where, image, du)
+            size = _orthogonalise(basis, i, vector_of_image, matrix)
+            matrix[i + 1, i] = size
+            divide(basis[i + 1], vector_of_image, size)
 
 
 @compiled_exactly
-def damped_differentiation(columns: int, sense: float) -> Floats:
-    """Differentiate in φ, (M, M); the component (−1)^m decays if the motor turns with `sense`."""
-    matrix = differentiation(columns)
-    if columns % 2 == 0:
-        for i in range(columns):
-            for j in range(columns):
-                matrix[i, j] += 0.5 * sense * (-1.0) ** (i - j)
-    return matrix
+def _orthogonalise(basis: Floats, i: int, image: Floats, projected: Floats) -> Any:
+    """Make an image orthogonal to the first i + 1 vectors, again where digits cancelled; return its length."""
+    size = np.sqrt(scalar_product(image, image))
+    before = size * np.inf
+    going = less(size, _CANCELS * before)
+    parts = zeros(image, (i + 1,))
+    while somewhere(going):
+        for j in range(i + 1):
+            parts[j] = choose(going, scalar_product(basis[j], image), 0.0)
+        for j in range(i + 1):
+            projected[j, i] += parts[j]
+            subtract_multiple(image, parts[j], basis[j])
+        before = choose(going, size, before)
+        size = choose(going, np.sqrt(scalar_product(image, image)), size)
+        going = going * less(size, _CANCELS * before)
+    return size
 
 
 @compiled_exactly
-def without_highest(x: Floats) -> Floats:
-    """Remove the component (−1)^m of x (n, M, 3), if M is even."""
-    n, columns, _ = x.shape
-    smooth = zeros(x, x.shape)
-    smooth[:] = x
-    if columns % 2 == 0:
-        for k in range(n):
-            for c in range(3):
-                total = 0.0 * x[k, 0, c]
-                for m in range(columns):
-                    total += (-1.0) ** m * x[k, m, c]
-                for m in range(columns):
-                    smooth[k, m, c] -= (-1.0) ** m * total / columns
-    return smooth
-
-
-@compiled_exactly
-def by_rate(resistance: Floats, q: Floats, out: Floats) -> None:
-    """Compute −B q of robots with local effects: the drag on moving nodes, (n, M, 3)."""
-    for k in range(q.shape[0]):
-        for m in range(q.shape[1]):
-            put(out, k, m, applied(block(resistance, k, m), vector(q, k, m)))
-
-
-@compiled
 def _by_rate(
-    body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, q: Floats, dx: Floats, du: Floats
+    body: Body, rates: Rates, x: Floats, u: Floats, where: Any, work: Workspace, q: Floats, dx: Floats, du: Floats
 ) -> None:
     """Compute −B q, (n, M, 3) and (P, 4): the drag on moving nodes, and by differences what else depends on ẋ."""
     du[:] = 0.0
-    if is_local(body):
-        by_rate(work.equations.resistance, q, dx)
+    moving = q.reshape(x.shape)
+    for k in range(x.shape[0]):
+        for m in range(x.shape[1]):
+            put(dx, k, m, applied(block(work.equations.resistance, k, m), vector(moving, k, m)))
+    further = where * reaches_further(body)
+    if not somewhere(further):
         return
-    step = _STEP / np.max(np.abs(q))
-    r, t = np.empty_like(x), np.empty_like(u)
-    dx[:] = 0.0
-    for sign in (-1.0, 1.0):  # ẋ changes by −sign · step · shift · q
-        moved = Rates(rates.rate, rates.phase, rates.differentiation, x + sign * step * q)
-        fill_residual(body, moved, x, u, work.room, r, t)
-        dx += sign / (2 * step * rates.rate) * r
-        du += sign / (2 * step * rates.rate) * t
+    step, start = _STEP / largest_entry(q), zeros(x, x.shape)
+    ends = new_unknowns(x, u), new_unknowns(x, u)
+    for side in range(2):  # ẋ changes by −(start − x) · shift
+        combine(start, 1.0, x, (2 * side - 1) * step, moving)
+        moved = Rates(rates.rate, rates.phase, rates.differentiation, start)
+        fill_residual(body, moved, x, u, where, work.room, ends[side].x, ends[side].u)
+    share = 1 / (2 * step * rates.rate)
+    combine(start, share, ends[1].x, -share, ends[0].x)
+    choose_all(dx, further, start, dx)
+    combine(ends[0].u, share, ends[1].u, -share, ends[0].u)
+    choose_all(du, further, ends[0].u, du)

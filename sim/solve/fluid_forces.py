@@ -13,14 +13,12 @@ import numpy as np
 from sim.arrays import Floats
 from sim.compiling import compiled
 from sim.linear.blocks import put, vector
-from sim.linear.vectors import cross, dot, minus, plus
-from sim.mechanics.balance import head_drag, motion_at, tail_spin
+from sim.linear.vectors import cross, minus, plus
+from sim.mechanics.balance import head_drag, motion_at
 from sim.mechanics.drag import node_drag
-from sim.mechanics.geometry import node_tangent
-from sim.mechanics.thinning import thinned, thins
+from sim.mechanics.geometry import measure, node_tangent
 from sim.model.body import Body
-from sim.solve.rates import in_stage
-from sim.solve.residual import fill_residual, new_room
+from sim.solve.residual import new_room, surround
 
 
 @compiled
@@ -37,10 +35,10 @@ def fluid_forces(body: Body, x: Floats, x_dot: Floats, u: Floats, phase: float) 
         friction of a contact line.
     """
     n, tails, _ = x.shape
-    velocities, t = u.copy().reshape(1, 4), np.zeros((1, 4))
-    room = new_room(x, velocities)
-    stage = in_stage(1.0, phase - tail_spin(body, u), x - x_dot)  # ẋ = x − (x − ẋ), at this phase
-    fill_residual(body, stage, x, velocities, room, np.zeros_like(x), t)
+    room = new_room(x, u.copy().reshape(1, 4))
+    room.x_dot[:] = x_dot
+    measure(room.geometry, x, body.offset, body.axial_stiffness)
+    surround(body, x, u, phase, 0, 1, room)
     forces, on_head = np.empty((n + 1, tails, 3)), room.around.wrench[0].copy()
     for a in range(4):
         on_head[a] -= head_drag(body, u, a)
@@ -57,8 +55,5 @@ def fluid_forces(body: Body, x: Floats, x_dot: Floats, u: Floats, phase: float) 
             force = node_drag(
                 tangent, velocity, cell * body.zeta_perp, cell * (body.zeta_parallel - body.zeta_perp)
             )
-            if thins(body):
-                height = dot(motion.e_y, position)
-                force = plus(force, thinned(room.geometry, body, k, m, velocity, height))
-            put(forces, k, m, force)
+            put(forces, k, m, plus(force, vector(room.around.drag, k, m)))
     return forces, on_head

@@ -1,31 +1,35 @@
-"""Newton's method for a robot on an orbit or in a stage of a time step.
+"""Newton's method on an orbit or in a stage of a time step, for a group of robots, one in each lane.
 
 Unknowns: free nodes x (n, M, 3) and the robot's velocities u (P, 4). Equations: `sim.solve.residual`. One linear
 system with the matrix of `sim.solve.linearise` for robots whose effects are local. With non-local effects each
 correction is found by GMRES; that matrix is its preconditioner, and products with the true one are central
 differences of the residual.
+
+A lane that has converged, or cannot, waits for the others. Its numbers depend neither on them nor on the number of
+lanes (`sim.lanes`). Units: l, μ0 l⁴/EI, EI/l².
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from sim.arrays import Floats
 from sim.compiling import compiled_exactly
-from sim.lanes import zeros
+from sim.lanes import choose, empty, larger, less, somewhere, zeros
 from sim.linear import chains as separate
 from sim.linear import coupled
 from sim.linear.coupled import Coupled, Coupling, new_coupled
-from sim.linear.gmres import combine, extend, new_krylov, start
+from sim.linear.gmres import extend, new_krylov, solution, start
+from sim.linear.lane_arrays import add_chosen, choose_all, combine, largest_entry
 from sim.mechanics.balance import tail_spin
 from sim.mechanics.geometry import turned_edges
-from sim.mechanics.tail_contact import has_contact
 from sim.model.body import Body
 from sim.solve.linearise import Equations, linearise, new_equations
 from sim.solve.rates import Rates, is_joined
-from sim.solve.residual import Room, fill_residual, is_local, new_room
+from sim.solve.residual import Room, fill_residual, new_room
+from sim.solve.robots_in_lanes import reaches_further
 
 FINITE_DIFFERENCE_STEP = 1e-6  # of the largest entry, in l or 1 + |ω|
 RELATIVE_TOLERANCE = 1e-3  # of the residual in one Newton correction by GMRES
@@ -51,57 +55,77 @@ def new_workspace(rates: Rates, x: Floats, u: Floats) -> Workspace:
     return Workspace(new_room(x, u), new_equations(x, u), system)
 
 
+class Unknowns(NamedTuple):
+    """Shapes and velocities, or what belongs to their equations."""
+
+    x: Floats  # (n, M, 3)
+    u: Floats  # (P, 4)
+
+
 @compiled_exactly
-def newton(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tolerance: float) -> tuple[int, float]:
-    """Improve x (n, M, 3) and u (P, 4) in place.
+def new_unknowns(x: Floats, u: Floats) -> Unknowns:
+    """Allocate room like x and u."""
+    return Unknowns(empty(x, x.shape), empty(u, u.shape))
+
+
+@compiled_exactly
+def newton(
+    body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tolerance: float, going: Any
+) -> tuple[int, Any]:
+    """Improve x (n, M, 3) and u (P, 4) in place, in the lanes where `going` is 1.
 
     Args:
         tolerance: on the last correction.
 
     Returns:
-        Number of corrections, and size of the last one (in l and 1 + |ω|; above `tolerance`: not converged).
+        Number of corrections of the slowest lane, and the size of each lane's last one (in l and 1 + |ω|; above
+        `tolerance`: not converged).
     """
-    size = np.inf
-    for count in range(1, MOST_CORRECTIONS + 1):
-        dx, du = correct(body, rates, x, u, work, True)
-        size = max(np.max(np.abs(dx)), np.max(np.abs(du)) / (1 + abs(body.omega)))
-        if not np.isfinite(size):
-            return count, np.inf
-        share = min(1.0, largest_move(body) / size)
-        move(body, x, share * dx)
-        u += share * du
-        if size < tolerance:
-            return count, size
-    return MOST_CORRECTIONS, size
+    size, limit = going * np.inf, largest_move(body)
+    dx, du = zeros(x, x.shape), zeros(u, u.shape)
+    count = 0
+    while count < MOST_CORRECTIONS and somewhere(going):
+        count += 1
+        correct(body, rates, x, u, work, True, going, dx, du)
+        change = larger(largest_entry(dx), largest_entry(du) / (1 + abs(body.omega)))
+        finite = less(change, np.inf)
+        size = choose(going, choose(finite, change, np.inf), size)
+        going = going * finite
+        move(body, x, choose(less(limit, change), limit / change, 1.0), dx, going)
+        add_chosen(u, choose(less(limit, change), limit / change, 1.0), du, going)
+        going = going * (1 - less(change, tolerance))
+    return count, size
 
 
 @compiled_exactly
-def correct(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, anew: bool) -> tuple[Floats, Floats]:
+def correct(
+    body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, anew: bool, going: Any, dx: Floats, du: Floats
+) -> None:
     """Compute one correction dx (n, M, 3), du (P, 4), with a new factorisation (`anew`) or the stored factors."""
-    local = is_local(body)
-    dx, du = np.empty_like(x), np.empty_like(u)
     if anew:
         linearise(body, rates, x, u, work.room, work.equations)
-    if not (anew and local):
-        fill_residual(body, rates, x, u, work.room, work.equations.r, work.equations.t)
+    if not anew or somewhere(going * reaches_further(body)):
+        fill_residual(body, rates, x, u, going, work.room, work.equations.r, work.equations.t)
     negate(work.equations, dx, du)
-    solve_linear(body, rates, x, u, work, anew, RELATIVE_TOLERANCE, dx, du)
-    return dx, du
+    solve_linear(body, rates, x, u, work, anew, RELATIVE_TOLERANCE, going, dx, du)
 
 
 @compiled_exactly
-def largest_move(body: Body) -> float:
+def largest_move(body: Body) -> Any:
     """Bound the move of a node in one correction, in l; tails in contact must not pass through each other."""
-    return body.tail_radius if has_contact(body) else LARGEST_MOVE
+    return choose(abs(body.nonlocal_terms.tail_contact), body.tail_radius, LARGEST_MOVE)
 
 
 @compiled_exactly
-def move(body: Body, x: Floats, dx: Floats) -> None:
-    """Correct the nodes x (n, M, 3) by dx; with flow, edges are turned, since stretching them would drive flow."""
-    if is_local(body):
-        x += dx
-    else:
-        x[:] = turned_edges(x, dx, body.offset)
+def move(body: Body, x: Floats, share: Any, dx: Floats, going: Any) -> None:
+    """Correct the nodes x (n, M, 3) by share · dx in the lanes where `going` is 1.
+
+    With flow, edges are turned, since stretching them would drive flow.
+    """
+    further = going * reaches_further(body)
+    if somewhere(further):
+        choose_all(x, further, turned_edges(x, share, dx, body.offset), x)
+    add_chosen(x, share, dx, going - further)
 
 
 @compiled_exactly
@@ -126,6 +150,7 @@ def solve_linear(
     work: Workspace,
     anew: bool,
     tolerance: float,
+    going: Any,
     dx: Floats,
     du: Floats,
 ) -> None:
@@ -134,14 +159,16 @@ def solve_linear(
     Args:
         anew: factorise it; otherwise the stored factors are used.
         tolerance: of GMRES for non-local effects, a share of the preconditioned right-hand side.
+        going: 1 in the lanes that are wanted.
         dx, du: come in as right-hand sides, (n, M, 3) and (P, 4); solved in place.
     """
     if anew:
         factor_and_solve(body, rates, u, work, dx, du)
     else:
         solve_local(rates, work, dx, du)
-    if not is_local(body):
-        _solve_nonlocal(body, rates, x, u, work, tolerance, dx, du)
+    further = going * reaches_further(body)
+    if somewhere(further):
+        _solve_nonlocal(body, rates, x, u, work, tolerance, further, dx, du)
 
 
 @compiled_exactly
@@ -175,38 +202,58 @@ def solve_local(rates: Rates, work: Workspace, dx: Floats, du: Floats) -> None:
 
 @compiled_exactly
 def _solve_nonlocal(
-    body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tolerance: float, dx: Floats, du: Floats
-) -> None:
+    body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tolerance: float, going: Any, dx: Floats,
+    du: Floats,
+) -> None:  # fmt: skip
     """Solve with the matrix of everything that acts, by GMRES with the factors as preconditioner.
 
     Args:
         tolerance: share of the preconditioned right-hand side that may be left.
+        going: 1 in the lanes that are wanted.
         dx, du: come in as the right-hand side after `solve_local`, (n, M, 3) and (P, 4).
     """
-    nodes, size = dx.size, dx.size + du.size
-    scale = 1 + abs(body.omega)
-    krylov = new_krylov(size, _MOST_PRODUCTS)
-    above, below = np.empty(size), np.empty(size)
-    right = np.empty(size)
-    right[:nodes], right[nodes:] = dx.reshape(nodes), du.reshape(du.size) / scale
+    size, scale = dx.size + du.size, 1 + abs(body.omega)
+    krylov, image = new_krylov(dx, size, _MOST_PRODUCTS), empty(dx, (size,))
+    above, below = new_unknowns(x, u), new_unknowns(x, u)
+    moved = new_unknowns(x, u)
+    _join(image, dx, du, scale)
+    norm = start(krylov, image)
+    wanted = going = going * less(0.0, norm)
     count = 0
-    if start(krylov, right) > 0:
-        for i in range(_MOST_PRODUCTS):
-            direction = krylov.basis[i]
-            along_x = direction[:nodes].reshape(x.shape)
-            along_u = (direction[nodes:] * scale).reshape(u.shape)
-            step = FINITE_DIFFERENCE_STEP / max(np.max(np.abs(direction)), 1e-12)
-            for sign, side in ((1.0, above), (-1.0, below)):
-                fill_residual(
-                    body, rates, x + sign * step * along_x, u + sign * step * along_u, work.room,
-                    side[:nodes].reshape(x.shape), side[nodes:].reshape(u.shape),
-                )  # fmt: skip
-            image = (above - below) / (2 * step)
-            solve_local(rates, work, image[:nodes].reshape(x.shape), image[nodes:].reshape(u.shape))
-            image[nodes:] /= scale
-            count = i + 1
-            if extend(krylov, i, image) < tolerance:
-                break
-    z = combine(krylov, count)
-    dx[:] = z[:nodes].reshape(dx.shape)
-    du[:] = (z[nodes:] * scale).reshape(du.shape)
+    while count < _MOST_PRODUCTS and somewhere(going):
+        direction = krylov.basis[count]
+        step = FINITE_DIFFERENCE_STEP / larger(largest_entry(direction), 1e-12)
+        _displace(moved, x, u, step, scale, direction)
+        fill_residual(body, rates, moved.x, moved.u, going, work.room, above.x, above.u)
+        _displace(moved, x, u, -step, scale, direction)
+        fill_residual(body, rates, moved.x, moved.u, going, work.room, below.x, below.u)
+        half = 1 / (2 * step)
+        combine(moved.x, half, above.x, -half, below.x)
+        combine(moved.u, half, above.u, -half, below.u)
+        solve_local(rates, work, moved.x, moved.u)
+        _join(image, moved.x, moved.u, scale)
+        left = extend(krylov, count, image, going)
+        going = going * (1 - less(left, tolerance * norm))
+        count += 1
+    solution(krylov, count, image)
+    flat, velocities = dx.reshape(dx.size), du.reshape(du.size)
+    choose_all(flat, wanted, image[: dx.size], flat)
+    for i in range(len(velocities)):
+        velocities[i] = choose(wanted, image[dx.size + i] * scale, velocities[i])
+
+
+@compiled_exactly
+def _join(out: Floats, dx: Floats, du: Floats, scale: Any) -> None:
+    """Set a vector to the entries of dx and of du/scale."""
+    flat, velocities = dx.reshape(dx.size), du.reshape(du.size)
+    for i in range(len(flat)):
+        out[i] = flat[i]
+    for i in range(len(velocities)):
+        out[len(flat) + i] = velocities[i] / scale
+
+
+@compiled_exactly
+def _displace(out: Unknowns, x: Floats, u: Floats, step: Any, scale: Any, direction: Floats) -> None:
+    """Move x and u by a step along a direction whose velocities are divided by `scale`."""
+    combine(out.x, 1.0, x, step, direction[: x.size])
+    combine(out.u, 1.0, u, step * scale, direction[x.size :])

@@ -11,7 +11,7 @@ phases φ_m = π/2 + 2π m/M, u at the P phases of one period. (The mirror image
 set, so a reversed motor gives exactly the mirror image.) d/dφ is the derivative of the trigonometric interpolant.
 It has spectral
 accuracy: at low ω̄ the shape hardly depends on φ, and M = 4 to 8 phases are enough. Newton's method solves for all
-phases together (`sim.solve.newton`).
+phases together (`sim.solve.newton`), for robots in lanes (`sim.solve.grouping`).
 
 Left out: motions in which the tails move differently (time stepping finds those, `sim.motion.settling`).
 Units: l, μ0 l⁴/EI, EI/l². Source: the paper's model (arXiv 2103.05712); for collocation Trefethen (2000), ch. 3.
@@ -19,90 +19,128 @@ Units: l, μ0 l⁴/EI, EI/l². Source: the paper's model (arXiv 2103.05712); for
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from sim.arrays import Floats
-from sim.compiling import compiled_exactly
-from sim.lanes import zeros
+from sim.arrays import Flags, Floats
 from sim.linear.spectral import with_phases
+from sim.mechanics import contact
 from sim.mechanics.balance import tail_spin
-from sim.mechanics.contact import tail_gap
-from sim.mechanics.geometry import measure, new_geometry, straight
+from sim.mechanics.geometry import straight
 from sim.model.body import Body
-from sim.solve.newton import new_workspace, newton
-from sim.solve.rates import on_orbit
-from sim.solve.residual import fill_residual, new_room
+from sim.solve.assembly import batch, row
+from sim.solve.grouping import NAMES, from_groups, group_width, in_groups, wanted_lanes
+from sim.solve.kernels import fill_residuals, solve_groups, solve_linear_in_groups
+from sim.solve.rates import FIRST_PHASE as FIRST_PHASE
 
-FIRST_PHASE = np.pi / 2
 HEAD_SHARE = 0.3  # of the motor's speed, in the first guess
 
 
-@compiled_exactly
+def straight_starts(rows: Floats, n: int, phases: int, tails: int) -> tuple[Floats, Floats]:
+    """Guess x (B, n, M, 3) and u (B, P, 4): straight tails, with a part of the motor's speed in the head."""
+    u = np.zeros((len(rows), phases // tails, 4))
+    u[:, :, 3] = -HEAD_SHARE * batch(rows).omega[:, None]
+    return straight(n, phases, batch(rows).offset), u
+
+
 def straight_start(body: Body, n: int, phases: int, tails: int) -> tuple[Floats, Floats]:
-    """Guess x (n, M, 3) and u (P, 4): straight tails, with a part of the motor's speed in the head."""
-    u = np.zeros((phases // tails, 4))
-    u[:, 3] = -HEAD_SHARE * body.omega
-    return straight(n, phases, body.offset), u
+    """Guess x (n, M, 3) and u (P, 4) of one robot as `straight_starts` does."""
+    x, u = straight_starts(row(body), n, phases, tails)
+    return x[0], u[0]
 
 
-@compiled_exactly
-def solve_orbit(body: Body, x: Floats, u: Floats, tolerance: float) -> tuple[int, float]:
-    """Improve x (n, M, 3) and u (P, 4) in place; see `sim.solve.newton.newton`."""
-    rates = on_orbit(x.shape[1], FIRST_PHASE)
-    return newton(body, rates, x, u, new_workspace(rates, x, u), tolerance)
+def solve_orbits_in_place(
+    rows: Floats, x: Floats, u: Floats, tolerance: float, going: Flags | None = None
+) -> Floats:
+    """Improve the orbits x (B, n, M, 3), u (B, P, 4) of B robots in place.
+
+    Args:
+        rows: the robots' numbers (`sim.solve.assembly.numbers`), (B, K).
+        tolerance: on the last correction.
+        going: which robots, (B,); all by default.
+
+    Returns:
+        Size of each robot's last correction, (B,), see `sim.solve.newton.newton`; NaN of those that are not going.
+    """
+    wanted = wanted_lanes(np.ones(len(rows), bool) if going is None else going)
+    shapes, velocities, sizes = in_groups(x), in_groups(u), np.empty_like(wanted)
+    solve_groups(in_groups(rows), NAMES, shapes, velocities, tolerance, wanted, sizes, group_width())
+    x[:], u[:] = from_groups(shapes, len(x)), from_groups(velocities, len(u))
+    return from_groups(sizes, len(x))
 
 
-@compiled_exactly
+def solve_orbit(body: Body, x: Floats, u: Floats, tolerance: float) -> float:
+    """Improve the orbit x (n, M, 3), u (P, 4) of one robot in place, see `solve_orbits_in_place`."""
+    return float(solve_orbits_in_place(row(body), x[None], u[None], tolerance)[0])
+
+
+def residuals_on_orbits(rows: Floats, x: Floats, u: Floats) -> tuple[Floats, Floats, Floats]:
+    """Compute the residuals at x (B, n, M, 3), u (B, P, 4) of B robots with numbers (B, K).
+
+    Returns:
+        r (B, n, M, 3) on the nodes, t (B, P, 4) on the robots, and the largest elastic force in an edge, (B,).
+    """
+    shapes, velocities, wanted = in_groups(x), in_groups(u), wanted_lanes(np.ones(len(x), bool))
+    r, t, force = np.empty_like(shapes), np.empty_like(velocities), np.empty_like(wanted)
+    fill_residuals(in_groups(rows), NAMES, shapes, velocities, wanted, r, t, force, group_width())
+    return from_groups(r, len(x)), from_groups(t, len(x)), from_groups(force, len(x))
+
+
 def residual_on_orbit(body: Body, x: Floats, u: Floats) -> tuple[Floats, Floats]:
-    """Compute the residual at x (n, M, 3), u (P, 4): r (n, M, 3) on the nodes and t (P, 4) on the robot."""
-    room = new_room(x, u)
-    r, t = np.empty_like(x), np.empty_like(u)
-    fill_residual(body, on_orbit(x.shape[1], FIRST_PHASE), x, u, room, r, t)
-    return r, t
+    """Compute the residual of one robot at x (n, M, 3), u (P, 4): r (n, M, 3) and t (P, 4)."""
+    r, t, _ = residuals_on_orbits(row(body), x[None], u[None])
+    return r[0], t[0]
 
 
-@compiled_exactly
-def largest_force(body: Body, x: Floats) -> float:
-    """Find the largest force that an edge of the tails x (n, M, 3) carries."""
-    geometry = new_geometry(x, x.shape[0], x.shape[1])
-    measure(geometry, x, body.offset, body.axial_stiffness)
-    return float(np.max(np.abs(geometry.force)))
+def solve_at_orbits(rows: Floats, x: Floats, u: Floats, r: Floats, t: Floats) -> tuple[Floats, Floats]:
+    """Solve with the derivatives of `residuals_on_orbits` at x (B, n, M, 3), u (B, P, 4).
+
+    Args:
+        rows: the robots' numbers, (B, K').
+        r, t: K right-hand sides for each robot, (B, K, n, M, 3) and (B, K, P, 4).
+
+    Returns:
+        The solutions, of the same shapes.
+    """
+    dx, du, wanted = in_groups(r), in_groups(t), wanted_lanes(np.ones(len(x), bool))
+    solve_linear_in_groups(in_groups(rows), NAMES, in_groups(x), in_groups(u), wanted, dx, du, group_width())
+    return from_groups(dx, len(x)), from_groups(du, len(x))
 
 
-@compiled_exactly
+def solve_at_orbit(body: Body, x: Floats, u: Floats, r: Floats, t: Floats) -> tuple[Floats, Floats]:
+    """Solve as `solve_at_orbits` does for one robot, with right-hand sides (K, n, M, 3) and (K, P, 4)."""
+    dx, du = solve_at_orbits(row(body), x[None], u[None], r[None], t[None])
+    return dx[0], du[0]
+
+
 def mean_motion(body: Body, u: Floats) -> Floats:
-    """Average (ω_t, ω_h, ω_yr, v_x, v_z) of the head's centre over time: ∫ u dφ/ω_t over ∫ dφ/ω_t."""
-    total, time = zeros(u, (5,)), 0.0 * u[0, 0]
-    for p in range(u.shape[0]):
-        omega_t = tail_spin(body, u[p])
-        time += 1 / omega_t
-        total[0] += 1.0
-        total[1] += u[p, 3] / omega_t
-        total[2] += u[p, 2] / omega_t
-        total[3] += (u[p, 0] + u[p, 2] * body.head_length / 2) / omega_t
-        total[4] += u[p, 1] / omega_t
-    for i in range(5):
-        total[i] = total[i] / time
-    return total
+    """Average (ω_t, ω_h, ω_yr, v_x, v_z) of the head's centre over time: ∫ u dφ/ω_t over ∫ dφ/ω_t.
+
+    Args:
+        body: one robot, or B of them (`sim.solve.assembly.batch`).
+        u: velocities, (P, 4); (B, P, 4) for B robots.
+
+    Returns:
+        (5,), or (B, 5).
+    """
+    v_x, v_z, omega_yr, omega_h = velocities = np.moveaxis(u, (-1, -2), (0, 1))
+    time = 1 / tail_spin(body, velocities)
+    sway = v_x + omega_yr * (body.head_length / 2)
+    parts = np.stack([np.ones_like(time), omega_h * time, omega_yr * time, sway * time, v_z * time, time])
+    *sums, whole = parts.cumsum(1)[:, -1]  # in the same order for one robot and for many
+    return np.stack(sums, -1) / np.expand_dims(whole, -1)
 
 
-@compiled_exactly
-def turns_forward(body: Body, u: Floats) -> bool:
-    """Tell whether the tails turn with the motor at all phases."""
-    smallest = np.inf
-    for p in range(u.shape[0]):
-        smallest = min(smallest, tail_spin(body, u[p]) * body.omega)
-    return bool(smallest > 0)
+def turns_forward(body: Body, u: Floats) -> Any:
+    """Tell whether the tails turn with the motor at all phases; arguments as in `mean_motion`."""
+    return (tail_spin(body, np.moveaxis(u, (-1, -2), (0, 1))) * body.omega > 0).all(0)
 
 
-@compiled_exactly
-def smallest_gap(body: Body, x: Floats, tails: int) -> float:
-    """Find the smallest gap between tails in a revolution, over 2 r0."""
-    x = with_phases(x, 2 * x.shape[1])
-    spacing = x.shape[1] // tails
-    shape, smallest = np.empty((x.shape[0], tails, 3)), np.inf
-    for m in range(spacing):
-        for j in range(tails):
-            shape[:, j] = x[:, m + j * spacing]
-        smallest = min(smallest, tail_gap(shape, body.offset, body.tail_radius))
-    return smallest
+def smallest_gaps(rows: Floats, x: Floats, tails: int) -> Floats:
+    """Find the smallest gap (B,) between tails x (B, n, M, 3) in a revolution, over 2 r0."""
+    fine = with_phases(x, 2 * x.shape[-2])
+    count, n, phases, _ = fine.shape
+    shapes = np.ascontiguousarray(np.moveaxis(fine.reshape(count, n, tails, phases // tails, 3), 3, 1))
+    body = batch(rows)
+    return contact.smallest_gaps(shapes, body.offset, body.tail_radius)

@@ -11,44 +11,50 @@ turn. A time step has one instant.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from sim.arrays import Floats
 from sim.compiling import compiled_exactly
+from sim.lanes import zeros
 from sim.linear.blocks import put, vector
 from sim.linear.spectral import differentiation
 from sim.linear.vectors import ZERO, cross, minus, plus, times
 from sim.mechanics.balance import motion_at, motor_gain, tail_spin
 from sim.model.body import Body
 
+FIRST_PHASE = np.pi / 2  # of the disc, in the first column of an orbit
+
 
 class Rates(NamedTuple):
     """An orbit (D alone), a stage of a time step (rate 1/τ alone) or a stage of a transient (both)."""
 
-    rate: float
-    phase: float  # of column 0; φ* in a stage of a time step
+    rate: Any
+    phase: Any  # of column 0; φ* in a stage of a time step
     differentiation: Floats  # D, (M, M); empty where columns are tails at one instant
     start: Floats  # x*, (n, M, 3); empty for an orbit
 
 
 @compiled_exactly
-def on_orbit(phases: int, first_phase: float) -> Rates:
-    """Collocate at M equal phases."""
-    return Rates(0.0, first_phase, differentiation(phases), np.zeros((0, 0, 0)))
+def on_orbit(x: Floats) -> Rates:
+    """Collocate x (n, M, 3) at M equal phases."""
+    none = 0.0 * x[0, 0, 0]
+    return Rates(none, none + FIRST_PHASE, differentiation(x.shape[1]), zeros(x, (0, 0, 0)))
 
 
 @compiled_exactly
-def in_stage(rate: float, phase: float, start: Floats) -> Rates:
+def in_stage(rate: Any, phase: Any, start: Floats) -> Rates:
     """Describe a stage with ẋ = rate (x − start) and φ = phase + ω_t/rate."""
-    return Rates(rate, phase, np.zeros((0, 0)), start)
+    none = 0.0 * start[0, 0, 0]
+    return Rates(none + rate, none + phase, np.zeros((0, 0)), start)
 
 
 @compiled_exactly
-def in_transient(rate: float, first_phase: float, by_phase: Floats, start: Floats) -> Rates:
+def in_transient(rate: Any, by_phase: Floats, start: Floats) -> Rates:
     """Describe a stage with ẋ = ω_t ∂x/∂φ + rate (x − start), at M equal phases; `by_phase` is D, (M, M)."""
-    return Rates(rate, first_phase, by_phase, start)
+    none = 0.0 * start[0, 0, 0]
+    return Rates(none + rate, none + FIRST_PHASE, by_phase, start)
 
 
 @compiled_exactly
@@ -58,7 +64,7 @@ def is_joined(rates: Rates) -> bool:
 
 
 @compiled_exactly
-def base_phase(rates: Rates, body: Body, u: Floats) -> float:
+def base_phase(rates: Rates, body: Body, u: Floats) -> Any:
     """Return the phase of column 0, for velocities u (P, 4); column m is 2π m/M later."""
     return rates.phase + (0.0 if is_joined(rates) else tail_spin(body, u[0]) / rates.rate)
 
@@ -97,6 +103,6 @@ def fill_rates(rates: Rates, body: Body, x: Floats, u: Floats, x_dot: Floats, by
 
 
 @compiled_exactly
-def phase_gain(rates: Rates, body: Body) -> float:
+def phase_gain(rates: Rates, body: Body) -> Any:
     """Compute ∂φ/∂ω_h."""
     return 0.0 if is_joined(rates) else motor_gain(body) / rates.rate

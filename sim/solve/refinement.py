@@ -1,4 +1,4 @@
-"""Number of phases and meshes of an orbit, the limit of its means for n → ∞, and their error.
+"""Number of phases and meshes of orbits, the limit of their means for n → ∞, and their error.
 
 1. The first solution starts from straight tails on the coarsest mesh. Phases are added until the means stop
    changing. The change from one number of phases to the next is the error of the smaller number.
@@ -7,32 +7,25 @@
    of the whole change by extrapolation. Over the sweep it is larger than the true error in more than 95 % of the
    rows.
 
-Every result says whether the robot was solved, and if not, why. Left out: whether the orbit is stable
+All robots of a batch go through this together. Those that need no more phases leave it, so that none waits for
+another one. Every result says whether the robot was solved, and if not, why. Left out: whether the orbit is stable
 (`sim.motion.stability`). Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
-from sim.compiling import compiled_exactly, formula
-from sim.lanes import fma, larger, zeros
+from sim.arrays import Flags, Floats, Integers
 from sim.linear.spectral import with_phases
 from sim.model.body import Body
-from sim.solve.newton import new_workspace, newton
-from sim.solve.orbit import (
-    FIRST_PHASE,
-    largest_force,
-    mean_motion,
-    residual_on_orbit,
-    solve_orbit,
-    straight_start,
-    turns_forward,
-)
-from sim.solve.rates import on_orbit
+from sim.solve.assembly import CONTACT, are_local, batch, row, without_further
+from sim.solve.grouping import by_kind
+from sim.solve.orbit import mean_motion, residuals_on_orbits, solve_orbits_in_place, straight_starts, turns_forward
 
 MESHES = (6, 8, 12)  # edges a tail
 SOLVED, NO_START, MANY_PHASES, LOST, BACKWARDS, UNBALANCED = range(6)
@@ -72,250 +65,290 @@ class Orbit(NamedTuple):
     u: tuple[Floats, Floats, Floats]
 
 
+class Coarse(NamedTuple):
+    """One robot's orbit on the coarsest mesh."""
+
+    ended: int  # SOLVED or why not
+    error: float  # of the means, for its number of phases
+    x: Floats  # (n, M, 3)
+    u: Floats  # (P, 4)
+
+
+class OnMesh(NamedTuple):
+    """One robot's orbit on one mesh."""
+
+    x: Floats  # (n, M, 3)
+    u: Floats  # (P, 4)
+    twist: Floats  # (3,): mean v_z, h_x, ω_yr
+
+
+@np.errstate(all="ignore")  # robots that overflow are flagged
+def refined_orbits(rows: Floats, tails: int, least: int) -> list[Orbit]:
+    """Solve for B robots with N tails, on `least` phases or more; `ended` says which could not be solved, and why.
+
+    Args:
+        rows: the robots' numbers (`sim.solve.assembly.numbers`), (B, K).
+        tails: N.
+        least: number of phases to begin with.
+    """
+    coarse = coarse_orbits(rows, tails, least)
+    orbits = [_unsolved(*one) for one in coarse]
+    solved = [i for i, one in enumerate(coarse) if one.ended == SOLVED]
+    for robots in by_kind(solved, lambda i: len(coarse[i].u)):
+        for i, orbit in zip(robots, _on_finer_meshes(rows[robots], [coarse[i] for i in robots]), strict=True):
+            orbits[i] = orbit
+    lost = [i for i, orbit in enumerate(orbits) if orbit.ended != SOLVED and rows[i, CONTACT] > _SOFTEST]
+    for i, found in zip(lost, _by_softer_contact(rows[lost], tails, least) if lost else [], strict=True):
+        orbits[i] = found or orbits[i]
+    return orbits
+
+
 def refined_orbit(body: Body, tails: int, least: int) -> Orbit:
-    """Solve for one robot with N tails, on `least` phases or more.
-
-    Returns:
-        The orbit; `ended` says why it could not be solved, if so.
-    """
-    if tails > MOST_PHASES:
-        return _unsolved(MANY_PHASES, np.zeros((MESHES[0], tails, 3)), np.zeros((1, 4)))
-    ended, error, x, u = _on_coarsest_mesh(body, tails, least)
-    orbit = _unsolved(ended, x, u) if ended != SOLVED else _on_finer_meshes(body, error, x, u)
-    if orbit.ended != SOLVED and body.nonlocal_terms.tail_contact > _SOFTEST:
-        return _by_softer_contact(body, tails, least, orbit)
-    return orbit
+    """Solve for one robot as `refined_orbits` does."""
+    return refined_orbits(row(body), tails, least)[0]
 
 
-def _by_softer_contact(body: Body, tails: int, least: int, lost: Orbit) -> Orbit:
-    """Solve from the robot's orbit with softer contact, on the same meshes and phases; else return `lost`."""
-    terms = body.nonlocal_terms
-    soft = body._replace(nonlocal_terms=terms._replace(tail_contact=terms.tail_contact / _SOFTER))
-    found = refined_orbit(soft, tails, least)
-    if found.ended != SOLVED:
-        return lost
-    for x, u in zip(found.x, found.u, strict=True):
-        _, size = solve_orbit(body, x, u, CORRECTION)
-        if not (size < CORRECTION and turns_forward(body, u)):
-            return lost
-    means = np.array([mean_motion(body, u) for u in found.u])
-    limit = extrapolate(means)
-    error = difference(_without_last_term(means), limit) + DOUBT * difference(means[2], limit) + PHASE_ERROR
-    return Orbit(SOLVED, max(error, found.error), limit, found.x, found.u)
-
-
-def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Floats]:
-    """Solve for the orbit on a given mesh: whether there is one, x (n, M, 3) and u (P, 4)."""
-    if tails > MOST_PHASES:
-        return False, np.zeros((edges, tails, 3)), np.zeros((1, 4))
-    ended, _, x, u = _on_coarsest_mesh(body, tails, FEW)
-    if ended != SOLVED:
-        return False, x, u
-    x = with_edges(x, body.offset, edges)
-    _, size = solve_orbit(body, x, u, CORRECTION)
-    return size < CORRECTION and turns_forward(body, u), x, u
-
-
-def _on_coarsest_mesh(body: Body, tails: int, least: int) -> tuple[int, float, Floats, Floats]:
-    """Solve on the coarsest mesh, with `least` phases or more: SOLVED or why not, error of the phases, x and u."""
-    terms = body.nonlocal_terms
-    plain = body._replace(nonlocal_terms=terms._make([0.0] * len(terms)))
-    if terms.tail_contact == 0:
-        return _from_straight_tails(body, plain, tails, least)
-    plain = plain._replace(nonlocal_terms=plain.nonlocal_terms._replace(tail_contact=terms.tail_contact))
-    return _enough_phases(body, plain, *_from_a_slow_motor(plain, tails), tails, least)
-
-
-def _from_a_slow_motor(plain: Body, tails: int) -> tuple[Floats, Floats]:
-    """Guess the orbit on the coarsest mesh, for a robot without other non-local effects than contact.
-
-    Contact decides on which side of each other the tails lie. So the guess comes from a slow motor, at which the
-    tails are apart. The motor is made faster step by step, with a softer contact.
-    """
-    terms = plain.nonlocal_terms
-    soft = plain._replace(nonlocal_terms=terms._replace(tail_contact=_SOFT * terms.tail_contact))
-    speed = min(_SLOW / abs(plain.omega), 1.0)
-    factor, slow = _FASTER, soft._replace(omega=speed * plain.omega)
-    x, u = straight_start(slow, MESHES[0], fewest_phases(tails), tails)
-    _, size = solve_orbit(slow, x, u, _START)
-    while size < _START and speed < 1 and factor > _LEAST_FASTER:
-        factor = min(factor, 1 / speed)
-        x_more, u_more = x.copy(), factor * u
-        _, larger = solve_orbit(soft._replace(omega=speed * factor * plain.omega), x_more, u_more, _START)
-        if larger < _START:
-            x, u, speed = x_more, u_more, speed * factor
-        else:
-            factor = np.sqrt(factor)
-    return x, u
-
-
-@compiled_exactly
-def fewest_phases(tails: int) -> int:
-    """Choose two phases or more, a multiple of N."""
-    return tails * int(np.ceil(2 / tails))
-
-
-@compiled_exactly
-def _from_straight_tails(body: Body, plain: Body, tails: int, least: int) -> tuple[int, float, Floats, Floats]:
-    """Solve as `_enough_phases` does, from straight tails."""
-    x, u = straight_start(plain, MESHES[0], fewest_phases(tails), tails)
-    return _enough_phases(body, plain, x, u, tails, least)
-
-
-@compiled_exactly
-def _unsolved(ended: int, x: Floats, u: Floats) -> Orbit:
+def _unsolved(ended: int, error: float, x: Floats, u: Floats) -> Orbit:
     return Orbit(ended, np.nan, np.full(5, np.nan), (x, x, x), (u, u, u))
 
 
-@compiled_exactly
-def _on_finer_meshes(body: Body, error: float, x: Floats, u: Floats) -> Orbit:
-    """Solve on all MESHES, from the orbit on the coarsest, and extrapolate; `error` is that of the phases."""
-    xs, us = (x, x, x), (u, u, u)
-    rates = on_orbit(x.shape[1], FIRST_PHASE)
-    for i in (1, 2):
-        n = MESHES[i]
-        x, u = with_edges(xs[1], body.offset, n), us[1].copy()
-        wanted = ROUGH
-        if i == 2:
-            x += NEXT_CHANGE * (x - with_edges(xs[0], body.offset, n))
-            u += NEXT_CHANGE * (us[1] - us[0])
-            wanted = CORRECTION
-        work = new_workspace(rates, x, u)
-        ended = UNBALANCED
-        for _ in range(2):
-            _, size = newton(body, rates, x, u, work, wanted)
-            if not size < wanted:
-                ended = LOST
-                break
-            if i == 1 or _is_balanced(body, x, u):
-                ended = SOLVED
-                break
-            wanted *= 1e-3  # slow motors: all forces are small
-        if ended != SOLVED:
-            return _unsolved(ended, x, u)
-        xs = (xs[0], x, x) if i == 1 else (xs[0], xs[1], x)
-        us = (us[0], u, u) if i == 1 else (us[0], us[1], u)
-    if not turns_forward(body, u):
-        return _unsolved(BACKWARDS, x, u)
-    means = np.empty((3, 5))
-    for i in range(3):
-        means[i] = mean_motion(body, us[i])
-    limit = extrapolate(means)
-    error += difference(_without_last_term(means), limit) + DOUBT * difference(means[2], limit)
-    return Orbit(SOLVED, error, limit, xs, us)
+def _by_softer_contact(rows: Floats, tails: int, least: int) -> list[Orbit | None]:
+    """Solve from the robots' orbits with softer contact, on the same meshes and phases; None where that fails."""
+    soft = rows.copy()
+    soft[:, CONTACT] /= _SOFTER
+    starts = refined_orbits(soft, tails, least)
+    orbits: list[Orbit | None] = [None] * len(rows)
+    solved = [i for i, orbit in enumerate(starts) if orbit.ended == SOLVED]
+    for robots in by_kind(solved, lambda i: len(starts[i].u[0])):
+        given, found = rows[robots], np.ones(len(robots), bool)
+        xs, us = ([np.stack(part) for part in zip(*((starts[i].x, starts[i].u)[k] for i in robots), strict=True)]
+                  for k in (0, 1))  # fmt: skip
+        for x, u in zip(xs, us, strict=True):
+            found &= _solved_forward(given, x, u, found)
+        means = np.stack([mean_motion(batch(given), u) for u in us])
+        limit = extrapolate(means)
+        error = difference(_limit_of_two(means[1], means[2]), limit)
+        error += DOUBT * difference(means[2], limit) + PHASE_ERROR
+        for at, i in enumerate(robots):
+            if found[at]:
+                shapes, velocities = (tuple(part[at] for part in parts) for parts in (xs, us))
+                orbits[i] = Orbit(SOLVED, max(float(error[at]), starts[i].error), limit[at], shapes, velocities)
+    return orbits
 
 
-@compiled_exactly
-def _is_balanced(body: Body, x: Floats, u: Floats) -> bool:
-    """Tell whether the unbalanced forces are small compared with the forces in the edges."""
-    r, t = residual_on_orbit(body, x, u)
-    return bool(max(np.max(np.abs(r)), np.max(np.abs(t))) < BALANCED * largest_force(body, x))
+def _solved_forward(rows: Floats, x: Floats, u: Floats, going: Flags) -> Flags:
+    """Solve in place; tell where that succeeded and the tails turn with the motor at all phases, (B,)."""
+    sizes = solve_orbits_in_place(rows, x, u, CORRECTION, going)
+    return np.asarray((sizes < CORRECTION) & turns_forward(batch(rows), u))
 
 
-@compiled_exactly
-def _enough_phases(
-    body: Body, plain: Body, x: Floats, u: Floats, tails: int, least: int
-) -> tuple[int, float, Floats, Floats]:
-    """Solve on the coarsest mesh, with `least` phases or more: SOLVED or why not, error of the phases, x and u.
+@np.errstate(all="ignore")  # robots that overflow are flagged
+def orbits_on_mesh(
+    rows: Floats, tails: int, edges: int, coarse: Sequence[Coarse], instants: Sequence[int] | None = None
+) -> list[OnMesh | None]:
+    """Solve for the orbits of B robots on a mesh; None where there is no solution.
 
-    The first solution, from x and u, is a rough one for the robot without its non-local effects (`plain`), on the
-    fewest phases. Then phases are added, each time from the solution before, until the means stop changing.
+    Args:
+        rows: the robots' numbers, (B, K).
+        tails: N.
+        edges: of a tail.
+        coarse: the orbits on the coarsest mesh, as `coarse_orbits` returns them.
+        instants: of a turn, P, for each robot; by default those of its orbit on the coarsest mesh.
     """
-    phases = x.shape[1]
-    means, change, robot, wanted = np.zeros(5), np.nan, plain, FIRST
-    solved = -1  # numbers of phases that the robot itself was solved on, less one
-    while True:
-        x_more, u_more = with_phases(x, phases), with_phases(u.reshape(1, -1, 4), phases // tails)[0]
-        rates = on_orbit(phases, FIRST_PHASE)
-        work = new_workspace(rates, x_more, u_more)
-        _, size = newton(robot, rates, x_more, u_more, work, wanted)
-        if not size < wanted:
-            return NO_START if solved < 1 else MANY_PHASES, np.nan, x, u
+    orbits: list[OnMesh | None] = [None] * len(rows)
+    wanted = [len(one.u) for one in coarse] if instants is None else instants
+    solved = [i for i, one in enumerate(coarse) if one.ended == SOLVED]
+    for robots in by_kind(solved, lambda i: (len(coarse[i].u), wanted[i])):
+        given, count = rows[robots], wanted[robots[0]]
+        x = with_edges(np.stack([coarse[i].x for i in robots]), batch(given).offset, edges)
+        u = np.stack([coarse[i].u for i in robots])
+        found = _solved_forward(given, x, u, np.ones(len(robots), bool))
+        if count != u.shape[1]:
+            x, u = with_phases(x, tails * count), with_phases(u, count)
+            found = solve_orbits_in_place(given, x, u, CORRECTION, found) < CORRECTION
+        twists = mean_motion(batch(given), u)[:, [4, 3, 2]]
+        for at, i in enumerate(robots):
+            if found[at]:
+                orbits[i] = OnMesh(x[at], u[at], twists[at])
+    return orbits
+
+
+def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Floats]:
+    """Solve for the orbit of one robot on a given mesh: whether there is one, x (n, M, 3) and u (P, 4)."""
+    coarse = coarse_orbits(row(body), tails)
+    found = orbits_on_mesh(row(body), tails, edges, coarse)[0]
+    return (False, coarse[0].x, coarse[0].u) if found is None else (True, found.x, found.u)
+
+
+@np.errstate(all="ignore")  # robots that overflow are flagged
+def coarse_orbits(rows: Floats, tails: int, least: int = FEW) -> list[Coarse]:
+    """Solve for B robots on the coarsest mesh; arguments as of `refined_orbits`.
+
+    The first solution is a rough one for the robots without non-local effects other than contact, on the fewest
+    phases. Then phases are added, each time from the solution before, until the means stop changing.
+    """
+    phases = fewest_phases(tails)
+    none = np.zeros((MESHES[0], tails, 3)), np.zeros((1, 4))
+    found = [Coarse(MANY_PHASES, np.nan, *none)] * len(rows)
+    if tails > MOST_PHASES or not len(rows):
+        return found
+    going = np.lexsort((np.abs(rows[:, 0]), ~are_local(rows)))  # similar robots share groups
+    numbers = without_further(rows)
+    x, u = straight_starts(numbers[going], MESHES[0], phases, tails)
+    touching = numbers[going, CONTACT] != 0
+    if touching.any():
+        x[touching], u[touching] = _from_a_slow_motor(numbers[going][touching], x[touching], u[touching], tails)
+    wanted, solved = FIRST, -1  # numbers of phases that the robots themselves were solved on, less one
+    means = change = np.empty(0)
+    while len(going):
+        new_x, new_u = with_phases(x, phases), with_phases(u, phases // tails)
+        converged = solve_orbits_in_place(numbers[going], new_x, new_u, wanted) < wanted
+        ended = NO_START if solved < 1 else MANY_PHASES
+        for i in going[~converged]:
+            found[i] = found[i]._replace(ended=ended)
         solved += 1
+        more = converged
         if solved == 0:
-            x, u, robot, wanted = x_more, u_more, body, ROUGH
-            phases = tails * int(np.ceil(least / tails))
-            continue
-        new_means = mean_motion(body, u_more)
-        if solved > 1:
-            last, change = change, difference(means, new_means)
-            if change <= PHASE_ERROR:
-                return SOLVED, change, x, u
-            to_come = next_change(last, change)
-            if to_come <= PHASE_ERROR:
-                return SOLVED, to_come, x_more, u_more
-        x, u, means = x_more, u_more, new_means
-        if phases > MOST_PHASES:
-            return MANY_PHASES, np.nan, x, u
-        phases = more_phases(tails, phases)
+            numbers, wanted, phases = rows, ROUGH, tails * -(-least // tails)
+            change = np.full(np.count_nonzero(more), np.nan)
+        else:
+            new_means = mean_motion(batch(rows[going]), new_u)
+            last, change = change, difference(means, new_means) if solved > 1 else np.full(len(going), np.nan)
+            enough, to_come = change <= PHASE_ERROR, _next_change(last, change)
+            soon = ~enough & (to_come <= PHASE_ERROR)
+            for at in np.flatnonzero(converged & (enough | soon)).tolist():
+                error, orbit = (change, (x, u)) if enough[at] else (to_come, (new_x, new_u))
+                found[going[at]] = Coarse(SOLVED, float(error[at]), *(part[at].copy() for part in orbit))
+            more = converged & ~(enough | soon)
+            if phases > MOST_PHASES:
+                break
+            phases = more_phases(tails, phases)
+            means, change = new_means[more], change[more]
+        going, x, u = going[more], new_x[more], new_u[more]
+    return found
 
 
-@compiled_exactly
-def next_change(last: float, change: float) -> float:
-    """Estimate the change of the means with the next number of phases from the last two; `last` may be NaN."""
-    fall = _SHRINKS if not np.isfinite(last) else min(max(change / last, 0.05), 1.0)
-    return change * fall
+def _from_a_slow_motor(rows: Floats, x: Floats, u: Floats, tails: int) -> tuple[Floats, Floats]:
+    """Guess orbits on the coarsest mesh, of robots without other non-local effects than contact.
+
+    Contact decides on which side of each other the tails lie. So the guess comes from a slow motor, at which the
+    tails are apart. The motor is made faster step by step, with a softer contact.
+
+    Args:
+        x, u: straight tails, (B, n, M, 3) and (B, P, 4).
+    """
+    omega, soft = rows[:, 0], rows.copy()
+    soft[:, CONTACT] *= _SOFT
+    speed, factor = np.minimum(_SLOW / np.abs(omega), 1.0), np.full(len(rows), _FASTER)
+    soft[:, 0] = speed * omega
+    x, u = x.copy(), u * speed[:, None, None]
+    sizes = solve_orbits_in_place(soft, x, u, _START)
+    going = np.flatnonzero((sizes < _START) & (speed < 1))
+    while len(going):
+        factor[going] = np.minimum(factor[going], 1 / speed[going])
+        faster = soft[going]
+        faster[:, 0] = speed[going] * factor[going] * omega[going]
+        new_x, new_u = x[going], factor[going, None, None] * u[going]
+        solved = solve_orbits_in_place(faster, new_x, new_u, _START) < _START
+        done, failed = going[solved], going[~solved]
+        x[done], u[done] = new_x[solved], new_u[solved]
+        speed[done] *= factor[done]
+        factor[failed] = np.sqrt(factor[failed])
+        going = going[(speed[going] < 1) & (factor[going] > _LEAST_FASTER)]
+    return x, u
 
 
-@compiled_exactly
+def fewest_phases(tails: int) -> int:
+    """Choose two phases or more, a multiple of N."""
+    return tails * -(-2 // tails)
+
+
 def more_phases(tails: int, phases: int) -> int:
     """Choose the next number of phases to try: a multiple of N, about half as many again."""
     return tails * max(phases // tails + 1, int(np.ceil(1.4 * phases / tails)))
 
 
-@compiled_exactly
-def with_edges(x: Floats, offset: float, wanted: int) -> Floats:
-    """Move free nodes (n, M, 3) to a mesh of `wanted` edges: cubic interpolation in the arc length."""
-    n, phases, _ = x.shape
-    out = zeros(x, (wanted, phases, 3))
+def _next_change(last: Floats, change: Floats) -> Floats:
+    """Estimate the changes of the means with the next number of phases from the last two; `last` may be NaN."""
+    fall = np.clip(change / last, 0.05, 1.0)
+    return change * np.where(np.isfinite(last), fall, _SHRINKS)
+
+
+def _on_finer_meshes(rows: Floats, coarse: Sequence[Coarse]) -> list[Orbit]:
+    """Solve on all MESHES for robots with the same number of phases, and extrapolate."""
+    body, (_, b, c) = batch(rows), MESHES
+    x0, u0 = np.stack([one.x for one in coarse]), np.stack([one.u for one in coarse])
+    x1, u1 = with_edges(x0, body.offset, b), u0.copy()
+    lost = ~(solve_orbits_in_place(rows, x1, u1, ROUGH) < ROUGH)
+    x2, u2 = with_edges(x1, body.offset, c), u1 + NEXT_CHANGE * (u1 - u0)
+    x2 += NEXT_CHANGE * (x2 - with_edges(x0, body.offset, c))
+    wanted, unbalanced = CORRECTION, ~lost
+    for _ in range(2):
+        sizes = solve_orbits_in_place(rows, x2, u2, wanted, unbalanced)
+        lost |= unbalanced & ~(sizes < wanted)
+        unbalanced &= ~lost & ~_are_balanced(rows, x2, u2)
+        if not unbalanced.any():
+            break
+        wanted *= 1e-3  # slow motors: all forces are small
+    ended: Integers = np.select(
+        [lost, unbalanced, ~turns_forward(body, u2)], [LOST, UNBALANCED, BACKWARDS], SOLVED
+    )
+    means = np.stack([mean_motion(body, u) for u in (u0, u1, u2)])
+    limit = extrapolate(means)
+    error = np.array([one.error for one in coarse]) + difference(_limit_of_two(means[1], means[2]), limit)
+    error += DOUBT * difference(means[2], limit)
+    return [
+        Orbit(SOLVED, float(error[i]), limit[i], (x0[i], x1[i], x2[i]), (u0[i], u1[i], u2[i]))
+        if ended[i] == SOLVED
+        else _unsolved(int(ended[i]), np.nan, x2[i], u2[i])
+        for i in range(len(rows))
+    ]
+
+
+def _are_balanced(rows: Floats, x: Floats, u: Floats) -> Flags:
+    """Tell where the unbalanced forces are small compared with the forces in the edges, (B,)."""
+    r, t, force = residuals_on_orbits(rows, x, u)
+    left = np.maximum(np.abs(r).max((1, 2, 3)), np.abs(t).max((1, 2)))
+    return np.asarray(left < BALANCED * force)
+
+
+@cache
+def _weights(given: int, wanted: int) -> Floats:
+    """Interpolate in the arc length from nodes 0..n to free nodes of another mesh, by cubics: (n', n + 1)."""
+    weights = np.zeros((wanted, given + 1))
     for k in range(wanted):
-        place = (k + 1) * n / wanted
-        first = min(max(int(np.floor(place)) - 1, 0), n - 3)
+        place = (k + 1) * given / wanted
+        first = min(max(int(np.floor(place)) - 1, 0), given - 3)
         for i in range(first, first + 4):
-            weight = 1.0
-            for j in range(first, first + 4):
-                if j != i:
-                    weight *= (place - j) / (i - j)
-            for m in range(phases):
-                for c in range(3):
-                    node = x[i - 1, m, c] if i > 0 else (offset if c == 0 else 0.0)
-                    out[k, m, c] += weight * node
-    return out
+            others = [j for j in range(first, first + 4) if j != i]
+            weights[k, i] = np.prod([(place - j) / (i - j) for j in others])
+    return weights
 
 
-@compiled_exactly
+def with_edges(x: Floats, offset: Any, wanted: int) -> Floats:
+    """Move free nodes (…, n, M, 3) to a mesh of `wanted` edges: cubic interpolation in the arc length.
+
+    Args:
+        offset: of the clamps, (…,).
+    """
+    *batch, n, phases, _ = x.shape
+    weights = _weights(n, wanted)
+    nodes = (weights[:, 1:] @ x.reshape(*batch, n, 3 * phases)).reshape(*batch, wanted, phases, 3)
+    nodes[..., 0] += weights[:, :1] * np.expand_dims(offset, (-1, -2))
+    return nodes
+
+
 def difference(a: Floats, b: Floats) -> Any:
-    """Compute the largest relative difference of two sets of means (5,); velocities relative to the speed."""
-    speed = np.sqrt(b[3] * b[3] + b[4] * b[4])
-    rates = larger(abs((a[0] - b[0]) / b[0]), larger(abs((a[1] - b[1]) / b[1]), abs((a[2] - b[2]) / b[2])))
-    return larger(rates, larger(abs(a[3] - b[3]), abs(a[4] - b[4])) / speed)
+    """Compute the largest relative difference of means (…, 5); velocities relative to the speed."""
+    away, speed = np.abs(a - b), np.hypot(b[..., 3], b[..., 4])
+    return np.maximum((away / np.abs(b))[..., :3].max(-1), away[..., 3:].max(-1) / speed)
 
 
-@compiled_exactly
 def extrapolate(found: Floats) -> Floats:
-    """Limit for n → ∞ of values on MESHES, (3, K), whose errors go as c₂/n² + c₄/n⁴."""
-    values = np.empty(found.shape[1])
-    for i in range(len(values)):
-        values[i] = limit(found[0, i], found[1, i], found[2, i])
-    return values
+    """Limit for n → ∞ of values on MESHES, (3, …), whose errors go as c₂/n² + c₄/n⁴."""
+    return np.asarray(_OF_COARSE * found[0] + (_OF_MIDDLE * found[1] + _OF_FINE * found[2]))
 
 
-@formula
-def limit(coarse: Any, middle: Any, fine: Any) -> Any:
-    """Compute the limit of one value on MESHES."""
-    return fma(_OF_COARSE, coarse, fma(_OF_MIDDLE, middle, _OF_FINE * fine))
-
-
-@formula
-def limit_of_two(middle: Any, fine: Any) -> Any:
+def _limit_of_two(middle: Floats, fine: Floats) -> Floats:
     """Extrapolate from the two finer meshes, with c₂/n² alone."""
-    return fma(_MORE, fine - middle, fine)
-
-
-@compiled_exactly
-def _without_last_term(found: Floats) -> Floats:
-    """Extrapolate values on MESHES, (3, K), from the two finer meshes."""
-    values = np.empty(found.shape[1])
-    for i in range(len(values)):
-        values[i] = limit_of_two(found[1, i], found[2, i])
-    return values
+    return fine + _MORE * (fine - middle)

@@ -2,10 +2,11 @@
 
     r = 0 on every free node, t = (F_x, F_z, M_y, M_z) = 0 about J
 
-`fill_residual` adds up all forces: local drag and the elastic forces of straight tails (`sim.mechanics.balance`),
-and the non-local effects. These are material frames (`frames`), flow between the parts (`flow`), contact
-between tails (`tail_contact`), friction of the contact line, and thinning of the fluid, which changes the drag on
-every node (`thinning`). A new non-local effect is called in `_surround` and adds to what `Surroundings` holds,
+`fill_residual` adds up all forces, for a robot in each lane (`sim.lanes`): local drag and the elastic forces of
+straight tails (`sim.mechanics.balance`), and the non-local effects. These are material frames (`frames`), springs
+at the roots (`root_spring`), contact between tails (`tail_contact`), flow between the parts (`flow`), thinning of
+the fluid (`thinning`), and friction of the contact line. Their formulas are for the plain numbers of one robot and
+are called lane by lane. A new non-local effect is called in `surround` and adds to what `Surroundings` holds,
 which is zero before the first one. Units: l, μ0 l⁴/EI, EI/l².
 
 The Newton matrices of `sim.solve.linearise` leave the non-local effects out; GMRES takes them into account
@@ -14,16 +15,17 @@ The Newton matrices of `sim.solve.linearise` leave the non-local effects out; GM
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from sim.arrays import Floats
 from sim.compiling import compiled_exactly
-from sim.lanes import zeros
-from sim.linear.blocks import put, vector, vector_at
-from sim.linear.vectors import ZERO, cross, dot, minus, plus
-from sim.mechanics.balance import body_wrench, clamp_balance, head_drag, motion_at, node_balance
+from sim.lanes import count_lanes, lane, somewhere, zeros
+from sim.linear.blocks import add, put, vector, vector_at
+from sim.linear.lane_arrays import put_lane, take_lane
+from sim.linear.vectors import ZERO, Vector, cross, dot, minus, plus
+from sim.mechanics.balance import Motion, body_wrench, clamp_balance, head_drag, motion_at, node_balance
 from sim.mechanics.contact_line import add_contact_line
 from sim.mechanics.flow import add_flow, has_flow
 from sim.mechanics.frames import add_frames, has_frames
@@ -33,12 +35,14 @@ from sim.mechanics.tail_contact import add_contact, has_contact
 from sim.mechanics.thinning import thinned, thins
 from sim.model.body import Body
 from sim.solve.rates import Rates, base_phase, fill_rates
+from sim.solve.robots_in_lanes import body_of_lane, reaches_further
 
 
 class Surroundings(NamedTuple):
     """What the non-local effects add up; zero without them."""
 
     flow: Floats  # of the fluid at nodes 0..n, (n + 1, M, 3)
+    drag: Floats  # further drag on nodes 0..n, (n + 1, M, 3)
     moment: Floats  # further moment of each clamp on the disc, (M, 3)
     wrench: Floats  # on the robot about J, (P, 4)
 
@@ -56,101 +60,106 @@ class Room(NamedTuple):
 def new_room(x: Floats, u: Floats) -> Room:
     """Allocate room for unknowns like x (n, M, 3) and u (P, 4)."""
     n, columns, _ = x.shape
-    around = Surroundings(zeros(x, (n + 1, columns, 3)), zeros(x, (columns, 3)), zeros(u, u.shape))
+    flow, drag = zeros(x, (n + 1, columns, 3)), zeros(x, (n + 1, columns, 3))
+    around = Surroundings(flow, drag, zeros(x, (columns, 3)), zeros(u, u.shape))
     return Room(new_geometry(x, n, columns), around, zeros(x, x.shape), zeros(x, x.shape))
 
 
 @compiled_exactly
-def is_local(body: Body) -> bool:
-    """Tell whether no effect reaches further than one node."""
-    total = 0.0
-    for value in body.nonlocal_terms:
-        total += abs(value)
-    return bool(total == 0)
-
-
-@compiled_exactly
-def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r: Floats, t: Floats) -> None:
+def fill_residual(
+    body: Body, rates: Rates, x: Floats, u: Floats, where: Any, room: Room, r: Floats, t: Floats
+) -> None:
     """Compute the residual at x (n, M, 3), u (P, 4).
 
     Args:
+        where: 1 in the lanes where it is wanted; in the others the non-local effects may be left out.
         r: (n, M, 3), filled.
         t: (P, 4), filled.
     """
-    if is_local(body):
-        fill_local_residual(body, rates, x, u, room, r, t)
-        return
     n, columns, _ = x.shape
-    instants = u.shape[0]
+    instants, around = u.shape[0], room.around
     measure(room.geometry, x, body.offset, body.axial_stiffness)
     fill_rates(rates, body, x, u, room.x_dot, room.by_spin)
     base = base_phase(rates, body, u)
-    room.around.flow[:] = 0.0
-    room.around.moment[:] = 0.0
-    room.around.wrench[:] = 0.0
+    for values in (around.flow, around.drag):
+        values[:] = 0.0
+    around.moment[:], around.wrench[:] = 0.0, 0.0
+    further = where * reaches_further(body)
+    if somewhere(further):
+        _surround_lanes(body, base, x, u, further, room)
     for p in range(instants):
-        phase = base + 2 * np.pi * p / columns
-        _surround(body, x, u[p], phase, p, columns // instants, room)
         for a in range(4):
-            t[p, a] = room.around.wrench[p, a] - head_drag(body, u[p], a)
+            t[p, a] = around.wrench[p, a] - head_drag(body, u[p], a)
     for m in range(columns):
         motion = motion_at(body, u[m % instants], base + 2 * np.pi * m / columns)
         for k in range(n):
-            velocity = plus(plus(motion.linear, cross(motion.spin, vector(x, k, m))), vector(room.x_dot, k, m))
-            velocity = minus(velocity, vector(room.around.flow, k + 1, m))
+            velocity = _velocity(motion, vector(x, k, m), vector(room.x_dot, k, m), vector(around.flow, k + 1, m))
             residual = node_balance(room.geometry, body, motion, k, m, velocity)[0]
-            if thins(body):
-                height = dot(motion.e_y, vector(x, k, m))
-                residual = plus(residual, thinned(room.geometry, body, k + 1, m, velocity, height))
-            put(r, k, m, residual)
-        flow, moment = vector(room.around.flow, 0, m), vector_at(room.around.moment, m)
+            put(r, k, m, plus(residual, vector(around.drag, k + 1, m)))
+        flow, moment = vector(around.flow, 0, m), vector_at(around.moment, m)
         clamp = clamp_balance(room.geometry, body, m, motion, flow, moment)
-        force, torque = clamp.force, clamp.moment
-        if thins(body):
-            root = (body.offset, 0.0, 0.0)
-            velocity = minus(plus(motion.linear, cross(motion.spin, root)), flow)
-            change = thinned(room.geometry, body, 0, m, velocity, dot(motion.e_y, root))
-            force, torque = plus(force, change), plus(torque, cross(root, change))
-        wrench = body_wrench(motion, force, torque)
+        root, drag = (body.offset, 0.0, 0.0), vector(around.drag, 0, m)
+        wrench = body_wrench(motion, plus(clamp.force, drag), plus(clamp.moment, cross(root, drag)))
         for a in range(4):
             t[m % instants, a] += wrench[a]
 
 
 @compiled_exactly
-def fill_local_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r: Floats, t: Floats) -> None:
-    """Compute the residual as `fill_residual` does, for one robot or a group, with local effects."""
-    n, columns, _ = x.shape
-    instants = u.shape[0]
-    measure(room.geometry, x, body.offset, body.axial_stiffness)
-    fill_rates(rates, body, x, u, room.x_dot, room.by_spin)
-    base = base_phase(rates, body, u)
-    for p in range(instants):
-        for a in range(4):
-            t[p, a] = -head_drag(body, u[p], a)
-    for m in range(columns):
-        motion = motion_at(body, u[m % instants], base + 2 * np.pi * m / columns)
-        for k in range(n):
-            velocity = plus(plus(motion.linear, cross(motion.spin, vector(x, k, m))), vector(room.x_dot, k, m))
-            put(r, k, m, node_balance(room.geometry, body, motion, k, m, velocity)[0])
-        clamp = clamp_balance(room.geometry, body, m, motion, ZERO, ZERO)
-        wrench = body_wrench(motion, clamp.force, clamp.moment)
-        for a in range(4):
-            t[m % instants, a] += wrench[a]
+def _velocity(motion: Motion, position: Vector, x_dot: Vector, flow: Vector) -> Vector:
+    """Compute the velocity of a node through the fluid."""
+    return minus(plus(plus(motion.linear, cross(motion.spin, position)), x_dot), flow)
 
 
 @compiled_exactly
-def _surround(body: Body, x: Floats, u: Floats, phase: float, p: int, tails: int, room: Room) -> None:
-    """Add all non-local effects at instant p; forces in the tails come first, because the flow depends on them."""
+def _surround_lanes(body: Body, base: Any, x: Floats, u: Floats, where: Any, room: Room) -> None:
+    """Add up all non-local effects of the robots in the lanes where `where` is 1, one robot after the other."""
+    columns, instants = x.shape[1], u.shape[0]
+    shape, velocities = np.empty(x.shape), np.empty(u.shape)
+    for i in range(count_lanes(body.omega)):
+        if lane(where, i) == 0:
+            continue
+        robot, first = body_of_lane(body, i), lane(base, i)
+        take_lane(shape, x, i)
+        take_lane(velocities, u, i)
+        alone = new_room(shape, velocities)
+        take_lane(alone.x_dot, room.x_dot, i)
+        measure(alone.geometry, shape, robot.offset, robot.axial_stiffness)
+        for p in range(instants):
+            surround(robot, shape, velocities[p], first + 2 * np.pi * p / columns, p, instants, alone)
+        put_lane(room.geometry.force, i, alone.geometry.force)
+        put_lane(room.around.flow, i, alone.around.flow)
+        put_lane(room.around.drag, i, alone.around.drag)
+        put_lane(room.around.moment, i, alone.around.moment)
+        put_lane(room.around.wrench, i, alone.around.wrench)
+
+
+@compiled_exactly
+def surround(body: Body, x: Floats, u: Floats, phase: float, p: int, instants: int, room: Room) -> None:
+    """Add all non-local effects of one robot at instant p, its columns p, p + P, …
+
+    Forces in the tails come first, because the flow depends on them, then the drag, which depends on the flow.
+    """
     geometry, around, columns = room.geometry, room.around, x.shape[1]
+    tails = columns // instants
     if has_frames(body):
-        for m in range(p, columns, columns // tails):
+        for m in range(p, columns, instants):
             motion = motion_at(body, u, phase + 2 * np.pi * (m - p) / columns)
             add_frames(body, geometry, motion, m, room.x_dot, around.moment)
     if body.nonlocal_terms.root_compliance != 0:
-        for m in range(p, columns, columns // tails):
+        for m in range(p, columns, instants):
             add_root_spring(body, geometry, m, around.moment)
     if has_contact(body):
         add_contact(body, geometry, x, u, phase, p, tails, around.wrench[p])
     if has_flow(body):
         add_flow(body, geometry, x, u, phase, p, tails, around.flow, around.wrench[p])
+    if thins(body):
+        for m in range(p, columns, instants):
+            motion = motion_at(body, u, phase + 2 * np.pi * (m - p) / columns)
+            for k in range(x.shape[0] + 1):
+                position, rate = (body.offset, 0.0, 0.0), ZERO
+                if k > 0:
+                    position, rate = vector(x, k - 1, m), vector(room.x_dot, k - 1, m)
+                velocity = _velocity(motion, position, rate, vector(around.flow, k, m))
+                change = thinned(geometry, body, k, m, velocity, dot(motion.e_y, position))
+                add(around.drag, k, m, change)
     add_contact_line(body, u, around.wrench[p])

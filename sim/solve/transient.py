@@ -1,4 +1,4 @@
-"""How a robot comes to its steady motion: shapes at all phases of the disc, changing from turn to turn.
+"""How robots come to their steady motions: shapes at all phases of the disc, changing from turn to turn.
 
 The shape of a tail depends on the time t since the motor's speed jumped and on the disc's phase φ:
 
@@ -8,10 +8,12 @@ At each t, x is collocated at M phases, as on an orbit (`sim.solve.orbit`). One 
 each disc phase at the jump. It is smooth in t, so time steps need not resolve the turning of the disc.
 
 Time steps are those of SDIRK2 (γ = 1 − 1/√2, L-stable, second order). Both stages use one factorisation. The
-length of a step follows the difference to the embedded method of first order.
+length of a step follows the difference to the embedded method of first order. The lag behind the steady circle
+(`sim.solve.lag`) is integrated in the same steps.
 
-The lag behind the steady circle (`sim.solve.lag`) is integrated in the same steps. `sim.solve.transient_groups`
-takes them for groups of robots.
+Robots are in lanes (`sim.lanes`). Each lane has its own time, and its own length of steps. In each round every
+lane tries a step; a lane whose step is rejected keeps its state, and one whose robot has come to its end takes the
+next robot. So the numbers of a robot depend neither on its neighbours nor on the number of lanes.
 
 Units: l, μ0 l⁴/EI. Source: Alexander (1977) for SDIRK2; Brachtendorf and others (1996) for a phase as second time.
 """
@@ -22,34 +24,56 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
-from sim.compiling import compiled, compiled_exactly, formula
-from sim.lanes import choose, larger, less, smaller
+from sim.arrays import Flags, Floats, Integers
+from sim.compiling import compiled_exactly, formula
+from sim.lanes import choose, lane, lanes, larger, less, smaller, somewhere, with_lane, zeros
+from sim.linear.lane_arrays import add_chosen, choose_all, largest_entry, put_lane, take_lane
 from sim.linear.spectral import differentiation
 from sim.model.body import Body
 from sim.solve.lag import advance_lag, between, turning
-from sim.solve.march import GAMMA
 from sim.solve.newton import Workspace, correct, largest_move, move, new_workspace
-from sim.solve.orbit import FIRST_PHASE
 from sim.solve.rates import Rates, in_transient
+from sim.solve.robots_in_lanes import body_in_lanes
+from sim.solve.steps import GAMMA
 
-MOST_STEPS = 400
-CORRECTION = 1e-3  # of a node, in l: Newton's method stops below it
-MOST_CORRECTIONS = 8
+_MOST_STEPS = 400
+_CORRECTION = 1e-3  # of a node, in l: Newton's method stops below it
+_MOST_CORRECTIONS = 8
 _OSCILLATION = 0.1  # weight of what averages out over a turn in the error of a step
 _FIRST_STEP = 5e-3  # over √ω̄
 _LONGEST_STEP = 0.5
-MOST_REJECTED = 60
+_MOST_REJECTED = 60
 
 
-class Transient(NamedTuple):
-    """K steps after the jump; entry 0 is the jump itself."""
+class Jump(NamedTuple):
+    """B robots at a jump of the motor's speed."""
 
-    times: Floats  # (K + 1,)
-    lag: Floats  # (K + 1, Q, 3): (Δz, Δx, Δψ), Q phases, or one entry for the mean over a turn
-    lag_rate: Floats  # (K + 1, Q, 3); not filled at the jump
-    shapes: Floats  # (marks, n, M, 3) at the marks
-    solved: bool
+    numbers: Floats  # with the speed after the jump, (B, K), see `sim.solve.assembly.numbers`
+    x: Floats  # shapes, (B, n, M, 3)
+    u: Floats  # guessed velocities, (B, P, 4)
+    twist: (
+        Floats  # steady (v_z, h_x, ω_yr) after the jump, (B, 3): mean surge, sway of the head's centre, yaw rate
+    )
+    until: Floats  # times to follow, (B,)
+
+
+class Followed(NamedTuple):
+    """B robots after a jump of the motor's speed."""
+
+    lag: Floats  # (B, T, Q, 3): (Δz, Δx, Δψ), Q phases, or one entry for the mean over a turn
+    shapes: Floats  # at the marks, (B, marks, n, M, 3)
+    end: Floats  # shapes at the end, (B, n, M, 3)
+    solved: Flags  # (B,)
+
+
+class _State(NamedTuple):
+    """Where the lanes are: at the start of a step, or in one."""
+
+    x: Floats  # (n, M, 3)
+    u: Floats  # (P, 4)
+    slope: Floats  # ∂x/∂t, (n, M, 3)
+    lag: Floats  # (Q, 3)
+    lag_rate: Floats  # (Q, 3)
 
 
 class _Step(NamedTuple):
@@ -58,129 +82,274 @@ class _Step(NamedTuple):
     slope: Floats  # (2, n, M, 3): ∂x/∂t of the stages
     lag_slope: Floats  # (2, Q, 3)
     start: Floats  # (n, M, 3)
-    lag: Floats  # (Q, 3) at the end of the stage
+    lag_start: Floats  # (Q, 3)
+    dx: Floats  # (n, M, 3)
+    du: Floats  # (P, 4)
     by_phase: Floats  # d/dφ of x, (M, M)
     lag_by_phase: Floats  # d/dφ of the lag, (Q, Q)
 
 
-@compiled
-def transient(
-    body: Body, x: Floats, u: Floats, twist: Floats, until: float, marks: Floats, tolerance: float
-) -> Transient:
-    """Follow a robot from its shape at a jump of the motor's speed.
+class _Course(NamedTuple):
+    """Which robot each lane has, and how far it has come; (W,)."""
+
+    robot: Integers
+    steps: Integers
+    rejected: Integers
+    marks: Integers  # passed
+    places: Integers  # times at which the lag is known
+
+
+@compiled_exactly
+def follow(jump: Jump, names: Any, marks: Floats, times: Floats, tolerance: float, width: Any) -> Followed:
+    """Follow robots from their shapes at a jump of the motor's speed.
 
     Args:
-        body: with the motor's speed after the jump.
-        x, u: shape (n, M, 3) and guessed velocities (P, 4) at the jump; changed in place.
-        twist: steady (v_z, h_x, ω_yr) after the jump: mean surge, sway of the head's centre, yaw rate.
-        until: time to follow.
-        marks: times at which shapes are kept, increasing, at most `until`.
+        jump: of the robots.
+        names: of the non-local effects.
+        marks: times at which shapes are kept, increasing.
+        times: at which the lag is wanted, (T,), increasing.
         tolerance: on the shape in one step, in l.
+        width: of the group, see `sim.lanes`.
+
+    Returns:
+        NaN at marks and times after a robot's end.
     """
-    n, columns, _ = x.shape
-    by_phase, lag_by_phase = differentiation(columns), turning(columns, u.shape[0])
+    robots, n, columns, _ = jump.x.shape
+    count = len(width)
+    numbers = lanes(np.empty((jump.numbers.shape[1], count)), width)
+    twist = lanes(np.empty((3, count)), width)
+    by_phase, lag_by_phase = differentiation(columns), turning(columns, jump.u.shape[1])
     fields = lag_by_phase.shape[0]
+    at = _new_state(numbers, n, columns, jump.u.shape[1], fields)
+    new = _new_state(numbers, n, columns, jump.u.shape[1], fields)
     step = _Step(
-        np.zeros((2, n, columns, 3)), np.zeros((2, fields, 3)), np.empty_like(x), np.zeros((fields, 3)),
-        by_phase, lag_by_phase,
+        zeros(numbers, (2, n, columns, 3)), zeros(numbers, (2, fields, 3)), zeros(numbers, at.x.shape),
+        zeros(numbers, (fields, 3)), zeros(numbers, at.x.shape), zeros(numbers, at.u.shape), by_phase,
+        lag_by_phase,
     )  # fmt: skip
-    times, lags = np.zeros(MOST_STEPS + 1), np.zeros((MOST_STEPS + 1, fields, 3))
-    rates, shapes = np.zeros_like(lags), np.zeros((len(marks), n, columns, 3))
-    work = new_workspace(in_transient(1.0, FIRST_PHASE, by_phase, x), x, u)
-    x_now, u_now, slope_now = x.copy(), u.copy(), np.zeros_like(x)
-    now, count, mark, rejected = 0.0, 0, 0, 0
-    dt = first_step(body)
-    while now < until and count < MOST_STEPS and rejected < MOST_REJECTED:
-        goal = marks[mark] if mark < len(marks) else until
-        dt = towards(goal - now, dt)
-        solved = _try_step(body, x, u, twist, x_now, slope_now, lags[count], now, dt, step, work)
-        error = embedded_error(step.slope, dt) if solved else np.inf
-        if not error < 2 * tolerance:
-            rejected += 1
-            dt = shorter_step(dt, error, 1.0 if solved else 0.0, tolerance)
-            u[:] = u_now
-            continue
-        now = goal if now + dt > goal - 1e-12 else now + dt
-        count += 1
-        times[count], lags[count], rates[count] = now, step.lag, step.lag_slope[1]
-        x_now[:], u_now[:], slope_now[:] = x, u, step.slope[1]
-        if mark < len(marks) and now == marks[mark]:
-            shapes[mark] = x
-            mark += 1
-        dt = next_step(dt, error, tolerance)
-    solved = now >= until
-    return Transient(times[: count + 1], lags[: count + 1], rates[: count + 1], shapes, solved)
+    found = Followed(
+        np.full((robots, len(times), fields, 3), np.nan),
+        np.full((robots, len(marks), n, columns, 3), np.nan),
+        np.full(jump.x.shape, np.nan),
+        np.zeros(robots, np.bool_),
+    )
+    waiting = np.full(count, -1)
+    course = _Course(waiting, waiting.copy(), waiting.copy(), waiting.copy(), waiting.copy())
+    for i in range(count):
+        _load(jump, min(i, robots - 1), i, numbers, twist, at, course)
+    started = min(count, robots)
+    body = body_in_lanes(numbers, names)
+    work = new_workspace(in_transient(1.0, by_phase, at.x), at.x, at.u)
+    now, dt = zeros(numbers, (1,))[0], _first_step(body)
+    goal, going = now, now
+    for i in range(count):
+        goal = with_lane(goal, i, _goal(jump, course, i, marks))
+        going = with_lane(going, i, 1.0 if i < started else 0.0)
+    while somewhere(going):
+        dt = choose(going, _towards(goal - now, dt), dt)
+        solved = _try_step(body, twist, at, new, now, dt, going, step, work)
+        error = choose(solved, _embedded_error(step.slope, dt), np.inf)
+        accepted = going * less(error, 2 * tolerance)
+        ended = 1 - less(now + dt, goal - 1e-12)
+        new_now = choose(accepted, choose(ended, goal, now + dt), now)
+        for i in range(count):
+            if lane(accepted, i) != 0:
+                course.steps[i] += 1
+                _record(i, course, at, new, step.lag_slope[1], now, new_now, marks, times, found)
+                goal = with_lane(goal, i, _goal(jump, course, i, marks))
+            elif lane(going, i) != 0:
+                course.rejected[i] += 1
+        _accept(at, new, step, accepted)
+        now = new_now
+        dt = choose(accepted, _next_step(dt, error, tolerance), _shorter_step(dt, error, solved, tolerance))
+        before = started
+        for i in range(count):
+            if lane(going, i) != 0 and _has_ended(jump, course, i, at, lane(now, i), found):
+                if started < robots:
+                    _load(jump, started, i, numbers, twist, at, course)
+                    now, goal = with_lane(now, i, 0.0), with_lane(goal, i, _goal(jump, course, i, marks))
+                    started += 1
+                    going = with_lane(going, i, -1.0)
+                else:
+                    going = with_lane(going, i, 0.0)
+        if started > before:
+            body = body_in_lanes(numbers, names)
+            dt, going = choose(less(going, 0.0), _first_step(body), dt), abs(going)
+    return found
+
+
+@compiled_exactly
+def _new_state(like: Floats, n: int, columns: int, instants: int, fields: int) -> _State:
+    """Allocate the state of the lanes."""
+    x, lag = (n, columns, 3), (fields, 3)
+    return _State(zeros(like, x), zeros(like, (instants, 4)), zeros(like, x), zeros(like, lag), zeros(like, lag))
+
+
+@compiled_exactly
+def _load(jump: Jump, robot: int, i: int, numbers: Floats, twist: Floats, at: _State, course: _Course) -> None:
+    """Put a robot at its jump into lane i; one without numbers can only come to its end."""
+    course.robot[i] = robot
+    course.steps[i], course.marks[i], course.places[i] = 0, 0, 0
+    course.rejected[i] = 0 if np.isfinite(np.sum(jump.numbers[robot])) else _MOST_REJECTED
+    put_lane(numbers, i, jump.numbers[robot])
+    put_lane(twist, i, jump.twist[robot])
+    put_lane(at.x, i, jump.x[robot])
+    put_lane(at.u, i, jump.u[robot])
+    put_lane(at.slope, i, np.zeros(at.slope.shape))
+    put_lane(at.lag, i, np.zeros(at.lag.shape))
+    put_lane(at.lag_rate, i, np.zeros(at.lag.shape))
+
+
+@compiled_exactly
+def _has_ended(jump: Jump, course: _Course, i: int, at: _State, now: float, found: Followed) -> bool:
+    """Tell whether the robot of lane i has come to its end, or cannot; keep its shape at the end."""
+    robot = course.robot[i]
+    if now >= jump.until[robot]:
+        found.solved[robot] = True
+        take_lane(found.end[robot], at.x, i)
+        return True
+    return bool(course.steps[i] >= _MOST_STEPS or course.rejected[i] >= _MOST_REJECTED)
+
+
+@compiled_exactly
+def _goal(jump: Jump, course: _Course, i: int, marks: Floats) -> float:
+    """Return the time at which a step of lane i must end next."""
+    until, mark = jump.until[course.robot[i]], course.marks[i]
+    return float(marks[mark]) if mark < len(marks) and marks[mark] < until else float(until)
+
+
+@compiled_exactly
+def _try_step(
+    body: Body, twist: Floats, at: _State, new: _State, now: Any, dt: Any, going: Any, step: _Step, work: Workspace
+) -> Any:
+    """Solve both stages; `new` and `step` hold the end of the step. Return where Newton's method converged."""
+    tau = GAMMA * dt
+    solved = going
+    new.u[:] = at.u
+    for stage in range(2):
+        _begin_stage(at, new, step, stage, dt, tau)
+        rates = in_transient(1 / tau, step.by_phase, step.start)
+        solved = _solve_stage(body, rates, new.x, new.u, stage == 0, solved, step, work)
+        if not somewhere(solved):
+            break
+        _rate_of_change(step.slope[stage], new.x, step.start, tau)
+        end = now + (tau if stage == 0 else dt)
+        advance_lag(body, new.u, twist, end, 1 / tau, step.lag_start, step.lag_by_phase, new.lag)
+        _rate_of_change(step.lag_slope[stage], new.lag, step.lag_start, tau)
+    return solved
+
+
+@compiled_exactly
+def _begin_stage(at: _State, new: _State, step: _Step, stage: int, dt: Any, tau: Any) -> None:
+    """Fill the starts of a stage, and guess its shape."""
+    n, columns, _ = at.x.shape
+    for k in range(n):
+        for m in range(columns):
+            for c in range(3):
+                start = at.x[k, m, c]
+                if stage == 1:
+                    start += (1 - GAMMA) * dt * step.slope[0, k, m, c]
+                step.start[k, m, c] = start
+                slope = at.slope[k, m, c] if stage == 0 else step.slope[0, k, m, c]
+                new.x[k, m, c] = start + tau * slope
+    for p in range(at.lag.shape[0]):
+        for c in range(3):
+            step.lag_start[p, c] = at.lag[p, c]
+            if stage == 1:
+                step.lag_start[p, c] += (1 - GAMMA) * dt * step.lag_slope[0, p, c]
+
+
+@compiled_exactly
+def _solve_stage(
+    body: Body, rates: Rates, x: Floats, u: Floats, anew: bool, going: Any, step: _Step, work: Workspace
+) -> Any:
+    """Solve for x and u at the end of a stage, where `going` is 1; return where it converged.
+
+    Args:
+        anew: factorise once; else the stored factors are used.
+    """
+    before, solved, limit = going * np.inf, 0.0 * going, largest_move(body)
+    for count in range(_MOST_CORRECTIONS):
+        correct(body, rates, x, u, work, anew and count == 0, going, step.dx, step.du)
+        size = largest_entry(step.dx)
+        going = going * less(size, smaller(limit, 2 * before))  # else the step is shortened
+        move(body, x, 1.0, step.dx, going)
+        add_chosen(u, 1.0, step.du, going)
+        converged = going * less(size, _CORRECTION)
+        solved, going, before = larger(solved, converged), going - converged, size
+        if not somewhere(going):
+            break
+    return solved
+
+
+@compiled_exactly
+def _rate_of_change(out: Floats, end: Floats, start: Floats, tau: Any) -> None:
+    """Set out = (end − start)/tau."""
+    flat, last, first = out.reshape(out.size), end.reshape(end.size), start.reshape(start.size)
+    for i in range(len(flat)):
+        flat[i] = (last[i] - first[i]) / tau
+
+
+@compiled_exactly
+def _accept(at: _State, new: _State, step: _Step, accepted: Any) -> None:
+    """Let accepted steps be the state."""
+    choose_all(at.x, accepted, new.x, at.x)
+    choose_all(at.u, accepted, new.u, at.u)
+    choose_all(at.slope, accepted, step.slope[1], at.slope)
+    choose_all(at.lag, accepted, new.lag, at.lag)
+    choose_all(at.lag_rate, accepted, step.lag_slope[1], at.lag_rate)
+
+
+@compiled_exactly
+def _record(
+    i: int, course: _Course, at: _State, new: _State, new_rate: Floats, now: Any, new_now: Any, marks: Floats,
+    times: Floats, found: Followed,
+) -> None:  # fmt: skip
+    """Keep the lags that lie in an accepted step of lane i, and the shape if the step ends at a mark."""
+    robot, begin, end = course.robot[i], lane(now, i), lane(new_now, i)
+    while course.steps[i] > 1 and course.places[i] < len(times) and times[course.places[i]] <= end:
+        place = course.places[i]
+        share = (times[place] - begin) / (end - begin)
+        for p in range(new.lag.shape[0]):
+            for c in range(3):
+                found.lag[robot, place, p, c] = between(
+                    share, end - begin, lane(at.lag[p, c], i), lane(new.lag[p, c], i),
+                    lane(at.lag_rate[p, c], i), lane(new_rate[p, c], i),
+                )  # fmt: skip
+        course.places[i] += 1
+    if course.marks[i] < len(marks) and end == marks[course.marks[i]]:
+        take_lane(found.shapes[robot, course.marks[i]], new.x, i)
+        course.marks[i] += 1
 
 
 @formula
-def first_step(body: Body) -> Any:
+def _first_step(body: Body) -> Any:
     """Choose the first step after a jump."""
     return _FIRST_STEP / np.sqrt(abs(body.omega))
 
 
 @formula
-def towards(left: Any, dt: Any) -> Any:
+def _towards(left: Any, dt: Any) -> Any:
     """Choose the next step, so that steps end on a goal without a tiny last one."""
     halved = choose(less(left, 2 * dt), smaller(dt, 0.5 * left), dt)
     return choose(less(left, 1.2 * dt), left, halved)
 
 
 @formula
-def next_step(dt: Any, error: Any, tolerance: Any) -> Any:
+def _next_step(dt: Any, error: Any, tolerance: Any) -> Any:
     """Choose the step after one that was accepted."""
     factor = 0.9 * np.sqrt(tolerance / larger(error, 1e-12))
     return smaller(dt * smaller(2.5, larger(0.3, factor)), _LONGEST_STEP)
 
 
 @formula
-def shorter_step(dt: Any, error: Any, solved: Any, tolerance: Any) -> Any:
+def _shorter_step(dt: Any, error: Any, solved: Any, tolerance: Any) -> Any:
     """Choose the step in place of one that was rejected, by its error or because it could not be solved."""
     return dt * choose(solved, larger(0.2, 0.9 * np.sqrt(tolerance / error)), 0.3)
 
 
-@compiled
-def _try_step(
-    body: Body, x: Floats, u: Floats, twist: Floats, x_now: Floats, slope_now: Floats, lag_now: Floats,
-    now: float, dt: float, step: _Step, work: Workspace,
-) -> bool:  # fmt: skip
-    """Solve both stages; x, u and `step` hold the end of the step. Return whether Newton's method converged."""
-    tau = GAMMA * dt
-    for stage in range(2):
-        step.start[:] = x_now
-        lag_start = lag_now.copy()
-        if stage == 1:
-            step.start[:] += (1 - GAMMA) * dt * step.slope[0]
-            lag_start += (1 - GAMMA) * dt * step.lag_slope[0]
-        x[:] = step.start + tau * (slope_now if stage == 0 else step.slope[0])
-        rates = in_transient(1 / tau, FIRST_PHASE, step.by_phase, step.start)
-        if not _solve_stage(body, rates, x, u, stage == 0, work):
-            return False
-        step.slope[stage] = (x - step.start) / tau
-        at = now + (tau if stage == 0 else dt)
-        advance_lag(body, u, twist, at, 1 / tau, lag_start, step.lag_by_phase, step.lag)
-        step.lag_slope[stage] = (step.lag - lag_start) / tau
-    return True
-
-
-@compiled
-def _solve_stage(body: Body, rates: Rates, x: Floats, u: Floats, anew: bool, work: Workspace) -> bool:
-    """Solve for x and u at the end of a stage; `anew`: factorise once, else with stored factors."""
-    before = np.inf
-    for count in range(MOST_CORRECTIONS):
-        dx, du = correct(body, rates, x, u, work, anew and count == 0)
-        size = np.max(np.abs(dx))
-        if not size < min(largest_move(body), 2 * before):  # more, and the step is shortened
-            return False
-        move(body, x, dx)
-        u += du
-        if size < CORRECTION:
-            return True
-        before = size
-    return False
-
-
 @compiled_exactly
-def embedded_error(slope: Floats, dt: Any) -> Any:
+def _embedded_error(slope: Floats, dt: Any) -> Any:
     """Compare with the embedded method, (1/2, 1/2) in place of (1 − γ, γ), in the largest entry.
 
     Args:
@@ -197,22 +366,3 @@ def embedded_error(slope: Floats, dt: Any) -> Any:
                 largest = larger(largest, _OSCILLATION * abs(change))
             largest = larger(largest, abs(mean))
     return largest
-
-
-@compiled
-def lag_at(solution: Transient, times: Floats) -> Floats:
-    """Interpolate the lag (T, Q, 3) to `times` (T,) between the first step and the last (cubic Hermite)."""
-    out = np.empty((len(times), solution.lag.shape[1], 3))
-    k = 1
-    for i in range(len(times)):
-        while k < len(solution.times) - 2 and solution.times[k + 1] < times[i]:
-            k += 1
-        span = solution.times[k + 1] - solution.times[k]
-        s = (times[i] - solution.times[k]) / span
-        for p in range(out.shape[1]):
-            for c in range(3):
-                out[i, p, c] = between(
-                    s, span, solution.lag[k, p, c], solution.lag[k + 1, p, c],
-                    solution.lag_rate[k, p, c], solution.lag_rate[k + 1, p, c],
-                )  # fmt: skip
-    return out

@@ -128,7 +128,7 @@ class ClampedRod:
         parallel, perp = tail_coefficients(self.slenderness)
         cells = np.full(self.edges, 1 / self.edges)
         cells[-1] /= 2
-        drag = np.array(node_resistance(_split(self.tangents(x)), cells * perp, cells * (parallel - perp)))
+        drag: Any = np.array(node_resistance(_split(self.tangents(x)), cells * perp, cells * (parallel - perp)))
         return np.linalg.eigvals(self.across(self.slope(x, load)) / drag[1, 1][:, None])
 
 

@@ -38,7 +38,7 @@ def held_torque(groups: Groups, S: Floats, *, edges: int = _EDGES) -> Floats:
         if x is None or u is None:
             x, u = straight_start(body, edges, 1, 1)
             u[:] = 0.0
-        _, size = solve_orbit(body, x, u, _TOLERANCE)
+        size = solve_orbit(body, x, u, _TOLERANCE)
         if not size < _TOLERANCE:
             break
         torque[i] = -_HELD * mean_motion(body, u)[1]

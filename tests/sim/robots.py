@@ -9,9 +9,10 @@ from sim.mechanics.balance import head_drag
 from sim.model.body import Body
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
-from sim.solve.assembly import bodies
+from sim.motion.stability import growths, growths_on_mesh
+from sim.solve.assembly import bodies, row
 from sim.solve.orbit import residual_on_orbit, solve_orbit, straight_start
-from sim.solve.refinement import MESHES, extrapolate
+from sim.solve.refinement import MESHES, Orbit, extrapolate
 
 CONTROL_VALUES = PRESETS["paper-control"].group_values()
 
@@ -25,6 +26,16 @@ def control(count: int = 1, **changes: object) -> Groups:
 def first_body(groups: Groups) -> Body:
     """Assemble the first robot for the compiled loops."""
     return bodies(groups)[0]
+
+
+def growth(body: Body, tails: int, x: np.ndarray, u: np.ndarray) -> float:
+    """Compute the growth on an orbit x (n, M, 3), u (P, 4) of one robot."""
+    return float(growths_on_mesh(row(body), tails, x[None], u[None])[0])
+
+
+def growth_of_orbit(body: Body, tails: int, orbit: Orbit) -> float:
+    """Compute the growth of one robot."""
+    return float(growths(row(body), tails, [orbit])[0])
 
 
 def mean_tail_wrench(body: Body, x: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -41,7 +52,7 @@ def held_loads(
     body = held_filament(omega_bar, l_over_r0, offset, **effects)
     x, u = straight_start(body, edges, 2, 1)
     u[:] = 0.0
-    _, size = solve_orbit(body, x, u, 1e-9)
+    size = solve_orbit(body, x, u, 1e-9)
     assert size < 1e-9
     return mean_tail_wrench(body, x, u), x[:, 0]
 

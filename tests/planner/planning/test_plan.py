@@ -56,8 +56,8 @@ def test_planning_never_calls_the_simulator_and_says_how_far_it_is(monkeypatch: 
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("the planner simulated")
 
-    for module, name in ((sim.motion.steady, "steady"), (sim.motion.orbits, "refined_orbit"),
-                         (sim.motion.orbits, "orbits_in_groups"), (sim.motion.run, "advance")):  # fmt: skip
+    for module, name in ((sim.motion.steady, "steady"), (sim.motion.orbits, "refined_orbits"),
+                         (sim.motion.run, "advance")):  # fmt: skip
         monkeypatch.setattr(module, name, refuse)
     shares: list[float] = []
     again = plan(polygon(4, 3.0), CONTROL, progress=shares.append)

@@ -8,12 +8,13 @@ import pytest
 from sim.motion import stability
 from sim.motion import steady as steady_module
 from sim.motion.batches import steady_columns
-from sim.motion.stability import DOUBTFUL, growth, growth_of_orbit, growth_on_more_phases, is_doubtful
+from sim.motion.stability import DOUBTFUL, growths_on_more_phases, is_doubtful
 from sim.motion.steady import orbits, steady
 from sim.motion.steady_motion import DIRECT, STABILITY_COLUMNS, STEPPING
+from sim.solve.assembly import row
 from sim.solve.refinement import FEW, SOLVED, Orbit, refined_orbit
 from tests.oracles.stepped_growth import stepped_growth
-from tests.sim.robots import CONTROL_VALUES, control, first_body
+from tests.sim.robots import CONTROL_VALUES, control, first_body, growth, growth_of_orbit
 
 TOP = {"C_t": 0.55, "C_r": 0.54, "C_yr": 4.1, "l_over_R": 3.82, "L_over_R": 4.24, "l_over_r0": 16.2}
 UNSTABLE = {**TOP, "N": 6, "omega_bar": 117.0}  # yaws nearly as fast as its tails spin
@@ -123,9 +124,9 @@ def test_the_growth_can_be_left_out() -> None:
 def test_a_growth_without_a_converged_exponent_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
     orbit = orbit_of({"N": 2, "omega_bar": 10.0})
     body = first_body(control(N=2, omega_bar=10.0))
-    assert growth_on_more_phases(body, 2, orbit) < 0
+    assert growths_on_more_phases(row(body), 2, [orbit])[0] < 0
     monkeypatch.setattr(stability, "_CONVERGED", 0.0)
-    assert np.isnan(growth_on_more_phases(body, 2, orbit))
+    assert np.isnan(growths_on_more_phases(row(body), 2, [orbit])[0])
 
 
 def test_which_growths_are_computed_again() -> None:
@@ -142,6 +143,6 @@ def test_unconverged_eigenvalues_do_not_make_a_motion_unstable(monkeypatch: pyte
     body, orbit = first_body(control(**SPURIOUS, N=2)), orbit_of({**SPURIOUS, "N": 2})
     monkeypatch.setattr(stability, "few_vectors", lambda _: 14)  # however many a growth takes
     found = growth(body, 2, orbit.x[1], orbit.u[1])
-    assert found == pytest.approx(growth_on_more_phases(body, 2, orbit), rel=0.05)
+    assert found == pytest.approx(growths_on_more_phases(row(body), 2, [orbit])[0], rel=0.05)
     monkeypatch.setattr(stability, "_SIGN_KNOWN", np.inf)
     assert growth(body, 2, orbit.x[1], orbit.u[1]) > 1000

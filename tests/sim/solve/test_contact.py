@@ -16,11 +16,10 @@ from sim.model.presets import PRESETS
 from sim.motion.resolution import Resolution
 from sim.motion.sensitivity import sensitivities
 from sim.motion.settling import settle
-from sim.motion.stability import growth
 from sim.motion.steady import orbits
 from sim.solve.orbit import mean_motion
 from sim.solve.refinement import FEW, MANY, SOLVED, difference, orbit_on_mesh, refined_orbit
-from tests.sim.robots import control, first_body
+from tests.sim.robots import control, first_body, growth
 
 MEANS = ("omega_t", "omega_h", "omega_yr", "v_x", "v_z")
 ROBOTS = {

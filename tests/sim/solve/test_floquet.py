@@ -9,12 +9,10 @@ import scipy.linalg
 from sim.linear.spectral import differentiation, interpolation
 from sim.mechanics.balance import tail_spin
 from sim.model.body import Body
-from sim.motion.stability import growth
 from sim.solve.orbit import FIRST_PHASE, mean_motion
-from sim.solve.rates import in_stage
 from sim.solve.refinement import SOLVED, refined_orbit
-from sim.solve.residual import fill_residual, new_room
-from tests.sim.robots import control, first_body
+from tests.sim import lanes
+from tests.sim.robots import control, first_body, growth
 
 RATE = 100.0  # any: it cancels
 
@@ -22,9 +20,8 @@ RATE = 100.0  # any: it cancels
 def residual_at(body: Body, phase: float, x: np.ndarray, slope: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Compute (r, t) of N tails at one phase, where ẋ = ω_t dx/dφ."""
     omega_t = tail_spin(body, u)
-    rates = in_stage(RATE, phase - omega_t / RATE, x - omega_t * slope / RATE)
-    r, t = np.empty_like(x), np.empty((1, 4))
-    fill_residual(body, rates, x, u[None], new_room(x, u[None]), r, t)
+    rates = lanes.Plain(RATE, phase - omega_t / RATE, np.zeros((0, 0)), x - omega_t * slope / RATE)
+    r, t = lanes.residual(body, rates, x, u[None])
     return np.concatenate([r.ravel(), t[0]])
 
 

@@ -13,11 +13,9 @@ import pytest
 from sim.effects import catalogue
 from sim.linear.spectral import differentiation
 from sim.model.body import Body
-from sim.solve.linearise import linearise
-from sim.solve.newton import factor_and_solve, new_workspace, newton
 from sim.solve.orbit import FIRST_PHASE, straight_start
-from sim.solve.rates import Rates, in_stage, in_transient, is_joined, on_orbit
-from sim.solve.residual import Room, fill_residual, new_room
+from tests.sim import lanes
+from tests.sim.lanes import Plain, corrections, linear
 from tests.sim.linear.systems import dense_matrix, joined_matrix
 from tests.sim.robots import control, first_body
 
@@ -38,42 +36,45 @@ def somewhere(body: Body, tails: int, phases: int, n: int) -> Unknowns:
     return x + 0.02 * rng.normal(size=x.shape), u + rng.normal(size=u.shape)
 
 
-def orbit_case() -> tuple[Body, Rates, Unknowns]:
+def on_orbit(phases: int) -> Plain:
+    return Plain(0.0, FIRST_PHASE, differentiation(phases), np.empty((0, 0, 0)))
+
+
+def orbit_case() -> tuple[Body, Plain, Unknowns]:
     body = strange(2)
-    return body, on_orbit(6, FIRST_PHASE), somewhere(body, 2, 6, 4)
+    return body, on_orbit(6), somewhere(body, 2, 6, 4)
 
 
-def stage_case() -> tuple[Body, Rates, Unknowns]:
+def stage_case() -> tuple[Body, Plain, Unknowns]:
     body = strange(3)
     x, u = somewhere(body, 3, 3, 5)
-    return body, in_stage(40.0, 0.7, x + 0.01 * np.random.default_rng(2).normal(size=x.shape)), (x, u)
+    start = x + 0.01 * np.random.default_rng(2).normal(size=x.shape)
+    return body, Plain(40.0, 0.7, np.zeros((0, 0)), start), (x, u)
 
 
-def transient_case() -> tuple[Body, Rates, Unknowns]:
+def transient_case() -> tuple[Body, Plain, Unknowns]:
     body = strange(2)
     x, u = somewhere(body, 2, 6, 4)
     start = x + 0.01 * np.random.default_rng(2).normal(size=x.shape)
-    return body, in_transient(30.0, FIRST_PHASE, differentiation(x.shape[1]), start), (x, u)
+    return body, Plain(30.0, FIRST_PHASE, differentiation(x.shape[1]), start), (x, u)
 
 
-def residual(body: Body, rates: Rates, z: np.ndarray, like: Unknowns, room: Room | None = None) -> np.ndarray:
+def residual(body: Body, rates: Plain, z: np.ndarray, like: Unknowns, noise: float = 0.0) -> np.ndarray:
     x, u = z[: like[0].size].reshape(like[0].shape), z[like[0].size :].reshape(like[1].shape)
-    r, t = np.empty_like(x), np.empty_like(u)
-    fill_residual(body, rates, x, u, room or new_room(x, u), r, t)
-    return np.concatenate([r.ravel(), t.ravel()])
+    return np.concatenate([part.ravel() for part in lanes.residual(body, rates, x, u, noise)])
 
 
 @pytest.mark.parametrize("case", [orbit_case, stage_case, transient_case])
 def test_the_matrix_is_the_derivative_of_the_residual_and_a_correction_solves_with_it(
-    case: Callable[[], tuple[Body, Rates, Unknowns]],
+    case: Callable[[], tuple[Body, Plain, Unknowns]],
 ) -> None:
     """Every entry, by central differences."""
     body, rates, (x, u) = case()
-    work = new_workspace(rates, x, u)
-    equations = work.equations
-    linearise(body, rates, x, u, work.room, equations)
+    rng = np.random.default_rng(3)
+    dx, du = rng.normal(size=x.shape), rng.normal(size=u.shape)
+    equations = linear(body, rates, x, u, dx, du)
     matrix = dense_matrix(equations.chains)
-    if is_joined(rates):
+    if len(rates.differentiation):
         gain = 1 + body.droop * body.resistance[3, 3]
         speed = np.array([body.omega + gain * u[m % len(u), 3] for m in range(x.shape[1])])
         matrix = joined_matrix(equations.chains, equations.resistance, speed, rates.differentiation)
@@ -85,23 +86,18 @@ def test_the_matrix_is_the_derivative_of_the_residual_and_a_correction_solves_wi
         step = 1e-6 * np.eye(len(z))[i]
         slope = (residual(body, rates, z + step, (x, u)) - residual(body, rates, z - step, (x, u))) / 2e-6
         assert slope == pytest.approx(matrix[:, i], rel=1e-5, abs=1e-4)
-    rng = np.random.default_rng(3)
-    dx, du = rng.normal(size=x.shape), rng.normal(size=u.shape)
     right = np.concatenate([dx.ravel(), du.ravel()])
-    factor_and_solve(body, rates, u, work, dx, du)
-    assert matrix @ np.concatenate([dx.ravel(), du.ravel()]) == pytest.approx(right, rel=1e-7, abs=1e-7)
+    assert matrix @ np.concatenate([equations.dx.ravel(), equations.du.ravel()]) == pytest.approx(
+        right, rel=1e-7, abs=1e-7
+    )
 
 
 @pytest.mark.parametrize("name", ["none", *(e.name for e in catalogue().values() if e.reach == "nonlocal")])
 def test_a_used_room_gives_the_residual_of_a_new_one(name: str) -> None:
     body = first_body(control(**{} if name == "none" else {name: catalogue()[name].typical}))
     x, u = somewhere(body, 2, 6, 5)
-    rates, z = on_orbit(6, FIRST_PHASE), np.concatenate([x.ravel(), u.ravel()])
-    used = new_room(x, u)
-    for values in (*used.around, used.x_dot, used.by_spin):
-        values[:] = np.random.default_rng(5).normal(size=values.shape)
-    for _ in range(2):
-        assert np.array_equal(residual(body, rates, z, (x, u), used), residual(body, rates, z, (x, u)))
+    rates, z = on_orbit(6), np.concatenate([x.ravel(), u.ravel()])
+    assert np.array_equal(residual(body, rates, z, (x, u), 0.7), residual(body, rates, z, (x, u)))
 
 
 @pytest.mark.parametrize(("tails", "omega", "most"), [(2, 10.0, 5), (3, 10.0, 5), (2, 60.0, 7), (5, -100.0, 8)])
@@ -109,20 +105,19 @@ def test_orbits_from_straight_tails_take_few_corrections(tails: int, omega: floa
     """Quadratic convergence: one correction more takes the last one from 1e-4 to below 1e-8."""
     body = first_body(control(N=tails, omega_bar=omega))
     phases = tails * -(-4 // tails)
-    rates = on_orbit(phases, FIRST_PHASE)
+    rates = on_orbit(phases)
     x, u = straight_start(body, 8, phases, tails)
-    work = new_workspace(rates, x, u)
-    count, size = newton(body, rates, x, u, work, 1e-4)
+    count, size = corrections(body, rates, x, u, 1e-4)
     assert size < 1e-4
     assert count <= most
-    more, size = newton(body, rates, x, u, work, 1e-8)
+    more, size = corrections(body, rates, x, u, 1e-8)
     assert more <= 2
     assert size < 1e-8
 
 
 def test_a_robot_that_is_no_number_ends_at_once() -> None:
     body = first_body(control())._replace(zeta_perp=np.nan)
-    rates = on_orbit(4, FIRST_PHASE)
+    rates = on_orbit(4)
     x, u = straight_start(body, 6, 4, 2)
-    count, size = newton(body, rates, x, u, new_workspace(rates, x, u), 1e-6)
+    count, size = corrections(body, rates, x, u, 1e-6)
     assert (count, size) == (1, np.inf)

@@ -1,0 +1,127 @@
+"""Balance, matrix and corrections of one robot, in the first of the lanes that the simulator has for a group."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.compiling import compiled_exactly
+from sim.lanes import lanes
+from sim.linear.chains import Chains
+from sim.model.body import Body
+from sim.solve.assembly import row
+from sim.solve.grouping import NAMES, group_width, in_groups, wanted_lanes
+from sim.solve.linearise import linearise
+from sim.solve.newton import factor_and_solve, new_workspace, newton
+from sim.solve.rates import Rates
+from sim.solve.residual import fill_residual, new_room
+from sim.solve.robots_in_lanes import body_in_lanes
+
+
+class Plain(NamedTuple):
+    """What `sim.solve.rates.Rates` says, in plain numbers; `start` is empty on an orbit."""
+
+    rate: float
+    phase: float
+    differentiation: Floats
+    start: Floats
+
+
+def _stacked(*arrays: Floats) -> list[Floats]:
+    """Fill all lanes with the same arrays."""
+    return [in_groups(np.asarray(array, float)[None])[0] for array in arrays]
+
+
+def residual(body: Body, rates: Plain, x: Floats, u: Floats, noise: float = 0.0) -> tuple[Floats, Floats]:
+    """Compute r (n, M, 3) and t (P, 4); `noise` fills the room before."""
+    r, t = _stacked(x, u)
+    wanted = wanted_lanes(np.ones(1, bool))
+    numbers, *parts = _stacked(row(body)[0], [rates.rate, rates.phase], rates.start, x, u)
+    _fill(numbers, NAMES, rates.differentiation, *parts, wanted, noise, r, t, group_width())
+    return r[..., 0], t[..., 0]
+
+
+@compiled_exactly
+def _fill(
+    numbers: Floats, names: Any, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats,
+    wanted: Floats, noise: float, r: Floats, t: Floats, width: Any,
+) -> None:  # fmt: skip
+    v, at_x, at_u, given = lanes(pair, width), lanes(x, width), lanes(u, width), lanes(wanted, width)
+    rates = Rates(v[0], v[1], by_phase, lanes(start, width))
+    room = new_room(at_x, at_u)
+    for values in (room.around.flow, room.around.drag, room.x_dot, room.by_spin):
+        values[:] = noise
+    room.around.moment[:], room.around.wrench[:] = noise, noise
+    body = body_in_lanes(lanes(numbers, width), names)
+    fill_residual(body, rates, at_x, at_u, given[0], room, lanes(r, width), lanes(t, width))
+
+
+class Linear(NamedTuple):
+    """Newton's equations of one robot."""
+
+    chains: Chains
+    resistance: Floats
+    r: Floats
+    t: Floats
+    dx: Floats  # solution for the given right-hand side
+    du: Floats
+
+
+def linear(body: Body, rates: Plain, x: Floats, u: Floats, dx: Floats, du: Floats) -> Linear:
+    """Linearise at x and u, and solve for the right-hand side dx, du."""
+    n, columns, instants = x.shape[0], x.shape[1], len(u)
+    blocks = [np.zeros((n, columns, 3, 3))] * 5
+    shapes = [*blocks, np.zeros((n, columns, 4, 3)), np.zeros((2, columns, 4, 3)), np.zeros((instants, 4, 4))]
+    chains, equations = Chains(*_stacked(*shapes, np.zeros((4, 4)))), _stacked(blocks[0], x, u)
+    numbers, *parts = _stacked(row(body)[0], [rates.rate, rates.phase], rates.start, x, u, dx, du)
+    _linear(numbers, NAMES, rates.differentiation, *parts, chains, *equations, group_width())
+    first = [np.ascontiguousarray(part[..., 0]) for part in (*chains, *equations, *parts[-2:])]
+    return Linear(Chains(*first[:9]), *first[9:])
+
+
+@compiled_exactly
+def _linear(
+    numbers: Floats, names: Any, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats, dx: Floats,
+    du: Floats, chains: Chains, resistance: Floats, r: Floats, t: Floats, width: Any,
+) -> None:  # fmt: skip
+    v, at_x, at_u = lanes(pair, width), lanes(x, width), lanes(u, width)
+    rates = Rates(v[0], v[1], by_phase, lanes(start, width))
+    body, work = body_in_lanes(lanes(numbers, width), names), new_workspace(rates, at_x, at_u)
+    linearise(body, rates, at_x, at_u, work.room, work.equations)
+    found = work.equations.chains
+    for out, block in (
+        (chains.diagonal, found.diagonal), (chains.lower, found.lower), (chains.upper, found.upper),
+        (chains.lower2, found.lower2), (chains.upper2, found.upper2), (chains.border, found.border),
+        (chains.foot, found.foot), (resistance, work.equations.resistance),
+    ):  # fmt: skip
+        lanes(out, width)[:] = block
+    lanes(chains.corner, width)[:] = found.corner
+    lanes(r, width)[:], lanes(t, width)[:] = work.equations.r, work.equations.t
+    factor_and_solve(body, rates, at_u, work, lanes(dx, width), lanes(du, width))
+
+
+def corrections(body: Body, rates: Plain, x: Floats, u: Floats, tolerance: float) -> tuple[int, float]:
+    """Improve x (n, M, 3) and u (P, 4) in place; return the number of corrections and the size of the last one."""
+    numbers, pair, start, at_x, at_u = _stacked(row(body)[0], [rates.rate, rates.phase], rates.start, x, u)
+    sizes = np.empty((1, len(group_width())))
+    wanted = wanted_lanes(np.ones(1, bool))
+    count = _newton(
+        numbers, NAMES, rates.differentiation, pair, start, at_x, at_u, wanted, tolerance, sizes, group_width()
+    )
+    x[:], u[:] = at_x[..., 0], at_u[..., 0]
+    return int(count), float(sizes[0, 0])
+
+
+@compiled_exactly
+def _newton(
+    numbers: Floats, names: Any, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats,
+    wanted: Floats, tolerance: float, sizes: Floats, width: Any,
+) -> int:  # fmt: skip
+    v, at_x, at_u = lanes(pair, width), lanes(x, width), lanes(u, width)
+    rates = Rates(v[0], v[1], by_phase, lanes(start, width))
+    body, going = body_in_lanes(lanes(numbers, width), names), lanes(wanted, width)[0]
+    count, size = newton(body, rates, at_x, at_u, new_workspace(rates, at_x, at_u), tolerance, going)
+    lanes(sizes, width)[0] = size
+    return count
