@@ -454,7 +454,7 @@ def swim(
     plan = pilot.plan if isinstance(pilot, Tracker) else pilot
     camera = camera or plan.request.camera
     tracker = pilot if isinstance(pilot, Tracker) else Tracker(plan, noise=camera.noise)
-    unit = plan.robot.time_scale / (100 * plan.robot.tail_length)
+    unit = plan.robot.time_scale / (100 * plan.robot.length_scale)
     robot = plan.robot if truth is None else one_robot(truth)
     return swim_under(
         tracker,
@@ -509,13 +509,13 @@ def write_page(
     if isinstance(paths, Mapping):
         for name, each in paths.items():
             drawn = each if isinstance(each, Path2D) else Path2D.of(each)
-            named.append(NamedPath(name, drawn.scaled(swims.tail_length)))
+            named.append(NamedPath(name, drawn.scaled(swims.length_scale)))
     else:
         for name in paths:
             with naming(name):
                 drawn = read_path(name).in_tails(swims, unit)
             short = Path(name).stem if shape_of(name) is None else name
-            named.append(NamedPath(short, drawn.scaled(swims.tail_length)))
+            named.append(NamedPath(short, drawn.scaled(swims.length_scale)))
     table, known = table_of(robot, swims, options)
     over = None if smooth is None else length_of(smooth, unit, swims, "--smooth")
     request = request_of(options, swims)

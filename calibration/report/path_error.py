@@ -166,7 +166,7 @@ def _path_error(
     carried: dict[Model, CarriedOut] = {}
     reasons = list(refusals)
     for name, tracked in vehicles.items():
-        path = wanted.path.scaled(tail_length / tracked.robot.tail_length)
+        path = wanted.path.scaled(tail_length / tracked.robot.length_scale)
         try:
             carried[name] = carry_out(make_plan(path, tracked, PlanRequest()), vehicles["corrected"])
         except InputError as refusal:
@@ -185,11 +185,11 @@ def carry_out(plan: Plan, swims: TrackedVehicle) -> CarriedOut:
         plan: made for any robot.
         swims: the robot that carries it out, from the same start and with the same seconds.
     """
-    metres = swims.robot.tail_length
+    metres = swims.robot.length_scale
     schedule = plan.schedule(swims.robot if isinstance(swims.robot, Robot) else None)
     switches = Switches(schedule.first_direction, schedule.dwells, np.array([schedule.start]))
     rollout = roll_out(swims.vehicle, switches, swims.offset)
-    path = plan.drawn.scaled(plan.robot.tail_length / metres).polyline()
+    path = plan.drawn.scaled(plan.robot.length_scale / metres).polyline()
     predicted = predicted_error(path, rollout.track, closed=plan.drawn.closed)
     flips = flips_between(len(schedule.dwells))
     growth = error_growth(swims.vehicle, replace(switches, poses=rollout.poses), rollout, flips)

@@ -145,11 +145,11 @@ def distance_apart(words: str | float, unit: str | None, robots: Sequence[Swimme
     """
     text, first = str(words), robots[0]
     relative = (number_and_unit(text)[1] or unit) == "l"
-    if relative and any(robot.tail_length != first.tail_length for robot in robots):
+    if relative and any(robot.length_scale != first.length_scale for robot in robots):
         raise InputError(
             f"distance apart {words}: the robots have different tail lengths; say its unit, as in 10cm"
         )
-    return read_length(text, unit, first, "distance apart", above_zero=True) * first.tail_length
+    return read_length(text, unit, first, "distance apart", above_zero=True) * first.length_scale
 
 
 def write_fleet(fleet: FleetPlan, folder: str | Path) -> list[Path]:

@@ -206,7 +206,7 @@ def _numbers(result: Plan) -> dict[str, str]:
         "TIMES": vehicle.rest.shape[1],
         "STRIDE": guidance.stride(result),
         "TIME_SCALE": result.robot.time_scale,
-        "TAIL_LENGTH_M": result.robot.tail_length,
+        "TAIL_LENGTH_M": result.robot.length_scale,
         "SHORTEST": result.minimum_dwell,
         "AHEAD": result.guidance.ahead,
         "ROD": result.tracked.rod,
@@ -319,7 +319,7 @@ def schedule_header(result: Plan, identity: str) -> str:
     """Write schedule.h as text."""
     entries, checkpoints = milliseconds(result.seconds), _checkpoints(result)
     lines = [", ".join(map(str, entries[i : i + 12])) for i in range(0, len(entries), 12)]
-    (x, y, heading), cm = result.start, 100 * result.robot.tail_length
+    (x, y, heading), cm = result.start, 100 * result.robot.length_scale
     parts = {
         "IDENTITY": identity,
         "NAME": safe_name(result),

@@ -119,7 +119,7 @@ def replan_from(plan: Plan, track: pd.DataFrame) -> Plan:
     Raises:
         InputError: the track cannot be used, it has reached the end, or no way leads on.
     """
-    robot = {"tail_length_m": plan.robot.tail_length, "time_scale_s": plan.robot.time_scale}
+    robot = {"tail_length_m": plan.robot.length_scale, "time_scale_s": plan.robot.time_scale}
     times, poses = poses_of(track, robot, running=True)
     if plan.ends_at is None:
         return rest_of(plan, times, poses)

@@ -89,7 +89,7 @@ class Trip(Job):
 
     def draw(self, axes: Axes, plan: Plan) -> None:
         """Draw the robot's axis at start and goal, and the places on its way."""
-        cm, body = 100 * plan.robot.tail_length, Footprint.of(plan.robot, 0.0)
+        cm, body = 100 * plan.robot.length_scale, Footprint.of(plan.robot, 0.0)
         axis = cm * np.array([body.places.min() - body.radius, body.places.max() + body.radius])
         for x, y, heading in (plan.start, self.goal):
             along = np.array([[math.cos(heading)], [math.sin(heading)]])

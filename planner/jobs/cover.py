@@ -129,7 +129,7 @@ class Coverage(Job):
         from matplotlib.collections import PatchCollection
         from matplotlib.patches import Circle as Disc
 
-        cm, track, width = 100 * plan.robot.tail_length, plan.smooth_track, self.width
+        cm, track, width = 100 * plan.robot.length_scale, plan.smooth_track, self.width
         way = arc_length(track)
         places = np.linspace(0.0, way[-1], min(_DISCS, math.ceil(_DENSE * way[-1] / width) + 1))
         centres = cm * np.stack([np.interp(places, way, track[:, i]) for i in (0, 1)], 1)

@@ -260,7 +260,7 @@ def _turns(member: Member, motion: TimedMotion, step: float) -> list[Turn]:
                 if room < max(plan.stated_error, plan.predicted_max):
                     continue
             turns.append(
-                Turn(WaitingCircle(place, side), begin, poses * [robot.tail_length, robot.tail_length, 1.0])
+                Turn(WaitingCircle(place, side), begin, poses * [robot.length_scale, robot.length_scale, 1.0])
             )
     return turns
 

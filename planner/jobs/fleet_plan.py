@@ -113,7 +113,7 @@ class FleetPlan:
             for name, plan in zip(self.names, self.plans, strict=True)
             for warning in plan.warnings
         ]
-        longest = max(plan.robot.tail_length for plan in self.plans)
+        longest = max(plan.robot.length_scale for plan in self.plans)
         if self.nearest.distance_m < CLOSE * longest:
             words.append(
                 f"robots come within {format_length(self.nearest.distance_m)} of each other: nearer than "
@@ -176,7 +176,7 @@ class FleetPlan:
         for k, each in enumerate(self.scheduled):
             colour, plan = _COLOURS[k % len(_COLOURS)], each.motion.plan
             if plan.kept_clear is not None:
-                draw_regions(axes, plan.kept_clear.free_space, plan.robot.tail_length)
+                draw_regions(axes, plan.kept_clear.free_space, plan.robot.length_scale)
             poses = each.places(np.linspace(each.begin, each.end, 2000)).poses
             axes.plot(*(100 * poses[:, :2].T), color=colour, lw=1.0, label=self.names[k])
             ends = 100 * each.motion.body.ends(poses[0])

@@ -98,7 +98,7 @@ class Orbit(Job):
 
     def draw(self, axes: Axes, plan: Plan) -> None:
         """Draw the place, and what the body reaches."""
-        cm = 100 * plan.robot.tail_length
+        cm = 100 * plan.robot.length_scale
         x, y = cm * np.array(self.place)
         angle = np.linspace(0, 2 * math.pi, 200)
         reach = cm * self.reach

@@ -39,7 +39,7 @@ class Body:
     @staticmethod
     def of(robot: Swimmer) -> Body:
         """Cover head and straight tails."""
-        discs, length = Footprint.of(robot, 0.0), robot.tail_length
+        discs, length = Footprint.of(robot, 0.0), robot.length_scale
         return Body(float(discs.places.max()) * length, float(discs.places.min()) * length, discs.radius * length)
 
     @property
@@ -86,7 +86,7 @@ class TimedMotion:
         changes[first] = vehicle.motion(switches.first_direction, None, elapsed[first])
         poses = planar.compose(switches.poses[dwell], changes)
         poses[:, :2] += vehicle.current * elapsed[:, None]
-        return np.asarray(poses * [robot.tail_length, robot.tail_length, 1.0])
+        return np.asarray(poses * [robot.length_scale, robot.length_scale, 1.0])
 
     def error(self, times: Floats) -> Floats:
         """Return the error in place (K,) [m] at times (K,) [s]; a robot that has not begun is where it was put."""
@@ -98,7 +98,7 @@ class TimedMotion:
         """Times [s] and errors in place [m]."""
         robot = self.plan.robot
         times, error = (error_with_feedback if self.feedback else error_open_loop)(self.plan)
-        return times * robot.time_scale, error * robot.tail_length
+        return times * robot.time_scale, error * robot.length_scale
 
 
 @dataclass(frozen=True, eq=False)

@@ -87,7 +87,7 @@ class Visits(Job):
 
     def draw(self, axes: Axes, plan: Plan) -> None:
         """Draw the numbers of the places."""
-        cm = 100 * plan.robot.tail_length
+        cm = 100 * plan.robot.length_scale
         places = cm * self.places
         axes.plot(*places.T, "o", color=REPLAYED, ms=5)
         numbers = [str(index + 1) for index in range(len(places))]

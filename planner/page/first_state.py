@@ -136,7 +136,7 @@ def first_plan(path: Path2D, tracked: TrackedVehicle, request: PlanRequest) -> d
         return None
     if len(plan.dwells) > _MOST_DWELLS:
         return None
-    second, cm = plan.robot.time_scale, 100 * plan.robot.tail_length
+    second, cm = plan.robot.time_scale, 100 * plan.robot.length_scale
     start, *poses = (plan.poses * [cm, cm, 1.0]).tolist()
     lengths = {
         "offset": tracked.offset,

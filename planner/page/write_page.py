@@ -60,7 +60,7 @@ def write_page(
     tracked = tracked_vehicle(robot, lookup, request.point, knowledge)
     known = knowledge or CalibrationKnowledge()
     why = _locked(robot, lookup, known)
-    shapes = shapes_of(tracked.vehicle.turn_radius * robot.tail_length, paths)
+    shapes = shapes_of(tracked.vehicle.turn_radius * robot.length_scale, paths)
     first = paths[0].path if paths else circle(shapes[0]["size"] / 100)
     data = {
         "robots": robots_of(robot)[: 1 if why else None],
@@ -70,7 +70,7 @@ def write_page(
             "robot": robot.name,
             "shape": shapes[0]["name"],
             "options": first_options(request, robot, smooth),
-            "plan": first_plan(first.scaled(1 / robot.tail_length), tracked, request),
+            "plan": first_plan(first.scaled(1 / robot.length_scale), tracked, request),
         },
         "locked": {"name": robot.name, "why": why} if why else None,
         "planner": {

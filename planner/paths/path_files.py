@@ -49,11 +49,11 @@ class Drawing:
         if self.unit is None and unit is None:
             raise InputError(NO_UNIT)
         given, own = (
-            in_tails(each, robot) if isinstance(each, str) else each and each / robot.tail_length
+            in_tails(each, robot) if isinstance(each, str) else each and each / robot.length_scale
             for each in (unit, self.unit)
         )
         if given and own and not math.isclose(given, own):
-            metres = self.path.length * own * robot.tail_length
+            metres = self.path.length * own * robot.length_scale
             raise InputError(
                 f"--unit {unit}: it has a size of its own, it is {metres:.3g} m long; leave --unit out"
             )

@@ -33,8 +33,8 @@ class Swimmer(Protocol):
         """In texts and files."""
 
     @property
-    def tail_length(self) -> float:
-        """The unit of length, l [m]."""
+    def length_scale(self) -> float:
+        """The unit of length [m]: of a robot the tail length l."""
 
     @property
     def time_scale(self) -> float:
@@ -47,12 +47,12 @@ class Swimmer(Protocol):
 
 def in_lab(value: float, robot: Swimmer) -> str:
     """Write a length given in tail lengths: 3.52 cm (0.32 l)."""
-    return length_in_lab(value, robot.tail_length)
+    return length_in_lab(value, robot.length_scale)
 
 
-def length_in_lab(value: float, tail_length: float) -> str:
-    """Write a length given in tail lengths; one of them is `tail_length` in m."""
-    return f"{format_length(value * tail_length)} ({_tails(value)} l)"
+def length_in_lab(value: float, length_scale: float) -> str:
+    """Write a length given in tail lengths; one of them is `length_scale` in m."""
+    return f"{format_length(value * length_scale)} ({_tails(value)} l)"
 
 
 def time_in_lab(value: float, robot: Swimmer) -> str:
@@ -79,7 +79,7 @@ def read_time(words: str, name: str) -> float:
 
 def place_in_lab(x: float, y: float, robot: Swimmer) -> str:
     """Write a place given in tail lengths: (3.52, 1.1) cm = (0.32, 0.1) l."""
-    cm = 100 * robot.tail_length
+    cm = 100 * robot.length_scale
     lab, tails = (", ".join(_fixed(s * value, n) for value in (x, y)) for s, n in ((cm, 2), (1.0, 3)))
     return f"({lab}) cm = ({tails}) l"
 
@@ -103,7 +103,7 @@ def _tails(value: float) -> str:
 def describe(path: Path2D, robot: Swimmer) -> str:
     """Describe length and extent of a path."""
     width, height = extent(path)
-    across = [format_length(value * robot.tail_length) for value in (width, height)]
+    across = [format_length(value * robot.length_scale) for value in (width, height)]
     return f"{in_lab(path.length, robot)} long, {' by '.join(across)} ({_tails(width)} by {_tails(height)} l)"
 
 
@@ -115,7 +115,7 @@ def in_tails(unit: str, robot: Swimmer) -> float:
     """
     if unit not in LENGTHS:
         raise InputError(f"unit {unit!r}; allowed are {', '.join(LENGTHS)}")
-    return 1.0 if unit == "l" else to_si(1.0, unit) / robot.tail_length
+    return 1.0 if unit == "l" else to_si(1.0, unit) / robot.length_scale
 
 
 def number_and_unit(words: str) -> tuple[float, str | None]:

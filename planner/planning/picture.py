@@ -22,19 +22,19 @@ _ASIDE = (1.0, 2.0, 3.0)  # distances of a label from its point, over the size o
 _WAYS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1], [0, 1], [0, -1], [1, 0], [-1, 0]])
 
 
-def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float, tail_length: float) -> None:
+def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float, length_scale: float) -> None:
     """Draw the raw and the declared path with a band of the stated error, on axes in cm.
 
     Args:
         axes: where to draw.
         raw, declared: points (n, 2), in l.
         stated: half the width of the band, in l.
-        tail_length: l in m.
+        length_scale: l in m.
     """
-    cm = 100 * tail_length
+    cm = 100 * length_scale
     edges = cm * band(declared, stated)
     axes.fill(
-        *edges.T, color="#2a7fba", alpha=0.25, lw=0, label=f"stated error {format_length(stated * tail_length)}"
+        *edges.T, color="#2a7fba", alpha=0.25, lw=0, label=f"stated error {format_length(stated * length_scale)}"
     )
     axes.plot(*(cm * raw.T), color=RAW, lw=1.0, label="path as given")
     axes.plot(*(cm * declared.T), color=DECLARED, lw=1.2, label="declared")
@@ -43,16 +43,16 @@ def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float, tail_l
     axes.set_ylabel("y [cm]")
 
 
-def draw_prediction(axes: Axes, track: Floats, tail_length: float) -> None:
+def draw_prediction(axes: Axes, track: Floats, length_scale: float) -> None:
     """Draw the predicted track, given in l, and its start as a dot, on axes in cm."""
-    points = 100 * tail_length * track
+    points = 100 * length_scale * track
     axes.plot(*points.T, color=PREDICTED, lw=0.8, label="predicted")
     axes.plot(*points[0], "o", color=DECLARED, ms=5)
 
 
-def draw_regions(axes: Axes, free_space: FreeSpace, tail_length: float) -> None:
-    """Draw obstacles, given in l, as areas, and walls as lines, on axes in cm; `tail_length` is l in m."""
-    cm = 100 * tail_length
+def draw_regions(axes: Axes, free_space: FreeSpace, length_scale: float) -> None:
+    """Draw obstacles, given in l, as areas, and walls as lines, on axes in cm; `length_scale` is l in m."""
+    cm = 100 * length_scale
     for region in free_space.regions:
         if isinstance(region, Circle):
             turn = np.linspace(0, 2 * np.pi, _ROUND)

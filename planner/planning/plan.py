@@ -287,7 +287,7 @@ class Plan(Generic[J]):
             np.tile(self.dwells, laps),
             self.start,
             planned.time_scale,
-            planned.tail_length,
+            planned.length_scale,
             self.identity,
         )
         return schedule if robot is None else schedule.swum_by(robot)
@@ -314,7 +314,7 @@ class Plan(Generic[J]):
         from planner.planning.picture import draw_prediction, draw_regions, draw_tracks
 
         ax = given_axes(ax)
-        length = self.robot.tail_length
+        length = self.robot.length_scale
         draw_tracks(ax, self.drawn.polyline(), self.reference, self.stated_error, length)
         draw_prediction(ax, self.smooth_track, length)
         if self.kept_clear is not None:
@@ -347,7 +347,7 @@ class Plan(Generic[J]):
         """Return the columns of `to_frame`, each (M,)."""
         start = np.concatenate([[0.0], np.cumsum(self.dwells)[:-1]])
         x, y, heading = self.poses[:-1].T
-        cm = 100 * self.robot.tail_length
+        cm = 100 * self.robot.length_scale
         return {
             "start_s": start * self.robot.time_scale,
             "direction": self.first_direction * (-1) ** np.arange(len(self.dwells)),
@@ -391,11 +391,11 @@ class Plan(Generic[J]):
             "robot": {
                 "name": robot.name,
                 **(
-                    {"vehicle": robot.to_dict(), "tail_length_m": robot.tail_length}
+                    {"vehicle": robot.to_dict(), "tail_length_m": robot.length_scale}
                     if isinstance(robot, MeasuredVehicle)
                     else {
                         "groups": robot.group_values(),
-                        "tail_length_m": robot.tail_length,
+                        "tail_length_m": robot.length_scale,
                         "motor_speed_rad_s": robot.motor_speed,
                     }
                 ),

@@ -69,7 +69,7 @@ def answers(
         command_word = words[:1] in ([BEGIN], [FINISH])
         if first and not command_word and is_header(words):
             columns, first = Columns.named(words, robot), False
-            unit = from_si(robot.tail_length, columns.length) if columns.length else 1.0
+            unit = from_si(robot.length_scale, columns.length) if columns.length else 1.0
             yield f"direction flip_at_s error_{columns.length or 'over_l'} alarm"
             continue
         first = False
@@ -129,7 +129,7 @@ class Columns:
             if unit is not None and (unit.kind != kind or tails):
                 raise InputError(f"{line}: {word!r} needs a unit of {kind}, such as {_example(name)}")
             times = to_si(1.0, unit.suffix) if unit is not None else 1.0
-            over = robot.time_scale if kind == "time" else robot.tail_length if unit and kind == "length" else 1.0
+            over = robot.time_scale if kind == "time" else robot.length_scale if unit and kind == "length" else 1.0
             names.append(name)
             factors.append((times, over))
             length = unit.suffix if name == "x" and unit is not None else length

@@ -82,7 +82,7 @@ class Swim:
         import pandas as pd
 
         robot, (x, y, heading) = self.plan.robot, self.poses.T
-        cm = 100 * robot.tail_length
+        cm = 100 * robot.length_scale
         columns = {
             "time_s": self.times * robot.time_scale, "x_cm": x * cm, "y_cm": y * cm,
             "heading_deg": np.degrees(heading), "time_bar": self.times, "x_over_l": x, "y_over_l": y,
@@ -94,7 +94,7 @@ class Swim:
         return frame
 
     def __repr__(self) -> str:
-        length = self.plan.robot.tail_length
+        length = self.plan.robot.length_scale
         rms, largest = format_length(self.rms() * length), format_length(float(self.distance.max()) * length)
         feedback = self.plan.feedback_error
         return (
@@ -129,7 +129,7 @@ class _Swimmer:
         else:
             self._run.body, self._run.reverse = run.body, run.reverse
         self._time = truth.time_scale / self._plan.robot.time_scale
-        self._length = truth.tail_length / self._plan.robot.tail_length
+        self._length = truth.length_scale / self._plan.robot.length_scale
 
     def go(self, duration: float) -> tuple[Floats, Floats]:
         """Advance: return times from now (K,) and poses (K, 3)."""

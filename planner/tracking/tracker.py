@@ -178,7 +178,7 @@ class Tracker:
         else:
             motor = f"motor {command.direction:+d} until {flip} ({command.flip_at:.4g} time units)"
         x, y, heading = self.pose
-        cm = 100 * robot.tail_length
+        cm = 100 * robot.length_scale
         forward, left, angle = self._estimate.state[10:]
         return "\n".join(
             [
@@ -201,7 +201,7 @@ class Tracker:
             ax: default: axes of a new figure.
         """
         ax = self._plan.plot(ax)
-        cm = 100 * self._plan.robot.tail_length
+        cm = 100 * self._plan.robot.length_scale
         x, y, heading = self.pose
         ahead = x + 0.3 * math.cos(heading), y + 0.3 * math.sin(heading)
         ax.plot(cm * x, cm * y, "^", color="black", label="estimated")

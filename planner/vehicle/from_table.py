@@ -68,7 +68,7 @@ def table_vehicle(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowl
         raise InputError(f"robot {robot.name!r} turns to the same side in both directions of its motor; it cannot "
                          "follow a path")  # fmt: skip
     lag = mirrored(np.stack([lag_table(curves.lag[i], curves.memory[i], curves.before) for i in (0, 1)]))
-    unit = robot.time_scale / robot.tail_length  # from m/s
+    unit = robot.time_scale / robot.length_scale  # from m/s
     return Vehicle(
         twist=twist,
         lag=lag,
@@ -171,7 +171,7 @@ def coefficient_modes(
             for slope, factor in zip(slopes, column.tolist(), strict=True):
                 total = total.plus(slope, factor)
             modes.append(Mode(f"coefficients: {k + 1}", total.twist, total.lag))
-    unit = robot.time_scale / robot.tail_length
+    unit = robot.time_scale / robot.length_scale
     for i, sigma in enumerate(knowledge.current_error):
         if sigma > 0:
             current = np.zeros(2)
@@ -195,7 +195,7 @@ def _slope_of_number(robot: Robot, lookup: LookupTable, motion: Motion, name: st
         if group not in catalogue() and above[group] != below[group]
     }
     faster = -math.log(ends[0].time_scale / ends[1].time_scale) / (2 * _STEP)
-    longer = math.log(ends[0].tail_length / ends[1].tail_length) / (2 * _STEP)
+    longer = math.log(ends[0].length_scale / ends[1].length_scale) / (2 * _STEP)
     by_before, by_time = np.gradient(motion.lag, np.log(BEFORE_KNOTS), TIMES, axis=(1, 2))
     slope = Motion(
         motion.twist * [faster + longer, faster + longer, faster],

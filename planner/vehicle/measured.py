@@ -104,7 +104,7 @@ class MeasuredVehicle:
         return float(value), float(spread)
 
     @property
-    def tail_length(self) -> float:
+    def length_scale(self) -> float:
         """l, the mean radius of the two circles [m]."""
         return self._values[0] * sum(1 / rate for rate in self._values[1:3]) / 2
 
@@ -116,8 +116,8 @@ class MeasuredVehicle:
     @property
     def outline(self) -> tuple[float, float, float]:
         """Front and back of the body, forward from its point, and half of the width [l]; never quite a point."""
-        half = self.length / 2 / self.tail_length
-        return half, -half, max(self.width / 2 / self.tail_length, _POINT)
+        half = self.length / 2 / self.length_scale
+        return half, -half, max(self.width / 2 / self.length_scale, _POINT)
 
     @cached_property
     def _values(self) -> Floats:
@@ -144,7 +144,7 @@ class MeasuredVehicle:
     def _motion(self, values: Floats) -> tuple[Floats, Floats, Floats]:
         """Compute twists (2, 3), lags (2, K, T, 3) and lags from rest (2, T, 3) for five numbers."""
         speed, left, right, slip, lag = values.tolist()
-        length, time = self.tail_length, self.time_scale
+        length, time = self.length_scale, self.time_scale
         ahead, across = speed * math.cos(slip) / length, speed * math.sin(slip) / length
         twist = time * np.array([[ahead, across, left], [ahead, -across, -right]])
         decay = np.exp(-BEFORE_KNOTS * time / lag) if lag > 0 else np.zeros_like(BEFORE_KNOTS)

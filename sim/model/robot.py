@@ -102,6 +102,11 @@ class Robot:
         return self.youngs_modulus * math.pi * self.tail_radius**4 / 4
 
     @property
+    def length_scale(self) -> float:
+        """The unit of length, l [m]."""
+        return self.tail_length
+
+    @property
     def time_scale(self) -> float:
         """The unit of dimensionless time, μ0 l⁴/EI [s]."""
         return self.viscosity * self.tail_length**4 / self.bending_stiffness

@@ -85,7 +85,7 @@ def test_the_schedule_is_the_same_in_every_language_and_memory(language: str, me
     assert checkpoints[-1, 1:] == pytest.approx(result.poses[-1], abs=1e-5)
     assert checkpoints[-1, 0] == numbers[-3] == sum(dwells)
     assert sum(dwells) == pytest.approx(1000 * result.seconds.sum(), abs=1)
-    start = [100 * result.robot.tail_length * result.start[0], math.degrees(result.start[2])]
+    start = [100 * result.robot.length_scale * result.start[0], math.degrees(result.start[2])]
     assert numbers[-2:] == pytest.approx(start, abs=1e-3)
 
 

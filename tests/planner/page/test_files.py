@@ -110,7 +110,7 @@ def compared(content: dict[str, Any], frame: pd.DataFrame, how: str = "none") ->
 def test_errors_of_a_track(name: str, noise: float) -> None:
     result = plan_of(name)
     content, frame = result.to_dict(), track_of(result, noise)
-    cm = 100 * result.robot.tail_length
+    cm = 100 * result.robot.length_scale
     lab = {
         "time [min]": frame["time_bar"] * result.robot.time_scale / 60, "x_mm": frame["x_over_l"] * 10 * cm,
         "Y [cm]": frame["y_over_l"] * cm, "heading_deg": np.degrees(frame["heading_rad"]),

@@ -49,7 +49,7 @@ def _integrated(vehicle: MeasuredVehicle, seconds: np.ndarray) -> np.ndarray:
 def _at_flips(vehicle: MeasuredVehicle, motion: Vehicle, seconds: np.ndarray) -> np.ndarray:
     """Predict poses (M + 1, 3) in m and rad, left first."""
     poses = poses_at_flips(motion, Switches(1, seconds / vehicle.time_scale, np.zeros((1, 3))))
-    return poses * [vehicle.tail_length, vehicle.tail_length, 1]
+    return poses * [vehicle.length_scale, vehicle.length_scale, 1]
 
 
 @pytest.mark.parametrize(("dwells", "error"), [(0.3, 0.012), (0.6, 0.001), ("random", 0.002)])
@@ -81,7 +81,7 @@ def test_without_lag_it_is_the_bicycle() -> None:
     yaw = speed / math.hypot(base, radius)
     needle = MeasuredVehicle(speed=speed, turn_left=yaw, turn_right=yaw, slip=math.atan(base / radius))
     motion = needle.motion()
-    length = needle.tail_length
+    length = needle.length_scale
     assert motion.pivot_distance * length == pytest.approx(base)
     assert motion.pivot_radius * length == pytest.approx(radius)
     assert not motion.lag.any()
@@ -147,7 +147,7 @@ def test_the_stated_error_holds_for_vehicles_within_the_tolerances(path: Path2D)
     means, spreads = np.array([SWIMMER.measured(name) for name in NUMBERS]).T
     drawn = means + spreads * np.random.default_rng(1).normal(size=(200, 5))
     tracks = _moved(drawn, result.dwells * SWIMMER.time_scale, result.first_direction, result.start)
-    largest = np.array([distance_to(result.reference, track / SWIMMER.tail_length).max() for track in tracks])
+    largest = np.array([distance_to(result.reference, track / SWIMMER.length_scale).max() for track in tracks])
     assert (largest <= result.stated_error).mean() >= 0.85
     assert np.quantile(largest, 0.95) > 0.6 * result.stated_error  # not by a large margin
 
@@ -155,7 +155,7 @@ def test_the_stated_error_holds_for_vehicles_within_the_tolerances(path: Path2D)
 def _moved(numbers: np.ndarray, seconds: np.ndarray, sign: int, start: Sequence[float]) -> np.ndarray:
     """Move vehicles (D, 5) from rest: tracks (D, K, 2) in m."""
     speed, left, right, slip, lag = numbers.T
-    place = np.broadcast_to(np.array(start[:2]) * SWIMMER.tail_length, (len(numbers), 2))
+    place = np.broadcast_to(np.array(start[:2]) * SWIMMER.length_scale, (len(numbers), 2))
     heading, twist, tracks = np.full(len(numbers), start[2]), np.zeros((len(numbers), 3)), [place[:, None]]
     for dwell in seconds:
         own = np.stack([speed * np.cos(slip), sign * speed * np.sin(slip), left if sign > 0 else -right], 1)
