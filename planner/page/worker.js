@@ -86,7 +86,7 @@ function drawnPath({ points, closed, words }) {
 }
 
 /* The drawn path in tail lengths, and what is asked of a plan; options of the page are in s and cm. */
-function wishIn({ path, options: { smooth, ...options } }, { robot }) {
+function wishIn({ path, options }, { robot }) {
   const cm = 100 * robot.tailLength, tolerance = options.tolerance === null ? null : options.tolerance / cm;
   return { drawn: scaled(drawnPath(path), 1 / cm), request: planRequest({ ...options, tolerance }) };
 }

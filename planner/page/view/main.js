@@ -109,6 +109,9 @@ class Page {
     byId("undo").disabled = this.history.past.length === 0;
     byId("redo").disabled = this.history.future.length === 0;
     if (!more) this.writeAddress();
+    const wish = JSON.stringify(this.wish());
+    if (wish === this.wished) return; // else a refusal would leave, and move the button that it tells to press
+    this.wished = wish;
     clearTimeout(this.timer);
     this.timer = setTimeout(() => this.planNow(), PAUSE);
     this.mark();

@@ -78,7 +78,7 @@ function pointsRefusal({ length }) {
 }
 
 /* A state as the planner takes it; `given` has exact SI values of fields of the robot. */
-function wishOf({ robot, path, options }, given) {
+function wishOf({ robot, path, options: { smooth, ...options } }, given) {
   const { points, closed, name, shape, size } = path;
   const drawing = points ? { points, closed, name } : { words: `${shape}:${size}` };
   return { robot: { ...given, name: robot.name, ...siValues(robot.values, given) }, path: drawing, options };
