@@ -187,6 +187,8 @@ def test_the_papers_protocol_fits_three_and_four_tails_and_predicts_two_and_five
     assert result.error_after < 0.5 * result.error_before
     with pytest.raises(InputError, match="N = 2, 3, 4 and 5"):
         PROTOCOLS["paper"](read_measurements(toy_table(16).query("N != 5")))
+    with pytest.raises(InputError, match="would split it"):
+        PROTOCOLS["paper"](read_measurements(table.assign(session="the only one")))
 
 
 def test_a_table_may_be_parquet(tmp_path: Path) -> None:
