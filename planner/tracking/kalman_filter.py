@@ -205,8 +205,10 @@ class Estimate:
         with np.errstate(over="ignore", invalid="ignore"):  # a pose may be as far away as numbers go
             size = float(innovation @ weight @ innovation)
         if size <= largest:
-            self.covariance -= PH @ weight @ PH.T
-            self.state += PH @ weight @ innovation
+            gain = PH @ weight
+            kept = np.eye(STATES) - gain @ H  # Joseph's form: the covariance stays symmetric and positive
+            self.covariance = kept @ self.covariance @ kept.T + gain * self.noise @ gain.T
+            self.state += gain @ innovation
             self.state[3:] = np.clip(self.state[3:], -self._most, self._most)
         return size
 

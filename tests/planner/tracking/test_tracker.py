@@ -256,6 +256,21 @@ def differences(estimate: Estimate, seen: Callable[[], np.ndarray]) -> np.ndarra
     return np.array(columns).T
 
 
+def test_the_covariance_stays_one_over_many_exact_poses() -> None:
+    """Rounding must not make it asymmetric or negative; an estimate of the best poses is the first to fail."""
+    estimate = Estimate(planned(), TrackerGuidance(planned()), (0.003, 0.003))
+    for flip in range(300):
+        dwell = Dwell(0.0, 1 if flip % 2 == 0 else -1, 1.1, 1.1)
+        for when in (0.3, 0.7, 1.1):
+            seen = estimate.seen_from(when, dwell, [])
+            assert seen is not None
+            estimate.update((0.0, 0.0, 0.0), seen[1], math.inf)
+        estimate.advance(dwell)
+    asymmetry = np.abs(estimate.covariance - estimate.covariance.T).max()
+    assert asymmetry < 1e-12 * np.abs(estimate.covariance).max()
+    assert np.linalg.eigvalsh(estimate.covariance).min() > 0
+
+
 @pytest.mark.parametrize("when", [3.4, 2.8, 1.0, 0.2])
 def test_derivatives_of_an_expected_pose(estimate: Estimate, when: float) -> None:
     expected = estimate.seen_from(when, NOW, PAST)
