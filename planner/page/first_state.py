@@ -104,7 +104,10 @@ def _rounded(value: float, towards: Any) -> float:
 def shapes_of(turn_radius: float, paths: Sequence[NamedPath]) -> list[dict[str, Any]]:
     """Return the shapes that the page offers; `turn_radius` [m] sets their first size [cm]."""
     size = _rounded(100 * _TURNS * turn_radius, math.ceil)
-    given = [{"name": name, "points": np.round(100 * path.points, 8).tolist(), "closed": path.closed} for name, path in paths]
+    given = [
+        {"name": name, "points": np.round(100 * path.points, 8).tolist(), "closed": path.closed}
+        for name, path in paths
+    ]
     return [
         *given,
         {"name": "circle", "words": "circle", "size": size, "sizeWords": "Radius"},
