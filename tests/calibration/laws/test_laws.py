@@ -94,6 +94,8 @@ def test_a_law_is_found_at_its_place_with_its_exponents(name: str, places: tuple
         assert low - margin / 2 < true < high + margin / 2
     assert law.error < min(0.7 * described.error_without, 1.2 * described.noise)
     assert "described by" in described.sentence
+    speeds = toy_table(4)["omega_rpm"].abs()
+    assert law.to_dict()["runs"]["omega_rpm"] == pytest.approx([speeds.min(), speeds.max()])
     robot = robot_with_law(START, law, law.fit.parameters)  # it moves as the fit says
     runs, place_of_run = law.model.robots(law.fit.parameters)
     for row in (0, 17):
