@@ -161,7 +161,8 @@ def answer(verdict: Verdict, case: Case) -> str:
         return "named"
     if not claimed:
         return "silent"
-    sure = [c for c in verdict.explaining if not c.uncertain]
+    in_form = set(verdict.in_form_only)  # "something in form like"
+    sure = [c for c in verdict.explaining if not (c.uncertain or in_form & {e.name for e in c.claimed})]
     return "wrong" if len(sure) == len(verdict.explaining) == 1 or not claims else "warned"
 
 
