@@ -167,6 +167,9 @@ def test_a_camera_that_turns_on_a_day_is_named_whether_that_day_is_held_out_or_f
     assert (record["number"], record["where"]) == ("course_zero", f"in session day {day}")
     assert abs(record["change"]) == pytest.approx(math.radians(turn), abs=0.2)
     assert words.startswith(f"zero of the course in session day {day} is")
+    stated = re.search(r"is ([\d.]+) ° \(", words)
+    assert stated
+    assert float(stated[1]) == pytest.approx(math.degrees(abs(record["change"])), rel=0.05)
 
 
 @pytest.mark.rest
