@@ -11,25 +11,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from calibration.attribution.claim_checks import NumberCheck
 from calibration.attribution.moves import StatedMove
 from calibration.attribution.nearest import Nearest
 from calibration.attribution.refits import Candidate, Rival
 from calibration.attribution.wrong_numbers import wrong_number
+from calibration.laws.laws import Laws
 from calibration.statistics.fit import Fit, Pull
 from calibration.statistics.residual_regression import Regression
 from calibration.statistics.residual_tests import Directions, Misfit
 from calibration.statistics.statistical_model import Experiment, Runs
 from calibration.statistics.study import FinalRefit, Split, count_of_rows, summary_of_excluded
+from calibration.swimmer.head_correction import HeadCorrection
 from calibration.verdict.next_runs import Batch, Explanation, NextRun
 from calibration.verdict.record import facts
 from calibration.words.render import errors_in_words, sentence
-
-if TYPE_CHECKING:
-    from calibration.laws.laws import Laws
-    from calibration.swimmer.head_correction import HeadCorrection
 
 _DISAGREES = 0.01  # p of the held-out runs below which they do not agree with the final model
 _LONGEST = 500  # letters of a sentence in a repr
