@@ -264,6 +264,8 @@ def test_an_opened_path_is_smoothed(page: Any, tmp_path: Path) -> None:
     assert advised, refusal
     unfold(page)
     page.fill("#smooth", advised[1])
+    page.locator("#smooth").blur()
+    assert page.locator("body").get_attribute("data-busy") == "0"  # nothing is planned anew, so the button stays
     page.get_by_role("button", name="Smooth this path").click()
     page.locator("#path-problem").wait_for(state="hidden")
     assert "dwells: if the coefficients are exact, 95 of 100" in planned(page)
