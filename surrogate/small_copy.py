@@ -35,15 +35,14 @@ from surrogate.domain import ROBOT
 from surrogate.errors import COMPARED, RESPONSE_OUTPUTS, error_scale, relative_errors
 from surrogate.interface import LookupTable
 from surrogate.motions import WrenchTable
-from surrogate.network import Ensemble
-from surrogate.response import Basis, memory_at_equal_dwells, put_flips
+from surrogate.network import SHARED, Ensemble
+from surrogate.response import Basis, put_flips
 from surrogate.table import NeuralTable
 from surrogate.table_file import trained_table
 from surrogate.training.simulated import draw_robots
 
 MAX_BYTES = 150_000
 NETWORKS = ("one_tail", "two_tails", "more_tails", "gap", "lag", "memory")
-EXACT = ("shift", "scale", "mean", "spread")  # in single precision always
 _TRIED, _SEED = 4096, 20
 _VECTORS = 48
 _MAX_COMPONENTS = 30  # of the curves
@@ -172,14 +171,16 @@ def _arrays(
 ) -> Arrays:
     """Return the numbers of a network of one member, without the axis of members; the first `outputs` only.
 
+    What members share is in single precision always.
+
     Args:
         last_exact: its last layer is in single precision in any case.
     """
     last = [f"{kind}.{network.shape['depth']}" for kind in ("weights", "biases")]
-    exact = (*EXACT, *last) if last_exact else EXACT
+    exact = (*SHARED, *last) if last_exact else SHARED
     arrays: Arrays = {}
     for part, array in network.state.items():
-        values = array if part in EXACT else array[0]
+        values = array if part in SHARED else array[0]
         if part in ("bypass", "mean", "spread", *last):
             values = values[..., :outputs]
         kind = np.float16 if half and part not in exact else np.float32
@@ -189,17 +190,14 @@ def _arrays(
 
 def _curve_arrays(table: NeuralTable) -> Arrays:
     """Return networks and curves of the response to flips with equal dwells."""
-    lag, memory = table.curves.bases["lag"], table.curves.bases["memory"]
-    count = min(len(lag.vectors), len(memory.vectors), _MAX_COMPONENTS)
+    mean, vectors = table.curves.equal_dwells
+    of_lag = len(table.curves.bases["lag"].vectors)
+    count = min(of_lag, len(vectors) - of_lag, _MAX_COMPONENTS)
     arrays: Arrays = {}
     for name, network in zip(NETWORKS[4:], table.curves.networks[:2], strict=True):
         arrays |= _arrays(name, network.member(0), half=True, outputs=count)
-    vectors = np.concatenate([lag.vectors[:count], memory_at_equal_dwells(memory.vectors[:count])])
-    mean = lag.mean + memory_at_equal_dwells(memory.mean[None])[0]
-    return arrays | {
-        "curves.mean": mean.astype(np.float32),
-        "curves.basis": vectors.astype(np.float16),
-    }
+    kept = np.concatenate([vectors[:count], vectors[of_lag : of_lag + count]])
+    return arrays | {"curves.mean": mean.astype(np.float32), "curves.basis": kept.astype(np.float16)}
 
 
 def network_depth(arrays: Arrays, name: str) -> int:
@@ -210,7 +208,7 @@ def _network(arrays: Arrays, name: str) -> Ensemble:
     """Return the network of a name, in double precision."""
     state = {part.removeprefix(f"{name}."): array.astype(float) for part, array in arrays.items()
              if part.startswith(f"{name}.")}  # fmt: skip
-    return Ensemble.from_state({part: value if part in EXACT else value[None] for part, value in state.items()})
+    return Ensemble.from_state({part: value if part in SHARED else value[None] for part, value in state.items()})
 
 
 READERS = Path(__file__).parent / "readers"
@@ -282,7 +280,7 @@ def weights_header(table: NeuralTable, small: SmallCopy, losses: Mapping[str, Ma
         inputs, outputs = arrays[f"{name}.bypass"].shape
         width = arrays[f"{name}.weights.0"].shape[1]
         half, half_last = (int(arrays[f"{name}.weights.{k}"].dtype == np.float16) for k in (0, layer_count))
-        exact = ", ".join(prefix + part for part in EXACT)
+        exact = ", ".join(prefix + part for part in SHARED)
         layers = [
             ", ".join(f"{prefix}{part}_{i}" for i in range(layer_count + 1)) for part in ("weights", "biases")
         ]
