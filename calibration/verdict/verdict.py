@@ -141,10 +141,10 @@ class Verdict:
     caveats: tuple[str, ...]  # what weakens the conclusion, in words
 
     def __repr__(self) -> str:
-        said = self.sentence
+        record = facts(self)
+        said, names = sentence(record), ", ".join(self.effects)
         said = said if len(said) <= _LONGEST else f"{said[:_LONGEST]} …"
-        names = ", ".join(self.effects)
-        return f"Verdict {self.verdict!r}{f': {names}' if names else ''}\n  {said}\n  {self.errors_in_words}"
+        return f"Verdict {self.verdict!r}{f': {names}' if names else ''}\n  {said}\n  {errors_in_words(record)}"
 
     @property
     def sentence(self) -> str:
