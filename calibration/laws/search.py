@@ -67,6 +67,12 @@ from sim.model.power_law import STEEPEST
 _AT_ONCE = 25  # residuals
 _PASSES = 3  # iterations for the scatter of the sessions
 _ABSORBED = 1e-6  # of a column's square, added to it: what is left of one that others explain is rounding
+_POWERS_AT_START = 2.0  # largest exponent with which a fit starts
+_MOST_INPUTS = 3  # of one law
+_NULL_DRAWS = 999  # tables without a law
+_LAW_DRAWS = 400  # tables with one
+_COVERED = 0.95
+_GAMMA = 1.0  # of EBIC
 
 
 @dataclass(frozen=True)
@@ -145,14 +151,6 @@ class LinearModels:
             weights[:, which[:, None], chosen] = step
             errors[:, which[:, None], chosen] = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
         return LinearFits(gain, weights, errors, share, base_share[:, 0])
-
-
-_POWERS_AT_START = 2.0  # largest exponent with which a fit starts
-_MOST_INPUTS = 3  # of one law
-_NULL_DRAWS = 999  # tables without a law
-_LAW_DRAWS = 400  # tables with one
-_COVERED = 0.95
-_GAMMA = 1.0  # of EBIC
 
 
 @dataclass(frozen=True)
