@@ -190,9 +190,12 @@ def _finished(figure: Figure, **legend: Any) -> Figure:
     return figure
 
 
-def plain_logarithms(axis: Axis) -> None:
-    """Label a logarithmic axis with a few plain numbers (1, 2, 5, 10, …)."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
+def plain_logarithms(axis: Axis, multiples: Sequence[float] = (1.0, 2.0, 5.0)) -> None:
+    """Label a logarithmic axis with a few plain numbers: `multiples` of 1, 10, ….
+
+    A narrow axis over more than two decades has room for the powers of ten alone.
+    """
+    axis.set_major_locator(LogLocator(subs=multiples, numticks=8))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
     axis.set_minor_locator(NullLocator())

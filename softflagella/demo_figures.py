@@ -221,7 +221,7 @@ def draw_parity(simulated: pd.DataFrame, predicted: pd.DataFrame) -> list[tuple[
         ends = [np.nanmin(truth), np.nanmax(truth)]
         axes.plot(ends, ends, color=INK, lw=0.7)
         if name == "omega_yr_rad_s":
-            _logarithmic(axes)
+            _logarithmic(axes, (1.0,))
         off = np.abs(answer - truth)
         error = f"{np.nanmedian(off):.1g}°" if name == "theta_deg" else f"{100 * np.nanmedian(off / truth):.1g} %"
         _label(axes, f"simulated {words} [{unit}]", f"look-up table [{unit}]")
@@ -231,11 +231,11 @@ def draw_parity(simulated: pd.DataFrame, predicted: pd.DataFrame) -> list[tuple[
     return figures
 
 
-def _logarithmic(axes: Axes) -> None:
+def _logarithmic(axes: Axes, multiples: Sequence[float] = (1.0, 2.0, 5.0)) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
-    plain_logarithms(axes.xaxis)
-    plain_logarithms(axes.yaxis)
+    plain_logarithms(axes.xaxis, multiples)
+    plain_logarithms(axes.yaxis, multiples)
 
 
 def _label(axes: Axes, x: str, y: str) -> None:
