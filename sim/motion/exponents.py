@@ -45,11 +45,12 @@ class Leading(NamedTuple):
 
 def leading_exponent(body: Body, tails: int, x: Floats, u: Floats) -> Leading:
     """Find it for an orbit x (n, M, 3), u (P, 4) of N tails; the growth is NaN if none has converged."""
-    omega_t, found = mean_motion(body, u)[0], exponents(body, tails, x, u)
+    means, found = mean_motion(body, u), exponents(body, tails, x, u)
     if not len(found):
         return Leading(np.nan, np.nan, tails)
+    omega_t = means[0]
     copies = found[found.real > found.real.max() - _SAME * abs(omega_t)]
     largest = copies[np.argmin(np.abs(copies.imag))]
     turns = abs(largest.imag / omega_t) % tails
-    growth = in_motor_revolutions(found.real.max(), body, u)
+    growth = float(in_motor_revolutions(found.real.max(), means))
     return Leading(growth, float(min(turns, tails - turns)), tails)

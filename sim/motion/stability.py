@@ -83,7 +83,7 @@ def growths_on_more_phases(rows: Floats, tails: int, orbits: Sequence[Orbit]) ->
     u = with_phases(np.stack([orbit.u[2] for orbit in orbits]), instants)
     solved = solve_orbits_in_place(rows, x, u, ROUGH) < ROUGH
     rates = np.array([values.real.max(initial=-np.inf) for values in _exponents(rows, tails, x, u)])
-    growth = _in_motor_revolutions(rates, mean_motion(batch(rows), u))
+    growth = in_motor_revolutions(rates, mean_motion(batch(rows), u))
     return np.where(solved & np.isfinite(growth), growth, np.nan)
 
 
@@ -186,12 +186,7 @@ def _exponents_with_residuals_below(limit: float, projected: Floats, shift: floa
     return np.asarray(shift + 1 / values)
 
 
-def in_motor_revolutions(exponent: float, body: Body, u: Floats) -> float:
-    """Convert a growth in a unit of time to that in one motor revolution, on an orbit with velocities u (P, 4)."""
-    return float(_in_motor_revolutions(exponent, mean_motion(body, u)))
-
-
-def _in_motor_revolutions(exponents: Any, means: Floats) -> Any:
+def in_motor_revolutions(exponents: Any, means: Floats) -> Any:
     """Convert growths (…) in a unit of time to those in one motor revolution, for orbits with `means` (…, 5)."""
     return 2 * np.pi * exponents / np.abs(means[..., 0] - means[..., 1])
 
