@@ -310,10 +310,8 @@ def _judged(
     if not spread and low <= effect.start <= high:
         return None
     leaves = math.sqrt(max(float((after**2).sum()) / values - 1, 0.0))
-    noise = math.sqrt(float(np.trace(fitted.noise.run)) / len(fitted.noise.run))
-    return Nearest(
-        effect, model, fitted, spread, b, (low, high), sizes, gain, error, min(removed, 1.0), leaves * noise
-    )
+    left = leaves * fitted.noise.rms
+    return Nearest(effect, model, fitted, spread, b, (low, high), sizes, gain, error, min(removed, 1.0), left)
 
 
 def _differs_from_null(study: Study, model: Shifted, fitted: Fit, seen: Integers) -> bool:

@@ -157,8 +157,7 @@ class RobotLaws:
     @property
     def noise(self) -> float:
         """Relative error that the noise of a run makes."""
-        run = self.base.noise.run
-        return float(np.sqrt(np.trace(run) / len(run)))
+        return self.base.noise.rms
 
     def to_frame(self) -> pd.DataFrame:
         """Tabulate the laws that were fitted, the largest gain first."""

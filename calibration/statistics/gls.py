@@ -50,6 +50,11 @@ class Noise:
     run: Floats  # S: covariance (k, k) of a run
     share: Floats | float  # ρ: variance of a session over that of a run, of each output (k,) or of all
 
+    @property
+    def rms(self) -> float:
+        """Standard deviation of a run, root mean square over the outputs."""
+        return float(np.sqrt(np.trace(self.run) / len(self.run)))
+
     def whitener(self, session: Integers, scale: Floats | None = None) -> Callable[[Floats], Floats]:
         """Make Σ^−½, which flattens (n, k, ...) to (n k, ...), for runs of `session` (n,).
 

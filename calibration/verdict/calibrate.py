@@ -29,8 +29,6 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-import numpy as np
-
 from calibration.attribution.claim_checks import check_number, with_checks
 from calibration.attribution.moves import Move, StatedMove, find_moves, groups_that_may_differ
 from calibration.attribution.nearest import adopt_nearest
@@ -359,12 +357,11 @@ def _errors(
         with suppress(InputError):  # the simulation may break down at the mean size
             predictions["new_specimen"] = found.nearest.of_new_specimen()
     stated = {name: errors(runs, prediction, test) for name, prediction in predictions.items()}
-    noise = base.noise.run
     return HeldOutErrors(
         rms={name: rms for name, (rms, _) in stated.items()},
         by_output={name: each for name, (_, each) in stated.items()},
         after_interval=error_interval(runs, final.prediction, test, study.seed),
-        noise=float(np.sqrt(np.trace(noise) / len(noise))),
+        noise=base.noise.rms,
         p_value=held_out_p_value(final, runs, test, seed=study.seed + 3),
     )
 
