@@ -87,32 +87,27 @@ def growths_on_more_phases(rows: Floats, tails: int, orbits: Sequence[Orbit]) ->
     return np.where(solved & np.isfinite(growth), growth, np.nan)
 
 
-def _projected(rows: Floats, tails: int, x: Floats, u: Floats, shifts: Floats, count: int) -> Floats:
-    """Project with at most `count` vectors, see `_project`."""
-    first = first_perturbation(tails, *x.shape[1:3])
-    return _project(rows, x, u, shifts, first, min(count, first.size - 1))
-
-
-def _project(rows: Floats, x: Floats, u: Floats, shifts: Floats, first: Floats, count: int) -> Floats:
+def _projected(rows: Floats, tails: int, x: Floats, u: Floats, shifts: Floats, most: int) -> Floats:
     """Project −(J + s B)⁻¹ B on a Krylov space for each of B robots.
 
     Args:
         rows: the robots' numbers (`sim.solve.assembly.numbers`), (B, K'); all motors have one sense.
+        tails: N.
         x, u: the orbits, (B, n, M, 3) and (B, P, 4).
         shifts: s, above 0, (B,).
-        first: first vector of all robots, (n, M, 3).
-        count: number of vectors K, fewer than the 3 n M unknowns.
+        most: largest number of vectors K; they are fewer than the 3 n M unknowns.
 
     Returns:
         The Hessenberg matrices with the parts of their last vectors outside the space, (B, K + 1, K).
     """
+    first = first_perturbation(tails, *x.shape[1:3]).ravel()
+    count = min(most, first.size - 1)
     by_phase = _damped_differentiation(x.shape[2], float(np.sign(rows[0, 0])))
     shapes, wanted = in_groups(_without_highest(x)), wanted_lanes(np.ones(len(rows), bool))
     projected = np.zeros((len(shapes), count + 1, count, shapes.shape[-1]))
-    first = first.ravel() / np.linalg.norm(first)
     arnoldi(
-        in_groups(rows), NAMES, shapes, in_groups(u), in_groups(shifts), by_phase, first, wanted, projected,
-        group_width(),
+        in_groups(rows), NAMES, shapes, in_groups(u), in_groups(shifts), by_phase, first / np.linalg.norm(first),
+        wanted, projected, group_width(),
     )  # fmt: skip
     return from_groups(projected, len(rows))
 
@@ -142,7 +137,7 @@ def largest_growths(projected: Floats, omega_t: Floats, omega_h: Floats) -> Floa
     DOUBTFUL, only eigenvalues larger than their residuals count.
 
     Args:
-        projected: Hessenberg matrices, see `_project`, (B, K + 1, K).
+        projected: Hessenberg matrices, see `_projected`, (B, K + 1, K).
         omega_t, omega_h: mean spins of the orbits, (B,).
 
     Returns:
