@@ -17,7 +17,7 @@ from planner.jobs.separation import Approach, Scheduled, approach, instants
 from planner.planning.picture import draw_regions, label_points
 from planner.planning.plan import Plan
 from sim.arrays import Floats
-from sim.io.notebook import as_html
+from sim.io.notebook import as_html, given_axes
 from sim.io.units import column_units, format_length, format_time
 
 if TYPE_CHECKING:
@@ -166,8 +166,6 @@ class FleetPlan:
         Args:
             ax: default: axes of a new figure.
         """
-        from sim.io.notebook import given_axes
-
         axes = given_axes(ax)
         minutes = self.duration_s / 60
         interval = next((each for each in _INTERVALS_MIN if minutes / each <= _MARKS), minutes / _MARKS)

@@ -63,9 +63,7 @@ EARLY = 2.0  # how much earlier than the last time a late message may be; it is 
 CONFIRMED = 3
 AGREED = 6
 FLIPS = 4
-LARGEST_MISFIT = (
-    21.1  # squared size of a residual above which a pose does not agree: χ² with three degrees of freedom
-)
+LARGEST_MISFIT = 21.1  # squared size of a residual above which a pose disagrees: χ² of three degrees of freedom
 MODEL_NOISE = 0.005  # standard deviation of what the model adds to a pose in some dwells [l, rad]
 LARGEST_MEAN = 5.0  # mean squared size above which the poses are not those of this robot
 
