@@ -205,5 +205,5 @@ function checkBare(names, wanted, where, synonyms) {
   }
 }
 
-export { UNITS, findUnit, splitName, unitsOfKind, toSi, fromSi, formatLength, inLab, inTails, timeInLab };
+export { UNITS, findUnit, splitName, toSi, fromSi, formatLength, inLab, inTails, timeInLab };
 export { placeInLab, labColumns, timesOf, convertColumns };

@@ -180,4 +180,4 @@ async function answerTo({ id, what, content }) {
 
 globalThis.onmessage = ({ data }) => answerTo(data);
 
-export { service };
+export { pictured };

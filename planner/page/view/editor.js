@@ -198,4 +198,4 @@ function transformed(points, { right, up, scale, turn }) {
   });
 }
 
-export { closes, HANDLES, PathEditor, showCorners, transformed, WORDS };
+export { closes, PathEditor, showCorners, transformed, WORDS };

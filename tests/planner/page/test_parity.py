@@ -11,6 +11,7 @@ import pytest
 
 from planner.api import plan
 from planner.jobs.plan import make_plan
+from planner.page.first_state import first_plan
 from planner.paths.path import Path2D, circle, polygon
 from planner.paths.path_files import read_path
 from planner.planning.plan import Plan
@@ -30,7 +31,7 @@ from tests.planner.page.cases import (
     shipped,
     tracked_of,
 )
-from tests.planner.page.page_core import TABLE, answers, call, opened, page_options
+from tests.planner.page.page_core import EXACT, TABLE, answer, answers, call, check_near, opened, page_options
 from tests.planner.page.parity import refusal_of, without_digits
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
@@ -173,6 +174,20 @@ def test_plans(name: str) -> None:
     case = CASES[name]()
     (found,) = answers([plan_call(case)], left_out=["vehicle"])
     assert difference(numbers_of_page(found), numbers(python_plan(case))) <= ALIKE
+
+
+def test_the_plan_that_python_writes_along_has_the_names_and_numbers_of_the_page() -> None:
+    case = CASES["triangle, tip"]()
+    result = python_plan(case)
+    first = first_plan(result.drawn, result.tracked, result.request)
+    shown = answer("worker.js", "pictured", call(*plan_call(case)))
+    assert first is not None
+    shown["motion"], shown["samples"] = shown["motion"][:: shown["samples"]], 1  # one pose for each dwell
+    rounded = {"reference": 5e-4, "motion": 5e-4, "dwells": 5e-5}
+    assert first.keys() == shown.keys()
+    assert first.pop("warnings") == shown.pop("warnings")
+    for name, value in first.items():
+        check_near(value, shown[name], rounded.get(name, 0.0) + EXACT)
 
 
 REFUSED: list[tuple[Path2D, dict[str, Any]]] = [
