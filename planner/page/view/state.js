@@ -107,6 +107,7 @@ function addressOf(state, initial) {
 function fromAddress(text, initial, shapes) {
   if (text === "") return { state: initial, problem: "" };
   try {
+    if (text.split("&").includes("")) throw new Error("it is cut off or damaged");
     return { state: readState(new Map(new URLSearchParams(text)), initial, shapes), problem: "" };
   } catch (broken) {
     const problem = `The link cannot be read: ${broken.message}. The page shows its own first plan.`;

@@ -59,7 +59,7 @@ def test_an_unknown_or_broken_address_gives_the_first_state_and_says_so() -> Non
     initial = first()
     broken = ["v=2", "rubbish", "v=1&points=1.", "v=1&points=2.3", "v=1&places=2,3", "v=1&places=2,3~4",
               "v=1&places=2,3~4,x", "v=1&path=heptagon%3A3", "v=1&C_t=x", "v=1&name=%E0%A4%A",
-              "v=1&path=circle%3A", "v=1&unknown=3", "v=1&C_t=none", "=",
+              "v=1&path=circle%3A", "v=1&unknown=3", "v=1&C_t=none", "=", "v=1&&",
               "v=1&path=squre%3A3"]  # fmt: skip
     read = answers([("view/state.js", "fromAddress", address, initial, SHAPES) for address in broken])
     for entry in read:
