@@ -271,6 +271,8 @@ def _replay(
 
     if out is None and shapes is None:
         raise InputError("name a file: --out for the track, or --shapes for the shapes")
+    if every is not None and shapes is None:
+        raise InputError("--every is the time between shapes; name their file with --shapes")
     planned, swimmer = load_schedule(plan), None if robot is None else load_robot(robot)
     schedule = planned if swimmer is None else planned.swum_by(swimmer)
     shown: Any = {"unit": "dwell", "delay": BAR_AFTER, "disable": None}  # None: shown on a terminal alone

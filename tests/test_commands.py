@@ -20,7 +20,7 @@ from dataset.build import build
 from dataset.design import Axis, load_design
 from planner.files.saved_plan import load_plan
 from sim.inputs import load_robot
-from sim.io.errors import run_command
+from sim.io.errors import InputError, run_command
 from sim.io.units import format_time
 from sim.model.plan_file import plan_id
 from sim.model.presets import PRESETS
@@ -93,6 +93,8 @@ def planner_replay(made: Path, out: Path) -> str:
     done("planner", "replay", short_plan(made, out), "--out", out / "track.csv", "--shapes", out / "shapes.npz")
     track, last = pd.read_csv(out / "track.csv"), np.load(out / "shapes.npz")["head_position"][-1]
     assert 100 * last[:2] == pytest.approx(track[["x_cm", "y_cm"]].iloc[-1], abs=0.02)
+    with pytest.raises(InputError, match="name their file with --shapes"):
+        main(["planner", "replay", str(out / "short.json"), "--out", str(out / "t.csv"), "--every", "1"])
     dwells = json.loads((out / "short.json").read_text())["dwell_bar"]
     assert track["time_bar"].iloc[-1] == pytest.approx(sum(dwells), rel=1e-6)
     assert sorted(set(track["direction"])) == [-1, 1]
