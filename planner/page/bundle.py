@@ -18,7 +18,7 @@ FOLDER = Path(__file__).parent
 _NAMES = r"\{ (\w+(?:, \w+)*) \}"
 _IMPORT = re.compile(rf'^import {_NAMES} from "(\.\.?/[\w./]+\.js)";$', re.MULTILINE)
 _EXPORT = re.compile(rf"^export {_NAMES};$", re.MULTILINE)
-_COMMENT = re.compile(r"^[ ]*/\*.*?\*/[ ]*\n", re.MULTILINE | re.DOTALL)  # that begins its line
+_LEFT_OUT = re.compile(r"^[ ]*/\*.*?\*/[ ]*\n|^[ ]+", re.MULTILINE | re.DOTALL)  # comments and indents
 _OTHER = re.compile(r"^\s*(?:import|export)\b.*$", re.MULTILINE)
 
 
@@ -31,7 +31,7 @@ class Module(NamedTuple):
 
 
 def read_module(path: Path) -> Module:
-    """Read a module and take its imports, exports and comments off.
+    """Read a module and take its imports, exports, comments and indents off.
 
     Raises:
         ValueError: an import or an export is not in the form that can be joined.
@@ -42,7 +42,7 @@ def read_module(path: Path) -> Module:
         for names, source in _IMPORT.findall(text)
     )
     exports = _EXPORT.findall(text)
-    body = _COMMENT.sub("", _EXPORT.sub("", _IMPORT.sub("", text)))
+    body = _LEFT_OUT.sub("", _EXPORT.sub("", _IMPORT.sub("", text)))
     other = _OTHER.search(body)
     if other:
         line = other.group().strip()

@@ -62,6 +62,7 @@ def write_page(
     why = _locked(robot, lookup, known)
     shapes = shapes_of(tracked.vehicle.turn_radius * robot.length_scale, paths)
     first = paths[0].path if paths else circle(shapes[0]["size"] / 100)
+    plan = first_plan(first.scaled(1 / robot.length_scale), tracked, request)
     data = {
         "robots": robots_of(robot)[: 1 if why else None],
         "limits": slider_ends(robot, lookup.domain),
@@ -70,7 +71,7 @@ def write_page(
             "robot": robot.name,
             "shape": shapes[0]["name"],
             "options": first_options(request, robot, smooth),
-            "plan": first_plan(first.scaled(1 / robot.length_scale), tracked, request),
+            "plan": plan and packed_bytes(json.dumps(plan, separators=(",", ":"), allow_nan=False).encode()),
         },
         "locked": {"name": robot.name, "why": why} if why else None,
         "planner": {

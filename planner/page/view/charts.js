@@ -1,12 +1,12 @@
 /* Small charts: dwells over time, and error over time of a measured track. Drawn in pixels. */
 import { largest } from "../math.js";
-import { digits, figure } from "./dom.js";
+import { digits, duration, figure } from "./dom.js";
 import { lineData } from "./scene.js";
 
-const EDGE = { left: 46, right: 10, top: 10, bottom: 18 };
+const EDGE = { left: 46, right: 10, top: 18, bottom: 18 };
 
 /* Draw values over time as a line; `steps` holds each value until the next time. Return the pixel of a time. */
-function chart(svg, { times, values, words, unit, limit = null, steps = false }) {
+function chart(svg, { times, values, words, limit = null, steps = false }) {
   const width = svg.clientWidth || 600, height = svg.clientHeight || 64;
   const first = times[0], span = Math.max(times[times.length - 1] - first, 1e-12);
   const high = Math.max(limit ?? 0, largest(values)) || 1;
@@ -15,21 +15,19 @@ function chart(svg, { times, values, words, unit, limit = null, steps = false })
   const points = steps
     ? values.flatMap((value, i) => [[x(times[i]), y(value)], [x(times[i + 1]), y(value)]])
     : values.map((value, i) => [x(times[i]), y(value)]);
+  const text = (left, down, anchor, said) => figure("text", { x: left, y: down, "text-anchor": anchor }, said);
+  const level = (kind, value, dashes = "none") => {
+    return figure("path", { class: kind, d: `M${EDGE.left},${y(value)}H${width - EDGE.right}`, "stroke-dasharray": dashes });
+  };
   svg.replaceChildren(
-    figure("path", {
-      class: "grid", d: `M${EDGE.left},${y(0)}H${width - EDGE.right}M${EDGE.left},${y(high)}H${width - EDGE.right}`,
-    }),
+    level("grid", 0), level("grid", high),
     figure("path", { class: "curve", d: lineData(points) }),
-    figure("text", { x: EDGE.left - 4, y: y(high) + 4, "text-anchor": "end" }, digits(high, 2)),
-    figure("text", { x: EDGE.left - 4, y: y(0) + 4, "text-anchor": "end" }, "0"),
-    figure("text", { x: EDGE.left, y: height - 4 }, `${words} [${unit}]`),
+    text(EDGE.left - 4, y(high) + 4, "end", digits(high, 2)), text(EDGE.left - 4, y(0) + 4, "end", "0"),
+    text(EDGE.left, 12, "start", words), text(EDGE.left, height - 4, "start", duration(first)),
+    text((EDGE.left + width - EDGE.right) / 2, height - 4, "middle", "time"),
+    text(width - EDGE.right, height - 4, "end", duration(times[times.length - 1])),
+    ...(limit === null ? [] : [level("now", limit, "5 4")]),
   );
-  if (limit !== null)
-    svg.append(
-      figure("path", {
-        class: "now", d: `M${EDGE.left},${y(limit)}H${width - EDGE.right}`, "stroke-dasharray": "5 4",
-      }),
-    );
   return x;
 }
 

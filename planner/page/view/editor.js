@@ -12,6 +12,7 @@ const WORDS = {
   move: "Drag or use arrow keys to move the picture; wheel, pinch, plus and minus zoom.",
   draw: "Draw a path with one stroke. Where it ends near its start, it is closed.",
   corners: "Click to add a corner, drag to move one, double-click to remove one.",
+  many: "Its points are too many to be moved: click to begin a new path, corner by corner.",
 };
 
 class PathEditor {
@@ -43,6 +44,11 @@ class PathEditor {
   /* The corners that can be moved: those of a new path, or of a path that has few. */
   get corners() {
     return this.begun ?? (this.path.points.length <= HANDLES ? this.path.points : []);
+  }
+
+  /* What the pointer does, in words. */
+  get words() {
+    return WORDS[this.mode === "corners" && !this.begun && this.path.points.length > HANDLES ? "many" : this.mode];
   }
 
   /* Whether the corners are those of the path. */
@@ -198,4 +204,4 @@ function transformed(points, { right, up, scale, turn }) {
   });
 }
 
-export { closes, PathEditor, showCorners, transformed, WORDS };
+export { closes, PathEditor, showCorners, transformed };

@@ -29,8 +29,8 @@ function textOf(bytes, name) {
   }
 }
 
-/* What is wrong with the last file, beside the part of the page that it is for; the next file takes it away. */
-class FileProblem {
+/* What is wrong with the last file or link, beside the part of the page that it is for; the next one takes it away. */
+class Problem {
   constructor() {
     this.place = null;
     this.words = "";
@@ -117,4 +117,4 @@ function inUnit({ points, closed, name }, scale) {
   return { points: points.map((point) => point.map((value) => value * scale)), closed, name };
 }
 
-export { askUnit, drawingTree, FileProblem, oneFile };
+export { askUnit, drawingTree, oneFile, Problem };

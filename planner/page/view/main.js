@@ -4,8 +4,8 @@ import { runningSum, sum } from "../math.js";
 import { inPage } from "../words.js";
 import { chart, marker, tradeOff } from "./charts.js";
 import { byId, element, pictureText, save, say } from "./dom.js";
-import { PathEditor, showCorners, WORDS } from "./editor.js";
-import { askUnit, FileProblem, oneFile } from "./files.js";
+import { PathEditor, showCorners } from "./editor.js";
+import { askUnit, oneFile, Problem } from "./files.js";
 import { connect, RobotForm, showMotion, showResults, summary } from "./panels.js";
 import { PlanView } from "./plan_view.js";
 import { PlannerClient } from "./planner_client.js";
@@ -37,21 +37,20 @@ class Page {
     this.initial = this.firstState();
     this.plan = null;
     this.track = null;
-    this.fileProblem = new FileProblem();
+    this.fileProblem = new Problem();
+    this.linkProblem = new Problem(); // until the next change
     this.runs = new Runs((content, use) => this.ask("runs", content, use), () => this.saveFile("robot.toml"));
     this.timer = null;
     this.questions = 0; // that are not answered
-    this.notice = ""; // about the link, until the next change
   }
 
-  /* Read the address, connect the controls, and plan. */
-  start() {
+  /* Read the address, connect the controls, and plan; show the first plan that Python has made, if there is one. */
+  start(plan) {
     const { state, problem } = this.address();
     this.history = new History(state);
-    this.notice = problem;
+    this.linkProblem.tell("path", problem);
     connect(this);
     this.refresh();
-    const { plan } = this.data.first; // that Python has made
     if (plan && state === this.initial) this.planned({ answer: plan }, this.wish());
     this.planNow();
   }
@@ -84,7 +83,7 @@ class Page {
   }
 
   change(part, kind = null) {
-    this.notice = "";
+    this.linkProblem.tell("path", "");
     if (this.history.change({ ...this.state, ...part }, kind)) this.refresh(kind !== null);
   }
 
@@ -105,7 +104,7 @@ class Page {
       const control = byId(key);
       if (control !== document.activeElement) control.value = options[key] ?? "";
     }
-    this.offerNext();
+    this.hint();
     byId("undo").disabled = this.history.past.length === 0;
     byId("redo").disabled = this.history.future.length === 0;
     if (!more) this.writeAddress();
@@ -133,10 +132,11 @@ class Page {
   }
 
   pathDrawn(answer) {
-    say(byId("path-problem"), answer.refusal ?? this.notice, true);
+    say(byId("path-problem"), answer.refusal ?? this.linkProblem.words, true);
     if (answer.refusal) return;
     this.drawn = answer.answer;
     this.editor.take(answer.answer.corners);
+    this.hint();
     byId("close").textContent = this.drawn.closed ? "Part the ends" : "Join the ends";
     showCorners(byId("corner-table"), this.editor.path.points, (points) =>
       this.setPoints(points, this.drawn.closed),
@@ -222,8 +222,7 @@ class Page {
     say(byId("message"), summary(this.plan));
     showResults(this.plan, byId("tails").checked);
     this.scale = chart(byId("strip"), {
-      times: runningSum(this.plan.dwells), values: [...this.plan.dwells], words: "dwell from flip to flip, over time", unit: "s",
-      steps: true,
+      times: runningSum(this.plan.dwells), values: [...this.plan.dwells], words: "dwell [s]", steps: true,
     });
     this.player.take(this.plan, again);
     this.show();
@@ -364,16 +363,16 @@ class Page {
   newAddress() {
     const { state, problem } = this.address();
     this.change(state);
-    this.notice = problem;
-    say(byId("path-problem"), problem, true);
+    this.linkProblem.tell("path", problem);
   }
 
   step(way) {
     if (this.history[way]()) this.refresh();
   }
 
-  /* Offer what most people do next. */
-  offerNext() {
+  /* Say what the pointer does, and offer what most people do next. */
+  hint() {
+    say(byId("mode-words"), this.editor.words);
     const draw = this.editor.mode === "draw" ? "Draw one stroke in the picture" : "Draw your own path";
     byId("next").textContent = this.state.path.points ? "Save the schedule" : draw;
   }
@@ -381,8 +380,7 @@ class Page {
   mode(name, anew = false) {
     this.editor.use(name, anew);
     byId("view").dataset.mode = name;
-    say(byId("mode-words"), WORDS[name]);
-    this.offerNext();
+    this.hint();
     this.view.place();
   }
 }
@@ -402,5 +400,10 @@ function shown(plan, robot) {
   };
 }
 
-inflated(byId("planner").textContent.trim()).text()
-  .then((planner) => new Page(JSON.parse(byId("data").textContent), planner).start());
+async function begin() {
+  const data = JSON.parse(byId("data").textContent), packed = [byId("planner").textContent.trim(), data.first.plan];
+  const [planner, plan] = await Promise.all(packed.map((text) => text && inflated(text).text()));
+  new Page(data, planner).start(JSON.parse(plan));
+}
+
+begin();

@@ -1,6 +1,6 @@
 /* The large picture and its lens: layers, zoom, pan; by mouse, pen, finger and keyboard. */
 import { byId, figure } from "./dom.js";
-import { axes, fitted, flips, lensPlace, panned, placeAt, planLayers, poseTransform, robotShape } from "./scene.js";
+import { axesOf, fitted, flips, lensPlace, panned, placeAt, planLayers, poseTransform, robotShape } from "./scene.js";
 import { transform, viewport, zoomed } from "./scene.js";
 
 const LENS = 10; // times larger than the picture
@@ -24,9 +24,10 @@ class PlanView {
     this.layers = figure("g", { id: "scene" });
     this.flips = figure("g");
     this.robot = figure("g");
+    this.axes = figure("g");
     this.overlay = figure("g");
     this.scene.append(this.layers, this.flips, this.robot);
-    this.svg.append(this.grid, this.scene, this.overlay);
+    this.svg.append(this.grid, this.scene, this.axes, this.overlay);
     this.lensFlips = figure("g");
     this.lensScene = figure("g");
     this.lensScene.append(figure("use", { href: "#scene" }), this.lensFlips);
@@ -79,7 +80,9 @@ class PlanView {
     const lens = (this.lens.clientWidth || 200) + 2 * LENS_MARGIN;
     this.lensPlace = lensPlace(this.view, this.shown(), width, height, lens);
     this.scene.setAttribute("transform", transform(this.view));
-    this.grid.replaceChildren(axes(this.view, width, height));
+    const { grid, axes } = axesOf(this.view, width, height);
+    this.grid.replaceChildren(grid);
+    this.axes.replaceChildren(axes);
     const dots = this.content.plan ? flips(this.content.plan, this.view) : null;
     this.flips.replaceChildren(...(dots ? [dots] : []));
     this.overlay.replaceChildren(...(this.editor?.overlay(this.view) ?? []));

@@ -29,8 +29,7 @@ function showTrack(track, plan, tails, actions) {
   );
   byId("measured").replaceChildren(list, picture, buttons);
   chart(picture, {
-    times: error.times, values: error.distances, words: "distance from the path over time", unit: "cm",
-    limit: error.stated,
+    times: error.times, values: error.distances, words: "distance from the path [cm]", limit: error.stated,
   });
 }
 

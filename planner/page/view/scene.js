@@ -178,34 +178,29 @@ function poseTransform([x, y, heading]) {
   return `translate(${x} ${y}) rotate(${(heading * 180) / Math.PI})`;
 }
 
-/* Axes with ticks [cm], a grid, and a scale bar, for a picture of width × height pixels. */
-function axes(view, width, height, unit = "cm") {
-  const step = tickStep(view);
-  const group = figure("g", { class: "axes" });
+/* A grid, and the ticks [cm] and scale bar over it, for a picture of width × height pixels: {grid, axes}. */
+function axesOf(view, width, height) {
+  const step = tickStep(view), grid = figure("g"), axes = figure("g", { class: "axes" });
+  const text = (x, y, anchor, words) => axes.append(figure("text", { x, y, "text-anchor": anchor }, words));
   const right = (width - view.left) / view.scale, left = -view.left / view.scale;
   const up = view.top / view.scale, down = (view.top - height) / view.scale;
   for (const x of ticks(left, right, step)) {
     const [px] = pixelOf(view, [x, 0]);
-    group.append(figure("path", { class: "grid", d: `M${px},0V${height}` }));
-    if (px > 30 && px < width - 16) {
-      group.append(figure("text", { x: px, y: height - 6, "text-anchor": "middle" }, tickWords(x, step)));
-    }
+    grid.append(figure("path", { class: "grid", d: `M${px},0V${height}` }));
+    if (px > 30 && px < width - 56) text(px, height - 6, "middle", tickWords(x, step));
   }
   for (const y of ticks(down, up, step)) {
     const [, py] = pixelOf(view, [0, y]);
-    group.append(figure("path", { class: "grid", d: `M0,${py}H${width}` }));
-    if (py > 12 && py < height - 26) group.append(figure("text", { x: 4, y: py - 3 }, tickWords(y, step)));
+    grid.append(figure("path", { class: "grid", d: `M0,${py}H${width}` }));
+    if (py > 32 && py < height - 26) text(4, py - 3, "start", tickWords(y, step));
   }
   const bar = step * view.scale;
-  group.append(
-    figure("path", { class: "bar", d: `M${width - 16 - bar},${height - 30}v6h${bar}v-6` }),
-    figure(
-      "text", { x: width - 16 - bar / 2, y: height - 34, "text-anchor": "middle" },
-      `${tickWords(step, step)} ${unit}`,
-    ),
-  );
-  return group;
+  axes.append(figure("path", { class: "bar", d: `M${width - 16 - bar},${height - 30}v6h${bar}v-6` }));
+  text(width - 16 - bar / 2, height - 34, "middle", `${tickWords(step, step)} cm`);
+  text(width - 8, height - 6, "end", "x [cm]");
+  text(4, 16, "start", "y [cm]");
+  return { grid, axes };
 }
 
-export { acrossOf, axes, fitted, flips, lensPlace, lineData, panned, pixelOf, placeAt, planLayers, poseTransform };
+export { acrossOf, axesOf, fitted, flips, lensPlace, lineData, panned, pixelOf, placeAt, planLayers, poseTransform };
 export { robotShape, ticks, tickStep, tickWords, transform, viewport, zoomed };

@@ -14,7 +14,7 @@ from softflagella.__main__ import main
 from tests.planner.page.cases import planned as planned_by_python
 from tests.planner.page.page_core import answer
 from tests.planner.page.parity import without_digits
-from tests.planner.page.view.browser import drop, planned, text_of
+from tests.planner.page.view.browser import address_of, drop, planned, text_of, unfold
 
 OLD = "Picture and numbers are those of the last plan that could be made."
 HEADER = "time_s,x_cm,y_cm,heading_deg\n"
@@ -139,3 +139,15 @@ def test_a_bad_link_is_refused_with_a_reason(page: Any, link: str, place: str, w
     planned(page)
     assert words in text_of(page, f"#{place}-problem")
     assert page.locator("#scene .declared").count() == 1
+
+
+def test_what_is_wrong_with_a_link_is_told_until_the_next_change(page: Any) -> None:
+    """A change that plans nothing anew counts, too."""
+    page.evaluate("location.hash = 'v=1&path=cube%3A3'")
+    page.locator("#path-problem", has_text="The link cannot be read").wait_for()
+    planned(page)
+    unfold(page)
+    page.fill("#smooth", "2.5")
+    page.locator("#smooth").blur()
+    assert "smooth=2.5" in address_of(page)
+    assert not page.is_visible("#path-problem")

@@ -107,10 +107,11 @@ def test_a_circle_drawn_with_the_mouse_is_planned_and_its_files_are_those_of_the
 
 @pytest.mark.parametrize(("shape", "anew"), [("eight", False), ("square", True)])
 def test_corners_begin_a_new_path(page: Any, shape: str, anew: bool) -> None:
-    """A path of many points has no corners to add to, and one of few can be left."""
+    """A path of many points has no corners to add to, which is said, and one of few can be left."""
     page.select_option("#shape", shape)
     planned(page)
     page.click("#new" if anew else "[value=corners]")
+    assert ("too many to be moved" in text_of(page, "#mode-words")) == (not anew)
     x, y = middle_of(page)
     for right, down in ((-250, 100), (0, 60), (250, -60)):
         page.mouse.click(x + right, y + down)
