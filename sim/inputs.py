@@ -79,7 +79,7 @@ def run_columns(table: pd.DataFrame, robot: Robot, where: str) -> tuple[list[Rob
         InputError: there is no column of a run, or a run is not possible.
     """
     from sim.io.quantities import convert_columns, numbers_of  # these load pandas
-    from sim.io.text_tables import row_name
+    from sim.io.tables import row_name
 
     given = convert_columns(table, RUN, where, RUN_SYNONYMS).table
     if not set(RUN) & set(given):

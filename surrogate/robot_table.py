@@ -20,7 +20,7 @@ import numpy as np
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.files import write_text
-from sim.io.notebook import as_html, given_axes
+from sim.io.notebook import Shown, given_axes
 from sim.io.reading import ContentError, read_json
 from sim.model.response import DWELLS, Responses
 from sim.motion.net_speed import net_speeds, twists
@@ -39,7 +39,7 @@ _CURVES = {"lag": (2, len(DWELLS), 3), "memory": (2, -1, len(DWELLS), 3),
 
 
 @dataclass(frozen=True, repr=False)
-class RobotTable:
+class RobotTable(Shown):
     """Motion and response of one robot, with the interface of `surrogate.interface.LookupTable`.
 
     Curves are those of `sim.model.response`; index 0 is the positive direction of the motor, index 1 the reversed
@@ -112,9 +112,6 @@ class RobotTable:
             f"{DWELLS[0]:g} to {DWELLS[-1]:g} time units\n"
             f"  largest error {100 * error['rms']:.2g} % ({worst})"
         )
-
-    def _repr_html_(self) -> str:
-        return as_html(repr(self), self.plot)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the net speed over equal dwells, with a positive and a negative motor first.

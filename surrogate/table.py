@@ -24,7 +24,7 @@ from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.inputs import check_columns
 from sim.io.errors import InputError
-from sim.io.notebook import as_html, given_axes
+from sim.io.notebook import Shown, given_axes
 from sim.model.groups import DWELL, checked_values
 from sim.model.response import DWELLS, Responses
 from sim.motion.net_speed import net_speeds, twists
@@ -69,7 +69,7 @@ _OF_TAILS = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
 
 
 @dataclass(frozen=True, repr=False)
-class NeuralTable:
+class NeuralTable(Shown):
     """A trained table with its domain, its intervals and its held-out errors."""
 
     tails: WrenchTable
@@ -226,9 +226,6 @@ class NeuralTable:
         ends = [(name, *self.ranges[name]) for name in (*_OF_TAILS, "C_yr") if name in self.ranges]
         within = ", ".join(f"{name} {low:.4g} to {high:.4g}" for name, low, high in ends)
         return "\n".join([*lines, f"  within {within}"])
-
-    def _repr_html_(self) -> str:
-        return as_html(repr(self), self.plot)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw median and 95th percentile of the held-out errors of each steady output [%].

@@ -35,7 +35,7 @@ from calibration.verdict.verdict import Verdict
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.arrays import Flags
 from sim.io.files import files_together, write_text
-from sim.io.notebook import as_html, given_axes
+from sim.io.notebook import Shown, given_axes
 from sim.io.provenance import provenance
 from sim.model.robot import Robot
 
@@ -46,7 +46,7 @@ FILES = ("verdict.json", "report.html", "corrected.toml")
 
 
 @dataclass(frozen=True, repr=False)
-class RobotVerdict(Verdict):
+class RobotVerdict(Shown, Verdict):
     """What a measured table says about a robot: a `Verdict` with the robot, its runs, and the corrected robot.
 
     Example:
@@ -75,9 +75,6 @@ class RobotVerdict(Verdict):
         if self.law and self.described:
             return law_handed_on(self.robot, self.law.kept[0], self.split.kept)
         return handed_on(self.robot, self.final_refit, self.learnt)
-
-    def _repr_html_(self) -> str:
-        return as_html(repr(self), self.plot)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the residual of each output, before and after, over the noise of a run.

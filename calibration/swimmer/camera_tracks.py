@@ -36,8 +36,7 @@ from sim.arrays import Floats
 from sim.inputs import RUN, RUN_SYNONYMS, run_columns
 from sim.io.errors import InputError, naming
 from sim.io.quantities import convert_columns, numbers_of
-from sim.io.tables import read_table
-from sim.io.text_tables import row_name
+from sim.io.tables import read_table, row_name
 from sim.model.robot import Robot
 from sim.motion.batches import steady_columns
 from sim.motion.lab_units import lab_motion

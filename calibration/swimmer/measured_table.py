@@ -57,8 +57,7 @@ from sim.inputs import RUN as INPUTS
 from sim.inputs import RUN_SYNONYMS as SYNONYMS
 from sim.io.errors import InputError, naming
 from sim.io.quantities import convert_columns, numbers_of
-from sim.io.tables import read_table
-from sim.io.text_tables import row_name
+from sim.io.tables import read_table, row_name
 from sim.io.units import to_si
 
 # Output -> (column, factor to SI, sign relative to the motor's; 0: a magnitude)

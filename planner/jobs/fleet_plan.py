@@ -17,7 +17,7 @@ from planner.jobs.separation import Approach, Scheduled, approach, instants
 from planner.planning.picture import draw_regions, label_points
 from planner.planning.plan import Plan
 from sim.arrays import Floats
-from sim.io.notebook import as_html, given_axes
+from sim.io.notebook import Shown, given_axes
 from sim.io.units import column_units, format_length, format_time
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Nearest(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class FleetPlan:
+class FleetPlan(Shown):
     """Plans that keep apart. Lengths in m, times in s.
 
     Example:
@@ -156,9 +156,6 @@ class FleetPlan:
         if self.warnings:
             lines.append(f"  {len(self.warnings)} warnings, the first: {self.warnings[0][:200]}")
         return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        return as_html(repr(self), self.plot)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the predicted tracks on axes in cm: bodies at the start, dots at round times.

@@ -27,7 +27,7 @@ from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.zigzag import Zigzag
 from sim.arrays import Floats
 from sim.io.errors import InputError
-from sim.io.notebook import as_html, given_axes
+from sim.io.notebook import Shown, given_axes
 from sim.io.units import column_units, format_time
 from sim.model.plan_file import FORMAT, plan_id
 from sim.model.robot import Robot
@@ -80,7 +80,7 @@ class Job:
 
 
 @dataclass(frozen=True, repr=False)
-class Plan(Generic[J]):
+class Plan(Shown, Generic[J]):
     """A schedule and its errors. Lengths are in l, times in μ0 l⁴/EI, unless a name says its unit.
 
     Example:
@@ -301,9 +301,6 @@ class Plan(Generic[J]):
             count = "1 warning" if len(self.warnings) == 1 else f"{len(self.warnings)} warnings, the first"
             lines.append(f"  {count}: {textwrap.shorten(self.warnings[0], 120, placeholder=' …')}")
         return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        return as_html(repr(self), self.plot)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the drawn, the declared and the predicted path, with the stated error, on axes in cm.

@@ -45,7 +45,7 @@ from planner.planning.plan import Plan
 from planner.tracking.guidance import TrackerGuidance
 from planner.tracking.kalman_filter import NAMES, POSE, Dwell, Estimate, difference
 from sim.io.errors import InputError
-from sim.io.notebook import as_html
+from sim.io.notebook import Shown
 from sim.io.units import format_time
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ class Command(NamedTuple):
     error: float  # the robot stays this close to the path until the next flip, in 95 % of the time [l]
 
 
-class Tracker:
+class Tracker(Shown):
     """See the module.
 
     Args:
@@ -188,9 +188,6 @@ class Tracker:
                 f"  alarm: {'calibrate again, the robot is not as the model says' if command.alarm else 'none'}",
             ]
         )
-
-    def _repr_html_(self) -> str:
-        return as_html(repr(self), self.plot)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the plan and the estimated pose at the last flip, on axes in cm.

@@ -21,23 +21,22 @@ def given_axes(ax: Axes | None) -> Axes:
     return pyplot.figure().add_subplot()
 
 
-def as_html(text: str, draw: Callable[[Axes], Any] | None = None, *, width: float = 4.5) -> str:
-    """Write a text as HTML, with a picture below it.
+class Shown:
+    """An object that a notebook shows as its text, with its plot below where it has one."""
 
-    Args:
-        text: lines; their layout is kept.
-        draw: draws on axes.
-        width: of the picture [inch]; its height is 4.5 inch.
-    """
+    def _repr_html_(self) -> str:
+        return as_html(repr(self), getattr(self, "plot", None))
+
+
+def as_html(text: str, draw: Callable[[Axes], Any] | None = None) -> str:
+    """Write lines of text as HTML that keeps their layout, with a picture below them that `draw` draws on axes."""
     words = f'<pre style="white-space: pre-wrap">{html.escape(text)}</pre>'
-    return words + ("" if draw is None else _picture(draw, width, text.partition("\n")[0]))
-
-
-def _picture(draw: Callable[[Axes], Any], width: float, description: str) -> str:
+    if draw is None:
+        return words
     from matplotlib.figure import Figure
 
-    figure, store = Figure(figsize=(width, 4.5)), io.BytesIO()
+    figure, store = Figure(figsize=(4.5, 4.5)), io.BytesIO()
     draw(figure.add_subplot())
     figure.savefig(store, format="png", dpi=90, bbox_inches="tight")
     data = base64.b64encode(store.getvalue()).decode()
-    return f'<img alt="{html.escape(description)}" src="data:image/png;base64,{data}">'
+    return f'{words}<img alt="{html.escape(text.partition(chr(10))[0])}" src="data:image/png;base64,{data}">'

@@ -2,22 +2,33 @@
 
 A program names its columns with their units ("R_yr_cm"). A table may have the same quantity in another unit of
 the same kind, as a suffix or in brackets, in upper or lower case. The notes say what was converted.
+
+A column of times has numbers, durations or times of day (h:mm:ss, with a fraction and days before it where it has
+them), or dates as in ISO 8601 (2026-05-01T12:00:00Z), without a zone in UTC; a spreadsheet and Parquet have all of
+them as types of their own. Dates, and numbers of more than ten years (seconds since 1970), count from the earliest
+of their column. Other ways of writing a time have two meanings (1:30, 1/5/2026) and are no numbers.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
 from typing import NamedTuple
 
+import numpy as np
 import pandas as pd
 
+from sim.arrays import Floats
 from sim.io.errors import InputError
-from sim.io.times import times_of
-from sim.io.units import Unit, convert, find_unit, of_kind, split
+from sim.io.units import Unit, convert, find_unit, from_si, of_kind, split, to_si
 
 _NONE: Mapping[str, str] = {}
 _CASE_COUNTS = {"l", "r"}  # L and R are the head's
+_CLOCK = re.compile(r"(?:([0-9]+) days?,? )?([0-9]+):([0-5][0-9]):([0-5][0-9](?:[.,][0-9]*)?)")
+_DATE = re.compile("[0-9]{4}-[0-9]{2}-[0-9]{2}")
+_EPOCH, _LATEST = 3e8, 1e11  # s: what is longer is a date; beyond it no date, but another unit
 
 
 class Converted(NamedTuple):
@@ -63,10 +74,10 @@ def convert_columns(
 
 
 def numbers_of(column: pd.Series) -> pd.Series:
-    """Convert a column to float64, with NaN for what is no number; `sim.io.times` reads columns of times."""
+    """Convert a column to float64, with NaN for what is no number."""
     unit = split(str(column.name)).unit
     if unit is not None and unit.kind == "time":
-        return pd.Series(times_of(column, unit.suffix), index=column.index, name=column.name)
+        return pd.Series(_times_of(column, unit.suffix), index=column.index, name=column.name)
     if column.dtype.kind in "mM":  # a duration or a date where no time belongs
         return pd.Series(math.nan, index=column.index, name=column.name)
     try:
@@ -80,6 +91,46 @@ def _number(value: object) -> float:
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
         return math.nan
+
+
+def _times_of(column: pd.Series, unit: str) -> Floats:
+    """Convert a column of times to numbers in a unit, with NaN for what is no time.
+
+    Args:
+        column: numbers in this unit, or durations or dates, as types or as text.
+        unit: suffix of the unit, such as "s".
+    """
+    if column.dtype.kind == "M":
+        column = column - column.min()
+    if column.dtype.kind == "m":
+        return np.asarray(from_si(column.dt.total_seconds().to_numpy(dtype=float), unit))
+    numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=float, na_value=math.nan)
+    if np.isnan(numbers).any():
+        words = [str(value) for value in column]
+        for kind in (_date, _clock):
+            seconds = np.array([kind(word) for word in words])
+            if not np.isnan(seconds).all():
+                return np.asarray(from_si(seconds - np.nanmin(seconds) if kind is _date else seconds, unit))
+    size = to_si(np.abs(numbers), unit)
+    numbers = np.where(size < _LATEST, numbers, math.nan)
+    first = np.nanmin(numbers, initial=math.inf)
+    return numbers - first if _EPOCH < to_si(first, unit) < _LATEST else numbers
+
+
+def _clock(word: str) -> float:
+    match = _CLOCK.fullmatch(word)
+    if match is None:
+        return math.nan
+    days, hours, minutes, seconds = match.groups(default="0")
+    return 86400.0 * int(days) + 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds.replace(",", "."))
+
+
+def _date(word: str) -> float:
+    try:
+        date = datetime.fromisoformat(word) if _DATE.match(word) else None
+    except ValueError:
+        date = None
+    return math.nan if date is None else (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
 
 
 def _alike(table: pd.DataFrame, wanted: str, synonyms: Mapping[str, str]) -> list[str]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sim.io.errors import InputError
-from sim.io.notebook import as_html
+from sim.io.notebook import Shown
 from sim.io.units import format_length, from_si
 from sim.model.correction import Correction, LearntRange
 from sim.model.groups import Groups, check_finite, check_positive, check_slenderness, check_tails
@@ -23,7 +23,7 @@ from sim.model.uncertainty import DEFAULTS, Sigma
 
 
 @dataclass(frozen=True, repr=False)
-class Robot:
+class Robot(Shown):
     """A robot and its fluid in SI units.
 
     Lengths are in m, Young's modulus in Pa, viscosity in Pa s, motor speed in rad/s (a magnitude; the direction is
@@ -88,9 +88,6 @@ class Robot:
         if self.correction is not None:
             lines.append("  with the correction of a calibration")
         return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        return as_html(repr(self))
 
     def sigma(self, name: str) -> Sigma:
         """Return one standard deviation of a field, as stated or by default (`sim.model.uncertainty`)."""

@@ -10,7 +10,7 @@ import pytest
 
 from planner.paths.path_files import read_path
 from sim.io.quantities import numbers_of
-from sim.io.text_tables import parse_table
+from sim.io.tables import parse_table
 from tests.planner.page.page_core import answer, check_near, opened
 from tests.planner.page.parity import refusal_of, without_digits
 

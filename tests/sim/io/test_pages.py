@@ -107,7 +107,7 @@ def test_a_notebook_shows_escaped_text_and_the_picture_below_it() -> None:
     page = as_html('<script>\n  "a" & b')
     assert "&lt;script&gt;\n  &quot;a&quot; &amp; b</pre>" in page
     assert "<img" not in page
-    page = as_html('Plan of "x"\nmore', lambda axes: axes.plot([0, 1]), width=2.0)
+    page = as_html('Plan of "x"\nmore', lambda axes: axes.plot([0, 1]))
     match = re.search(r'<img alt="([^"]*)" src="data:image/png;base64,([^"]+)">$', page)
     assert match
     assert match[1] == "Plan of &quot;x&quot;"

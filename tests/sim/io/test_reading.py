@@ -5,47 +5,34 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 
 from dataset.design import load_design
 from sim.inputs import load_robot
-from sim.io import tables
 from sim.io.errors import InputError
-from sim.io.reading import ContentError, read_bytes, read_json, read_toml
+from sim.io.reading import ContentError, read_bytes, read_json
 from sim.io.seals import check_seal, sealed
 from sim.io.tables import read_table
 from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
 
-DEEP = [
-    ("x = " + "[" * 100_000, "nested too deeply"),
-    ("x = " + "{a = " * 10_000, "nested too deeply"),
-    ("a." * 100_000 + "a = 1", "a key has more than 50 parts"),
-    ('"a" . ' * 60 + "b = 1", "a key has more than 50 parts"),
-    ("[" + "a." * 60 + "a]", "a key has more than 50 parts"),
-    ("x = 1\nx = 2", "is not TOML"),
-]
+BROKEN = {
+    "lists in lists": ("x = " + "[" * 100_000, "is not TOML: .*(recursion|nested)"),
+    "two values": ("x = 1\nx = 2", "is not TOML: Cannot overwrite a value"),
+    "a decimal comma": ("x = 1\ny = 1,1", r"is not TOML: .*\(at line 2, column 6"),
+    "no text": (b"\x80abc", "is not TOML: .* in position 0"),
+}
 
 
-@pytest.mark.parametrize(("text", "words"), DEEP, ids=range(len(DEEP)))
+@pytest.mark.parametrize("case", BROKEN)
 @pytest.mark.parametrize("load", [load_robot, load_design])
-def test_settings_that_would_take_minutes_are_rejected(
-    load: Callable[[Path], object], text: str, words: str, tmp_path: Path
-) -> None:
+def test_what_is_no_toml_is_said_with_its_place(load: Callable[[Path], object], case: str, tmp_path: Path) -> None:
+    content, words = BROKEN[case]
     path = tmp_path / "settings.toml"
-    path.write_text(text)
-    with pytest.raises(InputError, match=words):
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(InputError, match=words) as refusal:
         load(path)
-
-
-def test_keys_and_numbers_with_dots_are_read(tmp_path: Path) -> None:
-    path = tmp_path / "a.toml"
-    path.write_text("a.b.c = 1\nnumbers = [" + "1.5, " * 1000 + "]\n" + 'text = "' + "A robot. " * 1000 + '"\n')
-    content = read_toml(path)
-    assert content["a"] == {"b": {"c": 1}}
-    assert len(content["numbers"]) == 1000
+    assert str(path) in str(refusal.value)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
@@ -59,19 +46,9 @@ def test_a_file_beyond_the_limit_is_not_read(tmp_path: Path) -> None:
     path = tmp_path / "large"
     with open(path, "wb") as file:
         file.truncate(2**40)  # a sparse file
-    with pytest.raises(InputError, match="has more than 1 MiB"):
-        read_bytes(path, 2**20)
-    with pytest.raises(InputError, match="has more than"):
-        read_table(path)
-
-
-def test_a_small_parquet_file_with_many_rows_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "rows.parquet"
-    pq.write_table(pa.table({"a": pa.array([0.0] * 5000)}), path)
-    assert len(read_table(path)) == 5000
-    monkeypatch.setattr(tables, "MOST_VALUES", 4999)
-    with pytest.raises(InputError, match="5000 rows and 1 columns; give a smaller table"):
-        read_table(path)
+    for read in (read_bytes, read_table):
+        with pytest.raises(InputError, match="has more than 256 MiB"):
+            read(path)
 
 
 @pytest.mark.parametrize("data", [b"\xff\xfe\x00", b"\x80abc", b"{", b"[" * 100_000])
@@ -89,16 +66,6 @@ def test_missing_files_and_folders_are_one_line(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=words):
             read_bytes(path)
-
-
-def test_a_decimal_comma_in_toml_is_pointed_out(tmp_path: Path) -> None:
-    (tmp_path / "robot.toml").write_text("[tails]\nyoungs_modulus_MPa = 1,1 # measured\n")
-    with pytest.raises(InputError, match=r"is not TOML: .*; write 1\.1 for 1,1$"):
-        read_toml(tmp_path / "robot.toml")
-    (tmp_path / "list.toml").write_text("range = [1,1]\nbroken\n")
-    with pytest.raises(InputError, match="is not TOML") as caught:
-        read_toml(tmp_path / "list.toml")
-    assert "write" not in str(caught.value)
 
 
 TEXT = robot_toml(PRESETS["paper-control"])

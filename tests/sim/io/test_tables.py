@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 
 from sim.io.errors import InputError
 from sim.io.quantities import numbers_of
-from sim.io.tables import read_table
-from sim.io.text_tables import parse_table, row_name
+from sim.io.tables import parse_table, read_table, row_name
 
 TABLE = pd.DataFrame({"run": ["a", "b c"], "x [mm]": [0.5, -3.25], "y [mm]": [1.0, 1250.0]})
 TEXTS = {
