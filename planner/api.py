@@ -35,8 +35,8 @@ from planner.options import (
 from planner.paths.path import Path2D, shape_of, smoothed
 from planner.paths.path_files import Drawing, read_path
 from planner.paths.units import describe, in_lab, in_tails, read_degrees, read_length
-from planner.planning.camera import Camera
 from planner.planning.plan import Plan
+from planner.planning.request import Camera
 from planner.vehicle.zigzag import Objective
 from sim.io.errors import InputError, naming
 from sim.io.keywords import checks_keywords

@@ -20,8 +20,7 @@ from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.path import Path2D, like_a_shape, shape_of
 from planner.paths.path_files import Drawing, read_path
 from planner.paths.units import Swimmer, in_tails, read_length, read_pose, read_time
-from planner.planning.camera import POSE, Camera
-from planner.planning.request import Corner, PlanRequest
+from planner.planning.request import POSE, Camera, Corner, PlanRequest
 from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import Point, TrackedVehicle, tracked_vehicle

@@ -34,8 +34,8 @@ from planner.paths.path import circle as circle
 from planner.paths.path import polygon as polygon
 from planner.paths.path_files import Drawing as Drawing
 from planner.paths.path_files import read_path as read_path
-from planner.planning.camera import Camera as Camera
 from planner.planning.plan import Plan as Plan
+from planner.planning.request import Camera as Camera
 from planner.tracking.swim import Swim as Swim
 from planner.tracking.tracker import Command as Command
 from planner.tracking.tracker import Tracker as Tracker

@@ -26,7 +26,7 @@ from benchmarks.common import heading, in_parallel, per_cent, row
 from benchmarks.planner.stated_errors import random_path
 from planner.api import plan
 from planner.paths.path import circle
-from planner.planning.camera import Camera
+from planner.planning.request import Camera
 from planner.tracking.swim import Swim, swim
 from planner.tracking.tracker import Tracker
 from sim.io.errors import InputError

@@ -192,7 +192,7 @@ def carry_out(plan: Plan, swims: TrackedVehicle) -> CarriedOut:
     path = plan.drawn.scaled(plan.robot.length_scale / metres).polyline()
     predicted = predicted_error(path, rollout.track, closed=plan.drawn.closed)
     flips = flips_between(len(schedule.dwells))
-    growth = error_growth(swims.vehicle, replace(switches, poses=rollout.poses), rollout, flips)
+    growth = error_growth(swims.vehicle, replace(switches, poses=rollout.flips), rollout, flips)
     missed = rollout.track[-1] - path[-1]
     ends = np.hypot(*(missed + deviations_open_loop(growth)[0][:, -1]).T)
     low, high = np.quantile(ends, _INTERVAL).tolist()

@@ -23,16 +23,15 @@ from planner.goal.trip import FORMAT, Trip
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Reference
-from planner.planning.camera import DOCUMENTED, Camera
 from planner.planning.conditions import Arrival, Detour, KeptClear, Lap
-from planner.planning.declare import Declared
 from planner.planning.errors import PlanErrors, predicted_error
+from planner.planning.feasible import Declared
 from planner.planning.line_of_sight import Guidance
 from planner.planning.plan import GUARANTEE, KINDS, Plan
-from planner.planning.request import PlanRequest
+from planner.planning.request import DOCUMENTED, Camera, PlanRequest
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.measured import MeasuredVehicle
-from planner.vehicle.rollout import Switches, trace
+from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import Objective, Zigzag
 from sim.io.errors import InputError, naming
@@ -293,7 +292,7 @@ def _errors(
 ) -> PlanErrors:
     """Read the errors that are stated, and predict the track again."""
     guaranteed, closure, path = content[GUARANTEE], content["closure_over_l"], declared.reference.p
-    track = trace(tracked.vehicle, switches, tracked.offset)
+    track = roll_out(tracked.vehicle, switches, tracked.offset).track
     return PlanErrors(
         track=track,
         distance=predicted_error(path, track, closed=drawn.closed).distance,

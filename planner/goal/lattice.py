@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from planner.goal.dubins import DubinsPaths, shortest_paths
 from planner.paths.obstacles import Footprint, FreeSpace, Map
-from planner.paths.tractrix import Drift, slips
+from planner.paths.tractrix import Drift
 from sim.arrays import Flags, Floats, Integers
 
 _RANGE = 3  # of the joints between poses, in spacings
@@ -42,7 +42,7 @@ class RouteLimits:
 
     def clearance(self, poses: Floats, space: FreeSpace | Map | None = None) -> Floats:
         """Compute the distance (...) of the body from what is not free, at poses (..., 3): place and course."""
-        heading = poses[..., 2] - slips(poses[..., 2], self.drift)
+        heading = poses[..., 2] - self.drift.slip_along(poses[..., 2])
         placed = np.concatenate([poses[..., :2], heading[..., None]], -1)
         return self.body.clearance(placed, self.space if space is None else space)
 
@@ -116,7 +116,7 @@ class Lattice:
         """Bound the clearance (nx, ny) along the track of one joint from below, by its place in the lattice."""
         count = max(2, math.ceil(float(track.length[0]) / _STEP) + 1)
         poses = track.poses(np.linspace(0, track.length, count).T, self.limits.radius)[0]
-        heading = poses[:, 2] - slips(poses[:, 2], self.limits.drift)
+        heading = poses[:, 2] - self.limits.drift.slip_along(poses[:, 2])
         centres = self.limits.body.centres(np.stack([poses[:, 0], poses[:, 1], heading], 1)).reshape(-1, 2)
         offsets = np.rint(centres / self.map.step).astype(int) + self._pad * _CELLS
         (nx, ny) = self._shape

@@ -19,9 +19,9 @@ import numpy as np
 from planner.goal.dubins import DubinsPaths, three_arcs
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D
-from planner.paths.tractrix import Drift, Reference, slips
+from planner.paths.tractrix import Drift, Reference
 from planner.planning.conditions import Swing
-from planner.planning.declare import Declared
+from planner.planning.feasible import Declared
 from planner.planning.solve import Setting
 from sim.arrays import Floats
 from sim.io.errors import InputError
@@ -129,7 +129,7 @@ class _Track:
 
     def headed(self, poses: Floats) -> Floats:
         """Return places and headings (m, 3) of poses with courses."""
-        return np.column_stack([poses[:, :2], poses[:, 2] - slips(poses[:, 2], self._drift)])
+        return np.column_stack([poses[:, :2], poses[:, 2] - self._drift.slip_along(poses[:, 2])])
 
     def circled(self, circles: int, radius: float) -> Iterator[_Candidate]:
         """Yield circles at places from the end of the track to its beginning."""

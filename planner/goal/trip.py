@@ -3,7 +3,7 @@
 The pivot moves like a car that only drives forward and has a least turn radius. Its shortest track between two
 poses is one of Dubins' words, or a chain of them around obstacles (`planner.goal.route`). The schedule follows
 that track like any other path (`planner.planning.solve`). Its last dwells are then adjusted so that the robot ends
-at the goal with the wanted heading (`planner.goal.final_dwells`). If there is no track that leaves the margin,
+at the goal with the wanted heading (`planner.goal.last_dwells`). If there is no track that leaves the margin,
 shorter dwells are tried, which need less clearance. Lengths in l, angles in rad.
 """
 
@@ -17,19 +17,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planner.goal.final_dwells import Ending
+from planner.goal.last_dwells import Ending
 from planner.goal.lattice import RouteLimits
 from planner.goal.route import COURSES, Lattices, NoWayError, Route, route
 from planner.goal.swings import Delay
 from planner.paths.obstacles import Footprint, FreeSpace
-from planner.paths.tractrix import Drift, Reference, slips_at_heading
+from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import LONGEST, heading_in_degrees, in_lab, place_in_lab
-from planner.planning.camera import POSE
-from planner.planning.declare import Declared
+from planner.planning.feasible import Declared
 from planner.planning.line_of_sight import Start
 from planner.planning.picture import BODY, REPLAYED
 from planner.planning.plan import Job, Plan
-from planner.planning.request import PlanRequest, Progress
+from planner.planning.request import POSE, PlanRequest, Progress
 from planner.planning.solve import Setting, Task, solve
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.zigzag import check_least
@@ -184,7 +183,7 @@ def _stops(start: POSE, goal: POSE, via: Sequence[tuple[float, float]], back: fl
     """
     ends = []
     for x, y, heading in (start, goal):
-        course = heading + float(slips_at_heading(np.array(heading), drift))
+        course = heading + float(drift.slip_at(heading))
         ends.append(np.array([[x - back * math.cos(heading), y - back * math.sin(heading), course]]))
     courses = 2 * math.pi * np.arange(COURSES) / COURSES
     return [ends[0], *(np.stack([0 * courses + x, 0 * courses + y, courses], 1) for x, y in via), ends[1]]

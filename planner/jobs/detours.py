@@ -32,8 +32,7 @@ from planner.paths.tractrix import Drift, Reference
 from planner.paths.tractrix import reference as follow_path
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.conditions import BlockedError, Detour
-from planner.planning.declare import Declared
-from planner.planning.feasible import AS_DRAWN, TIGHTEST
+from planner.planning.feasible import AS_DRAWN, TIGHTEST, Declared
 from planner.planning.solve import Setting
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.arrays import Flags, Floats

@@ -25,10 +25,9 @@ from planner.jobs.plan import make_plan
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D, circle
 from planner.paths.units import in_lab, place_in_lab
-from planner.planning.camera import POSE
 from planner.planning.plan import Job, Plan
-from planner.planning.request import PlanRequest, Progress
-from planner.vehicle.rollout import predicted_poses
+from planner.planning.request import POSE, PlanRequest, Progress
+from planner.vehicle.rollout import roll_out
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.io.errors import InputError
 from sim.io.units import format_time
@@ -156,7 +155,7 @@ def hold(
             "move the place"
         )
     body = Footprint.of(robot, 0.0)
-    centres = body.centres(predicted_poses(vehicle, plan.switches)) - [x, y]
+    centres = body.centres(roll_out(vehicle, plan.switches).poses) - [x, y]
     reach = float((centres**2).sum(-1).max() ** 0.5) + body.radius
     laps = None if seconds is None else math.ceil(seconds / (plan.duration * robot.time_scale))
     twists = [(direction, *twist) for direction, twist in zip((1, -1), vehicle.twist.tolist(), strict=True)]

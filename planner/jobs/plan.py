@@ -13,8 +13,8 @@ from functools import cache
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
 from planner.paths.units import check_size
-from planner.planning.declare import Declared, declare
-from planner.planning.feasible import Feasibility
+from planner.planning.declare import declare
+from planner.planning.feasible import Declared, Feasibility
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest, Progress
 from planner.planning.solve import Change, Task, solve
@@ -61,6 +61,6 @@ def make_plan(
     once = solve(task, tracked, request, progress)
     if not request.loop:
         return once
-    from planner.jobs.laps import looped
+    from planner.goal.last_dwells import looped
 
     return looped(once, progress)

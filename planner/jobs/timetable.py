@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.goal.final_dwells import Ending
+from planner.goal.last_dwells import Ending
 from planner.jobs.separation import Places, Scheduled, TimedMotion, too_near
 from planner.paths.tractrix import Reference
 from planner.planning.line_of_sight import Start

@@ -18,10 +18,9 @@ from planner.goal.lattice import RouteLimits
 from planner.goal.route import Route
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D
-from planner.paths.tractrix import Drift, Reference, slips
+from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import LONGEST, check_size, in_lab
-from planner.planning.declare import Declared
-from planner.planning.feasible import AS_DRAWN
+from planner.planning.feasible import AS_DRAWN, Declared
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest, Progress
 from planner.planning.solve import Setting, Task, solve
@@ -110,7 +109,7 @@ def preferred_setting(tracked: TrackedVehicle, request: PlanRequest) -> Setting:
 
 def pivot_poses(places: Floats, courses: Floats, tracked: TrackedVehicle, drift: Drift) -> Floats:
     """Return the pivot's poses (..., 3), place and course, where the tracked point is at places (..., 2)."""
-    heading = courses - slips(courses, drift)
+    heading = courses - drift.slip_along(courses)
     axis = np.stack([np.cos(heading), np.sin(heading)], -1)
     return np.concatenate([places - tracked.rod * axis, courses[..., None]], -1)
 

@@ -29,6 +29,10 @@ from sim.io.errors import InputError
 _LAPS = 6
 _MOST_SLIP = 3.0  # sideways by forward motion
 _STRAIGHT = 1e-6  # rad; smaller turns are rounding
+_TOO_FAST = (
+    "the current, or the difference of left and right turns, is as fast as the robot's net motion; use a longer "
+    "dwell or a faster motor"
+)
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,23 @@ class Drift:
     @property
     def none(self) -> bool:
         return self.sideways == 0.0 and self.current == (0.0, 0.0)
+
+    def slip_at(self, heading: Floats | float) -> Floats:
+        """Compute the angles (...) from headings (...) to the direction of motion."""
+        (x, y), c, s = self.current, np.cos(heading), np.sin(heading)
+        return np.asarray(np.arctan2(self.sideways - x * s + y * c, 1 + x * c + y * s))
+
+    def slip_along(self, course: Floats | float) -> Floats:
+        """Compute the angles δ (...) from the heading to courses (...): sin δ − u cos δ = c·n, n left of a course.
+
+        Raises:
+            InputError: a current across a course is as fast as the robot.
+        """
+        (x, y), forward = self.current, math.hypot(1.0, self.sideways)
+        across = (y * np.cos(course) - x * np.sin(course)) / forward
+        if not (np.abs(across) < 1).all():
+            raise InputError(_TOO_FAST)
+        return np.asarray(math.atan(self.sideways) + np.arcsin(across))
 
 
 STILL = Drift()
@@ -70,7 +91,7 @@ class Reference:
             drift: what carries the robot off its heading.
             heading: the first one, whole turns included.
         """
-        headings = poses[:, 2] - slips(poses[:, 2], drift)
+        headings = poses[:, 2] - drift.slip_along(poses[:, 2])
         if heading is not None:
             headings = headings + _whole_turns(heading - headings[0])
         return Reference(poses[:, :2] + rod * _axis(headings), poses[:, :2], headings)
@@ -117,7 +138,7 @@ class Reference:
 
     def courses(self, drift: Drift) -> Floats:
         """Return places and courses of the pivot (m, 3): the directions in which it moves."""
-        return np.column_stack([self.q, self.heading + slips_at_heading(self.heading, drift)])
+        return np.column_stack([self.q, self.heading + drift.slip_at(self.heading)])
 
     @property
     def turn(self) -> float:
@@ -151,7 +172,7 @@ def reference(path: Path2D, pivot_distance: float, spacing: float, drift: Drift 
     if pivot_distance <= 0:
         heading = _pivot_headings(tangent, drift, closed=path.closed)
     else:
-        start = tangent[0] - _slip(float(tangent[0]), drift)
+        start = tangent[0] - drift.slip_along(tangent[0])
         for _ in range(_LAPS if path.closed else 1):
             heading = _drag(tangent, length, pivot_distance, start, drift)
             start = heading[-1] - _turning(tangent) if path.closed else start
@@ -173,7 +194,10 @@ def _pivot_headings(tangent: Floats, drift: Drift, *, closed: bool) -> Floats:
     wrap = tangent[-1:] if not closed else tangent[:1] + _turning(tangent)
     ends = np.concatenate([before, tangent, wrap])
     heading = (ends[1:] + ends[:-1]) / 2
-    return np.asarray(heading - [_slip(angle, drift) for angle in heading.tolist()])
+    heading = heading - drift.slip_along(heading)
+    for angle in heading.tolist():
+        _ratio(angle, drift)  # refuses a drift that is too fast
+    return heading
 
 
 def _turning(tangent: Floats) -> float:
@@ -182,44 +206,13 @@ def _turning(tangent: Floats) -> float:
     return float(tangent[-1] - tangent[0] + closing)
 
 
-def _slip(direction: float, drift: Drift) -> float:
-    """Compute the angle from the heading to a straight path in `direction`."""
-    if drift.none:
-        return 0.0
-    slip = 0.0
-    for _ in range(50):
-        slip = math.atan(_ratio(direction - slip, drift))
-    return slip
-
-
-def slips(direction: Floats, drift: Drift) -> Floats:
-    """Compute the angles (...) from the heading to straight paths in these directions (...)."""
-    slip = np.zeros_like(direction)
-    if drift.none:
-        return slip
-    cx, cy = drift.current
-    for _ in range(30):
-        c, s = np.cos(direction - slip), np.sin(direction - slip)
-        slip = np.arctan2(drift.sideways - cx * s + cy * c, 1 + cx * c + cy * s)
-    return slip
-
-
-def slips_at_heading(heading: Floats, drift: Drift) -> Floats:
-    """Compute the angles (...) from headings (...) to the direction of motion."""
-    course = heading
-    for _ in range(30):
-        course = heading + slips(course, drift)
-    return np.asarray(course - heading)
-
-
 def _ratio(heading: float, drift: Drift) -> float:
     """Compute the ratio of sideways to forward motion, (u + c·n)/(V + c·e)."""
     cx, cy = drift.current
     ahead = 1 + cx * math.cos(heading) + cy * math.sin(heading)
     aside = drift.sideways - cx * math.sin(heading) + cy * math.cos(heading)
     if ahead <= 0 or abs(aside) > _MOST_SLIP * ahead:
-        raise InputError("the current, or the difference of left and right turns, is as fast as the robot's net "
-                         "motion; use a longer dwell or a faster motor")  # fmt: skip
+        raise InputError(_TOO_FAST)
     return aside / ahead
 
 

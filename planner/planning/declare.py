@@ -15,19 +15,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
 
-from planner.paths.distance import two_sided
 from planner.paths.path import Path2D, smoothed
-from planner.paths.tractrix import Reference, reference
+from planner.paths.tractrix import reference
 from planner.paths.units import LONGEST, extent, in_lab, place_in_lab
-from planner.planning.conditions import Detour, Swing
 from planner.planning.feasible import (
     LOST,
     TIGHTEST,
+    Declared,
     Feasibility,
     Way,
     as_drawn,
@@ -49,29 +48,6 @@ _SMOOTHINGS = (1.0, 1.5, 2.2, 3.2, 4.7, 7.0)  # over the length that shows noise
 _FIRST = 0.5  # of the turn radius: the first length over which a path that is not noisy is smoothed
 
 
-@dataclass(frozen=True)
-class Declared:
-    """The declared path with its tractrix, and its distances from the path as drawn [l]."""
-
-    reference: Reference  # the path and the pivot that follows it
-    curvature: float  # largest of the pivot's reference
-    off_drawn: float = 0.0  # largest distance of a declared point from the drawn path
-    missed: float = 0.0  # largest distance of a drawn point from the declared path
-    warnings: tuple[str, ...] = ()  # in words
-    swing: Swing | None = None  # that takes time
-    detours: tuple[Detour, ...] = ()  # around obstacles, in the order of the path
-
-    def moved(self, reference: Reference, drawn: Path2D, curvature: float | None = None) -> Declared:
-        """Declare another reference in place of this one, with `curvature` or its own one."""
-        off_drawn, missed = two_sided(reference.p, drawn.polyline())
-        curvature = float(np.abs(reference.curvature).max()) if curvature is None else curvature
-        return replace(self, reference=reference, curvature=curvature, off_drawn=off_drawn, missed=missed)
-
-    def same(self, other: Declared) -> bool:
-        """Tell whether the pivot has the same way."""
-        return self is other or np.array_equal(self.reference.q, other.reference.q)
-
-
 def declare(raw: Path2D, feasibility: Feasibility, progress: Progress | None = None) -> Declared:
     """Choose the path that the robot will follow.
 
@@ -88,20 +64,20 @@ def declare(raw: Path2D, feasibility: Feasibility, progress: Progress | None = N
     accepted = feasible(raw, feasibility, progress)
     if accepted is None:
         raise InputError(_too_tight(raw, feasibility, progress))
-    followed, off_drawn, missed = accepted
-    warnings, robot = [], feasibility.robot
-    distance = max(off_drawn, missed)
+    robot, distance = feasibility.robot, max(accepted.off_drawn, accepted.missed)
     if distance > WARN * max(extent(raw)):
-        warnings.append(
+        warning = (
             f"the shape is lost in part: the declared path is up to {in_lab(distance, robot)} from the drawn one, "
             f"which is {in_lab(max(extent(raw)), robot)} across; draw it larger"
         )
     elif distance > FAR:
-        warnings.append(
+        warning = (
             f"the declared path leaves the drawn one by up to {in_lab(distance, robot)}, where the robot cannot "
             "turn so tightly; draw wider turns"
         )
-    return Declared(followed, float(np.abs(followed.curvature).max()), off_drawn, missed, tuple(warnings))
+    else:
+        return accepted
+    return replace(accepted, warnings=(warning,))
 
 
 def _too_tight(raw: Path2D, feasibility: Feasibility, progress: Progress | None) -> str:

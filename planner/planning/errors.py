@@ -38,8 +38,8 @@ import numpy as np
 from planner.draws import normals
 from planner.paths.distance import distance_to, nearest
 from planner.paths.path import Path2D
-from planner.planning.camera import Camera
-from planner.planning.declare import Declared
+from planner.planning.feasible import Declared
+from planner.planning.request import Camera
 from planner.vehicle.rollout import Rollout, Switches, roll_out
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Mode, Vehicle, interpolated
@@ -166,7 +166,7 @@ def error_growth(vehicle: Vehicle, switches: Switches, rollout: Rollout, flips: 
     """
     dwells, count = switches.dwells, len(switches.dwells)
     side = (np.arange(count) + (switches.first_direction < 0)) % 2
-    moves_predicted, poses = rollout.changes, rollout.poses
+    moves_predicted, poses = rollout.changes, rollout.flips
     circle = planar.arc(vehicle.twist[side], dwells)
     lag = planar.compose(moves_predicted, planar.inverse(circle))
     steps = np.diff(poses[:, :2], axis=0)

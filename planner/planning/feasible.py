@@ -9,6 +9,7 @@ Lengths in l.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from planner.paths.nearest_path import nearest_path, pose_spacing
 from planner.paths.path import Path2D, smoothed, steps_of
 from planner.paths.tractrix import Drift, Reference, reference
 from planner.paths.units import Swimmer, extent, place_in_lab
+from planner.planning.conditions import Detour, Swing
 from planner.planning.request import DECLARING, Corner, Progress, tell
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
@@ -57,15 +59,30 @@ class Feasibility(NamedTuple):
         return {"error": (), "fillet": (ROUNDED,)}.get(self.corner, ROOMS)
 
 
-class Accepted(NamedTuple):
-    """A path that the robot can follow."""
+@dataclass(frozen=True)
+class Declared:
+    """The declared path with its tractrix, and its distances from the path as drawn [l]."""
 
-    reference: Reference  # the path, and its tractrix
-    off_drawn: float  # largest distance of its points from the drawn path
-    missed: float  # largest distance of a drawn point from it
+    reference: Reference  # the path and the pivot that follows it
+    curvature: float  # largest of the pivot's reference
+    off_drawn: float = 0.0  # largest distance of a declared point from the drawn path
+    missed: float = 0.0  # largest distance of a drawn point from the declared path
+    warnings: tuple[str, ...] = ()  # in words
+    swing: Swing | None = None  # that takes time
+    detours: tuple[Detour, ...] = ()  # around obstacles, in the order of the path
+
+    def moved(self, reference: Reference, drawn: Path2D, curvature: float | None = None) -> Declared:
+        """Declare another reference in place of this one, with `curvature` or its own one."""
+        off_drawn, missed = two_sided(reference.p, drawn.polyline())
+        curvature = float(np.abs(reference.curvature).max()) if curvature is None else curvature
+        return replace(self, reference=reference, curvature=curvature, off_drawn=off_drawn, missed=missed)
+
+    def same(self, other: Declared) -> bool:
+        """Tell whether the pivot has the same way."""
+        return self is other or np.array_equal(self.reference.q, other.reference.q)
 
 
-def feasible(raw: Path2D, feasibility: Feasibility, progress: Progress | None = None) -> Accepted | None:
+def feasible(raw: Path2D, feasibility: Feasibility, progress: Progress | None = None) -> Declared | None:
     """Find the path to declare: the first way that is accepted; None if there is none.
 
     Raises:
@@ -81,7 +98,7 @@ def feasible(raw: Path2D, feasibility: Feasibility, progress: Progress | None = 
     return None
 
 
-def as_drawn(raw: Path2D, feasibility: Feasibility) -> Accepted | None:
+def as_drawn(raw: Path2D, feasibility: Feasibility) -> Declared | None:
     """Take the path as it was drawn, if the robot can follow it.
 
     Raises:
@@ -97,7 +114,7 @@ def as_drawn(raw: Path2D, feasibility: Feasibility) -> Accepted | None:
     return _accepted(raw, drawn, feasibility)
 
 
-def changed(raw: Path2D, feasibility: Feasibility, way: Way, progress: Progress | None = None) -> Accepted | None:
+def changed(raw: Path2D, feasibility: Feasibility, way: Way, progress: Progress | None = None) -> Declared | None:
     """Change a path in one way so that the robot can follow it; None if that fails, or loses the shape."""
     vehicle, rod, drift, corner = feasibility.vehicle, feasibility.rod, feasibility.drift, feasibility.corner
     if way == ROUNDED:
@@ -112,13 +129,14 @@ def changed(raw: Path2D, feasibility: Feasibility, way: Way, progress: Progress 
     return _accepted(raw, reference(path, rod, spacing(path), drift), feasibility)
 
 
-def _accepted(raw: Path2D, followed: Reference, feasibility: Feasibility) -> Accepted | None:
+def _accepted(raw: Path2D, followed: Reference, feasibility: Feasibility) -> Declared | None:
     """Accept a reference that turns wide enough and keeps the shape of the drawn path."""
-    if np.abs(followed.curvature).max() > TIGHTEST / feasibility.vehicle.pivot_radius:
+    curvature = float(np.abs(followed.curvature).max())
+    if curvature > TIGHTEST / feasibility.vehicle.pivot_radius:
         return None
-    off_drawn, missed = two_sided(followed.p, raw.polyline())
+    declared = Declared(followed, curvature, *two_sided(followed.p, raw.polyline()))
     lost = min(LOST * max(extent(raw)), feasibility.vehicle.turn_radius)
-    return None if max(off_drawn, missed) > lost else Accepted(followed, off_drawn, missed)
+    return None if max(declared.off_drawn, declared.missed) > lost else declared
 
 
 def smoothing_of_noise(raw: Path2D, vehicle: Vehicle) -> float | None:

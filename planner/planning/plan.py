@@ -15,14 +15,13 @@ from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
 from planner.paths.units import heading_in_degrees, in_lab, place_in_lab, time_in_lab
-from planner.planning.camera import POSE
 from planner.planning.conditions import Arrival, KeptClear, Lap
-from planner.planning.declare import Declared
 from planner.planning.errors import PlanErrors, feedback_error, plan_errors
+from planner.planning.feasible import Declared
 from planner.planning.line_of_sight import Guidance
-from planner.planning.request import PlanRequest
+from planner.planning.request import POSE, PlanRequest
 from planner.vehicle.measured import MeasuredVehicle
-from planner.vehicle.rollout import Switches, predicted_poses, trace_smoothly
+from planner.vehicle.rollout import Switches, roll_out, smooth_track
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.zigzag import Zigzag
 from sim.arrays import Floats
@@ -172,7 +171,7 @@ class Plan(Shown, Generic[J]):
     @cached_property
     def smooth_track(self) -> Floats:
         """Predicted track (S, 2) of the tracked point for pictures, with more samples where a dwell turns far."""
-        return trace_smoothly(self.tracked.vehicle, self.switches, self.tracked.offset)
+        return smooth_track(self.tracked.vehicle, self.switches, self.tracked.offset)
 
     @property
     def reference(self) -> Floats:
@@ -209,7 +208,7 @@ class Plan(Shown, Generic[J]):
 
     def clearance(self, space: FreeSpace) -> float:
         """Predict the smallest distance of the body from what is not free."""
-        body, poses = Footprint.of(self.robot, 0.0), predicted_poses(self.tracked.vehicle, self.switches)
+        body, poses = Footprint.of(self.robot, 0.0), roll_out(self.tracked.vehicle, self.switches).poses
         return float(body.clearance(poses, space).min())
 
     @property

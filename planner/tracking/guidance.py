@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.goal.dubins import TURNS, DubinsPaths, words
-from planner.paths.tractrix import Reference
+from planner.paths.tractrix import Drift, Reference
 from planner.planning.conditions import OVERLAP
 from planner.planning.line_of_sight import LineOfSight, look_ahead
 from planner.planning.plan import Plan
@@ -43,24 +43,6 @@ ROOM = 0.95  # the share of its largest curvature that the robot uses on the way
 SEGMENTS = 3
 
 
-class LearnedDrift(NamedTuple):
-    """What moves the pivot besides its net speed along the heading, as shares of that speed."""
-
-    sideways: float  # to the left of the heading
-    x: float  # current in the lab
-    y: float
-
-    def slip(self, heading: float) -> float:
-        """Compute the angle from a heading to the direction of motion."""
-        c, s = math.cos(heading), math.sin(heading)
-        return math.atan2(self.sideways - self.x * s + self.y * c, 1 + self.x * c + self.y * s)
-
-    def slips(self, heading: Floats) -> Floats:
-        """Compute the same for headings (m,)."""
-        c, s = np.cos(heading), np.sin(heading)
-        return np.asarray(np.arctan2(self.sideways - self.x * s + self.y * c, 1 + self.x * c + self.y * s))
-
-
 class TrackerGuidance(LineOfSight):
     """Line of sight about the plan's reference, turned by the learned drift, or about a way back to it."""
 
@@ -71,7 +53,7 @@ class TrackerGuidance(LineOfSight):
         self._lap_turn = plan.declared.reference.turn
         self._around, self._stopping = self._lap > 0, False
         x, y = (tracked.vehicle.current / straight.speed).tolist()
-        self._planned = self._drift = LearnedDrift(straight.drift / straight.speed, x, y)
+        self._planned = self._drift = Drift(straight.drift / straight.speed, (x, y))
         self._turns = 0.0  # whole turns by which headings differ from those of the reference
         self._pivot_distance = tracked.vehicle.pivot_distance
         self._pivot_radius = tracked.vehicle.pivot_radius
@@ -81,7 +63,7 @@ class TrackerGuidance(LineOfSight):
         self._way: Way | None = None
         self._leg, self._along = SEGMENTS, 0.0  # of the way; the path follows its last segment
 
-    def update_drift(self, drift: LearnedDrift) -> None:
+    def update_drift(self, drift: Drift) -> None:
         """Update the drift with what was learned."""
         self._drift = drift
 
@@ -98,7 +80,7 @@ class TrackerGuidance(LineOfSight):
         super().integrate(pose, sense)
         way = max(self._reached - before, 0.0) / max(self._rod, SHORTEST_ROD)
         heading, lean = self._heading[self.place], self._lean - self._turns
-        slip = self._drift.slip(heading + lean) - self._planned.slip(heading)
+        slip = float(self._drift.slip_at(heading + lean) - self._planned.slip_at(heading))
         (_, a, b), (_, c, d) = self._twist
         longer = (abs(a) + abs(c)) / (abs(b) + abs(d)) - self._pivot_distance
         slip += longer * self._bend()[0]
@@ -152,7 +134,7 @@ class TrackerGuidance(LineOfSight):
             return math.sqrt(x * x + y * y), math.atan2(y, x)
         turn, step = self._bend()
         turned = value + self._hysteresis[i] - math.atan(self._error / self._ahead) - self._bias
-        slip = self._planned.slip(self._heading[i])
+        slip = float(self._planned.slip_at(self._heading[i]))
         tangent = math.atan2(math.sin(slip) + rod * turn, math.cos(slip))  # from the heading, where all is well
         ahead = rod * (math.cos(turned) - 1)
         aside = self._error + rod * math.sin(turned)
@@ -167,8 +149,8 @@ class TrackerGuidance(LineOfSight):
         drift, planned, rod = self._drift, self._planned, self._rod
         rows = slice(place, self._last + 2)
         heading = np.array(self._heading[rows])
-        known = planned.slips(heading)
-        course, lean = heading + known, known - drift.slips(heading)
+        known = planned.slip_at(heading)
+        course, lean = heading + known, known - drift.slip_at(heading)
         x = np.array(self._x[rows]) + rod * (np.cos(heading) - np.cos(heading + lean))
         y = np.array(self._y[rows]) + rod * (np.sin(heading) - np.sin(heading + lean))
         left_out = np.array(self._arc[rows]) - self._arc[place]
@@ -206,13 +188,13 @@ class TrackerGuidance(LineOfSight):
     def _radius(self) -> float:
         """Return the radius of arcs on the way, for the learned robot in the learned current."""
         tightest = max(abs(forward / rate) for forward, _, rate in self._twist)
-        return tightest * (1 + math.sqrt(self._drift.x**2 + self._drift.y**2)) / ROOM
+        return tightest * (1 + math.hypot(*self._drift.current)) / ROOM
 
     def _pivot(self, pose: POSE) -> POSE:
         """Return place and course of the pivot."""
         x, y, heading = pose
         a = self._pivot_distance
-        return x - a * math.cos(heading), y - a * math.sin(heading), heading + self._drift.slip(heading)
+        return x - a * math.cos(heading), y - a * math.sin(heading), heading + float(self._drift.slip_at(heading))
 
     def _way_hysteresis(self) -> float:
         assert self._way is not None

@@ -21,9 +21,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.paths.tractrix import Drift
 from planner.planning.line_of_sight import arc_terms
 from planner.planning.plan import Plan
-from planner.tracking.guidance import LearnedDrift, TrackerGuidance
+from planner.tracking.guidance import TrackerGuidance
 from planner.vehicle.vehicle import interpolated
 from sim.arrays import Floats
 
@@ -101,7 +102,7 @@ class Estimate:
         self._law.update_vehicle([self._learned(0), self._learned(1)], state[7], [current_x, current_y])
         speed = self._speed * (1 + state[5])
         sideways = self._drift + self._sideways()
-        self._law.update_drift(LearnedDrift(sideways / speed, current_x / speed, current_y / speed))
+        self._law.update_drift(Drift(sideways / speed, (current_x / speed, current_y / speed)))
 
     def advance(self, dwell: Dwell) -> None:
         """Advance to the flip at the end of a dwell."""

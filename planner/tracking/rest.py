@@ -28,13 +28,13 @@ from planner.goal.route import Lattices, NoWayError, route
 from planner.paths.distance import two_sided
 from planner.paths.obstacles import Footprint
 from planner.paths.path import Path2D, arc_length, resample
-from planner.paths.tractrix import Drift, Reference, slips_at_heading
+from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import in_lab, place_in_lab
-from planner.planning.camera import POSE
 from planner.planning.conditions import KeptClear
-from planner.planning.declare import Declared
+from planner.planning.feasible import Declared
 from planner.planning.line_of_sight import Start
 from planner.planning.plan import Job, Plan
+from planner.planning.request import POSE
 from planner.planning.solve import Setting, follow_declared
 from planner.tracking.guidance import LEFT_OUT, ROOM, SEGMENTS, TrackerGuidance, shortest_way, stride
 from sim.arrays import Floats, Integers
@@ -124,7 +124,7 @@ def _way(plan: Plan, pose: POSE, place: int, drift: Drift) -> tuple[Reference | 
     if abs(distance) <= near and abs(turned) <= max(plan.straight.swing, _NEAR):
         return None, law.place
     a, (x, y, heading) = plan.tracked.vehicle.pivot_distance, pose
-    course = heading + float(slips_at_heading(np.array(heading), drift))
+    course = heading + float(drift.slip_at(heading))
     start = x - a * math.cos(heading), y - a * math.sin(heading), course
     poses, join = _shortest(plan, start, place, drift)
     if plan.kept_clear is not None:

@@ -1,7 +1,7 @@
 """A closed loop in simulation: a robot under a tracker's orders, and a camera that sees it.
 
 The robot is simulated in time steps, or moves as the planner's vehicle does, which takes a thousandth of the time.
-The camera looks at equal times (`planner.planning.camera`). Times in μ0 l⁴/EI and lengths in l are those of the
+The camera looks at equal times (`planner.planning.request`). Times in μ0 l⁴/EI and lengths in l are those of the
 plan's robot.
 """
 
@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from planner.paths.distance import distance_to
-from planner.planning.camera import POSE, Camera
 from planner.planning.plan import Plan
+from planner.planning.request import POSE, Camera
 from planner.tracking.tracker import Command
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats

@@ -15,6 +15,7 @@ from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
 from sim.mechanics import planar
 
+_SAMPLES = 8  # of a dwell
 _SMOOTH = np.radians(5)  # turn between two samples of a track that looks smooth
 
 
@@ -27,69 +28,66 @@ class Switches:
     poses: Floats  # (M + 1, 3)
 
 
-def poses_at_flips(vehicle: Vehicle, switches: Switches) -> Floats:
-    """Predict the poses (M + 1, 3) of the head's centre at the flips, if `vehicle` carries out the schedule."""
-    changes = pose_changes(vehicle, switches.first_direction, switches.dwells, switches.dwells[:, None])[:, 0]
-    return _chain(switches.poses[0], changes, vehicle.current * switches.dwells[:, None])
-
-
 class Rollout(NamedTuple):
-    """What a vehicle does on a schedule."""
+    """What a vehicle does on a schedule of M dwells."""
 
     changes: Floats  # (M, 3), of the pose in each dwell
-    poses: Floats  # (M + 1, 3), of the head's centre at the flips and the end
+    flips: Floats  # (M + 1, 3), poses of the head's centre at the flips and the end
+    poses: Floats  # (M samples + 1, 3), of the head's centre at equal times within each dwell
     track: Floats  # (M samples + 1, 2), of the tracked point
 
 
-def roll_out(vehicle: Vehicle, switches: Switches, offset: float, *, samples: int = 8) -> Rollout:
-    """Predict poses at the flips, and the track of the tracked point at equal times within each dwell."""
-    share = np.arange(1, samples + 1) / samples
-    times = switches.dwells[:, None] * share
-    changes = pose_changes(vehicle, switches.first_direction, switches.dwells, times)
-    flips = _chain(switches.poses[0], changes[:, -1], vehicle.current * switches.dwells[:, None])
+def roll_out(vehicle: Vehicle, switches: Switches, offset: float = 0.0, *, samples: int = _SAMPLES) -> Rollout:
+    """Predict poses on a schedule, and the track of the point that is `offset` ahead of the head's centre."""
+    times = switches.dwells[:, None] * np.arange(1, samples + 1) / samples
+    changes = _pose_changes(vehicle, switches.first_direction, None, switches.dwells, times)
+    flips = _chained(vehicle, switches.poses[0], changes[:, -1], switches.dwells)
     within = planar.compose(flips[:-1, None], changes)
     within[..., :2] += vehicle.current * times[..., None]
     poses = np.concatenate([flips[:1], within.reshape(-1, 3)])
     track = planar.compose(poses, np.array([offset, 0.0, 0.0]))[:, :2]
-    return Rollout(changes[:, -1], flips, track)
+    return Rollout(changes[:, -1], flips, poses, track)
 
 
-def trace(vehicle: Vehicle, switches: Switches, offset: float, *, samples: int = 8) -> Floats:
-    """Predict the track of the tracked point, (M samples + 1, 2), at equal times within each dwell."""
-    return roll_out(vehicle, switches, offset, samples=samples).track
-
-
-def trace_smoothly(vehicle: Vehicle, switches: Switches, offset: float) -> Floats:
+def smooth_track(vehicle: Vehicle, switches: Switches, offset: float) -> Floats:
     """Predict the track of the tracked point (S, 2) for pictures: a sample every 5°, at least 8 a dwell."""
-    times = np.maximum(np.ceil(np.abs(np.diff(switches.poses[:, 2])) / (8 * _SMOOTH)), 1).astype(int)
+    times = np.maximum(np.ceil(np.abs(np.diff(switches.poses[:, 2])) / (_SAMPLES * _SMOOTH)), 1).astype(int)
     most = int(times.max())
-    fine = trace(vehicle, switches, offset, samples=8 * most)
-    wanted = np.arange(8 * most) % (most // times)[:, None] == 0  # of each dwell, without its end
+    fine = roll_out(vehicle, switches, offset, samples=_SAMPLES * most).track
+    wanted = np.arange(_SAMPLES * most) % (most // times)[:, None] == 0  # of each dwell, without its end
     return np.concatenate([fine[:-1][wanted.ravel()], fine[-1:]])
 
 
-def predicted_poses(vehicle: Vehicle, switches: Switches) -> Floats:
-    """Predict poses (K, 3) of the head's centre, several a dwell."""
-    times = switches.dwells[:, None] * np.arange(0, 9) / 8
-    changes = pose_changes(vehicle, switches.first_direction, switches.dwells, times)
-    poses = planar.compose(switches.poses[:-1, None], changes)
-    poses[..., :2] += vehicle.current * times[..., None]
-    return np.asarray(poses.reshape(-1, 3))
+def flips_after(vehicle: Vehicle, switches: Switches, kept: int, last: Floats) -> Floats:
+    """Predict the poses (B, K, 3) at the flips where dwells (B, K) follow the first `kept` ones of a schedule."""
+    sense, before = switches.first_direction * (-1) ** kept, switches.dwells[kept - 1] if kept else None
+    changes = _pose_changes(vehicle, sense, before, last, last[..., None])[..., 0, :]
+    return _chained(vehicle, switches.poses[kept], changes, last)[:, 1:]
 
 
-def pose_changes(vehicle: Vehicle, first_direction: int, dwells: Floats, times: Floats) -> Floats:
-    """Predict the pose changes (M, K, 3) of each dwell after times (M, K), from rest."""
-    before = np.concatenate([dwells[:1], dwells[:-1]])[:, None] + np.zeros_like(times)
+def _pose_changes(vehicle: Vehicle, sense: int, before: float | None, dwells: Floats, times: Floats) -> Floats:
+    """Predict the pose changes (..., M, K, 3) of dwells (..., M), the first one in direction `sense`.
+
+    Args:
+        vehicle: who carries them out.
+        sense: direction of the first dwell.
+        before: length of the dwell before the first one; None: from rest.
+        dwells: their lengths.
+        times: (..., M, K), since the flip before each.
+    """
+    first = np.full_like(dwells[..., :1], dwells.flat[0] if before is None else before)
+    earlier = np.concatenate([first, dwells[..., :-1]], -1)[..., None] + np.zeros_like(times)
     changes = np.empty((*times.shape, 3))
-    for first, sense in ((0, first_direction), (1, -first_direction)):
-        changes[first::2] = vehicle.motion(sense, before[first::2], times[first::2])
-    changes[0] = vehicle.motion(first_direction, None, times[0])
+    for k, direction in enumerate((sense, -sense)):
+        changes[..., k::2, :, :] = vehicle.motion(direction, earlier[..., k::2, :], times[..., k::2, :])
+    if before is None:
+        changes[..., 0, :, :] = vehicle.motion(sense, None, times[..., 0, :])
     return changes
 
 
-def _chain(start: Floats, changes: Floats, drift: Floats) -> Floats:
-    """Compose poses (M + 1, 3) from a start, pose changes (M, 3) and moves in the lab (M, 2)."""
-    heading = start[2] + np.concatenate([[0.0], np.cumsum(changes[:, 2])])
-    moves = planar.turn(changes[:, :2], heading[:-1]) + drift
-    position = start[:2] + np.concatenate([[[0.0, 0.0]], np.cumsum(moves, 0)])
-    return np.concatenate([position, heading[:, None]], 1)
+def _chained(vehicle: Vehicle, start: Floats, changes: Floats, dwells: Floats) -> Floats:
+    """Compose poses (..., M + 1, 3) from a start and the pose changes (..., M, 3) of dwells (..., M)."""
+    heading = start[2] + np.cumsum(changes[..., 2], -1)
+    moves = planar.turn(changes[..., :2], heading - changes[..., 2]) + vehicle.current * dwells[..., None]
+    poses = np.concatenate([start[:2] + np.cumsum(moves, -2), heading[..., None]], -1)
+    return np.concatenate([np.broadcast_to(start, (*poses.shape[:-2], 1, 3)), poses], -2)

@@ -19,7 +19,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from planner.vehicle.rollout import Switches, poses_at_flips, trace
+from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.vehicle import SHORTEST, Vehicle
 from sim.arrays import Floats
 from sim.io.errors import InputError
@@ -86,7 +86,8 @@ def zigzag(vehicle: Vehicle, dwell: float, offset: float = 0.0) -> Zigzag:
     for _ in range(_TRIES):
         pair = [0.0, 0.0]
         pair[fast], pair[1 - fast] = dwell, dwell * ratio
-        switches, poses = _repeated(still, pair)
+        rollout = roll_out(still, Switches(1, np.tile(pair, _PAIRS), np.zeros((1, 3))), offset)
+        poses = rollout.flips
         turn = float(poses[-1, 2] - poses[-3, 2])
         if abs(turn) < 1e-10:
             break
@@ -96,7 +97,7 @@ def zigzag(vehicle: Vehicle, dwell: float, offset: float = 0.0) -> Zigzag:
     move = poses[-1, :2] - poses[-3, :2]
     duration = sum(pair)
     c, s = math.cos(middle), math.sin(middle)
-    track = trace(still, switches, offset)[-17:-1]
+    track = rollout.track[-17:-1]
     length = max(float(np.hypot(*move)), 1e-300)
     across = (track - track.mean(0)) @ (np.array([-move[1], move[0]]) / length)
     return Zigzag(
@@ -116,12 +117,6 @@ def _sway(vehicle: Vehicle, poses: Floats, direction: Floats) -> float:
     pivot = poses[-3:, :2] - vehicle.pivot_distance * axis
     across = pivot @ np.array([-direction[1], direction[0]])
     return float(across[1] - (across[0] + across[2]) / 2) / 2
-
-
-def _repeated(vehicle: Vehicle, pair: list[float]) -> tuple[Switches, Floats]:
-    """Repeat a pair of dwells, and predict the poses at the flips."""
-    switches = Switches(1, np.tile(pair, _PAIRS), np.zeros((1, 3)))
-    return switches, poses_at_flips(vehicle, switches)
 
 
 def dwells_for(vehicle: Vehicle, objective: Objective, least: float | None) -> list[float]:

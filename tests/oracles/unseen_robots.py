@@ -12,7 +12,7 @@ from planner.paths.path import Path2D, circle, polygon
 from planner.planning.errors import WOBBLE, plan_errors, predicted_error
 from planner.planning.plan import Plan
 from planner.vehicle.from_table import table_vehicle
-from planner.vehicle.rollout import trace
+from planner.vehicle.rollout import roll_out
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from surrogate.table import NeuralTable
@@ -114,6 +114,6 @@ def carried(seed: int, lookup: NeuralTable) -> Carried:
     own = tabulate(robot)
     tracked = result.tracked._replace(vehicle=table_vehicle(robot, own))
     errors = plan_errors(tracked, result.drawn, result.declared, result.switches, guaranteed=None, seed=0)
-    track = trace(tracked.vehicle, result.switches, tracked.offset)
+    track = roll_out(tracked.vehicle, result.switches, tracked.offset).track
     found = predicted_error(result.reference, track, closed=result.drawn.closed).largest
     return Carried(result, errors.stated, found + WOBBLE)

@@ -10,7 +10,7 @@ import pytest
 
 from planner.options import places_of, pose_of, request_of, seconds_of
 from planner.paths.obstacles import Circle
-from planner.planning.camera import Camera
+from planner.planning.request import Camera
 from sim.io.errors import InputError
 from tests.planner.plans import CONTROL
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.planning.camera import Camera
 from planner.planning.line_of_sight import Guidance
+from planner.planning.request import Camera
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle
 from sim.arrays import Floats
 from sim.mechanics import planar

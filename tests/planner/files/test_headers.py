@@ -14,8 +14,8 @@ import pytest
 
 from planner.api import plan
 from planner.files.headers import milliseconds, rounded, schedule_header, table_bytes, tracker_header
-from planner.planning.camera import Camera
 from planner.planning.plan import Plan
+from planner.planning.request import Camera
 from planner.tracking.swim import swim
 from planner.tracking.tracker import POSE, SLACK, Command, Tracker
 from planner.vehicle.vehicle import Vehicle

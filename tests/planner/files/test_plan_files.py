@@ -18,7 +18,7 @@ from planner.files.headers import milliseconds
 from planner.files.plan_files import write_plan
 from planner.files.plan_svg import SvgAxes
 from planner.files.tracks import tracking_error
-from planner.vehicle.rollout import Switches, poses_at_flips, trace
+from planner.vehicle.rollout import Switches, roll_out
 from sim.io.errors import InputError
 from sim.model.schedule import load_schedule
 from tests.planner.compiled import compile_c
@@ -149,10 +149,10 @@ def test_any_words_can_be_written() -> None:
 def test_a_long_dwell_is_drawn_as_a_curve() -> None:
     """Eight samples a dwell would be a polygon."""
     switches = Switches(1, np.array([60.0, 60.0]), planned().poses[:1])
-    switches = replace(switches, poses=poses_at_flips(planned().tracked.vehicle, switches))
+    switches = replace(switches, poses=roll_out(planned().tracked.vehicle, switches).flips)
     long = replace(planned(), switches=switches)
     kinks = []
-    for track in (trace(long.tracked.vehicle, long.switches, 0.0), long.smooth_track):
+    for track in (roll_out(long.tracked.vehicle, long.switches, 0.0).track, long.smooth_track):
         turns = np.diff(np.unwrap(np.arctan2(*np.diff(track, axis=0).T)))
         kinks.append((np.abs(turns) > np.radians(8)).sum())
     assert kinks[1] <= 2 < kinks[0]

@@ -20,7 +20,7 @@ from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import STILL, Drift, reference
 from planner.planning.plan import Plan
 from planner.vehicle.calibration_table import CalibrationKnowledge
-from planner.vehicle.rollout import Switches, poses_at_flips
+from planner.vehicle.rollout import Switches, roll_out
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.mechanics import planar
@@ -40,7 +40,7 @@ def check_end(goal_plan: Plan) -> None:
     """Check that the schedule, carried out anew from the start that was asked for, ends at the goal."""
     plan, goal = goal_plan, goal_plan.job.goal
     switches = Switches(plan.first_direction, plan.dwells, np.array([plan.start]))
-    end = poses_at_flips(plan.tracked.vehicle, switches)[-1]
+    end = roll_out(plan.tracked.vehicle, switches).flips[-1]
     assert end[:2] == pytest.approx(goal[:2], abs=1e-3)
     assert math.cos(end[2] - goal[2]) > 1 - 1e-6
     assert max(goal_plan.job.end_error) < 1e-3

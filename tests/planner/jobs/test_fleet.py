@@ -19,7 +19,7 @@ from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
-from planner.vehicle.rollout import Switches, poses_at_flips
+from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import tracked_vehicle
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
@@ -174,7 +174,7 @@ def test_ninety_five_per_cent_of_random_robots_keep_within_the_error_in_place() 
     error, expected = motion.error(times), motion.body.ends(motion.poses(times))
     for _ in range(100):
         robot = drawn_vehicle(made.tracked.vehicle, rng)
-        poses = poses_at_flips(robot, Switches(made.first_direction, made.dwells, made.poses))
+        poses = roll_out(robot, Switches(made.first_direction, made.dwells, made.poses)).flips
         ends = motion.body.ends(poses * [TAIL, TAIL, 1.0])
         off = np.hypot(*np.moveaxis(ends - expected, -1, 0)).max(1)
         held.append((off <= error + 1e-12).all())

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import planner.jobs.laps
 from planner.files.headers import rounded
 from planner.files.saved_plan import restore_plan
+from planner.goal import last_dwells
+from planner.goal.last_dwells import looped
 from planner.jobs.hold import Orbit, hold
-from planner.jobs.laps import looped
 from planner.jobs.plan import make_plan
 from planner.paths.obstacles import Circle, Footprint, FreeSpace
 from planner.paths.path import Path2D, circle
@@ -24,7 +24,7 @@ from planner.tracking.guidance import TrackerGuidance
 from planner.tracking.pipe import answers
 from planner.tracking.swim import swim
 from planner.tracking.tracker import POSE, Command, Tracker
-from planner.vehicle.rollout import Switches, poses_at_flips
+from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import tracked_vehicle
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
@@ -87,7 +87,7 @@ def test_laps_close(path: Path2D) -> None:
     assert plan.lap is not None
     assert max(plan.lap.closes, plan.lap.closes_turn) < 1e-4
     many = Switches(plan.first_direction, np.tile(plan.dwells, 6), plan.poses[:1])
-    after = poses_at_flips(tracked().vehicle, many)[count::count]
+    after = roll_out(tracked().vehicle, many).flips[count::count]
     turn = 0.0 if path is EIGHT else 2 * np.pi
     assert np.diff(after, axis=0) == pytest.approx(np.tile([0, 0, turn], (5, 1)), abs=1e-4)
     assert after[0] == pytest.approx(plan.poses[-1], abs=1e-9)
@@ -97,7 +97,7 @@ def test_laps_close(path: Path2D) -> None:
 
 
 def test_a_path_that_no_schedule_repeats_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planner.jobs.laps, "_closed", lambda *_: None)
+    monkeypatch.setattr(last_dwells, "_closed", lambda *_: None)
     with pytest.raises(InputError, match="no schedule of this path repeats"):
         looped(laps())
 
@@ -109,7 +109,7 @@ def test_a_lap_drifts_as_stated() -> None:
     count = len(laps().dwells)
     for _ in range(40):
         twice = Switches(laps().first_direction, np.tile(laps().dwells, 2), laps().poses[:1])
-        poses = poses_at_flips(drawn_vehicle(vehicle, rng), twice)
+        poses = roll_out(drawn_vehicle(vehicle, rng), twice).flips
         x, y, _ = poses[-1] - poses[count]
         beyond += np.hypot(x, y) > laps().lap.drift
     assert beyond <= 6

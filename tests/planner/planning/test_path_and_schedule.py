@@ -18,7 +18,7 @@ from planner.planning.declare import MOST_WORK, declare, remedy
 from planner.planning.feasible import Feasibility, changed, cost, feasible
 from planner.planning.line_of_sight import follow, guaranteed, hysteresis, look_ahead
 from planner.planning.request import DECLARING, REMEDY, Corner, Share
-from planner.vehicle.rollout import poses_at_flips, trace
+from planner.vehicle.rollout import roll_out
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
@@ -54,7 +54,7 @@ def test_the_bound_holds_on_random_paths(seed: int) -> None:
     dwell = rng.uniform(0.3, 2.0)
     ahead = look_ahead(car, curvature)
     switches = follow(ref, car, plain_guidance(car, dwell, ahead))
-    track = trace(car, switches, 0.0, samples=12)
+    track = roll_out(car, switches, 0.0, samples=12).track
     error = distance_to(ref.p, track[:-12])
     assert error.max() <= guaranteed(car, car.pivot_distance, car.yaw_rate * dwell, ahead)
     assert switches.dwells.min() >= dwell * (1 - 1e-9)
@@ -66,7 +66,7 @@ def test_error_does_not_grow_with_length() -> None:
     for length in (10.0, 80.0):
         ref = reference(Path2D.of([[0, 0], [length, 0]]), car.pivot_distance, 0.01)
         switches = follow(ref, car, plain_guidance(car, 1.0, look_ahead(car, 0.0)))
-        worst.append(np.abs(trace(car, switches, 0.0)[:, 1]).max())
+        worst.append(np.abs(roll_out(car, switches, 0.0).track[:, 1]).max())
     assert worst[1] < 1.2 * worst[0]
 
 
@@ -83,8 +83,8 @@ def test_the_schedule_predicts_what_the_vehicle_does(bias: float) -> None:
         pose = pose + np.append(car.current * dwell, 0.0)
         assert switches.poses[i + 1] == pytest.approx(pose, abs=1e-9)
         before = dwell
-    assert poses_at_flips(car, switches) == pytest.approx(switches.poses, abs=1e-8)
-    assert trace(car, switches, 0.0)[::8] == pytest.approx(switches.poses[:, :2], abs=1e-8)
+    assert roll_out(car, switches).flips == pytest.approx(switches.poses, abs=1e-8)
+    assert roll_out(car, switches, 0.0).track[::8] == pytest.approx(switches.poses[:, :2], abs=1e-8)
 
 
 SIDEWAYS = replace(

@@ -18,7 +18,7 @@ from planner.paths.path import Path2D, circle, polygon
 from planner.planning.request import PlanRequest
 from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
 from planner.vehicle.from_table import table_vehicle
-from planner.vehicle.rollout import trace
+from planner.vehicle.rollout import roll_out
 from planner.vehicle.zigzag import dwells_for, longest_dwell
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
@@ -217,7 +217,7 @@ def test_robots_with_the_coefficients_of_another_stay_within_the_error_of_unmeas
         other = {name: getattr(CONTROL, name) * value for name, value in zip(COEFFICIENTS, factor, strict=True)}
         with suppress(InputError):  # outside the table
             truth = table_vehicle(replace(CONTROL, **other), lookup)
-            misses.append(distance_to(result.reference, trace(truth, result.switches, 0.0)).max())
+            misses.append(distance_to(result.reference, roll_out(truth, result.switches, 0.0).track).max())
     assert len(misses) > 25
     assert result.unmeasured_error is not None
     assert np.mean(np.array(misses) < result.unmeasured_error) > 0.8

@@ -15,7 +15,6 @@ from planner.files.saved_plan import load_plan, restore_plan
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Reference, reference
-from planner.planning.camera import Camera
 from planner.planning.errors import (
     WOBBLE,
     ErrorGrowth,
@@ -28,9 +27,10 @@ from planner.planning.errors import (
     stated_error,
 )
 from planner.planning.line_of_sight import follow, look_ahead
+from planner.planning.request import Camera
 from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
-from planner.vehicle.rollout import Rollout, Switches, roll_out, trace
+from planner.vehicle.rollout import Rollout, Switches, roll_out
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle
 from sim.io.errors import InputError
 from sim.mechanics import planar
@@ -86,7 +86,7 @@ def test_it_is_the_quantile_over_drawn_vehicles(path: Path2D, car: Vehicle) -> N
     error = predicted_error(ref.p, rollout.track, closed=path.closed)
     stated = stated_for(car, switches, rollout, error)
     rng = np.random.default_rng(5)
-    worst = [distance_to(ref.p, trace(drawn_vehicle(car, rng), switches, 0.0)).max() for _ in range(300)]
+    worst = [distance_to(ref.p, roll_out(drawn_vehicle(car, rng), switches, 0.0).track).max() for _ in range(300)]
     assert np.mean(np.array(worst) + WOBBLE <= stated) == pytest.approx(0.95, abs=0.035)
     assert stated > (2 if car.modes[0].lag is not None else 1) * error.largest
 

@@ -12,9 +12,10 @@ import pytest
 
 from planner.api import plan
 from planner.goal.dubins import shortest_paths
-from planner.planning.camera import POSE, Camera
+from planner.paths.tractrix import Drift
 from planner.planning.plan import Plan
-from planner.tracking.guidance import LearnedDrift, TrackerGuidance, Way, shortest_way
+from planner.planning.request import POSE, Camera
+from planner.tracking.guidance import TrackerGuidance, Way, shortest_way
 from planner.tracking.swim import Swim, swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.zigzag import Objective
@@ -60,7 +61,7 @@ def test_a_drift_that_the_plan_knows_does_not_turn_the_reference() -> None:
 def test_on_a_straight_line_the_reference_turns_against_the_slip() -> None:
     """The other side: the robot heads into the current by the angle at which the two velocities add up."""
     guidance = TrackerGuidance(planned(((0.0, 0.0), (12.0, 0.0)), objective="flips"))
-    guidance.update_drift(LearnedDrift(0.0, 0.0, 0.2))
+    guidance.update_drift(Drift(0.0, (0.0, 0.2)))
     for x in np.linspace(0, 11, 300):
         guidance.integrate((float(x), 0.0, 0.0), 1)
     assert math.sin(-guidance._lean) == pytest.approx(0.2, rel=1e-3)

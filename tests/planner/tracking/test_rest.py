@@ -14,7 +14,7 @@ from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Reference, reference
 from planner.planning.plan import Plan
 from planner.tracking.rest import Remainder, reached, rest_of
-from planner.vehicle.rollout import predicted_poses
+from planner.vehicle.rollout import roll_out
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
 from sim.motion.replay import replay
@@ -91,7 +91,7 @@ def test_the_rest_in_the_simulator_ends_where_the_path_ends() -> None:
 def test_the_way_back_keeps_clear_of_obstacles(name: str, moved: tuple[float, ...]) -> None:
     after = rest(name, 0.3, *moved)
     body = Footprint.of(CONTROL, 0.0)
-    clearance = body.clearance(predicted_poses(after.tracked.vehicle, after.switches), ROCK).min()
+    clearance = body.clearance(roll_out(after.tracked.vehicle, after.switches).poses, ROCK).min()
     assert after.kept_clear is not None
     assert 0 < after.kept_clear.clearance == pytest.approx(clearance)
     assert end_error(name, after) < 0.1

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from planner.planning.camera import POSE, Camera
 from planner.planning.plan import Plan
+from planner.planning.request import POSE, Camera
 from planner.tracking import tracker
 from planner.tracking.guidance import TrackerGuidance
 from planner.tracking.kalman_filter import MOST, STATES, Dwell, Estimate
@@ -333,7 +333,7 @@ def test_the_guidance_swims_with_the_learned_robot(estimate: Estimate) -> None:
         found = learned.pose_after(estimate.pose, dwell.sense, dwell.before, dwell.length)
         assert found == pytest.approx(expected, abs=1e-12)
     speed = estimate._speed * (1 + STATE[5])
-    assert learned._drift[1:] == pytest.approx((STATE[8] / speed, STATE[9] / speed))
+    assert learned._drift.current == pytest.approx((STATE[8] / speed, STATE[9] / speed))
 
 
 def test_numbers_stay_within_bounds(estimate: Estimate) -> None:

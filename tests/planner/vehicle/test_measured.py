@@ -16,7 +16,7 @@ from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import Plan
 from planner.vehicle.measured import MeasuredVehicle
-from planner.vehicle.rollout import Switches, poses_at_flips
+from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.vehicle import Vehicle
 from sim.io.errors import InputError
 from sim.mechanics import planar
@@ -48,7 +48,7 @@ def _integrated(vehicle: MeasuredVehicle, seconds: np.ndarray) -> np.ndarray:
 
 def _at_flips(vehicle: MeasuredVehicle, motion: Vehicle, seconds: np.ndarray) -> np.ndarray:
     """Predict poses (M + 1, 3) in m and rad, left first."""
-    poses = poses_at_flips(motion, Switches(1, seconds / vehicle.time_scale, np.zeros((1, 3))))
+    poses = roll_out(motion, Switches(1, seconds / vehicle.time_scale, np.zeros((1, 3)))).flips
     return poses * [vehicle.length_scale, vehicle.length_scale, 1]
 
 

@@ -19,7 +19,7 @@ from planner.vehicle.calibration_table import (
     read_knowledge,
 )
 from planner.vehicle.from_table import table_vehicle
-from planner.vehicle.rollout import Switches, trace
+from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, interpolated, lag_table
 from planner.vehicle.zigzag import zigzag
 from sim.inputs import load_robot
@@ -94,7 +94,7 @@ def test_the_zigzag_is_that_of_arcs() -> None:
     angle = 0.0489 * 2.0 / 2
     assert found.net_speed == pytest.approx(0.0179 * np.sin(angle) / angle, rel=1e-6)
     pair = Switches(1, np.array([2.0, 2.0]), np.array([[0.0, 0.0, -angle]]))
-    across = trace(car, pair, 0.0, samples=400)[:-1, 1]
+    across = roll_out(car, pair, 0.0, samples=400).track[:-1, 1]
     assert found.rms == pytest.approx(across.std(), rel=0.02)
 
 

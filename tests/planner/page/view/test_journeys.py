@@ -18,7 +18,7 @@ from planner.page.write_page import write_page
 from planner.paths.path import circle
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
-from planner.vehicle.rollout import predicted_poses
+from planner.vehicle.rollout import roll_out
 from sim.inputs import load_robot
 from sim.io.errors import run_command
 from sim.model.presets import PRESETS
@@ -216,7 +216,7 @@ def test_a_track_is_shown_over_its_plan_with_its_error(page: Any, tmp_path: Path
     result: Plan = planned_by_python("circle", objective="flips")
     starts, share = np.cumsum([0.0, *result.dwells[:-1]]), np.arange(8) / 8
     time = (starts[:, None] + result.dwells[:, None] * share).ravel() * result.robot.time_scale
-    poses = predicted_poses(result.tracked.vehicle, result.switches).reshape(-1, 9, 3)[:, :8].reshape(-1, 3)
+    poses = roll_out(result.tracked.vehicle, result.switches).poses[:-1]
     track = pd.DataFrame(
         np.column_stack([time, poses * [11, 11, 1]]), columns=["time_s", "x_cm", "y_cm", "heading_rad"]
     )

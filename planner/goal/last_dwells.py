@@ -1,0 +1,227 @@
+"""Change the last dwells of a schedule so that the motion ends at a given pose: a goal, or the beginning of a lap.
+
+*A goal*: the dwells minimise a sum of squares: time, distances of the pivot from its track beyond those of the
+schedule, and the distance from the goal. A pose has three coordinates, so a few dwells are enough, and some may be
+dropped.
+
+*A lap*: the reference of a closed path is followed for a lap and once more. The dwells of the second lap, which
+began in motion, are the schedule: an even number of them. The last ones are changed a little, so that pose and
+motion at the end are those at the beginning: the sum of the squares of the changes is least. The first dwell of
+the first lap begins at rest; the start is where that one, too, ends in the pose from which all laps go on. Lengths
+in l, times in μ0 l⁴/EI.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from planner.paths.distance import distance_to
+from planner.planning.conditions import OVERLAP, Lap
+from planner.planning.errors import drift_of_a_lap, plan_errors
+from planner.planning.feasible import Declared
+from planner.planning.line_of_sight import follow
+from planner.planning.plan import J, Plan
+from planner.planning.request import POSE, Progress
+from planner.planning.solve import Setting
+from planner.vehicle.rollout import Switches, flips_after, roll_out
+from planner.vehicle.vehicle import Vehicle
+from sim.arrays import Floats
+from sim.io.errors import InputError
+from sim.mechanics import planar
+
+_STEP = 1e-4  # time units, for derivatives
+_LAST = 30  # dwells before a goal that are changed
+_DROPPED = 4  # at most this many are left out
+_REACHED = 1e-4  # l and rad
+_CONVERGED = 1e-3  # relative gain of the cost in a step, below which the search ends
+_MOST_EVALUATIONS = 200  # about thirty are needed
+_GOAL = 1e7  # time units that a squared distance [l² or rad²] from the goal costs
+_FAR = 3e4  # the same for a distance [l] from the track, beyond the largest one of the schedule
+_CHANGED = 60  # dwells before the end of a lap that are changed
+_NEAR = 6  # flips, or 2 % of them, from where the lap should end: its end is sought among them
+_EXACT = 1e4  # weight of the pose at the end, over the change of a dwell as a share of it
+_CLOSED = 1e-4  # l and rad; a lap that closes less well is refused
+
+
+@dataclass(frozen=True)
+class Ending:
+    """Changes the last dwells of a plan's schedule so that it ends at a pose."""
+
+    goal: POSE  # of the head's centre
+    least: float  # dwell that the motor allows
+    shorter: float = 1.0  # share of the plan's shortest dwell that these dwells must keep
+
+    def __call__(self, switches: Switches, declared: Declared, setting: Setting) -> Switches:
+        """Change a schedule: without any or some of its last dwells, whichever costs least."""
+        vehicle, track = setting.tracked.vehicle, declared.reference.q
+        dwell = min(setting.dwell, max(self.least, self.shorter * setting.dwell))
+        best, lowest = switches, math.inf
+        for dropped in range(min(_DROPPED, len(switches.dwells) - 1) + 1):
+            count = len(switches.dwells) - dropped
+            shorter = Switches(switches.first_direction, switches.dwells[:count], switches.poses[: count + 1])
+            candidate, cost = _ended(shorter, self.goal, vehicle, dwell, track)
+            if cost < lowest:
+                best, lowest = candidate, cost
+        return best
+
+
+def _ended(
+    switches: Switches, goal: POSE, vehicle: Vehicle, least: float, track: Floats
+) -> tuple[Switches, float]:
+    """Change the last dwells so that a schedule ends at a goal, and return it with its cost.
+
+    Args:
+        switches: the schedule.
+        goal: x, y [l] and heading [rad] of the head's centre.
+        vehicle: who carries it out.
+        least: the shortest dwell.
+        track: (m, 2), that of the pivot.
+    """
+    kept = max(len(switches.dwells) - _LAST, 0)
+    turns = round((switches.poses[-1, 2] - goal[2]) / (2 * math.pi))
+    target = np.array([goal[0], goal[1], goal[2] + 2 * math.pi * turns])
+
+    def distances(poses: Floats) -> Floats:
+        """Compute distances (B, K) of the pivot from its track, at poses (B, K, 3) of the head's centre."""
+        pivot = planar.compose(poses, np.array([-vehicle.pivot_distance, 0.0, 0.0]))[..., :2]
+        return distance_to(track, pivot.reshape(-1, 2)).reshape(pivot.shape[:-1])
+
+    near = float(distances(switches.poses[None, kept + 1 :]).max())
+
+    def residuals(last: Floats) -> Floats:
+        poses = flips_after(vehicle, switches, kept, last)
+        beyond = np.maximum(distances(poses) - near, 0.0)
+        parts = (math.sqrt(_GOAL) * (poses[:, -1] - target), np.sqrt(last), math.sqrt(_FAR) * beyond)
+        return np.concatenate(parts, 1)
+
+    first = np.maximum(switches.dwells[kept:], least * (1 + 1e-6))
+    last = _least_squares(residuals, first, least, x_scale=least, max_nfev=_MOST_EVALUATIONS, ftol=_CONVERGED)
+    found = residuals(last[None])[0]
+    missed = float(np.abs(found[:3]).max()) / math.sqrt(_GOAL)
+    cost = float((found**2).sum() + switches.dwells[:kept].sum()) + 1e6 * max(missed - _REACHED, 0.0)
+    ended = replace(switches, dwells=np.concatenate([switches.dwells[:kept], last]))
+    return replace(ended, poses=roll_out(vehicle, ended, samples=1).flips), cost
+
+
+def _least_squares(
+    residuals: Callable[[Floats], Floats], first: Floats, least: Floats | float, **options: Any
+) -> Floats:
+    """Find dwells (K,), not below `least`, whose residuals have the least sum of squares.
+
+    Args:
+        residuals: (B, R) of dwells (B, K).
+        first: the dwells to begin with.
+        least: the shortest ones.
+        options: of SciPy's `least_squares`.
+    """
+    from scipy.optimize import least_squares  # here, for it takes longer to load than most plans to make
+
+    known: dict[bytes, tuple[Floats, Floats]] = {}
+
+    def at(dwells: Floats) -> tuple[Floats, Floats]:
+        """Compute residuals (R,) and derivatives (R, K) together."""
+        key = dwells.tobytes()
+        if key not in known:
+            values = residuals(np.concatenate([dwells[None], dwells + _STEP * np.eye(len(dwells))]))
+            known.clear()
+            known[key] = values[0], (values[1:] - values[0]).T / _STEP
+        return known[key]
+
+    def values(dwells: Floats) -> Floats:
+        return at(dwells)[0]
+
+    def slopes(dwells: Floats) -> Floats:
+        return at(dwells)[1]
+
+    return np.asarray(least_squares(values, first, slopes, bounds=(least, np.inf), **options).x)
+
+
+def looped(plan: Plan[J], progress: Progress | None = None) -> Plan[J]:
+    """Turn the plan of a closed path into a schedule that repeats.
+
+    Args:
+        plan: of a closed path, for one lap from rest.
+        progress: called now and then with the share of the path that is done.
+
+    Raises:
+        InputError: no schedule closes.
+    """
+    tracked, reference, seed = plan.tracked, plan.declared.reference, plan.request.seed
+    twice = reference.laps(2, OVERLAP * tracked.vehicle.pivot_radius)
+    long = follow(twice, tracked.vehicle, plan.guidance, tracked.offset, progress=progress)
+    turn = reference.turn
+    tried = [_closed(long, first, last, turn, plan) for first, last in _ends(long, len(plan.dwells), turn)]
+    laps = [lap for lap in tried if lap is not None]
+    if not laps:
+        raise InputError("no schedule of this path repeats; change the dwell a little (--minimum-dwell)")
+    _, switches = min(laps, key=lambda lap: lap[0])
+    errors = plan_errors(
+        tracked, plan.drawn, plan.declared, switches, guaranteed=plan.errors.guaranteed, seed=seed
+    )
+    closes, closes_turn = _closure(tracked.vehicle, switches, turn)
+    lap = Lap(closes, closes_turn, *drift_of_a_lap(tracked, switches, seed))
+    return replace(plan, switches=switches, errors=errors, lap=lap)
+
+
+def _ends(long: Switches, count: int, turn: float) -> list[tuple[int, int]]:
+    """List first and last flip of laps that nearly close: an even number of dwells, one more pair, one less."""
+    first = count - 1
+    pose = long.poses[first] + np.array([0.0, 0.0, turn])
+    ahead = np.array([math.cos(pose[2]), math.sin(pose[2])])
+    reach = max(_NEAR, count // 50)
+    near = [last for last in range(2 * count - 1 - reach, 2 * count - 1 + reach + 1)
+            if (last - first) % 2 == 0 and first < last < len(long.dwells)]  # fmt: skip
+    if not near:
+        return []
+    best = min(near, key=lambda last: abs(float((long.poses[last, :2] - pose[:2]) @ ahead)))
+    return [(first, last) for last in (best, best - 2, best + 2) if first + 4 <= last < len(long.dwells)]
+
+
+def _closed(long: Switches, first: int, last: int, turn: float, plan: Plan) -> tuple[float, Switches] | None:
+    """Change the last dwells of a lap so that it closes; return the size of the changes, and the lap from rest."""
+    vehicle = plan.tracked.vehicle
+    sense = long.first_direction * (-1) ** first
+    dwells = long.dwells[first:last].copy()
+    dwells[-1] = long.dwells[first - 1]  # so that each lap begins after the same dwell
+    kept = max(len(dwells) - 1 - _CHANGED, 1)
+    lap = Switches(sense, dwells, long.poses[first : last + 1])
+    goal = long.poses[first] + np.array([0.0, 0.0, turn])
+    planned, least = dwells[kept:-1], np.minimum(plan.minimum_dwell, dwells[kept:-1].min())
+
+    def ends(changed: Floats) -> Floats:
+        """Predict the last poses (B, 3) with changed dwells (B, K)."""
+        final = np.full((len(changed), 1), dwells[-1])
+        return flips_after(vehicle, lap, kept, np.concatenate([changed, final], 1))[:, -1]
+
+    def residuals(changed: Floats) -> Floats:
+        return np.concatenate([_EXACT * (ends(changed) - goal), changed / planned - 1], 1)
+
+    begin, lowest = planned * (1 + 1e-9), least * (1 - 1e-9)
+    solution = _least_squares(residuals, begin, lowest, x_scale=plan.minimum_dwell)
+    if np.abs(ends(solution[None])[0] - goal).max() > _CLOSED:
+        return None
+    dwells[kept:-1] = solution
+    return float(((solution / planned - 1) ** 2).sum()), _from_rest(vehicle, lap, dwells, turn)
+
+
+def _from_rest(vehicle: Vehicle, lap: Switches, dwells: Floats, turn: float) -> Switches:
+    """Choose the start, at rest, from which the first dwell ends where it ends in every lap."""
+    sense, first = lap.first_direction, float(dwells[0])
+    moved = vehicle.motion(sense, None, first)
+    after = lap.poses[1] - np.array([0.0, 0.0, turn])
+    after[:2] -= vehicle.current * first
+    start = planar.compose(after, planar.inverse(moved))
+    return Switches(sense, dwells, roll_out(vehicle, Switches(sense, dwells, start[None])).flips)
+
+
+def _closure(vehicle: Vehicle, switches: Switches, turn: float) -> tuple[float, float]:
+    """Predict how the pose after two laps differs from that after one: distance, and angle."""
+    twice = Switches(switches.first_direction, np.tile(switches.dwells, 2), switches.poses)
+    poses = roll_out(vehicle, twice).flips
+    x, y, angle = (poses[-1] - poses[len(switches.dwells)]).tolist()
+    return math.hypot(x, y), abs(angle - turn)
