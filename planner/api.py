@@ -23,6 +23,7 @@ from planner.options import (
     Region,
     asked,
     length_of,
+    place_of,
     places_of,
     pose_of,
     refuse_other_unit,
@@ -34,7 +35,7 @@ from planner.options import (
 )
 from planner.paths.path import Path2D, shape_of, smoothed
 from planner.paths.path_files import Drawing, read_path
-from planner.paths.units import describe, in_lab, in_tails, read_degrees, read_length
+from planner.paths.units import describe, in_lab, in_tails, read_degrees
 from planner.planning.plan import Plan
 from planner.planning.request import Camera
 from planner.vehicle.zigzag import Objective
@@ -162,7 +163,7 @@ def to_goal(
 
     swims, unit = swimmer_of(robot), options.get("unit")
     ends = (pose_of(start, unit, swims, "--start"), pose_of(goal, unit, swims, "--goal"))
-    places = [[read_length(x, unit, swims, "--via") if isinstance(x, str) else x for x in place] for place in via]
+    places = [place_of(place, unit, swims, "--via") for place in via]
     own = {"objective": objective, "arrive_seconds": seconds_of(arrive, "--arrive")}
     return plan_to_goal(*ends, *asked(robot, options, **own), places, progress)
 
@@ -275,9 +276,7 @@ def hold(
 
     duration = seconds_of(seconds, "--for")
     tracked, request = asked(robot, options)
-    if isinstance(place, str) and "," not in place:
-        raise InputError(f"place {place!r}; write X,Y, for example 30cm,15cm")
-    (centre,) = places_of([place], options.get("unit"), tracked.robot)
+    centre = place_of(place, options.get("unit"), tracked.robot)
     return orbit(centre, tracked, request, duration, options.get("progress"))
 
 

@@ -7,12 +7,12 @@ Numbers are in tail lengths l, time units μ0 l⁴/EI and rad. Words are as in c
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypedDict
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from planner.files.own_table import table_for
@@ -25,7 +25,6 @@ from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowled
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import Point, TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import Objective
-from sim.arrays import Floats
 from sim.io.errors import InputError, naming
 from sim.io.units import LengthUnit
 from sim.model.robot import Robot
@@ -37,6 +36,7 @@ AnyVehicle = OneRobot | MeasuredVehicle
 Length = float | str
 Region = Circle | Polygon | Path2D | ArrayLike | str
 _REQUEST = tuple(field.name for field in fields(PlanRequest))
+_FARTHEST = 1e6  # l
 _SHAPES = {"circle": "circle:X,Y,RADIUS", "box": "box:LEFT,LOW,RIGHT,HIGH"}
 
 
@@ -241,21 +241,66 @@ def free_space(keep_out: Sequence[Region], walls: Region | None, unit: str | Non
 
 
 def pose_of(given: Sequence[Length], unit: str | None, robot: Swimmer, name: str) -> POSE:
-    """Return a pose in l and rad, or read its words: X, Y and degrees."""
-    if len(given) != 3:
-        raise InputError(f"{name.removeprefix('--')}: give x, y and heading")
-    if any(isinstance(each, str) for each in given):
+    """Return a pose in l and rad, or read its words: X, Y and degrees.
+
+    Raises:
+        InputError: it is none, or its heading is more than one turn, as one in degrees would be.
+    """
+    if len(given) == 3 and any(isinstance(each, str) for each in given):
         return read_pose([str(each) for each in given], unit, robot, name)
-    x, y, heading = (float(each) for each in given)
+    name = name.removeprefix("--")
+    x, y, heading = _finite(given, 3, f"{name}: give x, y and heading")
+    if abs(heading) > math.tau:
+        raise InputError(
+            f"{name}: a heading of {heading:g} is more than one turn; headings are in radians here, so give "
+            f"math.radians({heading:g}) if you mean degrees"
+        )
     return x, y, heading
+
+
+def place_of(
+    given: Sequence[Length] | str, unit: str | None, robot: Swimmer, name: str = ""
+) -> tuple[float, float]:
+    """Return a place in l, or read its words: X,Y in one or in two; `name` is what messages call it.
+
+    Raises:
+        InputError: it is no pair of finite numbers, or a word has no unit.
+    """
+    parts, name = (given.split(","), f"place {given}") if isinstance(given, str) else (given, name or "place")
+    if isinstance(given, str) and len(parts) != 2:
+        raise InputError(f"place {given!r}; write X,Y, for example 30cm,15cm")
+    if len(parts) == 2 and any(isinstance(part, str) for part in parts):
+        x, y = (read_length(str(part), unit, robot, name) for part in parts)
+    else:
+        x, y = _finite(parts, 2, f"{name}: give x and y")
+    return x, y
 
 
 def places_of(
     given: Sequence[Sequence[float] | str] | str | Path, unit: str | None, robot: Swimmer
-) -> Sequence[Sequence[float]]:
-    """Return places in l, or read their words: X,Y of each, or a file."""
-    words = [str(given)] if isinstance(given, str | Path) else [each for each in given if isinstance(each, str)]
-    return read_places(words, unit, robot).tolist() if words else given  # type: ignore[return-value]
+) -> list[tuple[float, float]]:
+    """Return places in l, or read their words: X,Y of each, or one file with a point for each.
+
+    Raises:
+        InputError: a place is none, or the file cannot be read.
+    """
+    places = [str(given)] if isinstance(given, str | Path) else list(given)
+    if len(places) == 1 and isinstance(file := places[0], str) and "," not in Path(file).name:
+        with naming(file):
+            points = read_path(file, closed=False).in_tails(robot, unit).points
+            return [(x, y) for x, y in points.tolist()]
+    return [place_of(each, unit, robot) for each in places]
+
+
+def _finite(values: Sequence[Any], count: int, wanted: str) -> list[float]:
+    """Check that there are `count` finite numbers; the message says what is wanted."""
+    try:
+        numbers = [float(value) for value in values]
+    except (TypeError, ValueError):
+        numbers = []
+    if len(numbers) != count or not all(abs(number) < _FARTHEST for number in numbers):
+        raise InputError(f"{wanted}, as finite numbers; not {values}")
+    return numbers
 
 
 def seconds_of(given: float | str | None, name: str) -> float | None:
@@ -304,28 +349,6 @@ def read_outline(words: str) -> Drawing:
         regions = f"{', '.join(_SHAPES.values())}, or a CSV or SVG outline"
         raise InputError(f"{words}: no such file or region; {guess}regions are {regions}")
     return read_path(words, closed=True)
-
-
-def read_places(words: Sequence[str], unit: str | None, robot: Swimmer) -> Floats:
-    """Read places (n, 2), in tail lengths.
-
-    Args:
-        words: X,Y of each, or one file with a point for each.
-        unit: of numbers without one.
-        robot: its tail length.
-
-    Raises:
-        InputError: a word is no pair of numbers, or the file cannot be read.
-    """
-    if len(words) == 1 and "," not in Path(words[0]).name:
-        with naming(words[0]):
-            return read_path(words[0], closed=False).in_tails(robot, unit).points
-    for word in words:
-        if word.count(",") != 1:
-            raise InputError(f"place {word!r}; write X,Y, for example 30cm,15cm")
-    return np.array(
-        [[read_length(each, unit, robot, f"place {word}") for each in word.split(",")] for word in words]
-    )
 
 
 def refuse_other_unit(region: object, unit: str | None, robot: Swimmer) -> None:

@@ -23,7 +23,7 @@ from planner.goal.trip import FORMAT, Trip
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Reference
-from planner.planning.conditions import Arrival, Detour, KeptClear, Lap
+from planner.planning.conditions import Arrival, KeptClear, Lap
 from planner.planning.errors import PlanErrors, predicted_error
 from planner.planning.feasible import Declared
 from planner.planning.line_of_sight import Guidance
@@ -255,7 +255,7 @@ def _plan(content: Mapping[str, Any], tracked: TrackedVehicle) -> Plan[None]:
     drawn = Path2D(raw[:-1] if closed else raw, closed)
     declared, straight, guidance = _guidance(content, tracked)
     errors = _errors(content, tracked, drawn, declared, switches)
-    kept_clear = _kept_clear(content["kept_clear"]) if "kept_clear" in content else None
+    kept_clear = KeptClear.from_dict(content["kept_clear"]) if "kept_clear" in content else None
     arrival = None
     if "arrival" in content:
         arrival, swing = Arrival.from_dict(content["arrival"], tracked.robot)
@@ -304,17 +304,6 @@ def _errors(
         closure=None if closure is None else float(closure),
         table_share=float(content.get("table_share", 1.0)),
     )
-
-
-def _kept_clear(content: Mapping[str, Any]) -> KeptClear:
-    """Read what a plan keeps clear of."""
-    detours = []
-    for row in content["detours"]:
-        (x, y), (join_x, join_y) = row["leaves"], row["joins"]
-        lengths = (float(row[name]) for name in ("length_over_l", "replaced_over_l", "farthest_over_l"))
-        detours.append(Detour((float(x), float(y)), (float(join_x), float(join_y)), *lengths))
-    margin, clearance = float(content["margin_over_l"]), float(content["predicted_clearance_over_l"])
-    return KeptClear(FreeSpace.from_dict(content), margin, clearance, tuple(detours))
 
 
 def _check_plan(content: Mapping[str, Any], name: str | Path) -> None:

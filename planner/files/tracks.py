@@ -9,7 +9,7 @@ again, through the places that are left; of any other plan the rest of its path 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -124,7 +124,7 @@ def replan_from(plan: Plan, track: pd.DataFrame) -> Plan:
     if plan.ends_at is None:
         return rest_of(plan, times, poses)
     place, q, kept = place_reached(plan, times, poses), plan.declared.reference.q, plan.kept_clear
-    left: list[Sequence[float]] = []
+    left: list[tuple[float, float]] = []
     passed = 0
     for via in plan.job.via:
         passed += int(np.hypot(*(q[passed:] - np.array(via)).T).argmin())

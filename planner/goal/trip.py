@@ -42,7 +42,6 @@ FORMAT = 1
 _SPACING = 0.02  # l
 _SHORTER = 0.4  # share of the chosen dwell that dwells near the end must keep
 _ZIGZAGS = 1.5  # first margin over the zigzag
-_FARTHEST = 1e6  # l
 
 
 @dataclass(frozen=True)
@@ -117,29 +116,14 @@ class Trip(Job):
 
 
 def to_goal(
-    start: Sequence[float],
-    goal: Sequence[float],
+    start: POSE,
+    goal: POSE,
     tracked: TrackedVehicle,
     request: PlanRequest,
-    via: Sequence[Sequence[float]] = (),
+    via: Sequence[tuple[float, float]] = (),
     progress: Progress | None = None,
 ) -> Plan[Trip]:
-    """Plan the motor's switching times from one pose to another.
-
-    Args:
-        start: x, y [l] and heading [rad] of the head's centre, at rest.
-        goal: the same at the end.
-        tracked: the vehicle, whose head's centre is tracked.
-        request: dwells, tolerance, obstacles.
-        via: places x, y that the pivot passes on its way, in this order.
-        progress: called now and then with the share of the path that is done.
-
-    Raises:
-        NoWayError: there is no way to the goal; it is an `InputError`.
-        InputError: a pose is bad.
-    """
-    first, last = _pose(start, "start"), _pose(goal, "goal")
-    places = tuple(_place(place) for place in via)
+    """Plan the switching times from one pose of the head's centre to another, see `planner.api.to_goal`."""
     vehicle, robot, space = tracked.vehicle, tracked.robot, request.space
     least_dwell = check_least(request.least_dwell(robot))
     body = Footprint.of(robot, -vehicle.pivot_distance)
@@ -148,7 +132,7 @@ def to_goal(
     @cache
     def track(drift: Drift, margin: float) -> Route:
         limits = RouteLimits(vehicle.pivot_radius, body, space, drift)
-        stops = _stops(first, last, places, vehicle.pivot_distance, drift)
+        stops = _stops(start, goal, via, vehicle.pivot_distance, drift)
         return route(stops, limits, margin, lattices.setdefault(drift, {}), robot)
 
     def source(setting: Setting) -> Declared:
@@ -160,16 +144,16 @@ def to_goal(
             raise InputError("start and goal are the same; nothing to do")
         # The guaranteed bound is for paths that turn less than the robot can; these arcs turn as much as it can.
         return Declared(
-            Reference.of_pivot(poses, tracked.rod, drift=setting.drift, heading=first[2]), curvature=0.0
+            Reference.of_pivot(poses, tracked.rod, drift=setting.drift, heading=start[2]), curvature=0.0
         )
 
     task = Task(
-        source=source, changes=(Delay(space),), start=lambda declared: Start(first, declared.reference.first_turn),
-        ending=Ending(last, least_dwell, _SHORTER), zigzags=_ZIGZAGS, longer=False, blocked=NoWayError,
+        source=source, changes=(Delay(space),), start=lambda declared: Start(start, declared.reference.first_turn),
+        ending=Ending(goal, least_dwell, _SHORTER), zigzags=_ZIGZAGS, longer=False, blocked=NoWayError,
     )  # fmt: skip
     plan = solve(task, tracked, request, progress)
     length = track(plan.drift, 0.0 if plan.kept_clear is None else plan.kept_clear.margin).length
-    return plan.with_job(Trip(last, plan.end, places, length))
+    return plan.with_job(Trip(goal, plan.end, tuple(via), length))
 
 
 def _stops(start: POSE, goal: POSE, via: Sequence[tuple[float, float]], back: float, drift: Drift) -> list[Floats]:
@@ -187,31 +171,3 @@ def _stops(start: POSE, goal: POSE, via: Sequence[tuple[float, float]], back: fl
         ends.append(np.array([[x - back * math.cos(heading), y - back * math.sin(heading), course]]))
     courses = 2 * math.pi * np.arange(COURSES) / COURSES
     return [ends[0], *(np.stack([0 * courses + x, 0 * courses + y, courses], 1) for x, y in via), ends[1]]
-
-
-def _pose(values: Sequence[float], name: str) -> POSE:
-    """Check a pose that the user gave."""
-    x, y, heading = _finite(values, 3, f"{name}: give x, y and heading")
-    if abs(heading) > math.tau:
-        raise InputError(
-            f"{name}: a heading of {heading:g} is more than one turn; headings are in radians here, so give "
-            f"math.radians({heading:g}) if you mean degrees"
-        )
-    return x, y, heading
-
-
-def _place(values: Sequence[float]) -> tuple[float, float]:
-    """Check a place that the user gave."""
-    x, y = _finite(values, 2, "place on the way: give x and y")
-    return x, y
-
-
-def _finite(values: Sequence[float], count: int, wanted: str) -> list[float]:
-    """Check that there are `count` finite numbers; the message says what is wanted."""
-    try:
-        numbers = [float(value) for value in values]
-    except (TypeError, ValueError):
-        numbers = []
-    if len(numbers) != count or not all(abs(number) < _FARTHEST for number in numbers):
-        raise InputError(f"{wanted}, as finite numbers; not {values}")
-    return numbers

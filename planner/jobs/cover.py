@@ -181,19 +181,9 @@ def cover(
     angle: float | None = None,
     progress: Progress | None = None,
 ) -> Plan[Coverage]:
-    """Plan a track that covers a region.
+    """Plan a track whose footprint about the tracked point covers a region, see `planner.api.cover`.
 
-    Args:
-        field: the region and its holes.
-        width: of the footprint about the tracked point.
-        tracked: the vehicle, and the point that carries the footprint.
-        request: dwells, tolerance, obstacles; with feedback, the share is that covered within the error with it.
-        angle: direction of the lanes; default: the quickest one.
-        progress: called now and then with the share of the path that is done.
-
-    Raises:
-        InputError: the width is too small for this robot's zigzag, the region needs too many lanes, or an obstacle
-            cannot be passed.
+    With feedback, the share that is certain is the one within the error with it.
     """
     robot, space, setting = tracked.robot, request.space, preferred_setting(tracked, request)
     straight, drift = setting.straight, setting.drift

@@ -15,7 +15,6 @@ so that flips correct it in both directions. It repeats until told otherwise. Le
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -122,25 +121,14 @@ class Orbit(Job):
 
 
 def hold(
-    place: Sequence[float],
+    place: tuple[float, float],
     tracked: TrackedVehicle,
     request: PlanRequest,
     seconds: float | None = None,
     progress: Progress | None = None,
 ) -> Plan[Orbit]:
-    """Plan an orbit about a place.
-
-    Args:
-        place: x, y.
-        tracked: the vehicle, and the point that stays near the place.
-        request: dwells, tolerance, obstacles.
-        seconds: for so long; None: until told otherwise.
-        progress: called now and then with the share of the path that is done.
-
-    Raises:
-        InputError: the place is no pair of finite numbers, the time is not above 0, or the body has no room.
-    """
-    x, y = _checked(place)
+    """Plan an orbit of the tracked point about a place, for so many seconds, see `planner.api.hold`."""
+    x, y = place
     if seconds is not None and not (math.isfinite(seconds) and seconds > 0):
         raise InputError(f"hold for {seconds:g} s; give a time above 0")
     vehicle, robot, space = tracked.vehicle, tracked.robot, request.space
@@ -165,14 +153,3 @@ def hold(
     )
     start = x + left / rate, y - forward / rate, 0.0
     return plan.with_job(Orbit((x, y), radius, reach, laps, smallest, -still, start))
-
-
-def _checked(place: Sequence[float]) -> tuple[float, float]:
-    """Check the place."""
-    try:
-        x, y = (float(value) for value in place)
-    except (TypeError, ValueError):
-        x = y = math.nan
-    if not max(abs(x), abs(y)) < 1e6:
-        raise InputError("the place to hold: give x and y, finite numbers")
-    return x, y

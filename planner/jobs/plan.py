@@ -25,17 +25,7 @@ from sim.io.errors import InputError
 def make_plan(
     drawn: Path2D, tracked: TrackedVehicle, request: PlanRequest, progress: Progress | None = None
 ) -> Plan[None]:
-    """Plan for a path, a vehicle and a request.
-
-    Args:
-        drawn: the path as drawn.
-        tracked: the vehicle and its tracked point.
-        request: what is asked of the plan.
-        progress: called now and then with the share of the path that is done.
-
-    Raises:
-        InputError: the path cannot be planned as asked.
-    """
+    """Plan for a path [l] that the tracked point follows, see `planner.api.plan`."""
     if request.loop and not drawn.closed:
         raise InputError("a path that repeats is closed; join its end to its start (--closed), or plan it once")
     check_size(drawn, tracked.robot, tracked.vehicle.turn_radius)

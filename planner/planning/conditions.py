@@ -17,6 +17,8 @@ from sim.io.errors import InputError
 from sim.io.units import format_time
 
 _SHOWN = 1e-5  # l and rad; smaller differences are rounding
+_DETOUR = ("leaves", "joins", "length_over_l", "replaced_over_l", "farthest_over_l")  # in plan.json
+_LAP = ("closes_over_l", "closes_rad", "drift_over_l", "drift_rad")
 OVERLAP = 10.0  # radii of the pivot's circle, of the next lap that a tracker sees
 
 
@@ -115,17 +117,19 @@ class KeptClear:
             **self.free_space.to_dict(),
             "margin_over_l": self.margin,
             "predicted_clearance_over_l": self.clearance,
-            "detours": [
-                {
-                    "leaves": detour.leaves,
-                    "joins": detour.joins,
-                    "length_over_l": detour.length,
-                    "replaced_over_l": detour.replaced,
-                    "farthest_over_l": detour.farthest,
-                }
-                for detour in self.detours
-            ],
+            "detours": [dict(zip(_DETOUR, detour, strict=True)) for detour in self.detours],
         }
+
+    @staticmethod
+    def from_dict(content: Mapping[str, Any]) -> KeptClear:
+        """Read the content of a plan.json."""
+        detours = []
+        for row in content["detours"]:
+            leaves, joins, *lengths = (row[name] for name in _DETOUR)
+            (x, y), (join_x, join_y) = leaves, joins
+            detours.append(Detour((float(x), float(y)), (float(join_x), float(join_y)), *map(float, lengths)))
+        margin, clearance = float(content["margin_over_l"]), float(content["predicted_clearance_over_l"])
+        return KeptClear(FreeSpace.from_dict(content), margin, clearance, tuple(detours))
 
 
 class Lap(NamedTuple):
@@ -147,15 +151,9 @@ class Lap(NamedTuple):
 
     def to_dict(self) -> dict[str, float]:
         """Return the content for plan.json."""
-        return {
-            "closes_over_l": self.closes,
-            "closes_rad": self.closes_turn,
-            "drift_over_l": self.drift,
-            "drift_rad": self.drift_turn,
-        }
+        return dict(zip(_LAP, self, strict=True))
 
     @staticmethod
     def from_dict(content: Mapping[str, Any]) -> Lap:
         """Read the content of a plan.json."""
-        names = ("closes_over_l", "closes_rad", "drift_over_l", "drift_rad")
-        return Lap(*(float(content[name]) for name in names))
+        return Lap(*(float(content[name]) for name in _LAP))

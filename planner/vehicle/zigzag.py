@@ -36,6 +36,7 @@ _COMPARED = 10  # such dwells
 _WIDEST = 0.6  # rad that the heading swings to a side
 _COUNT = 100
 _LONGER = 1.3  # from one longer dwell to the next
+_SAVED = ("speed_bar", "swing_rad", "sway_over_l", "drift_bar", "rms_over_l", "largest_over_l")  # in plan.json
 
 
 @dataclass(frozen=True)
@@ -60,22 +61,14 @@ class Zigzag:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content for plan.json."""
-        return {
-            "dwells_bar": list(self.dwells),
-            "speed_bar": self.speed,
-            "swing_rad": self.swing,
-            "sway_over_l": self.sway,
-            "drift_bar": self.drift,
-            "rms_over_l": self.rms,
-            "largest_over_l": self.largest,
-        }
+        dwells, *numbers = vars(self).values()
+        return {"dwells_bar": list(dwells), **dict(zip(_SAVED, numbers, strict=True))}
 
     @staticmethod
     def from_dict(content: Mapping[str, Any]) -> Zigzag:
         """Read the content that `to_dict` returns."""
         left, right = content["dwells_bar"]
-        names = ("speed_bar", "swing_rad", "sway_over_l", "drift_bar", "rms_over_l", "largest_over_l")
-        return Zigzag((float(left), float(right)), *(float(content[name]) for name in names))
+        return Zigzag((float(left), float(right)), *(float(content[name]) for name in _SAVED))
 
 
 def zigzag(vehicle: Vehicle, dwell: float, offset: float = 0.0) -> Zigzag:

@@ -35,6 +35,10 @@ def test_poses_places_and_times() -> None:
     assert pose_of((1, 2, 3), "cm", CONTROL, "--goal") == (1, 2, 3)
     assert places_of(["1l,0", f"0,{CM}"], "cm", CONTROL) == [pytest.approx([1, 0]), pytest.approx([0, 1])]
     assert places_of([(1, 2), (3, 4)], "cm", CONTROL) == [(1, 2), (3, 4)]
+    assert places_of(["1l,0", (3, 4)], None, CONTROL) == [(1, 0), (3, 4)]
+    for bad in ([(0, 0, 0)], [(0, float("nan"))], [(0, "east")], [3.0]):
+        with pytest.raises(InputError, match="place"):
+            places_of(bad, "cm", CONTROL)  # type: ignore[arg-type]
     assert seconds_of("1h20min", "--for") == seconds_of(4800.0, "--for") == 4800
     assert seconds_of(None, "--for") is None
 

@@ -173,8 +173,6 @@ def test_the_command_reads_places_from_words_and_files(tmp_path: Path, capsys: p
     assert one["order"] == two["order"] == [0, 2, 1]
     assert np.array(one["places"]) == pytest.approx(np.array(two["places"]))
     assert {"plan.json", "schedule.h", "tour.svg"} <= {path.name for path in (tmp_path / "one").iterdir()}
-    with pytest.raises(InputError, match="two or more"):
-        tour([(0, 0, 0), (1, 1, 1)], tracked_vehicle(CONTROL, None, "head_centre", None), QUICK)
 
 
 FIELD = Field(Polygon.of([[0, 0], [3, 0], [3, 1.5], [0, 1.5]]))
