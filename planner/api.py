@@ -26,7 +26,6 @@ from planner.options import (
     place_of,
     places_of,
     pose_of,
-    refuse_other_unit,
     region_of,
     request_of,
     seconds_of,
@@ -239,8 +238,8 @@ def cover(
 
     tracked, request = asked(robot, options)
     swims, unit = tracked.robot, options.get("unit")
-    refuse_other_unit(region, unit, swims)
-    outline, *crossed = (region_of(each, unit, swims) for each in (region, *holes))
+    outline = region_of(region, unit, swims, agree=True)
+    crossed = [region_of(each, unit, swims) for each in holes]
     across = length_of(width, unit, swims, "--width")
     along = read_degrees(angle, "--angle") if isinstance(angle, str) else angle
     field = Field(outline, (*crossed, *request.space.regions))

@@ -221,10 +221,10 @@ def camera_of(given: Camera | Sequence[str], unit: str | None, robot: Swimmer) -
     return Camera((noise, heading), every_s, delay_s, lost)
 
 
-def region_of(given: Region, unit: str | None, robot: Swimmer) -> Circle | Polygon:
-    """Return a region, or read its words."""
+def region_of(given: Region, unit: str | None, robot: Swimmer, *, agree: bool = False) -> Circle | Polygon:
+    """Return a region, or read its words, see `read_region`."""
     if isinstance(given, str | Path):
-        return read_region(str(given), unit, robot)
+        return read_region(str(given), unit, robot, agree=agree)
     return given if isinstance(given, Circle | Polygon) else Polygon.of(given)
 
 
@@ -308,13 +308,14 @@ def seconds_of(given: float | str | None, name: str) -> float | None:
     return read_time(given, name) if isinstance(given, str) else given
 
 
-def read_region(words: str, unit: str | None, robot: Swimmer) -> Circle | Polygon:
+def read_region(words: str, unit: str | None, robot: Swimmer, *, agree: bool = False) -> Circle | Polygon:
     """Read a region, in tail lengths.
 
     Args:
         words: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG with a closed outline.
         unit: of numbers without one; a drawing with a size has its own.
         robot: its tail length.
+        agree: refuse a file that has another unit than `unit`.
 
     Raises:
         InputError: the words are no region, or a length has no unit.
@@ -332,7 +333,7 @@ def read_region(words: str, unit: str | None, robot: Swimmer) -> Circle | Polygo
     with naming(words):
         given = drawing.unit or unit
         named = given if isinstance(given, str) else {1.0: "m", 0.001: "mm"}.get(given or 0.0, "cm")
-        path = drawing.in_tails(robot, unit if drawing.unit is None else None)
+        path = drawing.in_tails(robot, unit if agree or drawing.unit is None else None)
         return Polygon.of(path, 1.0 / in_tails(named, robot), named)
 
 
@@ -349,10 +350,3 @@ def read_outline(words: str) -> Drawing:
         regions = f"{', '.join(_SHAPES.values())}, or a CSV or SVG outline"
         raise InputError(f"{words}: no such file or region; {guess}regions are {regions}")
     return read_path(words, closed=True)
-
-
-def refuse_other_unit(region: object, unit: str | None, robot: Swimmer) -> None:
-    """Refuse a file with an outline that says another unit than `unit`; other regions have none of their own."""
-    if isinstance(region, str) and region.partition(":")[0] not in _SHAPES:
-        with naming(region):
-            read_outline(region).in_tails(robot, unit)

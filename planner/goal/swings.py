@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.goal.dubins import DubinsPaths, three_arcs
-from planner.paths.obstacles import Footprint, FreeSpace
+from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift, Reference
 from planner.planning.conditions import Swing
@@ -93,7 +93,7 @@ class Delay:
         if not setting.longer:
             return declared
         vehicle, drift = setting.tracked.vehicle, setting.drift
-        body, margin = Footprint.of(setting.tracked.robot, -vehicle.pivot_distance), setting.margin or 0.0
+        body, margin = setting.tracked.body, setting.margin or 0.0
 
         def free(poses: Floats) -> bool:
             return bool(body.clearance(poses, self.space).min() >= _ROOM * margin)

@@ -126,12 +126,11 @@ def to_goal(
     """Plan the switching times from one pose of the head's centre to another, see `planner.api.to_goal`."""
     vehicle, robot, space = tracked.vehicle, tracked.robot, request.space
     least_dwell = check_least(request.least_dwell(robot))
-    body = Footprint.of(robot, -vehicle.pivot_distance)
     lattices: dict[Drift, Lattices] = {}
 
     @cache
     def track(drift: Drift, margin: float) -> Route:
-        limits = RouteLimits(vehicle.pivot_radius, body, space, drift)
+        limits = RouteLimits(vehicle.pivot_radius, tracked.body, space, drift)
         stops = _stops(start, goal, via, vehicle.pivot_distance, drift)
         return route(stops, limits, margin, lattices.setdefault(drift, {}), robot)
 

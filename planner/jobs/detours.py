@@ -110,9 +110,8 @@ class Detours:
     """
 
     def __init__(self, tracked: TrackedVehicle, space: FreeSpace, drift: Drift):
-        body = Footprint.of(tracked.robot, -tracked.vehicle.pivot_distance)
         self.tracked, self.drift = tracked, drift
-        self.limits = RouteLimits(tracked.vehicle.pivot_radius / AS_DRAWN, body, space, drift)
+        self.limits = RouteLimits(tracked.vehicle.pivot_radius / AS_DRAWN, tracked.body, space, drift)
         self._lattices: dict[tuple[float, ...], Lattice] = {}
 
     def clearance(self, reference: Reference) -> Floats:

@@ -9,7 +9,7 @@ This is priority-based search, of Ma, Harabor, Stuckey, Li and Koenig, "Searchin
 for multi-agent path finding", AAAI 2019.
 
 Robots that have not begun and robots that have ended count, too. The distance asked for is kept although both
-robots are off by their errors in place (`planner.jobs.error_in_place`).
+robots are off by their errors in place (`planner.jobs.separation`).
 
 Left out: what the flow of one robot does to another (docs/results.md). Lengths in m, times in s.
 """
@@ -25,9 +25,8 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from planner.jobs.error_in_place import times_at
 from planner.jobs.fleet_plan import FleetPlan
-from planner.jobs.separation import Places, Scheduled, TimedMotion, approach, distances, too_near
+from planner.jobs.separation import Places, Scheduled, TimedMotion, approach, distances, times_at, too_near
 from planner.jobs.timetable import Timetable, Timing, Turn, WaitingCircle, circle_reference, with_circles
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.planning.conditions import KeptClear
@@ -72,18 +71,7 @@ def fleet(
     feedback: bool = False,
     progress: Callable[[float], object] | None = None,
 ) -> FleetPlan:
-    """Time plans so that the bodies of the robots keep apart.
-
-    Args:
-        members: the robots with their plans; where possible, later ones give way to earlier ones.
-        apart: least distance between bodies [m].
-        feedback: poses will be measured for a tracker, so the errors in place are those with feedback.
-        progress: called now and then with the share of what is done.
-
-    Raises:
-        NoTimingError: some robots cannot keep apart; the message names them and says why.
-        InputError: there are fewer than two robots or too many, or a number is not allowed.
-    """
+    """Time plans so that the bodies of the robots keep `apart` [m], see `planner.api.fleet`."""
     _check(members, apart)
     planner = _Fleet(members, apart, feedback)
     planner.check_rest()

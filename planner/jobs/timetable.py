@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.goal.dubins import DubinsPaths
 from planner.goal.last_dwells import Ending
 from planner.jobs.separation import Places, Scheduled, TimedMotion, too_near
 from planner.paths.tractrix import Reference
@@ -171,16 +172,11 @@ class Timetable:
 
 def circle_reference(plan: Plan, circle: WaitingCircle) -> Reference:
     """Make the reference of a waiting circle; it begins and ends at the place, and ends a whole turn further."""
-    reference, tracked = plan.declared.reference, plan.tracked
-    drift = plan.drift
-    radius = tracked.vehicle.pivot_radius / ROOM
-    count = math.ceil(2 * math.pi * radius / _SPACING)
-    ((x, y, course),) = reference.part(circle.place, circle.place + 1).courses(drift).tolist()
-    courses = course + circle.side * 2 * math.pi * np.arange(count + 1) / count
-    left = circle.side * radius * np.array([-math.sin(course), math.cos(course)])
-    arms = circle.side * radius * np.stack([np.sin(courses), -np.cos(courses)], 1)
-    poses = np.column_stack([np.array([x, y]) + left + arms, courses])
-    return Reference.of_pivot(poses, tracked.rod, drift, float(reference.heading[circle.place]))
+    reference, drift, radius = plan.declared.reference, plan.drift, plan.tracked.vehicle.pivot_radius / ROOM
+    begin = reference.part(circle.place, circle.place + 1).courses(drift)
+    turn = DubinsPaths(begin, np.array([[circle.side, 0, 0]]), np.array([[2 * math.pi * radius, 0.0, 0.0]]))
+    heading = float(reference.heading[circle.place])
+    return Reference.of_pivot(turn.sampled(radius, _SPACING), plan.tracked.rod, drift, heading)
 
 
 def with_circles(plan: Plan[J], circles: Sequence[WaitingCircle]) -> Plan[J]:

@@ -16,7 +16,7 @@ import numpy as np
 from planner.goal.dubins import TURNS, DubinsPaths, words
 from planner.goal.lattice import RouteLimits
 from planner.goal.route import Route
-from planner.paths.obstacles import Footprint, FreeSpace
+from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import LONGEST, check_size, in_lab
@@ -50,10 +50,9 @@ class Travel:
     def of(tracked: TrackedVehicle, zigzag: Zigzag, space: FreeSpace, drift: Drift, margin: float) -> Travel:
         """Take the vehicle's radius and speeds."""
         vehicle = tracked.vehicle
-        body = Footprint.of(tracked.robot, -vehicle.pivot_distance)
         own = float(np.abs(vehicle.twist[:, 0]).mean())
         straight = zigzag.net_speed
-        limits = RouteLimits(vehicle.pivot_radius / AS_DRAWN, body, space, drift)
+        limits = RouteLimits(vehicle.pivot_radius / AS_DRAWN, tracked.body, space, drift)
         return Travel(limits, margin, straight, straight + AS_DRAWN * (own - straight))
 
     @property

@@ -20,7 +20,7 @@ _NAMES = {  # of each module; a leading underscore is left out
     "planner.draws": "WEYL FIRST SECOND MIDDLE TAIL",
     "planner.files.headers": "LARGEST MOST_MS CHECKPOINTS",
     "planner.paths.distance": "TIE",
-    "planner.paths.file_kinds": "KINDS",
+    "planner.paths.path_files": "KINDS",
     "planner.paths.nearest_path": "SPACING MOST_POSES COARSEST WEIGHTS ITERATIONS ALONG POINTS_A_POSE ROUNDS "
     "LEAST EVEN SHORT SHORTEST_STEP",
     "planner.paths.path": "CIRCLE_POINTS LARGEST MOST_SMOOTHED EVEN",

@@ -12,7 +12,7 @@ import { numbersOf, parseWords, readTablePath, textsOf } from "./tables.js";
 import { splitName } from "./units.js";
 import { InputError } from "./words.js";
 
-const { KINDS } = CONSTANTS.file_kinds; // kind: its endings, and how it begins
+const { KINDS } = CONSTANTS.path_files; // kind: its endings, and how it begins
 const HEAD = 4096; // bytes that tell
 const FORMAT = 2; // of plan.json
 const TRACK = ["heading", "time"]; // what a path does not have

@@ -214,29 +214,21 @@ class Plan(Shown, Generic[J]):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know, in words."""
-        own = (*self._zigzag_warnings(), *self._table_warnings())
+        own: list[str] = []
+        if self.predicted_max > WIDE * self.tracked.vehicle.turn_radius:
+            turn = math.degrees(self.minimum_dwell * self.tracked.vehicle.yaw_rate)
+            own.append(
+                f"the predicted track is up to {in_lab(self.predicted_max, self.robot)} from the declared path: "
+                f"in dwells of {time_in_lab(self.minimum_dwell, self.robot)} the robot turns by {turn:.0f} "
+                "degrees; shorter ones keep it nearer"
+            )
+        large = self.stated_error >= _OWN_TABLE_FROM * self.predicted_max
+        if large and self.errors.table_share > 0.5 and not self.tracked.own_table:
+            own.append(
+                f"the stated error is mostly that of the look-up table, over {len(self.dwells)} flips: simulate "
+                "this robot's own table (--own-table, own_table=True), or measure poses on the way"
+            )
         return (*self.declared.warnings, *own, *self.tracked.warnings)
-
-    def _table_warnings(self) -> tuple[str, ...]:
-        """Propose the robot's own table where the errors of the look-up table decide the stated error."""
-        large = self.stated_error >= _OWN_TABLE_FROM * self.predicted_max and self.errors.table_share > 0.5
-        if self.tracked.own_table or not large:
-            return ()
-        return (
-            f"the stated error is mostly that of the look-up table, over {len(self.dwells)} flips: simulate this "
-            "robot's own table (--own-table, own_table=True), or measure poses on the way",
-        )
-
-    def _zigzag_warnings(self) -> tuple[str, ...]:
-        """Warn of a predicted track that is far from the declared path."""
-        if self.predicted_max <= WIDE * self.tracked.vehicle.turn_radius:
-            return ()
-        turn = math.degrees(self.minimum_dwell * self.tracked.vehicle.yaw_rate)
-        return (
-            f"the predicted track is up to {in_lab(self.predicted_max, self.robot)} from the declared path: in "
-            f"dwells of {time_in_lab(self.minimum_dwell, self.robot)} the robot turns by {turn:.0f} degrees; "
-            "shorter ones keep it nearer",
-        )
 
     @cached_property
     def unmeasured_error(self) -> float | None:

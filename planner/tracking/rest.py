@@ -26,7 +26,6 @@ from planner.goal.dubins import words
 from planner.goal.lattice import RouteLimits
 from planner.goal.route import Lattices, NoWayError, route
 from planner.paths.distance import two_sided
-from planner.paths.obstacles import Footprint
 from planner.paths.path import Path2D, arc_length, resample
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import in_lab, place_in_lab
@@ -154,8 +153,7 @@ def _radius(plan: Plan) -> float:
 
 def _limits(plan: Plan, drift: Drift) -> RouteLimits:
     assert plan.kept_clear is not None
-    body = Footprint.of(plan.robot, -plan.tracked.vehicle.pivot_distance)
-    return RouteLimits(_radius(plan), body, plan.kept_clear.free_space, drift)
+    return RouteLimits(_radius(plan), plan.tracked.body, plan.kept_clear.free_space, drift)
 
 
 def _around(plan: Plan, start: POSE, place: int, limits: RouteLimits, margin: float) -> tuple[Floats, int]:

@@ -6,6 +6,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from planner.paths.obstacles import Footprint
 from planner.paths.tractrix import Drift
 from planner.paths.units import time_in_lab
 from planner.vehicle.calibration_table import COEFFICIENTS, UNMEASURED, CalibrationKnowledge
@@ -36,6 +37,11 @@ class TrackedVehicle(NamedTuple):
     def rod(self) -> float:
         """Distance from the pivot to the tracked point."""
         return self.vehicle.pivot_distance + self.offset
+
+    @property
+    def body(self) -> Footprint:
+        """The body about the pivot."""
+        return Footprint.of(self.robot, -self.vehicle.pivot_distance)
 
     def drift(self, straight: Zigzag) -> Drift:
         """Return what carries the robot off its heading in straight motion, as shares of its net speed.
