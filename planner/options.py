@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypedDict
@@ -266,7 +266,8 @@ def place_of(
     Raises:
         InputError: it is no pair of finite numbers, or a word has no unit.
     """
-    parts, name = (given.split(","), f"place {given}") if isinstance(given, str) else (given, name or "place")
+    parts = given.split(",") if isinstance(given, str) else list(given) if isinstance(given, Iterable) else [given]
+    name = f"place {given}" if isinstance(given, str) else name or "place"
     if isinstance(given, str) and len(parts) != 2:
         raise InputError(f"place {given!r}; write X,Y, for example 30cm,15cm")
     if len(parts) == 2 and any(isinstance(part, str) for part in parts):
