@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -33,6 +33,35 @@ RUN_SYNONYMS = {
     "rpm": "omega", "motor": "omega", "motor_speed": "omega", "length": "l", "tail_length": "l", "tails": "N",
     "heading": "course",
 }  # fmt: skip
+
+
+class Measured(NamedTuple):
+    """An output of a measured run: its column, its sign relative to the motor's (0: a magnitude), and why."""
+
+    column: str
+    sign: int = 0
+    sense: str = ""
+
+
+MEASURED = {
+    "omega_h": Measured("omega_h_rpm", -1, "the head turns against the motor"),
+    "omega_t": Measured("omega_t_rpm", 1, "the tails turn with the motor"),
+    "omega_yr": Measured(
+        "omega_yr_rad_s", 1, "a positive motor turns the robot to the left (counter-clockwise) seen from above"
+    ),
+    "R_yr": Measured("R_yr_cm"),
+    "theta": Measured("theta_deg"),
+    "v": Measured("v_cm_s"),
+}
+RUN_NOTES = ("elapsed_min", "temperature_C", "tank_diameter_cm", "course_deg")
+RUN_SIGMAS = ("camera_scale_sigma_percent", "heading_zero_sigma_deg", "tachometer_sigma_percent")
+RUN_ERRORS = (  # of `calibration.swimmer.camera_tracks`; not used, since repeats give the noise
+    "omega_yr_error", "R_yr_error", "theta_error", "v_error", "drift_x_cm_s", "drift_y_cm_s", "drift_error",
+)  # fmt: skip
+RUN_COLUMNS = (
+    *RUN, *(column for column, _, _ in MEASURED.values()), "run", "trial", "session", "robot", *RUN_NOTES,
+    *RUN_ERRORS, *RUN_SIGMAS,
+)  # fmt: skip
 
 
 def check_columns(columns: Mapping[str, Any]) -> dict[str, Floats]:

@@ -53,6 +53,7 @@ from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs
 from calibration.statistics.study import divided, middle_session
 from calibration.swimmer.influences import CAMERA, HEADING, TACHOMETER
 from sim.arrays import Flags, Floats, Integers
+from sim.inputs import MEASURED, RUN_COLUMNS, RUN_NOTES, RUN_SIGMAS
 from sim.inputs import RUN as INPUTS
 from sim.inputs import RUN_SYNONYMS as SYNONYMS
 from sim.io.errors import InputError, naming
@@ -62,41 +63,12 @@ from sim.io.units import to_si
 
 # Output -> (column, factor to SI, sign relative to the motor's; 0: a magnitude)
 OUTPUTS = {
-    output: (f"{output}_{unit}", to_si(1.0, unit), sign)
-    for output, unit, sign in (
-        ("omega_h", "rpm", -1),
-        ("omega_t", "rpm", 1),
-        ("omega_yr", "rad_s", 1),
-        ("R_yr", "cm", 0),
-        ("theta", "deg", 0),
-        ("v", "cm_s", 0),
-    )
+    output: (column, to_si(1.0, column.removeprefix(f"{output}_")), sign)
+    for output, (column, sign, _) in MEASURED.items()
 }
-_SENSES = {
-    "omega_h": "the head turns against the motor",
-    "omega_t": "the tails turn with the motor",
-    "omega_yr": "a positive motor turns the robot to the left (counter-clockwise) seen from above",
-}
-_ERRORS = (  # of `calibration.swimmer.camera_tracks`; not used, since repeats give the noise
-    "omega_yr_error", "R_yr_error", "theta_error", "v_error", "drift_x_cm_s", "drift_y_cm_s", "drift_error",
-)  # fmt: skip
-_SIGMAS = {  # column -> nuisance parameter, factor
-    "camera_scale_sigma_percent": (CAMERA, 0.01),
-    "heading_zero_sigma_deg": (HEADING, math.pi / 180),
-    "tachometer_sigma_percent": (TACHOMETER, 0.01),
-}
-_NOTED = ("elapsed_min", "temperature_C", "tank_diameter_cm", "course_deg")
-KNOWN_COLUMNS = {
-    *INPUTS,
-    *(c for c, _, _ in OUTPUTS.values()),
-    "run",
-    "trial",
-    "session",
-    "robot",
-    *_NOTED,
-    *_ERRORS,
-    *_SIGMAS,
-}
+_SIGMAS = dict(  # column -> nuisance parameter, factor
+    zip(RUN_SIGMAS, ((CAMERA, 0.01), (HEADING, math.pi / 180), (TACHOMETER, 0.01)), strict=True)
+)
 _LARGEST = 1e9  # of a value
 _FEWEST_RUNS = 24
 _COPY = "a copy of an earlier row, equal in all inputs and outputs"
@@ -163,11 +135,11 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
     for name in INPUTS:  # before the others: a table without them is no measured table
         if name not in table:
             raise InputError(f"the table has no column {name!r}; it needs {', '.join(INPUTS)}")
-    table, others = convert_columns(table, (*outputs_columns, *_NOTED, *_SIGMAS), where, SYNONYMS)
+    table, others = convert_columns(table, (*outputs_columns, *RUN_NOTES, *RUN_SIGMAS), where, SYNONYMS)
     converted = (*converted, *others)
-    unknown = [str(c) for c in table if c not in KNOWN_COLUMNS]
+    unknown = [str(c) for c in table if c not in RUN_COLUMNS]
     for name in unknown:
-        near = difflib.get_close_matches(name, KNOWN_COLUMNS, n=1)
+        near = difflib.get_close_matches(name, RUN_COLUMNS, n=1)
         if near:
             raise InputError(f"unknown column {name!r}: is it {near[0]!r}? rename or drop it")
     empty = [str(c) for c in table if c not in (*INPUTS, *unknown) and _is_empty(table[c])]
@@ -249,7 +221,7 @@ def _mark_gaps(reasons: list[str], table: pd.DataFrame, numbers: pd.DataFrame) -
     """Give a reason to every usable row that lacks a note, and return the notes that many rows lack."""
     sparse = []
     usable = np.array([not reason for reason in reasons])
-    for column in (name for name in _NOTED if name in numbers):
+    for column in (name for name in RUN_NOTES if name in numbers):
         gaps = np.flatnonzero(usable & ~np.isfinite(numbers[column].to_numpy()))
         if len(gaps) > _GAPS * usable.sum():
             sparse.append(column)
@@ -374,7 +346,9 @@ def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...
         reasons[i] = reasons[i] or "omega_rpm = 0"
     for name, (column, _, expected) in ((name, OUTPUTS[name]) for name in outputs if OUTPUTS[name][2]):
         for i in np.flatnonzero(values[column] * sign * expected <= 0):
-            fault = f"{column} = {values[column][i]:g} has the wrong sign for its omega_rpm: {_SENSES[name]}"
+            fault = (
+                f"{column} = {values[column][i]:g} has the wrong sign for its omega_rpm: {MEASURED[name].sense}"
+            )
             reasons[i] = reasons[i] or fault
     return reasons
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
@@ -39,6 +40,10 @@ _NAMES = {  # of each module; a leading underscore is left out
     "planner.vehicle.from_table": "ODD TIME_STEPS STEP",
     "planner.vehicle.vehicle": "SHORTEST STEP TIMES BEFORE_KNOTS",
     "planner.vehicle.zigzag": "PAIRS TRIES QUICK LONGEST KEPT NEARLY COMPARED WIDEST COUNT LONGER",
+    "sim.inputs": "RUN RUN_SYNONYMS MEASURED RUN_NOTES RUN_SIGMAS RUN_COLUMNS",
+    "sim.io.number_words": "NUMBER MISSING COMMA POINT THOUSANDS WHOLE_LINE THREE OTHER FORMULA",
+    "sim.io.quantities": "CLOCK EPOCH LATEST",
+    "sim.io.tables": "COMMENT MARKED_NUMBER BLANKS SEPARATORS",
     "sim.io.units": "UNITS TEXTS SPELLINGS MOST_PARTS",
     "sim.model.groups": "MOST_TAILS LEAST_SLENDERNESS",
     "sim.model.response": "DWELLS BEFORE FORGOTTEN",
@@ -80,8 +85,10 @@ def constants() -> dict[str, dict[str, Any]]:
 
 
 def constants_module() -> str:
-    """Write the constants as a module of JavaScript."""
-    return f"const CONSTANTS = {json.dumps(_plain(constants()), ensure_ascii=False)};\nexport {{ CONSTANTS }};\n"
+    """Write the constants as a module of JavaScript; patterns become those of JavaScript."""
+    text = json.dumps(_plain(constants()), ensure_ascii=False)
+    text = re.sub(r'\{"pattern": ("(?:[^"\\]|\\.)*"), "flags": ("\w*")\}', r"new RegExp(\1, \2)", text)
+    return f"const CONSTANTS = {text};\nexport {{ CONSTANTS }};\n"
 
 
 def _of(module: str, names: list[str]) -> dict[str, Any]:
@@ -95,9 +102,12 @@ def _camel(name: str) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Write arrays as lists, and named tuples as dictionaries."""
+    """Write arrays as lists, named tuples and patterns as dictionaries."""
     if hasattr(value, "_asdict"):
         return _plain(value._asdict())
+    if isinstance(value, re.Pattern):
+        flags = "".join(letter for letter, flag in (("i", re.I), ("m", re.M)) if value.flags & flag)
+        return {"pattern": value.pattern, "flags": flags}
     if isinstance(value, Mapping):
         return {name: _plain(part) for name, part in value.items()}
     if isinstance(value, list | tuple):

@@ -4,6 +4,7 @@
  * and s. Of runs it is said which rows cannot be right, and what is needed; where a calibration refuses a table for the
  * number of its runs, this reader goes on; copied rows, gaps of the notes and outputs that follow from others are left
  * to the calibration. Lengths in cm, spins in rpm. */
+import { CONSTANTS } from "./constants.js";
 import { largest, median, smallest, sum } from "./math.js";
 import { distanceTo } from "./reference.js";
 import { groupValues, makeRobot } from "./robot.js";
@@ -11,35 +12,11 @@ import { query } from "./table.js";
 import { convertColumns, labColumns, splitName, toSi } from "./units.js";
 import { InputError, closeMatch, general, inPage, naming, quoted, refusing, repr } from "./words.js";
 
-const INPUTS = ["N", "l_cm", "omega_rpm"];
-const OUTPUTS = { // output: its column, and its sign relative to the motor's (0: a magnitude)
-  omega_h: { column: "omega_h_rpm", sign: -1, sense: "the head turns against the motor" },
-  omega_t: { column: "omega_t_rpm", sign: 1, sense: "the tails turn with the motor" },
-  omega_yr: {
-    column: "omega_yr_rad_s", sign: 1,
-    sense: "a positive motor turns the robot to the left (counter-clockwise) seen from above",
-  },
-  R_yr: { column: "R_yr_cm", sign: 0 },
-  theta: { column: "theta_deg", sign: 0 },
-  v: { column: "v_cm_s", sign: 0 },
-};
+const { RUN: INPUTS, MEASURED: OUTPUTS, RUN_SYNONYMS, RUN_NOTES, RUN_SIGMAS, RUN_COLUMNS } = CONSTANTS.inputs;
 const PLANAR = ["omega_yr", "R_yr", "theta", "v"]; // outputs beyond the spins
 const POSITIVE = ["N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s"];
-const SYNONYMS = new Map(
-  Object.entries({
-    rpm: "omega", motor: "omega", motor_speed: "omega", length: "l", tail_length: "l", tails: "N",
-    heading: "course",
-  }),
-);
-const NOTED = ["elapsed_min", "temperature_C", "tank_diameter_cm", "course_deg"];
-const SIGMAS = ["camera_scale_sigma_percent", "heading_zero_sigma_deg", "tachometer_sigma_percent"];
-const ERRORS = [
-  "omega_yr_error", "R_yr_error", "theta_error", "v_error", "drift_x_cm_s", "drift_y_cm_s", "drift_error",
-];
-const KNOWN = [
-  ...INPUTS, ...Object.values(OUTPUTS).map(({ column }) => column), "run", "trial", "session", ...NOTED,
-  ...ERRORS, ...SIGMAS,
-];
+const SYNONYMS = new Map(Object.entries(RUN_SYNONYMS));
+const MEASURED = Object.values(OUTPUTS).map(({ column }) => column);
 const LARGEST = 1e9; // of a value
 const FEWEST_RUNS = 24;
 const FEWEST_REPEATS = 8;
@@ -54,14 +31,14 @@ function readMeasurements(given, where) {
 }
 
 function measurementsOf(given, where) {
-  const first = convertColumns(given, INPUTS, where, SYNONYMS), outputColumns = Object.values(OUTPUTS);
+  const first = convertColumns(given, INPUTS, where, SYNONYMS);
   const lacking = INPUTS.find((name) => !first.table.names.includes(name));
   if (lacking) throw new InputError(`the table has no column '${lacking}'; it needs ${INPUTS.join(", ")}`);
-  const others = [...outputColumns.map(({ column }) => column), ...NOTED, ...SIGMAS];
+  const others = [...MEASURED, ...RUN_NOTES, ...RUN_SIGMAS];
   const { table: whole, notes } = convertColumns(first.table, others, where, SYNONYMS);
-  const unknown = whole.names.filter((name) => !KNOWN.includes(name));
+  const unknown = whole.names.filter((name) => !RUN_COLUMNS.includes(name));
   for (const name of unknown) {
-    const near = closeMatch(name, KNOWN);
+    const near = closeMatch(name, RUN_COLUMNS);
     if (near) throw new InputError(`unknown column ${quoted(name)}: is it '${near}'? rename or drop it`);
   }
   const empty = emptyColumns(whole).filter((name) => ![...INPUTS, ...unknown].includes(name));
@@ -83,9 +60,9 @@ function measurementsOf(given, where) {
     const first = `${rowName(table, 0)}: ${reasons[0]}`;
     throw new InputError(`0 usable runs (${first}); a calibration needs at least ${FEWEST_RUNS}`);
   }
-  const session = table.texts[table.names.indexOf("session")];
+  const [session, robot] = ["session", "robot"].map((name) => table.texts[table.names.indexOf(name)]);
   const names = usable.map((row) => session?.[row] ?? `N = ${columns.N[row]}`);
-  const conditions = usable.map((row) => INPUTS.map((name) => columns[name][row]).join());
+  const conditions = usable.map((row) => [...INPUTS.map((name) => columns[name][row]), robot?.[row]].join());
   const repeats = usable.length - new Set(conditions).size;
   const excluded = [
     ...reasons.flatMap((reason, row) => (reason ? [`${rowName(table, row)}: ${reason}`] : [])),
@@ -143,8 +120,7 @@ function reasonsOf(table, columns, outputs) {
 
 /* Whether columns of these names are those of runs, if not of all that a table of runs needs. */
 function areOfRuns(names) {
-  const wanted = [...INPUTS, ...Object.values(OUTPUTS).map(({ column }) => column)];
-  const quantities = new Set(wanted.map((name) => splitName(name).quantity.toLowerCase()));
+  const quantities = new Set([...INPUTS, ...MEASURED].map((name) => splitName(name).quantity.toLowerCase()));
   return names.some((name) => {
     const quantity = splitName(name).quantity.toLowerCase();
     return quantities.has(quantity) || (SYNONYMS.has(quantity) && quantity !== "heading");
@@ -213,7 +189,7 @@ function answerTo([tails, length, speed], fields, lookup) {
 function missingColumns({ names, outputs }) {
   const unmeasured = Object.keys(OUTPUTS).filter((output) => !outputs.includes(output));
   const missing = unmeasured.map((output) => `${OUTPUTS[output].column}: one more measured quantity`);
-  for (const name of ["session", ...NOTED]) if (!names.includes(name)) missing.push(`${name}: ${USES[name]}`);
+  for (const name of ["session", ...RUN_NOTES]) if (!names.includes(name)) missing.push(`${name}: ${USES[name]}`);
   return missing;
 }
 

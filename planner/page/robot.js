@@ -17,7 +17,6 @@ const POSITIVE = {
   head_length: "headLength", viscosity: "viscosity", motor_speed: "motorSpeed", C_t: "C_t", C_r: "C_r",
 };
 const LOCKED = ["effects", "correction", "learnt_from", "calibration"];
-const MOST_SETTINGS = 2 ** 20; // characters of a robot
 const WORDS = /"(?:[^"\\\n]|\\.)*"|'[^'\n]*'|[^\s,[\]"'#]+/g; // of a value
 const DECIMAL = /^[+-]?(?:0|[1-9](?:_?\d)*)(?:\.\d(?:_?\d)*)?(?:[eE][+-]?\d(?:_?\d)*)?$/;
 const DECIMAL_COMMA = /^[ \t]*[\w-]+[ \t]*=[ \t]*([+-]?\d{1,20}),(\d{1,20})[ \t]*(?:#.*)?$/m;
@@ -68,7 +67,6 @@ function groupValues(robot) {
 
 /* Read a robot. where: the file's name, for messages. */
 function readRobot(text, where) {
-  if (text.length > MOST_SETTINGS) throw new InputError(`${where} has more than 1 MiB; such a file is not read`);
   const { name = where.replace(/\.[^.]*$/, ""), ...tables } = readToml(text.replace(/^\ufeff/, ""), where);
   const locked = LOCKED.find((table) => table in tables);
   if (locked) {

@@ -4,8 +4,8 @@
  * low, high}; a shape is {kind, id, segments, clips}; a rule of a style sheet {kind, names, given, weight}. */
 import { differences, largestSize, unwrap } from "./math.js";
 import { pathOf, stepsOf } from "./path.js";
-import { NAMES, NUMBER, Lengths, fitted, moved, numbersIn, pointsOn, product, shapeSegments } from "./svg_shapes.js";
-import { transformed, transformOf } from "./svg_shapes.js";
+import { NAMES, NUMBER, Lengths, fitted, moved, numbersIn, product, shapeSegments } from "./svg_shapes.js";
+import { transformed, transformOf, unread } from "./svg_shapes.js";
 import { InputError, naming, quoted } from "./words.js";
 
 const COMMENT = /\/\*[^]*?\*\/|<!--|-->/g;
@@ -159,7 +159,7 @@ class TreeReader {
     );
     const inner = {
       ...around,
-      matrix: product(around.matrix, transformOf(own.transform ?? "none")),
+      matrix: product(around.matrix, transformOf(own)),
       visible: VISIBLE[(own.visibility ?? "").toLowerCase()] ?? around.visible,
       unread: around.unread || (unread[0] ?? ""),
     };
@@ -178,9 +178,9 @@ class TreeReader {
     }
     const inner = this.inside(own, this.inside(group, around));
     const segments = shapeSegments(kindOf(part), own, this.lengths, around.view) ?? [];
-    const corners = segments.map(({ points }) => points[0]);
+    const corners = segments.map(({ end }) => end);
     const upright = corners.every(([x, y], i) => !i || x === corners[i - 1][0] || y === corners[i - 1][1]);
-    const straight = segments.every(({ kind }) => ["move", "line", "close"].includes(kind));
+    const straight = segments.every(({ at }) => at === null);
     const axes = [0, 1].map((axis) => [...new Set(corners.map((point) => point[axis]))].sort((a, b) => a - b));
     const four = new Set(corners.map(String)).size === 4;
     if (!four || axes.some(({ length }) => length !== 2) || !upright || !straight) {
@@ -195,7 +195,7 @@ class TreeReader {
     const numbers = numbersIn(own, "viewBox"), box = numbers.length ? numbers : null;
     const outer = this.open.length === 1;
     if (box && (box.length !== 4 || Math.min(box[2], box[3]) < 0)) {
-      throw new InputError(`viewBox=${quoted(own.viewBox)} is not read; give left, top, width and height`);
+      unread(own, "viewBox", "give left, top, width and height");
     }
     const place = ["x", "y"].map((name) => (outer ? 0 : this.lengths.read(own, name, around.view, 0)));
     const size = outer ? this.outerSize(own, box)
@@ -215,7 +215,7 @@ class TreeReader {
     }
     const view = !box ? size : size.includes(0) ? [0, 0] : box.slice(2);
     const fits = box && !view.includes(0);
-    const inner = fits ? fitted(own.preserveAspectRatio, place, size, box) : shift;
+    const inner = fits ? fitted(own, place, size, box) : shift;
     return { ...around, matrix: product(around.matrix, inner), view, clips };
   }
 
@@ -291,7 +291,7 @@ function namedPaths(shapes) {
   for (const { kind, id, segments, clips } of shapes) {
     counts[kind] = (counts[kind] ?? 0) + 1;
     const count = counts[kind], name = id || `${kind}${count}`;
-    const parts = subpaths(segments).map(sampled).filter(({ points }) => points.length > 1);
+    const parts = subpaths(segments).filter(({ points }) => points.length > 1);
     parts.forEach((part, i) => {
       const own = parts.length === 1 ? name : `${name}/${i + 1}`;
       const clip = clips.find((each) => hides(each, part.points));
@@ -305,45 +305,25 @@ function namedPaths(shapes) {
   return paths;
 }
 
-/* Split segments at moves and after closed ends. */
+/* Sample the points of each subpath, curves as polylines, and tell whether it is closed: [{points, ends}, …]. */
 function subpaths(segments) {
   const parts = [];
-  let part = [];
-  const end = () => {
-    if (part.length) parts.push(part);
-    part = [];
-  };
-  for (const segment of segments) {
-    if (segment.kind === "move") end();
-    part.push(segment);
-    if (segment.kind === "close") end();
-  }
-  end();
-  return parts;
-}
-
-/* Sample the points of one subpath, curves as polylines, and tell whether it is closed. */
-function sampled(segments) {
-  let points = [], ends = false;
-  for (const segment of segments) {
-    const [end] = segment.points;
-    ends ||= segment.kind === "close";
-    if (segment.kind === "move") points = [end];
-    else if (segment.kind === "line" || segment.kind === "close") points.push(end);
-    else {
-      const count = enough(segment);
-      points.push(...pointsOn(segment, Array.from({ length: count }, (_, i) => (i + 1) / count)));
-    }
-    if (points.length > MOST_POINTS) {
+  let part = { ends: true };
+  for (const { kind, end, at } of segments) {
+    if (kind === "move" || part.ends) parts.push((part = { points: [], ends: false }));
+    part.ends = kind === "close";
+    if (at === null) part.points.push(end);
+    else for (let i = 1, count = enough(at); i <= count; i++) part.points.push(at(i / count));
+    if (part.points.length > MOST_POINTS) {
       throw new InputError(`a curve of the drawing needs more than ${MOST_POINTS} points; simplify the drawing`);
     }
   }
-  return { points, ends };
+  return parts;
 }
 
 /* The number of segments of a curve such that none turns by more than TURN. */
-function enough(curve) {
-  const probes = pointsOn(curve, Array.from({ length: PROBES + 1 }, (_, i) => i / PROBES)), angles = [];
+function enough(at) {
+  const probes = Array.from({ length: PROBES + 1 }, (_, i) => at(i / PROBES)), angles = [];
   for (let i = 0; i < PROBES; i++) {
     const x = probes[i + 1][0] - probes[i][0], y = probes[i + 1][1] - probes[i][1];
     if (Math.hypot(x, y) > 0) angles.push(Math.atan2(y, x));

@@ -1,9 +1,7 @@
 /* Segments of a drawing's shapes, from the words of attributes; numbers, lengths, transforms and views.
  *
- * Every shape is read as data of a path. A segment is {kind, points}: its points are those that a transform moves. A
- * line or move has its end; "close" too; a Bézier curve its start and control points; an arc has start, end, centre,
- * and the points of the ellipse at 0 and at a quarter turn, and its sweep [rad]. Matrices are [a, b, c, d, e, f] as in
- * SVG. */
+ * Every shape is read as data of a path. A segment is {kind, end, at}: a "move", a "line", a "close" or a "curve", the
+ * end [x, y], and the point of a curve at a share of it. Matrices are [a, b, c, d, e, f] as in SVG. */
 import { CONSTANTS } from "./constants.js";
 import { TAU, mod } from "./math.js";
 import { InputError, quoted } from "./words.js";
@@ -25,59 +23,38 @@ function moved([a, b, c, d, e, f], [x, y]) {
 }
 
 /* Apply a matrix to a segment. */
-function transformed(matrix, segment) {
-  const points = segment.points.map((point) => moved(matrix, point));
-  const mirrored = matrix[0] * matrix[3] - matrix[2] * matrix[1] < 0;
-  return segment.kind === "arc" ? { ...segment, points, sweep: mirrored ? -segment.sweep : segment.sweep }
-    : { ...segment, points };
+function transformed(matrix, { kind, end, at }) {
+  return { kind, end: moved(matrix, end), at: at && ((share) => moved(matrix, at(share))) };
 }
 
-/* Points of a curve at shares of it. */
-function pointsOn(segment, shares) {
-  return segment.kind === "arc" ? arcPoints(segment, shares) : shares.map((t) => bezierPoint(segment.points, t));
-}
-
-function bezierPoint(points, t) {
-  const s = 1 - t;
-  return [0, 1].map((axis) => {
-    const p = points.map((point) => point[axis]);
+/* A Bézier curve with two or three control points. */
+function bezier(points) {
+  const [x, y] = [0, 1].map((axis) => points.map((point) => point[axis]));
+  return (t) => [x, y].map((p) => {
+    const s = 1 - t;
     if (p.length === 3) return s * s * p[0] + 2 * s * t * p[1] + t * t * p[2];
     return s * s * s * p[0] + 3 * (s * s * t * p[1] + t * t * s * p[2]) + t * t * t * p[3];
   });
 }
 
-function arcPoints({ points: [start, end, centre, first, quarter], sweep }, shares) {
-  const [x, y] = centre;
-  const a = Math.hypot(first[0] - x, first[1] - y), b = Math.hypot(quarter[0] - x, quarter[1] - y);
-  const rotation = Math.atan2(first[1] - y, first[0] - x), c = Math.cos(rotation), s = Math.sin(rotation);
-  const angle = Math.atan2(start[1] - y, start[0] - x) - rotation;
-  const begin = Math.atan2(a * Math.sin(angle), b * Math.cos(angle));
-  return shares.map((share) => {
-    if (share === 0) return start;
-    if (share === 1) return end;
-    const along = a * Math.cos(begin + sweep * share), across = b * Math.sin(begin + sweep * share);
-    return [x + along * c - across * s, y + along * s + across * c];
-  });
-}
-
-/* An arc as the data of a path give it. */
-function arcTo(start, [rx, ry, degrees, large, clockwise], end) {
-  if ((start[0] === end[0] && start[1] === end[1]) || rx === 0 || ry === 0) {
-    return { kind: "arc", points: [start, end, start, start, start], sweep: 0 };
-  }
+/* An arc as the data of a path give it (SVG 2, B.2.4). */
+function arc(start, [rx, ry, degrees, large, clockwise], end) {
+  if ((start[0] === end[0] && start[1] === end[1]) || rx === 0 || ry === 0) return (share) => (share === 1 ? end : start);
   const turn = degrees * (Math.PI / 180), c = Math.cos(turn), s = Math.sin(turn);
   const dx = (start[0] - end[0]) / 2, dy = (start[1] - end[1]) / 2, x = c * dx + s * dy, y = c * dy - s * dx;
-  const check = (x * x) / (rx * rx) + (y * y) / (ry * ry), grown = check > 1 ? Math.sqrt(check) : 1;
-  const a = rx * grown, b = ry * grown, one = a * a * (y * y), two = b * b * (x * x);
-  const size = Math.sqrt(Math.abs((a * a * (b * b) - one - two) / (one + two))) * (large === clockwise ? -1 : 1);
+  const grown = Math.sqrt(Math.max((x * x) / (rx * rx) + (y * y) / (ry * ry), 1)), a = rx * grown, b = ry * grown;
+  const left = a * a * (y * y), low = b * b * (x * x); // rounded as svgelements does: half an ellipse amplifies it
+  const size = Math.sqrt(Math.abs((a * a * (b * b) - left - low) / (left + low))) * (large === clockwise ? -1 : 1);
   const cx = (size * a * y) / b, cy = (-size * b * x) / a;
-  const centre = [c * cx - s * cy + (start[0] + end[0]) / 2, s * cx + c * cy + (start[1] + end[1]) / 2];
-  const u = [(x - cx) / a, (y - cy) / b], v = [(-x - cx) / a, (-y - cy) / b];
+  const u = [(x - cx) / a, (y - cy) / b], v = [(-x - cx) / a, (-y - cy) / b], first = Math.atan2(u[1], u[0]);
   const cosine = (u[0] * v[0] + u[1] * v[1]) / Math.sqrt((u[0] ** 2 + u[1] ** 2) * (v[0] ** 2 + v[1] ** 2));
   const between = Math.acos(Math.min(Math.max(cosine, -1), 1)) * (u[0] * v[1] - u[1] * v[0] < 0 ? -1 : 1);
-  const sweep = clockwise ? mod(between, TAU) : mod(between, TAU) - TAU;
-  const first = [centre[0] + a * c, centre[1] + a * s], quarter = [centre[0] - b * s, centre[1] + b * c];
-  return { kind: "arc", points: [start, end, centre, first, quarter], sweep };
+  const sweep = mod(between, TAU) - (clockwise ? 0 : TAU);
+  return (share) => {
+    if (share === 1) return end;
+    const along = cx + a * Math.cos(first + sweep * share), across = cy + b * Math.sin(first + sweep * share);
+    return [(start[0] + end[0]) / 2 + c * along - s * across, (start[1] + end[1]) / 2 + s * along + c * across];
+  };
 }
 
 /* The segments of the data of a path, all of them. */
@@ -98,31 +75,30 @@ function pathSegments(data) {
     return form.test(data);
   };
   const number = () => Number(take(FLOAT));
-  const add = (segment, end, turning = null) => {
-    segments.push(segment);
+  const add = (kind, end, at = null, turning = null) => {
+    segments.push({ kind, end, at });
     [here, control] = [end, turning];
   };
   while (!comes(END)) {
     const command = take(COMMAND), kind = command.toLowerCase(), relative = kind === command;
     if (!here && kind !== "m") refuse();
-    if (kind === "z") add({ kind: "close", points: [first] }, first);
+    if (kind === "z") add("close", first);
     for (let begins = true; kind !== "z" && (begins || comes(FLOAT)); begins = false) {
       const [x, y] = relative && here ? here : [0, 0], place = () => [x + number(), y + number()];
       if (kind === "a") {
         const radii = [number(), number()].map(Math.abs), turn = number(), flags = [FLAG, FLAG].map(take);
         const end = place();
-        add(arcTo(here, [...radii, turn, ...flags.map((flag) => flag === "1")], end), end);
+        add("curve", end, arc(here, [...radii, turn, ...flags.map((flag) => flag === "1")], end));
       } else if (kind === "h" || kind === "v") {
-        const end = kind === "h" ? [x + number(), here[1]] : [here[0], y + number()];
-        add({ kind: "line", points: [end] }, end);
+        add("line", kind === "h" ? [x + number(), here[1]] : [here[0], y + number()]);
       } else {
         const places = Array.from({ length: PLACES[kind] }, place), end = places[places.length - 1];
         if (kind === "m" && begins) first = end;
-        if (kind === "m" || kind === "l") add({ kind: kind === "m" && begins ? "move" : "line", points: places }, end);
+        if (kind === "m" || kind === "l") add(kind === "m" && begins ? "move" : "line", end);
         else {
           const smooth = control ? [2 * here[0] - control[0], 2 * here[1] - control[1]] : here;
           const points = [here, ...(kind === "s" || kind === "t" ? [smooth] : []), ...places];
-          add({ kind: "curve", points }, end, points[points.length - 2]);
+          add("curve", end, bezier(points), points[points.length - 2]);
         }
       }
     }
@@ -135,6 +111,11 @@ const LENGTH = new RegExp(`^(${N})\\s*([a-zA-Z]*|%)$`);
 const FUNCTION = /[\s,]*([a-zA-Z]+)\s*\(([^()]*)\)/g;
 const ASPECT = /^(?:none|x(Min|Mid|Max)Y(Min|Mid|Max))(?:\s+(?:meet|(slice)))?$/;
 const SHARES = { Min: 0, Mid: 0.5, Max: 1 };
+
+/* Refuse an attribute; words: what to do. */
+function unread(own, name, words) {
+  throw new InputError(`${name}=${quoted((own[name] ?? "").slice(0, 40))} is not read; ${words}`);
+}
 
 /* Lengths in pixels, and whether pixels have a size. */
 class Lengths {
@@ -152,8 +133,7 @@ class Lengths {
       return (Number(found[1]) * [...view, Math.hypot(...view) / Math.SQRT2][NAMES.lengths[name]]) / 100;
     }
     if (!found || !(unit in NAMES.pixels)) {
-      const words = "give a number, with mm, cm, in, pt, pc, px or without";
-      throw new InputError(`${name}=${quoted(text)} is not read; ${words}`);
+      unread(own, name, "give a number, with mm, cm, in, pt, pc, px or without");
     }
     if (unit !== "" && unit !== "px") {
       if (!this.sized) {
@@ -169,9 +149,7 @@ class Lengths {
 /* Read an attribute that is numbers between blanks and commas. */
 function numbersIn(own, name) {
   const text = own[name] ?? "";
-  if (/[^,\s]/.test(text.replace(NUMBER, ""))) {
-    throw new InputError(`${name}=${quoted(text.slice(0, 40))} is not read; give numbers`);
-  }
+  if (/[^,\s]/.test(text.replace(NUMBER, ""))) unread(own, name, "give numbers");
   return (text.match(NUMBER) ?? []).map(Number);
 }
 
@@ -207,17 +185,13 @@ function rectData(x, y, width, height, a, b) {
 }
 
 /* The matrix of the attribute `transform`. */
-function transformOf(text) {
-  let matrix = [1, 0, 0, 1, 0, 0];
-  if (text.toLowerCase() === "none") return matrix;
-  const calls = Array.from(text.matchAll(FUNCTION));
+function transformOf(own) {
+  const text = (own.transform ?? "").replace(/^none$/i, ""), calls = Array.from(text.matchAll(FUNCTION));
   const functions = calls.map(([, name, inside]) => oneTransform(name.toLowerCase(), inside));
   if (functions.includes(null) || /[^,\s]/.test(text.replace(FUNCTION, ""))) {
-    const words = "give matrix, translate, scale, rotate or skew, in px and deg";
-    throw new InputError(`transform=${quoted(text.slice(0, 40))} is not read; ${words}`);
+    unread(own, "transform", "give matrix, translate, scale, rotate or skew, in px and deg");
   }
-  for (const each of functions) matrix = product(matrix, each);
-  return matrix;
+  return functions.reduce(product, [1, 0, 0, 1, 0, 0]);
 }
 
 const MATRICES = { // of the functions of a transform; angles in degrees
@@ -248,12 +222,9 @@ function oneTransform(name, inside) {
 }
 
 /* Fit the viewBox (left, top, width, height) of an <svg> into its place and size. */
-function fitted(aspect, place, size, box) {
-  const found = ASPECT.exec(aspect || "xMidYMid");
-  if (!found) {
-    const words = "give none, or xMidYMid and meet or slice";
-    throw new InputError(`preserveAspectRatio=${quoted(aspect)} is not read; ${words}`);
-  }
+function fitted(own, place, size, box) {
+  const found = ASPECT.exec(own.preserveAspectRatio || "xMidYMid");
+  if (!found) unread(own, "preserveAspectRatio", "give none, or xMidYMid and meet or slice");
   let scale = [0, 1].map((i) => size[i] / box[2 + i]);
   if (found[1]) scale = Array(2).fill(found[3] ? Math.max(...scale) : Math.min(...scale));
   const at = [0, 1].map((i) => {
@@ -263,4 +234,4 @@ function fitted(aspect, place, size, box) {
   return [scale[0], 0, 0, scale[1], ...at];
 }
 
-export { NAMES, product, moved, transformed, pointsOn, Lengths, NUMBER, fitted, numbersIn, shapeSegments, transformOf };
+export { NAMES, product, moved, transformed, Lengths, NUMBER, fitted, numbersIn, shapeSegments, transformOf, unread };

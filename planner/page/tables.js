@@ -1,31 +1,17 @@
 /* Tables as text: comma, semicolon, tab or blanks between columns, comment lines, quotes as in CSV; numbers and
  * missing values as people write them; paths in tables. */
+import { CONSTANTS } from "./constants.js";
 import { pathOf } from "./path.js";
 import { findUnit, splitName, timesOf, toSi } from "./units.js";
-import { InputError, naming, quoted, repr } from "./words.js";
+import { InputError, naming, quoted, repr, whole } from "./words.js";
 
-const EXPONENT = "(?:[eE][+-]?[0-9]+)?";
-const NUMBER = new RegExp(`^(?:[+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)${EXPONENT}|[+-]?(?:inf|infinity))$`, "i");
-const MISSING = new RegExp(
-  "^(?:[-–—]*|[+-]?nan(?:\\(ind\\))?|<?n/?a>?|null|none|[+-]?1\\.#[a-z]+|#n/?[avd](?: n/a)?|#\\S*[!?]|#{4,}|" +
-    "err:[0-9]+)$",
-  "i",
-);
-const COMMA = new RegExp(`^[+-]?[0-9]*,[0-9]+${EXPONENT}$`, "m");
-const POINT = new RegExp(`^[+-]?[0-9]*\\.[0-9]+${EXPONENT}$`, "m");
-const THOUSANDS = new RegExp(
-  "^[+-]?[0-9]{1,3}(?:(?:\\.[0-9]{3})+,[0-9]+|(?:,[0-9]{3})+\\.[0-9]+|(?:\\.[0-9]{3}){2,}|(?:,[0-9]{3}){2,}" +
-    "|(?:[ '’\u00a0\u2009\u202f][0-9]{3})+(?:[.,][0-9]*)?)$",
-  "m",
-);
-const WHOLE_LINE = /^[+-]?[0-9]+$/m;
-const THREE = (mark) => new RegExp(`^[+-]?[1-9][0-9]{0,2}[${mark}][0-9]{3}$`, "m");
-const OTHER = (mark) => // what shows that the mark is decimal
-  new RegExp(`^(?![+-]?[1-9][0-9]{0,2}[${mark}][0-9]{3}$)[+-]?[0-9]*[${mark}][0-9]+${EXPONENT}$`, "m");
-const FORMULA = /^'+[=+\-@\t\r]/;
+const { NUMBER, MISSING, COMMA, POINT, THOUSANDS, WHOLE_LINE, THREE, OTHER, FORMULA } = CONSTANTS.number_words;
+const { COMMENT, MARKED_NUMBER, BLANKS, SEPARATORS } = CONSTANTS.tables;
 
-/* Say whether a word is a number, with a decimal point or comma; and whether it stands for a missing value. */
-const isNumber = (word) => NUMBER.test(word), isMissing = (word) => MISSING.test(word);
+/* Say whether a word is a number, with a decimal point or comma; whether it stands for a missing value; and whether a
+ * line is a comment. */
+const [isNumber, isMissing] = [NUMBER, MISSING].map((form) => (word) => whole(form).test(word));
+const isMarked = (line) => line.search(COMMENT) === 0;
 
 /* Refuse numbers that can be read in two ways. */
 function checkMarks(columns, where, separator) {
@@ -42,10 +28,10 @@ function checkMarks(columns, where, separator) {
     );
   }
   for (const mark of separator === ";" ? ",." : ",") {
-    const alone = mark === "," && !first(OTHER(","));
+    const alone = mark === "," && !first(OTHER[","]);
     for (const text of texts) {
-      const three = THREE(mark).exec(text);
-      if (!three || OTHER(mark).test(text) || !(alone || WHOLE_LINE.test(text))) continue;
+      const three = THREE[mark].exec(text);
+      if (!three || OTHER[mark].test(text) || !(alone || WHOLE_LINE.test(text))) continue;
       const [word] = three, small = word.replace(mark, ".").replace(/0+$/, "");
       throw new InputError(
         `${where} has the number ${quoted(word)}, which may be ${word.replace(mark, "")} or ${small}; write it without `
@@ -65,7 +51,7 @@ function plainWords(words) {
 
 /* Leave out the apostrophe before a text that a spreadsheet would take for a formula. */
 function plainText(word) {
-  return FORMULA.test(word) ? word.slice(1) : word;
+  return word.startsWith("'") && word.search(FORMULA) === 0 ? word.slice(1) : word;
 }
 
 /* Convert the plain cells of a column to numbers, with NaN for what is none; times to the unit of its name. */
@@ -87,19 +73,11 @@ function textsOf(words) {
   return words.map((word) => (whole ? String(Number(word)) : repr(numberOf(word))));
 }
 
-const COMMENT = /^\s*[#%]/;
-const MARKED_NUMBER = /^\s*[#%]+\s*[+-]?[.,]?[0-9]/;
-const BLANKS = /("(?:[^"]|"")*")|\s+/g;
-const SEPARATORS = [";", "\t", ","];
-const MOST_COLUMNS = 10_000;
-const MOST_TEXT = 128 * 2 ** 20; // bytes
-
 /* Parse a table as its plain words: {names, words, lines}, with a column of words for each name, and the line of each
  * row; a table of numbers alone has the names 0, 1, … bytes: content of the file. where: its name, for messages. */
 function parseWords(bytes, where) {
-  if (bytes.length > MOST_TEXT) throw new InputError(`${where} has more than 128 MiB; such a file is not read`);
   const lines = decoded(Uint8Array.from(bytes), where).replaceAll("\r\n", "\n").replaceAll("\r", "\n").split("\n");
-  const top = lines.findIndex((line) => line.trim() && !COMMENT.test(line));
+  const top = lines.findIndex((line) => line.trim() && !isMarked(line));
   if (top < 0) throw new InputError(`${where} is empty; give a table with one row per line`);
   const separator = separatorOf(lines.slice(top), where);
   const { names, rows } = header(lines, top, separator, where);
@@ -132,9 +110,6 @@ function parseWords(bytes, where) {
 /* The names of the columns, or null, and the rows below them. */
 function header(lines, top, separator, where) {
   const rows = rowsOf(lines, top, separator, where), { words } = rows[0];
-  if (words.length > MOST_COLUMNS) {
-    throw new InputError(`${where} has more than ${MOST_COLUMNS} columns; give a table with one row per line`);
-  }
   const above = lines.slice(0, top), commented = commentedNames(above, words.length, separator);
   if (words.every((word) => isNumber(word) || isMissing(word)) || (commented && words.some(isNumber))) {
     if (commented === null) { // what looked like comments may be rows
@@ -160,7 +135,7 @@ function header(lines, top, separator, where) {
 
 function isComment(words) {
   if (!words.length) return true;
-  return COMMENT.test(words[0]) && !MARKED_NUMBER.test(words.join(" ")) && !isMissing(words[0]);
+  return isMarked(words[0]) && words.join(" ").search(MARKED_NUMBER) !== 0 && !isMissing(words[0]);
 }
 
 /* Decode UTF-8, UTF-16 with a byte order mark, or Windows-1252. */
@@ -243,7 +218,7 @@ function rowsOf(lines, start, separator, where, most = Infinity) {
   const rows = [], mark = separator === " " ? "\t" : separator;
   let words = [], word = "", state = "start"; // of a cell; "plain", "quoted" or "closed" within it
   for (let i = start; i < lines.length && rows.length < most; i++) {
-    const line = separator === " " ? lines[i].trim().replace(BLANKS, (_, held) => held ?? "\t") : lines[i];
+    const line = separator === " " ? lines[i].trim().replace(new RegExp(BLANKS, "g"), (_, held) => held ?? "\t") : lines[i];
     const broken = (reason) =>
       new InputError(`${where} is no CSV table (line ${i + 1}: ${reason}); give a header and one row per line`);
     for (const sign of line) {

@@ -3,18 +3,14 @@
  * A value v in a unit is (v + zero) · times / over in SI units. Of a robot, tailLength [m] and timeScale [s] count. */
 import { CONSTANTS } from "./constants.js";
 import { smallest } from "./math.js";
-import { InputError, fixed, general, quoted, repr } from "./words.js";
+import { InputError, fixed, general, quoted, repr, whole } from "./words.js";
 
 const { UNITS: KNOWN, TEXTS, SPELLINGS, SIGNS, MOST_PARTS } = CONSTANTS.units;
 const UNITS = new Map(Object.entries(KNOWN));
 const RPM = (2 * Math.PI) / 60; // rad/s
 const CASE_COUNTS = new Set(["l", "r"]); // L and R are the head's
-const CLOCK = /^(?:([0-9]+) days?,? )?([0-9]+):([0-5][0-9]):([0-5][0-9](?:[.,][0-9]*)?)$/;
-const DATE = new RegExp(
-  "^([0-9]{4})-([0-9]{2})-([0-9]{2})(?:[T ]([0-9]{2}):([0-9]{2})(?::([0-9]{2}(?:[.,][0-9]+)?))?)?" +
-    "(Z|[+-][0-9]{2}:?[0-9]{2})?$",
-);
-const EPOCH = 3e8, LATEST = 1e11; // s: what is longer is a date; beyond it no date, but another unit
+const { CLOCK, EPOCH, LATEST } = CONSTANTS.quantities;
+const DATE = /^(\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d)?)?)(?:(?<=:\d\d:\d\d)[.,](\d+))?(?:Z|([+-]\d\d):?(\d\d))?$/;
 
 /* Find a unit by its suffix or another spelling ("deg/s", "°", "U/min"); null if it is no known unit. */
 function findUnit(text) {
@@ -135,20 +131,17 @@ function earliest(values) {
 }
 
 function clockOf(word) {
-  const match = CLOCK.exec(word);
+  const match = whole(CLOCK).exec(word);
   if (!match) return NaN;
   const [days, hours, minutes, seconds] = match.slice(1).map((part) => Number((part ?? "0").replace(",", ".")));
   return 86400 * days + 3600 * hours + 60 * minutes + seconds;
 }
 
 function dateOf(word) {
-  const match = DATE.exec(word);
-  if (!match) return NaN;
-  const [, year, month, day, hours = "00", minutes = "00", seconds = "00", zone = "Z"] = match;
-  const [whole, part = "0"] = seconds.split(/[.,]/), offset = zone.replace(/^(...)(\d\d)$/, "$1:$2");
-  const time = `${year}-${month}-${day}T${hours}:${minutes}`;
-  const exact = new Date(`${time}Z`), isDay = !Number.isNaN(exact.getTime()) && exact.toISOString().startsWith(time);
-  return isDay ? new Date(`${time}:00${offset}`).getTime() / 1000 + Number(`${whole}.${part}`) : NaN;
+  const [, text = "", part = "0", hours = "+00", minutes = "00"] = DATE.exec(word) ?? [], given = text.replace(" ", "T");
+  const date = new Date(given.length > 10 ? `${given}Z` : given), zone = new Date(`1970-01-01T00:00${hours}:${minutes}`);
+  const isDay = !Number.isNaN(date.getTime()) && date.toISOString().startsWith(given);
+  return isDay ? (date.getTime() + zone.getTime()) / 1000 + Number(`0.${part}`) : NaN;
 }
 
 /* Rename and convert columns to those that are wanted: {table, notes}; all others stay as they are.

@@ -87,6 +87,11 @@ function quoted(text) {
   return quote + text.replace(/[^\S ]|\p{C}/gu, hidden).replaceAll(quote, `\\${quote}`) + quote;
 }
 
+/* A pattern that matches whole texts. */
+function whole(pattern) {
+  return new RegExp(`^(?:${pattern.source})$`, pattern.flags);
+}
+
 /* The known word that is most like a given one: at most a third of its letters differ; null if there is none. */
 function closeMatch(word, known) {
   const far = Array.from(known, (other) => editsBetween(word, other)), least = Math.min(...far);
@@ -107,4 +112,4 @@ function editsBetween(word, other) {
 }
 
 export { InputError, refusing, naming, DECLARING, REMEDY, FOLLOWING, tell, inPage, repr, general, fixed, quoted };
-export { closeMatch };
+export { closeMatch, whole };

@@ -99,7 +99,7 @@ def _subpaths(shapes: list[Shape]) -> dict[str, tuple[Floats, bool]]:
     for kind, identity, drawn, matrix, clips in shapes:
         counts[kind] = counts.get(kind, 0) + 1
         name = identity or f"{kind}{counts[kind]}"
-        parts = [_points(SvgPath(part)) for part in abs(SvgPath(drawn) * matrix).as_subpaths()]
+        parts = [_points(SvgPath(part), matrix) for part in SvgPath(drawn).as_subpaths()]
         parts = [part for part in parts if len(part[0]) > 1]
         for i, part in enumerate(parts):
             part_name = name if len(parts) == 1 else f"{name}/{i + 1}"
@@ -112,8 +112,11 @@ def _subpaths(shapes: list[Shape]) -> dict[str, tuple[Floats, bool]]:
     return subpaths
 
 
-def _points(subpath: Any) -> tuple[Floats, bool]:
-    """Sample the points of one subpath, curves as polylines, and tell whether it is closed."""
+def _points(subpath: Any, matrix: Matrix) -> tuple[Floats, bool]:
+    """Sample the points of one subpath in pixels, curves as polylines, and tell whether it is closed.
+
+    Points are sampled before the transform: svgelements takes the axes of a skewed ellipse for upright ones.
+    """
     points: list[list[float]] = []
     closed = False
     for segment in subpath:
@@ -124,16 +127,20 @@ def _points(subpath: Any) -> tuple[Floats, bool]:
             if segment.end is not None:
                 points.append([segment.end.x, segment.end.y])
         else:
-            points += segment.npoint(np.linspace(0, 1, _enough(segment) + 1)[1:]).tolist()
+            points += segment.npoint(np.linspace(0, 1, _enough(segment, matrix) + 1)[1:]).tolist()
         if len(points) > _MOST_POINTS:
             raise InputError(f"a curve of the drawing needs more than {_MOST_POINTS} points; simplify the drawing")
-    return np.array(points, dtype=float).reshape(-1, 2), closed
+    return _moved(np.array(points, dtype=float).reshape(-1, 2), matrix), closed
 
 
-def _enough(curve: Any) -> int:
-    """Return the number of segments of a curve such that none turns by more than _TURN."""
+def _moved(points: Floats, matrix: Matrix) -> Floats:
+    return points @ np.array([[matrix.a, matrix.b], [matrix.c, matrix.d]]) + [matrix.e, matrix.f]
+
+
+def _enough(curve: Any, matrix: Matrix) -> int:
+    """Return the number of segments of a curve such that none turns by more than _TURN, once it is transformed."""
     probes = np.asarray(curve.npoint(np.linspace(0, 1, _PROBES + 1)), dtype=float)
-    moves = np.diff(probes, axis=0)
+    moves = np.diff(_moved(probes, matrix), axis=0)
     moves = moves[np.hypot(moves[:, 0], moves[:, 1]) > 0]
     turns = np.diff(np.unwrap(np.arctan2(moves[:, 1], moves[:, 0])))
     return max(_PROBES, steps_of(_PROBES * float(np.abs(turns).max(initial=0.0)), _TURN))
@@ -149,8 +156,7 @@ class Clip(NamedTuple):
 
     def hides(self, points: Floats) -> bool:
         """Tell whether one of some points (n, 2), in pixels, is outside."""
-        m = ~self.matrix
-        own = points @ np.array([[m.a, m.b], [m.c, m.d]]) + [m.e, m.f]
+        own = _moved(points, ~self.matrix)
         low, high = np.array(self.low), np.array(self.high)
         slack = 1e-6 * float((high - low).max())
         return bool(((own < low - slack) | (own > high + slack)).any())

@@ -45,14 +45,12 @@ class Problem {
   }
 }
 
-const MOST_TEXT = 16 * 2 ** 20;
 const DEEPEST = 200; // levels; the planner refuses fewer
 const LIVE = /http:\/\/www\.w3\.org\/(?=2000\/svg|1999\/xhtml)/g;
 
 /* Read the text of a drawing: {tag, attributes, children, text} of its elements, "{namespace}name" where they have
  * one. */
 function drawingTree(text, name) {
-  if (text.length > MOST_TEXT) throw new InputError(`${name} has more than 16 MiB; such a file is not read`);
   if (text.includes("<?xml-stylesheet")) {
     throw new InputError(`${name}: <?xml-stylesheet> is not read; save the drawing with its style`);
   }

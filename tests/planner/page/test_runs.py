@@ -61,6 +61,7 @@ TABLES: dict[str, Change] = {
         l_cm=10 * table["l_cm"], theta_deg=np.radians(table["theta_deg"])).rename(columns=OTHER_UNITS),
     "other columns": lambda table: table.assign(remark="calm", camera=1, temperature_F=70.0),
     "no sessions": lambda table: table.drop(columns="session"),
+    "two robots": lambda table: table.assign(robot=np.where(np.arange(len(table)) % 3, "a", "b")),
     "numbered sessions": lambda table: table.assign(session=np.arange(len(table)) % 4),
     "columns without a value": lambda table: table.assign(
         v_cm_s=np.nan, session=" ", elapsed_min="", tachometer_sigma_percent=np.nan),

@@ -63,6 +63,14 @@ def test_circles_and_ellipses_are_smooth(tmp_path: Path) -> None:
         assert np.abs(kinks(drawn_path(tmp_path, body))).max() < CORNER, body
 
 
+def test_a_skewed_circle_is_the_image_of_the_circle(tmp_path: Path) -> None:
+    for body in ("<circle cx='2' r='3' {}/>", "<path {} d='M5 0A3 3 0 0 1 2 3A3 3 0 1 1 5 0'/>"):
+        skewed = drawn_path(tmp_path, body.format("transform='translate(4 -2) skewX(40) scale(1 -2)'"))
+        x, y = (skewed.points * [1, -1] - [4, -2]).T
+        radius = np.hypot(x - math.tan(math.radians(40)) * y - 2, y / 2)
+        assert radius == pytest.approx(np.full(len(radius), 3.0))
+
+
 def test_a_bezier_curve_is_followed(tmp_path: Path) -> None:
     """Points of the curve by de Casteljau's definition."""
     points = drawn_path(tmp_path, "<path d='M 0 0 C 1 -2 3 -2 4 0'/>").points
