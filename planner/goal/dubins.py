@@ -9,6 +9,7 @@ course. All functions take arrays of poses.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -34,6 +35,10 @@ class DubinsPaths(NamedTuple):
 
     def take(self, rows: Integers) -> DubinsPaths:
         return DubinsPaths(self.start[rows], self.turns[rows], self.lengths[rows])
+
+    @staticmethod
+    def joined(parts: Sequence[DubinsPaths]) -> DubinsPaths:
+        return DubinsPaths(*(np.concatenate([part[i] for part in parts]) for i in range(3)))
 
     def poses(self, way: Floats, radius: float) -> Floats:
         """Compute poses (M, K, 3) after ways (M, K) along the tracks; beyond the end, that of the end."""

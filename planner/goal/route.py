@@ -180,7 +180,7 @@ def _chosen(stops: list[Floats], limits: RouteLimits, margin: float) -> Route | 
 
 def chained(parts: list[DubinsPaths], radius: float) -> Route:
     """Join tracks, one after another."""
-    return Route(DubinsPaths(*(np.concatenate([part[i] for part in parts]) for i in range(3))), radius)
+    return Route(DubinsPaths.joined(parts), radius)
 
 
 def _lattice(stops: list[Floats], limits: RouteLimits, spacing: float, courses: int) -> Lattice:
@@ -241,7 +241,7 @@ def shortened(leg: DubinsPaths, lattice: Lattice, margin: float) -> DubinsPaths:
             row = choice[k]
             parts.append(places.take(np.array([k - 1])) if row < 0 else tracks.take(np.array([row])))
             k = k - 1 if row < 0 else int(i[row])
-        leg = chained(parts[::-1], limits.radius).tracks
+        leg = DubinsPaths.joined(parts[::-1])
     return leg
 
 
@@ -258,4 +258,4 @@ def _cut(leg: DubinsPaths, spacing: float, radius: float) -> DubinsPaths:
         turns = leg.take(np.full(len(edges) - 1, row)).turns
         poses = leg.take(np.array([row])).poses(edges[None, :-1], radius)[0]
         parts.append(DubinsPaths(poses, turns, lengths))
-    return DubinsPaths(*(np.concatenate([part[i] for part in parts]) for i in range(3)))
+    return DubinsPaths.joined(parts)

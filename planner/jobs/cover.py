@@ -21,7 +21,7 @@ from planner.goal.route import Route, chained
 from planner.jobs.shortest_order import EXACT, MOST, Order, shortest_order
 from planner.jobs.travel import SLACK, Travel, pivot_poses, plan_track, preferred_setting
 from planner.paths.distance import distance_to
-from planner.paths.obstacles import Circle, FreeSpace, Polygon, Region
+from planner.paths.obstacles import Circle, FreeSpace, Region
 from planner.paths.path import arc_length
 from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab
@@ -138,7 +138,7 @@ class Coverage(Job):
         axes.plot([], [], color=SWATH, lw=6, label="swept")
         axes.autoscale_view()
         for region in (self.field.outline, *self.field.holes):
-            outline = cm * corners(region)
+            outline = cm * region.corners
             axes.plot(*np.concatenate([outline, outline[:1]]).T, color=DECLARED, lw=1.0, ls="--")
 
     def to_dict(self, plan: Plan) -> dict[str, Any]:
@@ -302,7 +302,7 @@ def _track(ends: Floats, travel: Travel, tracked: TrackedVehicle, drift: Drift) 
 
 def across(field: Field, angle: float) -> float:
     """Compute the extent of a region across a direction."""
-    return float(np.ptp(corners(field.outline) @ np.array([-np.sin(angle), np.cos(angle)])))
+    return float(np.ptp(field.outline.corners @ np.array([-np.sin(angle), np.cos(angle)])))
 
 
 def lanes(field: Field, width: float, angle: float, *, apart: float) -> Floats:
@@ -316,7 +316,7 @@ def lanes(field: Field, width: float, angle: float, *, apart: float) -> Floats:
     """
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, s], [-s, c]])  # to the frame of the lanes
-    outline = corners(field.outline) @ turn.T
+    outline = field.outline.corners @ turn.T
     low, high = outline.min(0), outline.max(0)
     count = max(1, int(np.ceil((high[1] - low[1]) / width)))
     spacing = (high[1] - low[1]) / count
@@ -343,12 +343,3 @@ def share_covered(field: Field, track: Floats, width: float) -> float:
     """Compute the share of a region's area within half a width of a track (S, 2)."""
     points, _ = field.raster(width / 20)
     return float((distance_to(track, points) <= width / 2).mean())
-
-
-def corners(region: Region) -> Floats:
-    """Return the corners (n, 2) of a region; those of a polygon of many sides for a circle."""
-    if isinstance(region, Polygon):
-        return region.corners
-    assert isinstance(region, Circle)
-    angle = 2 * np.pi * np.arange(180) / 180
-    return np.array([region.x, region.y]) + region.radius * np.stack([np.cos(angle), np.sin(angle)], 1)

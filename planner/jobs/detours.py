@@ -272,13 +272,7 @@ def _turned(reference: Reference, blocked: Flags) -> Reference:
 
 def _stretches(blocked: Flags, arc: Floats, radius: float) -> list[Stretch]:
     """Find blocked stretches; those that are near one another are one."""
-    runs: list[tuple[int, int]] = []
-    for first, last in _runs(blocked):
-        if runs and arc[first] - arc[runs[-1][1]] < 2 * radius:
-            runs[-1] = (runs[-1][0], last)
-        else:
-            runs.append((first, last))
-    stretches = []
+    runs, stretches = _runs(blocked, arc, 2 * radius), []
     for k, (first, last) in enumerate(runs):
         middle_before = 0 if k == 0 else _halfway(arc, runs[k - 1][1], first)
         middle_behind = len(arc) - 1 if k == len(runs) - 1 else _halfway(arc, last, runs[k + 1][0]) - 1
@@ -312,14 +306,8 @@ def _compared(reference: Reference, changed: Reference) -> tuple[Detour, ...]:
     """List the parts of a changed reference that are off the original one."""
     distance, segment, _ = nearest(reference.p, changed.p)
     arc = arc_length(changed.p)
-    runs: list[tuple[int, int]] = []
-    for first, last in _runs(distance > _OFF):
-        if runs and arc[first] - arc[runs[-1][1]] < _APART:
-            runs[-1] = (runs[-1][0], last)
-        else:
-            runs.append((first, last))
     detours = []
-    for first, last in runs:
+    for first, last in _runs(distance > _OFF, arc, _APART):
         a, b = max(first - 1, 0), min(last + 1, len(arc) - 1)
         farthest = float(distance[a : b + 1].max())
         if farthest > _FAR:
@@ -329,10 +317,16 @@ def _compared(reference: Reference, changed: Reference) -> tuple[Detour, ...]:
     return tuple(detours)
 
 
-def _runs(flags: Flags) -> list[tuple[int, int]]:
-    """List first and last index of each run of true flags."""
+def _runs(flags: Flags, arc: Floats, apart: float) -> list[tuple[int, int]]:
+    """List first and last index of each run of true flags; those less than `apart` along the arc are one."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True))
+    runs: list[tuple[int, int]] = []
+    for first, last in zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True):
+        if runs and arc[first] - arc[runs[-1][1]] < apart:
+            runs[-1] = (runs[-1][0], last)
+        else:
+            runs.append((first, last))
+    return runs
 
 
 class Hindered:

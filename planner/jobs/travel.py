@@ -19,15 +19,14 @@ from planner.goal.route import Route
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift, Reference
-from planner.paths.units import LONGEST, check_size, in_lab
+from planner.paths.units import check_size
 from planner.planning.feasible import AS_DRAWN, Declared
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest, Progress
-from planner.planning.solve import Setting, Task, solve
+from planner.planning.solve import Change, Setting, Task, solve
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.zigzag import Zigzag, dwells_for
 from sim.arrays import Floats, Integers
-from sim.io.errors import InputError
 
 WORDS = 3  # tried among obstacles
 DETOUR = 6.0  # turn radii that a blocked track counts longer
@@ -128,14 +127,10 @@ def plan_track(
         return Declared(reference, float(np.abs(reference.curvature).max()))
 
     drawn = Path2D(source(preferred).reference.p, False)
-    if drawn.length > LONGEST:
-        length = in_lab(drawn.length, tracked.robot)
-        raise InputError(f"the path is {length} long; at most {LONGEST:g} l can be planned")
     check_size(drawn, tracked.robot, tracked.vehicle.turn_radius)
-    if space.empty:
-        return solve(Task(source=source, drawn=drawn), tracked, request, progress)
-    from planner.jobs.detours import Around
+    changes: tuple[Change, ...] = ()
+    if not space.empty:
+        from planner.jobs.detours import Around  # loads SciPy's graphs
 
-    return solve(
-        Task(source=source, changes=(Around(tracked, space, drawn),), drawn=drawn), tracked, request, progress
-    )
+        changes = (Around(tracked, space, drawn),)
+    return solve(Task(source=source, changes=changes, drawn=drawn), tracked, request, progress)

@@ -19,6 +19,7 @@ from planner.paths.units import Swimmer
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
 
+_SIDES = 180  # of a circle as a polygon
 _BLOCK = 2_000_000  # distances computed at once
 
 
@@ -46,6 +47,12 @@ class Circle:
     def distance(self, points: Floats) -> Floats:
         """Compute the distance (M,) of points (M, 2), negative inside."""
         return np.asarray(np.hypot(points[:, 0] - self.x, points[:, 1] - self.y) - self.radius)
+
+    @property
+    def corners(self) -> Floats:
+        """Corners (n, 2) of a polygon with many sides, for pictures and lanes."""
+        angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
+        return np.array([self.x, self.y]) + self.radius * np.stack([np.cos(angle), np.sin(angle)], 1)
 
     @property
     def box(self) -> Floats:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.paths.obstacles import Circle, FreeSpace
+from planner.paths.obstacles import FreeSpace
 from sim.arrays import Floats
 from sim.io.units import format_length
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 RAW, DECLARED, PREDICTED, REPLAYED = "#b0b0b0", "#1a1a1a", "#2a7fba", "#c8452f"
 KEEP_OUT, BODY = "#d8b365", "#8a4fa3"
-_ROUND = 121  # points of a circle
 _WIDE, _HIGH = 0.65, 1.2  # of a letter, over the size of the font
 _ASIDE = (1.0, 2.0, 3.0)  # distances of a label from its point, over the size of the font
 _WAYS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1], [0, 1], [0, -1], [1, 0], [-1, 0]])
@@ -54,12 +53,7 @@ def draw_regions(axes: Axes, free_space: FreeSpace, length_scale: float) -> None
     """Draw obstacles, given in l, as areas, and walls as lines, on axes in cm; `length_scale` is l in m."""
     cm = 100 * length_scale
     for region in free_space.regions:
-        if isinstance(region, Circle):
-            turn = np.linspace(0, 2 * np.pi, _ROUND)
-            x, y = region.x + region.radius * np.cos(turn), region.y + region.radius * np.sin(turn)
-            axes.fill(cm * x, cm * y, color=KEEP_OUT, lw=0)
-        else:
-            axes.fill(*(cm * region.corners.T), color=KEEP_OUT, lw=0)
+        axes.fill(*(cm * region.corners.T), color=KEEP_OUT, lw=0)
     if free_space.walls is not None:
         corners = cm * free_space.walls.corners
         axes.plot(*np.concatenate([corners, corners[:1]]).T, color=KEEP_OUT, lw=3)

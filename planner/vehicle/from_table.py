@@ -24,6 +24,7 @@ from sim.effects.tail_contact import EFFECT as CONTACT
 from sim.effects.tail_contact import least_gap
 from sim.io.errors import InputError
 from sim.mechanics import planar
+from sim.model.response import Responses
 from sim.model.robot import Robot
 from surrogate.answers import refusing_robots
 from surrogate.interface import ErrorModes, LookupTable
@@ -67,7 +68,7 @@ def table_vehicle(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowl
     if (twist[:, 2] * [1.0, -1.0] <= 0).any():
         raise InputError(f"robot {robot.name!r} turns to the same side in both directions of its motor; it cannot "
                          "follow a path")  # fmt: skip
-    lag = mirrored(np.stack([lag_table(curves.lag[i], curves.memory[i], curves.before) for i in (0, 1)]))
+    lag = _lags(curves)
     unit = robot.time_scale / robot.length_scale  # from m/s
     return Vehicle(
         twist=twist,
@@ -94,14 +95,18 @@ def check_known(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowled
     columns = both_directions(robot.group_values())
     with refusing_robots([robot, robot], lookup):
         twist = _twists(lookup.query(columns))
-        curves = lookup.response(columns)
-    lag = mirrored(np.stack([lag_table(curves.lag[i], curves.memory[i], curves.before) for i in (0, 1)]))
+        lag = _lags(lookup.response(columns))
     coefficient_modes(robot, lookup, Motion(twist, lag), knowledge)
 
 
 def _twists(motion: Mapping[str, Floats]) -> Floats:
     """Return the twists (2, 3) of both directions from a table's answer."""
     return np.stack([motion[name] for name in STEADY], -1)
+
+
+def _lags(curves: Responses) -> Floats:
+    """Return the lags (2, K, T, 3) of both directions from a table's curves."""
+    return mirrored(np.stack([lag_table(curves.lag[i], curves.memory[i], curves.before) for i in (0, 1)]))
 
 
 def _table_modes(twist: Floats, errors: ErrorModes) -> list[Mode]:
@@ -239,11 +244,9 @@ def _other(lookup: LookupTable, values: Mapping[str, float], motion: Motion) -> 
         InputError: the table does not know this robot.
     """
     columns = both_directions(values)
-    answer = lookup.query(columns)
-    twist = np.stack([answer[name] for name in STEADY], -1)
+    twist = _twists(lookup.query(columns))
     try:
         curves = lookup.response(columns)
     except InputError:  # of robots whose left and right turns differ
         return Motion(twist, motion.lag)
-    lag = np.stack([lag_table(curves.lag[i], curves.memory[i], curves.before) for i in (0, 1)])
-    return Motion(twist, motion.lag if curves.failed.any() else mirrored(lag))
+    return Motion(twist, motion.lag if curves.failed.any() else _lags(curves))

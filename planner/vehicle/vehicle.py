@@ -51,9 +51,7 @@ class Vehicle:
         side = 0 if sense > 0 else 1
         if before is not None:
             return interpolated(self.lag[side], before, time)
-        i, share = _step_below(np.asarray(time, dtype=float))
-        table = self.rest[side]
-        return np.asarray((1 - share) * table[i] + share * table[i + 1])
+        return _at(self.rest[side], time)
 
     def motion(self, sense: int, before: ArrayLike | None, time: ArrayLike) -> Floats:
         """Compute the pose change E_σ(time | before), (..., 3), without the current."""
@@ -62,10 +60,7 @@ class Vehicle:
 
     def lag_noise(self, sense: int, time: ArrayLike) -> Floats:
         """Return the standard deviation (..., 3) of the lag after `time`, over the disc's phase at the flip."""
-        table = self.spread[0 if sense > 0 else 1]
-        time = np.asarray(time, dtype=float)
-        parts = [np.interp(time, TIMES, table[:, i]) for i in range(3)]
-        return np.stack(parts, -1)
+        return _at(self.spread[0 if sense > 0 else 1], time)
 
     @property
     def yaw_rate(self) -> float:
@@ -124,6 +119,12 @@ def interpolated(table: Floats, before: ArrayLike, time: ArrayLike) -> Floats:
     near = (1 - share) * table[k, i] + share * table[k, i + 1]
     far = (1 - share) * table[k + 1, i] + share * table[k + 1, i + 1]
     return np.asarray((1 - part) * near + part * far)
+
+
+def _at(table: Floats, time: ArrayLike) -> Floats:
+    """Interpolate lags (..., 3) after `time` (...) in a table (T, 3)."""
+    i, share = _step_below(np.asarray(time, dtype=float))
+    return np.asarray((1 - share) * table[i] + share * table[i + 1])
 
 
 def _step_below(time: Floats) -> tuple[Integers, Floats]:
