@@ -152,9 +152,16 @@ def _simulate(
     print(f"{len(table)} runs -> {out}")
 
 
-@program.command("tracks", of="calibration.api:tracks")
+@program.command("tracks", of="calibration.api:tracks", written_by="from")
 def _tracks(
-    tracks: str, runs: str, *, robot: str | None = None, y_down: bool = False, check: str | None = None, out: str
+    tracks: str,
+    runs: str,
+    *,
+    robot: str | None = None,
+    y_down: bool = False,
+    check: str | None = None,
+    out: str,
+    **given: Any,
 ) -> None:
     """Turn camera tracks into a table of runs.
 
@@ -162,14 +169,17 @@ def _tracks(
         check: PNG, draw the fitted circles over the tracks.
         out: CSV.
     """
-    _refuse_early(tracks, runs)
+    from sim.io.pose_tracks import read_tracks
+
+    _refuse_early(runs)
+    read_tracks(tracks, **given)
     from calibration.report.figures import draw_tracks
     from calibration.swimmer.camera_tracks import measure_tracks
     from sim.inputs import load_robot
     from sim.io.files import whole_file, write_csv
 
     known = None if robot is None else load_robot(robot)
-    measured = measure_tracks(tracks, runs, y_down=y_down, robot=known)
+    measured = measure_tracks(tracks, runs, y_down=y_down, robot=known, **given)
     for line in measured.converted:
         print(line, file=sys.stderr)
     for line in measured.excluded:

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Unpack
 
 import pandas as pd
 
@@ -26,6 +26,7 @@ from calibration.verdict.next_runs import decide as decide_between
 from calibration.verdict.verdict import Verdict
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
+from sim.io.track_options import TrackOptions
 from sim.io.units import LengthUnit
 from sim.robot_rows import OneRobot, one_robot, with_units
 
@@ -143,6 +144,7 @@ def tracks(
     *,
     y_down: bool = False,
     robot: OneRobot | None = None,
+    **options: Unpack[TrackOptions],
 ) -> pd.DataFrame:
     """Turn camera tracks into a measured table: yaw rate, turn radius, slip angle and speed of each run.
 
@@ -152,6 +154,7 @@ def tracks(
         y_down: y and headings are those of a picture, whose y axis points down.
         robot: the robot as given, its robot.toml, or the name of a preset, with whose simulated motion the tracks
             are compared.
+        options: of tracks that another program has written, see `TrackOptions`.
 
     Returns:
         The runs with `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s` and their errors. What was left out is in
@@ -170,7 +173,8 @@ def tracks(
         >>> sf.tracks(circle, runs)[["omega_yr_rad_s", "R_yr_cm", "theta_deg"]].round(3).values.tolist()
         [[0.05, 9.0, 70.0]]
     """
-    measured = measure_tracks(tracks, runs, y_down=y_down, robot=None if robot is None else one_robot(robot))
+    known = None if robot is None else one_robot(robot)
+    measured = measure_tracks(tracks, runs, y_down=y_down, robot=known, **options)
     for line in measured.excluded:
         warnings.warn(f"excluded: {line}", stacklevel=2)
     table = with_units(measured.table)

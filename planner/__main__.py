@@ -15,6 +15,8 @@ from sim.io.errors import InputError, naming
 from sim.io.units import format_length, format_time
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from planner.jobs.fleet_plan import FleetPlan
     from planner.planning.plan import Plan
     from planner.tracking.tracker import Tracker
@@ -227,7 +229,7 @@ def _page(*, out: str, paths: Sequence[str] = (), **given: Any) -> None:
     print(f"{page.stat().st_size / 1e6:.2f} MB, opens in a browser -> {page}")
 
 
-@program.command("replan", of="planner.api:replan")
+@program.command("replan", of="planner.api:replan", written_by="from")
 def _replan(plan: str, track: str, *, out: str, **given: Any) -> None:
     """Plan the rest of a saved plan from where a robot is now.
 
@@ -236,7 +238,21 @@ def _replan(plan: str, track: str, *, out: str, **given: Any) -> None:
         track: table of the robot so far: time_s, x_cm, y_cm, heading_deg; in its last row the robot is now, at
             rest.
     """
-    _write(program.commands["replan"].call(plan=plan, track=track, **given), out)
+    with naming(track):
+        result = program.commands["replan"].call(plan=plan, track=_read_track(track, given), **given)
+    _write(result, out)
+
+
+def _read_track(track: str, given: dict[str, Any]) -> pd.DataFrame:
+    """Read a track with its options among those given, and say what of it is lost."""
+    from planner.files.tracks import read_track
+    from sim.io.track_options import TrackOptions
+
+    options = {name: given.pop(name) for name in given.keys() & TrackOptions.__annotations__.keys()}
+    table = read_track(track, **options)
+    for line in table.attrs.pop("lost", ()):
+        print(line, file=sys.stderr)
+    return table
 
 
 @program.command("replay")
@@ -304,8 +320,8 @@ def _replay(
         print(check(plan, track).line)
 
 
-@program.command("check", of="planner.api:check")
-def _check(plan: str, track: str, *, out: str | None = None) -> None:
+@program.command("check", of="planner.api:check", written_by="from")
+def _check(plan: str, track: str, *, out: str | None = None, **given: Any) -> None:
     """Tracking error of a replayed track.
 
     Args:
@@ -317,7 +333,8 @@ def _check(plan: str, track: str, *, out: str | None = None) -> None:
     from planner.files.saved_plan import load_plan
 
     content = load_plan(plan)
-    error = check(content, track)
+    with naming(track):
+        error = check(content, _read_track(track, given))
     print(error.line)
     if out is not None:
         from planner.files.tracks import write_overlay

@@ -6,6 +6,7 @@ called.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
@@ -40,6 +41,7 @@ from planner.planning.request import Camera
 from planner.vehicle.zigzag import Objective
 from sim.io.errors import InputError, naming
 from sim.io.keywords import checks_keywords
+from sim.io.track_options import TrackOptions
 from sim.model.robot import Robot
 from sim.robot_rows import OneRobot, one_robot
 from surrogate.interface import LookupTable
@@ -339,6 +341,7 @@ def fleet(
 def check(
     plan: Plan | Mapping[str, Any] | str | Path,
     track: pd.DataFrame | str | Path,
+    **options: Unpack[TrackOptions],
 ) -> TrackingError:
     """Compare a replayed or measured track with its plan.
 
@@ -346,6 +349,7 @@ def check(
         plan: a plan, the path of its plan.json, or its content.
         track: `time_s`, `x_cm`, `y_cm`, `heading_deg` of the head's centre, as a camera gives them, or the columns
             that `replay` returns; or its file.
+        options: of a file that another program has written, see `TrackOptions`.
 
     Returns:
         Distances of the tracked point from the declared path: `rms` and `largest`, with the `stated` error; from
@@ -362,11 +366,22 @@ def check(
         True
     """
     from planner.files.saved_plan import load_plan
-    from planner.files.tracks import read_track, tracking_error
+    from planner.files.tracks import tracking_error
 
     content = load_plan(plan) if isinstance(plan, str | Path) else plan
     with naming(track):
-        return tracking_error(content.to_dict() if isinstance(content, Plan) else content, read_track(track))
+        poses = _poses(track, options)
+        return tracking_error(content.to_dict() if isinstance(content, Plan) else content, poses)
+
+
+def _poses(track: pd.DataFrame | str | Path, options: TrackOptions) -> pd.DataFrame:
+    """Read a track, and warn of poses that are lost."""
+    from planner.files.tracks import read_track
+
+    poses = read_track(track, **options)
+    for line in poses.attrs.get("lost", ()):
+        warnings.warn(line, stacklevel=3)
+    return poses
 
 
 @checks_keywords
@@ -376,6 +391,7 @@ def replan(
     *,
     lookup: LookupTable | str | Path | None = None,
     own_table: bool = False,
+    **options: Unpack[TrackOptions],
 ) -> Plan:
     """Plan the rest of a plan from where a robot is now: the last pose of its track, at rest.
 
@@ -389,6 +405,7 @@ def replan(
             columns that `replay` returns; or its file. One row is enough.
         lookup: the look-up table with which a saved plan was made, or its file; see `restore_plan`.
         own_table: a saved plan was made with the robot's own table, which is simulated.
+        options: of a track that another program has written, see `TrackOptions`.
 
     Returns:
         A plan whose first dwell begins now; its `job` is a `Trip` for a trip to a goal.
@@ -406,12 +423,12 @@ def replan(
         (2.0, True)
     """
     from planner.files.saved_plan import restore_plan
-    from planner.files.tracks import read_track, replan_from
+    from planner.files.tracks import replan_from
 
     if isinstance(plan, str | Path):
         plan = restore_plan(plan, lookup=lookup, own_table=own_table)
     with naming(track):
-        return replan_from(plan, read_track(track))
+        return replan_from(plan, _poses(track, options))
 
 
 @checks_keywords

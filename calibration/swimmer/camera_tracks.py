@@ -24,7 +24,7 @@ import math
 from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Unpack
 
 import numpy as np
 import pandas as pd
@@ -35,8 +35,10 @@ from calibration.swimmer.possible_runs import check_factor
 from sim.arrays import Floats
 from sim.inputs import RUN, RUN_SYNONYMS, run_columns
 from sim.io.errors import InputError, naming
+from sim.io.pose_tracks import read_tracks
 from sim.io.quantities import convert_columns, numbers_of
 from sim.io.tables import read_table, row_name
+from sim.io.track_options import TrackOptions
 from sim.model.robot import Robot
 from sim.motion.batches import steady_columns
 from sim.motion.lab_units import lab_motion
@@ -98,6 +100,7 @@ def measure_tracks(
     *,
     y_down: bool = False,
     robot: Robot | None = None,
+    **options: Unpack[TrackOptions],
 ) -> MeasuredTracks:
     """Make a table for `calibration.swimmer.measured_table` from tracks and the settings of each run.
 
@@ -106,6 +109,7 @@ def measure_tracks(
         runs: run, N, l_cm, omega_rpm and other notes; one row for each run.
         y_down: y and headings are those of a picture, whose y axis points down.
         robot: the robot as given; what the tracks give is compared with its simulated motion.
+        options: of tracks that another program has written, see `TrackOptions`.
 
     Returns:
         The runs with omega_yr_rad_s, R_yr_cm, theta_deg, v_cm_s and their errors, and the fits.
@@ -115,8 +119,11 @@ def measure_tracks(
             a number, or all are far from what the robot does.
     """
     samples, where = (
-        (tracks, "the tracks") if isinstance(tracks, pd.DataFrame) else (read_table(tracks), str(tracks))
+        (tracks, "the tracks")
+        if isinstance(tracks, pd.DataFrame)
+        else (read_tracks(tracks, **options), str(tracks))
     )
+    lost = samples.attrs.get("lost", [])
     table, place = (runs, "the runs") if isinstance(runs, pd.DataFrame) else (read_table(runs), str(runs))
     samples, converted = convert_columns(samples, COLUMNS, where, _SYNONYMS)
     table, renamed = convert_columns(table, RUN, place, RUN_SYNONYMS)
@@ -124,7 +131,7 @@ def measure_tracks(
         _check_runs(table)
     with naming(tracks):
         measured = _measured(samples, table, y_down, robot)
-    return measured._replace(converted=(*converted, *renamed))
+    return measured._replace(excluded=[*lost, *measured.excluded], converted=(*converted, *renamed))
 
 
 def _check_runs(table: pd.DataFrame) -> None:

@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import pandas as pd
@@ -26,8 +26,9 @@ from planner.planning.request import PlanRequest
 from planner.tracking.rest import place_reached, rest_of
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.io.pose_tracks import read_tracks
 from sim.io.quantities import convert_columns, numbers_of
-from sim.io.tables import read_table
+from sim.io.track_options import TrackOptions
 from sim.io.units import format_length
 from sim.mechanics import planar
 
@@ -140,9 +141,16 @@ def replan_from(plan: Plan, track: pd.DataFrame) -> Plan:
     return to_goal((x, y, math.remainder(heading, math.tau)), plan.ends_at, plan.tracked, request, left)
 
 
-def read_track(track: pd.DataFrame | str | Path) -> pd.DataFrame:
-    """Read the table of a track from its file."""
-    return track if isinstance(track, pd.DataFrame) else read_table(track)
+def read_track(track: pd.DataFrame | str | Path, **options: Unpack[TrackOptions]) -> pd.DataFrame:
+    """Read the table of a track from its file, see `sim.io.pose_tracks`.
+
+    Raises:
+        InputError: the file cannot be read, or has the tracks of several robots.
+    """
+    table = track if isinstance(track, pd.DataFrame) else read_tracks(track, **options)
+    if options and len(runs := table["run"].unique()) > 1:
+        raise InputError(f"there are {len(runs)} tracks, of {runs[0]}, {runs[1]} …; give that of one robot")
+    return table
 
 
 def poses_of(track: pd.DataFrame, robot: Mapping[str, Any], *, running: bool = False) -> tuple[Floats, Floats]:

@@ -35,7 +35,9 @@ from planner.vehicle.calibration_table import read_knowledge
 from planner.vehicle.from_table import default_table
 from sim.inputs import check_columns, load_robot
 from sim.io.errors import InputError, naming
+from sim.io.pose_tracks import read_tracks
 from sim.io.tables import read_table
+from sim.io.track_options import Source
 from sim.model.robot_toml import robot_toml
 from sim.model.schedule import load_schedule
 from surrogate.robot_table import load_robot_table
@@ -72,6 +74,7 @@ from tests.oracles.example_files import (
     verdict,
 )
 from tests.oracles.mutations import changed_content, mutated
+from tests.sim.io import tracked_files
 
 
 @dataclass(frozen=True)
@@ -210,6 +213,18 @@ def _measure(path: Path) -> None:
         assert name not in table or not np.isinf(table[name]).any(), "a result is infinite"
 
 
+def _read_tracks(source: Source, options: dict[str, Any], path: Path) -> None:
+    table = read_tracks(path, written_by=source, **options)
+    _finite(table.drop(columns="run"))
+
+
+def _tracked(name: str, source: Source, content: Callable[[], bytes], **options: Any) -> FileFormat:
+    """Say how a file of another program is made and read."""
+    return FileFormat(
+        file(name, content), partial(_read_tracks, source, options), () if name.endswith("npy") else TABLE
+    )
+
+
 def _read_verdict(path: Path) -> None:
     explanations, sessions = read_explanations(path)
     for explanation in explanations:
@@ -264,5 +279,14 @@ FORMATS: dict[str, FileFormat] = {
     "runs of camera tracks": FileFormat(
         file("runs.csv", lambda: text(NOTED), tracks_csv=lambda: text(samples())), _measure, TABLE
     ),
+    "DeepLabCut": _tracked("a.csv", "deeplabcut", tracked_files.deeplabcut, scale="0.5mm", fps=25.0),
+    "SLEAP": _tracked("a.csv", "sleap", tracked_files.sleap, scale="0.5mm", fps=25.0),
+    "TrackMate": _tracked("a.csv", "trackmate", tracked_files.trackmate, scale="1mm", front="0", rear="1"),
+    "TrackMate, XML": _tracked(
+        "a.xml", "trackmate", tracked_files.trackmate_xml, scale="1mm", fps=25.0, front="0", rear="1"
+    ),
+    "Tracker": _tracked("a.txt", "tracker", tracked_files.tracker, scale="1cm"),
+    "idtracker.ai": _tracked("a.npy", "idtrackerai", tracked_files.idtrackerai, scale="1mm", front="1", rear="2"),
+    "Motive": _tracked("a.csv", "motive", tracked_files.motive),
     "verdict": FileFormat(file("verdict.json", lambda: json.dumps(verdict()).encode()), _read_verdict, JSON),
 }  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -65,6 +66,28 @@ def test_tracks_in_other_units_are_converted() -> None:
     ]  # fmt: skip
     with pytest.raises(InputError, match="column 'x' has no unit; name it one of x_m, x_cm"):
         measure_tracks(given.rename(columns={"x_cm": "x"}), RUNS)
+
+
+def test_a_folder_of_another_program_s_files_has_a_run_for_each(tmp_path: Path) -> None:
+    """In pixels of 0.1 cm, y downwards; the table of runs names the files."""
+    for run, seed in enumerate((0, 1), 1):
+        given = track(seed)
+        x, y, heading = given["x_cm"] * 10, -given["y_cm"] * 10, np.radians(given["heading_deg"])
+        forward, down = 20 * np.cos(heading), -20 * np.sin(heading)
+        table = pd.DataFrame({
+            "track": "", "frame_idx": range(len(given)), "instance.score": 1.0, "front.x": x + forward,
+            "front.y": y + down, "front.score": 0.9, "rear.x": x - forward, "rear.y": y - down, "rear.score": 0.9,
+        })  # fmt: skip
+        table.loc[[3, 9], "rear.x"] = np.nan
+        table.to_csv(tmp_path / f"swim-{run}.csv", index=False)
+    runs = TWO.assign(run=["swim-1", "swim-2"])
+    measured = measure_tracks(tmp_path, runs, written_by="sleap", scale="1mm", fps=5.0)
+    expected = measure_tracks(pd.concat([track(0), track(1).assign(run=2)]), TWO).table
+    for name in ("omega_yr_rad_s", "R_yr_cm", "theta_deg"):
+        assert measured.table[name].to_numpy() == pytest.approx(expected[name].to_numpy(), rel=2e-3)
+    assert [line.rpartition("/")[2] for line in measured.excluded] == [
+        "swim-1.csv: 2 of 300 poses are lost", "swim-2.csv: 2 of 300 poses are lost"
+    ]  # fmt: skip
 
 
 ROBOT = load_robot("paper-measured")

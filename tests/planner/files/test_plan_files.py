@@ -14,6 +14,8 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
+from planner.__main__ import main
+from planner.api import check
 from planner.files.headers import milliseconds
 from planner.files.plan_files import write_plan
 from planner.files.plan_svg import SvgAxes
@@ -23,6 +25,7 @@ from sim.io.errors import InputError
 from sim.model.schedule import load_schedule
 from tests.planner.compiled import compile_c
 from tests.planner.plans import CONTROL, planned
+from tests.sim.io.tracked_files import two_robots
 
 
 def test_files_of_a_plan(tmp_path: Path) -> None:
@@ -186,6 +189,41 @@ def test_a_track_of_a_camera_has_the_error_of_the_same_track_in_tail_lengths() -
         assert getattr(error, name) == pytest.approx(getattr(expected, name), rel=1e-9)
     assert error.largest * CONTROL.tail_length < 0.0035
     assert f"{1000 * error.rms * CONTROL.tail_length:.3g} mm ({error.rms:.3g} l) rms" in error.line
+
+
+def test_a_track_of_another_program_has_the_error_of_the_same_track(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Pixels of 0.5 mm, the plan's 0, 0 at (900, 700) of the picture, one frame lost."""
+    record, track = tracks()
+    json_file, file = tmp_path / "plan.json", tmp_path / "swimDLC_resnet50.csv"
+    json_file.write_text(json.dumps(record))
+    frames = np.round(25 * CONTROL.time_scale * track["time_bar"]).astype(int)
+    pixels = CONTROL.tail_length / 0.0005
+    lines = ["scorer" + 6 * ",DLC", "bodyparts,tip,tip,tip,disc,disc,disc", "coords,x,y,likelihood,x,y,likelihood"]
+    for frame, x, y, heading in zip(frames, track.x_over_l, track.y_over_l, track.heading_rad, strict=True):
+        dots = [(x * pixels + d * np.cos(heading), y * pixels + d * np.sin(heading)) for d in (30, -30)]
+        lines.append(f"{frame}" + "".join(f",{900 + u},{700 - v},0.99" for u, v in dots))
+    lines.append(f"{frames.iloc[-1] + 1},0,0,0.1,0,0,0.1")
+    file.write_text("\n".join(lines))
+    words = ["--from", "deeplabcut", "--front", "tip", "--rear", "disc", "--scale", "0.5mm", "--fps", "25"]
+    main(["check", str(json_file), str(file), *words, "--origin", "900", "700"])
+    told = capsys.readouterr()
+    assert told.err == f"{file}: 1 of {len(track) + 1} poses are lost\n"
+    with pytest.warns(UserWarning, match="1 of .* poses are lost"):
+        error = check(json_file, file, written_by="deeplabcut", front="tip", rear="disc", scale="0.5mm", fps=25.0,
+                      origin=(900.0, 700.0))  # fmt: skip
+    assert told.out == f"{error.line}\n"
+    assert error.rms == pytest.approx(tracking_error(record, track).rms, rel=0.01)
+    file.write_text(file.read_text().replace("bodyparts", "individuals" + 3 * ",a" + 3 * ",b" + "\nbodyparts"))
+    with pytest.raises(InputError, match="has no point 'front' but tip, disc"):
+        check(json_file, file, written_by="deeplabcut", scale="0.5mm", fps=25.0)
+
+
+def test_the_tracks_of_several_robots_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "swim.csv").write_bytes(two_robots())
+    with pytest.raises(InputError, match="there are 2 tracks, of swim one, swim two …; give that of one robot"):
+        check(tracks()[0], tmp_path / "swim.csv", written_by="deeplabcut", scale="0.5mm", fps=25.0)
 
 
 def test_the_track_of_another_robot_or_plan_is_refused() -> None:

@@ -1,0 +1,152 @@
+"""Tracks as tables of poses, also of what other programs have tracked: run, time_s, x_cm, y_cm, heading_deg.
+
+A pose needs two points on the axis of the robot, equally far before and behind the head's centre:
+
+    (x, y) = (front + rear) / 2,   heading = atan2(y_front - y_rear, x_front - x_rear)
+
+Only a rigid body of Motive has a heading of its own. The y axis of pictures points down and is reversed. Where a
+program is not sure of a point (`Program.likely`), the pose is lost.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from pathlib import Path
+from typing import Unpack
+
+import numpy as np
+import pandas as pd
+
+from sim.io.errors import InputError
+from sim.io.reading import read_bytes
+from sim.io.tables import read_table
+from sim.io.track_options import TrackOptions
+from sim.io.tracking_programs import PROGRAMS, Program, Seen
+from sim.io.units import find_unit
+
+_LISTED = 8  # names in a message
+_SIGNS = {  # how a file begins -> what may have written it
+    "scorer,": "deeplabcut",
+    "track,frame_idx,": "sleap",
+    "LABEL,ID,TRACK_ID,": "trackmate",
+    "<": "trackmate",
+    "#multi:": "tracker",
+    "multi:": "tracker",
+    "seconds,x1,y1": "idtrackerai",
+    "\x93NUMPY": "idtrackerai",
+    "\x89HDF": "deeplabcut, sleap or idtrackerai",
+    "Format Version,": "motive",
+}
+
+
+def read_tracks(path: str | Path, **options: Unpack[TrackOptions]) -> pd.DataFrame:
+    """Read tracks that the program `written_by` has written; without it a table, which is returned as it is.
+
+    A run is named as its file, without what DeepLabCut adds from "DLC" on. Where a file has several robots, each
+    is a run, with its name behind that of the file. `attrs["lost"]` says how many poses are lost.
+
+    Raises:
+        InputError: the file is not as the program writes it, or an option is missing, or has no meaning for it.
+    """
+    path, source = Path(path), options.get("written_by")
+    if source is None:
+        if options:
+            raise InputError(f"--{min(options)} is for tracks of another program; say which with --from")
+        start = read_bytes(path)[:80].decode("latin-1") if path.is_file() else ""
+        if sign := next(filter(start.removeprefix("ï»¿").startswith, _SIGNS), None):
+            raise InputError(f"{path} is no table of poses; say what wrote it: --from {_SIGNS[sign]}")
+        return read_table(path)
+    if source not in PROGRAMS:
+        raise InputError(f"no program {source!r}; there are {', '.join(PROGRAMS)}")
+    program, runs = PROGRAMS[source], []
+    for file in _films(path, program) if path.is_dir() else [path]:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # pandas' of columns of mixed types
+                seen = program.read(file)
+        except InputError:
+            raise
+        except Exception as broken:  # a damaged file can raise any error from within the parsers
+            reason = (str(broken).splitlines() or ["it ends early"])[0]
+            reason = f"it has no {reason}" if isinstance(broken, KeyError) else reason
+            raise InputError(f"{file} is not as {program.title} writes it ({reason})") from None
+        runs.append(_poses(seen, file, program, options))
+    table = pd.concat(runs, ignore_index=True)
+    table.attrs["lost"] = [line for run in runs for line in run.attrs["lost"]]
+    return table
+
+
+def _films(folder: Path, program: Program) -> list[Path]:
+    """List a folder's files of a program, one for each film."""
+    films: dict[str, Path] = {}
+    for ending in program.endings:
+        for file in sorted(folder.glob(f"*{ending}")):
+            films.setdefault(file.stem, file)
+    if not films:
+        raise InputError(f"{folder} has no files of {program.title}: {', '.join(program.endings)}")
+    return list(films.values())
+
+
+def _poses(seen: Seen, path: Path, program: Program, options: TrackOptions) -> pd.DataFrame:
+    """Make poses of the points of a file."""
+    points, own_metres, own_seconds = seen
+    fps, scale = options.get("fps"), options.get("scale")
+    for name, given, own in (("fps", fps, own_seconds), ("scale", scale, own_metres)):
+        if given is not None and own is not None:
+            raise InputError(f"{path} has its own units; leave out --{name}")
+    if own_seconds is None and not (fps and 0 < fps < math.inf):
+        raise InputError(f"{path} counts frames; give the frames per second of its film, such as --fps 30")
+    seconds = own_seconds or 1 / (fps or 1.0)
+    metres = own_metres or _length(path, scale)
+    points.loc[points["sure"] < program.likely, ["x", "y"]] = math.nan
+    if "heading" in points and not {"front", "rear"} & set(options):
+        poses = points[points["robot"] != ""]
+    else:
+        front = _rows(points, path, options.get("front", "front"))
+        rear = _rows(points, path, options.get("rear", "rear"))
+        poses = front.merge(rear, on=["robot", "time"], how="outer", suffixes=("_front", "_rear"))
+        along, aside = (poses[f"{axis}_front"] - poses[f"{axis}_rear"] for axis in "xy")
+        poses["heading"] = np.arctan2(-aside if program.y_down else aside, along)
+        poses["x"], poses["y"] = poses["x_rear"] + along / 2, poses["y_rear"] + aside / 2
+    x, y = options.get("origin", (0.0, 0.0))
+    up, run = (-1 if program.y_down else 1), path.stem.partition("DLC")[0].rstrip("_-") or path.stem
+    several = len(poses["robot"].unique()) > 1
+    table = pd.DataFrame({
+        "run": run + " " + poses["robot"] if several else run,
+        "time_s": seconds * poses["time"],
+        "x_cm": 100 * metres * (poses["x"] - x),
+        "y_cm": 100 * metres * (poses["y"] - y) * up,
+        "heading_deg": np.degrees(poses["heading"]),
+    }).sort_values(["run", "time_s"], kind="stable")  # fmt: skip
+    known = np.isfinite(table.drop(columns="run").to_numpy()).all(axis=1)
+    lost = len(table) - int(known.sum())
+    if lost == len(table):
+        raise InputError(f"{path}: its two points are never both seen; name others with --front and --rear")
+    table = table.loc[known]
+    table.attrs["lost"] = [f"{path}: {lost} of {len(table) + lost} poses are lost"] if lost else []
+    return table
+
+
+def _length(path: Path, words: str | None) -> float:
+    """Read the length of a pixel, in metres."""
+    parts = re.fullmatch(r"\s*(\d*\.?\d+(?:e-?\d+)?)\s*([^\W\d]+)\s*", words or "")
+    unit = find_unit(parts[2]) if parts else None
+    if parts is None or unit is None or unit.kind != "length" or not 0 < float(parts[1]) < math.inf:
+        given = f"--scale {words}" if words else f"{path} has no unit of length"
+        raise InputError(f"{given}; give the length of a pixel, or of the file's unit, such as --scale 0.2mm")
+    return float(parts[1]) * unit.times / unit.over
+
+
+def _rows(points: pd.DataFrame, path: Path, name: str) -> pd.DataFrame:
+    """Return the rows of a point, one for each time."""
+    rows = points[points["point"] == name]
+    if rows.empty:
+        names = list(points["point"].unique())
+        listed = ", ".join(names[:_LISTED]) + (", …" if len(names) > _LISTED else "")
+        raise InputError(
+            f"{path} has no point {name!r} but {listed}; a heading needs two on the robot's axis: --front NAME "
+            "--rear NAME"
+        )
+    return rows.drop_duplicates(["robot", "time"])
