@@ -5,13 +5,14 @@
  * reversed motor makes the mirror image. Units: l, μ0 l⁴/EI, EI/l²; the gap is over 2 r0, the slip angle in
  * degrees. */
 import { CONSTANTS } from "./constants.js";
-import { inverse, solveDense } from "./math.js";
+import { dot, inverse, mean, solveDense } from "./math.js";
 
 const { SOFT, SMALL_DEFLECTION, SMALL_SURGE, TINY, THRUST, THRUST_SOFT, THRUST_POWER } = CONSTANTS.tails;
 const { TORQUE_SOFT, TORQUE_POWER } = CONSTANTS.tails;
 const { STEPS, CORRECTION, ACCEPTED, DIFFERENCE, MIN_SHARE, FIRST_SPIN, MAX_TURN } = CONSTANTS.balance;
 const { MIN_SURGE } = CONSTANTS.tails;
-/* Prepare a network {shift, scale, mean, spread, members} from the arrays of a model file. */
+
+/* Prepare a network {shift, scale, middle, spread, members} from the arrays of a model file. */
 function networkOf({ shape, state }) {
   const parts = (name, k) => {
     const { values } = state[name], size = values.length / shape.members;
@@ -22,26 +23,21 @@ function networkOf({ shape, state }) {
     biases: Array.from({ length: shape.depth + 1 }, (_, layer) => parts(`biases.${layer}`, k)),
     bypass: parts("bypass", k),
   }));
-  const [shift, scale, mean, spread] = ["shift", "scale", "mean", "spread"].map((name) => state[name].values);
-  return { shift, scale, mean, spread, members };
+  const [shift, scale, middle, spread] = ["shift", "scale", "mean", "spread"].map((name) => state[name].values);
+  return { shift, scale, middle, spread, members };
 }
 
 /* The mean of the members, as an array of the outputs. */
 function evaluate(network, inputs) {
-  const first = scaledInputs(network, inputs), { mean, spread, members } = network;
-  const total = new Float64Array(mean.length);
-  for (const member of members) perceptron(member, first).forEach((value, j) => (total[j] += value));
-  return total.map((value, j) => (value / members.length) * spread[j] + mean[j]);
+  const members = membersAt(network, inputs);
+  return members[0].map((_, j) => mean(members.map((outputs) => outputs[j])));
 }
 
 /* The outputs of every member. */
 function membersAt(network, inputs) {
-  const first = scaledInputs(network, inputs), { mean, spread, members } = network;
-  return members.map((member) => perceptron(member, first).map((value, j) => value * spread[j] + mean[j]));
-}
-
-function scaledInputs({ shift, scale }, inputs) {
-  return Float64Array.from(shift, (middle, i) => (inputs[i] - middle) / scale[i]);
+  const { shift, scale, middle, spread, members } = network;
+  const first = Float64Array.from(shift, (value, i) => (inputs[i] - value) / scale[i]);
+  return members.map((member) => perceptron(member, first).map((value, j) => value * spread[j] + middle[j]));
 }
 
 function perceptron({ weights, biases, bypass }, first) {
@@ -211,18 +207,14 @@ function motionSensitivity(head, tails, motion) {
 }
 
 /* The motion with torque and thrust of linear theory and the side forces of straight tails. */
-function firstGuess({ speed, gain, resistance }, { perp, parallel, offset, number }) {
+function firstGuess({ speed, gain, resistance }, tails) {
+  const { perp, parallel, offset, number } = tails, straight = straightResistance(tails);
   let spin = FIRST_SPIN * speed;
   for (let i = 0; i < 3; i++) {
     const torque = number * perp * offset ** 2 * linearTorque(perp * spin);
     spin = (speed * resistance[3][3]) / (resistance[3][3] + gain * (torque + resistance[3][4]));
   }
-  const headSpin = (spin - speed) / gain, matrix = [0, 1, 2].map((i) => resistance[i].slice(0, 3));
-  matrix[0][0] += number * perp;
-  matrix[1][1] += number * parallel;
-  matrix[2][2] += (number * perp) / 3;
-  matrix[0][2] -= (number * perp) / 2;
-  matrix[2][0] -= (number * perp) / 2;
+  const headSpin = (spin - speed) / gain, matrix = straight.map((row, i) => row.map((entry, j) => entry + resistance[i][j]));
   const push = [0, 1, 2].map((i) => [-resistance[i][3] * headSpin - resistance[i][4] * spin]);
   push[1][0] += number * (perp - parallel) * spin * offset ** 2 * linearThrust(perp * spin);
   solveDense(matrix, push);
@@ -235,7 +227,7 @@ function unbalanced(resistance, tails, motion, y) {
     side + force * y[0], along + thrust * (y[1] + squared * y[4]), turn + force * y[2],
     torque * (y[3] + squared * y[5]),
   ];
-  return wrench.map((part, i) => resistance[i].reduce((left, entry, j) => left - entry * motion[j], part));
+  return wrench.map((part, i) => part - dot(resistance[i], motion));
 }
 
 /* Solve for the motion; converged: it was found. */
@@ -247,7 +239,7 @@ function solveBalance(network, head, tails) {
   const inverseSlope = inverse(firstSlope(head, tails, motion, residual, y));
   let size = Infinity;
   for (let count = 0; count < STEPS; count++) {
-    const step = inverseSlope.map((row) => row.reduce((sum, entry, j) => sum - entry * residual[j], 0));
+    const step = inverseSlope.map((row) => -dot(row, residual));
     const turned = Math.abs(gain * step[3]) / motion[4], share = turned > MAX_TURN ? MAX_TURN / turned : 1;
     for (let i = 0; i < 4; i++) {
       step[i] *= share;
@@ -287,18 +279,10 @@ function correction(step, motion) {
 
 /* Update the inverse of the derivative after a step that changed the balance so (Broyden's good update). */
 function update(inverseSlope, step, change) {
-  const predicted = [0, 0, 0, 0], along = [0, 0, 0, 0];
-  for (let i = 0; i < 4; i++) {
-    for (let j = 0; j < 4; j++) {
-      predicted[i] += inverseSlope[i][j] * change[j];
-      along[j] += step[i] * inverseSlope[i][j];
-    }
-  }
-  const size = along.reduce((sum, part, i) => sum + part * change[i], 0);
+  const predicted = inverseSlope.map((row) => dot(row, change)), size = dot(step, predicted);
+  const along = step.map((_, j) => dot(step, inverseSlope.map((row) => row[j])));
   if (size === 0) return;
-  for (let i = 0; i < 4; i++) {
-    for (let j = 0; j < 4; j++) inverseSlope[i][j] += ((step[i] - predicted[i]) * along[j]) / size;
-  }
+  inverseSlope.forEach((row, i) => along.forEach((part, j) => (row[j] += ((step[i] - predicted[i]) * part) / size)));
 }
 
 export { networkOf, evaluate, membersAt, tailInputs, networkInputs, wrenchSlopes, headAndTails, networkIndex };

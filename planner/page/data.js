@@ -1,7 +1,8 @@
-/* The numbers of a look-up table or of a vehicle, as Python has written them into the page (table_data.py has the
+/* Texts of files, and the numbers of a look-up table or of a vehicle, as Python has written them into the page (table_data.py has the
  * format).
  *
  * A tensor becomes {shape, values}, with all values in one Float64Array, the last axis fastest. */
+import { InputError } from "./words.js";
 
 const LETTERS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%:()*+-;,=.?@^_/{|}~";
 
@@ -13,6 +14,15 @@ async function readData({ numbers, ...plain }, flat = false) {
     for (let i = 0; i < count; i++) bytes[8 * i + place] = byPlace[place * count + i];
   }
   return withTensors(plain, new Float64Array(bytes.buffer), flat);
+}
+
+/* The text of a file, which must be text. */
+function textOf(bytes, name) {
+  try {
+    return new TextDecoder("utf-8", { fatal: true }).decode(bytes);
+  } catch {
+    throw new InputError(`${name} is no text in UTF-8`);
+  }
 }
 
 /* What `packed_bytes` has written, as the body of a response. */
@@ -44,4 +54,4 @@ function withTensors(part, numbers, flat) {
   return Object.fromEntries(Object.entries(part).map(([name, value]) => [name, withTensors(value, numbers, flat)]));
 }
 
-export { inflated, readData };
+export { inflated, readData, textOf };

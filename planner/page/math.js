@@ -31,6 +31,13 @@ function mean(values) {
   return sum(values) / values.length;
 }
 
+/* The sum of products. */
+function dot(one, other) {
+  let total = 0;
+  for (let i = 0; i < one.length; i++) total += one[i] * other[i];
+  return total;
+}
+
 /* The largest value; −∞ of none, NaN if there is one. */
 function largest(values) {
   let most = -Infinity;
@@ -128,11 +135,8 @@ function unwrap(angles) {
 
 /* Sums of products with a symmetric kernel wherever it lies fully within the values. */
 function convolved(values, kernel) {
-  return Float64Array.from({ length: values.length - kernel.length + 1 }, (_, i) => {
-    let total = 0;
-    for (let k = 0; k < kernel.length; k++) total += values[i + k] * kernel[k];
-    return total;
-  });
+  const count = values.length - kernel.length + 1;
+  return Float64Array.from({ length: count }, (_, i) => dot(kernel, values.subarray(i)));
 }
 
 /* The pose reached by `then`, given in the frame of `first`. */
@@ -219,6 +223,6 @@ function splineMatrix(knots, places, flatEnd = false) {
   });
 }
 
-export { TAU, MIRROR, mod, halfTurn, clip, sum, mean, largest, smallest, largestSize, median, quantile, runningSum };
-export { differences, linspace, geomspace, column, bounds, placeBelow, interp, unwrap, convolved, compose };
+export { TAU, MIRROR, mod, halfTurn, clip, sum, mean, dot, largest, smallest, largestSize, median, quantile };
+export { runningSum, differences, linspace, geomspace, column, bounds, placeBelow, interp, unwrap, convolved, compose };
 export { inversePose, arc, solveDense, inverse, splineMatrix };

@@ -195,40 +195,21 @@ function missingColumns({ names, outputs }) {
 
 /* Runs that are still needed; the more, the further from the rules. */
 function neededRuns({ columns, usable, repeats, sessions }) {
-  const needed = [], column = (name) => usable.map((row) => columns[name][row]);
-  if (usable.length < FEWEST_RUNS) {
-    const more = FEWEST_RUNS - usable.length;
-    needed.push(`${more} more: the table has ${usable.length} usable runs, and a calibration needs ${FEWEST_RUNS}`);
-  }
-  const [tails, lengths, speeds] = INPUTS.map(column), sizes = speeds.map(Math.abs);
-  if (isOne(tails)) needed.push(`runs with another N: all have N = ${tails[0]}`);
-  if (isOne(lengths)) needed.push(`runs with another tail length: all have l = ${lengths[0]} cm`);
-  if (largest(sizes) - smallest(sizes) < SAME_SPEED * largest(sizes)) {
-    needed.push(`runs at another motor speed: all are at ${sizes[0]} rpm`);
-  }
-  const forward = speeds.some((speed) => speed > 0), backward = speeds.some((speed) => speed < 0);
-  if (!(forward && backward)) {
-    needed.push(`runs with the motor reversed: all have a ${forward ? "positive" : "negative"} omega_rpm`);
-  }
-  if (repeats < FEWEST_REPEATS) {
-    const more = FEWEST_REPEATS - repeats;
-    needed.push(
-      `${more} more repeated under equal conditions: the table has ${repeats}, and the noise is estimated from ` +
-        `${FEWEST_REPEATS}`,
-    );
-  }
-  if (sessions.length < FEWEST_SESSIONS) {
-    const more = FEWEST_SESSIONS - sessions.length, word = more === 1 ? "session" : "sessions";
-    needed.push(
-      `${more} more ${word}: the table has ${sessions.length}, and with fewer than ${FEWEST_SESSIONS} the ` +
-        "verdict is weaker",
-    );
-  }
-  return needed;
-}
-
-function isOne(values) {
-  return largest(values) === smallest(values);
+  const [tails, lengths, speeds] = INPUTS.map((name) => usable.map((row) => columns[name][row]));
+  const spread = (values) => largest(values) - smallest(values), sizes = speeds.map(Math.abs);
+  const more = (count, fewest, words, why) => [count < fewest, `${fewest - count} more${words}: the table has ${count}${why}`];
+  const isLast = sessions.length === FEWEST_SESSIONS - 1, sign = speeds[0] > 0 ? "positive" : "negative";
+  const needed = [
+    more(usable.length, FEWEST_RUNS, "", ` usable runs, and a calibration needs ${FEWEST_RUNS}`),
+    [spread(tails) === 0, `runs with another N: all have N = ${tails[0]}`],
+    [spread(lengths) === 0, `runs with another tail length: all have l = ${lengths[0]} cm`],
+    [spread(sizes) < SAME_SPEED * largest(sizes), `runs at another motor speed: all are at ${sizes[0]} rpm`],
+    [spread(speeds.map(Math.sign)) === 0, `runs with the motor reversed: all have a ${sign} omega_rpm`],
+    more(repeats, FEWEST_REPEATS, " repeated under equal conditions", `, and the noise is estimated from ${FEWEST_REPEATS}`),
+    more(sessions.length, FEWEST_SESSIONS, isLast ? " session" : " sessions",
+      `, and with fewer than ${FEWEST_SESSIONS} the verdict is weaker`),
+  ];
+  return needed.flatMap(([isLacking, words]) => (isLacking ? [words] : []));
 }
 
 const FARTHEST = 1e6; // l, of a place; time units, of a time

@@ -4,6 +4,7 @@
  * the numbers have no unit. A track is {kind: "track", table}, a table of runs {kind: "runs", table}, a robot {kind:
  * "robot", fields}. */
 import { CONSTANTS } from "./constants.js";
+import { textOf } from "./data.js";
 import { readRobot } from "./robot.js";
 import { areOfRuns } from "./measured.js";
 import { checkPlanId } from "./seals.js";
@@ -76,15 +77,6 @@ function pathOfPlan(text, name, stem) {
   }
   const points = closed ? path.slice(0, -1) : path;
   return { kind: "path", unit: 100 * robot.tail_length_m, paths: [{ points, closed, name: stem }] };
-}
-
-/* The text of a file, which must be text. */
-function textOf(bytes, name) {
-  try {
-    return new TextDecoder("utf-8", { fatal: true }).decode(bytes);
-  } catch {
-    throw new InputError(`${name} is no text in UTF-8`);
-  }
 }
 
 export { openFile };

@@ -7,7 +7,7 @@ import { evaluate, headAndTails, membersAt, motionSensitivity, networkIndex, net
 import { networkOf, solveBalance, steadyOutputs, tailInputs, wrenchSlopes } from "./balance.js";
 import { CONSTANTS } from "./constants.js";
 import { readData } from "./data.js";
-import { clip } from "./math.js";
+import { clip, dot, mean } from "./math.js";
 import { BEFORE, CURVE } from "./vehicle.js";
 import { InputError } from "./words.js";
 
@@ -119,12 +119,11 @@ function tableErrorModes({ curveErrors, intervals, ...table }, robot) {
 function widthFeatures(table, { head, tails, motion, inputs, own }) {
   const kind = networkIndex(tails.number), members = membersAt(table.wrench[kind], own);
   const sensitivity = motionSensitivity(head, tails, motion), slopes = wrenchSlopes(tails, motion);
-  const product = (row, column) => row.reduce((total, entry, i) => total + entry * column[i], 0);
-  const middle = slopes[0].map((_, i) => members.reduce((total, y) => total + y[i], 0) / members.length);
-  const spread = members.reduce((total, y) => {
-    const wrench = slopes.map((row) => product(row, y.map((value, i) => value - middle[i])));
-    return total + Math.hypot(...sensitivity.map((row) => product(row, wrench))) / members.length;
-  }, 0);
+  const middle = slopes[0].map((_, i) => mean(members.map((y) => y[i])));
+  const spread = mean(members.map((y) => {
+    const wrench = slopes.map((row) => dot(row, y.map((value, i) => value - middle[i])));
+    return Math.hypot(...sensitivity.map((row) => dot(row, wrench)));
+  }));
   const away = novelty(table.support[kind], own);
   const more = [Math.log(away + 1e-12), Math.log(spread + 1e-9), Math.log(tails.number), kind === 0 ? 1 : 0];
   return [...inputs, ...more].map((value) => (Number.isNaN(value) ? 0 : value));
@@ -144,8 +143,7 @@ function halfWidth({ shift, scale, weights, bounds, middle, factor }, name, feat
   const octant = HALVED.reduce((place, f, k) => place + (features[f] > middle.values[k] ? 2 ** k : 0), 0);
   const x = features.map((value, i) => clip((value - shift.values[i]) / scale.values[i], -5, 5)), terms = [1, ...x];
   x.forEach((value, i) => terms.push(...x.slice(i).map((other) => value * other)));
-  const log = terms.reduce((total, term, i) => total + term * weights[name].values[i], 0);
-  const local = Math.exp(clip(log, bounds[name][0], bounds[name][1]));
+  const local = Math.exp(clip(dot(terms, weights[name].values), bounds[name][0], bounds[name][1]));
   return factor[name].values[single ? 2 ** HALVED.length : octant] * local * size;
 }
 

@@ -13,7 +13,7 @@
  * left and heading. Switches are {firstDirection ±1, dwells, poses}: dwell times, and poses [x, y, heading] of the
  * head's centre at the flips and the end. Lengths in l, times in μ0 l⁴/EI, angles in rad. */
 import { CONSTANTS } from "./constants.js";
-import { arc, clip, column, compose, geomspace, interp, largest, largestSize, mean, placeBelow } from "./math.js";
+import { arc, clip, column, compose, dot, geomspace, interp, largest, largestSize, mean, placeBelow } from "./math.js";
 import { splineMatrix } from "./math.js";
 import { InputError, general, quoted } from "./words.js";
 
@@ -124,18 +124,8 @@ function trackedPoint(robot, { vehicle, unmeasured, calibrated, ownTable }, poin
 
 /* Resample a flat curve over DWELLS at TIMES. Below the shortest dwell it is a straight line to zero. */
 function resampled(curve) {
-  return product(RESAMPLE, [0, 1, 2].map((axis) => curve.filter((_, at) => at % 3 === axis)));
-}
-
-/* The flat table of a matrix times columns. */
-function product(matrix, columns) {
-  const table = new Float64Array(matrix.length * columns.length);
-  matrix.forEach((row, i) => columns.forEach((values, k) => {
-    let total = 0;
-    for (let j = 0; j < row.length; j++) total += row[j] * values[j];
-    table[i * columns.length + k] = total;
-  }));
-  return table;
+  const columns = [0, 1, 2].map((axis) => curve.filter((_, at) => at % 3 === axis));
+  return Float64Array.from(RESAMPLE.flatMap((row) => columns.map((values) => dot(row, values))));
 }
 
 /* Lags after dwells of BEFORE_KNOTS, from flat curves of the lag and of the memory after dwells `before`. */

@@ -60,9 +60,8 @@ function digits(value, count = 3) {
 }
 
 function duration(seconds) {
-  if (seconds < 90) return `${digits(seconds)} s`;
-  if (seconds < 5400) return `${digits(seconds / 60)} min`;
-  return `${digits(seconds / 3600)} h`;
+  const [size, unit] = seconds < 90 ? [1, "s"] : seconds < 5400 ? [60, "min"] : [3600, "h"];
+  return `${digits(seconds / size)} ${unit}`;
 }
 
 /* Minutes and seconds of a clock: 3:07.5 */
@@ -84,24 +83,16 @@ function length(centimetres, tailLength, tails) {
 /* Write an SVG element with its styles as text. Colours are those of light paper. */
 function pictureText(svg, title, style) {
   const copy = svg.cloneNode(true);
-  const [width, height] = [svg.clientWidth, svg.clientHeight];
-  copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
-  copy.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  copy.setAttribute("viewBox", `0 0 ${svg.clientWidth} ${svg.clientHeight}`);
   for (const name of ["tabindex", "aria-labelledby", "aria-busy", "data-mode"]) copy.removeAttribute(name);
-  const rules = document.createElementNS("http://www.w3.org/2000/svg", "style");
-  rules.textContent = drawingRules(style);
-  const name = document.createElementNS("http://www.w3.org/2000/svg", "title");
-  name.textContent = title;
-  copy.prepend(name, rules);
+  copy.prepend(figure("title", {}, title), figure("style", {}, drawingRules(style)));
   return `<?xml version="1.0" encoding="UTF-8"?>\n${new XMLSerializer().serializeToString(copy)}\n`;
 }
 
 /* The rules of the page that concern lines and letters: those before the first condition. */
 function drawingRules(style) {
-  return (
-    style.slice(0, style.indexOf("@media")) +
-    style.slice(style.indexOf("svg text"), style.indexOf("/* end of lines */")).replace("0.75rem", "12px")
-  );
+  const lines = style.slice(style.indexOf("svg text"), style.indexOf("/* end of lines */"));
+  return style.slice(0, style.indexOf("@media")) + lines.replace("0.75rem", "12px");
 }
 
 export { byId, clock, degrees, describe, digits, duration, element, figure, length, pictureText, save, say };

@@ -1,5 +1,6 @@
 /* The one file that a user drops or chooses: what is wrong with it, a drawing as a tree of plain objects, and the
  * question for the unit of a path that does not say it, or for one of several paths. */
+import { textOf } from "../data.js";
 import { bounds } from "../math.js";
 import { InputError, refusing } from "../words.js";
 import { byId, digits, element, say } from "./dom.js";
@@ -12,21 +13,12 @@ async function oneFile(files) {
   if (files.length > 1) return { refusal: "Give one file at a time." };
   const [{ name, size }] = files;
   if (size > MOST_BYTES) {
-    const limit = `${MOST_BYTES / 1e6} MB`;
-    return { refusal: `${name} has ${Math.round(size / 1e6)} MB; the page reads up to ${limit}.` };
+    return { refusal: `${name} has ${Math.round(size / 1e6)} MB; the page reads up to ${MOST_BYTES / 1e6} MB.` };
   }
   const bytes = await files[0].arrayBuffer().catch(() => null); // null: of a folder, or of a file that is gone
   if (bytes === null) return { refusal: `${name} cannot be read; give a file.` };
   if (!/\.svg$/i.test(name)) return { name, bytes };
   return refusing(() => ({ name, tree: drawingTree(textOf(bytes, name), name) }), ({ message }) => ({ refusal: message }));
-}
-
-function textOf(bytes, name) {
-  try {
-    return new TextDecoder("utf-8", { fatal: true }).decode(bytes);
-  } catch {
-    throw new InputError(`${name} is no text in UTF-8`);
-  }
 }
 
 /* What is wrong with the last file or link, beside the part of the page that it is for; the next one takes it away. */
@@ -80,34 +72,24 @@ const UNITS = { mm: 0.1, cm: 1, m: 100, in: 2.54 };
 /* Ask; the promise resolves with {points [cm], closed, name}, or null if the user takes none. */
 function askUnit({ paths, unit }, tailLength) {
   if (unit !== null && paths.length === 1) return Promise.resolve(inUnit(paths[0], unit));
-  const dialog = byId("unit-dialog");
-  const scales = unit === null ? { ...UNITS, "tail lengths": tailLength } : { "as the file says": unit };
-  const choice = (group, value, words, checked) =>
-    element("label", { class: "choice" }, element("input", { type: "radio", name: group, value, checked }), words);
-  const size = (scale) => {
-    const [width, height] = bounds(paths[0].points).map(([low, high]) => digits((high - low) * scale));
-    return `${width} × ${height} cm`;
+  const dialog = byId("unit-dialog"), asks = unit === null;
+  const scales = asks ? { ...UNITS, "tail lengths": tailLength } : { "as the file says": unit };
+  const choice = (group, value, words, checked) => {
+    return element("label", { class: "choice" }, element("input", { type: "radio", name: group, value, checked }), words);
   };
-  const units = Object.entries(scales).map(([name, scale], i) =>
-    choice("unit", scale, `${name}: ${size(scale)}`, i === (unit === null ? 1 : 0)),
-  );
-  const names =
-    paths.length > 1 ? paths.map((path, i) => choice("path", i, path.name || `path ${i + 1}`, i === 0)) : [];
-  byId("unit-title").textContent = unit === null ? "Which unit has this file?" : "Which path of this file?";
-  byId("unit-words").textContent =
-    unit === null ? "The file does not say its unit. Width and height would be:" : "";
-  byId("unit-choices").replaceChildren(...units, ...names);
+  const units = Object.entries(scales).map(([name, scale], i) => {
+    const size = bounds(paths[0].points).map(([low, high]) => digits((high - low) * scale));
+    return choice("unit", scale, `${name}: ${size.join(" × ")} cm`, i === Number(asks));
+  });
+  const names = paths.map((path, i) => choice("path", i, path.name || `path ${i + 1}`, i === 0));
+  byId("unit-title").textContent = asks ? "Which unit has this file?" : "Which path of this file?";
+  byId("unit-words").textContent = asks ? "The file does not say its unit. Width and height would be:" : "";
+  byId("unit-choices").replaceChildren(...units, ...(paths.length > 1 ? names : []));
   dialog.showModal();
   return new Promise((resolve) => {
-    dialog.addEventListener(
-      "close",
-      () => {
-        const chosen = (name) => dialog.querySelector(`[name=${name}]:checked`)?.value;
-        const path = paths[Number(chosen("path") ?? 0)];
-        resolve(dialog.returnValue === "take" ? inUnit(path, Number(chosen("unit"))) : null);
-      },
-      { once: true },
-    );
+    const chosen = (name) => Number(dialog.querySelector(`[name=${name}]:checked`)?.value ?? 0);
+    const closed = () => resolve(dialog.returnValue === "take" ? inUnit(paths[chosen("path")], chosen("unit")) : null);
+    dialog.addEventListener("close", closed, { once: true });
   });
 }
 

@@ -3,7 +3,7 @@ import { inflated } from "../data.js";
 import { runningSum, sum } from "../math.js";
 import { inPage } from "../words.js";
 import { chart, marker, tradeOff } from "./charts.js";
-import { byId, element, pictureText, save, say } from "./dom.js";
+import { byId, pictureText, save, say } from "./dom.js";
 import { PathEditor, showCorners } from "./editor.js";
 import { askUnit, oneFile, Problem } from "./files.js";
 import { connect, RobotForm, showMotion, showResults, summary } from "./panels.js";
@@ -29,11 +29,7 @@ class Page {
     );
     this.view.editor = this.editor;
     this.player = new Player((pose, time) => this.played(pose, time));
-    this.form = new RobotForm(
-      data.limits,
-      (values, key) => this.setRobot(values, key),
-      () => this.history.settle(),
-    );
+    this.form = new RobotForm(data.limits, (values, key) => this.setRobot(values, key), () => this.history.settle());
     this.initial = this.firstState();
     this.plan = null;
     this.track = null;
@@ -69,12 +65,12 @@ class Page {
 
   firstState() {
     const { robot, shape, options } = this.data.first;
-    const values = labValues(this.robots.get(robot).fields);
-    const preset = this.data.shapes.find((candidate) => candidate.name === shape);
-    return { robot: { name: robot, values }, path: this.ofShape(preset), options };
+    return { robot: { name: robot, values: labValues(this.robots.get(robot).fields) }, path: this.ofShape(shape), options };
   }
 
-  ofShape({ name, points, closed, size }) {
+  /* The path of a shape that the page offers. */
+  ofShape(shape) {
+    const { name, points, closed, size } = this.data.shapes.find((candidate) => candidate.name === shape);
     return points ? { points, closed, name } : { shape: name, size };
   }
 
@@ -93,10 +89,8 @@ class Page {
     const { robot, path, options } = this.state;
     this.form.show(robot.values);
     byId("robot-name").value = this.robots.has(robot.name) ? robot.name : "";
-    byId("shape").value = path.points
-      ? this.data.shapes.some((shape) => shape.name === path.name) ? path.name : ""
-      : path.shape;
-    const shape = this.data.shapes.find((candidate) => candidate.name === path.shape);
+    const shape = this.data.shapes.find(({ name }) => name === path.shape);
+    byId("shape").value = path.shape ?? this.data.shapes.find(({ name }) => name === path.name)?.name ?? "";
     byId("size").disabled = !shape;
     byId("size-words").textContent = shape?.sizeWords ?? "Size";
     if (byId("size") !== document.activeElement) byId("size").value = path.size ?? "";
@@ -138,16 +132,14 @@ class Page {
     this.editor.take(answer.answer.corners);
     this.hint();
     byId("close").textContent = this.drawn.closed ? "Part the ends" : "Join the ends";
-    showCorners(byId("corner-table"), this.editor.path.points, (points) =>
-      this.setPoints(points, this.drawn.closed),
-    );
+    const changed = (points) => this.setPoints(points, this.drawn.closed);
+    showCorners(byId("corner-table"), this.editor.path.points, changed);
     this.show();
   }
 
   /* Mark whether a plan or an answer is on its way, for screen readers and for programs that wait. */
   mark() {
-    const busy =
-      this.questions > 0 || this.timer !== null || this.client.wish !== null || this.client.planning !== null;
+    const busy = this.questions > 0 || this.timer !== null || this.client.wish !== null || this.client.planning !== null;
     document.body.dataset.busy = busy ? "1" : "0";
     byId("view").setAttribute("aria-busy", String(busy));
   }
@@ -242,16 +234,12 @@ class Page {
   played(pose, time) {
     this.view.playing = this.player.running;
     this.view.showRobot(this.plan.body, pose);
-    if (this.scale) marker(byId("strip"), this.scale(time));
+    if (this.scale) marker(byId("strip"), this.scale.x(time));
   }
 
   setRobot(values, key) {
-    const known = this.robots.get(this.state.robot.name);
-    const name = known ? `${this.state.robot.name}-changed` : this.state.robot.name;
-    this.change(
-      { robot: { name: this.state.robot.name.endsWith("-changed") ? this.state.robot.name : name, values } },
-      `robot ${key}`,
-    );
+    const { name } = this.state.robot, isNew = this.robots.has(name) && !name.endsWith("-changed");
+    this.change({ robot: { name: isNew ? `${name}-changed` : name, values } }, `robot ${key}`);
   }
 
   /* Take points; those drawn here are put on the grid, those of a file are not. */
@@ -276,16 +264,13 @@ class Page {
   }
 
   async tradeOff() {
-    byId("trade-off").replaceChildren(element("p", { class: "soft" }, "Planning with ten dwells…"));
-    const answer = await this.client.ask("tradeOff", this.wish());
-    if (answer.stopped) return;
-    if (answer.refusal) say(byId("trade-off").firstChild, answer.refusal, true);
-    else
-      byId("trade-off").replaceChildren(
-        tradeOff(answer.answer, this.state.options.minimumSeconds, (dwell) =>
-          this.setOption("minimumSeconds", dwell),
-        ),
-      );
+    byId("trade-off").replaceChildren();
+    say(byId("trade-words"), "Planning with ten dwells…");
+    const { answer, refusal, stopped } = await this.client.ask("tradeOff", this.wish());
+    if (stopped) return;
+    say(byId("trade-words"), refusal ?? "", true);
+    const take = (dwell) => this.setOption("minimumSeconds", dwell);
+    if (answer) tradeOff(byId("trade-off"), answer, this.state.options.minimumSeconds, take);
   }
 
   setOption(key, value) {
@@ -294,10 +279,8 @@ class Page {
 
   async saveFile(name) {
     if (name === "plan.svg") {
-      save(
-        name, pictureText(byId("view"), document.title, document.querySelector("style").textContent),
-        "image/svg+xml",
-      );
+      const style = document.querySelector("style").textContent;
+      save(name, pictureText(byId("view"), document.title, style), "image/svg+xml");
       return;
     }
     const answer = await this.client.ask("file", { name, wish: this.wish() });

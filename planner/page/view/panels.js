@@ -174,7 +174,7 @@ function connectFields(page) {
     },
     shape: ({ target: { value } }) => {
       page.view.moved = false;
-      page.change({ path: page.ofShape(page.data.shapes.find((shape) => shape.name === value)) });
+      page.change({ path: page.ofShape(value) });
     },
     size: () => page.history.settle(),
     snap: ({ target }) => (page.editor.snaps = target.checked),

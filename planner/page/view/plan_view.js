@@ -19,18 +19,11 @@ class PlanView {
     this.pose = null;
     this.follows = null; // the place [cm] that the lens shows
     this.moved = false; // whether the user has chosen the viewport
-    this.grid = figure("g");
-    this.scene = figure("g");
     this.layers = figure("g", { id: "scene" });
-    this.flips = figure("g");
-    this.robot = figure("g");
-    this.axes = figure("g");
-    this.overlay = figure("g");
-    this.scene.append(this.layers, this.flips, this.robot);
+    for (const name of ["grid", "flips", "robot", "axes", "overlay", "lensFlips"]) this[name] = figure("g");
+    this.scene = figure("g", {}, this.layers, this.flips, this.robot);
     this.svg.append(this.grid, this.scene, this.axes, this.overlay);
-    this.lensFlips = figure("g");
-    this.lensScene = figure("g");
-    this.lensScene.append(figure("use", { href: "#scene" }), this.lensFlips);
+    this.lensScene = figure("g", {}, figure("use", { href: "#scene" }), this.lensFlips);
     this.lensMark = figure("path", { class: "mark" });
     this.lensWords = figure("text", { "text-anchor": "middle" });
     this.lens.append(this.lensScene, this.lensMark, this.lensWords);
@@ -94,9 +87,7 @@ class PlanView {
     this.lens.style.display = plan ? "" : "none";
     if (!plan) return;
     this.lens.setAttribute("class", this.lensPlace);
-    const [x, y] = this.follows ?? plan.start;
-    const size = this.lens.clientWidth || 200;
-    const scale = LENS * this.view.scale;
+    const [x, y] = this.follows ?? plan.start, size = this.lens.clientWidth || 200, scale = LENS * this.view.scale;
     const view = { scale, left: size / 2 - scale * x, top: size / 2 + scale * y };
     this.lensScene.setAttribute("transform", transform(view));
     const near = plan.flips.filter((flip) => Math.hypot(flip[0] - x, flip[1] - y) * scale < size);
@@ -135,21 +126,13 @@ class PlanView {
     svg.addEventListener("pointerdown", (event) => this.press(event));
     svg.addEventListener("pointermove", (event) => this.move(event));
     for (const name of ["pointerup", "pointercancel"]) svg.addEventListener(name, (event) => this.release(event));
-    svg.addEventListener(
-      "wheel",
-      (event) => {
-        event.preventDefault();
-        this.zoom(Math.exp(-event.deltaY / 500), ...this.pixels(event));
-      },
-      { passive: false },
-    );
-    svg.addEventListener(
-      "touchmove",
-      (event) => {
-        if (event.touches.length > 1) event.preventDefault();
-      },
-      { passive: false },
-    );
+    const zoom = (event) => {
+      event.preventDefault();
+      this.zoom(Math.exp(-event.deltaY / 500), ...this.pixels(event));
+    };
+    svg.addEventListener("wheel", zoom, { passive: false });
+    const pinch = (event) => event.touches.length > 1 && event.preventDefault();
+    svg.addEventListener("touchmove", pinch, { passive: false });
     svg.addEventListener("keydown", (event) => this.key(event));
     new ResizeObserver(() => (this.moved ? this.place() : this.fit())).observe(svg);
   }
@@ -165,12 +148,11 @@ class PlanView {
   }
 
   move(event) {
-    const before = this.pointers.get(event.pointerId);
+    const before = this.pointers.get(event.pointerId), now = this.pixels(event);
     if (!before) {
       this.hover(event);
       return;
     }
-    const now = this.pixels(event);
     if (this.pointers.size === 2) this.pinch(event.pointerId, before, now);
     else if (this.editing) {
       for (const step of event.getCoalescedEvents?.() ?? [event]) this.editor.drag(this.placeOf(step), step);

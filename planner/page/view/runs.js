@@ -4,11 +4,8 @@ import { byId, describe, digits, duration, element, figure, length, say } from "
 
 /* Show a track's errors; `actions` has fit(how), saveTrack() and remove(). */
 function showTrack(track, plan, tails, actions) {
-  const size = (value) => length(value, plan.tailLength, tails);
-  const { error } = track;
-  const [worstX, worstY] = error.worst.place;
-  const list = element("dl");
-  const within = error.largest <= error.stated;
+  const size = (value) => length(value, plan.tailLength, tails), list = element("dl");
+  const { error } = track, [worstX, worstY] = error.worst.place, within = error.largest <= error.stated;
   describe(list, [
     ["Track", `${track.name}${track.shift ? ` (moved: ${track.shift})` : ""}`],
     ...(track.ofPlan ? [["Of plan", `${track.ofPlan}, as the file says; compared with the plan above`]] : []),
@@ -17,11 +14,8 @@ function showTrack(track, plan, tails, actions) {
     ["From the drawn path", `${size(error.rawRms)} rms, ${size(error.rawLargest)} at most`],
     ["Largest error", `at ${duration(error.worst.time)}, x ${digits(worstX)} cm, y ${digits(worstY)} cm`],
   ]);
-  const picture = figure("svg", {
-    class: "chart", width: "100%", height: 90, role: "img", "aria-label": "Distance from the path over time",
-  });
-  const button = (words, click) => element("button", { type: "button", click }, words);
-  const buttons = element(
+  const about = { width: "100%", height: 90, role: "img", "aria-label": "Distance from the path over time" };
+  const picture = figure("svg", about), buttons = element(
     "div", { class: "row" }, button("Begin at time 0", () => actions.fit("time")),
     button("Lay on the plan (rigid motion)", () => actions.fit("rigid")),
     button("As measured", () => actions.fit("none")), button("Save track.csv", actions.saveTrack),
@@ -31,6 +25,10 @@ function showTrack(track, plan, tails, actions) {
   chart(picture, {
     times: error.times, values: error.distances, words: "distance from the path [cm]", limit: error.stated,
   });
+}
+
+function button(words, click) {
+  return element("button", { type: "button", click }, words);
 }
 
 const PLAIN = /^[\w@%+=:,./-]+$/; // a word that a shell takes as it is
@@ -85,8 +83,7 @@ class Runs {
   }
 
   commandParts(command) {
-    const code = element("code", {}, command);
-    const copied = element("span", { role: "status" });
+    const code = element("code", {}, command), copied = element("span", { role: "status" });
     const copy = async () => {
       try {
         await navigator.clipboard.writeText(command);
@@ -96,7 +93,6 @@ class Runs {
         copied.textContent = "The browser does not let the page copy: the command is selected, press Ctrl-C.";
       }
     };
-    const button = (words, click) => element("button", { type: "button", click }, words);
     return [
       element("p", {}, "Save robot.toml beside the table. The fit, and the search for copied rows, are made by the command:"),
       element("pre", {}, code),

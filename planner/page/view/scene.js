@@ -1,6 +1,6 @@
 /* What the picture of a plan consists of, in cm with y upwards, and the part of the plane that it shows: zoom, pan,
  * fit, ticks. Pixels go right and down. */
-import { bounds } from "../math.js";
+import { bounds, clip } from "../math.js";
 import { figure } from "./dom.js";
 
 const LEAST_SCALE = 1e-3; // pixels per cm
@@ -8,7 +8,7 @@ const LARGEST_SCALE = 1e6;
 
 /* A viewport: the scale [pixels per cm] and the pixel of the origin. */
 function viewport(scale, left, top) {
-  return { scale: Math.min(Math.max(scale, LEAST_SCALE), LARGEST_SCALE), left, top };
+  return { scale: clip(scale, LEAST_SCALE, LARGEST_SCALE), left, top };
 }
 
 /* Show all points [cm] in width × height pixels, with a margin. */
@@ -22,8 +22,7 @@ function fitted(points, width, height, margin = 0.12) {
 
 /* Zoom by a factor about a pixel. */
 function zoomed(view, factor, x, y) {
-  const scale = Math.min(Math.max(view.scale * factor, LEAST_SCALE), LARGEST_SCALE);
-  const real = scale / view.scale;
+  const scale = clip(view.scale * factor, LEAST_SCALE, LARGEST_SCALE), real = scale / view.scale;
   return { scale, left: x + (view.left - x) * real, top: y + (view.top - y) * real };
 }
 
@@ -47,16 +46,12 @@ const LENS_PLACES = {
 
 /* The place in width × height pixels at which a round lens hides the fewest points [cm]: "right top", …. */
 function lensPlace(view, points, width, height, lens) {
-  const hidden = Object.entries(LENS_PLACES).map(([name, [right, down]]) => {
-    const x = lens / 2 + right * (width - lens);
-    const y = lens / 2 + down * (height - lens);
-    const inside = points.filter((point) => {
-      const [px, py] = pixelOf(view, point);
-      return Math.hypot(px - x, py - y) < lens / 2;
-    });
-    return { name, count: inside.length };
+  const pixels = points.map((point) => pixelOf(view, point));
+  const hidden = Object.values(LENS_PLACES).map(([right, down]) => {
+    const x = lens / 2 + right * (width - lens), y = lens / 2 + down * (height - lens);
+    return pixels.filter(([px, py]) => Math.hypot(px - x, py - y) < lens / 2).length;
   });
-  return hidden.reduce((best, place) => (place.count < best.count ? place : best)).name;
+  return Object.keys(LENS_PLACES)[hidden.indexOf(Math.min(...hidden))];
 }
 
 /* The transform of a group that is drawn in cm, y upwards. */
@@ -66,8 +61,7 @@ function transform(view) {
 
 /* The step of ticks [cm]: 1, 2 or 5 times a power of ten, at least `pixels` apart. */
 function tickStep(view, pixels = 70) {
-  const least = pixels / view.scale;
-  const power = 10 ** Math.floor(Math.log10(least));
+  const least = pixels / view.scale, power = 10 ** Math.floor(Math.log10(least));
   return [1, 2, 5, 10].map((factor) => factor * power).find((step) => step >= least * (1 - 1e-9));
 }
 
@@ -89,21 +83,20 @@ function lineData(points, closed = false) {
   return points.length ? `M${points.map(([x, y]) => `${x},${y}`).join("L")}${closed ? "Z" : ""}` : "";
 }
 
-/* A line of a fixed width in pixels. */
-function line(kind, points, closed = false) {
-  return figure("path", { class: kind, d: lineData(points, closed), "vector-effect": "non-scaling-stroke" });
+/* A line of a fixed width in pixels; d: as the data of an SVG path. */
+function line(kind, d) {
+  return figure("path", { class: kind, d, "vector-effect": "non-scaling-stroke" });
 }
 
 /* Build the layers of a plan [cm]: band, drawn and declared path, track by direction. */
 function planLayers({ drawn, plan, tracks, old }) {
   const layers = figure("g", { class: old ? "old" : "" });
   if (plan) layers.append(band(plan));
-  if (drawn) layers.append(line("drawn", drawn.points, drawn.closed));
+  if (drawn) layers.append(line("drawn", lineData(drawn.points, drawn.closed)));
   if (plan) {
-    layers.append(line("declared", plan.reference, plan.closed), ...motion(plan));
-    layers.append(startMark(plan));
+    layers.append(line("declared", lineData(plan.reference, plan.closed)), ...motion(plan), startMark(plan));
   }
-  for (const { points } of tracks) layers.append(line("measured", points));
+  for (const { points } of tracks) layers.append(line("measured", lineData(points)));
   return layers;
 }
 
@@ -119,34 +112,27 @@ function motion(plan) {
     const direction = i % 2 ? -plan.firstDirection : plan.firstDirection;
     data[direction] += lineData(plan.track.slice(i * plan.samples, (i + 1) * plan.samples + 1));
   });
-  return Object.entries(data).map(([direction, d]) =>
-    figure("path", { class: direction === "1" ? "forward" : "backward", d, "vector-effect": "non-scaling-stroke" }),
-  );
+  return [line("forward", data[1]), line("backward", data[-1])];
 }
 
 /* An arrow at the start pose, as long as the head. */
 function startMark(plan) {
-  const [x, y, heading] = plan.start;
-  const size = plan.body.headLength;
-  const tip = [x + size * Math.cos(heading), y + size * Math.sin(heading)];
-  const barbs = [2.6, -2.6].map((angle) => [
-    tip[0] + 0.35 * size * Math.cos(heading + angle), tip[1] + 0.35 * size * Math.sin(heading + angle),
-  ]);
-  const d = `${lineData([[x, y], tip])}${lineData([barbs[0], tip, barbs[1]])}`;
-  return figure("path", { class: "start", d, "vector-effect": "non-scaling-stroke" });
+  const [x, y, heading] = plan.start, size = plan.body.headLength;
+  const from = ([atX, atY], length, angle) => [atX + length * Math.cos(angle), atY + length * Math.sin(angle)];
+  const tip = from([x, y], size, heading), [left, right] = [2.6, -2.6].map((a) => from(tip, 0.35 * size, heading + a));
+  return line("start", lineData([[x, y], tip]) + lineData([left, tip, right]));
 }
 
 /* Dots at flips that are LEAST_APART pixels or more from the one drawn before; null: they are too dense. */
 function flips(plan, view) {
-  let d = "", last = null, drawn = 0;
+  let d = "", last = null;
   for (const [x, y] of plan.flips) {
     const here = pixelOf(view, [x, y]);
     if (last && Math.hypot(here[0] - last[0], here[1] - last[1]) < LEAST_APART) return null;
     last = here;
     d += `M${x},${y}h0`;
-    drawn += 1;
   }
-  return drawn ? figure("path", { class: "flip", d, "vector-effect": "non-scaling-stroke" }) : null;
+  return line("flip", d);
 }
 
 /* Where a tail is clamped, seen from above, in radii of the disc, which is turned so that no tail hides another. */
@@ -156,22 +142,13 @@ function acrossOf(k, tails) {
 
 /* The robot from above, to scale, at the origin, heading to the right. */
 function robotShape({ headLength, headRadius, tailLength, tailRadius, discOffset, tails }) {
-  const shape = figure("g", { class: "robot" });
-  const rear = -headLength / 2;
-  for (let k = 0; k < tails; k++) {
-    const across = discOffset * acrossOf(k, tails);
-    shape.append(
-      figure("rect", {
-        class: "tail", x: rear - tailLength, y: across - tailRadius, width: tailLength, height: 2 * tailRadius,
-      }),
-    );
-  }
-  shape.append(
-    figure("rect", {
-      class: "head", x: rear, y: -headRadius, width: headLength, height: 2 * headRadius, rx: headRadius / 4,
-    }),
+  const rear = -headLength / 2, part = (kind, place) => figure("rect", { class: kind, ...place });
+  const clamped = Array.from({ length: tails }, (_, k) => discOffset * acrossOf(k, tails) - tailRadius);
+  const size = { width: tailLength, height: 2 * tailRadius }, head = { width: headLength, height: 2 * headRadius };
+  return figure(
+    "g", { class: "robot" }, clamped.map((y) => part("tail", { x: rear - tailLength, y, ...size })),
+    part("head", { x: rear, y: -headRadius, ...head, rx: headRadius / 4 }),
   );
-  return shape;
 }
 
 function poseTransform([x, y, heading]) {

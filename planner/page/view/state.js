@@ -41,27 +41,22 @@ const OPTIONS = {
 
 /* Robot fields in laboratory units from those in SI units. A number that is a round one keeps its digits. */
 function labValues(robot) {
-  const pairs = FIELDS.map(({ key, perSi }) => {
-    const value = robot[key];
-    return [key, value === null || value === undefined ? null : tidied(value * perSi)];
-  });
-  return Object.fromEntries(pairs);
+  return Object.fromEntries(FIELDS.map(({ key, perSi }) => [key, tidied(robot[key] ?? null, perSi)]));
 }
 
-/* Remove the last bits that a change of units leaves: 3.2 instead of 3.2000000000000006. */
-function tidied(value) {
-  const short = Number(value.toPrecision(12));
+/* Scale a number, and remove the last bits that this leaves: 3.2 instead of 3.2000000000000006. */
+function tidied(number, scale) {
+  const value = number * scale, short = Number(value.toPrecision(12));
+  if (number === null) return null;
   return Math.abs(short - value) <= 4 * Number.EPSILON * Math.abs(value) ? short : value;
 }
 
 /* Robot fields in SI units from those in laboratory units; `given` has exact SI values of unchanged fields. */
 function siValues(values, given = {}) {
   const known = labValues(given);
-  const pairs = FIELDS.map(({ key, perSi }) => {
-    if (values[key] === null) return [key, null];
-    return [key, values[key] === known[key] ? given[key] : values[key] / perSi];
-  });
-  return Object.fromEntries(pairs);
+  return Object.fromEntries(FIELDS.map(({ key, perSi }) => {
+    return [key, values[key] === known[key] ? given[key] ?? null : values[key] && values[key] / perSi];
+  }));
 }
 
 /* Put points on the grid of thousandths, without repeating one. */
@@ -152,13 +147,11 @@ function number(key, text, optional = false) {
 /* Write thousandths as differences in base 36: "a.-3~1.0" has the points (10, -3) and (11, -3) thousandths. */
 function packed(points) {
   let [x, y] = [0, 0];
-  return points
-    .map((point) => {
-      const [right, up] = point.map((value) => Math.round(value * THOUSANDTHS)), step = [right - x, up - y];
-      [x, y] = [right, up];
-      return step.map((value) => value.toString(36)).join(".");
-    })
-    .join("~");
+  return points.map((point) => {
+    const [right, up] = point.map((value) => Math.round(value * THOUSANDTHS)), step = [right - x, up - y];
+    [x, y] = [right, up];
+    return step.map((value) => value.toString(36)).join(".");
+  }).join("~");
 }
 
 function unpacked(text) {
