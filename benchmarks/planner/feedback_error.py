@@ -32,7 +32,6 @@ from planner.tracking.tracker import Tracker
 from sim.io.errors import InputError
 from sim.motion.warm import compile_once
 from tests.oracles.unseen_robots import lab_robot
-from tests.planner.vehicles import drawn_vehicle
 
 CURRENT = 0.05  # of the net speed
 LONGEST = 900  # dwells
@@ -68,7 +67,7 @@ def outcomes(seed: int, vehicle: bool) -> list[Outcome] | str:
         return f"{seed}: {refused}"
     if len(planned[0].dwells) > LONGEST:
         return f"{seed}: {len(planned[0].dwells)} dwells"
-    truth = drawn_vehicle(planned[0].tracked.vehicle, rng) if vehicle else robot
+    truth = planned[0].tracked.vehicle.drawn(rng) if vehicle else robot
     angle = rng.uniform(0, 2 * math.pi)
     found = []
     for (name, camera), each in zip(CAMERAS.items(), planned, strict=False):

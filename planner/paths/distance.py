@@ -50,18 +50,18 @@ def nearest(polyline: Floats, points: Floats) -> tuple[Floats, Integers, Floats]
         neighbours = tree.query(some, k=count)
         gap, near = (np.reshape(part, (len(some), count)) for part in neighbours)
         candidates = np.concatenate([owner[near], previous[near]], 1)
-        distance[block], segment[block], place[block] = _closest(start, direction, some, candidates)
+        distance[block], segment[block], place[block] = closest_segment(start, direction, some, candidates)
         reach = np.hypot(distance[block] + TIE, half) * (1 + 1e-9)
         unsure = np.flatnonzero((gap[:, -1] <= reach) & (count < len(owner)))
         for i in unsure.tolist():
             near = tree.query_ball_point(some[i], reach[i])
             close = np.unique(np.concatenate([owner[near], previous[near]]))
-            closest = _closest(start, direction, some[i : i + 1], close[None])
+            closest = closest_segment(start, direction, some[i : i + 1], close[None])
             distance[first + i], segment[first + i], place[first + i] = (part[0] for part in closest)
     return distance, segment, place
 
 
-def _closest(
+def closest_segment(
     start: Floats, direction: Floats, points: Floats, candidates: Integers
 ) -> tuple[Floats, Integers, Floats]:
     """Choose the nearest of the candidate segments (M, k) of each point; of equally near ones the first."""

@@ -186,7 +186,7 @@ class LineOfSight:
         return sense * (heading - wanted) - self._hysteresis[i]
 
     @property
-    def _ended(self) -> bool:
+    def ended(self) -> bool:
         return self.place >= self._last and self.share >= 1
 
     def next_dwell(
@@ -212,7 +212,7 @@ class LineOfSight:
         value = self._excess(self.pose_after(pose, sense, before, time), sense)
         low, low_value, slope = 0.0, None, rate
         for _ in range(MOST_LOOKS):
-            if self._ended:
+            if self.ended:
                 return self._end(pose, sense, before, time), True
             if value >= 0 and (low_value is None or value < EXACT):
                 return time, False
@@ -255,7 +255,7 @@ class LineOfSight:
         for _ in range(HALVINGS):
             middle = (low + high) / 2
             self._excess(self.pose_after(pose, sense, before, middle), sense)
-            low, high = (low, middle) if self._ended else (middle, high)
+            low, high = (low, middle) if self.ended else (middle, high)
         return high
 
 

@@ -175,7 +175,7 @@ class TrackerGuidance(LineOfSight):
         return 0
 
     @property
-    def _ended(self) -> bool:
+    def ended(self) -> bool:
         return not self._around and self._leg >= SEGMENTS and self.place >= self._last and self.share >= 1
 
     def _bend(self) -> tuple[float, float]:

@@ -105,7 +105,7 @@ class Swim:
         )
 
 
-class _Swimmer:
+class Swimmer:
     """A robot in time steps, or a vehicle, from rest; it advances at constant motor speed, and flips."""
 
     def __init__(
@@ -190,7 +190,7 @@ def swim(
     every, delay = camera.every_s / scale, camera.delay_s / scale
     begin, limit = np.array(plan.start if start is None else start), longest * plan.duration
     command = pilot.update(0.0)
-    swimmer = _Swimmer(truth, plan, command.direction, begin, current)
+    swimmer = Swimmer(truth, plan, command.direction, begin, current)
     now, look, change = 0.0, every, plan.duration / 2 if later else np.inf
     waiting: list[tuple[float, POSE, float]] = []
     rows = [(np.zeros(1), begin[None], command)]

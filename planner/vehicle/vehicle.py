@@ -16,7 +16,7 @@ end of a dwell. Lengths are in l, times in μ0 l⁴/EI.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,6 +61,15 @@ class Vehicle:
     def lag_noise(self, sense: int, time: ArrayLike) -> Floats:
         """Return the standard deviation (..., 3) of the lag after `time`, over the disc's phase at the flip."""
         return _at(self.spread[0 if sense > 0 else 1], time)
+
+    def drawn(self, rng: np.random.Generator, size: float = 1.0) -> Vehicle:
+        """Draw a vehicle within what is uncertain of this one, times a size."""
+        twist, lag, current = self.twist.copy(), self.lag.copy(), self.current.copy()
+        for mode, z in zip(self.modes, size * rng.standard_normal(len(self.modes)), strict=True):
+            twist += z * mode.twist
+            lag += 0.0 if mode.lag is None else z * mode.lag
+            current += z * mode.current
+        return replace(self, twist=twist, lag=lag, current=current)
 
     @property
     def yaw_rate(self) -> float:

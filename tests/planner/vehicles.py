@@ -48,16 +48,6 @@ def vehicle(*, yaw: float = 0.0489, sway: float = 0.0424, surge: float = 0.0179,
     )
 
 
-def drawn_vehicle(car: Vehicle, rng: np.random.Generator, size: float = 1.0) -> Vehicle:
-    """Draw a vehicle within the uncertainty of another one, times a size."""
-    twist, lag, current = car.twist.copy(), car.lag.copy(), car.current.copy()
-    for mode, z in zip(car.modes, size * rng.standard_normal(len(car.modes)), strict=True):
-        twist += z * mode.twist
-        lag += 0.0 if mode.lag is None else z * mode.lag
-        current += z * mode.current
-    return replace(car, twist=twist, lag=lag, current=current)
-
-
 def plain_guidance(car: Vehicle, dwell: float, ahead: float) -> Guidance:
     """Make guidance with the swing Ω T of a robot without lags."""
     return Guidance(dwell, ahead, float(np.abs(car.twist[:, 2]).max()) * dwell)

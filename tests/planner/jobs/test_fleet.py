@@ -25,7 +25,7 @@ from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay
 from tests.planner.plans import CONTROL, LINE, planned
-from tests.planner.vehicles import FINE, drawn_vehicle
+from tests.planner.vehicles import FINE
 from tests.shared import shared
 
 pytestmark = pytest.mark.slow
@@ -173,7 +173,7 @@ def test_ninety_five_per_cent_of_random_robots_keep_within_the_error_in_place() 
     rng, held = np.random.default_rng(0), []
     error, expected = motion.error(times), motion.body.ends(motion.poses(times))
     for _ in range(100):
-        robot = drawn_vehicle(made.tracked.vehicle, rng)
+        robot = made.tracked.vehicle.drawn(rng)
         poses = roll_out(robot, Switches(made.first_direction, made.dwells, made.poses)).flips
         ends = motion.body.ends(poses * [TAIL, TAIL, 1.0])
         off = np.hypot(*np.moveaxis(ends - expected, -1, 0)).max(1)
@@ -201,7 +201,7 @@ def test_robots_under_trackers_keep_apart() -> None:
         tracks = []
         for each in result.scheduled:
             made = each.motion.plan
-            robot = replace(drawn_vehicle(made.tracked.vehicle, rng, 0.7), current=np.array([2e-5, -2e-5]))
+            robot = replace(made.tracked.vehicle.drawn(rng, 0.7), current=np.array([2e-5, -2e-5]))
             tracks.append(swim(Tracker(made, noise=(0.005, 0.005)), made, robot, replace(FINE, seed=rng)))
         scale = CONTROL.time_scale
         times = np.arange(0.0, result.duration_s, 1.0)

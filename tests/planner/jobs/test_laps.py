@@ -34,7 +34,7 @@ from sim.model.schedule import Schedule
 from sim.motion.replay import replay
 from tests.planner.compiled import CompiledTracker
 from tests.planner.plans import CONTROL, tracked
-from tests.planner.vehicles import FINE, drawn_vehicle
+from tests.planner.vehicles import FINE
 from tests.shared import shared
 
 pytestmark = pytest.mark.slow
@@ -109,7 +109,7 @@ def test_a_lap_drifts_as_stated() -> None:
     count = len(laps().dwells)
     for _ in range(40):
         twice = Switches(laps().first_direction, np.tile(laps().dwells, 2), laps().poses[:1])
-        poses = roll_out(drawn_vehicle(vehicle, rng), twice).flips
+        poses = roll_out(vehicle.drawn(rng), twice).flips
         x, y, _ = poses[-1] - poses[count]
         beyond += np.hypot(x, y) > laps().lap.drift
     assert beyond <= 6

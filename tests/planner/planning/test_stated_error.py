@@ -38,7 +38,7 @@ from sim.motion.replay import replay
 from surrogate.table_file import load
 from tests.oracles.unseen_robots import carried
 from tests.planner.plans import planned as plan_of
-from tests.planner.vehicles import drawn_vehicle, plain_guidance, vehicle
+from tests.planner.vehicles import plain_guidance, vehicle
 
 CIRCLE, LINE = circle(1.0), Path2D.of([[0, 0], [25, 0]])
 JITTER = np.tile([0.0, 0.0, 1e-3], (2, len(TIMES), 1))  # of the lag, over the disc's phase
@@ -86,7 +86,7 @@ def test_it_is_the_quantile_over_drawn_vehicles(path: Path2D, car: Vehicle) -> N
     error = predicted_error(ref.p, rollout.track, closed=path.closed)
     stated = stated_for(car, switches, rollout, error)
     rng = np.random.default_rng(5)
-    worst = [distance_to(ref.p, roll_out(drawn_vehicle(car, rng), switches, 0.0).track).max() for _ in range(300)]
+    worst = [distance_to(ref.p, roll_out(car.drawn(rng), switches, 0.0).track).max() for _ in range(300)]
     assert np.mean(np.array(worst) + WOBBLE <= stated) == pytest.approx(0.95, abs=0.035)
     assert stated > (2 if car.modes[0].lag is not None else 1) * error.largest
 

@@ -22,7 +22,7 @@ from planner.vehicle.zigzag import Objective
 from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker
 from tests.planner.plans import CONTROL, planned
-from tests.planner.vehicles import PROMPT, drawn_vehicle, root_mean_square
+from tests.planner.vehicles import PROMPT, root_mean_square
 
 pytestmark = pytest.mark.slow
 
@@ -70,7 +70,7 @@ def test_on_a_straight_line_the_reference_turns_against_the_slip() -> None:
 def within(plan: Plan, tracker: Tracker | CompiledTracker, camera: Camera, rng: Any, current: float) -> np.ndarray:
     """Swim as a vehicle within the plan's uncertainty, in a current; tell when its error is the told one."""
     angle = rng.uniform(0, 2 * math.pi)
-    car = drawn_vehicle(plan.tracked.vehicle, rng)
+    car = plan.tracked.vehicle.drawn(rng)
     car = replace(car, current=current * np.array([math.cos(angle), math.sin(angle)]))
     result = swim(tracker, plan, car, camera)
     return result.distance <= result.errors
