@@ -25,7 +25,7 @@ from sim.motion.batches import one_thread
 from sim.motion.orbits import Perturbed, solve_orbits
 from sim.motion.stability import growths, growths_on_mesh
 from sim.solve.assembly import bodies, numbers, row
-from sim.solve.refinement import FEW, MESHES, SOLVED, refined_orbit
+from sim.solve.refinement import MESHES, PHASES, SOLVED, refined_orbit
 from tests.oracles.stepped_growth import stepped_growth
 
 _FOLLOWED = 7.0  # natural logarithm of the change that is followed in time
@@ -76,8 +76,8 @@ def agreement(title: str, selected: list[Groups]) -> None:
     away, seen = [], []
     for groups in selected:
         body = bodies(groups)[0]
-        orbit = refined_orbit(body, groups.N, FEW)
-        if orbit.ended != SOLVED:
+        orbit = refined_orbit(body, groups.N, PHASES)
+        if orbit.status != SOLVED:
             continue
         final = growths(row(body), groups.N, [orbit])[0]
         coarse = growths_on_mesh(row(body), groups.N, orbit.x[1][None], orbit.u[1][None])[0]
@@ -99,8 +99,8 @@ def domain() -> None:
     wide, rows = robots(4096), []
     for tails in np.unique(wide["N"][wide["N"] > 1]):
         groups = Groups.from_columns({name: values[wide["N"] == tails] for name, values in wide.items()})
-        orbits = solve_orbits(numbers(groups), groups.N, phases=FEW, perturbed=Perturbed.ALL)
-        solved = orbits.ended == SOLVED
+        orbits = solve_orbits(numbers(groups), groups.N, phases=PHASES, perturbed=Perturbed.ALL)
+        solved = orbits.status == SOLVED
         yaws = np.abs(orbits.means[:, 2] / orbits.means[:, 0])
         rows.append(np.column_stack([yaws, orbits.growth])[solved])
     yaws, grows = np.concatenate(rows).T

@@ -47,7 +47,7 @@ from sim.io.errors import InputError
 from sim.model.robot import Robot
 from sim.motion.batches import sensitivity_columns, steady_columns
 from sim.motion.sensitivity import Sensitivities
-from sim.solve.refinement import FEW, MANY
+from sim.solve.refinement import PHASES, PHASES_FOR_SLOPES
 from surrogate.domain import COEFFICIENTS
 from surrogate.table import NeuralTable
 from surrogate.table_file import load
@@ -174,7 +174,7 @@ class SwimmerModel:
         wanted = tuple(dict.fromkeys(move for group in moves.values() for move in group))
         # Non-local effects at their null may need more phases than the motion; with effects at work it has them.
         at_null = any(catalogue()[name].reach == "nonlocal" for name in wanted if name in catalogue())
-        phases = MANY if at_null and self._is_at_null(parameters) else FEW
+        phases = PHASES_FOR_SLOPES if at_null and self._is_at_null(parameters) else PHASES
         distinct, same = _distinct(columns)
         found = self.solver.slopes(distinct, wanted, phases=phases, jobs=self.jobs, title=title)
         values, slopes = (

@@ -43,12 +43,6 @@ from sim.linear.vectors import (
 
 
 @formula
-def bending_energy(c: Any, inverse_voronoi: Any) -> Any:
-    """Compute g(c) of one joint, with 1/l_k."""
-    return 2 * inverse_voronoi * (1 - c) / (1 + c)
-
-
-@formula
 def bend(
     before: Vector, after: Vector, length_before: Any, length_after: Any, inverse_voronoi: Any
 ) -> tuple[Any, Any, Any, Vector, Vector]:

@@ -27,7 +27,7 @@ from sim.motion.settling import settle
 from sim.motion.steady import steady
 from sim.motion.steady_motion import STABILITY_COLUMNS
 from sim.motion.warm import compile_once
-from sim.solve.refinement import MANY
+from sim.solve.refinement import PHASES_FOR_SLOPES
 
 _DIRECT_ROWS, _SLOPE_ROWS, _STEPPED_ROWS = 128, 16, 4  # robots a batch: the progress bar moves after each
 
@@ -127,7 +127,7 @@ def sensitivity_columns(
     columns: Mapping[str, Floats],
     parameters: Sequence[str],
     *,
-    phases: int = MANY,
+    phases: int = PHASES_FOR_SLOPES,
     jobs: int | None = None,
     title: str = "sensitivities",
 ) -> Sensitivities:

@@ -16,7 +16,7 @@ from sim.motion.stability import growths
 from sim.solve.assembly import CONTACT
 from sim.solve.grouping import by_kind, slices
 from sim.solve.orbit import smallest_gaps
-from sim.solve.refinement import FEW, SOLVED, refined_orbits
+from sim.solve.refinement import PHASES, SOLVED, refined_orbits
 
 _NEAR = 1.1  # gap from which tails cannot touch, given the error of the gap
 
@@ -35,7 +35,7 @@ class Orbits(NamedTuple):
     means: Floats  # (B, 5), NaN where not solved
     slopes: Floats  # (B, K, 5): derivatives of the means along K directions
     error: Floats  # (B,) estimated relative error
-    ended: Integers  # (B,) SOLVED or why not, see `sim.solve.refinement`
+    status: Integers  # (B,) SOLVED or why not, see `sim.solve.refinement`
     gap: Floats  # (B,) smallest distance between tails over 2 r0
     growth: Floats  # (B,) of small perturbations in a motor revolution, see `sim.motion.stability`; NaN: unknown
 
@@ -45,7 +45,7 @@ def solve_orbits(
     tails: int,
     directions: Floats | None = None,
     *,
-    phases: int = FEW,
+    phases: int = PHASES,
     perturbed: Perturbed = Perturbed.NONE,
 ) -> Orbits:
     """Solve for the orbits of robots with N tails.
@@ -72,7 +72,7 @@ def _solve_at_once(
     slopes = np.full((len(rows), count, 5), np.nan)
     gap, grows = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
     orbits = refined_orbits(rows, tails, phases)
-    solved = [i for i, orbit in enumerate(orbits) if orbit.ended == SOLVED]
+    solved = [i for i, orbit in enumerate(orbits) if orbit.status == SOLVED]
     for robots in by_kind(solved, lambda i: orbits[i].x[2].shape):
         gap[robots] = smallest_gaps(rows[robots], np.stack([orbits[i].x[2] for i in robots]), tails)
     if perturbed is not Perturbed.NONE:
@@ -85,7 +85,7 @@ def _solve_at_once(
         np.array([orbit.means for orbit in orbits]).reshape(-1, 5),
         slopes,
         np.array([orbit.error for orbit in orbits]),
-        np.array([orbit.ended for orbit in orbits], dtype=int),
+        np.array([orbit.status for orbit in orbits], dtype=int),
         gap,
         grows,
     )

@@ -3,7 +3,7 @@
     Φ(x, s): shape of all tails at disc phase 0  ->  shape one turn later
 
 Inertia is left out, so the shape x (n, N, 3) is the whole state. The map is made of implicit time steps
-(`sim.solve.steps`), a fixed number of equal ones. A motion whose shape repeats after each turn is a fixed point,
+(`sim.solve.march`), a fixed number of equal ones. A motion whose shape repeats after each turn is a fixed point,
 
     F(x, s) = Φ(x, s) − x = 0.
 

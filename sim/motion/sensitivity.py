@@ -20,7 +20,7 @@ from sim.model.groups import Groups
 from sim.model.sweepable import SLOPE_INPUTS, SLOPE_OUTPUTS
 from sim.motion.orbits import solve_orbits
 from sim.solve.assembly import numbers
-from sim.solve.refinement import MANY
+from sim.solve.refinement import PHASES_FOR_SLOPES
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Sensitivities:
     derivatives: dict[str, Floats]  # SLOPE_OUTPUTS -> (B, K), per unit of the parameter
 
 
-def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = MANY) -> Sensitivities:
+def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = PHASES_FOR_SLOPES) -> Sensitivities:
     """Simulate steady motion and its derivatives.
 
     Args:

@@ -1,6 +1,6 @@
 """Settling: time stepping from rest until the motion is steady.
 
-A robot starts from rest with straight tails and is stepped in time (`sim.solve.steps`). From time SETTLED on,
+A robot starts from rest with straight tails and is stepped in time (`sim.solve.march`). From time SETTLED on,
 means over whole revolutions of the disc are compared with those of the revolutions before. The motion is converged
 when all means agree to DRIFT. At time LONGEST the run ends, and the row is flagged. Every mean is taken over at
 least one whole revolution, because with N = 2 a part of a revolution gives a wrong ω_yr. If Newton's method fails,

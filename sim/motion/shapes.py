@@ -23,10 +23,10 @@ from sim.model.schedule import Schedule
 from sim.motion.replay import run_at_rest
 from sim.motion.run import Run
 from sim.solve.assembly import bodies
-from sim.solve.fluid_forces import fluid_forces
 from sim.solve.march import PHASE, YAW, State, X, Y
-from sim.solve.orbit import FIRST_PHASE
-from sim.solve.refinement import MANY, REASONS, SOLVED, orbit_on_mesh, refined_orbit
+from sim.solve.rates import FIRST_PHASE
+from sim.solve.refinement import PHASES_FOR_SLOPES, REASONS, SOLVED, orbit_on_mesh, refined_orbit
+from sim.solve.residual import fluid_forces
 
 _JUST_AFTER = 1e-3  # of a time step: when forces are taken after a jump of the motor's speed
 
@@ -52,9 +52,9 @@ def steady_states(robot: Robot, phases: Floats) -> tuple[Body, list[State]]:
     """
     groups = robot.groups()
     body = bodies(groups)[0]
-    orbit = refined_orbit(body, groups.N, MANY)
-    if orbit.ended != SOLVED:
-        raise InputError(f"{robot.name} has no shape to draw: {REASONS[orbit.ended]}")
+    orbit = refined_orbit(body, groups.N, PHASES_FOR_SLOPES)
+    if orbit.status != SOLVED:
+        raise InputError(f"{robot.name} has no shape to draw: {REASONS[orbit.status]}")
     return body, [state_from_orbit(body, orbit.x[2], orbit.u[2], phase) for phase in phases.tolist()]
 
 

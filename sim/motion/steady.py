@@ -23,7 +23,7 @@ from sim.motion.settling import settle
 from sim.motion.stability import QUICK
 from sim.motion.steady_motion import DIRECT, Steady
 from sim.solve.assembly import numbers
-from sim.solve.refinement import FEW, REASONS, SOLVED
+from sim.solve.refinement import PHASES, REASONS, SOLVED
 
 GROWS = -0.02  # growth in a motor revolution from which small perturbations may take the tails to another motion
 GROWS_IN_CONTACT = -0.12  # the same where tails touch: the mesh's error is larger
@@ -53,7 +53,7 @@ def steady(groups: Groups, *, stability: bool = True) -> Steady:
         (0.049, True)
     """
     check_groups(groups)
-    motion = _orbits(groups, FEW, Perturbed.ALL if stability else Perturbed.TOUCHING)
+    motion = _orbits(groups, PHASES, Perturbed.ALL if stability else Perturbed.TOUCHING)
     quick = np.abs(motion.omega_yr) > QUICK * np.abs(motion.omega_t)
     contact = groups.effects.get(CONTACT.name, np.zeros(len(groups))) != 0
     grows = motion.growth > np.where(contact, GROWS_IN_CONTACT, GROWS)
@@ -84,7 +84,7 @@ def _rows(groups: Groups, rows: Integers) -> Groups:
     return groups.select(rows)
 
 
-def orbits(groups: Groups, *, phases: int = FEW) -> Steady:
+def orbits(groups: Groups, *, phases: int = PHASES) -> Steady:
     """Solve directly, with `phases` phases to begin with; `failed` where there is no orbit."""
     return _orbits(groups, phases, Perturbed.NONE)
 
@@ -93,7 +93,7 @@ def _orbits(groups: Groups, phases: int, perturbed: Perturbed) -> Steady:
     """Solve directly, and compute how fast perturbations grow."""
     solution = solve_orbits(numbers(groups), groups.N, phases=phases, perturbed=perturbed)
     means = solution.means.T
-    solved = solution.ended == SOLVED
+    solved = solution.status == SOLVED
     return Steady(
         omega_t=means[0],
         omega_h=means[1],
@@ -107,7 +107,7 @@ def _orbits(groups: Groups, phases: int, perturbed: Perturbed) -> Steady:
         method=np.full(len(groups), DIRECT),
         growth=solution.growth,
         note=np.array(
-            [REASONS[k] or _growth_note(g) for k, g in zip(solution.ended.tolist(), solution.growth, strict=True)]
+            [REASONS[k] or _growth_note(g) for k, g in zip(solution.status.tolist(), solution.growth, strict=True)]
         ),
     )
 

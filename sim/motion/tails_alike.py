@@ -21,7 +21,8 @@ from sim.arrays import Floats
 from sim.linear.spectral import with_phases
 from sim.mechanics.geometry import turned_edges
 from sim.model.body import Body
-from sim.solve.orbit import mean_motion, residual_on_orbit, solve_at_orbit, turns_forward
+from sim.solve.assembly import row
+from sim.solve.orbit import mean_motion, residuals_on_orbits, solve_at_orbits, turns_forward
 from sim.solve.refinement import orbit_on_mesh
 
 EDGES = 12
@@ -92,10 +93,14 @@ class TailsAlike:
         """Average (ω_t, ω_h, ω_yr, v_x, v_z) of the head's centre, (5,)."""
         return mean_motion(self.body_at(float(y[-1])), self.unpack(y)[1])
 
+    def _numbers(self, s: float) -> Floats:
+        """Return the robot's numbers, (1, K')."""
+        return row(self.body_at(s))
+
     def _residual(self, y: Floats, s: float) -> Floats:
         """Compute F at the shape of y, with the robot's numbers at s."""
         x, u = self.unpack(y)
-        r, t = residual_on_orbit(self.body_at(s), x, u)
+        r, t, _ = residuals_on_orbits(self._numbers(s), x[None], u[None])
         return np.concatenate([r.ravel(), t.ravel()])
 
     def _solved(self, y: Floats, row: Floats, right: Floats | None, bottom: float) -> Floats:
@@ -105,10 +110,9 @@ class TailsAlike:
         sides = np.array([by_s] if right is None else [by_s, right])
         x, u = self.unpack(y)
         nodes = x.size
-        dx, du = solve_at_orbit(
-            self.body_at(s), x, u, sides[:, :nodes].reshape(-1, *x.shape), sides[:, nodes:].reshape(-1, *u.shape)
-        )
-        packed = [self.pack(a, b, 0.0)[:-1] for a, b in zip(dx, du, strict=True)]
+        r, t = sides[:, :nodes].reshape(1, -1, *x.shape), sides[:, nodes:].reshape(1, -1, *u.shape)
+        dx, du = solve_at_orbits(self._numbers(s), x[None], u[None], r, t)
+        packed = [self.pack(a, b, 0.0)[:-1] for a, b in zip(dx[0], du[0], strict=True)]
         v = packed[0]
         w = np.zeros_like(v) if right is None else packed[1]
         ds = (bottom - row[:-1] @ w) / (row[-1] - row[:-1] @ v)

@@ -10,7 +10,7 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.motion.revolution import Turn
-from sim.solve.orbit import FIRST_PHASE
+from sim.solve.rates import FIRST_PHASE
 
 _ALIKE = 0.02  # largest distance between nodes of tails that move alike, in l
 _TURN = 2 * np.pi

@@ -32,11 +32,11 @@ from sim.linear.blocks import block, put, vector
 from sim.linear.lane_arrays import choose_all, combine, divide, largest_entry, scalar_product, subtract_multiple
 from sim.linear.vectors import applied
 from sim.model.body import Body
+from sim.solve.grouping import body_in_lanes, reaches_further
 from sim.solve.linearise import linearise
 from sim.solve.newton import Workspace, new_unknowns, new_workspace, solve_linear
 from sim.solve.rates import Rates, in_transient
 from sim.solve.residual import fill_residual
-from sim.solve.robots_in_lanes import body_in_lanes, reaches_further
 
 _TOLERANCE = 1e-3  # of GMRES
 _CANCELS = 0.1  # smaller parts of a vector are made orthogonal again
@@ -79,7 +79,7 @@ def arnoldi(
             out[g],
         )
         rates = in_transient(shift[g], by_phase, at_x)
-        linearise(body, rates, at_x, at_u, work.room, work.equations)
+        linearise(body, rates, at_x, at_u, work.scratch, work.equations)
         for k in range(first.size):
             basis[0, k] = 0.0 * shift[g] + first[k]
         for i in range(count):
@@ -127,7 +127,7 @@ def _by_rate(
     for side in range(2):  # ẋ changes by −(start − x) · shift
         combine(start, 1.0, x, (2 * side - 1) * step, moving)
         moved = Rates(rates.rate, rates.phase, rates.differentiation, start)
-        fill_residual(body, moved, x, u, where, work.room, ends[side].x, ends[side].u)
+        fill_residual(body, moved, x, u, where, work.scratch, ends[side].x, ends[side].u)
     share = 1 / (2 * step * rates.rate)
     combine(start, share, ends[1].x, -share, ends[0].x)
     choose_all(dx, further, start, dx)

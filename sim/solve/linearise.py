@@ -47,7 +47,7 @@ from sim.mechanics.balance import (
 from sim.mechanics.geometry import edge_block, joint_block, measure
 from sim.model.body import Body
 from sim.solve.rates import Rates, base_phase, fill_rates, phase_gain
-from sim.solve.residual import Room
+from sim.solve.residual import Scratch
 
 
 class Equations(NamedTuple):
@@ -61,25 +61,25 @@ class Equations(NamedTuple):
 
 @compiled_exactly
 def new_equations(x: Floats, u: Floats) -> Equations:
-    """Allocate room for unknowns like x (n, M, 3) and u (P, 4)."""
+    """Allocate arrays for unknowns like x (n, M, 3) and u (P, 4)."""
     n, columns, _ = x.shape
     chains = new_chains(x, n, columns, u.shape[0])
     return Equations(chains, zeros(x, (n, columns, 3, 3)), zeros(x, x.shape), zeros(u, u.shape))
 
 
 @compiled_exactly
-def linearise(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, equations: Equations) -> None:
+def linearise(body: Body, rates: Rates, x: Floats, u: Floats, scratch: Scratch, equations: Equations) -> None:
     """Fill the equations at x (n, M, 3), u (P, 4)."""
     columns, instants = x.shape[1], u.shape[0]
-    measure(room.geometry, x, body.offset, body.axial_stiffness)
-    fill_rates(rates, body, x, u, room.x_dot, room.by_spin)
+    measure(scratch.geometry, x, body.offset, body.axial_stiffness)
+    fill_rates(rates, body, x, u, scratch.x_dot, scratch.by_spin)
     base = base_phase(rates, body, u)
     for p in range(instants):
         _head(body, u[p], equations.chains.corner[p], equations.t[p])
     for m in range(columns):
         motion = motion_at(body, u[m % instants], base + 2 * np.pi * m / columns)
-        _tail(body, motion, rates, x, room, equations, m)
-        _clamp(body, motion, rates, room, equations, m, m % instants)
+        _tail(body, motion, rates, x, scratch, equations, m)
+        _clamp(body, motion, rates, scratch, equations, m, m % instants)
 
 
 @compiled_exactly
@@ -94,11 +94,13 @@ def _head(body: Body, u: Floats, corner: Floats, t: Floats) -> None:
 
 
 @compiled_exactly
-def _tail(body: Body, motion: Motion, rates: Rates, x: Floats, room: Room, equations: Equations, m: int) -> None:
+def _tail(
+    body: Body, motion: Motion, rates: Rates, x: Floats, scratch: Scratch, equations: Equations, m: int
+) -> None:
     """Balance of the nodes of column m, its blocks, and its derivative in the robot's velocities."""
     n, gain, rate = x.shape[0], motor_gain(body), rates.rate
     turning_load = times(phase_gain(rates, body) / n, _load_by_phase(body, motion))
-    chains, geometry = equations.chains, room.geometry
+    chains, geometry = equations.chains, scratch.geometry
     edge, joint = edge_block(geometry, 0, m, body.axial_stiffness), ZERO_MATRIX  # of node k
     after_below = ZERO_MATRIX
     for k in range(n):
@@ -107,7 +109,7 @@ def _tail(body: Body, motion: Motion, rates: Rates, x: Floats, room: Room, equat
             edge_next = edge_block(geometry, k + 1, m, body.axial_stiffness)
             joint_next = joint_block(geometry, k + 1, m)
         position = vector(x, k, m)
-        velocity = plus(plus(motion.linear, cross(motion.spin, position)), vector(room.x_dot, k, m))
+        velocity = plus(plus(motion.linear, cross(motion.spin, position)), vector(scratch.x_dot, k, m))
         residual, resistance, before, after = node_balance(geometry, body, motion, k, m, velocity)
         put(equations.r, k, m, residual)
         put_block(equations.resistance, k, m, resistance)
@@ -126,7 +128,7 @@ def _tail(body: Body, motion: Motion, rates: Rates, x: Floats, room: Room, equat
             put_block(chains.upper2, k, m, joint)
             put_block(chains.lower2, k, m, transposed(joint))
 
-        about_z = times(gain, plus(cross(E_Z, position), vector(room.by_spin, k, m)))
+        about_z = times(gain, plus(cross(E_Z, position), vector(scratch.by_spin, k, m)))
         border = chains.border[k]
         put(border, m, 0, times(-1.0, applied(resistance, motion.e_x)))
         put(border, m, 1, times(-1.0, transposed(resistance)[2]))
@@ -137,9 +139,11 @@ def _tail(body: Body, motion: Motion, rates: Rates, x: Floats, room: Room, equat
 
 
 @compiled_exactly
-def _clamp(body: Body, motion: Motion, rates: Rates, room: Room, equations: Equations, m: int, p: int) -> None:
+def _clamp(
+    body: Body, motion: Motion, rates: Rates, scratch: Scratch, equations: Equations, m: int, p: int
+) -> None:
     """Compute the force and moment of column m on the disc at instant p."""
-    clamp = clamp_balance(room.geometry, body, m, motion, ZERO, ZERO)
+    clamp = clamp_balance(scratch.geometry, body, m, motion, ZERO, ZERO)
     chains, root = equations.chains, (body.offset, 0.0, 0.0)
     wrench = body_wrench(motion, clamp.force, clamp.moment)
     for a in range(4):
@@ -155,7 +159,7 @@ def _clamp(body: Body, motion: Motion, rates: Rates, room: Room, equations: Equa
     turning = phase_gain(rates, body)
     corner[0, 3] -= dot(motion.e_y, clamp.force) * turning
     corner[2, 3] += dot(motion.e_x, clamp.moment) * turning
-    load = times(0.5 * turning / room.geometry.length.shape[0], _load_by_phase(body, motion))
+    load = times(0.5 * turning / scratch.geometry.length.shape[0], _load_by_phase(body, motion))
     by_load = body_wrench(motion, load, cross(root, load))
     for a in range(4):
         corner[a, 3] += by_load[a]

@@ -26,10 +26,10 @@ from sim.linear.lane_arrays import add_chosen, choose_all, combine, largest_entr
 from sim.mechanics.balance import tail_spin
 from sim.mechanics.geometry import turned_edges
 from sim.model.body import Body
+from sim.solve.grouping import reaches_further
 from sim.solve.linearise import Equations, linearise, new_equations
-from sim.solve.rates import Rates, is_joined
-from sim.solve.residual import Room, fill_residual, new_room
-from sim.solve.robots_in_lanes import reaches_further
+from sim.solve.rates import Rates, is_periodic
+from sim.solve.residual import Scratch, fill_residual, new_scratch
 
 FINITE_DIFFERENCE_STEP = 1e-6  # of the largest entry, in l or 1 + |ω|
 RELATIVE_TOLERANCE = 1e-3  # of the residual in one Newton correction by GMRES
@@ -41,18 +41,18 @@ LARGEST_MOVE = 0.3  # of a node in one correction, in l; r0 where tails feel eac
 class Workspace(NamedTuple):
     """Everything that Newton's method works in; only a coupled system needs the last part."""
 
-    room: Room
+    scratch: Scratch
     equations: Equations
     system: Coupled
 
 
 @compiled_exactly
 def new_workspace(rates: Rates, x: Floats, u: Floats) -> Workspace:
-    """Allocate room for unknowns like x (n, M, 3) and u (P, 4)."""
+    """Allocate arrays for unknowns like x (n, M, 3) and u (P, 4)."""
     n, columns, instants = x.shape[0], x.shape[1], u.shape[0]
-    joined = 1 if is_joined(rates) else 0
+    joined = 1 if is_periodic(rates) else 0
     system = new_coupled(x, n, joined * columns, joined * instants)
-    return Workspace(new_room(x, u), new_equations(x, u), system)
+    return Workspace(new_scratch(x, u), new_equations(x, u), system)
 
 
 class Unknowns(NamedTuple):
@@ -64,7 +64,7 @@ class Unknowns(NamedTuple):
 
 @compiled_exactly
 def new_unknowns(x: Floats, u: Floats) -> Unknowns:
-    """Allocate room like x and u."""
+    """Allocate arrays like x and u."""
     return Unknowns(empty(x, x.shape), empty(u, u.shape))
 
 
@@ -103,9 +103,9 @@ def correct(
 ) -> None:
     """Compute one correction dx (n, M, 3), du (P, 4), with a new factorisation (`anew`) or the stored factors."""
     if anew:
-        linearise(body, rates, x, u, work.room, work.equations)
+        linearise(body, rates, x, u, work.scratch, work.equations)
     if not anew or somewhere(going * reaches_further(body)):
-        fill_residual(body, rates, x, u, going, work.room, work.equations.r, work.equations.t)
+        fill_residual(body, rates, x, u, going, work.scratch, work.equations.r, work.equations.t)
     negate(work.equations, dx, du)
     solve_linear(body, rates, x, u, work, anew, RELATIVE_TOLERANCE, going, dx, du)
 
@@ -179,7 +179,7 @@ def factor_and_solve(body: Body, rates: Rates, u: Floats, work: Workspace, dx: F
         dx, du: come in as right-hand sides, (n, M, 3) and (P, 4); solved in place.
     """
     chains = work.equations.chains
-    if not is_joined(rates):
+    if not is_periodic(rates):
         separate.factor_and_solve(chains, dx, du[0])
         return
     n, columns, _ = dx.shape
@@ -193,7 +193,7 @@ def factor_and_solve(body: Body, rates: Rates, u: Floats, work: Workspace, dx: F
 @compiled_exactly
 def solve_local(rates: Rates, work: Workspace, dx: Floats, du: Floats) -> None:
     """Solve with the factors, in place: dx (n, M, 3) and du (P, 4) come in as right-hand sides."""
-    if not is_joined(rates):
+    if not is_periodic(rates):
         separate.solve(work.equations.chains, dx, du[0])
     else:
         n, columns, _ = dx.shape
@@ -224,9 +224,9 @@ def _solve_nonlocal(
         direction = krylov.basis[count]
         step = FINITE_DIFFERENCE_STEP / larger(largest_entry(direction), 1e-12)
         _displace(moved, x, u, step, scale, direction)
-        fill_residual(body, rates, moved.x, moved.u, going, work.room, above.x, above.u)
+        fill_residual(body, rates, moved.x, moved.u, going, work.scratch, above.x, above.u)
         _displace(moved, x, u, -step, scale, direction)
-        fill_residual(body, rates, moved.x, moved.u, going, work.room, below.x, below.u)
+        fill_residual(body, rates, moved.x, moved.u, going, work.scratch, below.x, below.u)
         half = 1 / (2 * step)
         combine(moved.x, half, above.x, -half, below.x)
         combine(moved.u, half, above.u, -half, below.u)

@@ -9,9 +9,9 @@ Tails are equal and evenly spaced. In the motion in which they move alike, tail 
 0 at phase φ + 2πj/N. So one tail at all phases is enough, and u has the period 2π/N. x is collocated at M = N P
 phases φ_m = π/2 + 2π m/M, u at the P phases of one period. (The mirror image of this set of phases is the same
 set, so a reversed motor gives exactly the mirror image.) d/dφ is the derivative of the trigonometric interpolant.
-It has spectral
-accuracy: at low ω̄ the shape hardly depends on φ, and M = 4 to 8 phases are enough. Newton's method solves for all
-phases together (`sim.solve.newton`), for robots in lanes (`sim.solve.grouping`).
+It has spectral accuracy: at low ω̄ the shape hardly depends on φ, and M = 4 to 8 phases are enough. Newton's method
+solves for all phases together (`sim.solve.newton`). Arrays are (B, …) for B robots, and (G, …, W) in compiled
+loops: groups of W robots in lanes (`sim.solve.grouping`).
 
 Left out: motions in which the tails move differently (time stepping finds those, `sim.motion.settling`).
 Units: l, μ0 l⁴/EI, EI/l². Source: the paper's model (arXiv 2103.05712); for collocation Trefethen (2000), ch. 3.
@@ -24,17 +24,23 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Flags, Floats
+from sim.compiling import compiled_exactly
+from sim.lanes import lanes
+from sim.linear.lane_arrays import largest_entry
 from sim.linear.spectral import with_phases
 from sim.mechanics import contact
 from sim.mechanics.balance import tail_spin
-from sim.mechanics.geometry import straight
+from sim.mechanics.geometry import measure, straight
 from sim.model.body import Body
-from sim.solve.assembly import batch, row
-from sim.solve.grouping import NAMES, from_groups, group_width, in_groups, wanted_lanes
-from sim.solve.kernels import fill_residuals, solve_groups, solve_linear_in_groups
-from sim.solve.rates import FIRST_PHASE as FIRST_PHASE
+from sim.solve.assembly import batch
+from sim.solve.grouping import NAMES, body_in_lanes, from_groups, group_width, in_groups, wanted_lanes
+from sim.solve.linearise import linearise
+from sim.solve.newton import new_workspace, newton, solve_linear
+from sim.solve.rates import on_orbit
+from sim.solve.residual import fill_residual, new_scratch
 
 HEAD_SHARE = 0.3  # of the motor's speed, in the first guess
+_TOLERANCE = 1e-6  # of GMRES, for right-hand sides
 
 
 def straight_starts(rows: Floats, n: int, phases: int, tails: int) -> tuple[Floats, Floats]:
@@ -42,12 +48,6 @@ def straight_starts(rows: Floats, n: int, phases: int, tails: int) -> tuple[Floa
     u = np.zeros((len(rows), phases // tails, 4))
     u[:, :, 3] = -HEAD_SHARE * batch(rows).omega[:, None]
     return straight(n, phases, batch(rows).offset), u
-
-
-def straight_start(body: Body, n: int, phases: int, tails: int) -> tuple[Floats, Floats]:
-    """Guess x (n, M, 3) and u (P, 4) of one robot as `straight_starts` does."""
-    x, u = straight_starts(row(body), n, phases, tails)
-    return x[0], u[0]
 
 
 def solve_orbits_in_place(
@@ -65,14 +65,9 @@ def solve_orbits_in_place(
     """
     wanted = wanted_lanes(np.ones(len(rows), bool) if going is None else going)
     shapes, velocities, sizes = in_groups(x), in_groups(u), np.empty_like(wanted)
-    solve_groups(in_groups(rows), NAMES, shapes, velocities, tolerance, wanted, sizes, group_width())
+    _solve_groups(in_groups(rows), NAMES, shapes, velocities, tolerance, wanted, sizes, group_width())
     x[:], u[:] = from_groups(shapes, len(x)), from_groups(velocities, len(u))
     return from_groups(sizes, len(x))
-
-
-def solve_orbit(body: Body, x: Floats, u: Floats, tolerance: float) -> float:
-    """Improve the orbit x (n, M, 3), u (P, 4) of one robot in place, see `solve_orbits_in_place`."""
-    return float(solve_orbits_in_place(row(body), x[None], u[None], tolerance)[0])
 
 
 def residuals_on_orbits(rows: Floats, x: Floats, u: Floats) -> tuple[Floats, Floats, Floats]:
@@ -83,14 +78,8 @@ def residuals_on_orbits(rows: Floats, x: Floats, u: Floats) -> tuple[Floats, Flo
     """
     shapes, velocities, wanted = in_groups(x), in_groups(u), wanted_lanes(np.ones(len(x), bool))
     r, t, force = np.empty_like(shapes), np.empty_like(velocities), np.empty_like(wanted)
-    fill_residuals(in_groups(rows), NAMES, shapes, velocities, wanted, r, t, force, group_width())
+    _fill_residuals(in_groups(rows), NAMES, shapes, velocities, wanted, r, t, force, group_width())
     return from_groups(r, len(x)), from_groups(t, len(x)), from_groups(force, len(x))
-
-
-def residual_on_orbit(body: Body, x: Floats, u: Floats) -> tuple[Floats, Floats]:
-    """Compute the residual of one robot at x (n, M, 3), u (P, 4): r (n, M, 3) and t (P, 4)."""
-    r, t, _ = residuals_on_orbits(row(body), x[None], u[None])
-    return r[0], t[0]
 
 
 def solve_at_orbits(rows: Floats, x: Floats, u: Floats, r: Floats, t: Floats) -> tuple[Floats, Floats]:
@@ -104,14 +93,8 @@ def solve_at_orbits(rows: Floats, x: Floats, u: Floats, r: Floats, t: Floats) ->
         The solutions, of the same shapes.
     """
     dx, du, wanted = in_groups(r), in_groups(t), wanted_lanes(np.ones(len(x), bool))
-    solve_linear_in_groups(in_groups(rows), NAMES, in_groups(x), in_groups(u), wanted, dx, du, group_width())
+    _solve_linear_in_groups(in_groups(rows), NAMES, in_groups(x), in_groups(u), wanted, dx, du, group_width())
     return from_groups(dx, len(x)), from_groups(du, len(x))
-
-
-def solve_at_orbit(body: Body, x: Floats, u: Floats, r: Floats, t: Floats) -> tuple[Floats, Floats]:
-    """Solve as `solve_at_orbits` does for one robot, with right-hand sides (K, n, M, 3) and (K, P, 4)."""
-    dx, du = solve_at_orbits(row(body), x[None], u[None], r[None], t[None])
-    return dx[0], du[0]
 
 
 def mean_motion(body: Body, u: Floats) -> Floats:
@@ -144,3 +127,60 @@ def smallest_gaps(rows: Floats, x: Floats, tails: int) -> Floats:
     shapes = np.ascontiguousarray(np.moveaxis(fine.reshape(count, n, tails, phases // tails, 3), 3, 1))
     body = batch(rows)
     return contact.smallest_gaps(shapes, body.offset, body.tail_radius)
+
+
+@compiled_exactly
+def _solve_groups(
+    numbers: Floats, names: Any, x: Floats, u: Floats, tolerance: float, wanted: Floats, sizes: Floats, width: Any
+) -> None:
+    """Improve x (G, n, M, 3, W) and u (G, P, 4, W) in place.
+
+    Args:
+        numbers: of the robots, (G, K, W).
+        names: of the non-local effects.
+        wanted: 1 in the lanes that are wanted, (G, W).
+        sizes: of the last corrections, (G, W), filled.
+        width: of the groups, see `sim.lanes`.
+    """
+    given, shapes, velocities = lanes(numbers, width), lanes(x, width), lanes(u, width)
+    going, size = lanes(wanted, width), lanes(sizes, width)
+    rates = on_orbit(shapes[0])
+    work = new_workspace(rates, shapes[0], velocities[0])
+    for g in range(len(given)):
+        body = body_in_lanes(given[g], names)
+        size[g] = newton(body, rates, shapes[g], velocities[g], work, tolerance, going[g])[1]
+
+
+@compiled_exactly
+def _fill_residuals(
+    numbers: Floats, names: Any, x: Floats, u: Floats, wanted: Floats, r: Floats, t: Floats, force: Floats,
+    width: Any,
+) -> None:  # fmt: skip
+    """Fill r (G, n, M, 3, W), t (G, P, 4, W) and force (G, W) at x and u; arguments as in `_solve_groups`."""
+    given, shapes, velocities = lanes(numbers, width), lanes(x, width), lanes(u, width)
+    where, largest = lanes(wanted, width), lanes(force, width)
+    on_nodes, on_robots = lanes(r, width), lanes(t, width)
+    rates, scratch = on_orbit(shapes[0]), new_scratch(shapes[0], velocities[0])
+    for g in range(len(given)):
+        body = body_in_lanes(given[g], names)
+        fill_residual(body, rates, shapes[g], velocities[g], where[g], scratch, on_nodes[g], on_robots[g])
+        measure(scratch.geometry, shapes[g], body.offset, body.axial_stiffness)
+        largest[g] = largest_entry(scratch.geometry.force)
+
+
+@compiled_exactly
+def _solve_linear_in_groups(
+    numbers: Floats, names: Any, x: Floats, u: Floats, wanted: Floats, dx: Floats, du: Floats, width: Any
+) -> None:
+    """Solve in place for the right-hand sides dx (G, K, n, M, 3, W), du (G, K, P, 4, W); see `_solve_groups`."""
+    given, shapes, velocities = lanes(numbers, width), lanes(x, width), lanes(u, width)
+    going, changes, changes_of_robot = lanes(wanted, width), lanes(dx, width), lanes(du, width)
+    rates = on_orbit(shapes[0])
+    work = new_workspace(rates, shapes[0], velocities[0])
+    for g in range(len(given)):
+        body, at_x, at_u = body_in_lanes(given[g], names), shapes[g], velocities[g]
+        linearise(body, rates, at_x, at_u, work.scratch, work.equations)
+        for i in range(changes.shape[1]):
+            solve_linear(
+                body, rates, at_x, at_u, work, i == 0, _TOLERANCE, going[g], changes[g, i], changes_of_robot[g, i]
+            )

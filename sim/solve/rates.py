@@ -58,7 +58,7 @@ def in_transient(rate: Any, by_phase: Floats, start: Floats) -> Rates:
 
 
 @compiled_exactly
-def is_joined(rates: Rates) -> bool:
+def is_periodic(rates: Rates) -> bool:
     """Tell whether the columns are phases, joined to each other by ∂x/∂φ."""
     return rates.differentiation.shape[0] > 0
 
@@ -66,7 +66,7 @@ def is_joined(rates: Rates) -> bool:
 @compiled_exactly
 def base_phase(rates: Rates, body: Body, u: Floats) -> Any:
     """Return the phase of column 0, for velocities u (P, 4); column m is 2π m/M later."""
-    return rates.phase + (0.0 if is_joined(rates) else tail_spin(body, u[0]) / rates.rate)
+    return rates.phase + (0.0 if is_periodic(rates) else tail_spin(body, u[0]) / rates.rate)
 
 
 @compiled_exactly
@@ -82,7 +82,7 @@ def fill_rates(rates: Rates, body: Body, x: Floats, u: Floats, x_dot: Floats, by
     base = base_phase(rates, body, u)
     for m in range(columns):
         now = u[m % u.shape[0]]
-        if not is_joined(rates):  # ∂v/∂φ = ω_yr e_x × x − v_x e_y, ∂φ/∂ω_t = 1/rate
+        if not is_periodic(rates):  # ∂v/∂φ = ω_yr e_x × x − v_x e_y, ∂φ/∂ω_t = 1/rate
             motion = motion_at(body, now, base + 2 * np.pi * m / columns)
             for k in range(n):
                 position = vector(x, k, m)
@@ -105,4 +105,4 @@ def fill_rates(rates: Rates, body: Body, x: Floats, u: Floats, x_dot: Floats, by
 @compiled_exactly
 def phase_gain(rates: Rates, body: Body) -> Any:
     """Compute ∂φ/∂ω_h."""
-    return 0.0 if is_joined(rates) else motor_gain(body) / rates.rate
+    return 0.0 if is_periodic(rates) else motor_gain(body) / rates.rate

@@ -14,7 +14,7 @@ another one. Every result says whether the robot was solved, and if not, why. Le
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -41,7 +41,7 @@ FIRST = 1e-2  # limit of the last Newton correction on the fewest phases
 CORRECTION = 1e-6  # the same on the finest mesh; stretching is stiff: see BALANCED
 ROUGH = 1e-5  # the same on coarser meshes, where only the means are needed: their error is then about 1e-9
 BALANCED = 1e-5  # largest unbalanced force over the largest force in an edge
-FEW, MANY = 3, 12  # phases to begin with; MANY for derivatives, which may depend more on the phase than the motion
+PHASES, PHASES_FOR_SLOPES = 3, 12  # to begin with; derivatives may depend more on the phase
 PHASE_ERROR = 1e-4  # relative, in the means
 DOUBT = 0.03  # share of the extrapolation that counts as error
 _SHRINKS = 0.2  # assumed factor on the phase error with the next number of phases, if only one is known
@@ -58,7 +58,7 @@ _START, _SOFT = 1e-3, 0.05  # limit of the last Newton correction on the way, an
 class Orbit(NamedTuple):
     """One robot's orbit on the three MESHES: shapes x (n, M, 3) and velocities u (P, 4)."""
 
-    ended: int  # SOLVED or why not
+    status: int  # SOLVED or why not
     error: float  # estimated relative error of the means
     means: Floats  # (5,): ω_t, ω_h, ω_yr, v_x, v_z of the head's centre; NaN where not solved
     x: tuple[Floats, Floats, Floats]
@@ -68,7 +68,7 @@ class Orbit(NamedTuple):
 class Coarse(NamedTuple):
     """One robot's orbit on the coarsest mesh."""
 
-    ended: int  # SOLVED or why not
+    status: int  # SOLVED or why not
     error: float  # of the means, for its number of phases
     x: Floats  # (n, M, 3)
     u: Floats  # (P, 4)
@@ -84,7 +84,7 @@ class OnMesh(NamedTuple):
 
 @np.errstate(all="ignore")  # robots that overflow are flagged
 def refined_orbits(rows: Floats, tails: int, least: int) -> list[Orbit]:
-    """Solve for B robots with N tails, on `least` phases or more; `ended` says which could not be solved, and why.
+    """Solve for B robots with N tails, on `least` phases or more; `status` says which are not solved, and why.
 
     Args:
         rows: the robots' numbers (`sim.solve.assembly.numbers`), (B, K).
@@ -93,14 +93,20 @@ def refined_orbits(rows: Floats, tails: int, least: int) -> list[Orbit]:
     """
     coarse = coarse_orbits(rows, tails, least)
     orbits = [_unsolved(*one) for one in coarse]
-    solved = [i for i, one in enumerate(coarse) if one.ended == SOLVED]
+    solved = [i for i, one in enumerate(coarse) if one.status == SOLVED]
     for robots in by_kind(solved, lambda i: len(coarse[i].u)):
         for i, orbit in zip(robots, _on_finer_meshes(rows[robots], [coarse[i] for i in robots]), strict=True):
             orbits[i] = orbit
-    lost = [i for i, orbit in enumerate(orbits) if orbit.ended != SOLVED and rows[i, CONTACT] > _SOFTEST]
+    lost = [i for i, orbit in enumerate(orbits) if orbit.status != SOLVED and rows[i, CONTACT] > _SOFTEST]
     for i, found in zip(lost, _by_softer_contact(rows[lost], tails, least) if lost else [], strict=True):
         orbits[i] = found or orbits[i]
     return orbits
+
+
+def stacked(orbits: Iterable[Orbit], mesh: int) -> tuple[Floats, Floats]:
+    """Stack the shapes (B, n, M, 3) and velocities (B, P, 4) of B orbits with equal phases on a mesh, 0 to 2."""
+    x, u = zip(*((orbit.x[mesh], orbit.u[mesh]) for orbit in orbits), strict=True)
+    return np.stack(x), np.stack(u)
 
 
 def refined_orbit(body: Body, tails: int, least: int) -> Orbit:
@@ -108,8 +114,8 @@ def refined_orbit(body: Body, tails: int, least: int) -> Orbit:
     return refined_orbits(row(body), tails, least)[0]
 
 
-def _unsolved(ended: int, error: float, x: Floats, u: Floats) -> Orbit:
-    return Orbit(ended, np.nan, np.full(5, np.nan), (x, x, x), (u, u, u))
+def _unsolved(status: int, error: float, x: Floats, u: Floats) -> Orbit:
+    return Orbit(status, np.nan, np.full(5, np.nan), (x, x, x), (u, u, u))
 
 
 def _by_softer_contact(rows: Floats, tails: int, least: int) -> list[Orbit | None]:
@@ -118,17 +124,14 @@ def _by_softer_contact(rows: Floats, tails: int, least: int) -> list[Orbit | Non
     soft[:, CONTACT] /= _SOFTER
     starts = refined_orbits(soft, tails, least)
     orbits: list[Orbit | None] = [None] * len(rows)
-    solved = [i for i, orbit in enumerate(starts) if orbit.ended == SOLVED]
+    solved = [i for i, orbit in enumerate(starts) if orbit.status == SOLVED]
     for robots in by_kind(solved, lambda i: len(starts[i].u[0])):
         given, found = rows[robots], np.ones(len(robots), bool)
-        xs, us = ([np.stack(part) for part in zip(*((starts[i].x, starts[i].u)[k] for i in robots), strict=True)]
-                  for k in (0, 1))  # fmt: skip
+        xs, us = zip(*(stacked([starts[i] for i in robots], mesh) for mesh in range(len(MESHES))), strict=True)
         for x, u in zip(xs, us, strict=True):
             found &= _solved_forward(given, x, u, found)
-        means = np.stack([mean_motion(batch(given), u) for u in us])
-        limit = extrapolate(means)
-        error = difference(_limit_of_two(means[1], means[2]), limit)
-        error += DOUBT * difference(means[2], limit) + PHASE_ERROR
+        limit, error = _limit_and_error(batch(given), us)
+        error += PHASE_ERROR
         for at, i in enumerate(robots):
             if found[at]:
                 shapes, velocities = (tuple(part[at] for part in parts) for parts in (xs, us))
@@ -157,7 +160,7 @@ def orbits_on_mesh(
     """
     orbits: list[OnMesh | None] = [None] * len(rows)
     wanted = [len(one.u) for one in coarse] if instants is None else instants
-    solved = [i for i, one in enumerate(coarse) if one.ended == SOLVED]
+    solved = [i for i, one in enumerate(coarse) if one.status == SOLVED]
     for robots in by_kind(solved, lambda i: (len(coarse[i].u), wanted[i])):
         given, count = rows[robots], wanted[robots[0]]
         x = with_edges(np.stack([coarse[i].x for i in robots]), batch(given).offset, edges)
@@ -181,7 +184,7 @@ def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Flo
 
 
 @np.errstate(all="ignore")  # robots that overflow are flagged
-def coarse_orbits(rows: Floats, tails: int, least: int = FEW) -> list[Coarse]:
+def coarse_orbits(rows: Floats, tails: int, least: int = PHASES) -> list[Coarse]:
     """Solve for B robots on the coarsest mesh; arguments as of `refined_orbits`.
 
     The first solution is a rough one for the robots without non-local effects other than contact, on the fewest
@@ -203,9 +206,9 @@ def coarse_orbits(rows: Floats, tails: int, least: int = FEW) -> list[Coarse]:
     while len(going):
         new_x, new_u = with_phases(x, phases), with_phases(u, phases // tails)
         converged = solve_orbits_in_place(numbers[going], new_x, new_u, wanted) < wanted
-        ended = NO_START if solved < 1 else MANY_PHASES
+        status = NO_START if solved < 1 else MANY_PHASES
         for i in going[~converged]:
-            found[i] = found[i]._replace(ended=ended)
+            found[i] = found[i]._replace(status=status)
         solved += 1
         more = converged
         if solved == 0:
@@ -290,19 +293,24 @@ def _on_finer_meshes(rows: Floats, coarse: Sequence[Coarse]) -> list[Orbit]:
         if not unbalanced.any():
             break
         wanted *= 1e-3  # slow motors: all forces are small
-    ended: Integers = np.select(
+    status: Integers = np.select(
         [lost, unbalanced, ~turns_forward(body, u2)], [LOST, UNBALANCED, BACKWARDS], SOLVED
     )
-    means = np.stack([mean_motion(body, u) for u in (u0, u1, u2)])
-    limit = extrapolate(means)
-    error = np.array([one.error for one in coarse]) + difference(_limit_of_two(means[1], means[2]), limit)
-    error += DOUBT * difference(means[2], limit)
+    limit, error = _limit_and_error(body, (u0, u1, u2))
+    error += [one.error for one in coarse]
     return [
         Orbit(SOLVED, float(error[i]), limit[i], (x0[i], x1[i], x2[i]), (u0[i], u1[i], u2[i]))
-        if ended[i] == SOLVED
-        else _unsolved(int(ended[i]), np.nan, x2[i], u2[i])
+        if status[i] == SOLVED
+        else _unsolved(int(status[i]), np.nan, x2[i], u2[i])
         for i in range(len(rows))
     ]
+
+
+def _limit_and_error(robots: Body, velocities: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Extrapolate the means of orbits with velocities (B, P, 4) on each of MESHES, and estimate the error (B,)."""
+    means = np.stack([mean_motion(robots, u) for u in velocities])
+    limit, limit_of_two = extrapolate(means), means[2] + _MORE * (means[2] - means[1])
+    return limit, difference(limit_of_two, limit) + DOUBT * difference(means[2], limit)
 
 
 def _are_balanced(rows: Floats, x: Floats, u: Floats) -> Flags:
@@ -347,8 +355,3 @@ def difference(a: Floats, b: Floats) -> Any:
 def extrapolate(found: Floats) -> Floats:
     """Limit for n → ∞ of values on MESHES, (3, …), whose errors go as c₂/n² + c₄/n⁴."""
     return np.asarray(_OF_COARSE * found[0] + (_OF_MIDDLE * found[1] + _OF_FINE * found[2]))
-
-
-def _limit_of_two(middle: Floats, fine: Floats) -> Floats:
-    """Extrapolate from the two finer meshes, with c₂/n² alone."""
-    return fine + _MORE * (fine - middle)

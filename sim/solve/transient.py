@@ -30,11 +30,11 @@ from sim.lanes import choose, lane, lanes, larger, less, smaller, somewhere, wit
 from sim.linear.lane_arrays import add_chosen, choose_all, largest_entry, put_lane, take_lane
 from sim.linear.spectral import differentiation
 from sim.model.body import Body
+from sim.solve.grouping import body_in_lanes
 from sim.solve.lag import advance_lag, between, turning
+from sim.solve.march import GAMMA
 from sim.solve.newton import Workspace, correct, largest_move, move, new_workspace
 from sim.solve.rates import Rates, in_transient
-from sim.solve.robots_in_lanes import body_in_lanes
-from sim.solve.steps import GAMMA
 
 _MOST_STEPS = 400
 _CORRECTION = 1e-3  # of a node, in l: Newton's method stops below it

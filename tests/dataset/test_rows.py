@@ -31,7 +31,7 @@ def test_a_row_does_not_depend_on_its_batch(monkeypatch: pytest.MonkeyPatch) -> 
     def lose_slow_and_fast(rows: np.ndarray, *words: Any, **options: Any) -> Orbits:
         found = solve_orbits(rows, *words, **options)
         lost = (np.abs(rows[:, 0]) < 9) | (np.abs(rows[:, 0]) > 29)
-        found.ended[lost], found.means[lost] = LOST, np.nan
+        found.status[lost], found.means[lost] = LOST, np.nan
         return found
 
     solve_orbits = steady.solve_orbits

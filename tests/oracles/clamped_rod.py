@@ -60,7 +60,8 @@ class ClampedRod:
         before, after, _, length, weight = self.measured(x)
         cosine = sum(a * b for a, b in zip(before, after, strict=True))
         stretched = 0.5 * self.axial_stiffness * (length * self.edges - 1) ** 2 / self.edges
-        return (stretched + rod.bending_energy(cosine, weight)).sum(0)
+        bent = 2 * weight * (1 - cosine) / (1 + cosine)
+        return (stretched + bent).sum(0)
 
     def forces(self, x: Any, load: Load) -> Any:
         """Compute the elastic force and the load on each free node."""

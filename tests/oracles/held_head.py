@@ -18,7 +18,8 @@ from sim.arrays import Floats
 from sim.mechanics.drag import tail_coefficients
 from sim.model.groups import Groups
 from sim.solve.assembly import bodies
-from sim.solve.orbit import mean_motion, solve_orbit, straight_start
+from sim.solve.orbit import mean_motion
+from tests.sim.robots import solve_orbit, straight_start
 
 _HELD = 1e7  # resistance of a held head
 _EDGES = 32

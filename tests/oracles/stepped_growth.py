@@ -18,7 +18,8 @@ from sim.mechanics.balance import tail_spin
 from sim.model.body import Body
 from sim.motion.shapes import state_on_orbit
 from sim.solve.march import PHASE, State, advance
-from sim.solve.orbit import FIRST_PHASE, mean_motion
+from sim.solve.orbit import mean_motion
+from sim.solve.rates import FIRST_PHASE
 from sim.solve.refinement import MESHES, orbit_on_mesh
 
 _SIZE = 1e-6  # of the first difference, in l

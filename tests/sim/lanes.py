@@ -12,12 +12,11 @@ from sim.lanes import lanes
 from sim.linear.chains import Chains
 from sim.model.body import Body
 from sim.solve.assembly import row
-from sim.solve.grouping import NAMES, group_width, in_groups, wanted_lanes
+from sim.solve.grouping import NAMES, body_in_lanes, group_width, in_groups, wanted_lanes
 from sim.solve.linearise import linearise
 from sim.solve.newton import factor_and_solve, new_workspace, newton
 from sim.solve.rates import Rates
-from sim.solve.residual import fill_residual, new_room
-from sim.solve.robots_in_lanes import body_in_lanes
+from sim.solve.residual import fill_residual, new_scratch
 
 
 class Plain(NamedTuple):
@@ -35,7 +34,7 @@ def _stacked(*arrays: Floats) -> list[Floats]:
 
 
 def residual(body: Body, rates: Plain, x: Floats, u: Floats, noise: float = 0.0) -> tuple[Floats, Floats]:
-    """Compute r (n, M, 3) and t (P, 4); `noise` fills the room before."""
+    """Compute r (n, M, 3) and t (P, 4); `noise` fills the scratch arrays before."""
     r, t = _stacked(x, u)
     wanted = wanted_lanes(np.ones(1, bool))
     numbers, *parts = _stacked(row(body)[0], [rates.rate, rates.phase], rates.start, x, u)
@@ -50,12 +49,12 @@ def _fill(
 ) -> None:  # fmt: skip
     v, at_x, at_u, given = lanes(pair, width), lanes(x, width), lanes(u, width), lanes(wanted, width)
     rates = Rates(v[0], v[1], by_phase, lanes(start, width))
-    room = new_room(at_x, at_u)
-    for values in (room.around.flow, room.around.drag, room.x_dot, room.by_spin):
+    scratch = new_scratch(at_x, at_u)
+    for values in (scratch.around.flow, scratch.around.drag, scratch.x_dot, scratch.by_spin):
         values[:] = noise
-    room.around.moment[:], room.around.wrench[:] = noise, noise
+    scratch.around.moment[:], scratch.around.wrench[:] = noise, noise
     body = body_in_lanes(lanes(numbers, width), names)
-    fill_residual(body, rates, at_x, at_u, given[0], room, lanes(r, width), lanes(t, width))
+    fill_residual(body, rates, at_x, at_u, given[0], scratch, lanes(r, width), lanes(t, width))
 
 
 class Linear(NamedTuple):
@@ -89,7 +88,7 @@ def _linear(
     v, at_x, at_u = lanes(pair, width), lanes(x, width), lanes(u, width)
     rates = Rates(v[0], v[1], by_phase, lanes(start, width))
     body, work = body_in_lanes(lanes(numbers, width), names), new_workspace(rates, at_x, at_u)
-    linearise(body, rates, at_x, at_u, work.room, work.equations)
+    linearise(body, rates, at_x, at_u, work.scratch, work.equations)
     found = work.equations.chains
     for out, block in (
         (chains.diagonal, found.diagonal), (chains.lower, found.lower), (chains.upper, found.upper),

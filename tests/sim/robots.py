@@ -11,7 +11,7 @@ from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.motion.stability import growths, growths_on_mesh
 from sim.solve.assembly import bodies, row
-from sim.solve.orbit import residual_on_orbit, solve_orbit, straight_start
+from sim.solve.orbit import residuals_on_orbits, solve_orbits_in_place, straight_starts
 from sim.solve.refinement import MESHES, Orbit, extrapolate
 
 CONTROL_VALUES = PRESETS["paper-control"].group_values()
@@ -26,6 +26,23 @@ def control(count: int = 1, **changes: object) -> Groups:
 def first_body(groups: Groups) -> Body:
     """Assemble the first robot for the compiled loops."""
     return bodies(groups)[0]
+
+
+def straight_start(body: Body, n: int, phases: int, tails: int) -> tuple[np.ndarray, np.ndarray]:
+    """Guess x (n, M, 3) and u (P, 4) of one robot: straight tails."""
+    x, u = straight_starts(row(body), n, phases, tails)
+    return x[0], u[0]
+
+
+def solve_orbit(body: Body, x: np.ndarray, u: np.ndarray, tolerance: float) -> float:
+    """Improve the orbit x (n, M, 3), u (P, 4) of one robot in place; return the size of the last correction."""
+    return float(solve_orbits_in_place(row(body), x[None], u[None], tolerance)[0])
+
+
+def residual_on_orbit(body: Body, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the residual of one robot at x (n, M, 3), u (P, 4): r (n, M, 3) and t (P, 4)."""
+    r, t, _ = residuals_on_orbits(row(body), x[None], u[None])
+    return r[0], t[0]
 
 
 def growth(body: Body, tails: int, x: np.ndarray, u: np.ndarray) -> float:

@@ -9,11 +9,11 @@ import pytest
 
 from sim.mechanics.drag import tail_coefficients
 from sim.model.presets import PRESETS
-from sim.solve.fluid_forces import fluid_forces
 from sim.solve.march import advance, new_state
-from sim.solve.orbit import FIRST_PHASE, solve_orbit, straight_start
+from sim.solve.rates import FIRST_PHASE
+from sim.solve.residual import fluid_forces
 from tests.reference.cases import BEAM_K4, FILAMENT, FILAMENT_TIP, LINEAR_FILAMENT
-from tests.sim.robots import extrapolated_loads, held_filament, held_loads
+from tests.sim.robots import extrapolated_loads, held_filament, held_loads, solve_orbit, straight_start
 
 ROBOT = PRESETS["paper-control"]
 SLENDERNESS, OFFSET = ROBOT.tail_length / ROBOT.tail_radius, 0.016 / 0.11

@@ -11,8 +11,8 @@ from sim.mechanics.contact_line import CREEP, add_contact_line
 from sim.model.body import Body
 from sim.model.presets import CONTROL
 from sim.motion.steady import steady
-from sim.solve.orbit import FIRST_PHASE, residual_on_orbit, straight_start
-from tests.sim.robots import control, first_body
+from sim.solve.rates import FIRST_PHASE
+from tests.sim.robots import control, first_body, residual_on_orbit, straight_start
 
 EDGES, PHASES = 10, 4
 

@@ -16,7 +16,7 @@ from sim.model.sweepable import SLOPE_INPUTS, SLOPE_OUTPUTS
 from sim.motion.batches import run_batches, sensitivity_columns, split
 from sim.motion.sensitivity import sensitivities
 from sim.motion.steady import orbits
-from sim.solve.refinement import MANY
+from sim.solve.refinement import PHASES_FOR_SLOPES
 from tests.sim.robots import CONTROL_VALUES, control, sweep_points
 
 
@@ -66,7 +66,7 @@ LOCAL = {name: effect for name, effect in catalogue().items() if effect.reach ==
 
 
 def steady_values(groups: Groups) -> dict[str, np.ndarray]:
-    motion = orbits(groups, phases=MANY)
+    motion = orbits(groups, phases=PHASES_FOR_SLOPES)
     assert motion.converged.all()
     values = (motion.omega_t, motion.omega_h, motion.omega_yr, motion.v_x, motion.v_z, motion.turn_radius)
     return dict(zip(SLOPE_OUTPUTS, (*values, motion.slip_angle), strict=True))

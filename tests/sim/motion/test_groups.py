@@ -17,7 +17,7 @@ from sim.motion.response import mirrored, responses
 from sim.motion.stability import growths
 from sim.solve import grouping, refinement
 from sim.solve.assembly import Nonlocal, numbers
-from sim.solve.refinement import FEW, MANY, NO_START, refined_orbits
+from sim.solve.refinement import NO_START, PHASES, PHASES_FOR_SLOPES, refined_orbits
 from tests.sim.motion.test_stability import UNSTABLE
 from tests.sim.robots import control, sweep_points
 
@@ -36,7 +36,7 @@ def robots(tails: int, count: int) -> Groups:
 
 
 def orbits_of(rows: Floats, tails: int) -> Numbers:
-    return [(o.error, o.means, *o.x, *o.u) for o in refined_orbits(rows, tails, FEW)]
+    return [(o.error, o.means, *o.x, *o.u) for o in refined_orbits(rows, tails, PHASES)]
 
 
 def slopes_of(rows: Floats, tails: int) -> Numbers:
@@ -44,11 +44,13 @@ def slopes_of(rows: Floats, tails: int) -> Numbers:
     directions = np.zeros((len(rows), len(ALONG), rows.shape[1]))
     for k, number in enumerate(ALONG):
         directions[:, k, number] = rows[:, number]
-    return [(slopes,) for slopes in slopes_of_orbits(rows, directions, refined_orbits(rows, tails, MANY))]
+    return [
+        (slopes,) for slopes in slopes_of_orbits(rows, directions, refined_orbits(rows, tails, PHASES_FOR_SLOPES))
+    ]
 
 
 def growths_of(rows: Floats, tails: int) -> Numbers:
-    return [(growth,) for growth in growths(rows, tails, refined_orbits(rows, tails, FEW))]
+    return [(growth,) for growth in growths(rows, tails, refined_orbits(rows, tails, PHASES))]
 
 
 def flips_of(rows: Floats, tails: int, until: float = 1.0) -> list[Flip]:
@@ -109,7 +111,7 @@ def test_derivatives_agree_with_differences_of_solutions() -> None:
     found = slopes_of(rows, 3)
     for k, number in enumerate(ALONG):
         change = np.where(np.arange(rows.shape[1]) == number, step, 0.0) * rows
-        ends = [refined_orbits(rows + way * change, 3, MANY) for way in (-1, 1)]
+        ends = [refined_orbits(rows + way * change, 3, PHASES_FOR_SLOPES) for way in (-1, 1)]
         for i, (below, above) in enumerate(zip(*ends, strict=True)):
             slopes, difference = found[i][0], (above.means - below.means) / (2 * step)
             assert slopes[k] == pytest.approx(difference, rel=1e-4, abs=1e-5 * np.abs(slopes[k]).max())
@@ -121,7 +123,7 @@ def test_a_robot_that_cannot_be_solved_leaves_the_others_of_its_group_alone() ->
     broken = rows.copy()
     broken[4] = np.nan
     found = orbits_of(broken, 3)
-    assert refined_orbits(broken, 3, FEW)[4].ended == NO_START
+    assert refined_orbits(broken, 3, PHASES)[4].status == NO_START
     assert np.isnan(found[4][1]).all()
     assert all(agree(wanted[i], found[i]) for i in range(10) if i != 4)
     some: list[Any] = flips_of(rows, 3)
@@ -163,7 +165,7 @@ def test_robots_with_non_local_effects_are_solved_beside_the_others() -> None:
     rows = numbers(robots(3, 3))
     directions = np.zeros((3, 2, rows.shape[1]))
     directions[:, :, 0] = rows[:, :1]
-    solved = refined_orbits(rows, 3, MANY)
+    solved = refined_orbits(rows, 3, PHASES_FOR_SLOPES)
     wanted = slopes_of_orbits(rows, directions, solved)
     directions[1, 1] = 0.0
     directions[1, 1, rows.shape[1] - len(Nonlocal._fields) + Nonlocal._fields.index("tail_interaction")] = 1.0
@@ -177,8 +179,8 @@ def test_local_and_nonlocal_and_doubtful_robots_keep_their_places() -> None:
     """The growth of the robot that yaws fast is computed again; the curved one has a group of its own."""
     plain, curved, quick = control(1, N=6), control(1, N=6, natural_curvature=0.5), control(1, **UNSTABLE)
     rows = np.concatenate([numbers(groups) for groups in (quick, curved, plain, quick, plain)])
-    orbits = refined_orbits(rows, 6, FEW)
-    wanted = [growths(rows[[i]], 6, refined_orbits(rows[[i]], 6, FEW))[0] for i in range(len(rows))]
+    orbits = refined_orbits(rows, 6, PHASES)
+    wanted = [growths(rows[[i]], 6, refined_orbits(rows[[i]], 6, PHASES))[0] for i in range(len(rows))]
     assert wanted[0] > 0 > wanted[1] != wanted[2]
     assert growths(rows, 6, orbits) == pytest.approx(wanted, rel=1e-6)
     assert growths(rows[:0], 6, []).shape == (0,)
@@ -195,7 +197,7 @@ def test_a_group_may_hold_local_and_nonlocal_robots(monkeypatch: pytest.MonkeyPa
 def test_robots_with_nonlocal_effects_have_the_same_numbers_in_a_group_and_alone() -> None:
     """Their lanes take different numbers of products in GMRES, which leaves 1e-3 of a correction."""
     rows = numbers(control(5, omega_bar=np.linspace(8, 40, 5), tail_interaction=np.linspace(0.1, 1.0, 5)))
-    together = refined_orbits(rows, 2, FEW)
+    together = refined_orbits(rows, 2, PHASES)
     for i, orbit in enumerate(together):
-        alone = refined_orbits(rows[[i]], 2, FEW)[0]
+        alone = refined_orbits(rows[[i]], 2, PHASES)[0]
         assert orbit.means == pytest.approx(alone.means, rel=1e-6)

@@ -12,7 +12,7 @@ from sim.motion.stability import DOUBTFUL, growths_on_more_phases, is_doubtful
 from sim.motion.steady import orbits, steady
 from sim.motion.steady_motion import DIRECT, STABILITY_COLUMNS, STEPPING
 from sim.solve.assembly import row
-from sim.solve.refinement import FEW, SOLVED, Orbit, refined_orbit
+from sim.solve.refinement import PHASES, SOLVED, Orbit, refined_orbit
 from tests.oracles.stepped_growth import stepped_growth
 from tests.sim.robots import CONTROL_VALUES, control, first_body, growth, growth_of_orbit
 
@@ -34,8 +34,8 @@ SPURIOUS = {
 
 
 def orbit_of(robot: dict[str, float]) -> Orbit:
-    orbit = refined_orbit(first_body(control(**robot)), int(robot["N"]), FEW)
-    assert orbit.ended == SOLVED
+    orbit = refined_orbit(first_body(control(**robot)), int(robot["N"]), PHASES)
+    assert orbit.status == SOLVED
     return orbit
 
 
@@ -77,8 +77,8 @@ def test_phases_that_do_not_resolve_a_perturbation_do_not_make_a_motion_unstable
 def test_a_ring_of_tails_in_contact_is_unstable_above_a_speed(omega_bar: float, stable: bool) -> None:
     """Contact presses the five tails together; time steps with contact agree, on the mesh of the growth."""
     body = first_body(control(**PRESSED, omega_bar=omega_bar))
-    orbit = refined_orbit(body, 5, FEW)
-    assert orbit.ended == SOLVED
+    orbit = refined_orbit(body, 5, PHASES)
+    assert orbit.status == SOLVED
     found = growth_of_orbit(body, 5, orbit)
     assert (found < -0.2) if stable else (found > 0.2)
     assert found == pytest.approx(stepped_growth(body, 5, 4.0), abs=0.15)

@@ -87,7 +87,7 @@ def test_a_row_without_an_orbit_is_stepped_and_says_so(monkeypatch: pytest.Monke
 
     def lose_the_first(rows: np.ndarray, tails: int, *, phases: int, perturbed: Perturbed) -> Orbits:
         solution = solve_orbits(rows, tails, phases=phases, perturbed=perturbed)
-        solution.ended[0] = LOST
+        solution.status[0] = LOST
         solution.means[0] = np.nan
         return solution
 

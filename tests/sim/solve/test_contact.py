@@ -18,7 +18,7 @@ from sim.motion.sensitivity import sensitivities
 from sim.motion.settling import settle
 from sim.motion.steady import orbits
 from sim.solve.orbit import mean_motion
-from sim.solve.refinement import FEW, MANY, SOLVED, difference, orbit_on_mesh, refined_orbit
+from sim.solve.refinement import PHASES, PHASES_FOR_SLOPES, SOLVED, difference, orbit_on_mesh, refined_orbit
 from tests.sim.robots import control, first_body, growth
 
 MEANS = ("omega_t", "omega_h", "omega_yr", "v_x", "v_z")
@@ -60,8 +60,8 @@ def test_gaps_are_kept_to_two_per_cent(name: str) -> None:
     """Of the axes as smooth curves, over the whole revolution; without contact the tails overlap."""
     groups = ROBOTS[name]
     body = first_body(with_contact(groups))
-    plain, found = (refined_orbit(b, groups.N, FEW) for b in (first_body(groups), body))
-    assert plain.ended == found.ended == SOLVED
+    plain, found = (refined_orbit(b, groups.N, PHASES) for b in (first_body(groups), body))
+    assert plain.status == found.status == SOLVED
     assert true_gap(plain.x[2], body.offset, body.tail_radius, groups.N) < 0.9
     assert true_gap(found.x[2], body.offset, body.tail_radius, groups.N) == pytest.approx(1, abs=0.02)
     assert difference(found.means, plain.means) > 10 * found.error
@@ -81,7 +81,7 @@ def test_meshes_converge(name: str) -> None:
     assert away[1] < 0.6 * away[0]
     assert away[2] < 0.7 * away[1]
     assert away[2] < 0.01
-    found = refined_orbit(body, groups.N, FEW)
+    found = refined_orbit(body, groups.N, PHASES)
     assert difference(found.means, means[32]) < 2 * found.error + away[2] / 3
 
 
@@ -114,7 +114,7 @@ def test_time_steps_settle_to_the_orbit(name: str) -> None:
 def test_sensitivities_are_differences() -> None:
     def yaw(size: float, C_t: float) -> float:
         groups = replace(with_contact(ROBOTS["measured"], size), C_t=np.array([C_t]))
-        return float(orbits(groups, phases=MANY).omega_yr[0])
+        return float(orbits(groups, phases=PHASES_FOR_SLOPES).omega_yr[0])
 
     C_t, size, width = ROBOTS["measured"].C_t.item(), 0.3, 1e-3
     found = sensitivities(with_contact(ROBOTS["measured"], size), ("tail_contact", "C_t"))
@@ -126,7 +126,7 @@ def test_sensitivities_are_differences() -> None:
 def test_tails_that_push_a_little_keep_moving_alike_and_a_ring_of_five_stout_ones_buckles() -> None:
     def growth_of(groups: Groups) -> float:
         body = first_body(with_contact(groups))
-        found = refined_orbit(body, groups.N, FEW)
+        found = refined_orbit(body, groups.N, PHASES)
         return growth(body, groups.N, found.x[0], found.u[0])
 
     assert growth_of(control(N=2, omega_bar=25.0)) < -0.5

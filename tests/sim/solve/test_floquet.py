@@ -9,7 +9,8 @@ import scipy.linalg
 from sim.linear.spectral import differentiation, interpolation
 from sim.mechanics.balance import tail_spin
 from sim.model.body import Body
-from sim.solve.orbit import FIRST_PHASE, mean_motion
+from sim.solve.orbit import mean_motion
+from sim.solve.rates import FIRST_PHASE
 from sim.solve.refinement import SOLVED, refined_orbit
 from tests.sim import lanes
 from tests.sim.robots import control, first_body, growth
@@ -78,6 +79,6 @@ def test_growth_is_that_of_the_monodromy(robot: dict[str, float], steps: int) ->
     """On the coarsest mesh; the tails of the perturbed robot move differently."""
     tails, body = int(robot["N"]), first_body(control(**robot))
     orbit = refined_orbit(body, tails, 3)
-    assert orbit.ended == SOLVED
+    assert orbit.status == SOLVED
     x, u = orbit.x[0], orbit.u[0]
     assert growth(body, tails, x, u) == pytest.approx(monodromy_growth(body, tails, x, u, steps), rel=0.03)

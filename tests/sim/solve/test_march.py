@@ -8,10 +8,10 @@ import pytest
 from sim.mechanics.balance import motion_at
 from sim.model.body import Body
 from sim.motion.shapes import state_from_orbit
-from sim.solve.fluid_forces import fluid_forces
 from sim.solve.march import PHASE, TOLERANCE, State, advance, new_state
-from sim.solve.orbit import FIRST_PHASE
-from sim.solve.refinement import FEW, SOLVED, refined_orbit
+from sim.solve.rates import FIRST_PHASE
+from sim.solve.refinement import PHASES, SOLVED, refined_orbit
+from sim.solve.residual import fluid_forces
 from tests.oracles.clamped_rod import ClampedRod, dead_load
 from tests.sim.robots import CONTROL_VALUES, control, first_body
 
@@ -59,8 +59,8 @@ def test_all_forces_vanish_in_the_middle_of_a_transient(tails: int, omega: float
 @pytest.mark.parametrize("tails", [1, 2, 3, 5])
 def test_all_forces_vanish_on_an_orbit(tails: int) -> None:
     body = first_body(control(N=tails, omega_bar=-40.0, C_yr=5.0))
-    orbit = refined_orbit(body, tails, FEW)
-    assert orbit.ended == SOLVED
+    orbit = refined_orbit(body, tails, PHASES)
+    assert orbit.status == SOLVED
     on_node, on_robot = unbalanced(body, state_from_orbit(body, orbit.x[2], orbit.u[2], FIRST_PHASE))
     assert on_node < 1e-5
     assert on_robot < 1e-5

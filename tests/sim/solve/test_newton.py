@@ -13,11 +13,11 @@ import pytest
 from sim.effects import catalogue
 from sim.linear.spectral import differentiation
 from sim.model.body import Body
-from sim.solve.orbit import FIRST_PHASE, straight_start
+from sim.solve.rates import FIRST_PHASE
 from tests.sim import lanes
 from tests.sim.lanes import Plain, corrections, linear
 from tests.sim.linear.systems import dense_matrix, joined_matrix
-from tests.sim.robots import control, first_body
+from tests.sim.robots import control, first_body, straight_start
 
 Unknowns = tuple[np.ndarray, np.ndarray]
 

@@ -14,9 +14,9 @@ from sim.motion.resolution import Resolution
 from sim.motion.sensitivity import sensitivities
 from sim.motion.settling import settle
 from sim.motion.steady import orbits
-from sim.solve.orbit import mean_motion, solve_orbit
-from sim.solve.refinement import FEW, MANY, SOLVED, difference, refined_orbit, with_edges
-from tests.sim.robots import control, first_body, sweep_points
+from sim.solve.orbit import mean_motion
+from sim.solve.refinement import PHASES, PHASES_FOR_SLOPES, SOLVED, difference, refined_orbit, with_edges
+from tests.sim.robots import control, first_body, solve_orbit, sweep_points
 
 # Natural twist alone shows nothing (it needs natural splay beside it).
 NONLOCAL = tuple(e.name for e in catalogue().values() if e.reach == "nonlocal" and not e.beside)
@@ -39,7 +39,7 @@ def test_orbits_are_what_time_steps_settle_to(name: str) -> None:
 
 def yaw_rates(groups: Groups) -> np.ndarray:
     """Compute ω_yr on the phases that derivatives are taken on."""
-    return orbits(groups, phases=MANY).omega_yr
+    return orbits(groups, phases=PHASES_FOR_SLOPES).omega_yr
 
 
 # Friction has no derivative where it starts: its bounds end at its null.
@@ -73,8 +73,8 @@ def test_the_stated_error_covers_a_much_finer_mesh() -> None:
     for i in range(12):
         groups = Groups.from_columns({name: values[i : i + 1] for name, values in points.items()})
         body = first_body(groups)
-        orbit = refined_orbit(body, groups.N, FEW)
-        assert orbit.ended == SOLVED
+        orbit = refined_orbit(body, groups.N, PHASES)
+        assert orbit.status == SOLVED
         x, u = orbit.x[2], orbit.u[2]
         phases = 2 * x.shape[1]
         x, u = with_phases(x, phases), with_phases(u.reshape(1, -1, 4), phases // groups.N)[0]
