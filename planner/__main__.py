@@ -27,11 +27,13 @@ BAR_AFTER = 1.0  # s
 ROBOT = "--robot --vehicle"  # options that mean the same
 
 
-def _write(result: Plan | FleetPlan, out: str, *lines: str, **pictures: Any) -> None:
+def _write(result: Plan | FleetPlan, out: str, *lines: str, arduino: str | None = None, **pictures: Any) -> None:
     """Write a plan, and print warnings, what there is to say of it, and its files."""
+    from planner.files.arduino import write_arduino
     from planner.files.plan_files import write_plan
 
-    files = write_plan(result, out, **pictures)
+    library = [] if arduino is None else [write_arduino(result, arduino)]
+    files = [*write_plan(result, out, **pictures), *library]
     for warning in result.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     for line in (*result.lines(), *lines, f"-> {', '.join(map(str, files))}"):
@@ -59,7 +61,9 @@ def _progress_bar() -> Iterator[Callable[[float], object]]:
 
 
 @program.command("plan", of="planner.api:plan", robot=ROBOT)
-def _plan(path: str, *, robot: str, out: str, trade_off: bool = False, **given: Any) -> None:
+def _plan(
+    path: str, *, robot: str, out: str, trade_off: bool = False, arduino: str | None = None, **given: Any
+) -> None:
     """Plan the switching times for a path.
 
     Args:
@@ -76,7 +80,7 @@ def _plan(path: str, *, robot: str, out: str, trade_off: bool = False, **given: 
         in_lab(value, result.robot) for value in (errors.drawn_rms, errors.drawn_max, result.declared.missed)
     )
     drawn = f"from the path as drawn {rms} rms, {largest} at most; every drawn point is within {missed} of the "
-    _write(result, out, f"{drawn}declared path", pictures=pictures)
+    _write(result, out, f"{drawn}declared path", arduino=arduino, pictures=pictures)
 
 
 def _planned_by(word: str, given: Mapping[str, Any]) -> Plan:
@@ -88,7 +92,12 @@ def _planned_by(word: str, given: Mapping[str, Any]) -> Plan:
 
 @program.command("goal", of="planner.api:to_goal", robot=ROBOT)
 def _goal(
-    *, goal: tuple[str, str, str], start: tuple[str, str, str] = ("0", "0", "0"), out: str, **given: Any
+    *,
+    goal: tuple[str, str, str],
+    start: tuple[str, str, str] = ("0", "0", "0"),
+    out: str,
+    arduino: str | None = None,
+    **given: Any,
 ) -> None:
     """Plan the way from one pose to another, around obstacles; exit status 3 where there is none.
 
@@ -96,25 +105,25 @@ def _goal(
         goal: X Y DEGREES, of the head's centre at the end.
         start: X Y DEGREES, of the head's centre at the start, at rest (default: 0 0 0).
     """
-    _write(_planned_by("goal", {"start": start, "goal": goal, **given}), out)
+    _write(_planned_by("goal", {"start": start, "goal": goal, **given}), out, arduino=arduino)
 
 
 @program.command("tour", of="planner.api:tour", robot=ROBOT, back="return")
-def _tour(*, out: str, **given: Any) -> None:
+def _tour(*, out: str, arduino: str | None = None, **given: Any) -> None:
     """Visit places in the order that takes the robot the least time."""
-    _write(_planned_by("tour", given), out)
+    _write(_planned_by("tour", given), out, arduino=arduino)
 
 
 @program.command("cover", of="planner.api:cover", robot=ROBOT, width="--width", holes="hole")
-def _cover(*, out: str, **given: Any) -> None:
+def _cover(*, out: str, arduino: str | None = None, **given: Any) -> None:
     """Sweep a region with a camera, magnet or sampler under the robot."""
-    _write(_planned_by("cover", given), out)
+    _write(_planned_by("cover", given), out, arduino=arduino)
 
 
 @program.command("hold", of="planner.api:hold", robot=ROBOT, seconds="for")
-def _hold(*, out: str, **given: Any) -> None:
+def _hold(*, out: str, arduino: str | None = None, **given: Any) -> None:
     """Stay about a place, on the smallest orbit that the robot can keep."""
-    _write(_planned_by("hold", given), out)
+    _write(_planned_by("hold", given), out, arduino=arduino)
 
 
 @program.command("fleet")
@@ -230,7 +239,7 @@ def _page(*, out: str, paths: Sequence[str] = (), **given: Any) -> None:
 
 
 @program.command("replan", of="planner.api:replan", written_by="from")
-def _replan(plan: str, track: str, *, out: str, **given: Any) -> None:
+def _replan(plan: str, track: str, *, out: str, arduino: str | None = None, **given: Any) -> None:
     """Plan the rest of a saved plan from where a robot is now.
 
     Args:
@@ -240,7 +249,7 @@ def _replan(plan: str, track: str, *, out: str, **given: Any) -> None:
     """
     with naming(track):
         result = program.commands["replan"].call(plan=plan, track=_read_track(track, given), **given)
-    _write(result, out)
+    _write(result, out, arduino=arduino)
 
 
 def _read_track(track: str, given: dict[str, Any]) -> pd.DataFrame:

@@ -18,6 +18,7 @@ from planner.api import swim as swim
 from planner.api import to_goal as to_goal
 from planner.api import tour as tour
 from planner.api import write_page as write_page
+from planner.files.arduino import write_arduino as write_arduino
 from planner.files.plan_files import write_plan as write_plan
 from planner.files.saved_plan import load_goal as load_goal
 from planner.files.saved_plan import load_plan as load_plan

@@ -37,6 +37,7 @@ from sim.io.errors import InputError, run_command
 
 _HELP = {  # of parameters that no docstring describes
     "out": "folder",
+    "arduino": "DIR, an Arduino library with the schedule, and sketches that drive the motor",
     "robot": "robot.toml or the name of a preset",
     "plan": "plan.json",
     "data": "folder or URL of a data set",

@@ -1,0 +1,94 @@
+"""An Arduino library with the schedule of a plan and sketches that drive the motor; PlatformIO takes it, too.
+
+The code is that of `planner/c/arduino`: softflagella.h drives an H-bridge and follows the schedule. Sketches are
+the first test of the motor's sign, the schedule open loop, and the orders of a computer that tracks the robot.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from planner.files.headers import c_part, safe_name, schedule_header
+from planner.planning.plan import Plan
+from sim.io.errors import InputError
+from sim.io.files import files_together, write_text
+from sim.io.keywords import checks_keywords
+from sim.io.provenance import __version__
+
+if TYPE_CHECKING:
+    from planner.jobs.fleet_plan import FleetPlan
+
+_SKETCHES = ("first_turn", "open_loop", "tracked")
+_CODE = {
+    "src/softflagella.h": "softflagella.h",
+    **{f"examples/{name}/{name}.ino": f"{name}.ino" for name in _SKETCHES},
+}
+_FILES = ("library.properties", "src/schedule.h", *_CODE)
+
+
+@checks_keywords
+def write_arduino(result: Plan | FleetPlan, folder: str | Path) -> Path:
+    """Write an Arduino library with the schedule of a plan, all of it or nothing, and return its folder.
+
+    Args:
+        result: a plan; of a fleet, the plan of one robot.
+        folder: it is made if it is missing; a library that was written into it before is replaced.
+
+    Raises:
+        InputError: the plan is that of a fleet, a dwell is too short for whole milliseconds, or the folder holds
+            other files.
+
+    Example:
+        >>> import tempfile
+        >>> from softflagella import circle, plan, write_arduino
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     library = write_arduino(plan(circle(2.0), "paper-control"), folder)
+        ...     sorted(path.name for path in library.iterdir())
+        ['examples', 'library.properties', 'src']
+    """
+    if not isinstance(result, Plan):
+        raise InputError("a board drives one robot; give one plan of the fleet, such as result.plans[0]")
+    library = Path(folder)
+    _check(library)
+    contents = {
+        "library.properties": _properties(result),
+        "src/schedule.h": schedule_header(result, result.identity),
+        **{name: c_part(f"arduino/{code}") for name, code in _CODE.items()},
+    }
+    with files_together(library, _FILES) as temporary:
+        for name, text in contents.items():
+            (temporary / name).parent.mkdir(parents=True, exist_ok=True)
+            write_text(temporary / name, text)
+    return library
+
+
+def _check(folder: Path) -> None:
+    """Refuse a folder with files that are no such library.
+
+    Raises:
+        InputError: it has other files, one of which the message names, or it is a file.
+    """
+    files = sorted(path for path in folder.rglob("*") if not path.is_dir()) if folder.is_dir() else []
+    other = next((path for path in files if path.relative_to(folder).as_posix() not in _FILES), None)
+    if other is not None:
+        raise InputError(
+            f"{folder} has other files, such as {other.relative_to(folder)}; give a folder of its own"
+        )
+
+
+def _properties(result: Plan) -> str:
+    """Write library.properties; PlatformIO reads it, too."""
+    lines = {
+        "name": "softflagella plan",
+        "version": __version__,
+        "author": "softflagella",
+        "maintainer": "softflagella",
+        "sentence": f"Plan {result.identity} of the robot {safe_name(result)}.",
+        "paragraph": "The schedule of a soft flagellated robot's motor, and sketches that follow it.",
+        "category": "Device Control",
+        "url": "https://arxiv.org/abs/2103.05712",
+        "architectures": "*",
+        "includes": "softflagella.h",
+    }
+    return "".join(f"{key}={value}\n" for key, value in lines.items())
