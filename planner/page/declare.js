@@ -10,7 +10,7 @@ import { CORNER, extent, fillet, kinks, largestFillet, pathLength, polyline, sca
 import { reference, twoSided } from "./reference.js";
 import { inLab, placeInLab } from "./units.js";
 import { pivotRadius, turnRadius } from "./vehicle.js";
-import { DECLARING, REMEDY, InputError, fixed, general, quoted, tell } from "./words.js";
+import { DECLARING, REMEDY, InputError, fixed, general, quoted } from "./words.js";
 
 const { AS_DRAWN, ROOMS, TIGHTEST, LOST, ROUNDED, SMALL, NOISY, FEWEST_POSES, FILLET_ROOM } = CONSTANTS.feasible;
 const { SPACING, MOST_POINTS, MINIMAX, ROUNDING, POINTS_A_POSE } = CONSTANTS.feasible;
@@ -53,7 +53,7 @@ function changed(raw, feasibility, way, progress = null) {
   else if (pathLength(raw) < FEWEST_POSES * poseSpacing(raw, radius)) return null;
   else {
     path = nearestPath(raw, Math.max(rod, 0), radius, {
-      drift, minimax: corner === "minimax", timeWeight, progress: (share) => tell(progress, DECLARING, share),
+      drift, minimax: corner === "minimax", timeWeight, progress: (share) => progress?.(DECLARING, share),
     });
   }
   return acceptedReference(raw, reference(path, rod, spacingOf(path), drift), feasibility);
@@ -161,11 +161,9 @@ function tooTight(raw, feasibility, progress) {
   const { robot, vehicle, rod, drift } = feasibility, drawn = reference(raw, rod, spacingOf(raw), drift);
   const curvature = drawn.curvature.map(Math.abs), worst = placeOfLargest(curvature);
   const within = inLab(pivotRadius(vehicle) / TIGHTEST, robot), circle = inLab(turnRadius(vehicle), robot);
-  return (
-    `path too tight at ${placeInLab(...drawn.p[worst], robot)}: the pivot would turn with radius ` +
-    `${inLab(1 / curvature[worst], robot)}, the robot can with ${within}; its circle has radius ${circle}, and ` +
-    `the nearest path that it can follow has lost the shape; ${remedy(raw, feasibility, progress)}`
-  );
+  return `path too tight at ${placeInLab(...drawn.p[worst], robot)}: the pivot would turn with radius `
+    + `${inLab(1 / curvature[worst], robot)}, the robot can with ${within}; its circle has radius ${circle}, and `
+    + `the nearest path that it can follow has lost the shape; ${remedy(raw, feasibility, progress)}`;
 }
 
 /* Say what helps a path that is too tight. */
@@ -177,22 +175,16 @@ function remedy(raw, feasibility, progress = null) {
     if (smooth === null) {
       return "it looks noisy, and no smoothing was found that keeps its shape: draw it with less noise";
     }
-    return (
-      `it looks noisy: smoothed over ${inLab(smooth.length, robot)} it is ` +
-      `${inLab(pathLength(smooth.path), robot)} long, not ${inLab(pathLength(raw), robot)}, and moves by up to ` +
-      `${inLab(smooth.moved, robot)}; give --smooth ${general(smooth.length)}l`
-    );
+    return `it looks noisy: smoothed over ${inLab(smooth.length, robot)} it is `
+      + `${inLab(pathLength(smooth.path), robot)} long, not ${inLab(pathLength(raw), robot)}, and moves by up to `
+      + `${inLab(smooth.moved, robot)}; give --smooth ${general(smooth.length)}l`;
   }
   const scale = search.scale(raw);
   if (scale !== null) return `scale the path by ${general(scale, 3)}`;
   const smooth = search.smoothing(raw, FIRST * turnRadius(feasibility.vehicle));
-  if (smooth === null) {
-    return "draw it with wider turns: neither a larger scale nor smoothing was found to help";
-  }
-  return (
-    `smooth it over ${inLab(smooth.length, robot)}, which moves it by up to ${inLab(smooth.moved, robot)}: give ` +
-    `--smooth ${general(smooth.length)}l`
-  );
+  if (smooth === null) return "draw it with wider turns: neither a larger scale nor smoothing was found to help";
+  return `smooth it over ${inLab(smooth.length, robot)}, which moves it by up to ${inLab(smooth.moved, robot)}: give `
+    + `--smooth ${general(smooth.length)}l`;
 }
 
 /* A search whose work is bounded. */
@@ -200,7 +192,7 @@ class Search {
   constructor(feasibility, progress) {
     this.feasibility = feasibility;
     this.work = 0;
-    this.tell = () => tell(progress, REMEDY, this.work / MOST_WORK);
+    this.tell = () => progress?.(REMEDY, this.work / MOST_WORK);
     // the path as drawn (null), and every other way to change it, the cheapest first
     this.ways = [null, ...waysOf(feasibility).toReversed().filter((_, i) => i % 2 === 0)];
   }

@@ -5,7 +5,7 @@
 import { CONSTANTS } from "./constants.js";
 import { clip, column, compose, inversePose } from "./math.js";
 import { motionAfter, pivotDistance, pivotRadius, sideOf, speedOf, turnRadius, zigzag } from "./vehicle.js";
-import { FOLLOWING, InputError, general, tell } from "./words.js";
+import { FOLLOWING, InputError, general } from "./words.js";
 
 const { EXACT, LARGEST_STEP, TURNS, MOST_BIAS, HALVINGS, MOST_LOOKS } = CONSTANTS.line_of_sight;
 const { MOST_SWITCHES, PATIENCE, EVERY } = CONSTANTS.line_of_sight;
@@ -165,7 +165,7 @@ function follow(reference, vehicle, guidance, offset = 0, progress = null) {
     if (dwells.length >= MOST_SWITCHES) {
       throw new InputError(`the path needs more than ${MOST_SWITCHES} switches; split it`);
     }
-    if (dwells.length % EVERY === 0) tell(progress, FOLLOWING, law.place / reference.q.length);
+    if (dwells.length % EVERY === 0) progress?.(FOLLOWING, law.place / reference.q.length);
   }
 }
 

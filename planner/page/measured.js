@@ -41,8 +41,10 @@ function measurementsOf(given, where) {
     const near = closeMatch(name, RUN_COLUMNS);
     if (near) throw new InputError(`unknown column ${quoted(name)}: is it '${near}'? rename or drop it`);
   }
-  const empty = emptyColumns(whole).filter((name) => ![...INPUTS, ...unknown].includes(name));
-  const table = without(whole, empty);
+  const hasNone = (i) => whole.texts[i].every((text) => ["", "nan"].includes(text.trim()));
+  const empty = whole.names.filter((name, i) => hasNone(i) && ![...INPUTS, ...unknown].includes(name));
+  const kept = (values) => values.filter((_, i) => !empty.includes(whole.names[i]));
+  const table = { names: kept(whole.names), columns: kept(whole.columns), texts: kept(whole.texts), lines: whole.lines };
   const outputs = Object.keys(OUTPUTS).filter((name) => table.names.includes(OUTPUTS[name].column));
   if (outputs.length < 2 || !outputs.some((name) => PLANAR.includes(name))) {
     throw new InputError(
@@ -73,16 +75,6 @@ function measurementsOf(given, where) {
     outputs, columns, usable, repeats, names: table.names, sessions: [...new Set(names)].sort(),
     converted: [...first.notes, ...notes], excluded,
   };
-}
-
-/* Names of columns that have nothing but missing values and blanks. */
-function emptyColumns({ names, texts }) {
-  return names.filter((_, i) => texts[i].every((text) => text.trim() === "" || text === "nan"));
-}
-
-function without({ names, columns, texts, lines }, left) {
-  const kept = (values) => values.filter((_, i) => !left.includes(names[i]));
-  return { names: kept(names), columns: kept(columns), texts: kept(texts), lines };
 }
 
 /* Name a row by its number and by its line in the file. */
@@ -216,9 +208,7 @@ const FARTHEST = 1e6; // l, of a place; time units, of a time
 const COLUMNS = ["time_bar", "x_over_l", "y_over_l", "heading_rad"];
 const LAB = ["time_s", "x_cm", "y_cm", "heading_deg"]; // or in other units
 const ALIKE = 1e-3; // of a place and of the tail length, largest difference of the same place in cm and in l
-const HOW = {
-  none: "", time: "its first time is 0", rigid: "its first pose is that of the plan, its first time 0",
-};
+const HOW = { none: "", time: "its first time is 0", rigid: "its first pose is that of the plan, its first time 0" };
 
 /* Compare a track with a plan, as measured ("none"), from time 0 ("time"), or laid on the plan's start ("rigid").
  *

@@ -59,18 +59,17 @@ function poseSpacing(raw, radius) {
 
 /* Begin with poses along the target, headings smoothed over a pivot distance; and the turn of a lap. */
 function firstPoses(target, pivotDistance, closed) {
-  const count = target.length, moves = [];
-  for (let i = 0; i < (closed ? count : count - 1); i++) {
-    const next = target[(i + 1) % count];
-    moves.push([next[0] - target[i][0], next[1] - target[i][1]]);
-  }
+  const count = target.length, moves = Array.from({ length: closed ? count : count - 1 }, (_, i) => {
+    return [0, 1].map((axis) => target[(i + 1) % count][axis] - target[i][axis]);
+  });
   const length = moves.map(([x, y]) => Math.hypot(x, y)), least = 1e-9 * largest(length);
   const going = Array.from(moves.keys()).filter((i) => length[i] > least);
   const known = unwrap(going.map((i) => Math.atan2(moves[i][1], moves[i][0])));
   const first = known[0], last = known[known.length - 1];
   const turn = closed ? last - first + halfTurn(first - last) : null;
   const tangent = interp(Array.from(target.keys()), going, known);
-  const reach = smoothingReach(pivotDistance, mean(going.map((i) => length[i])), count);
+  const smoothed = Math.trunc((0.5 * pivotDistance) / mean(going.map((i) => length[i]))); // neighbours to each side
+  const reach = clip(smoothed, 1, Math.max(count >> 1, 1));
   const early = (i) => (closed ? tangent[count - reach + i] - turn : tangent[0]);
   const late = (i) => (closed ? tangent[i] + turn : tangent[count - 1]);
   const around = Float64Array.from({ length: count + 2 * reach }, (_, i) => {
@@ -82,11 +81,6 @@ function firstPoses(target, pivotDistance, closed) {
   const x = column(target, 0).map((value, i) => value - pivotDistance * Math.cos(heading[i]));
   const y = column(target, 1).map((value, i) => value - pivotDistance * Math.sin(heading[i]));
   return { poses: { x, y, heading }, turn };
-}
-
-/* The number of neighbours to each side over which headings are smoothed. */
-function smoothingReach(pivotDistance, spacing, count) {
-  return clip(Math.trunc((0.5 * pivotDistance) / spacing), 1, Math.max(count >> 1, 1));
 }
 
 /* Unit vectors along the path, times the weight of such distances, and across it. */
@@ -153,11 +147,8 @@ function stepped({ x, y, heading }, step, place) {
 
 /* Repeat the first pose of a lap at its end. */
 function wholeLap({ x, y, heading }, turn) {
-  return {
-    x: Float64Array.from([...x, x[0]]),
-    y: Float64Array.from([...y, y[0]]),
-    heading: Float64Array.from([...heading, heading[0] + turn]),
-  };
+  const whole = (values, more) => Float64Array.from([...values, values[0] + more]);
+  return { x: whole(x, 0), y: whole(y, 0), heading: whole(heading, turn) };
 }
 
 /* The linearised least squares: {cost, band, right, width}.

@@ -221,35 +221,29 @@ function trackerHeader(plan, id, template) {
   const row = (values) => `{${Array.from(values, repr).join(", ")}}`;
   const table = (values, write = String) => `{\n${linesOf(Array.from(values, write)).join(",\n")}}`;
   const nine = (value) => general(value, 9);
+  const numbers = {
+    TIME_SCALE: robot.timeScale, TAIL_LENGTH_M: robot.tailLength, SHORTEST: guidance.dwell, AHEAD: guidance.ahead,
+    ROD: rodOf(tracked), OFFSET: tracked.offset, LAP_TURN: 0, SWING: guidance.swing, PIVOT_RADIUS: radius,
+    NET_SPEED: straight.speed, NET_DRIFT: straight.drift, PIVOT_DISTANCE: pivotDistance(vehicle),
+    WAY_AHEAD: lookAhead(vehicle, 0, straight),
+    LIMIT: Math.max(NEAR * radius, ERRORS * errors.predictedMax), // up to which the line of sight leads back
+  };
   const parts = {
+    ...Object.fromEntries(Object.entries(numbers).map(([name, value]) => [name, repr(value)])),
     IDENTITY: id, NAME: safeName(robot), MODEL: model, BYTES: 2 * lags + 12 * q.length,
     FIRST_DIRECTION: switches.firstDirection, POINTS: q.length, LAP: 0, TIMES: COUNT,
     STRIDE: Math.max(Math.round((STRIDE * radius) / Math.max(spacing, 1e-9)), 1), // points from one target to the next
-    ...mapped({
-      TIME_SCALE: robot.timeScale, TAIL_LENGTH_M: robot.tailLength, SHORTEST: guidance.dwell, AHEAD: guidance.ahead,
-      ROD: rodOf(tracked), OFFSET: tracked.offset, LAP_TURN: 0, SWING: guidance.swing, PIVOT_RADIUS: radius,
-      NET_SPEED: straight.speed, NET_DRIFT: straight.drift, PIVOT_DISTANCE: pivotDistance(vehicle),
-      WAY_AHEAD: lookAhead(vehicle, 0, straight),
-      LIMIT: Math.max(NEAR * radius, ERRORS * errors.predictedMax), // up to which the line of sight leads back
-    }, repr),
     start: row(switches.poses[0]),
     twist: `{${vehicle.twist.map(row).join(", ")}}`,
     current: row(vehicle.current),
     most: row([...MOST, current, current, ...MOST_MARKER]),
     lag_unit: row(unit),
     prior: table(prior(plan).flat(), repr),
-    path_x: table(q.map(([x]) => x), nine),
-    path_y: table(q.map(([, y]) => y), nine),
-    path_heading: table(heading, nine),
+    path_x: table(q.map(([x]) => x), nine), path_y: table(q.map(([, y]) => y), nine), path_heading: table(heading, nine),
     rest: table(vehicle.rest.flatMap(inUnits)),
-    lag_left: table(inUnits(vehicle.lag[0])),
-    lag_right: table(inUnits(vehicle.lag[1])),
+    lag_left: table(inUnits(vehicle.lag[0])), lag_right: table(inUnits(vehicle.lag[1])),
   };
   return filled(template, parts);
-}
-
-function mapped(values, write) {
-  return Object.fromEntries(Object.entries(values).map(([name, value]) => [name, write(value)]));
 }
 
 /* The units of the lags, forward, left and heading. */

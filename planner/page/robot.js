@@ -30,8 +30,7 @@ function makeRobot(fields) {
   for (const [name, field] of Object.entries({ ...POSITIVE, disc_offset: "discOffset", C_yr: "C_yr" })) {
     const value = robot[field];
     if (name === "disc_offset" && value === null) continue;
-    const finite = Math.abs(value) < Number.MAX_VALUE;
-    if (!finite) throw new InputError(`${name} = ${repr(value)}; it must be a finite number`);
+    if (!(Math.abs(value) < Number.MAX_VALUE)) throw new InputError(`${name} = ${repr(value)}; it must be a finite number`);
     if (name !== "C_yr" && value <= 0) throw new InputError(`${name} = ${general(value)}; it must be above 0`);
   }
   if (!(ratio > LEAST_SLENDERNESS)) {
@@ -173,17 +172,12 @@ function keyOf({ quantity, unit }, other = unit) {
 /* Say what is wrong with a key, and name what may be meant. */
 function unknown(table, key) {
   const { quantity } = splitName(key.endsWith(SIGMA) ? key.slice(0, -SIGMA.length) : key);
-  const entries = ENTRIES.filter((entry) => entry.table === table);
+  const entries = ENTRIES.filter((entry) => entry.table === table), tables = new Set(ENTRIES.map((entry) => entry.table));
   const near = closeMatch(quantity, entries.map((entry) => entry.quantity));
-  if (!entries.length) {
-    const tables = new Set(ENTRIES.map((entry) => entry.table));
-    return `unknown entry [${table}] ${key}; a robot has [${[...tables].join("], [")}]`;
-  }
-  if (near && near !== quantity) {
-    return `unknown entry [${table}] ${key}; is it ${keyOf(entries.find((entry) => entry.quantity === near))}?`;
-  }
-  return `unknown entry [${table}] ${key}; [${table}] has ${entries.map((entry) => keyOf(entry)).join(", ")}, in any `
-    + "usual unit";
+  const advice = !entries.length ? `a robot has [${[...tables].join("], [")}]`
+    : near && near !== quantity ? `is it ${keyOf(entries.find((entry) => entry.quantity === near))}?`
+    : `[${table}] has ${entries.map((entry) => keyOf(entry)).join(", ")}, in any usual unit`;
+  return `unknown entry [${table}] ${key}; ${advice}`;
 }
 
 /* Convert a number of the file to SI units. */

@@ -17,9 +17,7 @@ const IMPORTANT = /\s*!\s*important$/i;
 /* Read the rules that declare one of the `known` properties, the weakest first. */
 function readStyleSheet(text, known) {
   const bare = text.replace(COMMENT, "").replace(NO_RULE, ""), rest = bare.replace(RULE, "").trim(), rules = [];
-  if (rest) {
-    throw new InputError(`<style> is not read from ${quoted(rest.slice(0, 30))} on; write attributes instead`);
-  }
+  if (rest) throw new InputError(`<style> is not read from ${quoted(rest.slice(0, 30))} on; write attributes instead`);
   for (const [, selectors, body] of bare.matchAll(RULE)) {
     const given = Object.fromEntries(Object.entries(declarations(body)).filter(([name]) => known.has(name)));
     if (!Object.keys(given).length) continue;
@@ -44,9 +42,8 @@ function declared(rules, kind, attributes) {
   const classes = (attributes.class ?? "").split(/\s+/).map((name) => `.${name}`);
   const own = new Set([...classes, `#${attributes.id}`]), found = {};
   for (const rule of rules) {
-    if (["", "*", kind].includes(rule.kind) && rule.names.every((name) => own.has(name))) {
-      Object.assign(found, rule.given);
-    }
+    const applies = ["", "*", kind].includes(rule.kind) && rule.names.every((name) => own.has(name));
+    if (applies) Object.assign(found, rule.given);
   }
   return found;
 }
@@ -68,14 +65,8 @@ const VISIBLE = { visible: true, hidden: false, collapse: false };
 const SIZE = ["width", "height"];
 const AROUND = { matrix: [1, 0, 0, 1, 0, 0], view: [null, null], visible: true, unread: "", clips: [] };
 
-/* Find the shapes of a drawing, and whether its pixels have a size: {shapes, physical}. */
-function readTree(root) {
-  const reader = new TreeReader(root);
-  reader.walk(root, AROUND, null);
-  return { shapes: reader.shapes, physical: reader.lengths.physical };
-}
-
-class TreeReader {
+/* The shapes of a drawing, and the lengths that it was read with, which tell whether its pixels have a size. */
+class Drawing {
   constructor(root) {
     const styles = [];
     this.lengths = new Lengths();
@@ -91,6 +82,7 @@ class TreeReader {
     }
     const known = [...NAMES.read, ...Object.keys(NAMES.lengths), ...Object.keys(NAMES.unread)];
     this.rules = readStyleSheet(styles.join("\n"), new Set(known));
+    this.walk(root, AROUND, null);
   }
 
   /* Find the shapes of an element; used: width and height of the <use> that shows it. */
@@ -183,9 +175,7 @@ class TreeReader {
     const straight = segments.every(({ at }) => at === null);
     const axes = [0, 1].map((axis) => [...new Set(corners.map((point) => point[axis]))].sort((a, b) => a - b));
     const four = new Set(corners.map(String)).size === 4;
-    if (!four || axes.some(({ length }) => length !== 2) || !upright || !straight) {
-      return null;
-    }
+    if (!four || axes.some(({ length }) => length !== 2) || !upright || !straight) return null;
     const [low, high] = [0, 1].map((i) => axes.map((axis) => axis[i]));
     return inner.unread || flat(inner.matrix) ? null : { name: "clip-path", matrix: inner.matrix, low, high };
   }
@@ -275,14 +265,14 @@ const MOST_POINTS = 200_000;
  * name. */
 function readDrawing(root, where) {
   if (kindOf(root) !== "svg") throw new InputError(`${where} is not SVG: it begins with <${kindOf(root)}>`);
-  const { shapes, physical } = naming(where, () => readTree(root)), paths = naming(where, () => namedPaths(shapes));
+  const { shapes, lengths } = naming(where, () => new Drawing(root)), paths = naming(where, () => namedPaths(shapes));
   if (!paths.size) {
     throw new InputError(`${where} has no path, line, polyline, polygon, rectangle, circle or ellipse; draw one`);
   }
   const upright = Array.from(paths, ([name, { points, ends }]) => {
     return { ...naming(where, () => pathOf(points.map(([x, y]) => [x + 0, -y + 0]), ends || null)), name };
   });
-  return { paths: upright, unit: physical ? METRES_PER_PIXEL : null };
+  return { paths: upright, unit: lengths.physical ? METRES_PER_PIXEL : null };
 }
 
 /* Points of every subpath by name. */

@@ -132,9 +132,7 @@ class Lengths {
     if (unit === "%" && !view.includes(null)) {
       return (Number(found[1]) * [...view, Math.hypot(...view) / Math.SQRT2][NAMES.lengths[name]]) / 100;
     }
-    if (!found || !(unit in NAMES.pixels)) {
-      unread(own, name, "give a number, with mm, cm, in, pt, pc, px or without");
-    }
+    if (!found || !(unit in NAMES.pixels)) unread(own, name, "give a number, with mm, cm, in, pt, pc, px or without");
     if (unit !== "" && unit !== "px") {
       if (!this.sized) {
         const words = `in a drawing without a size; give its <svg> a width in ${unit}`;

@@ -101,7 +101,8 @@ function tableErrorModes({ curveErrors, intervals, ...table }, robot) {
   const found = motionOf(table, robot), { head, tails, motion } = found, speeds = curveSpeeds(head, motion);
   const answer = steadyOutputs(table, head, tails, motion), features = widthFeatures(table, found);
   const steady = STEADY.map((name, i) => {
-    const size = errorScale(name, answer), half = halfWidth(intervals, name, features, size) / NORMAL_90;
+    const size = RELATIVE.includes(name) ? Math.abs(answer[name]) : Math.hypot(answer.v_x, answer.v_z);
+    const half = halfWidth(intervals, name, features, size) / NORMAL_90;
     const sigma = Math.hypot(half, curveErrors.simulator * size);
     return { twist: STEADY.map((_, k) => (k === i ? sigma : 0)), lag: null, memory: null };
   });
@@ -127,11 +128,6 @@ function widthFeatures(table, { head, tails, motion, inputs, own }) {
   const away = novelty(table.support[kind], own);
   const more = [Math.log(away + 1e-12), Math.log(spread + 1e-9), Math.log(tails.number), kind === 0 ? 1 : 0];
   return [...inputs, ...more].map((value) => (Number.isNaN(value) ? 0 : value));
-}
-
-/* The size that errors of a steady output are relative to. */
-function errorScale(name, answer) {
-  return RELATIVE.includes(name) ? Math.abs(answer[name]) : Math.hypot(answer.v_x, answer.v_z);
 }
 
 /* Half of the width of the interval of an output.

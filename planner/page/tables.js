@@ -3,7 +3,7 @@
 import { CONSTANTS } from "./constants.js";
 import { pathOf } from "./path.js";
 import { findUnit, splitName, timesOf, toSi } from "./units.js";
-import { InputError, naming, quoted, repr, whole } from "./words.js";
+import { InputError, naming, quoted, refusing, repr, whole } from "./words.js";
 
 const { NUMBER, MISSING, COMMA, POINT, THOUSANDS, WHOLE_LINE, THREE, OTHER, FORMULA } = CONSTANTS.number_words;
 const { COMMENT, MARKED_NUMBER, BLANKS, SEPARATORS } = CONSTANTS.tables;
@@ -151,9 +151,7 @@ function decoded(bytes, where) {
     }
     text = new TextDecoder("windows-1252").decode(bytes);
   }
-  if (text.includes("\0")) {
-    throw new InputError(`${where} is no text; give a table as text, .xlsx or .parquet`);
-  }
+  if (text.includes("\0")) throw new InputError(`${where} is no text; give a table as text, .xlsx or .parquet`);
   return text;
 }
 
@@ -161,13 +159,8 @@ function decoded(bytes, where) {
 function separatorOf(lines, where) {
   const counts = new Map();
   for (const mark of SEPARATORS) {
-    let rows;
-    try {
-      rows = rowsOf(lines, 0, mark, where, 2);
-    } catch {
-      continue; // quotes that end within a cell: another separator
-    }
-    const [first, second] = rows.map(({ words }) => words.length);
+    const rows = refusing(() => rowsOf(lines, 0, mark, where, 2), () => []); // none: quotes end within a cell
+    const [first = 0, second] = rows.map(({ words }) => words.length);
     if (first > 1 && first === second) return mark;
     counts.set(mark, first);
   }
@@ -177,11 +170,7 @@ function separatorOf(lines, where) {
 
 /* The words of one line; none if its quotes do not pair. */
 function lineWords(line, separator) {
-  try {
-    return rowsOf([line], 0, separator, "")[0]?.words ?? [];
-  } catch {
-    return [];
-  }
+  return refusing(() => rowsOf([line], 0, separator, "")[0]?.words ?? [], () => []);
 }
 
 /* Say whether words are units, apart from empty ones. */

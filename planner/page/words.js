@@ -43,11 +43,6 @@ function naming(where, work) {
   });
 }
 
-/* Tell how far a stage is: progress is a function of the stage, in words, and the share of it that is done. */
-function tell(progress, stage, done) {
-  if (progress) progress(stage, done);
-}
-
 /* A message of the planner with its advice in the page's words; the lengths of smoothing become cm. */
 function inPage(message, robot) {
   const cm = message.replace(/(?<=--smooth )(\S+)l/, (_, tails) => general(100 * robot.tailLength * tails, 3));
@@ -111,5 +106,5 @@ function editsBetween(word, other) {
   return row[other.length];
 }
 
-export { InputError, refusing, naming, DECLARING, REMEDY, FOLLOWING, tell, inPage, repr, general, fixed, quoted };
+export { InputError, refusing, naming, DECLARING, REMEDY, FOLLOWING, inPage, repr, general, fixed, quoted };
 export { closeMatch, whole };

@@ -30,13 +30,11 @@ async function service(data) {
 
   function tracked(fields, point) {
     const key = JSON.stringify([fields, point]);
-    if (asked?.key !== key) asked = { key, swims: vehicleOf(fields, point) };
-    return asked.swims;
-  }
-
-  function vehicleOf(fields, point) {
-    if (!locked) return trackedVehicle(makeRobot(fields), table, point);
-    return trackedPoint(makeRobot({ ...fields, groups: locked.groups }), locked, point, data.table.identity);
+    if (asked?.key === key) return asked.swims;
+    const robot = makeRobot(locked ? { ...fields, groups: locked.groups } : fields);
+    const swims = locked ? trackedPoint(robot, locked, point, locked.identity) : trackedVehicle(robot, table, point);
+    asked = { key, swims };
+    return swims;
   }
 
   function planOf(wish, progress = null) {

@@ -33,9 +33,7 @@ function chart(svg, { times, values, words, limit = null, steps = false }) {
 /* The line that marks a time in a chart of this height. */
 function marker(svg, x) {
   svg.querySelector(".time")?.remove();
-  svg.append(
-    figure("path", { class: "now time", d: `M${x},${EDGE.top}V${(svg.clientHeight || 64) - EDGE.bottom}` }),
-  );
+  svg.append(figure("path", { class: "now time", d: `M${x},${EDGE.top}V${(svg.clientHeight || 64) - EDGE.bottom}` }));
 }
 
 /* Draw stated error over time for several dwells; `take(dwell)` is called with the one that is chosen. */

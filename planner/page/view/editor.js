@@ -62,14 +62,9 @@ class PathEditor {
       return true;
     }
     if (this.mode !== "corners") return false;
-    const points = this.corners;
-    const index = points.findIndex((point) => this.near(point, place));
-    if (index >= 0) {
-      this.held = { index, points: [...points] };
-      return true;
-    }
-    const placed = this.snapped(place, points[points.length - 1], event);
-    this.held = { index: points.length, points: [...points, placed] };
+    const points = [...this.corners], index = points.findIndex((point) => this.near(point, place));
+    if (index < 0) points.push(this.snapped(place, points[points.length - 1], event));
+    this.held = { index: index < 0 ? points.length - 1 : index, points };
     return true;
   }
 
@@ -80,16 +75,13 @@ class PathEditor {
 
   /* A place on the grid; with Shift, at a multiple of 15 degrees from the corner before. */
   snapped(place, before, event) {
-    let [x, y] = place;
+    const [x, y] = place, step = tickStep(this.view) / 5;
     if (event.shiftKey && before) {
       const angle = Math.round(Math.atan2(y - before[1], x - before[0]) / DIRECTIONS) * DIRECTIONS;
       const along = (x - before[0]) * Math.cos(angle) + (y - before[1]) * Math.sin(angle);
       return [before[0] + along * Math.cos(angle), before[1] + along * Math.sin(angle)];
     }
-    if (!this.snaps) return place;
-    const step = tickStep(this.view) / 5;
-    [x, y] = [Math.round(x / step) * step, Math.round(y / step) * step];
-    return [x, y];
+    return this.snaps ? place.map((value) => Math.round(value / step) * step) : place;
   }
 
   drag(place, event) {
@@ -105,8 +97,7 @@ class PathEditor {
     this.cancel();
     if (stroke && stroke.length > 2) this.finished(stroke, closes(stroke));
     if (!held) return;
-    const first = held.points[0];
-    const added = held.points.length > this.corners.length;
+    const [first] = held.points, added = held.points.length > this.corners.length;
     if (held.points.length < 2) this.begun = held.points;
     else if (added && held.points.length > 3 && this.near(first, held.points[held.index])) {
       this.changed(held.points.slice(0, -1), true);
@@ -128,30 +119,24 @@ class PathEditor {
   /* What is drawn over the picture [pixels]. */
   overlay(view) {
     this.view = view;
-    const shapes = [];
-    const points = this.held?.points ?? this.corners;
-    const line = this.stroke ?? (this.held ? points : null);
+    const shapes = [], points = this.held?.points ?? this.corners, line = this.stroke ?? this.held?.points;
     if (line) {
       const pixels = line.map((point) => pixelOf(view, point));
       const closed = !this.stroke && this.continues && this.path.closed;
       shapes.push(figure("path", { class: "stroke", d: lineData(pixels, closed) }));
     }
-    if (this.mode === "corners") {
-      points.forEach((point, i) => {
-        const [cx, cy] = pixelOf(view, point);
-        shapes.push(figure("circle", { class: i === this.held?.index ? "handle chosen" : "handle", cx, cy, r: 6 }));
-      });
-    }
-    return shapes;
+    if (this.mode !== "corners") return shapes;
+    return [...shapes, ...points.map((point, i) => {
+      const [cx, cy] = pixelOf(view, point);
+      return figure("circle", { class: i === this.held?.index ? "handle chosen" : "handle", cx, cy, r: 6 });
+    })];
   }
 }
 
 /* Tell whether a stroke ends where it begins. */
 function closes(stroke) {
-  const [x, y] = stroke[0];
-  const size = Math.max(...stroke.map((point) => Math.hypot(point[0] - x, point[1] - y)));
-  const end = stroke[stroke.length - 1];
-  return Math.hypot(end[0] - x, end[1] - y) < JOINS * size;
+  const [[x, y]] = stroke, away = stroke.map((point) => Math.hypot(point[0] - x, point[1] - y));
+  return away[away.length - 1] < JOINS * Math.max(...away);
 }
 
 /* Fill `host` with the corners; `changed(points)` takes new ones. Focus stays where it is. */
@@ -195,12 +180,11 @@ function after(points) {
 
 /* Move, scale and turn points about their middle. */
 function transformed(points, { right, up, scale, turn }) {
-  const middle = bounds(points).map(([low, high]) => (low + high) / 2);
-  const angle = (turn * Math.PI) / 180;
-  const [cos, sin] = [scale * Math.cos(angle), scale * Math.sin(angle)];
+  const [midX, midY] = bounds(points).map(([low, high]) => (low + high) / 2);
+  const angle = (turn * Math.PI) / 180, cos = scale * Math.cos(angle), sin = scale * Math.sin(angle);
   return points.map(([x, y]) => {
-    const [dx, dy] = [x - middle[0], y - middle[1]];
-    return [middle[0] + right + cos * dx - sin * dy, middle[1] + up + sin * dx + cos * dy];
+    const dx = x - midX, dy = y - midY;
+    return [midX + right + cos * dx - sin * dy, midY + up + sin * dx + cos * dy];
   });
 }
 

@@ -23,10 +23,8 @@ class Page {
     this.robots = new Map(data.robots.map((robot) => [robot.name, robot]));
     this.client = new PlannerClient(() => this.worker(), (words) => this.problem(words));
     this.view = new PlanView();
-    this.editor = new PathEditor(
-      (points, closed) => this.smooth(points, closed, "my stroke"),
-      (points, closed) => this.setPoints(points, closed),
-    );
+    const drawn = (points, closed) => this.smooth(points, closed, "my stroke");
+    this.editor = new PathEditor(drawn, (points, closed) => this.setPoints(points, closed));
     this.view.editor = this.editor;
     this.player = new Player((pose, time) => this.played(pose, time));
     this.form = new RobotForm(data.limits, (values, key) => this.setRobot(values, key), () => this.history.settle());
@@ -99,8 +97,8 @@ class Page {
       if (control !== document.activeElement) control.value = options[key] ?? "";
     }
     this.hint();
-    byId("undo").disabled = this.history.past.length === 0;
-    byId("redo").disabled = this.history.future.length === 0;
+    byId("undo").disabled = !this.history.has(-1);
+    byId("redo").disabled = !this.history.has(1);
     if (!more) this.writeAddress();
     const wish = JSON.stringify(this.wish());
     if (wish === this.wished) return; // else a refusal would leave, and move the button that it tells to press
@@ -122,19 +120,16 @@ class Page {
   }
 
   drawPath() {
-    return this.ask("path", this.wish(), (answer) => this.pathDrawn(answer));
-  }
-
-  pathDrawn(answer) {
-    say(byId("path-problem"), answer.refusal ?? this.linkProblem.words, true);
-    if (answer.refusal) return;
-    this.drawn = answer.answer;
-    this.editor.take(answer.answer.corners);
-    this.hint();
-    byId("close").textContent = this.drawn.closed ? "Part the ends" : "Join the ends";
-    const changed = (points) => this.setPoints(points, this.drawn.closed);
-    showCorners(byId("corner-table"), this.editor.path.points, changed);
-    this.show();
+    return this.ask("path", this.wish(), ({ answer, refusal }) => {
+      say(byId("path-problem"), refusal ?? this.linkProblem.words, true);
+      if (refusal) return;
+      this.drawn = answer;
+      this.editor.take(answer.corners);
+      this.hint();
+      byId("close").textContent = answer.closed ? "Part the ends" : "Join the ends";
+      showCorners(byId("corner-table"), this.editor.path.points, (points) => this.setPoints(points, answer.closed));
+      this.show();
+    });
   }
 
   /* Mark whether a plan or an answer is on its way, for screen readers and for programs that wait. */
@@ -146,22 +141,18 @@ class Page {
 
   /* Ask the planner, and count the question as long as `use` takes to use the answer. */
   async ask(what, content, use) {
-    this.asked();
+    this.count(1);
     const answer = await this.client.ask(what, content);
     try {
       if (!answer.stopped) await use(answer);
     } finally {
-      this.answered();
+      this.count(-1);
     }
   }
 
-  asked() {
-    this.questions += 1;
-    this.mark();
-  }
-
-  answered() {
-    this.questions -= 1;
+  /* Count a question that begins (1) or ends (-1). */
+  count(step) {
+    this.questions += step;
     this.mark();
   }
 
@@ -172,11 +163,8 @@ class Page {
     const wish = this.wish();
     this.client.ask("steady", wish).then((answer) => answer.stopped || showMotion(answer));
     this.runs.compare(wish.robot);
-    this.client.plan(wish, {
-      began: () => this.began(),
-      progress: ({ stage, done }) => say(byId("progress"), `Planning: ${stage}, ${Math.round(100 * done)} %`),
-      done: (answer) => this.planned(answer, wish),
-    });
+    const progress = ({ stage, done }) => say(byId("progress"), `Planning: ${stage}, ${Math.round(100 * done)} %`);
+    this.client.plan({ content: wish, began: () => this.began(), progress, done: (answer) => this.planned(answer, wish) });
   }
 
   began() {
@@ -213,13 +201,18 @@ class Page {
     this.old = false;
     say(byId("message"), summary(this.plan));
     showResults(this.plan, byId("tails").checked);
-    this.scale = chart(byId("strip"), {
-      times: runningSum(this.plan.dwells), values: [...this.plan.dwells], words: "dwell [s]", steps: true,
-    });
+    this.showStrip();
     this.player.take(this.plan, again);
     this.show();
     if (this.track) this.compare();
     if (byId("trade").open) this.tradeOff();
+  }
+
+  /* Draw the dwells over time, as wide as the window is now. */
+  showStrip() {
+    const { dwells } = this.plan, content = { times: runningSum(dwells), values: [...dwells], words: "dwell [s]", steps: true };
+    this.scale = chart(byId("strip"), content);
+    this.player.show();
   }
 
   problem(words) {
@@ -290,7 +283,7 @@ class Page {
 
   /* Open the file that was dropped or chosen; it says by its content what it is. */
   async openFiles(files) {
-    this.asked();
+    this.count(1);
     const file = await oneFile(files);
     if (file?.refusal) this.fileProblem.tell("path", file.refusal);
     else if (file) {
@@ -300,7 +293,7 @@ class Page {
         if (!refusal) await this.opened(file.name, answer);
       });
     }
-    this.answered();
+    this.count(-1);
   }
 
   async opened(name, content) {
@@ -349,8 +342,10 @@ class Page {
     this.linkProblem.tell("path", problem);
   }
 
+  /* Undo (-1) or redo (1) a change. */
   step(way) {
-    if (this.history[way]()) this.refresh();
+    this.history.move(way);
+    this.refresh();
   }
 
   /* Say what the pointer does, and offer what most people do next. */

@@ -94,21 +94,15 @@ function showMotion(answer) {
   ]);
 }
 
-const SAVES = {
-  "schedule.h": "the dwells, for a microcontroller", "tracker.h": "the plan with feedback, for a microcontroller",
-  "plan.csv": "the dwells as a table", "plan.json": "all of the plan, for softflagella", "path.csv": "the path in cm",
-  "robot.toml": "the robot, for softflagella", "plan.svg": "this picture",
-};
-
 /* Fill the lists, and connect every control to the page. */
 function connect(page) {
   const { data } = page, choice = (value, words) => element("option", { value }, words);
   const none = (words) => element("option", { value: "", disabled: true }, words);
   byId("robot-name").append(none("changed"), ...data.robots.map(({ name }) => choice(name, name)));
   byId("shape").append(none("own path"), ...data.shapes.map(({ name, words }) => choice(name, words ?? name)));
-  byId("saves").append(...Object.entries(SAVES).map(([name, title]) => {
-    return element("button", { type: "button", title, click: () => page.saveFile(name) }, name);
-  }));
+  byId("saves").addEventListener("click", ({ target }) => {
+    if (target.matches("button:enabled")) page.saveFile(target.textContent);
+  });
   if (data.locked) {
     byId("robot-fields").hidden = true;
     say(byId("locked"), data.locked.why);
@@ -128,8 +122,8 @@ function connectButtons(page) {
   const points = () => page.editor.path.points;
   listen("click", {
     next: () => (page.state.path.points ? page.saveFile("schedule.h") : byId("draw").click()),
-    undo: () => page.step("undo"),
-    redo: () => page.step("redo"),
+    undo: () => page.step(-1),
+    redo: () => page.step(1),
     open: () => byId("pick").click(),
     new: () => {
       document.querySelector("[value=corners]").checked = true;
@@ -201,13 +195,14 @@ function connectWindow(page) {
   const broken = (words) => page.problem(`The page has made an error: ${words}`);
   addEventListener("error", (event) => broken(event.message));
   addEventListener("unhandledrejection", ({ reason }) => broken(reason?.message ?? reason));
+  addEventListener("resize", () => page.plan && page.showStrip());
   addEventListener("hashchange", () => page.newAddress());
   addEventListener("beforeprint", () => (byId("address").textContent = location.href));
   document.addEventListener("change", () => page.writeAddress());
   document.addEventListener("keydown", (event) => {
     if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z") return;
     event.preventDefault();
-    page.step(event.shiftKey ? "redo" : "undo");
+    page.step(event.shiftKey ? 1 : -1);
   });
   document.addEventListener("dragover", (event) => event.preventDefault());
   document.addEventListener("drop", (event) => {

@@ -5,7 +5,11 @@ import { transform, viewport, zoomed } from "./scene.js";
 
 const LENS = 10; // times larger than the picture
 const LENS_MARGIN = 10; // pixels from the edges, as in page.css
-const KEYS = { ArrowLeft: [60, 0], ArrowRight: [-60, 0], ArrowUp: [0, 60], ArrowDown: [0, -60] };
+const KEYS = {
+  ArrowLeft: (view) => view.pan(60, 0), ArrowRight: (view) => view.pan(-60, 0), ArrowUp: (view) => view.pan(0, 60),
+  ArrowDown: (view) => view.pan(0, -60), "+": (view) => view.zoom(1.25), "=": (view) => view.zoom(1.25),
+  "-": (view) => view.zoom(0.8), 0: (view) => view.fit(),
+};
 
 class PlanView {
   /* `editor` has press, drag, release(place, event) → whether it takes the gesture, and overlay(view). */
@@ -185,12 +189,8 @@ class PlanView {
   }
 
   key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    if (KEYS[event.key]) this.pan(...KEYS[event.key]);
-    else if (event.key === "+" || event.key === "=") this.zoom(1.25);
-    else if (event.key === "-") this.zoom(0.8);
-    else if (event.key === "0") this.fit();
-    else return;
+    if (event.ctrlKey || event.metaKey || event.altKey || !KEYS[event.key]) return;
+    KEYS[event.key](this);
     event.preventDefault();
   }
 }

@@ -43,8 +43,8 @@ class PlannerClient {
   }
 
   /* Plan the newest wish. A plan that is being made is finished first; wishes between are dropped. */
-  async plan(content, { began, progress, done }) {
-    this.wish = { content, began, progress, done };
+  async plan(wish) {
+    this.wish = wish;
     if (this.planning) return;
     while (this.wish) {
       const { content, began, progress, done } = this.wish;

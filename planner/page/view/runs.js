@@ -115,10 +115,8 @@ function summary({ rows, left, columns, medians }) {
   const shown = left ? `the first ${rows.length} of ${rows.length + left} usable runs` : `${rows.length} usable runs`;
   if (!medians) return `The look-up table answers for none of ${shown}.`;
   const differences = columns.map((column, i) => `${WORDS[column].replace(/ \[.*/, "")} ${signed(medians[i])} %`);
-  return (
-    `The look-up table, with the robot of this page, answers for ${known} of ${shown}. ` +
-    `Median difference of the measured values: ${differences.join(", ")}.`
-  );
+  return `The look-up table, with the robot of this page, answers for ${known} of ${shown}. `
+    + `Median difference of the measured values: ${differences.join(", ")}.`;
 }
 
 /* A difference in per cent: +1.4, −0.3, 0.0. */

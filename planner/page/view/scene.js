@@ -93,9 +93,7 @@ function planLayers({ drawn, plan, tracks, old }) {
   const layers = figure("g", { class: old ? "old" : "" });
   if (plan) layers.append(band(plan));
   if (drawn) layers.append(line("drawn", lineData(drawn.points, drawn.closed)));
-  if (plan) {
-    layers.append(line("declared", lineData(plan.reference, plan.closed)), ...motion(plan), startMark(plan));
-  }
+  if (plan) layers.append(line("declared", lineData(plan.reference, plan.closed)), ...motion(plan), startMark(plan));
   for (const { points } of tracks) layers.append(line("measured", lineData(points)));
   return layers;
 }

@@ -177,19 +177,21 @@ function listed(text) {
 /* The states that can be undone and done again. */
 class History {
   constructor(state) {
-    this.state = state;
-    this.past = [];
-    this.future = [];
+    this.states = [state];
+    this.place = 0;
+  }
+
+  get state() {
+    return this.states[this.place];
   }
 
   /* Take a new state. Changes with the same `kind`, such as moves of one slider, are one step. */
   change(state, kind = null) {
     if (JSON.stringify(state) === JSON.stringify(this.state)) return false;
-    if (kind === null || kind !== this.kind) this.past.push(this.state);
-    if (this.past.length > MOST_STEPS) this.past.shift();
+    const kept = kind !== null && kind === this.kind ? this.place : this.place + 1;
+    this.states = [...this.states.slice(0, kept), state].slice(-MOST_STEPS - 1);
+    this.place = this.states.length - 1;
     this.kind = kind;
-    this.future = [];
-    this.state = state;
     return true;
   }
 
@@ -198,20 +200,14 @@ class History {
     this.kind = null;
   }
 
-  undo() {
-    return this.move(this.past, this.future);
+  /* Whether a step back (-1) or on (1) is possible. */
+  has(step) {
+    return this.place + step in this.states;
   }
 
-  redo() {
-    return this.move(this.future, this.past);
-  }
-
-  move(from, to) {
-    if (from.length === 0) return false;
-    to.push(this.state);
-    this.state = from.pop();
-    this.kind = null;
-    return true;
+  move(step) {
+    if (this.has(step)) this.place += step;
+    this.settle();
   }
 }
 
