@@ -3,7 +3,7 @@
 The table states its own errors. Its curves are simulated once more with coarser meshes and four times the
 tolerance. On a dozen robots, compared with finer meshes and a fifth of the tolerance, the error was 0.1 to 0.3 of
 the difference, of nearly the same shape (`_ALONG`, `_ACROSS`). What the last dwell but one changes is not in the
-curves, and counts as an error in full (`sim.motion.longer_memory`).
+curves, and counts as an error in full (`sim.motion.response`).
 
 Where curves come from time steps, a random schedule is replayed and compared, dwell by dwell, with what the table
 predicts. The difference, less what the unknown phase of the disc explains, is the size of the error of a lag.
@@ -27,9 +27,8 @@ from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, LAGS, Responses, memory_after
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule
-from sim.motion.longer_memory import longer_memory
 from sim.motion.replay import replay
-from sim.motion.response import responses
+from sim.motion.response import longer_memory, responses
 from sim.motion.steady import steady
 from sim.motion.steady_motion import STEADY_OUTPUTS, Steady
 from surrogate.robot_table import RobotTable

@@ -22,9 +22,9 @@ from sim.inputs import check_columns
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.motion.batches import one_thread
-from sim.motion.orbits import Perturbed, solve_orbits
 from sim.motion.stability import growths, growths_on_mesh
-from sim.solve.assembly import bodies, numbers, row
+from sim.motion.steady import Perturbed, orbits
+from sim.solve.assembly import bodies, row
 from sim.solve.refinement import MESHES, PHASES, SOLVED, refined_orbit
 from tests.oracles.stepped_growth import stepped_growth
 
@@ -60,8 +60,8 @@ def kinds(count: int) -> Iterator[tuple[str, list[Groups]]]:
     for i in np.flatnonzero(wide["N"] > 1).tolist():
         if len(quick) < count:
             groups = groups_of(wide, i)
-            means = solve_orbits(numbers(groups), groups.N).means[0]
-            if abs(means[2]) > _QUICK * abs(means[0]):
+            motion = orbits(groups)
+            if abs(motion.omega_yr[0]) > _QUICK * abs(motion.omega_t[0]):
                 quick.append(groups)
     yield f"|ω_yr/ω_t| > {_QUICK}", quick
     control = PRESETS["paper-control"].groups()
@@ -99,10 +99,9 @@ def domain() -> None:
     wide, rows = robots(4096), []
     for tails in np.unique(wide["N"][wide["N"] > 1]):
         groups = Groups.from_columns({name: values[wide["N"] == tails] for name, values in wide.items()})
-        orbits = solve_orbits(numbers(groups), groups.N, phases=PHASES, perturbed=Perturbed.ALL)
-        solved = orbits.status == SOLVED
-        yaws = np.abs(orbits.means[:, 2] / orbits.means[:, 0])
-        rows.append(np.column_stack([yaws, orbits.growth])[solved])
+        motion = orbits(groups, perturbed=Perturbed.ALL)
+        yaws = np.abs(motion.omega_yr / motion.omega_t)
+        rows.append(np.column_stack([yaws, motion.growth])[motion.converged])
     yaws, grows = np.concatenate(rows).T
     for low, high in pairwise(_YAWS):
         inside = (low <= yaws) & (yaws < high)

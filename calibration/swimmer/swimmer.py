@@ -2,8 +2,8 @@
 
 Runs under equal conditions share one simulation. A reversed motor mirrors the motion, unless an odd influence is
 present. A parameter may differ from run to run: then it is an array (n,). Motions are solved directly and
-extrapolated in the mesh (`sim.motion.orbits`); their errors of a few hundredths of a percent are far below those
-of measurements. Outputs are compared as ln |output|, θ in radians.
+extrapolated in the mesh (`sim.motion.sensitivity`); their errors of a few hundredths of a percent are far below
+those of measurements. Outputs are compared as ln |output|, θ in radians.
 """
 
 from __future__ import annotations

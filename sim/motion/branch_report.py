@@ -17,8 +17,8 @@ from sim.io.page_figures import BLUE, GREEN, INK, ORANGE, RED, SOFT, VIOLET
 from sim.io.pages import Page
 from sim.io.provenance import code_version
 from sim.motion.branches import Branch, Branches, Motion
-from sim.motion.exponents import DOUBLING, FOLD, HOPF
-from sim.motion.slow_sweep import Settled
+from sim.motion.stability import DOUBLING, FOLD, HOPF
+from sim.motion.swept_input import Settled
 
 UP, DOWN = "time steps, up", "time steps, down"
 _MARKS = {FOLD: ("o", RED), HOPF: ("s", VIOLET), DOUBLING: ("D", GREEN)}
@@ -30,7 +30,7 @@ def branch_table(result: Branches) -> DataFrame:
     """Make a table of all points: those of the branches in the order along each, then those of the slow sweeps.
 
     Columns: the input; `branch` (from 1; 0 for time steps) and `origin`; whether the tails move alike; the
-    means of `sim.motion.steady_motion.STEADY_OUTPUTS`; growth, stability, `turns` (`sim.motion.exponents`);
+    means of `sim.motion.steady_motion.STEADY_OUTPUTS`; growth, stability, `turns` (`sim.motion.stability`);
     `kind`, where a fold, Hopf point or period doubling was located; `converged`: false where time steps did not
     settle.
     """

@@ -2,7 +2,7 @@
 
 1. Newton's method from straight tails finds orbits at some values of the input.
 2. Time steps find the motions that a robot reaches: from rest at some values, and in slow sweeps up and down
-   (`sim.motion.slow_sweep`).
+   (`sim.motion.swept_input`).
 3. Each motion found is followed along the input in both directions, around folds (`sim.motion.continuation`): as
    an orbit if the tails move alike (`sim.motion.tails_alike`), else as a fixed point of the map over a turn of the
    disc (`sim.motion.revolution`).
@@ -28,13 +28,11 @@ import numpy as np
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.motion.continuation import Equations, Point, first_point, follow, locate
-from sim.motion.exponents import FOLD, Leading, leading_exponent
 from sim.motion.revolution import Revolutions
 from sim.motion.shapes import state_from_orbit
-from sim.motion.slow_sweep import Settled, from_rest, perturbed, settled_from, slow_sweep
-from sim.motion.swept_input import SweptInput
-from sim.motion.tails_alike import EDGES, TailsAlike
-from sim.motion.turn_shapes import orbit_from_turn
+from sim.motion.stability import FOLD, Leading, leading_exponent
+from sim.motion.swept_input import Settled, SweptInput, from_rest, perturbed, settled_from, slow_sweep
+from sim.motion.tails_alike import EDGES, TailsAlike, orbit_from_turn
 from sim.solve.march import State
 from sim.solve.refinement import difference
 

@@ -17,12 +17,11 @@ from sim.effects import catalogue
 from sim.mechanics import planar
 from sim.mechanics.geometry import straight
 from sim.model.groups import Groups
-from sim.model.response import BEFORE, DWELLS, SETTLED, Responses
-from sim.motion.flips import Flip, follow_flips, orbits_with_phases
-from sim.motion.net_speed import net_speeds, twists
+from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED, Responses, at_equal_dwells
+from sim.motion.flips import NO_MARKS, Flip, follow_flips, orbits_with_phases
 from sim.motion.run import REVERSED
 from sim.motion.steady import check_groups, steady
-from sim.motion.steady_motion import Steady
+from sim.motion.steady_motion import Steady, twists
 from sim.motion.stepped_response import stepped_response
 from sim.solve.assembly import numbers, reversed_numbers, unpacked
 from sim.solve.grouping import slices
@@ -32,6 +31,9 @@ _SAME = 1.2  # time units from which the memory is constant
 MESHES = (6, 9)  # edges
 TOLERANCE = 1e-3  # of a time step, in l: see `sim.solve.transient`
 _OFFSET = 1  # of a robot's numbers
+_MEMORY_EDGES, _MEMORY_TOLERANCE = 6, 4e-4  # mesh of `longer_memory`, and of a time step, in l
+_MEMORY_UNTIL = float(BEFORE[-1])  # from here on the difference is constant
+_SOME_BEFORE = BEFORE[::2].copy()  # dwells before that are simulated
 _TIMES = np.unique([*np.minimum(DWELLS, SETTLED), *np.minimum(DWELLS, _SAME)])
 _UNTIL_SETTLED, _UNTIL_SAME = (np.searchsorted(_TIMES, np.minimum(DWELLS, end)) for end in (SETTLED, _SAME))
 
@@ -106,7 +108,7 @@ def responses(
     twist = twists(motion.v_z, motion.v_x, motion.omega_yr, sense)
     if not history:
         memory[:], rest[:] = np.nan, np.nan
-    speed = net_speeds(twist, lag, memory, before)
+    speed = planar.net_speed(twist[:, None], lag + at_equal_dwells(memory, before), DWELLS)
     failed = ~np.isfinite(speed[:, -1])
     for array in (lag, memory, rest, spread, speed):
         array[failed] = np.nan
@@ -230,3 +232,61 @@ def _extrapolated(
 def mirrored(x: Floats) -> Floats:
     """Mirror a robot's shape (n, M, 3), as a reversed motor does."""
     return np.ascontiguousarray(x[:, -np.arange(x.shape[1])] * np.array([1.0, -1.0, 1.0]))
+
+
+@np.errstate(all="ignore")  # robots that overflow give NaN
+def longer_memory(groups: Groups) -> Floats:
+    """Simulate what a response owes to the last dwell but one, (B, K, D, 3) after BEFORE; NaN where unknown.
+
+    The curves say how a robot responds after a dwell S that follows a long one. Here S follows another dwell of S:
+
+        longer(T | S) = lag(T | S, S) − lag(T | S)
+
+    It decays with 2 S: at S = 0.3 it is up to 4·10⁻³ of speed and yaw rate, at 0.6 up to 10⁻³, at 1 below 10⁻⁵. It
+    is meant as an error of the curves, so one coarse mesh is enough.
+    """
+    found = _at_some_dwells(groups)
+    knots, places = np.log(np.append(_SOME_BEFORE, FORGOTTEN)), np.log(BEFORE)
+    known = np.concatenate([found, np.zeros_like(found[:, :1])], 1)
+    k = np.clip(np.searchsorted(knots, places, side="right") - 1, 0, len(knots) - 2)
+    share = ((places - knots[k]) / (knots[k + 1] - knots[k]))[:, None, None]
+    return np.asarray((1 - share) * known[:, k] + share * known[:, k + 1])
+
+
+def _at_some_dwells(groups: Groups) -> Floats:
+    """Simulate the difference after two dwells of _SOME_BEFORE, (B, K, D, 3), seen as for a positive motor."""
+    rows, reverse_rows, count = numbers(groups), reversed_numbers(groups), len(_SOME_BEFORE)
+    dwells = np.minimum(DWELLS, _MEMORY_UNTIL)
+    forth = orbits_with_phases(rows, groups.N, [_MEMORY_EDGES])[0]
+    instants = [len(orbit.u) if orbit else 1 for orbit in forth]
+    back = orbits_with_phases(reverse_rows, groups.N, [_MEMORY_EDGES], [instants])[0]
+    orbits = [(f, b) if f and b else None for f, b in zip(forth, back, strict=True)]
+    there = [_flipped(row, *pair) if pair else None for row, pair in zip(rows, orbits, strict=True)]
+    and_back = [
+        _flipped(row, *pair[::-1]) if pair else None for row, pair in zip(reverse_rows, orbits, strict=True)
+    ]
+    first = follow_flips(there, NO_MARKS, _MEMORY_TOLERANCE, _SOME_BEFORE)
+    once = follow_flips(and_back, NO_MARKS, _MEMORY_TOLERANCE, _SOME_BEFORE)
+    second = [
+        flip._replace(x=course.shapes[k], u=pair[1].u, until=dwell) if flip and course and pair else None
+        for flip, course, pair in zip(and_back, first, orbits, strict=True)
+        for k, dwell in enumerate(_SOME_BEFORE.tolist())
+    ]
+    twice = follow_flips(second, NO_MARKS, _MEMORY_TOLERANCE)
+    last: list[Flip | None] = []
+    for i, (flip, course, pair) in enumerate(zip(there, once, orbits, strict=True)):
+        for k, two in enumerate(twice[i * count : (i + 1) * count]):
+            if flip and course and pair and two:
+                last += [flip._replace(x=x, u=pair[0].u) for x in (two.end, course.shapes[k])]
+            else:
+                last += [None, None]
+    unknown = np.full((len(dwells), 3), np.nan)
+    lags = [course.lag.mean(1) if course else unknown for course in follow_flips(last, dwells, _MEMORY_TOLERANCE)]
+    each = np.array(lags).reshape(len(rows), count, 2, len(dwells), 3)
+    mirror = np.where(rows[:, :1] < 0, planar.MIRROR, np.ones(3))
+    return np.asarray((each[:, :, 0] - each[:, :, 1]) * mirror[:, None, None])
+
+
+def _flipped(row: Floats, after: OnMesh, before: OnMesh) -> Flip:
+    """Flip the motor of a robot in the steady motion `before`; its numbers afterwards are `row`."""
+    return Flip(row, before.x, before.u * REVERSED, after.twist, _MEMORY_UNTIL)

@@ -28,7 +28,7 @@ import numpy as np
 from sim.arrays import Floats
 from sim.mechanics.balance import motor_gain, tail_spin
 from sim.model.body import Body
-from sim.motion.exponents import Leading
+from sim.motion.stability import Leading
 from sim.solve.march import PHASE, SURGE, SWAY, YAW, State, advance, new_state
 
 STEPS = 48  # a motor revolution
@@ -153,7 +153,7 @@ class Revolutions:
         return turn is not None and bool(np.isfinite(turn.means).all())
 
     def leading(self, y: Floats) -> Leading:
-        """Find the perturbation that decays least, by Arnoldi's method (`sim.motion.exponents.Leading`)."""
+        """Find the perturbation that decays least, by Arnoldi's method (`sim.motion.stability.Leading`)."""
         turn = self.at(y)
         image = None if turn is None else self._image(y)
         if turn is None or image is None:

@@ -1,8 +1,10 @@
 """Derivatives of the steady motion in every input and effect size, by the implicit function theorem.
 
-The orbit depends on a robot's numbers (`sim.motion.orbit_slopes`). These depend on its inputs and effect sizes
-(`sim.solve.assembly`), and that part is differentiated by the complex step (`sim.linear.complex_step`). So an
-effect needs no code for its derivative. Derivatives are extrapolated in the mesh, like the means.
+The orbit z(p) satisfies F(z, p) = 0, so dz/dp = −(∂F/∂z)⁻¹ ∂F/∂p with the matrix of Newton's method. p are a
+robot's numbers (`sim.solve.assembly`); a direction in them costs one more right-hand side, by central differences,
+where differences of orbits would cost two more solutions. The numbers depend on the inputs and effect sizes. That
+part is differentiated by the complex step (`sim.linear.complex_step`), so an effect needs no code for its
+derivative. Derivatives are extrapolated in the mesh, like the means. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -18,9 +20,12 @@ from sim.io.errors import InputError
 from sim.linear.complex_step import derivative
 from sim.model.groups import Groups
 from sim.model.sweepable import SLOPE_INPUTS, SLOPE_OUTPUTS
-from sim.motion.orbits import solve_orbits
-from sim.solve.assembly import numbers
-from sim.solve.refinement import PHASES_FOR_SLOPES
+from sim.solve.assembly import are_local, batch, numbers
+from sim.solve.grouping import by_kind, group_width, slices
+from sim.solve.orbit import mean_motion, residuals_on_orbits, solve_at_orbits
+from sim.solve.refinement import MESHES, PHASES_FOR_SLOPES, SOLVED, Orbit, extrapolate, refined_orbits, stacked
+
+WIDTH = 1e-5  # finite-difference step in a robot's numbers; the balance depends almost linearly on them
 
 
 @dataclass(frozen=True)
@@ -53,9 +58,10 @@ def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = PH
     moved = [_direction(groups, name) for name in names]
     scales = np.stack([scale for _, scale in moved], 1) if names else np.empty((len(groups), 0))
     directions = np.stack([d for d, _ in moved], 1) if names else np.empty((len(groups), 0, rows.shape[1]))
-    solution = solve_orbits(rows, groups.N, directions, phases=phases)
-    slopes = solution.slopes / scales[:, :, None]  # (B, K, 5)
-    values = dict(zip(SLOPE_OUTPUTS, solution.means.T, strict=False))
+    parts = [_at_once(rows[part], directions[part], groups.N, phases) for part in slices(len(rows))]
+    means, slopes = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    slopes /= scales[:, :, None]
+    values = dict(zip(SLOPE_OUTPUTS, means.T, strict=False))
     derivatives = {name: slopes[:, :, i] for i, name in enumerate(SLOPE_OUTPUTS[:5])}
     sway, surge, yaw = values["v_x"], values["v_z"], values["omega_yr_bar"]
     speed = np.hypot(sway, surge)
@@ -86,3 +92,47 @@ def _direction(groups: Groups, name: str) -> tuple[Floats, Floats]:
             return numbers(replace(groups, effects={**groups.effects, name: changed}))
 
     return derivative(changed_numbers, value, size), size
+
+
+def _at_once(rows: Floats, directions: Floats, tails: int, phases: int) -> tuple[Floats, Floats]:
+    """Compute means (B, 5) and derivatives (B, K, 5) of as many robots as there is room for; NaN where lost."""
+    orbits = refined_orbits(rows, tails, phases)
+    solved = [i for i, orbit in enumerate(orbits) if orbit.status == SOLVED]
+    slopes = np.full((*directions.shape[:2], 5), np.nan)
+    if directions.shape[1]:
+        slopes[solved] = slopes_of_orbits(rows[solved], directions[solved], [orbits[i] for i in solved])
+    return np.array([orbit.means for orbit in orbits]).reshape(-1, 5), slopes
+
+
+def slopes_of_orbits(rows: Floats, directions: Floats, orbits: Sequence[Orbit]) -> Floats:
+    """Compute the derivatives of the extrapolated means (`sim.solve.orbit.mean_motion`), (B, K, 5).
+
+    Args:
+        rows: the robots' numbers (`sim.solve.assembly.numbers`), (B, K').
+        directions: in the numbers, (B, K, K').
+        orbits: of the robots, all solved.
+    """
+    slopes = np.empty((len(MESHES), len(rows), directions.shape[1], 5))
+    local, width = are_local(rows), len(group_width())
+    for alike in by_kind(range(len(rows)), lambda i: (orbits[i].x[0].shape, bool(local[i]))):
+        for first in range(0, len(alike), width):
+            robots = alike[first : first + width]
+            for mesh in range(len(MESHES)):
+                x, u = stacked([orbits[i] for i in robots], mesh)
+                slopes[mesh, robots] = _slopes(rows[robots], directions[robots], x, u)
+    return extrapolate(slopes)
+
+
+def _slopes(rows: Floats, directions: Floats, x: Floats, u: Floats) -> Floats:
+    """Compute the derivatives of the means on one mesh, (B, K, 5), at x (B, n, M, 3) and u (B, P, 4)."""
+    count = directions.shape[1]
+    ends = [(rows[:, None] + way * WIDTH * directions).reshape(-1, rows.shape[1]) for way in (-1, 1)]
+    shapes, velocities = np.repeat(x, count, 0), np.repeat(u, count, 0)
+    below, above = (residuals_on_orbits(end, shapes, velocities) for end in ends)
+    r, t = ((low - high) / (2 * WIDTH) for low, high in zip(below[:2], above[:2], strict=True))
+    _, du = solve_at_orbits(rows, x, u, r.reshape(-1, count, *x.shape[1:]), t.reshape(-1, count, *u.shape[1:]))
+    changes = WIDTH * du.reshape(velocities.shape)
+    fall, rise = (
+        mean_motion(batch(end), velocities + way * changes) for way, end in zip((-1, 1), ends, strict=True)
+    )
+    return ((rise - fall) / (2 * WIDTH)).reshape(-1, count, 5)

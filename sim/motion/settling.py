@@ -6,7 +6,7 @@ when all means agree to DRIFT. At time LONGEST the run ends, and the row is flag
 least one whole revolution, because with N = 2 a part of a revolution gives a wrong ω_yr. If Newton's method fails,
 the robot is tried once more with half the step.
 
-This is the reference for the orbits of `sim.motion.orbits`. It finds the motion that straight tails reach from
+This is the reference for the orbits of `sim.solve.refinement`. It finds the motion that straight tails reach from
 rest, also where the tails do not move alike. Units: l, μ0 l⁴/EI.
 """
 

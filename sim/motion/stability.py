@@ -11,14 +11,23 @@ a slow perturbation, and change the growth by up to a fifth if the robot yaws fa
 that of a robot with |ω_yr| > QUICK |ω_t|, is computed again on 12 edges and more than twice as many phases, an odd
 number in an N-th of a turn. Robots with contact are left out of that; it would take seconds.
 
-Units: l, μ0 l⁴/EI.
+Of an orbit's exponents σ, defined up to i N ω_t and in conjugate pairs, the largest Re σ also says what the
+perturbation does to the tails. With k = Im σ/ω_t between 0 and N/2, that of the next tail has the phase 2πk/N.
+Where the growth changes its sign,
+
+    fold               k = 0: real; another such motion meets this one
+    period doubling    k = N/2: after an N-th of a turn the perturbation has changed its sign
+    Hopf               all others: a second frequency appears (Neimark-Sacker)
+
+A motion in which the tails differ is treated as one tail, with N = 1 (`sim.motion.revolution`).
+Units: l, μ0 l⁴/EI. Source: Kuznetsov, *Elements of Applied Bifurcation Theory* (2004), ch. 4 and 5.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,13 +38,16 @@ from sim.solve.assembly import CONTACT, are_local, batch, row
 from sim.solve.floquet import arnoldi
 from sim.solve.grouping import NAMES, by_kind, from_groups, group_width, in_groups, wanted_lanes
 from sim.solve.orbit import mean_motion, solve_orbits_in_place
-from sim.solve.refinement import ROUGH, Orbit
+from sim.solve.refinement import ROUGH, Orbit, stacked
 
 QUICK = 0.4  # |ω_yr/ω_t| from which a robot yaws fast
 DOUBTFUL = -0.05  # growth from which it is computed again
 _MORE_VECTORS = 30  # of Arnoldi's method, beyond two for each tail: enough for the leading eigenvalues to converge
 _CONVERGED = 1e-3  # relative residual of an eigenvalue up to which it has converged
 _SIGN_KNOWN = 1.0  # the same from which not even the sign of its real part is known
+FOLD, DOUBLING, HOPF = "fold", "period doubling", "Hopf"
+_SAME = 1e-3  # relative distance of Re σ up to which exponents are copies of one, i N ω_t apart
+_REAL = 1e-3  # distance of k from 0 or N/2 up to which it counts as that
 
 
 def growths(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats:
@@ -48,8 +60,7 @@ def growths(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats:
     """
     found = np.full(len(rows), np.nan)
     for robots in _alike(range(len(rows)), rows, orbits):
-        x, u = (np.stack([(orbits[i].x, orbits[i].u)[c][1] for i in robots]) for c in (0, 1))
-        found[robots] = growths_on_mesh(rows[robots], tails, x, u)
+        found[robots] = growths_on_mesh(rows[robots], tails, *stacked([orbits[i] for i in robots], 1))
     means = np.array([orbit.means for orbit in orbits]).reshape(-1, 5)
     doubtful = np.flatnonzero(is_doubtful(means, found) & (rows[:, CONTACT] == 0)).tolist()
     for robots in _alike(doubtful, rows, orbits):
@@ -79,8 +90,8 @@ def is_doubtful(means: Floats, value: Any) -> Any:
 def growths_on_more_phases(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats:
     """Compute the growths (B,) on the third mesh, from eigenvalues that have converged; NaN: unknown."""
     instants = 2 * len(orbits[0].u[2]) + 1
-    x = with_phases(np.stack([orbit.x[2] for orbit in orbits]), tails * instants)
-    u = with_phases(np.stack([orbit.u[2] for orbit in orbits]), instants)
+    x, u = stacked(orbits, 2)
+    x, u = with_phases(x, tails * instants), with_phases(u, instants)
     solved = solve_orbits_in_place(rows, x, u, ROUGH) < ROUGH
     rates = np.array([values.real.max(initial=-np.inf) for values in _exponents(rows, tails, x, u)])
     growth = in_motor_revolutions(rates, mean_motion(batch(rows), u))
@@ -153,17 +164,8 @@ def largest_growths(projected: Floats, omega_t: Floats, omega_h: Floats) -> Floa
     return out
 
 
-def exponents(body: Body, tails: int, x: Floats, u: Floats) -> Complex:
-    """Compute exponents σ of perturbations e^{σt} of an orbit x (n, M, 3), u (P, 4) of N tails.
-
-    Returns:
-        Those that have converged, in any order; none if they cannot be computed.
-    """
-    return _exponents(row(body), tails, x[None], u[None])[0]
-
-
 def _exponents(rows: Floats, tails: int, x: Floats, u: Floats) -> list[Complex]:
-    """Compute what `exponents` does, for B robots whose motors have one sense."""
+    """Compute the exponents that have converged, for B robots whose motors have one sense; none where unknown."""
     shifts = np.abs(mean_motion(batch(rows), u)[:, 0])
     projected = _projected(rows, tails, x, u, shifts, 2 * tails + _MORE_VECTORS)
     return [
@@ -213,3 +215,31 @@ def first_perturbation(tails: int, n: int, columns: int) -> Floats:
         for wave in (np.cos(harmonic * phase), np.sin(harmonic * phase)):
             vector += bend[:, None, None] * wave[:, None] * numbers.normal(size=3)
     return vector
+
+
+class Leading(NamedTuple):
+    """The perturbation that decays least."""
+
+    growth: float  # natural logarithm of its growth in a motor revolution; NaN: unknown
+    turns: float  # k, between 0 and N/2
+    tails: int  # N
+
+    @property
+    def kind(self) -> str:
+        """Name what happens where its growth changes the sign."""
+        if self.turns < _REAL:
+            return FOLD
+        return DOUBLING if self.tails / 2 - self.turns < _REAL else HOPF
+
+
+def leading_exponent(body: Body, tails: int, x: Floats, u: Floats) -> Leading:
+    """Find it for an orbit x (n, M, 3), u (P, 4) of N tails; the growth is NaN if none has converged."""
+    means, found = mean_motion(body, u), _exponents(row(body), tails, x[None], u[None])[0]
+    if not len(found):
+        return Leading(np.nan, np.nan, tails)
+    omega_t = means[0]
+    copies = found[found.real > found.real.max() - _SAME * abs(omega_t)]
+    largest = copies[np.argmin(np.abs(copies.imag))]
+    turns = abs(largest.imag / omega_t) % tails
+    growth = float(in_motor_revolutions(found.real.max(), means))
+    return Leading(growth, float(min(turns, tails - turns)), tails)

@@ -1,6 +1,6 @@
 """Steady motion at constant motor speed: solved for directly where that works, else by time stepping.
 
-The direct solution (`sim.motion.orbits`) is the relative periodic orbit in which all tails move alike. It takes
+The direct solution (`sim.solve.refinement`) is the relative periodic orbit in which all tails move alike. It takes
 about a millisecond a robot, states the error of its means, and how fast small perturbations grow
 (`sim.motion.stability`). Straight tails at rest reach this orbit if the robot yaws slowly compared with the spin
 of its disc (docs/steady-motions.md). If it yaws faster (|ω_yr| > QUICK |ω_t|), or if perturbations may grow, it
@@ -11,24 +11,37 @@ meshes and steps. Units: l, μ0 l⁴/EI.
 
 from __future__ import annotations
 
+from enum import Enum
+
 import numpy as np
 
 from sim.arrays import Floats, Integers, Words
 from sim.effects import check_size
 from sim.effects.tail_contact import EFFECT as CONTACT
 from sim.model.groups import Groups
-from sim.motion.orbits import Perturbed, solve_orbits
 from sim.motion.resolution import Resolution
 from sim.motion.settling import settle
-from sim.motion.stability import QUICK
-from sim.motion.steady_motion import DIRECT, Steady
+from sim.motion.stability import QUICK, growths
+from sim.motion.steady_motion import DIRECT, Steady, joined
+from sim.solve import assembly
 from sim.solve.assembly import numbers
-from sim.solve.refinement import PHASES, REASONS, SOLVED
+from sim.solve.grouping import by_kind, slices
+from sim.solve.orbit import smallest_gaps
+from sim.solve.refinement import PHASES, REASONS, SOLVED, refined_orbits, stacked
 
 GROWS = -0.02  # growth in a motor revolution from which small perturbations may take the tails to another motion
 GROWS_IN_CONTACT = -0.12  # the same where tails touch: the mesh's error is larger
 SAME = 0.02  # relative difference up to which a stepped motion counts as the direct one
+_NEAR = 1.1  # gap from which tails cannot touch, given the error of the gap
 _OTHER_MOTION = "straight tails reach another motion than the one in which they move alike"
+
+
+class Perturbed(Enum):
+    """Which robots get the growth of small perturbations."""
+
+    NONE = "none"
+    TOUCHING = "those with contact whose tails touch"
+    ALL = "all"
 
 
 @np.errstate(all="ignore")  # robots that overflow are flagged
@@ -53,13 +66,13 @@ def steady(groups: Groups, *, stability: bool = True) -> Steady:
         (0.049, True)
     """
     check_groups(groups)
-    motion = _orbits(groups, PHASES, Perturbed.ALL if stability else Perturbed.TOUCHING)
+    motion = orbits(groups, perturbed=Perturbed.ALL if stability else Perturbed.TOUCHING)
     quick = np.abs(motion.omega_yr) > QUICK * np.abs(motion.omega_t)
     contact = groups.effects.get(CONTACT.name, np.zeros(len(groups))) != 0
     grows = motion.growth > np.where(contact, GROWS_IN_CONTACT, GROWS)
     doubtful = np.flatnonzero(~motion.failed & (quick | grows))
     if len(doubtful):
-        reached = settle(_rows(groups, doubtful), resolution=Resolution.for_settling)
+        reached = settle(groups.select(doubtful), resolution=Resolution.for_settling)
         changed = doubtful[_difference(motion.at(doubtful), reached) > SAME]
         motion = _with_stepped(motion, groups, changed, np.full(len(groups), _OTHER_MOTION))
     lost = np.flatnonzero(motion.failed & (motion.method == DIRECT))
@@ -77,38 +90,47 @@ def _with_stepped(motion: Steady, groups: Groups, rows: Integers, notes: Words) 
     """Step `rows` of this motion in time instead; notes (B,) say why."""
     if not len(rows):
         return motion
-    return motion.with_rows(rows, stepped(_rows(groups, rows), notes[rows].tolist()))
+    return motion.with_rows(rows, stepped(groups.select(rows), notes[rows].tolist()))
 
 
-def _rows(groups: Groups, rows: Integers) -> Groups:
-    return groups.select(rows)
+def orbits(groups: Groups, *, phases: int = PHASES, perturbed: Perturbed = Perturbed.NONE) -> Steady:
+    """Solve directly; `failed` where there is no orbit.
+
+    Args:
+        groups: B robots of one N.
+        phases: number of phases to begin with.
+        perturbed: robots that get a growth.
+    """
+    rows = numbers(groups)
+    return joined([_at_once(rows[part], groups.N, phases, perturbed) for part in slices(len(rows))])
 
 
-def orbits(groups: Groups, *, phases: int = PHASES) -> Steady:
-    """Solve directly, with `phases` phases to begin with; `failed` where there is no orbit."""
-    return _orbits(groups, phases, Perturbed.NONE)
-
-
-def _orbits(groups: Groups, phases: int, perturbed: Perturbed) -> Steady:
-    """Solve directly, and compute how fast perturbations grow."""
-    solution = solve_orbits(numbers(groups), groups.N, phases=phases, perturbed=perturbed)
-    means = solution.means.T
-    solved = solution.status == SOLVED
+def _at_once(rows: Floats, tails: int, phases: int, perturbed: Perturbed) -> Steady:
+    """Solve directly for as many robots as there is room for, from their numbers (B, K)."""
+    orbits = refined_orbits(rows, tails, phases)
+    solved = np.array([orbit.status == SOLVED for orbit in orbits], bool)
+    gap, growth = np.full((2, len(rows)), np.nan)
+    for robots in by_kind(np.flatnonzero(solved).tolist(), lambda i: orbits[i].x[2].shape):
+        shapes, _ = stacked([orbits[i] for i in robots], 2)
+        gap[robots] = smallest_gaps(rows[robots], shapes, tails)
+    if perturbed is not Perturbed.NONE:
+        wanted = solved if perturbed is Perturbed.ALL else (rows[:, assembly.CONTACT] != 0) & (gap < _NEAR)
+        growth[wanted] = growths(rows[wanted], tails, [orbits[i] for i in np.flatnonzero(wanted)])
+    notes = [REASONS[orbit.status] or _growth_note(g) for orbit, g in zip(orbits, growth, strict=True)]
+    omega_t, omega_h, omega_yr, v_x, v_z = np.array([orbit.means for orbit in orbits]).reshape(-1, 5).T
     return Steady(
-        omega_t=means[0],
-        omega_h=means[1],
-        omega_yr=means[2],
-        v_x=means[3],
-        v_z=means[4],
-        tail_gap=solution.gap,
-        error=solution.error,
+        omega_t,
+        omega_h,
+        omega_yr,
+        v_x,
+        v_z,
+        tail_gap=gap,
+        error=np.array([orbit.error for orbit in orbits], float),
         converged=solved,
         failed=~solved,
-        method=np.full(len(groups), DIRECT),
-        growth=solution.growth,
-        note=np.array(
-            [REASONS[k] or _growth_note(g) for k, g in zip(solution.status.tolist(), solution.growth, strict=True)]
-        ),
+        method=np.full(len(rows), DIRECT),
+        growth=growth,
+        note=np.array(notes, str),
     )
 
 
@@ -125,7 +147,7 @@ def stepped(groups: Groups, notes: list[str]) -> Steady:
     lasting = np.flatnonzero(~coarse.failed)
     fine = coarse
     if len(lasting):
-        finer = settle(_rows(groups, lasting), resolution=lambda speed: Resolution.fitting(speed).finer(2))
+        finer = settle(groups.select(lasting), resolution=lambda speed: Resolution.fitting(speed).finer(2))
         fine = coarse.with_rows(lasting, finer)
     fields = {**vars(fine), "error": _difference(coarse, fine) / 3}  # of second order
     fields["note"] = np.array([f"{a}; {b}" if b else a for a, b in zip(notes, fine.note.tolist(), strict=True)])

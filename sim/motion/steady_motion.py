@@ -10,6 +10,7 @@ Units: l, μ0 l⁴/EI.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -84,3 +85,18 @@ class Steady:
             wide[rows] = getattr(other, field.name)
             changed[field.name] = wide.astype(str) if values.dtype.kind == "U" else wide
         return Steady(**changed)
+
+
+def joined(parts: Sequence[Steady]) -> Steady:
+    """Join the rows of motions, one after the other."""
+    return Steady(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Steady)})
+
+
+def twists(surge: Floats, sway: Floats, yaw_rate: Floats, sense: Floats) -> Floats:
+    """Compute the steady twists (B, 3), forward, left and yaw rate, seen as for a positive motor.
+
+    Args:
+        surge, sway, yaw_rate: v_z, v_x and ω_yr, (B,) each.
+        sense: direction of the motor, ±1, (B,).
+    """
+    return np.stack([surge, sense * sway, sense * yaw_rate], -1)

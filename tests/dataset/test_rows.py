@@ -12,8 +12,7 @@ from dataset.simulate import simulate
 from sim.model.presets import PRESETS
 from sim.model.sweepable import SLOPE_INPUTS
 from sim.motion import response, run, settling, steady
-from sim.motion.orbits import Orbits
-from sim.solve.refinement import LOST, NO_START
+from sim.solve.refinement import LOST, NO_START, Orbit
 
 CONTROL = {**PRESETS["paper-control"].group_values(), "history": True}
 
@@ -28,14 +27,15 @@ def some_rows(*changes: dict[str, float]) -> dict[str, np.ndarray]:
 def test_a_row_does_not_depend_on_its_batch(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor does one that falls back to time steps, whose mesh is that of its own speed."""
 
-    def lose_slow_and_fast(rows: np.ndarray, *words: Any, **options: Any) -> Orbits:
-        found = solve_orbits(rows, *words, **options)
-        lost = (np.abs(rows[:, 0]) < 9) | (np.abs(rows[:, 0]) > 29)
-        found.status[lost], found.means[lost] = LOST, np.nan
-        return found
+    def lose_slow_and_fast(rows: np.ndarray, *words: Any) -> list[Orbit]:
+        orbits = zip(np.abs(rows[:, 0]), refined_orbits(rows, *words), strict=True)
+        return [lost(orbit) if speed < 9 or speed > 29 else orbit for speed, orbit in orbits]
 
-    solve_orbits = steady.solve_orbits
-    monkeypatch.setattr(steady, "solve_orbits", lose_slow_and_fast)
+    def lost(orbit: Orbit) -> Orbit:
+        return orbit._replace(status=LOST, means=np.full(5, np.nan))
+
+    refined_orbits = steady.refined_orbits
+    monkeypatch.setattr(steady, "refined_orbits", lose_slow_and_fast)
     speeds = (8.0, 30.0, 10.0, 15.0, 20.0)
     points = some_rows(*({"omega_bar": speed, "history": speed == 15.0} for speed in speeds), {"N": 3.0})
     together = simulate(points)
@@ -93,12 +93,9 @@ def test_derivatives_on_request() -> None:
 def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither an orbit nor a time step can be solved."""
 
-    def lost(rows: np.ndarray, *_: object, **__: object) -> Orbits:
-        count, none = len(rows), np.full(len(rows), np.nan)
-        means, slopes = np.full((count, 5), np.nan), np.empty((count, 0, 5))
-        return Orbits(means, slopes, none, np.full(count, NO_START), none, none)
-
-    monkeypatch.setattr(steady, "solve_orbits", lost)
+    none = (np.full((6, 2, 3), np.nan),) * 3
+    lost = Orbit(NO_START, np.nan, np.full(5, np.nan), none, none)
+    monkeypatch.setattr(steady, "refined_orbits", lambda rows, *_: [lost] * len(rows))
     monkeypatch.setattr(response, "orbits_with_phases", lambda rows, _, meshes: [[None] * len(rows)] * len(meshes))
     monkeypatch.setattr(settling, "state_on_orbit", lambda *_: None)
     monkeypatch.setattr(run, "advance", lambda *_: False)

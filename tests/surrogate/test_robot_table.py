@@ -18,9 +18,8 @@ from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.response import DWELLS
 from sim.model.robot import Robot
-from sim.motion.longer_memory import longer_memory
 from sim.motion.replay import replay
-from sim.motion.response import responses
+from sim.motion.response import longer_memory, responses
 from sim.motion.steady import steady
 from surrogate.robot_table import RobotTable, load_robot_table
 from surrogate.table_file import load_table

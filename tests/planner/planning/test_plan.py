@@ -49,14 +49,13 @@ def test_paper_cases_are_planned_within_their_bound(path: str, robot: str, most:
 
 def test_planning_never_calls_the_simulator_and_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     """A plan is made as before; numbers of its progress do not fall."""
-    import sim.motion.orbits
     import sim.motion.run
     import sim.motion.steady
 
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("the planner simulated")
 
-    for module, name in ((sim.motion.steady, "steady"), (sim.motion.orbits, "refined_orbits"),
+    for module, name in ((sim.motion.steady, "steady"), (sim.motion.steady, "refined_orbits"),
                          (sim.motion.run, "advance")):  # fmt: skip
         monkeypatch.setattr(module, name, refuse)
     shares: list[float] = []

@@ -16,11 +16,10 @@ from sim.model.sweepable import SLOPE_INPUTS, SWEEPABLE, read_range
 from sim.motion.branch_report import branch_table, draw_branches, largest_hysteresis
 from sim.motion.branches import Branch, Branches, Motion, find_branches
 from sim.motion.continuation import Point, first_point, follow, locate
-from sim.motion.exponents import DOUBLING, FOLD, HOPF, Leading, leading_exponent
 from sim.motion.revolution import Revolutions
 from sim.motion.shapes import state_from_orbit
-from sim.motion.slow_sweep import perturbed, settled_from
-from sim.motion.swept_input import SweptInput
+from sim.motion.stability import DOUBLING, FOLD, HOPF, Leading, leading_exponent
+from sim.motion.swept_input import SweptInput, perturbed, settled_from
 from sim.motion.tails_alike import EDGES, TailsAlike
 from sim.solve.refinement import difference
 from tests.shared import shared

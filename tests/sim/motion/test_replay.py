@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from sim.io.errors import InputError
-from sim.model.response import BEFORE, DWELLS
+from sim.mechanics import planar
+from sim.model.response import BEFORE, DWELLS, at_equal_dwells
 from sim.model.schedule import Schedule
-from sim.motion.longer_memory import longer_memory
-from sim.motion.net_speed import net_speeds, twists
 from sim.motion.replay import replay, replay_error
 from sim.motion.resolution import Resolution
-from sim.motion.response import responses
+from sim.motion.response import longer_memory, responses
 from sim.motion.steady import steady
+from sim.motion.steady_motion import twists
 from tests.oracles.switching import switch_response
 from tests.sim.robots import CONTROL_VALUES, control
 
@@ -109,7 +109,8 @@ def test_with_it_the_net_speed_of_short_dwells_is_that_of_flips_that_go_on() -> 
     motion, curves = steady(groups), responses(groups)
     twist = twists(motion.v_z, motion.v_x, motion.omega_yr, np.ones(1))
     longer = curves.memory + longer_memory(groups)
-    off = [abs(net_speeds(twist, curves.lag, memory)[0, few] - stepped) for memory in (curves.memory, longer)]
+    lags = [curves.lag + at_equal_dwells(memory) for memory in (curves.memory, longer)]
+    off = [abs(planar.net_speed(twist[:, None], lag, DWELLS)[0, few] - stepped) for lag in lags]
     assert (off[1] < 0.4 * off[0]).all()
 
 

@@ -9,12 +9,11 @@ import sim.motion.settling
 import sim.motion.steady
 from sim.model.presets import INDEPENDENT, PRESETS
 from sim.motion.batches import steady_columns, stepped_columns
-from sim.motion.orbits import Orbits, Perturbed
 from sim.motion.settling import settle
 from sim.motion.stability import QUICK
 from sim.motion.steady import orbits, steady
 from sim.motion.steady_motion import DIRECT, STEPPING
-from sim.solve.refinement import LOST, REASONS
+from sim.solve.refinement import LOST, REASONS, Orbit
 from tests.reference.cases import INDEPENDENT_HEAD_SHARE, MEASURED_HEAD_SHARE, STEADY_INPUTS, STEADY_POINTS
 from tests.sim.robots import control, sweep_points
 
@@ -85,14 +84,12 @@ def test_a_row_without_an_orbit_is_stepped_and_says_so(monkeypatch: pytest.Monke
     groups = control(2, omega_bar=[10.0, 14.0])
     plain = steady(groups)
 
-    def lose_the_first(rows: np.ndarray, tails: int, *, phases: int, perturbed: Perturbed) -> Orbits:
-        solution = solve_orbits(rows, tails, phases=phases, perturbed=perturbed)
-        solution.status[0] = LOST
-        solution.means[0] = np.nan
-        return solution
+    def lose_the_first(rows: np.ndarray, tails: int, phases: int) -> list[Orbit]:
+        first, *others = refined_orbits(rows, tails, phases)
+        return [first._replace(status=LOST, means=np.full(5, np.nan)), *others]
 
-    solve_orbits = sim.motion.steady.solve_orbits
-    monkeypatch.setattr(sim.motion.steady, "solve_orbits", lose_the_first)
+    refined_orbits = sim.motion.steady.refined_orbits
+    monkeypatch.setattr(sim.motion.steady, "refined_orbits", lose_the_first)
     assert orbits(groups).failed.tolist() == [True, False]
     motion = steady(groups)
     assert motion.method.tolist() == [STEPPING, DIRECT]
@@ -122,7 +119,7 @@ def test_tails_in_contact_that_leave_the_orbit_are_stepped_and_say_so(monkeypatc
     groups = control(1, N=4, omega_bar=30.0, tail_contact=1.0)
     plain = steady(groups)
     assert plain.method.tolist() == [DIRECT]
-    monkeypatch.setattr(sim.motion.orbits, "growths", lambda rows, *_: np.full(len(rows), 0.1))
+    monkeypatch.setattr(sim.motion.steady, "growths", lambda rows, *_: np.full(len(rows), 0.1))
     assert steady(groups).method.tolist() == [DIRECT]  # stepping reaches the same motion
     monkeypatch.setattr(sim.motion.steady, "SAME", 0.0)
     other = steady(groups)
