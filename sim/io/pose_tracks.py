@@ -52,8 +52,8 @@ def read_tracks(path: str | Path, **options: Unpack[TrackOptions]) -> pd.DataFra
     """
     path, source = Path(path), options.get("written_by")
     if source is None:
-        if options:
-            raise InputError(f"--{min(options)} is for tracks of another program; say which with --from")
+        if others := options.keys() - {"written_by"}:
+            raise InputError(f"--{min(others)} is for tracks of another program; say which with --from")
         start = read_bytes(path)[:80].decode("latin-1") if path.is_file() else ""
         if sign := next(filter(start.removeprefix("ï»¿").startswith, _SIGNS), None):
             raise InputError(f"{path} is no table of poses; say what wrote it: --from {_SIGNS[sign]}")
@@ -111,7 +111,9 @@ def _poses(seen: Seen, path: Path, program: Program, options: TrackOptions) -> p
         poses["heading"] = np.arctan2(-aside if program.y_down else aside, along)
         poses["x"], poses["y"] = poses["x_rear"] + along / 2, poses["y_rear"] + aside / 2
     x, y = options.get("origin", (0.0, 0.0))
-    up, run = (-1 if program.y_down else 1), path.stem.partition("DLC")[0].rstrip("_-") or path.stem
+    up, run = (-1 if program.y_down else 1), path.stem
+    if program is PROGRAMS["deeplabcut"]:
+        run = run.partition("DLC")[0].rstrip("_-") or run
     several = len(poses["robot"].unique()) > 1
     table = pd.DataFrame({
         "run": run + " " + poses["robot"] if several else run,

@@ -132,10 +132,7 @@ def _sleap(path: Path) -> Seen:
     """Read an "analysis" export."""
     if _is_hdf5(path):
         with _hdf5(path) as file:
-            tracks, scores = (
-                file["tracks"][:],
-                file["point_scores"][:],
-            )  # (robots, 2, nodes, frames), without the 2
+            tracks, scores = file["tracks"][:], file["point_scores"][:]  # (robots, 2, nodes, frames), without 2
             nodes = [name.decode() for name in file["node_names"]]
             robots = [name.decode() for name in file["track_names"]] or [""]
         frames = np.arange(tracks.shape[-1])

@@ -115,6 +115,12 @@ def test_options_without_a_program_are_refused(tmp_path: Path) -> None:
         read_tracks(tmp_path / "track.csv", fps=30.0)
 
 
+def test_without_a_program_a_table_is_read_as_it_is(tmp_path: Path) -> None:
+    poses().to_csv(tmp_path / "track.csv", index=False)
+    table = read_tracks(tmp_path / "track.csv", written_by=None)
+    pd.testing.assert_frame_equal(table.reset_index(drop=True), poses())
+
+
 def test_nothing_in_a_pickle_runs(tmp_path: Path) -> None:
     class Trap:
         def __reduce__(self) -> Any:
