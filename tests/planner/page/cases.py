@@ -1,4 +1,4 @@
-"""Robots, vehicles, paths and plans by which the core is compared with Python."""
+"""Robots, vehicles, paths, plans and runs by which the core is compared with Python."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from planner.api import plan
 from planner.jobs.plan import make_plan
@@ -20,6 +21,7 @@ from planner.vehicle.vehicle import Mode, Vehicle
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
+from sim.motion.lab_units import lab_columns
 from surrogate.domain import ROBOT as GROUPS
 from surrogate.table import NeuralTable
 from surrogate.table_file import load
@@ -29,7 +31,7 @@ from tests.planner.vehicles import vehicle
 from tests.shared import shared
 
 EFFECT = "left_right_bias"
-CONTROL, TRIANGLE = PRESETS["paper-control"], PRESETS["paper-triangle"]
+CONTROL, TRIANGLE, MEASURED = (PRESETS[f"paper-{name}"] for name in ("control", "triangle", "measured"))
 
 
 @cache
@@ -156,3 +158,33 @@ def random_case(seed: int) -> tuple[Path2D, Robot, dict[str, Any]]:
         options["time_weight"] = 0.03
     number = seed % 40
     return path, random_robots(40 if number > 1 else 2, seed=1)[number], options
+
+
+def look_up(runs: pd.DataFrame) -> dict[str, np.ndarray]:
+    """Ask the look-up table for the motion of each run, in the columns of a measured table."""
+    robots = [
+        replace(MEASURED, tails=int(n), tail_length=length / 100, motor_speed=abs(speed) * np.pi / 30)
+        for n, length, speed in zip(runs["N"], runs["l_cm"], runs["omega_rpm"], strict=True)
+    ]
+    groups = columns_of([robot.group_values() for robot in robots])
+    groups["omega_bar"] = groups["omega_bar"] * np.sign(runs["omega_rpm"].to_numpy())
+    length, time = runs["l_cm"].to_numpy(), np.array([robot.time_scale for robot in robots])
+    return lab_columns(shipped().query(groups), length, time)
+
+
+def table_of_runs() -> pd.DataFrame:
+    """Make runs of two numbers of tails, two lengths and two speeds, in both directions and three sessions."""
+    rows = [
+        (tails, length, sense * speed, f"day {k % 3}")
+        for tails in (3, 4)
+        for length in (7.0, 9.5)
+        for speed in (100.0, 150.0)
+        for sense in (1, -1)
+        for k in range(3)
+    ]
+    runs = pd.DataFrame(rows, columns=["N", "l_cm", "omega_rpm", "session"])
+    rng = np.random.default_rng(7)
+    answers = look_up(runs)
+    for name in ("omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s", "R_yr_cm", "theta_deg"):
+        runs[name] = answers[name] * np.exp(0.03 * rng.normal(size=len(runs)))
+    return runs

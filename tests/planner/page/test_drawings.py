@@ -50,15 +50,9 @@ BAD = [
     f"<svg><path d='M{'1 ' * 50_001}'/></svg>", f"<svg>{'<g>' * 120}{'</g>' * 120}</svg>",
 ]  # fmt: skip
 BROKEN = [
-    "<svg",
-    "",
-    "no xml",
-    "<svg><g></svg>",
-    "<svg></svg><svg/>",
-    "<svg b='1' b='2'/>",
-    "<svg b=1/>",
+    "<svg", "", "no xml", "<svg><g></svg>", "<svg></svg><svg/>", "<svg b='1' b='2'/>", "<svg b=1/>",
     "<svg b='&x;'/>",
-]
+]  # fmt: skip
 
 
 def svg(body: str, root: str = "", before: str = "") -> str:

@@ -31,8 +31,18 @@ from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml
 from sim.model.uncertainty import Sigma
 from tests.planner.page.cases import CONTROL, PATHS, followed, planned, shipped
-from tests.planner.page.page_core import TABLE, answer, answers, call, check_near, opened, to_page
-from tests.planner.page.parity import check_header, refusal_of
+from tests.planner.page.page_core import (
+    TABLE,
+    answer,
+    answers,
+    call,
+    check_header,
+    check_near,
+    opened,
+    page_options,
+    refusal_of,
+    to_page,
+)
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
 
@@ -222,26 +232,21 @@ def test_a_robot_that_python_must_make_is_refused(table: str) -> None:
 
 
 def test_robots_that_cannot_be_are_refused() -> None:
-    camel = {"tail_length": "tailLength", "tail_radius": "tailRadius", "motor_speed": "motorSpeed",
-             "disc_offset": "discOffset", "youngs_modulus": "youngsModulus"}  # fmt: skip
     cases: list[dict[str, Any]] = [
         {"tails": 0}, {"tails": 65}, {"tails": 2.5}, {"tail_length": 0.0}, {"viscosity": -1.5}, {"C_t": -1e-7},
         {"motor_speed": 0.0}, {"disc_offset": -0.01}, {"tail_radius": 0.03}, {"youngs_modulus": 1e-320},
         {"tail_length": 1e200, "tail_radius": 1e-200}, {"viscosity": 1e-310, "motor_speed": 1e-300},
     ]  # fmt: skip
     for changes in cases:
-        given = {**to_page(CONTROL), **{camel.get(name, name): value for name, value in changes.items()}}
+        given = {**to_page(CONTROL), **page_options(changes)}
         with pytest.raises(ValueError, match=r".") as refusal:
             replace(CONTROL, **changes)
         assert str(answer("robot.js", "makeRobot", given)) == str(refusal.value)
 
 
 def test_sliders_end_where_the_look_up_table_does() -> None:
-    domain = shipped().domain
-    ends, units = (
-        slider_ends(CONTROL, domain),
-        {"motor_speed": 2 * np.pi / 60, "viscosity": 1.0, "youngs_modulus": 1e6},
-    )
+    domain, units = shipped().domain, {"motor_speed": 2 * np.pi / 60, "viscosity": 1.0, "youngs_modulus": 1e6}
+    ends = slider_ends(CONTROL, domain)
     for field, key in zip(units, ("motorSpeed", "viscosity", "youngsModulus"), strict=True):
         reached = sorted(replace(CONTROL, **{field: end * units[field]}).omega_bar for end in ends[key])
         assert reached == pytest.approx(domain["omega_bar"], rel=0.1)

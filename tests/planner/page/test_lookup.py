@@ -15,8 +15,15 @@ from planner.vehicle.tracked_point import tracked_vehicle
 from sim.io.errors import InputError
 from sim.model.response import BEFORE
 from tests.planner.page.cases import CONTROL, VEHICLES, columns_of, random_groups, shipped
-from tests.planner.page.page_core import TABLE, answer, answers, check_near
-from tests.planner.page.parity import check_alike, refusal_of, without_digits
+from tests.planner.page.page_core import (
+    TABLE,
+    answer,
+    answers,
+    check_alike,
+    check_near,
+    refusal_of,
+    without_digits,
+)
 
 SOLVED = 1e-9  # relative; balances are solved until a correction is 2e-12, on different ways
 MOST_LETTERS = 1_350_000

@@ -18,11 +18,11 @@ from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from sim.inputs import load_robot
 from sim.io.errors import InputError
-from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml
 from tests.planner.page.cases import (
     CONTROL,
+    MEASURED,
     PATHS,
     TRIANGLE,
     VEHICLES,
@@ -31,13 +31,22 @@ from tests.planner.page.cases import (
     shipped,
     tracked_of,
 )
-from tests.planner.page.page_core import EXACT, TABLE, answer, answers, call, check_near, opened, page_options
-from tests.planner.page.parity import refusal_of, without_digits
+from tests.planner.page.page_core import (
+    EXACT,
+    TABLE,
+    answer,
+    answers,
+    call,
+    check_near,
+    opened,
+    page_options,
+    refusal_of,
+    without_digits,
+)
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
 
 ALIKE = 1e-8  # of the largest number of a column; balances are solved to 2e-12, and plans amplify this
-MEASURED = PRESETS["paper-measured"]
 SQUARE, BEND = PATHS["square"], PATHS["bend"]
 SHORT = {"objective": "flips"}
 

@@ -16,9 +16,8 @@ import pytest
 from calibration.statistics import study
 from calibration.swimmer import measured_table
 from calibration.swimmer.measured_table import read_measurements
-from tests.planner.page.page_core import FOLDER, TABLE, answer, opened, typed
-from tests.planner.page.parity import refusal_of
-from tests.planner.page.runs import ROBOT, look_up, table_of_runs
+from tests.planner.page.cases import MEASURED, look_up, table_of_runs
+from tests.planner.page.page_core import FOLDER, TABLE, answer, opened, refusal_of, typed
 
 NAME = "table.csv"
 Change = Callable[[pd.DataFrame], pd.DataFrame]
@@ -114,7 +113,7 @@ def compared(table: pd.DataFrame) -> Any:
     texts = [[str(value) for value in table[name]] for name in table]
     numbers = [pd.to_numeric(table[name], errors="coerce").fillna(0).tolist() for name in table]
     content = {"names": list(table), "columns": numbers, "texts": texts, "lines": list(range(2, len(table) + 2))}
-    return answer("measured.js", "comparedRuns", content, NAME, ROBOT, TABLE)
+    return answer("measured.js", "comparedRuns", content, NAME, MEASURED, TABLE)
 
 
 def test_answers_and_differences_are_those_of_the_look_up_table() -> None:

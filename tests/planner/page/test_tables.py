@@ -11,8 +11,7 @@ import pytest
 from planner.paths.path_files import read_path
 from sim.io.quantities import numbers_of
 from sim.io.tables import parse_table
-from tests.planner.page.page_core import answer, check_near, opened
-from tests.planner.page.parity import refusal_of, without_digits
+from tests.planner.page.page_core import answer, check_near, opened, refusal_of, without_digits
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
 

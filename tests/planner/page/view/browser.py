@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+FIRST_SCREEN = ("#message", "#next", "#view", "#play", ".legend")  # what the first plan needs
+
 
 def chromium() -> str:
     """Return the browser's program; without one the test is skipped, but it fails where CI = true."""

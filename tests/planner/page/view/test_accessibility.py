@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.planner.page.view.browser import address_of, middle_of, opened_page, planned, unfold
+from tests.planner.page.view.browser import FIRST_SCREEN, address_of, middle_of, opened_page, planned, unfold
 from tests.planner.page.view.conftest import FIRST
 
 TEXT, LINES = 4.5, 3.0  # contrast at least
@@ -154,6 +154,9 @@ def test_on_a_phone_targets_are_large_and_a_finger_draws(browser: Any, address: 
     with opened_page(browser, f"{address}#{FIRST}", **PHONE) as page:
         planned(page)
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        for part in FIRST_SCREEN:
+            box = page.locator(part).bounding_box()
+            assert box["y"] + box["height"] <= 844, part
         page.check("input[value=draw]")
         session, (x, y) = page.context.new_cdp_session(page), middle_of(page)
         for k, angle in enumerate(np.linspace(0.0, 2 * np.pi, 40)):

@@ -12,8 +12,7 @@ from planner.files.plan_files import write_plan
 from sim.io.errors import run_command
 from softflagella.__main__ import main
 from tests.planner.page.cases import planned as planned_by_python
-from tests.planner.page.page_core import answer
-from tests.planner.page.parity import without_digits
+from tests.planner.page.page_core import answer, without_digits
 from tests.planner.page.view.browser import address_of, drop, planned, text_of, unfold
 
 OLD = "Picture and numbers are those of the last plan that could be made."

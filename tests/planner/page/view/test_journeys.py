@@ -24,11 +24,11 @@ from sim.io.errors import run_command
 from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
 from softflagella.__main__ import main
-from tests.planner.page.cases import CONTROL, EFFECT, TRIANGLE, one_robot, shipped
+from tests.planner.page.cases import CONTROL, EFFECT, TRIANGLE, one_robot, shipped, table_of_runs
 from tests.planner.page.cases import planned as planned_by_python
-from tests.planner.page.parity import check_header
-from tests.planner.page.runs import table_of_runs
+from tests.planner.page.page_core import check_header
 from tests.planner.page.view.browser import (
+    FIRST_SCREEN,
     address_of,
     drag,
     drop,
@@ -61,7 +61,7 @@ def test_the_page_opens_with_a_plan_and_a_saved_link_opens_with_the_same(browser
         assert "dwells: if the coefficients are exact, 95 of 100 such robots stay within" in planned(page)
         assert first == ["1", *(text_of(page, part) for part in ("#message", "#facts", "#warnings"))]
         assert page.get_attribute("#play", "aria-pressed") == "false"  # less motion is wanted
-        for part in ("#message", "#next", "#view", "#play", ".legend", "#shape"):
+        for part in (*FIRST_SCREEN, "#shape"):
             box = page.locator(part).bounding_box()
             assert box["y"] + box["height"] <= 860, part  # all that the first plan needs is on the first screen
         page.check("#tails")

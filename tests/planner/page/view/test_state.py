@@ -1,4 +1,4 @@
-"""Parts of the page that need no browser: units, addresses, zoom, ticks, strokes, corners, poses, the clock."""
+"""Parts of the page that need no browser: units, addresses, zoom, ticks, strokes, corners, poses."""
 
 from __future__ import annotations
 
@@ -104,10 +104,7 @@ def test_ticks_are_round_and_far_enough_apart() -> None:
     check_near(answer("view/scene.js", "ticks", -1.1, 2.3, 0.5), [-1, -0.5, 0, 0.5, 1, 1.5, 2])
 
 
-def test_words_grid_and_corners() -> None:
-    words = answers([("view/dom.js", "clock", seconds) for seconds in (0, 59.94, 179.96, 3599.99)])
-    assert words == ["0:00.0", "0:59.9", "3:00.0", "60:00.0"]
-    assert answer("view/scene.js", "tickWords", -0.5, 0.1) == "−0.5"
+def test_the_grid_and_moved_corners() -> None:
     points = [[0.1234, 2], [0.12341, 2.0001], [-1, 0]]
     assert answer("view/state.js", "onGrid", points) == [[0.123, 2], [-1, 0]]
     square, same = [[0, 0], [2, 0], [2, 2], [0, 2]], {"right": 0, "up": 0, "scale": 1, "turn": 0}
