@@ -27,7 +27,7 @@ from dataset.design import MOST_ROWS, SweepDesign, checked_design
 from dataset.folder import Folder
 from dataset.schema import rows_version, schema
 from dataset.shards import ROWS, BadFileError, Part, record_batches, rows_named
-from sim.effects import catalogue
+from sim.effects import is_effect
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.io.provenance import fingerprint, provenance
@@ -137,7 +137,7 @@ def read_manifest(address: str | Path) -> dict[str, Any]:
     if not (
         _has(content, _KINDS)
         and all(_has(part, _PART_KINDS) and set(part) == set(_PART_KINDS) for part in content["parts"])
-        and all(isinstance(name, str) and name in catalogue() for name in content["effects"])
+        and all(isinstance(name, str) and is_effect(name) for name in content["effects"])
     ):
         raise InputError(f"{path} has entries that no build writes; build the data set anew")
     return {**content, "digest": digest}

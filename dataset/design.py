@@ -32,7 +32,7 @@ from dataset.robot_inputs import (
     sweep_toml,
 )
 from sim.arrays import Floats, Integers
-from sim.effects import catalogue
+from sim.effects import catalogue, is_effect
 from sim.inputs import check_columns
 from sim.io.errors import InputError, naming
 from sim.io.reading import read_toml
@@ -115,7 +115,7 @@ class SweepDesign:
     @property
     def effects(self) -> list[str]:
         """The effects among the columns, in alphabetical order."""
-        return sorted(set(self.columns) & set(catalogue()))
+        return sorted(filter(is_effect, self.columns))
 
     def ranges(self) -> dict[str, dict[str, Any]]:
         """Return range and scale of each column, as in sweep.toml; around a robot, what its corners span."""
@@ -281,7 +281,7 @@ def _axis(name: str, spec: Any) -> Axis:
         raise InputError(f"{name} has both_directions = {mirrored!r}; only the motor speed takes true or false")
     if not (math.isfinite(low) and math.isfinite(high) and low <= high):
         raise InputError(f"{name} has range [{low:g}, {high:g}]; it must be finite and ordered")
-    if low <= 0 and name not in catalogue():
+    if low <= 0 and not is_effect(name):
         raise InputError(f"{name} starts at {low:g}; it must be above 0")
     if scale == "log" and low <= 0:
         raise InputError(f"{name} starts at {low:g}; a log scale needs a low end above 0")

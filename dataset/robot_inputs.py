@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Floats
-from sim.effects import catalogue, check_effects
+from sim.effects import check_effects, is_effect
 from sim.inputs import group_columns, load_robot
 from sim.io.errors import InputError
 from sim.io.units import UNITS, from_si, of_kind, split, to_si
@@ -74,7 +74,7 @@ def input_of_robot(name: str) -> tuple[str, str]:
     Raises:
         InputError: there is no such input, or it has no unit.
     """
-    if name in WITHOUT_UNIT or name in catalogue():
+    if name in WITHOUT_UNIT or is_effect(name):
         return WITHOUT_UNIT.get(name, name), ""
     quantity, unit = split(name)
     if quantity in WITH_UNIT and unit is not None and unit.kind == UNITS[WITH_UNIT[quantity]].kind:
@@ -104,7 +104,7 @@ def robot_columns(robot: Mapping[str, Any], samples: Mapping[str, Floats]) -> di
             the other way.
     """
     base = Robot(name="", **robot)
-    effects = [name for name in samples if name in catalogue()]
+    effects = [name for name in samples if is_effect(name)]
     robots = []
     for values in zip(*(column.tolist() for column in samples.values()), strict=True):
         row = dict(zip(samples, values, strict=True))
@@ -119,7 +119,7 @@ def robot_columns(robot: Mapping[str, Any], samples: Mapping[str, Floats]) -> di
 
 def column_names(robot: Mapping[str, Any], inputs: Mapping[str, object]) -> list[str]:
     """List the columns of the rows of a sweep around a robot."""
-    effects = sorted({*robot["effects"], *(name for name in inputs if name in catalogue())})
+    effects = sorted({*robot["effects"], *(name for name in inputs if is_effect(name))})
     return [*GROUP_COLUMNS, *OPTIONAL_COLUMNS, *effects]
 
 

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 
-from sim.effects import catalogue
+from sim.effects import effect_named
 from sim.io.provenance import code_version
 from sim.model.groups import MOTOR_SPEED
 from sim.model.response import BEFORE, DWELLS
@@ -132,7 +132,8 @@ def rows_version() -> str:
 
 def schema(effects: Iterable[str] = (), sensitivities: bool = False) -> pa.Schema:
     """Return the schema of a data set that sweeps the named effects as well, with derivatives or without."""
-    swept = tuple(Column(name, _real, catalogue()[name].unit, catalogue()[name].title) for name in sorted(effects))
+    found = map(effect_named, sorted(effects))
+    swept = tuple(Column(effect.name, _real, effect.unit, effect.title) for effect in found)
     slopes = SLOPES if sensitivities else ()
     return pa.schema([parquet_field(column) for column in (*INPUTS, *swept, *OUTPUTS, *slopes, *FLAGS)])
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.effects import catalogue, check_effects, check_size
+from sim.effects import catalogue, check_effects, check_size, effect_named, is_effect
 from sim.io.errors import InputError, naming
 from sim.io.files import write_text
 from sim.io.keywords import checks_keywords
@@ -74,12 +74,10 @@ def check_columns(columns: Mapping[str, Any]) -> dict[str, Floats]:
         InputError: a column is missing or unknown, or a number is not finite or out of its range.
     """
     groups = {*GROUP_COLUMNS, *OPTIONAL_COLUMNS}
-    known = {*groups, *catalogue()}
-    unknown = sorted(name for name in set(columns) - known if name not in catalogue())
+    unknown = sorted(name for name in set(columns) - groups if not is_effect(name))
     if unknown:
-        raise InputError(
-            f"unknown column {unknown[0]!r}; allowed are {', '.join(sorted(known))}: rename or drop it"
-        )
+        allowed = ", ".join(sorted({*groups, *catalogue()}))
+        raise InputError(f"unknown column {unknown[0]!r}; allowed are {allowed}: rename or drop it")
     values = checked_values(columns)
     for name in [name for name in values if name not in groups]:
         for size in (values[name].min(), values[name].max()):
@@ -91,8 +89,8 @@ def group_columns(robots: Sequence[Robot]) -> dict[str, Floats]:
     """Return the dimensionless columns of robots, (M,) each; an effect that a robot lacks is null."""
     rows = [robot.group_values() for robot in robots]
     names = dict.fromkeys(name for row in rows for name in row)
-    nulls = {name: catalogue()[name].null if name in catalogue() else None for name in names}
-    return {name: np.array([row.get(name, nulls[name]) for row in rows]) for name in names}
+    nulls = {name: effect_named(name).null for name in names if is_effect(name)}
+    return {name: np.array([row.get(name, nulls.get(name)) for row in rows]) for name in names}
 
 
 def run_columns(table: pd.DataFrame, robot: Robot, where: str) -> tuple[list[Robot], dict[str, Floats]]:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sim.arrays import Floats
-from sim.effects import catalogue
+from sim.effects import catalogue, effect_named
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.io.notebook import Shown, given_axes
@@ -332,7 +332,7 @@ def _medians(errors: Mapping[str, Mapping[str, float]]) -> str:
 def _check_flips(values: Mapping[str, Floats]) -> None:
     """Refuse robots whose response to a flip was not learned."""
     for name in values.keys() - ROBOT:
-        if catalogue()[name].symmetry == "odd" and values[name].any():
+        if effect_named(name).symmetry == "odd" and values[name].any():
             raise InputError(
                 f"{name} makes left and right turns differ, which the look-up table has not learned; make the "
                 "robot a table of its own: softflagella surrogate robot ROBOT.toml --out TABLE.json"

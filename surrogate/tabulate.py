@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Floats
-from sim.effects import catalogue
+from sim.effects import effect_named, is_effect
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.io.provenance import provenance
@@ -158,9 +158,9 @@ def _slopes(values: dict[str, float]) -> dict[str, Any]:
 
 def _ends(name: str, value: float) -> tuple[tuple[float, float], tuple[float, float]]:
     """Choose two values beside `value`, within an effect's bounds, with their places on the derivative's scale."""
-    if name not in catalogue():
+    if not is_effect(name):
         return (value * math.exp(_STEP), _STEP), (value * math.exp(-_STEP), -_STEP)
-    effect = catalogue()[name]
+    effect = effect_named(name)
     step = _STEP * abs(effect.typical - effect.null)
     low, high = (min(max(value + sign * step, effect.bounds[0]), effect.bounds[1]) for sign in (-1, 1))
     return (high, high), (low, low)

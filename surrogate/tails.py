@@ -49,7 +49,7 @@ import numpy as np
 
 from sim.arrays import Flags, Floats, Integers
 from sim.compiling import compiled, formula
-from sim.effects import catalogue
+from sim.effects import effect_named
 from sim.io.errors import InputError
 from sim.mechanics.drag import head_resistance, tail_coefficients
 from sim.model.groups import Groups
@@ -200,7 +200,7 @@ def robots_of_groups(groups: Floats) -> Floats:
 
 def needs_no_learning(effect: str) -> bool:
     """Return whether an effect enters the balance by algebra: it changes head, disc, motor, or all drag alike."""
-    entry = catalogue()[effect]
+    entry = effect_named(effect)
     return entry.reach == "local" and entry.term not in _ON_TAILS
 
 

@@ -359,7 +359,7 @@ def calibration_laws(made: Path, out: Path) -> str:
 def calibration_adopt(made: Path, out: Path) -> str:
     laws_of_toy(4, **HIDDEN).save(out)
     done("calibration", "adopt", out / "laws.json", "--name", "new_effect", "--law", "Cyr", "--out", out)
-    assert "factor_law" in (out / "new_effect.py").read_text()
+    assert "make_law" in (out / "new_effect.py").read_text()
     assert (out / "test_new_effect.py").exists()
     return "new_effect.py belongs in "
 

@@ -27,7 +27,7 @@ from calibration.swimmer.swimmer import SwimmerModel
 from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.model.effect import Effect
-from sim.model.power_law import Powers
+from sim.model.laws import Powers
 
 if TYPE_CHECKING:
     from sim.model.body import Body

@@ -27,7 +27,7 @@ from calibration.swimmer.synthetic_table import make_table
 from sim.arrays import Floats
 from sim.inputs import group_columns
 from sim.model.groups import Groups
-from sim.model.power_law import Powers
+from sim.model.laws import Powers
 
 SCORES = (8.0, 16.0, 32.0)
 NULL = 1000  # seed of the table in which nothing is missing
@@ -85,7 +85,7 @@ class Setting:
         return np.asarray(slopes @ [float(power) for _, power in place.moves])
 
     def logarithm(self, powers: Powers) -> Floats:
-        """Compute ln m of every run (n,), as `sim.model.power_law` has it."""
+        """Compute ln m of every run (n,), as `sim.model.laws` has it."""
         robots, of_run = self.model.robots(self.base.parameters)
         logs = [powers.logarithm(Groups.from_columns(group_columns([robot])))[0] for robot in robots]
         return np.array(logs)[of_run]

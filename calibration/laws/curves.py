@@ -55,7 +55,7 @@ from calibration.statistics.fit import Fit
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.study import Study
 from sim.arrays import Floats
-from sim.model.power_law import STEEPEST
+from sim.model.laws import STEEPEST
 
 POWER = "power"
 _ACCEPTED = 0.05  # p-value

@@ -31,9 +31,8 @@ from sim.arrays import Floats, Integers
 from sim.effects import effect_named
 from sim.inputs import group_columns
 from sim.io.errors import InputError
-from sim.model.effect import Effect
 from sim.model.groups import Groups
-from sim.model.power_law import STEEPEST, Powers
+from sim.model.laws import STEEPEST, Law, Powers
 from sim.model.robot import Robot
 from surrogate.table import NeuralTable
 
@@ -124,20 +123,20 @@ class LawModel(SwimmerModel):
         """Compute m of every run, (n,)."""
         return np.exp(self._inputs @ [parameters.get(name, 0.0) for name in self.exponents])
 
-    def effect(self, parameters: Parameters) -> tuple[Effect, float, float]:
-        """Return the law as an effect, at the means of noted inputs.
+    def law(self, parameters: Parameters) -> tuple[Law, float, float]:
+        """Return the law, at the means of noted inputs.
 
         Args:
             parameters: a size, exponents and a lever; the last two are rounded to thousandths.
 
         Returns:
-            The effect; its size; and the factor, at the control example over that at the mean of the runs, of the
+            The law; its size; and the factor, at the control example over that at the mean of the runs, of the
             parameters that a law multiplies. The factor is 1 for a term: its size contains it.
         """
         powers = self.powers(parameters)
-        effect = self.place.effect(powers, parameters.get(LEVER, 0.0))
+        law = self.place.law(powers, parameters.get(LEVER, 0.0))
         to_control = self.to_control(powers, parameters)
-        return (effect, parameters[SIZE] * to_control, 1.0) if self.place.is_term else (effect, 1.0, to_control)
+        return (law, parameters[SIZE] * to_control, 1.0) if self.place.is_term else (law, 1.0, to_control)
 
     def powers(self, parameters: Parameters) -> Powers:
         """Collect the exponents of ω, l and N."""

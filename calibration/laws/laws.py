@@ -138,7 +138,7 @@ class Law:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the law as laws.json has it; `size` is at the geometric mean of the runs."""
-        effect, size, _ = self.model.effect(self.fit.parameters)
+        effect, size, _ = self.model.law(self.fit.parameters)
         runs = self.model.runs
         numbers = {
             p.name.removeprefix("law_"): {

@@ -2,12 +2,12 @@
 
 A `Place` is one of
 
-- a component of the wrench on head and disc, driven by a component of the velocity (`sim.model.power_law`). Terms
+- a component of the wrench on head and disc, driven by a component of the velocity (`sim.model.laws`). Terms
   that are odd in the direction of the motor are among them if the runs have both directions;
 - a side force at one place on the axis, along the tails or along the head. How far ahead of the disc it acts, its
   lever λ, is fitted, too;
 - an effect on the tails: spin drag, splay, sag, natural curvature along the circle of the clamps, which is odd,
-  and drag that depends on the local speed or on the place along the tail (`sim.model.scaled_effect`);
+  and drag that depends on the local speed or on the place along the tail;
 - a coefficient of the head, the drag of the tails, or their stiffness: a factor, which is 1 without a law.
 
 The first three are terms of a size ε. Each is multiplied by m = (ω/ω_m)^p (l/l_m)^q (N/N_m)^r, with ω_m, l_m and
@@ -26,18 +26,19 @@ from dataclasses import dataclass
 
 from sim.effects import catalogue
 from sim.model.effect import Effect
-from sim.model.power_law import (
+from sim.model.laws import (
     COEFFICIENTS,
     LEVERS,
+    LOCAL_DRAG,
     MOTIONS,
+    SCALED,
     TAILS,
     WRENCHES,
+    Law,
+    Load,
     Powers,
-    factor_law,
-    force_law,
-    is_mirrored,
+    make_law,
 )
-from sim.model.scaled_effect import LOCAL_DRAG, SCALED, scaled_effect
 
 _WRENCH_WORDS = {
     "Fx": "a side force on the head",
@@ -113,17 +114,12 @@ class Place:
         """Least and largest λ of a place that has one."""
         return _LEVER_BOUNDS[self.lever_unit]
 
-    def effect(self, powers: Powers, lever: float = 0.0) -> Effect:
-        """Return the effect at this place (`sim.model.power_law`, `sim.model.scaled_effect`)."""
-        if self.wrench:
-            rectified = is_mirrored(self.wrench, self.motion) if self.odd else None
-            ahead = lever if self.lever_unit else 0.0
-            return force_law(
-                self.wrench, self.motion, powers, rectified=rectified, lever=ahead, lever_unit=self.lever_unit
-            )
-        if self.is_term:
-            return scaled_effect(_effect_on_tails(self.name), powers)
-        return factor_law(self.name, powers)
+    def law(self, powers: Powers, lever: float = 0.0) -> Law:
+        """Return the law at this place (`sim.model.laws`)."""
+        if not self.wrench:
+            return make_law(_effects_on_tails().get(self.name, self.name), powers)
+        load = Load(self.wrench, self.motion, self.odd, self.lever_unit)
+        return make_law(load.place, powers, lever=lever if self.lever_unit else 0.0)
 
 
 def place_named(name: str) -> Place:
@@ -168,19 +164,27 @@ def places(*, both_directions: bool = True) -> tuple[Place, ...]:
         *coefficients,
         Place(drag_of_tails, "the drag of the tails", drag, "tails", is_term=False),
         Place(stiffness, _STIFFNESS_WORDS, (("youngs_modulus", 1),), "tails", is_term=False),
-        *(_tail_effect(effect) for effect in _effects_on_tails() if both_directions or effect.symmetry == "even"),
+        *(
+            Place(name, _TAIL_EFFECTS[name], ((make_law(effect).name, 1),), "tails", odd=effect.symmetry == "odd")
+            for name, effect in _effects_on_tails().items()
+            if both_directions or effect.symmetry == "even"
+        ),
         *elsewhere,
         *odd,
     )
 
 
+def _effects_on_tails() -> dict[str, Effect]:
+    """Return the effects on the tails that a law multiplies, by name."""
+    return {name: catalogue()[name] for name in SCALED} | LOCAL_DRAG
+
+
 def _load(wrench: str, motion: str, *, odd: bool, lever_unit: str = "") -> Place:
     """Make the place of a load at one place on the axis."""
-    rectified = is_mirrored(wrench, motion) if odd else None
-    moves = [(force_law(wrench, motion, Powers(), rectified=rectified).name, 1)]
+    moves = [(make_law(Load(wrench, motion, odd).place).name, 1)]
     words = _WRENCH_WORDS[wrench]
     if lever_unit:
-        moves.append((force_law("My", motion, Powers()).name, 1))
+        moves.append((make_law(Load("My", motion).place).name, 1))
         words = _ELSEWHERE
     sides = ", and that differs between left and right turns" if odd else ""
     return Place(
@@ -193,20 +197,3 @@ def _load(wrench: str, motion: str, *, odd: bool, lever_unit: str = "") -> Place
         odd=odd,
         lever_unit=lever_unit,
     )
-
-
-def _effects_on_tails() -> list[Effect]:
-    """List the effects on the tails that a law multiplies."""
-    return [_effect_on_tails(name) for name in (*SCALED, *LOCAL_DRAG)]
-
-
-def _effect_on_tails(name: str) -> Effect:
-    """Return an effect of SCALED or LOCAL_DRAG."""
-    return LOCAL_DRAG.get(name) or catalogue()[name]
-
-
-def _tail_effect(effect: Effect) -> Place:
-    """Make the place of an effect on the tails."""
-    law = scaled_effect(effect, Powers())
-    odd = effect.symmetry == "odd"
-    return Place(effect.name, _TAIL_EFFECTS[effect.name], ((law.name, 1),), "tails", odd=odd)

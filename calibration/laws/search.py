@@ -61,8 +61,8 @@ from calibration.statistics.gls import Gls, eliminated, solved
 from calibration.statistics.statistical_model import changes, precisions
 from calibration.swimmer.swimmer import SwimmerModel
 from sim.arrays import Flags, Floats, Integers
-from sim.effects import catalogue, effect_named
-from sim.model.power_law import STEEPEST
+from sim.effects import effect_named, is_effect
+from sim.model.laws import STEEPEST
 
 _AT_ONCE = 25  # residuals
 _PASSES = 3  # iterations for the scatter of the sessions
@@ -300,7 +300,7 @@ def _by_cost(names: Sequence[str]) -> list[tuple[str, ...]]:
     """Group parameters by what their derivatives need."""
     groups: dict[tuple[bool, bool], list[str]] = {}
     for name in names:
-        known = [effect_named(name)] if name in catalogue() else []
+        known = [effect_named(name)] if is_effect(name) else []
         key = (any(e.symmetry == "odd" for e in known), any(e.reach == "nonlocal" for e in known))
         groups.setdefault(key, []).append(name)
     return [tuple(group) for group in groups.values()]

@@ -16,21 +16,18 @@ from typing import Any
 import numpy as np
 
 from calibration.words.render import rendered
-from sim.effects import catalogue, check_size
+from sim.effects import catalogue, check_size, effect_named
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_text
 from sim.io.reading import ContentError, read_json
-from sim.model.effect import Effect
 from sim.model.groups import Groups
-from sim.model.power_law import FactorLaw, ForceLaw
+from sim.model.laws import COEFFICIENTS, SCALED, TAILS, Law
 from sim.model.presets import PRESETS
-from sim.model.scaled_effect import LOCAL_DRAG, ScaledEffect
 from sim.motion.steady import steady
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{2,40}", re.ASCII)
 _WIDTH = 110  # of lines
 _WIDER = 10.0  # bounds over the size
-_LAWS = (ForceLaw, FactorLaw, ScaledEffect)
 _TAILS = (2, 3)  # of the robots of the test
 
 
@@ -58,12 +55,12 @@ def adopt_law(source: str | Path, name: str, folder: str | Path, *, place: str =
         raise InputError(f"there is an effect {name} already; give another name")
     record, without, table = _law_of(source, place)
     try:
-        effect = catalogue()[str(record["effect"]["name"])]
+        law = effect_named(str(record["effect"]["name"]))
         size, error = float(record["effect"]["size"]), float(record["error"])
         words, runs = _plain(record["words"]), _runs_in_words(record["runs"])
-        if not isinstance(effect, _LAWS) or not math.isfinite(size + error) or not size or not words:
+        if not isinstance(law, Law) or not math.isfinite(size + error) or not size or not words:
             raise ValueError
-        check_size(effect.name, size)
+        check_size(law.name, size)
     except (KeyError, TypeError, ValueError, OverflowError):
         raise InputError(f"{source}: the law cannot be read; calibrate the table again") from None
     described = (
@@ -71,11 +68,11 @@ def adopt_law(source: str | Path, name: str, folder: str | Path, *, place: str =
         f"runs with {runs}. The error on held-out runs is {100 * error:.2f} % with it, {100 * without:.2f} % "
         "without it. It describes these runs."
     )
-    text = _effect_file(effect, name, size, textwrap.fill(described, _WIDTH), table)
+    text = _effect_file(law, name, size, textwrap.fill(described, _WIDTH), table)
     file, test = f"{name}.py", f"test_{name}.py"
     with files_together(folder, (file, test)) as temporary:
         write_text(temporary / file, text)
-        write_text(temporary / test, _test_file(effect, name, size))
+        write_text(temporary / test, _test_file(law, name, size))
     return [Path(folder, file), Path(folder, test)]
 
 
@@ -120,46 +117,22 @@ def _runs_in_words(runs: dict[str, Any]) -> str:
     return ", ".join(parts)
 
 
-def _effect_file(effect: Effect, name: str, size: float, words: str, table: str) -> str:
-    imports, law = _source_of(effect)
-    low, high = effect.bounds if isinstance(effect, FactorLaw) else (-_WIDER * abs(size), _WIDER * abs(size))
-    described = {"title": name.replace("_", " "), "equation": effect.equation, "words": words, "table": table}
-    source = {"imports": "\n".join(imports), "law": law, "name": name, "low": low, "high": high, "size": size}
-    return rendered("effect.j2", described | source) + "\n"
+def _effect_file(law: Law, name: str, size: float, words: str, table: str) -> str:
+    is_factor = law.place in (*COEFFICIENTS, *TAILS)
+    low, high = law.bounds if is_factor else (-_WIDER * abs(size), _WIDER * abs(size))
+    described = {"title": name.replace("_", " "), "equation": law.equation, "words": words, "table": table}
+    numbers = {"law": law, "scaled": law.place in SCALED, "low": low, "high": high, "size": size}
+    return rendered("effect.j2", {**described, **numbers, "name": name}) + "\n"
 
 
-def _source_of(effect: Effect) -> tuple[list[str], str]:
-    """Write the lines that import a law's maker, and its call."""
-    assert isinstance(effect, _LAWS)
-    pairs = zip(("speed", "length", "tails"), vars(effect.powers).values(), strict=True)
-    powers = f"Powers({', '.join(f'{key}={value!r}' for key, value in pairs if value)})"
-    if isinstance(effect, FactorLaw):
-        return ["from sim.model.power_law import Powers, factor_law"], f'factor_law("{effect.place}", {powers})'
-    if isinstance(effect, ForceLaw):
-        further = f", rectified={effect.rectified}" if effect.symmetry == "odd" else ""
-        if effect.lever_unit:
-            further += f', lever={effect.lever!r}, lever_unit="{effect.lever_unit}"'
-        call = f'force_law("{effect.wrench}", "{effect.motion}", {powers}{further})'
-        return ["from sim.model.power_law import Powers, force_law"], call
-    scaled = effect.effect.name
-    imports = ["from sim.model.power_law import Powers"]
-    if scaled in LOCAL_DRAG:
-        imports.append("from sim.model.scaled_effect import LOCAL_DRAG, scaled_effect")
-        return imports, f'scaled_effect(LOCAL_DRAG["{scaled}"], {powers})'
-    imports.append("from sim.model.scaled_effect import scaled_effect")
-    return [f"from sim.effects.{scaled} import EFFECT as {scaled.upper()}", *imports], (
-        f"scaled_effect({scaled.upper()}, {powers})"
-    )
-
-
-def _test_file(effect: Effect, name: str, size: float) -> str:
+def _test_file(law: Law, name: str, size: float) -> str:
     expected = []
     for tails in _TAILS:
-        values = {**PRESETS["paper-control"].group_values(), "N": float(tails), effect.name: size}
+        values = {**PRESETS["paper-control"].group_values(), "N": float(tails), law.name: size}
         solved = steady(Groups.from_columns({key: np.array([value]) for key, value in values.items()}))
         outputs = [float(f"{float(getattr(solved, key)[0]):.10g}") for key in ("omega_yr", "v_x", "v_z")]
         if not np.isfinite(outputs).all():
-            raise InputError(f"{effect.name} = {size:g}: the control robot cannot be simulated with this law")
+            raise InputError(f"{law.name} = {size:g}: the control robot cannot be simulated with this law")
         expected.append(f"({tails}, {outputs})")
-    filled = {"name": name, "law": effect.name, "size": size, "expected": ",\n        ".join(expected)}
+    filled = {"name": name, "law": law.name, "size": size, "expected": ",\n        ".join(expected)}
     return rendered("effect_test.j2", filled) + "\n"

@@ -8,7 +8,7 @@ kept contain the errors of these. A current in the tank is stated on its own.
 Where no effect explains the runs, a correction goes into the table [correction] (`sim.model.correction`). Its
 uncertainty is that of its weights and of what it leaves beyond noise, at the robot of the file.
 
-**A law** is an effect by its name (`sim.model.power_law`), whose factor is 1 at the paper's control example; that
+**A law** is an effect by its name (`sim.model.laws`), whose factor is 1 at the paper's control example; that
 of the fit is 1 at the geometric mean of the runs. So the size of a term, or the coefficient that a factor
 multiplies, is written for the control example. Exponents are rounded to thousandths.
 
@@ -43,12 +43,12 @@ from calibration.swimmer.influences import CURRENT, LENGTH
 from calibration.swimmer.swimmer import robot_numbers
 from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge, knowledge_toml
 from sim.arrays import Flags, Floats
-from sim.effects import catalogue
+from sim.effects import catalogue, effect_named, is_effect
 from sim.io.errors import InputError
 from sim.io.seals import sealed
 from sim.io.units import from_si, to_si
 from sim.model.correction import learnt_range
-from sim.model.power_law import force_law
+from sim.model.laws import Load, make_law
 from sim.model.presets import CONTROL
 from sim.model.robot import Robot
 from sim.model.robot_toml import ENTRIES, robot_toml
@@ -74,7 +74,7 @@ def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:
     sizes = {
         name: float(value)
         for name, value in parameters.items()
-        if name in catalogue() and value != catalogue()[name].null
+        if is_effect(name) and value != effect_named(name).null
     }
     return replace(robot, **numbers, effects={**robot.effects, **sizes})
 
@@ -206,11 +206,11 @@ def robot_with_law(given: Robot, law: Law, parameters: Parameters) -> Robot:
 
 
 def effects_of_law(law: Law, parameters: Parameters) -> tuple[dict[str, float], float]:
-    """Return the sizes of a law's effects, in the order of its moves, and the factor of `LawModel.effect`."""
+    """Return the sizes of a law's effects, in the order of its moves, and the factor of `LawModel.law`."""
     model = law.model
-    effect, size, factor = model.effect(parameters)
+    at_place, size, factor = model.law(parameters)
     if not law.place.lever_unit:
-        return {effect.name: size}, factor
+        return {at_place.name: size}, factor
     powers, motion = model.powers(parameters), law.place.motion
     if law.place.lever_unit == "l":  # l/R is l/l_c times that of the control example
         couple_powers, arm = replace(powers, length=powers.length + 1), CONTROL.l_over_R
@@ -218,8 +218,8 @@ def effects_of_law(law: Law, parameters: Parameters) -> tuple[dict[str, float], 
         couple_powers, arm = powers, model.robot.head_length / model.robot.head_radius
     couple = size * parameters[LEVER] * arm
     return {
-        force_law("Fx", motion, powers).name: size,
-        force_law("My", motion, couple_powers).name: couple,
+        make_law(Load("Fx", motion).place, powers).name: size,
+        make_law(Load("My", motion).place, couple_powers).name: couple,
     }, factor
 
 

@@ -26,7 +26,7 @@ from functools import cache
 from typing import Any
 
 from calibration.statistics.statistical_model import Parameter
-from sim.effects import Effect, catalogue
+from sim.effects import Effect, catalogue, effect_named, is_effect
 from sim.io.units import UNITS, from_si
 from sim.model.robot import Robot
 
@@ -166,8 +166,7 @@ def influences() -> dict[str, Influence]:
 @cache
 def stated_influence(name: str) -> Influence | None:
     """Find an effect that states itself in its name, such as the term of a law; None if it is none."""
-    known = catalogue()
-    return _plain(known[name]) if name in known and name not in list(known) else None
+    return _plain(effect_named(name)) if is_effect(name) and name not in catalogue() else None
 
 
 def _plain(effect: Effect) -> Influence:
@@ -191,7 +190,7 @@ def is_odd(name: str, influence: Influence | None) -> bool:
     """
     if influence is not None:
         return influence.odd
-    return name in catalogue() and catalogue()[name].symmetry == "odd"
+    return is_effect(name) and effect_named(name).symmetry == "odd"
 
 
 def reason_untestable(

@@ -41,7 +41,7 @@ from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.observation import Observation
 from calibration.swimmer.possible_runs import Owned, check_inputs, check_outputs, check_owned, possible_settings
 from sim.arrays import Flags, Floats, Integers
-from sim.effects import catalogue
+from sim.effects import effect_named, is_effect
 from sim.inputs import group_columns
 from sim.io.errors import InputError
 from sim.model.robot import Robot
@@ -173,7 +173,7 @@ class SwimmerModel:
         moves = {name: _moves(name, influence) for name, influence in influences.items()}
         wanted = tuple(dict.fromkeys(move for group in moves.values() for move in group))
         # Non-local effects at their null may need more phases than the motion; with effects at work it has them.
-        at_null = any(catalogue()[name].reach == "nonlocal" for name in wanted if name in catalogue())
+        at_null = any(is_effect(name) and effect_named(name).reach == "nonlocal" for name in wanted)
         phases = PHASES_FOR_SLOPES if at_null and self._is_at_null(parameters) else PHASES
         distinct, same = _distinct(columns)
         found = self.solver.slopes(distinct, wanted, phases=phases, jobs=self.jobs, title=title)
@@ -348,7 +348,7 @@ class SwimmerModel:
         """
         runs, work = self.runs, self._at_work(parameters)
         drivers = {i.needs: self._driver(i.needs, parameters) for i in work if i.needs}
-        signed |= any(i.odd for i in work) or any(catalogue()[e].symmetry == "odd" for e in self.robot.effects)
+        signed |= any(i.odd for i in work) or any(effect_named(e).symmetry == "odd" for e in self.robot.effects)
         omega = runs.omega if signed else np.abs(runs.omega)
         by_run = {name: value for name, value in parameters.items() if np.ndim(value)}
         table = np.column_stack([runs.tails, runs.length, omega, *by_run.values(), *drivers.values()]).round(9)
@@ -402,7 +402,7 @@ class SwimmerModel:
         names = {i.effect for i in work if i.effect} | {
             i.parameter.second.name for i in work if i.parameter.second
         }
-        nulls = {name: np.full(len(runs), catalogue()[name].null) for name in sorted(names)}
+        nulls = {name: np.full(len(runs), effect_named(name).null) for name in sorted(names)}
         columns = {**nulls, **group_columns([run.robot for run in runs])}
         columns["omega_bar"] = columns["omega_bar"] * np.array([run.sign for run in runs])
         return columns

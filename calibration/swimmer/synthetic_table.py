@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from sim.effects import catalogue
+from sim.effects import effect_named
 from sim.inputs import group_columns
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
@@ -61,7 +61,7 @@ def make_table(
     design = [(n, length, rpm) for n in tails for length in lengths_cm for rpm in motor_rpm]
     runs = [replace(robot, tails=n, tail_length=length / 100, motor_speed=rpm * RPM) for n, length, rpm in design]
     columns = group_columns(runs)
-    odd = any(catalogue()[name].symmetry == "odd" for name in robot.effects)
+    odd = any(effect_named(name).symmetry == "odd" for name in robot.effects)
     directions = (1, -1) if odd else (1,)  # else a reversed motor mirrors the motion
     both = {k: np.concatenate([d * v if k == "omega_bar" else v for d in directions]) for k, v in columns.items()}
     motion = stepped_columns(both, finer=2, jobs=jobs, title=title)

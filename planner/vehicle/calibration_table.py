@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Floats
-from sim.effects import catalogue
+from sim.effects import is_effect
 from sim.io.errors import InputError, naming
 from sim.io.reading import read_toml
 from sim.model.uncertainty import DEFAULTS
@@ -51,8 +51,8 @@ class CalibrationKnowledge:
     current_error: tuple[float, float] = (0.0, 0.0)  # [m/s]
 
     def __post_init__(self) -> None:
-        numbers, effects = (*COEFFICIENTS, *NUMBERS), catalogue()
-        unknown = [name for name in self.names if name not in numbers and name not in effects]
+        numbers = (*COEFFICIENTS, *NUMBERS)
+        unknown = [name for name in self.names if name not in numbers and not is_effect(name)]
         if unknown:
             allowed = ", ".join(numbers)
             raise InputError(f"calibration: unknown name {unknown[0]!r}; give {allowed} or an effect")

@@ -19,7 +19,7 @@ import numpy as np
 from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle, lag_table, resampled
 from sim.arrays import Floats
-from sim.effects import catalogue
+from sim.effects import effect_named, is_effect
 from sim.effects.tail_contact import EFFECT as CONTACT
 from sim.effects.tail_contact import least_gap
 from sim.io.errors import InputError
@@ -197,7 +197,7 @@ def _slope_of_number(robot: Robot, lookup: LookupTable, motion: Motion, name: st
     changes = {
         group: math.log(above[group] / below[group]) / (2 * _STEP)
         for group in above
-        if group not in catalogue() and above[group] != below[group]
+        if not is_effect(group) and above[group] != below[group]
     }
     faster = -math.log(ends[0].time_scale / ends[1].time_scale) / (2 * _STEP)
     longer = math.log(ends[0].length_scale / ends[1].length_scale) / (2 * _STEP)
@@ -219,8 +219,8 @@ def _slope(robot: Robot, lookup: LookupTable, motion: Motion, name: str) -> Moti
         twist = np.asarray(stored[name])
         turned = (twist[:, 2] / motion.twist[:, 2])[:, None, None, None]
         return Motion(twist, motion.lag * turned * [0.0, 0.0, 1.0])
-    effect = name in catalogue()
-    step = _STEP * catalogue()[name].typical if effect else _STEP
+    effect = is_effect(name)
+    step = _STEP * effect_named(name).typical if effect else _STEP
     ends = []
     for sign in (1.0, -1.0):
         value = values.get(name, 0.0) + sign * step if effect else values[name] * np.exp(sign * step)

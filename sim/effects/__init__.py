@@ -11,34 +11,13 @@ from functools import cache
 
 from sim.io.errors import InputError
 from sim.model.effect import Effect
-from sim.model.power_law import law_from_name
-from sim.model.scaled_effect import scaled_from_name
+from sim.model.laws import Law, read_law
 
-__all__ = ["Effect", "catalogue", "check_effects", "check_size", "effect_named"]
-
-
-class Catalogue(dict[str, Effect]):
-    """Effects by name. It lists those of this folder, and knows beside them each law by its name.
-
-    A law (`sim.model.power_law`, `sim.model.scaled_effect`) states itself in its name. So it is found here in any
-    process without being registered, and it is never listed.
-    """
-
-    def __contains__(self, name: object) -> bool:
-        return super().__contains__(name) or (isinstance(name, str) and self._law(name) is not None)
-
-    def __missing__(self, name: str) -> Effect:
-        law = self._law(name)
-        if law is None:
-            raise KeyError(name)
-        return law
-
-    def _law(self, name: str) -> Effect | None:
-        return law_from_name(name) or scaled_from_name(name, self)
+__all__ = ["Effect", "catalogue", "check_effects", "check_size", "effect_named", "is_effect"]
 
 
 @cache
-def catalogue() -> Catalogue:
+def catalogue() -> dict[str, Effect]:
     """Return every effect that the base model lacks, by name, in alphabetical order.
 
     Example:
@@ -52,20 +31,35 @@ def catalogue() -> Catalogue:
     for name, effect in found.items():
         if effect.name != name:
             raise TypeError(f"effect file {name}.py declares the name {effect.name!r}; make them equal")
-    return Catalogue(found)
+    return found
+
+
+@cache
+def _law(name: str) -> Law | None:
+    return read_law(name, catalogue())
+
+
+def _find(name: str) -> Effect | None:
+    return catalogue().get(name) or _law(name)
+
+
+def is_effect(name: str) -> bool:
+    """Tell whether a name is that of an effect or of a law."""
+    return _find(name) is not None
 
 
 def effect_named(name: str) -> Effect:
-    """Return the effect of that name.
+    """Return the effect, or the law (`sim.model.laws`), of that name.
 
     Raises:
-        InputError: there is no such effect.
+        InputError: there is none.
     """
-    if name not in catalogue():
+    effect = _find(name)
+    if effect is None:
         near = difflib.get_close_matches(name, catalogue(), 1)
         known = f"is it {near[0]}?" if near else f"known are {', '.join(catalogue())}"
         raise InputError(f"unknown effect {name!r}; {known}")
-    return catalogue()[name]
+    return effect
 
 
 def check_effects(effects: Mapping[str, float]) -> None:

@@ -9,11 +9,13 @@ tanks: in one tank, a larger C_t does the same.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from sim.arrays import Floats
+from sim.mechanics.drag import head_resistance
 from sim.model.effect import Driver, Effect
 
 if TYPE_CHECKING:
@@ -25,12 +27,8 @@ if TYPE_CHECKING:
 class TankWall(Effect):
     def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
         factor = 1 / (1 - 2.104 * size + 2.089 * size**3 - 0.948 * size**5)
-        lever = groups.L_over_R / groups.l_over_R / 2
-        more = 6 * math.pi * groups.C_t / groups.l_over_R * (factor - 1)
-        coupled = more * lever
-        return body.with_resistance(
-            {(0, 0): more, (1, 1): more, (0, 2): coupled, (2, 0): coupled, (2, 2): coupled * lever}
-        )
+        more = head_resistance(groups.C_t * (factor - 1), 0.0, 0.0, body.head_radius, body.head_length)
+        return body.plus(resistance=np.array(more))
 
 
 EFFECT = TankWall(

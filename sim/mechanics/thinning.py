@@ -4,7 +4,7 @@
 
 v is the velocity of the node through the fluid, s its distance from the clamp, y its height over the axis; γ is of
 `sim.effects.stratified_viscosity`. ε is the size of
-`sim.effects.shear_thinning`; p and g are those of `sim.model.scaled_effect`. λ is e^time in units of the time that
+`sim.effects.shear_thinning`; p and g are those of `sim.model.laws`. λ is e^time in units of the time that
 makes λ γ̇ = 1 at the clamps of the paper's control example; λ_c is λ for time = 0. It is the same number of seconds
 for robots of one material and fluid, so in units of μ0 l⁴/EI it is proportional to r0⁴. Source: Carreau (1972).
 Units: l, μ0 l⁴/EI, EI/l².

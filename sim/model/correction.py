@@ -12,7 +12,7 @@ where b is the largest size that is allowed. So it changes drag, and the simulat
 motion, and the response to a flip, which was not measured, with the same drag. Left and right turns stay mirror
 images.
 
-A correction and a law (`sim.model.power_law`) describe the runs that they were learnt from, and say nothing of
+A correction and a law (`sim.model.laws`) describe the runs that they were learnt from, and say nothing of
 others. So a robot outside the runs, by more than a small margin, is refused. In a robot.toml the range of a law is
 
     [learnt_from]

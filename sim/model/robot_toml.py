@@ -94,8 +94,10 @@ def read_robot(tables: Mapping[str, Any], where: str) -> dict[str, Any]:
     for table, content in tables.items():
         for key, value in content.items() if isinstance(content, dict) else [("", content)]:
             entry = _entry(table, key.removesuffix(_SIGMA))
-            if entry is None or (key.endswith(_SIGMA) and entry.field not in DEFAULTS):
+            if entry is None:
                 raise InputError(f"{where}: {_unknown(table, key)}")
+            if key.endswith(_SIGMA) and entry.field not in DEFAULTS:
+                raise InputError(f"{where}: [{table}] {key}: this number takes no standard deviation")
             if key.endswith(_SIGMA):
                 stated.append((entry, key, value))
             elif entry.field in values:
@@ -146,39 +148,20 @@ def _entry(table: str, key: str) -> Entry | None:
 
 
 def _unknown(table: str, key: str) -> str:
-    """Say what is wrong with a key: it has no unit, or there is no such number; suggest one."""
+    """Say what is wrong with a key: it has no unit, or there is no such number; tell the nearest entry."""
+    quantity = key.removesuffix(_SIGMA)
     for entry in ENTRIES:
-        if entry.unit and (table, key.removesuffix(_SIGMA)) == (entry.table, entry.quantity):
+        if entry.unit and (table, quantity) == (entry.table, entry.quantity):
             units = ", ".join(entry.with_unit(suffix) for suffix in of_kind(UNITS[entry.unit].kind))
             return f"[{table}] {key} has no unit; give one of {units}"
-    tables = list(dict.fromkeys(entry.table for entry in ENTRIES))
+    tables = ", ".join(f"[{name}]" for name in dict.fromkeys(entry.table for entry in ENTRIES))
     if not key:
-        return f"{table} is in no table; a robot has [{'], ['.join(tables)}]"
-    if table not in tables:
-        near = difflib.get_close_matches(table, tables, 1)
-        return f"unknown entry [{table}] {key}; " + (
-            f"is it [{near[0]}]?" if near else f"a robot has [{'], ['.join(tables)}]"
-        )
-    return f"unknown entry [{table}] {key}; {_suggestion(table, key)}"
-
-
-def _suggestion(table: str, key: str) -> str:
-    """Suggest a key of a table for one that it does not have, or list those that it has."""
-    quantity, unit = split(key.removesuffix(_SIGMA))
-    entries = {entry.quantity: entry for entry in ENTRIES if entry.table == table}
-    if quantity in entries and key.endswith(_SIGMA) and entries[quantity].field not in DEFAULTS:
-        return "this number takes no standard deviation"
-    elsewhere = [entry.table for entry in ENTRIES if entry.quantity == quantity and entry.table != table]
-    if elsewhere:
-        return f"is it [{elsewhere[0]}] {key}?"
-    of_diameter = quantity.endswith("diameter") and "radius" in entries
-    near = ["radius"] if of_diameter else difflib.get_close_matches(quantity, entries, 1)
-    if not near:
-        return f"[{table}] has {', '.join(entry.key for entry in entries.values())}, in any usual unit"
-    entry = entries[near[0]]
-    fits = unit is not None and entry.unit and UNITS[entry.unit].kind == unit.kind
-    wanted = entry.with_unit(unit.suffix) if unit is not None and fits else entry.key
-    return f"give {wanted}, half of it" if of_diameter else f"is it {wanted}?"
+        return f"{table} is in no table; a robot has {tables}"
+    entries = [f"[{entry.table}] {entry.key}" for entry in ENTRIES]
+    half = ", half of it" if "diameter" in key else ""
+    near = difflib.get_close_matches(f"[{table}] {key.replace('diameter', 'radius')}", entries, 1)
+    hint = f"is it {near[0]}{half}?" if near else f"a robot has {tables}"
+    return f"unknown entry [{table}] {key}; {hint}"
 
 
 def _number(value: object, key: str, entry: str) -> float:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.effects import catalogue
+from sim.effects import effect_named
 from sim.mechanics import planar
 from sim.mechanics.geometry import straight
 from sim.model.groups import Groups
@@ -82,7 +82,7 @@ def responses(
     """
     check_groups(groups)
     motion = steady(groups, stability=False) if motion is None else motion
-    even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
+    even = all(effect_named(name).symmetry == "even" for name in groups.effects)
     wanted = _Wanted(groups.N, even, before, tolerance)
     rows, reverse_rows = numbers(groups), reversed_numbers(groups)
     both = history and extrapolated_memory

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim.arrays import Floats
-from sim.effects import catalogue
+from sim.effects import catalogue, effect_named, is_effect
 from sim.io.errors import InputError
 from sim.linear.complex_step import derivative
 from sim.model.groups import Groups
@@ -51,7 +51,7 @@ def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = PH
     """
     names = tuple(parameters)
     for name in names:
-        if name not in SLOPE_INPUTS and name not in catalogue():
+        if name not in SLOPE_INPUTS and not is_effect(name):
             allowed = ", ".join((*SLOPE_INPUTS, *catalogue()))
             raise InputError(f"no parameter {name!r} to differentiate in; there are {allowed}")
     rows = numbers(groups)
@@ -84,7 +84,7 @@ def _direction(groups: Groups, name: str) -> tuple[Floats, Floats]:
         def changed_numbers(changed: Floats) -> Floats:
             return numbers(replace(groups, **{name: changed}))  # type: ignore[arg-type]
     else:
-        effect = catalogue()[name]
+        effect = effect_named(name)
         value = groups.effects.get(name, np.full(len(groups), effect.null))
         size = np.full(len(groups), abs(effect.typical - effect.null))
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.arrays import Floats
-from sim.effects import catalogue
+from sim.effects import catalogue, is_effect
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.model.body import Body
@@ -55,7 +55,7 @@ class SweptInput:
     high: float
 
     def __post_init__(self) -> None:
-        if self.name != SPEED and self.name not in SLOPE_INPUTS and self.name not in catalogue():
+        if self.name != SPEED and self.name not in SLOPE_INPUTS and not is_effect(self.name):
             allowed = ", ".join((SPEED, *SLOPE_INPUTS, *catalogue()))
             raise InputError(f"no input {self.name!r} to sweep; there are {allowed}")
         ends = f"{self.low:g}:{self.high:g}"

@@ -19,7 +19,7 @@ from sim.effects import catalogue, effect_named
 from sim.mechanics.drag import head_resistance, tail_coefficients
 from sim.model.body import Body
 from sim.model.groups import Groups
-from sim.model.scaled_effect import LOCAL_DRAG
+from sim.model.laws import LOCAL_DRAG
 
 # Numbers of the non-local effects, by their names; plain numbers in compiled loops.
 _NONLOCAL = {e.term: e for e in (*catalogue().values(), *LOCAL_DRAG.values()) if e.reach == "nonlocal"}

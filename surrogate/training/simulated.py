@@ -19,7 +19,7 @@ from scipy.stats import qmc
 
 from dataset.data_set import read, read_manifest, usable
 from sim.arrays import Flags, Floats, Integers
-from sim.effects import catalogue
+from sim.effects import effect_named, is_effect
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, LAG_PARTS
 from sim.motion.batches import run_batches, split
@@ -73,9 +73,9 @@ def read_robots(folder: str) -> tuple[SimulatedRobots, Integers]:
 
 def join_robots(parts: Sequence[SimulatedRobots]) -> SimulatedRobots:
     """Join the robots of all parts; effects that some do not have are at their null there."""
-    effects = {name for part in parts for name in part.robots if name in catalogue()}
+    effects = {name for part in parts for name in part.robots if is_effect(name)}
     full = [
-        {**{name: np.full(len(part), catalogue()[name].null) for name in sorted(effects)}, **part.robots}
+        {**{name: np.full(len(part), effect_named(name).null) for name in sorted(effects)}, **part.robots}
         for part in parts
     ]
     curves = [part.curves for part in parts] if all(part.curves for part in parts) else [{} for _ in parts]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from calibration.swimmer.swimmer import Solver
-from sim.effects import catalogue
+from sim.effects import effect_named, is_effect
 from sim.inputs import check_columns
 from sim.mechanics.thinning import UNIT_OF_TIME
 from sim.model.groups import Groups
@@ -37,15 +37,15 @@ def slopes(columns: Mapping[str, Any], parameters: tuple[str, ...], **_: object)
     """Stand-in for `sim.motion.batches.sensitivity_columns`, by differences; all robots in one batch."""
     base = {name: np.asarray(value, float) for name, value in columns.items()}
     rows = len(base["N"])
-    for name in (parameter for parameter in parameters if parameter in catalogue()):
-        base.setdefault(name, np.full(rows, catalogue()[name].null))
+    for name in (parameter for parameter in parameters if is_effect(parameter)):
+        base.setdefault(name, np.full(rows, effect_named(name).null))
     stacked = {name: np.tile(value, (1 + len(parameters), 1)) for name, value in base.items()}
     widths = []
     for place, name in enumerate(parameters, 1):
         at = base[name]
         width = 1e-5 * np.abs(at)
-        if name in catalogue():  # towards the inside
-            effect = catalogue()[name]
+        if is_effect(name):  # towards the inside
+            effect = effect_named(name)
             step = 1e-5 * abs(effect.typical - effect.null)
             width = step * np.where(at + step <= effect.bounds[1], 1, -1)
         stacked[name][place] += width

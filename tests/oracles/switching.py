@@ -30,7 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.arrays import Flags, Floats
-from sim.effects import catalogue
+from sim.effects import effect_named
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.body import Body
@@ -76,7 +76,7 @@ def switch_response(
     for row in np.flatnonzero(~(np.isfinite(dwell) & (dwell > 0)))[:1]:
         raise InputError(f"{DWELL} = {dwell[row]} in row {row + 1}; it must be a finite number above 0")
     motion = steady(groups, stability=False) if motion is None else motion
-    even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
+    even = all(effect_named(name).symmetry == "even" for name in groups.effects)
     robots = bodies(groups)
     pairs = zip(robots, reversed_bodies(groups), dwell, strict=True)
     lag = np.array([_lag(body, reverse, groups.N, T, even, resolution) for body, reverse, T in pairs])

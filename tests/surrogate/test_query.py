@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim.effects import catalogue
+from sim.effects import catalogue, effect_named
 from sim.io.errors import InputError
 from sim.model.groups import DWELL
 from sim.model.response import DWELLS, SETTLED
@@ -63,7 +63,7 @@ LAW = "law_Fx_wt_rectified_speed-100_length1000_tails1000"
 def test_robots_with_every_effect_that_the_table_knows(name: str) -> None:
     drawn = robots()
     if name:
-        effect = catalogue()[name]
+        effect = effect_named(name)
         random = np.random.default_rng(len(name))
         drawn[name] = np.clip(effect.typical * random.uniform(-1, 1, 400), *effect.bounds)
     check_same(load().query(drawn, flag=True), answer(load(), drawn))

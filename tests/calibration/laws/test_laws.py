@@ -21,7 +21,7 @@ from calibration.report.robot_verdict import RobotLaws, find_robot_laws
 from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.swimmer.measured_table import read_measurements
 from sim.arrays import Floats
-from sim.effects import catalogue
+from sim.effects import effect_named
 from sim.inputs import group_columns, load_robot
 from tests.calibration import toy
 from tests.calibration.toy_tables import (
@@ -88,7 +88,7 @@ def test_a_law_is_found_at_its_place_with_its_exponents(name: str, places: tuple
     assert name in kept
     law = kept[name]
     (effect,) = LAWS[name]
-    for exponent, true in zip(EXPONENTS, catalogue()[effect].powers.__dict__.values(), strict=True):
+    for exponent, true in zip(EXPONENTS, vars(effect_named(effect).powers).values(), strict=True):
         low, high = law.fit.interval(exponent)
         margin = high - low  # the interval is one of 95 %
         assert low - margin / 2 < true < high + margin / 2

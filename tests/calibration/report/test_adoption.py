@@ -15,7 +15,7 @@ from calibration.report.adoption import adopt_law
 from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.solve.assembly import numbers
-from tests.sim.model.test_power_law import with_law
+from tests.sim.model.test_laws import with_law
 
 LAWS = {
     "Fx_wh": ("law_Fx_wh_speed-93_length425_tails0", 0.4),

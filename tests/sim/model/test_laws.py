@@ -8,21 +8,22 @@ from itertools import product
 import numpy as np
 import pytest
 
-from sim.effects import catalogue, check_size
+from sim.effects import catalogue, check_size, effect_named, is_effect
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.model.groups import Groups
-from sim.model.power_law import (
+from sim.model.laws import (
     COEFFICIENTS,
+    LOCAL_DRAG,
     MOTIONS,
+    SCALED,
     TAILS,
     WRENCHES,
+    Law,
+    Load,
     Powers,
-    factor_law,
-    force_law,
-    law_from_name,
+    make_law,
 )
-from sim.model.scaled_effect import LOCAL_DRAG, SCALED, scaled_effect
 from sim.motion.sensitivity import sensitivities
 from sim.motion.steady import steady
 from sim.solve.assembly import assemble, numbers
@@ -50,7 +51,7 @@ def with_law(name: str, size: float, **changes: object) -> Groups:
 def test_a_law_with_the_formula_of_an_effect_is_that_effect(
     effect: str, size: float, wrench: str, motion: str, factor: float, powers: Powers
 ) -> None:
-    law = force_law(wrench, motion, powers)
+    law = make_law(Load(wrench, motion).place, powers)
     for changes in ({}, {"N": 4, "l_over_R": 4.0, "omega_bar": -20.0}):
         one = numbers(with_law(effect, size, **changes))
         assert np.allclose(numbers(with_law(law.name, size * factor, **changes)), one, rtol=1e-14, atol=0)
@@ -58,7 +59,7 @@ def test_a_law_with_the_formula_of_an_effect_is_that_effect(
 
 @pytest.mark.parametrize("coefficient", COEFFICIENTS)
 def test_a_coefficient_as_a_power_law_is_that_coefficient(coefficient: str) -> None:
-    law = factor_law(coefficient, STEEP)
+    law = make_law(coefficient, STEEP)
     groups = with_law(law.name, 0.7, N=3, l_over_R=4.0, omega_bar=20.0)
     factor = float(np.exp(0.7 * STEEP.logarithm(groups)[0]))
     assert abs(factor - 1) > 0.05
@@ -70,7 +71,7 @@ def test_a_coefficient_as_a_power_law_is_that_coefficient(coefficient: str) -> N
 @pytest.mark.parametrize("name", ["tail_drag", "tail_stiffness"])
 def test_a_factor_of_the_tails_is_another_unit_of_viscosity_or_time(name: str) -> None:
     """More drag: the head has less and the motor turns faster, in that unit; more stiffness: it turns slower."""
-    law = factor_law(name, STEEP)
+    law = make_law(name, STEEP)
     groups = with_law(law.name, 0.7, N=3, l_over_R=4.0, omega_bar=20.0)
     factor = float(np.exp(0.7 * STEEP.logarithm(groups)[0])) ** (1 if name == "tail_drag" else -1)
     head = {
@@ -84,9 +85,9 @@ def test_a_factor_of_the_tails_is_another_unit_of_viscosity_or_time(name: str) -
 
 def test_no_run_tells_stiffer_tails_from_a_thinner_fluid() -> None:
     """Drag of head and tails that grows with speed is less stiffness at the same speed."""
-    law = factor_law("tail_stiffness", Powers(speed=-0.42))
+    law = make_law("tail_stiffness", Powers(speed=-0.42))
     softer = with_law(law.name, 1.0, N=3, omega_bar=20.0)
-    drag = 1 / float(np.exp(law.powers.logarithm(softer)[0]))  # type: ignore[attr-defined]
+    drag = 1 / float(law.factor(softer)[0])
     slow = float(np.exp(Powers(speed=1.0).logarithm(softer)[0]))  # ω/ω_control
     denser = with_law("inertia", (drag - 1) / slow, N=3, omega_bar=20.0)
     for output in OUTPUTS:
@@ -106,10 +107,10 @@ def test_the_power_law_is_in_motor_speed_and_not_in_its_group() -> None:
 
 
 LAWS = [
-    *(force_law(w, m, STEEP).name for w, m in product(WRENCHES, MOTIONS)),
-    *(factor_law(c, STEEP).name for c in (*COEFFICIENTS, *TAILS)),
-    force_law("Fx", "wt", STEEP, lever=-0.5, lever_unit="l").name,
-    force_law("Fx", "wyr", STEEP, lever=0.75, lever_unit="L").name,
+    *(make_law(Load(w, m).place, STEEP).name for w, m in product(WRENCHES, MOTIONS)),
+    *(make_law(c, STEEP).name for c in (*COEFFICIENTS, *TAILS)),
+    make_law("Fx_wt_l", STEEP, lever=-0.5).name,
+    make_law("Fx_wyr_L", STEEP, lever=0.75).name,
 ]
 
 
@@ -117,7 +118,7 @@ CHANGES = {"N": 3, "l_over_R": 4.0, "omega_bar": 20.0}
 
 
 def law_of(name: str, powers: Powers = STEEP) -> str:
-    return scaled_effect(LOCAL_DRAG[name] if name in LOCAL_DRAG else catalogue()[name], powers).name
+    return make_law(catalogue().get(name, name), powers).name
 
 
 def motion(groups: Groups) -> list[float]:
@@ -127,7 +128,7 @@ def motion(groups: Groups) -> list[float]:
 
 @pytest.mark.parametrize("name", [*LAWS, *map(law_of, (*SCALED, *LOCAL_DRAG))])
 def test_derivatives_are_those_of_finite_differences(name: str) -> None:
-    size = catalogue()[name].typical / 5
+    size = effect_named(name).typical / 5
     step = size / 20 if "tail_sag" in name else 1e-3
     values = [steady(with_law(name, size + sign * step, N=3)) for sign in (1, -1)]
     slopes = sensitivities(with_law(name, size, N=3), [name, "l_over_R", "omega_bar"])
@@ -139,7 +140,7 @@ def test_derivatives_are_those_of_finite_differences(name: str) -> None:
 
 @pytest.mark.parametrize("name", LAWS)
 def test_a_law_is_mirror_symmetric_and_null_at_zero(name: str) -> None:
-    law = catalogue()[name]
+    law = effect_named(name)
     assert law.symmetry == "even"
     assert np.array_equal(numbers(with_law(name, 0.0)), numbers(control()))
     left, right = (steady(with_law(name, law.typical, omega_bar=speed)) for speed in (10.0, -10.0))
@@ -149,11 +150,12 @@ def test_a_law_is_mirror_symmetric_and_null_at_zero(name: str) -> None:
 
 def test_a_law_is_known_by_its_name_and_not_listed() -> None:
     for name in LAWS:
-        law = law_from_name(name)
-        assert law is not None
-        assert law.name == name
-        assert name in catalogue()
-        assert name not in list(catalogue())
+        law = effect_named(name)
+        assert isinstance(law, Law)
+        assert law == make_law(law.place, law.powers, lever=law.lever)
+        assert (law.name, law.powers) == (name, STEEP)
+        assert is_effect(name)
+        assert name not in catalogue()
 
 
 NO_LAWS = [
@@ -168,7 +170,7 @@ NO_LAWS = [
 
 @pytest.mark.parametrize("name", NO_LAWS)
 def test_what_is_no_name_of_a_law_is_refused(name: str) -> None:
-    assert f"law_{name}" not in catalogue()
+    assert not is_effect(f"law_{name}")
     with pytest.raises(InputError, match="unknown effect"):
         check_size(f"law_{name}", 0.1)
     with pytest.raises(InputError, match="unknown column"):
@@ -179,21 +181,21 @@ def test_what_is_no_name_of_a_law_is_refused(name: str) -> None:
 def test_a_side_force_with_a_lever_is_a_force_and_a_couple(unit: str, ahead: float) -> None:
     """F_x at z ahead of J has M_y = z F_x about J."""
     changes = {"N": 3, "l_over_R": 4.0, "omega_bar": 20.0}
-    law = force_law("Fx", "wt", STEEP, lever=-0.4, lever_unit=unit)
+    law = make_law(f"Fx_wt_{unit}", STEEP, lever=-0.4)
     one = numbers(with_law(law.name, 0.3, **changes))
-    force = numbers(with_law(force_law("Fx", "wt", STEEP).name, 0.3, **changes))
-    couple = numbers(with_law(force_law("My", "wt", STEEP).name, -0.3 * 0.4 * ahead * 4.0, **changes))
+    force = numbers(with_law(make_law("Fx_wt", STEEP).name, 0.3, **changes))
+    couple = numbers(with_law(make_law("My_wt", STEEP).name, -0.3 * 0.4 * ahead * 4.0, **changes))
     assert np.allclose(one, force + couple - numbers(control(**changes)), rtol=1e-13, atol=1e-16)
 
 
 def test_a_lever_or_an_exponent_that_cannot_be_is_refused() -> None:
-    for wrench, lever, unit, message in (
-        ("Fz", -0.5, "l", "only Fx"),
-        ("Fx", 1.0, "R", "only Fx"),
-        ("Fx", 5.0, "l", "from -4"),
+    for place, lever, message in (
+        ("Fz_vz", -0.5, "'Fz_vz' has no lever"),
+        ("Fx_wt_R", 0.0, "no place 'Fx_wt_R' of a law"),
+        ("Fx_wt_l", 5.0, "lever = 5; it must lie from -4"),
     ):
         with pytest.raises(InputError, match=message):
-            force_law(wrench, "wt", Powers(), lever=lever, lever_unit=unit)
+            make_law(place, lever=lever)
     with pytest.raises(InputError, match=r"exponent of length = 5; it must lie from -4 to 4"):
         Powers(length=5)
 
@@ -211,7 +213,7 @@ def test_local_drag_by_speed_is_a_shear_thinning_fluid_of_high_shear() -> None:
     """Far above 1/λ, (1 + (λ γ̇)²)^(−ε/2) is (λ γ̇)^(−ε), and λ = e^2.5 λ_c is e^(−2.5 ε) of the law's drag."""
     longer = {"l_over_R": 2 * CONTROL_VALUES["l_over_R"], "omega_bar": 20.0}
     law = law_of("tail_drag_by_speed", Powers())
-    drag = factor_law("tail_drag", Powers(length=1.0)).name
+    drag = make_law("tail_drag", Powers(length=1.0)).name
     one = motion(with_law(law, -0.1, **longer))
     fluid = {"shear_thinning": 0.1, "shear_thinning_time": 2.5, drag: 0.1 * 2.5 / math.log(2)}
     other = motion(control(**longer, **fluid))
