@@ -163,8 +163,9 @@ def looped(plan: Plan[J], progress: Progress | None = None) -> Plan[J]:
     errors = plan_errors(
         tracked, plan.drawn, plan.declared, switches, guaranteed=plan.errors.guaranteed, seed=seed
     )
-    closes, closes_turn = _closure(tracked.vehicle, switches, turn)
-    lap = Lap(closes, closes_turn, *drift_of_a_lap(tracked, switches, seed))
+    again = roll_out(tracked.vehicle, replace(switches, dwells=np.tile(switches.dwells, 2)), samples=1).flips
+    x, y, angle = (again[-1] - again[len(switches.dwells)]).tolist()
+    lap = Lap(math.hypot(x, y), abs(angle - turn), *drift_of_a_lap(tracked, switches, seed))
     return replace(plan, switches=switches, errors=errors, lap=lap)
 
 
@@ -217,11 +218,3 @@ def _from_rest(vehicle: Vehicle, lap: Switches, dwells: Floats, turn: float) -> 
     after[:2] -= vehicle.current * first
     start = planar.compose(after, planar.inverse(moved))
     return Switches(sense, dwells, roll_out(vehicle, Switches(sense, dwells, start[None])).flips)
-
-
-def _closure(vehicle: Vehicle, switches: Switches, turn: float) -> tuple[float, float]:
-    """Predict how the pose after two laps differs from that after one: distance, and angle."""
-    twice = Switches(switches.first_direction, np.tile(switches.dwells, 2), switches.poses)
-    poses = roll_out(vehicle, twice).flips
-    x, y, angle = (poses[-1] - poses[len(switches.dwells)]).tolist()
-    return math.hypot(x, y), abs(angle - turn)

@@ -18,7 +18,7 @@ import numpy as np
 
 from planner.goal.dubins import DubinsPaths, three_arcs
 from planner.paths.obstacles import FreeSpace
-from planner.paths.path import Path2D
+from planner.paths.path import Path2D, points_at
 from planner.paths.tractrix import Drift, Reference
 from planner.planning.conditions import Swing
 from planner.planning.feasible import Declared
@@ -125,7 +125,7 @@ class _Track:
 
     def at(self, way: float) -> Floats:
         """Return the pose (3,) after a way along the track."""
-        return np.array([np.interp(way, self._arc, column) for column in self._poses.T])
+        return points_at(np.array(way), self._arc, self._poses)
 
     def headed(self, poses: Floats) -> Floats:
         """Return places and headings (m, 3) of poses with courses."""
@@ -189,7 +189,7 @@ class _Track:
 
     def _gained(self, leaves: float, joins: Floats, radius: float) -> Floats:
         """Compute the lengths (m, 4) that swings between two places gain."""
-        ends = np.stack([np.interp(joins, self._arc, column) for column in self._poses.T], 1)
+        ends = points_at(joins, self._arc, self._poses)
         return np.asarray(three_arcs(self.at(leaves), ends, radius)[1].sum(-1) - (joins - leaves)[:, None])
 
     def _root(self, leaves: float, low: float, high: float, word: int, rest: float, radius: float) -> float:

@@ -22,7 +22,7 @@ from planner.jobs.shortest_order import EXACT, MOST, Order, shortest_order
 from planner.jobs.travel import SLACK, Travel, pivot_poses, plan_track, preferred_setting
 from planner.paths.distance import distance_to
 from planner.paths.obstacles import Circle, FreeSpace, Region
-from planner.paths.path import arc_length
+from planner.paths.path import arc_length, points_at
 from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab
 from planner.planning.picture import DECLARED
@@ -132,7 +132,7 @@ class Coverage(Job):
         cm, track, width = 100 * plan.robot.length_scale, plan.smooth_track, self.width
         way = arc_length(track)
         places = np.linspace(0.0, way[-1], min(_DISCS, math.ceil(_DENSE * way[-1] / width) + 1))
-        centres = cm * np.stack([np.interp(places, way, track[:, i]) for i in (0, 1)], 1)
+        centres = cm * points_at(places, way, track)
         discs = [Disc((x, y), cm * width / 2) for x, y in centres.tolist()]
         axes.add_collection(PatchCollection(discs, color=SWATH, lw=0, zorder=0))
         axes.plot([], [], color=SWATH, lw=6, label="swept")

@@ -27,7 +27,7 @@ from planner.goal.route import AROUND, LEVELS, Route, shortened
 from planner.paths.distance import nearest
 from planner.paths.nearest_path import nearest_poses, tracked_points
 from planner.paths.obstacles import Footprint, FreeSpace
-from planner.paths.path import Path2D, arc_length
+from planner.paths.path import Path2D, arc_length, points_at
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.tractrix import reference as follow_path
 from planner.paths.units import in_lab, place_in_lab
@@ -165,7 +165,7 @@ class Detours:
             length = float(moved.arc[-1])
             at = np.linspace(0, length, max(3, math.ceil(length / (_POSES * self.limits.radius)) + 1))
             x, y, angle, place = (np.interp(at, moved.arc, values) for values in (*moved.poses.T, progress))
-            target = np.stack([np.interp(place, reference.arc, reference.p[:, i]) for i in (0, 1)], 1)
+            target = points_at(place, reference.arc, reference.p)
             inside = (place > reference.arc[stretch.first]) & (place < reference.arc[stretch.last])
             shares = np.where(inside, _BLOCKED, 1.0)
             poses = nearest_poses(

@@ -33,7 +33,7 @@ import numpy as np
 
 from planner.draws import normals
 from planner.paths.obstacles import Footprint
-from planner.paths.path import Path2D, arc_length
+from planner.paths.path import Path2D, arc_length, axis_at, points_at
 from planner.paths.tractrix import reference
 from planner.paths.units import Swimmer
 from planner.planning.errors import LEVEL, WOBBLE, deviations_open_loop, error_growth, flips_between
@@ -75,7 +75,7 @@ class Body:
 
     def ends(self, poses: Floats) -> Floats:
         """Compute the ends (..., 2, 2) of the line at poses (..., 3) of the head's centre."""
-        axis = np.stack([np.cos(poses[..., 2]), np.sin(poses[..., 2])], -1)
+        axis = axis_at(poses[..., 2])
         return np.asarray(poses[..., None, :2] + np.array([[self.front], [self.back]]) * axis[..., None, :])
 
 
@@ -100,7 +100,7 @@ class TimedMotion:
         """Predict the poses (K, 3) of the head's centre [m, rad] at times (K,) [s]; it rests before and after."""
         plan = self.plan
         vehicle, switches, robot = plan.tracked.vehicle, plan.switches, plan.robot
-        ends = np.concatenate([[0.0], np.cumsum(plan.dwells)])
+        ends = plan.flip_times
         own = np.clip(times / robot.time_scale, 0.0, ends[-1])
         dwell = np.clip(np.searchsorted(ends, own, side="right") - 1, 0, len(plan.dwells) - 1)
         elapsed, before = own - ends[dwell], plan.dwells[dwell - 1]
@@ -240,7 +240,7 @@ def error_open_loop(plan: Plan) -> tuple[Floats, Floats]:
     for place in _ends(plan):
         away = moved + turned[..., None] * place * left
         sizes.append(np.hypot(away[..., 0], away[..., 1]))
-    times = np.concatenate([[0.0], np.cumsum(plan.dwells)])[edges]
+    times = plan.flip_times[edges]
     return times, WOBBLE + np.concatenate([[0.0], _band(np.maximum(*sizes))])
 
 
@@ -252,10 +252,10 @@ def error_with_feedback(plan: Plan) -> tuple[Floats, Floats]:
     levers = [place + tracked.vehicle.pivot_distance for place in _ends(plan)]
     along = np.zeros(_PLACES)
     for lever in levers:
-        p = declared.q + lever * np.stack([np.cos(declared.heading), np.sin(declared.heading)], 1)
-        here = _interpolated(arcs, declared.arc, p)
+        p = declared.q + lever * axis_at(declared.heading)
+        here = points_at(arcs, declared.arc, p)
         for shifted in (arcs + lag, arcs - lag):
-            along = np.maximum(along, np.hypot(*(_interpolated(shifted, declared.arc, p) - here).T))
+            along = np.maximum(along, np.hypot(*(points_at(shifted, declared.arc, p) - here).T))
     beyond = max(0.0, max(map(abs, levers)) - tracked.rod)
     across = plan.predicted_max + plan.feedback_error + plan.straight.swing * beyond
     return times_at(plan, arcs), np.hypot(WOBBLE + along, across)
@@ -263,10 +263,10 @@ def error_with_feedback(plan: Plan) -> tuple[Floats, Floats]:
 
 def times_at(plan: Plan, arcs: Floats) -> Floats:
     """Estimate the times (K,) at which the pivot has come so far (K,) along its reference."""
-    axis = np.stack([np.cos(plan.poses[:, 2]), np.sin(plan.poses[:, 2])], 1)
+    axis = axis_at(plan.poses[:, 2])
     way = arc_length(plan.poses[:, :2] - plan.tracked.vehicle.pivot_distance * axis)
-    times = np.concatenate([[0.0], np.cumsum(plan.dwells)])
-    return np.asarray(np.interp(arcs / float(plan.declared.reference.arc[-1]) * way[-1], way, times))
+    at = arcs / float(plan.declared.reference.arc[-1]) * way[-1]
+    return np.asarray(np.interp(at, way, plan.flip_times))
 
 
 def _ends(plan: Plan) -> tuple[float, float]:
@@ -317,11 +317,6 @@ def _passing_times(path: Path2D, tracked: TrackedVehicle, dwell: float) -> Float
     steps = np.diff(followed.arc) / np.maximum(ahead, 0.1) / straight.speed
     times = np.concatenate([[0.0], np.cumsum(steps)])
     return np.asarray(np.interp(np.linspace(0.0, 1.0, _PLACES), np.linspace(0.0, 1.0, len(times)), times))
-
-
-def _interpolated(arcs: Floats, known: Floats, points: Floats) -> Floats:
-    """Interpolate points (m, 2) at arc lengths (K,)."""
-    return np.stack([np.interp(arcs, known, column) for column in points.T], 1)
 
 
 def _band(sizes: Floats) -> Floats:

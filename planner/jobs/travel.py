@@ -17,7 +17,7 @@ from planner.goal.dubins import TURNS, DubinsPaths, words
 from planner.goal.lattice import RouteLimits
 from planner.goal.route import Route
 from planner.paths.obstacles import FreeSpace
-from planner.paths.path import Path2D
+from planner.paths.path import Path2D, axis_at
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import check_size
 from planner.planning.feasible import AS_DRAWN, Declared
@@ -108,7 +108,7 @@ def preferred_setting(tracked: TrackedVehicle, request: PlanRequest) -> Setting:
 def pivot_poses(places: Floats, courses: Floats, tracked: TrackedVehicle, drift: Drift) -> Floats:
     """Return the pivot's poses (..., 3), place and course, where the tracked point is at places (..., 2)."""
     heading = courses - drift.slip_along(courses)
-    axis = np.stack([np.cos(heading), np.sin(heading)], -1)
+    axis = axis_at(heading)
     return np.concatenate([places - tracked.rod * axis, courses[..., None]], -1)
 
 

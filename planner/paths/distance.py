@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from planner.paths.path import steps_of
+from planner.paths.path import arc_length, points_at, steps_of
 from sim.arrays import Floats, Integers
 
 TIE = 1e-12  # difference of distances that are equal
@@ -83,7 +83,7 @@ def two_sided(first: Floats, second: Floats) -> tuple[float, float]:
 
 def _filled(polyline: Floats) -> Floats:
     """Add points to a polyline, so that all steps are short compared with its length."""
-    length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(polyline, axis=0).T))])
+    length = arc_length(polyline)
     count = max(2, min(4000, steps_of(length[-1], max(float(np.diff(length).min()), length[-1] / 4000))))
     at = np.union1d(np.linspace(0, length[-1], count), length)
-    return np.stack([np.interp(at, length, polyline[:, i]) for i in (0, 1)], 1)
+    return points_at(at, length, polyline)

@@ -31,7 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.paths.path import Path2D, resample
+from planner.paths.path import Path2D, axis_at, resample
 from planner.paths.tractrix import STILL, Drift
 from sim.arrays import Floats, Integers
 
@@ -142,7 +142,7 @@ def tracked_points(poses: Floats, pivot_distance: float) -> Floats:
     chord = np.append(np.repeat(np.hypot(*np.diff(poses[:, :2], axis=0).T), _POINTS_A_POSE), 0.0)
     off = -turned * chord * (at % 1) * (1 - at % 1) / 2
     points = np.stack([x - off * np.sin(heading), y + off * np.cos(heading)], 1)
-    return points + pivot_distance * np.stack([np.cos(heading), np.sin(heading)], 1)
+    return points + pivot_distance * axis_at(heading)
 
 
 def pose_spacing(raw: Path2D, radius: float) -> float:
@@ -165,7 +165,7 @@ def _start(target: Floats, pivot_distance: float, *, closed: bool) -> tuple[Floa
     if turn is not None:
         before, after = tangent[-reach:] - turn, tangent[:reach] + turn
     heading = np.convolve(np.concatenate([before, tangent, after]), kernel, mode="valid")
-    q = target - pivot_distance * np.stack([np.cos(heading), np.sin(heading)], 1)
+    q = target - pivot_distance * axis_at(heading)
     return np.concatenate([q, heading[:, None]], 1), None if turn is None else float(turn)
 
 
@@ -176,7 +176,7 @@ def _sides(target: Floats, *, closed: bool) -> Floats:
     else:
         moves = np.gradient(target, axis=0)
     angle = np.arctan2(moves[:, 1], moves[:, 0])
-    along, across = np.stack([np.cos(angle), np.sin(angle)], 1), np.stack([-np.sin(angle), np.cos(angle)], 1)
+    along, across = axis_at(angle), np.stack([-np.sin(angle), np.cos(angle)], 1)
     return np.stack([_ALONG * along, across], 1)
 
 
@@ -196,7 +196,7 @@ def _minimax(poses: Floats, task: Task, told: Callable[[int], object]) -> Floats
 
 def _distances(poses: Floats, task: Task) -> Floats:
     """Compute the distances (m,) of the tracked point from the target."""
-    ahead = task.distance * np.stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])], 1)
+    ahead = task.distance * axis_at(poses[:, 2])
     return np.asarray(np.hypot(*(poses[:, :2] + ahead - task.target).T))
 
 

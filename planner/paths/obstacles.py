@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planner.paths.path import Path2D
+from planner.paths.path import Path2D, axis_at
 from planner.paths.units import Swimmer
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
@@ -52,7 +52,7 @@ class Circle:
     def corners(self) -> Floats:
         """Corners (n, 2) of a polygon with many sides, for pictures and lanes."""
         angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
-        return np.array([self.x, self.y]) + self.radius * np.stack([np.cos(angle), np.sin(angle)], 1)
+        return np.array([self.x, self.y]) + self.radius * axis_at(angle)
 
     @property
     def box(self) -> Floats:
@@ -203,7 +203,7 @@ class Footprint:
 
     def centres(self, poses: Floats) -> Floats:
         """Compute the centres (..., K, 2) of the discs at poses (..., 3): origin and heading."""
-        axis = np.stack([np.cos(poses[..., 2]), np.sin(poses[..., 2])], -1)
+        axis = axis_at(poses[..., 2])
         return np.asarray(poses[..., None, :2] + self.places[:, None] * axis[..., None, :])
 
     def clearance(self, poses: Floats, space: FreeSpace | Map) -> Floats:

@@ -97,7 +97,7 @@ def circle(radius: float) -> Path2D:
         12.57
     """
     angle = 2 * math.pi * np.arange(_CIRCLE_POINTS) / _CIRCLE_POINTS
-    return Path2D.of(radius * np.stack([np.cos(angle), np.sin(angle)], 1), closed=True)
+    return Path2D.of(radius * axis_at(angle), closed=True)
 
 
 @checks_keywords
@@ -115,9 +115,14 @@ def polygon(corners: int, side: float) -> Path2D:
     """
     reach = side / 2 / math.sin(math.pi / corners)
     angle = 2 * math.pi * (np.arange(corners) + 0.5) / corners - math.pi / 2
-    ring = reach * np.stack([np.cos(angle), np.sin(angle)], 1)
+    ring = reach * axis_at(angle)
     middle = (ring[0] + ring[-1]) / 2
     return Path2D.of(np.concatenate([[middle], ring]), closed=True)
+
+
+def axis_at(heading: Floats) -> Floats:
+    """Return unit vectors (..., 2) along headings (...) [rad]."""
+    return np.stack([np.cos(heading), np.sin(heading)], -1)
 
 
 def arc_length(polyline: Floats) -> Floats:
@@ -125,12 +130,17 @@ def arc_length(polyline: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(polyline, axis=0), axis=1))])
 
 
+def points_at(at: Floats, known: Floats, points: Floats) -> Floats:
+    """Interpolate points (m, c), known at increasing lengths (m,), at others (K,), (K, c)."""
+    return np.stack([np.interp(at, known, column) for column in points.T], -1)
+
+
 def resample(polyline: Floats, spacing: float) -> Floats:
     """Place points at equal arc length, at most `spacing` apart; the ends are kept."""
     lengths = arc_length(polyline)
     count = max(2, steps_of(lengths[-1], spacing) + 1)
     at = np.linspace(0, lengths[-1], count)
-    return np.stack([np.interp(at, lengths, polyline[:, i]) for i in (0, 1)], 1)
+    return points_at(at, lengths, polyline)
 
 
 def steps_of(length: float, most: float) -> int:

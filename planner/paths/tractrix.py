@@ -22,7 +22,7 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.paths.path import Path2D, arc_length, resample
+from planner.paths.path import Path2D, arc_length, axis_at, resample
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
@@ -79,7 +79,7 @@ class Reference:
     @staticmethod
     def of_path(p: Floats, heading: Floats, rod: float, *, closed: bool) -> Reference:
         """Place the pivot a rod behind the points (m, 2) of a path."""
-        return Reference(p, p - rod * _axis(heading), heading, closed)
+        return Reference(p, p - rod * axis_at(heading), heading, closed)
 
     @staticmethod
     def of_pivot(poses: Floats, rod: float, drift: Drift, heading: float | None = None) -> Reference:
@@ -94,7 +94,7 @@ class Reference:
         headings = poses[:, 2] - drift.slip_along(poses[:, 2])
         if heading is not None:
             headings = headings + _whole_turns(heading - headings[0])
-        return Reference(poses[:, :2] + rod * _axis(headings), poses[:, :2], headings)
+        return Reference(poses[:, :2] + rod * axis_at(headings), poses[:, :2], headings)
 
     @staticmethod
     def joined(*parts: Reference, closed: bool = False) -> Reference:
@@ -177,11 +177,6 @@ def reference(path: Path2D, pivot_distance: float, spacing: float, drift: Drift 
             heading = _drag(tangent, length, pivot_distance, start, drift)
             start = heading[-1] - _turning(tangent) if path.closed else start
     return Reference.of_path(p, heading, pivot_distance, closed=path.closed)
-
-
-def _axis(heading: Floats) -> Floats:
-    """Return unit vectors (m, 2) along headings (m,)."""
-    return np.stack([np.cos(heading), np.sin(heading)], 1)
 
 
 def _whole_turns(angle: float) -> float:

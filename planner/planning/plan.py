@@ -132,6 +132,11 @@ class Plan(Shown, Generic[J]):
         return float(self.dwells.sum())
 
     @property
+    def flip_times(self) -> Floats:
+        """Times (M + 1,) of the start, the flips and the end."""
+        return np.concatenate([[0.0], np.cumsum(self.dwells)])
+
+    @property
     def minimum_dwell(self) -> float:
         """The shortest dwell that the schedule may have."""
         return self.guidance.dwell
@@ -333,11 +338,10 @@ class Plan(Shown, Generic[J]):
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Return the columns of `to_frame`, each (M,)."""
-        start = np.concatenate([[0.0], np.cumsum(self.dwells)[:-1]])
         x, y, heading = self.poses[:-1].T
         cm = 100 * self.robot.length_scale
         return {
-            "start_s": start * self.robot.time_scale,
+            "start_s": self.flip_times[:-1] * self.robot.time_scale,
             "direction": self.first_direction * (-1) ** np.arange(len(self.dwells)),
             "dwell_s": self.seconds,
             "x_cm": x * cm,

@@ -67,7 +67,7 @@ def answers(
     for line in lines:
         words = line.replace(",", " ").split()
         command_word = words[:1] in ([BEGIN], [FINISH])
-        if first and not command_word and is_header(words):
+        if first and not command_word and len(_numbers(words)) not in _COUNTS:  # it must name columns
             columns, first = Columns.named(words, robot), False
             unit = from_si(robot.length_scale, columns.length) if columns.length else 1.0
             yield f"direction flip_at_s error_{columns.length or 'over_l'} alarm"
@@ -149,11 +149,6 @@ class Columns:
         complete = {"x", "y", "heading"} <= set(row) and len(numbers) <= len(self.names)
         pose = (row["x"], row["y"], row["heading"]) if complete else None
         return row["time"], pose, seen if complete else None
-
-
-def is_header(words: list[str]) -> bool:
-    """Tell whether the words of the first line must name columns: they are no numbers of a plain line."""
-    return len(_numbers(words)) not in _COUNTS
 
 
 def _numbers(words: list[str]) -> list[float]:

@@ -26,7 +26,7 @@ from planner.goal.dubins import words
 from planner.goal.lattice import RouteLimits
 from planner.goal.route import Lattices, NoWayError, route
 from planner.paths.distance import two_sided
-from planner.paths.path import Path2D, arc_length, resample
+from planner.paths.path import Path2D, arc_length, axis_at, resample
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.conditions import KeptClear
@@ -108,7 +108,7 @@ def rest_of(plan: Plan, times: Floats, poses: Floats) -> Plan[Remainder]:
 def place_reached(plan: Plan, times: Floats, poses: Floats) -> int:
     """Return the point of the reference that a robot has reached; see `rest_of`."""
     vehicle, heading = plan.tracked.vehicle, poses[:, 2]
-    q = poses[:, :2] - vehicle.pivot_distance * np.stack([np.cos(heading), np.sin(heading)], 1)
+    q = poses[:, :2] - vehicle.pivot_distance * axis_at(heading)
     speed = vehicle.speed + float(np.hypot(*vehicle.current))
     return reached(plan.declared.reference, times, np.column_stack([q, heading]), speed)
 

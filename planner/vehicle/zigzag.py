@@ -19,6 +19,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from planner.paths.path import axis_at
 from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.vehicle import SHORTEST, Vehicle
 from sim.arrays import Floats
@@ -106,7 +107,7 @@ def zigzag(vehicle: Vehicle, dwell: float, offset: float = 0.0) -> Zigzag:
 
 def _sway(vehicle: Vehicle, poses: Floats, direction: Floats) -> float:
     """Compute half of the distance between the pivot at flips to the right and at flips to the left."""
-    axis = np.stack([np.cos(poses[-3:, 2]), np.sin(poses[-3:, 2])], 1)
+    axis = axis_at(poses[-3:, 2])
     pivot = poses[-3:, :2] - vehicle.pivot_distance * axis
     across = pivot @ np.array([-direction[1], direction[0]])
     return float(across[1] - (across[0] + across[2]) / 2) / 2
