@@ -300,21 +300,27 @@ def _replay(
         raise InputError("--every is the time between shapes; name their file with --shapes")
     planned, swimmer = load_schedule(plan), None if robot is None else load_robot(robot)
     schedule = planned if swimmer is None else planned.swum_by(swimmer)
-    shown: Any = {"unit": "dwell", "delay": BAR_AFTER, "disable": None}  # None: shown on a terminal alone
+
+    def bar(what: str) -> Any:
+        count = len(schedule.dwells)
+        return tqdm(
+            total=count, desc=what, unit="dwell", delay=BAR_AFTER, disable=None
+        )  # None: on a terminal alone
+
     if shapes is not None:
         check_name(shapes)
         times = equal_times(schedule, every)
-        with tqdm(total=len(schedule.dwells), desc="replay", **shown) as bar:
-            write_shapes(shapes, scheduled_shapes(schedule, times, progress=bar.update), schedule, swimmer)
+        with bar("replay") as shown:
+            write_shapes(shapes, scheduled_shapes(schedule, times, progress=shown.update), schedule, swimmer)
         print(f"{len(times)} shapes, {format_time(times[-1] * schedule.time_scale)} -> {shapes}")
     if out is None:
         return
-    with tqdm(total=len(schedule.dwells), desc="replay", **shown) as bar:
-        track = replay([schedule], progress=bar.update)[0]
+    with bar("replay") as shown:
+        track = replay([schedule], progress=shown.update)[0]
     own_error = ""
     if error:
-        with tqdm(total=len(schedule.dwells), desc="on a coarser mesh", **shown) as bar:
-            size = replay_error(schedule, track, progress=bar.update)
+        with bar("on a coarser mesh") as shown:
+            size = replay_error(schedule, track, progress=shown.update)
         length = schedule.tail_length
         in_lab = f"{size:.2g} l" if length is None else f"{format_length(size * length)} ({size:.2g} l)"
         own_error = f", the simulator's own error is {in_lab} at most"

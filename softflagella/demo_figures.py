@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 
 from dataset.figures import plain_logarithms
 from planner.files.tracks import TrackingError, draw_overlay
-from planner.planning.picture import band
+from planner.planning.picture import draw_tracks
 from sim.arrays import Floats
-from sim.io.page_figures import BLUE, GREEN, INK, ORANGE, PALE, RED, SOFT, VIOLET
+from sim.io.page_figures import BLUE, GREEN, INK, ORANGE, RED, SOFT, VIOLET
 from sim.model.response import DWELLS
 from sim.model.robot import Robot
 from sim.motion.lab_units import RPM, lab_columns
@@ -84,16 +84,12 @@ def draw_circles(robot: Robot, motions: Sequence[Steady]) -> Figure:
 
 def draw_path(plan: Mapping[str, Any], error: TrackingError, label: str = "replayed") -> Figure:
     """Draw the path as given, the declared path with its stated error, and a track, in cm."""
-    cm = 100 * plan["robot"]["tail_length_m"]
+    length = plan["robot"]["tail_length_m"]
     figure = Figure(figsize=(_NARROW, 3.4))
     axes = figure.add_subplot()
-    declared = cm * np.array(plan["reference"])
-    axes.fill(*band(declared, cm * error.stated).T, color=BLUE, alpha=0.3, lw=0, label="stated error")
-    axes.plot(*(cm * np.array(plan["raw_path"])).T, color=PALE, lw=1.4, label="path as given")
-    axes.plot(*declared.T, color=INK, lw=1.2, label="declared path")
-    axes.plot(*(cm * error.track).T, color=RED, lw=0.8, label=label)
-    axes.plot(*(cm * error.track[0]), "o", color=RED, ms=4)
-    axes.set_aspect("equal")
+    draw_tracks(axes, np.array(plan["raw_path"]), np.array(plan["reference"]), error.stated, length)
+    axes.plot(*(100 * length * error.track.T), color=RED, lw=0.8, label=label)
+    axes.plot(*(100 * length * error.track[0]), "o", color=RED, ms=4)
     _label(axes, "x [cm]", "y [cm]")
     _legend_above(axes, columns=2)
     return _finished(figure)

@@ -14,7 +14,7 @@ metres, unless a name says l; l is the tail length of the robot as given.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -25,7 +25,6 @@ from planner.paths.path_files import read_path
 from planner.planning.errors import (
     deviations_open_loop,
     error_growth,
-    flips_between,
     predicted_error,
     rms_in_time,
     stated_error,
@@ -191,8 +190,7 @@ def carry_out(plan: Plan, swims: TrackedVehicle) -> CarriedOut:
     rollout = roll_out(swims.vehicle, switches, swims.offset)
     path = plan.drawn.scaled(plan.robot.length_scale / metres).polyline()
     predicted = predicted_error(path, rollout.track, closed=plan.drawn.closed)
-    flips = flips_between(len(schedule.dwells))
-    growth = error_growth(swims.vehicle, replace(switches, poses=rollout.flips), rollout, flips)
+    growth = error_growth(swims.vehicle, switches, rollout)
     missed = rollout.track[-1] - path[-1]
     ends = np.hypot(*(missed + deviations_open_loop(growth)[0][:, -1]).T)
     low, high = np.quantile(ends, _INTERVAL).tolist()

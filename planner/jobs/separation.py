@@ -36,7 +36,7 @@ from planner.paths.obstacles import Footprint
 from planner.paths.path import Path2D, arc_length, axis_at, points_at
 from planner.paths.tractrix import reference
 from planner.paths.units import Swimmer
-from planner.planning.errors import LEVEL, WOBBLE, deviations_open_loop, error_growth, flips_between
+from planner.planning.errors import LEVEL, WOBBLE, deviations_open_loop, error_growth
 from planner.planning.plan import Plan
 from planner.vehicle.rollout import roll_out
 from planner.vehicle.tracked_point import TrackedVehicle
@@ -231,16 +231,15 @@ def _side(begin: Floats, end: Floats, point: Floats) -> Floats:
 def error_open_loop(plan: Plan) -> tuple[Floats, Floats]:
     """Return times (E,) and the error in place (E,) of a robot that carries out the schedule open loop."""
     tracked, switches = plan.tracked, plan.switches
-    edges = flips_between(len(plan.dwells))
-    rollout = roll_out(tracked.vehicle, switches, tracked.offset)
-    moved, turned = deviations_open_loop(error_growth(tracked.vehicle, switches, rollout, edges))
-    heading = plan.poses[edges[1:], 2]
+    growth = error_growth(tracked.vehicle, switches, roll_out(tracked.vehicle, switches))
+    moved, turned = deviations_open_loop(growth)
+    heading = plan.poses[growth.flips[1:], 2]
     left = np.stack([-np.sin(heading), np.cos(heading)], -1)
     sizes = []
     for place in _ends(plan):
         away = moved + turned[..., None] * place * left
         sizes.append(np.hypot(away[..., 0], away[..., 1]))
-    times = plan.flip_times[edges]
+    times = plan.flip_times[growth.flips]
     return times, WOBBLE + np.concatenate([[0.0], _band(np.maximum(*sizes))])
 
 

@@ -120,10 +120,10 @@ def plan_errors(
         guaranteed: bound on the error without uncertainty, if there is one.
         seed: of the random robots.
     """
-    path, count = declared.reference.p, len(switches.dwells)
+    path = declared.reference.p
     rollout = roll_out(tracked.vehicle, switches, tracked.offset)
     predicted = predicted_error(path, rollout.track, closed=drawn.closed)
-    growth = error_growth(tracked.vehicle, switches, rollout, flips_between(count))
+    growth = error_growth(tracked.vehicle, switches, rollout)
     return PlanErrors(
         track=rollout.track,
         distance=predicted.distance,
@@ -155,16 +155,10 @@ class ErrorGrowth(NamedTuple):
     turned: Floats  # (E, P), of the heading
 
 
-def error_growth(vehicle: Vehicle, switches: Switches, rollout: Rollout, flips: Integers) -> ErrorGrowth:
-    """Propagate the modes of a vehicle, and those of its disc's phase, to some flips of a schedule.
-
-    Args:
-        vehicle: with its modes and its spread.
-        switches: the schedule.
-        rollout: what the vehicle does on it.
-        flips: their numbers (E,), increasing, from 0 to that of all dwells.
-    """
+def error_growth(vehicle: Vehicle, switches: Switches, rollout: Rollout) -> ErrorGrowth:
+    """Propagate the modes of a vehicle, and those of its disc's phase, to some _BLOCKS flips of its rollout."""
     dwells, count = switches.dwells, len(switches.dwells)
+    flips = np.unique(np.linspace(0, count, min(count, _BLOCKS) + 1).astype(int))
     side = (np.arange(count) + (switches.first_direction < 0)) % 2
     moves_predicted, poses = rollout.changes, rollout.flips
     circle = planar.arc(vehicle.twist[side], dwells)
@@ -244,16 +238,11 @@ def predicted_error(declared: Floats, track: Floats, *, closed: bool) -> Predict
     return Predicted(distance, signed, normal, closed)
 
 
-def flips_between(count: int) -> Integers:
-    """Choose the flips of a schedule of `count` dwells between which deviations are drawn, some _BLOCKS."""
-    return np.unique(np.linspace(0, count, min(count, _BLOCKS) + 1).astype(int))
-
-
 def stated_error(growth: ErrorGrowth, predicted: Predicted, *, seed: int = 0) -> float:
     """Compute the quantile LEVEL of the largest distance from the declared path [l], over random vehicles.
 
     Args:
-        growth: of the errors, at the flips of `flips_between`.
+        growth: of the errors, between blocks of the schedule.
         predicted: distances of the predicted track from the path.
         seed: of the random draws, see `planner.draws`.
     """
@@ -334,7 +323,7 @@ def _in_time(distance: Floats, dwells: Floats) -> float:
 def drift_of_a_lap(tracked: TrackedVehicle, switches: Switches, seed: int) -> tuple[float, float]:
     """Compute the quantiles LEVEL of how far robots are from the vehicle after a lap, and of their turn."""
     rollout = roll_out(tracked.vehicle, switches, tracked.offset)
-    growth = error_growth(tracked.vehicle, switches, rollout, flips_between(len(switches.dwells)))
+    growth = error_growth(tracked.vehicle, switches, rollout)
     modes = growth.deviation.shape[1]
     drawn = normals(seed, 0, _LAP_DRAWS * modes).reshape(_LAP_DRAWS, modes)
     moved, turned = drawn @ growth.deviation[-1], drawn @ growth.turned[-1]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.files.saved_plan import load_plan, restore_plan
+from planner.files.saved_plan import restore_plan
 from planner.files.tracks import tracking_error
 from planner.jobs.detours import Hindered
 from planner.jobs.plan import make_plan
@@ -132,21 +132,6 @@ def test_random_obstacles(seed: int) -> None:
     rocks = [Circle(*(path.points[i] + rng.normal(0, 0.3, 2)).tolist(), rng.uniform(0.2, 0.6)) for i in (70, 130)]
     space = FreeSpace.of(rocks)
     check_clear(make_plan(path, tracked(), replace(QUICK, space=space)), space)
-
-
-def test_regions_are_in_the_unit_that_is_given(tmp_path: Path) -> None:
-    from planner.__main__ import main
-
-    cm = 100 * CONTROL.tail_length
-    (tmp_path / "line.csv").write_text(f"x_cm,y_cm\n0,0\n{5 * cm},0\n")
-    words = ["plan", str(tmp_path / "line.csv"), "--robot", "paper-control", "--out", str(tmp_path / "out")]
-    words += ["--unit", "cm", "--objective", "flips", "--keep-out", f"circle:{2.5 * cm},{-cm},0.3l"]
-    assert run_command(main, words) == 0
-    content = load_plan(tmp_path / "out" / "plan.json")
-    kept = content["kept_clear"]
-    assert kept["keep_out"][0]["circle"] == pytest.approx([2.5, -1, 0.3])
-    assert kept["margin_over_l"] > 0
-    assert content["id"].startswith("p")
 
 
 BENT = Path2D.of([[0.0, 0.0], [2.0, 0.0], [3.5, 1.5]])

@@ -21,7 +21,6 @@ from planner.planning.errors import (
     Predicted,
     error_growth,
     feedback_error,
-    flips_between,
     predicted_error,
     rms_in_time,
     stated_error,
@@ -54,7 +53,7 @@ def planned(car: Vehicle, path: Path2D) -> tuple[Switches, Reference, Rollout]:
 
 
 def stated_for(car: Vehicle, switches: Switches, rollout: Rollout, error: Predicted) -> float:
-    growth = error_growth(car, switches, rollout, flips_between(len(switches.dwells)))
+    growth = error_growth(car, switches, rollout)
     return stated_error(growth, error)
 
 
@@ -124,7 +123,7 @@ def test_the_modes_of_the_phase_are_lags() -> None:
     dwells = np.array([0.5, 0.7, 0.4, 0.9, 0.6])
     switches = Switches(-1, dwells, np.zeros((6, 3)))
     rollout = roll_out(car, switches, 0.0)
-    growth = error_growth(car, switches, rollout, np.arange(6))
+    growth = error_growth(car, switches, rollout)
     phase = np.concatenate([[0.0], np.cumsum(dwells * [-3.1, 3.0, -3.1, 3.0, -3.1])[:-1]])
     second = np.arange(5) % 2 == 0  # dwells of the second direction
     waves = [~second * np.cos(phase), ~second * np.sin(phase), second * np.cos(phase), second * np.sin(phase)]

@@ -12,7 +12,7 @@ import pytest
 import planner.files.own_table
 import softflagella as sf
 import surrogate.tabulate
-from tests.softflagella.made import GOAL, ODD, ROBOT, START, goal, own_table
+from tests.softflagella.made import ODD, ROBOT, goal, own_table
 
 KNOWN = sf.CalibrationKnowledge(names=("C_yr",), covariance=np.array([[0.01]]))
 
@@ -35,12 +35,6 @@ def test_a_robot_in_any_form_has_the_plan_of_the_planner(calibrated_file: Path) 
     uncertain = sf.plan(circle, ROBOT, knowledge=KNOWN, **few)
     for given in (uncertain, sf.plan(circle, str(calibrated_file), **few)):
         assert given.stated_error == wanted.stated_error > exact.stated_error
-
-
-@pytest.mark.slow
-def test_a_plan_to_a_goal_is_that_of_the_planner(calibrated_file: Path) -> None:
-    wanted = sf.to_goal(START, GOAL, ROBOT, knowledge=KNOWN)
-    assert sf.to_goal(START, GOAL, calibrated_file).to_dict() == wanted.to_dict()
 
 
 @pytest.mark.slow
