@@ -23,24 +23,43 @@ ROUNDING = 1e-9
 
 
 class DubinsPaths(NamedTuple):
-    """M paths: a start pose (M, 3), the turns (M, 3) of its segments (+1 left, 0, −1) and their lengths (M, 3)."""
+    """M paths of three segments each."""
 
-    start: Floats
-    turns: Integers
-    lengths: Floats
+    start: Floats  # (M, 3), poses
+    turns: Integers  # (M, 3), of the segments: +1 left, 0, −1
+    lengths: Floats  # (M, 3), of the segments
+    radius: float  # of all arcs
+
+    @staticmethod
+    def circles(begin: Floats, side: int, count: int, radius: float) -> DubinsPaths:
+        """Make whole circles from a pose (3,), to the left (+1) or to the right (−1)."""
+        lengths = np.array([[2 * math.pi * radius * count, 0.0, 0.0]])
+        return DubinsPaths(begin[None], np.array([[side, 0, 0]]), lengths, radius)
 
     @property
     def length(self) -> Floats:
+        """Lengths (M,)."""
         return np.asarray(self.lengths.sum(-1))
 
+    @property
+    def total(self) -> float:
+        """Length of paths that follow each other."""
+        return float(self.lengths.sum())
+
+    @property
+    def ends(self) -> Floats:
+        """Poses (M, 3) at the ends."""
+        return self.poses(self.length[:, None])[:, 0]
+
     def take(self, rows: Integers) -> DubinsPaths:
-        return DubinsPaths(self.start[rows], self.turns[rows], self.lengths[rows])
+        return DubinsPaths(self.start[rows], self.turns[rows], self.lengths[rows], self.radius)
 
     @staticmethod
     def joined(parts: Sequence[DubinsPaths]) -> DubinsPaths:
-        return DubinsPaths(*(np.concatenate([part[i] for part in parts]) for i in range(3)))
+        start, lengths = (np.concatenate([getattr(part, name) for part in parts]) for name in ("start", "lengths"))
+        return DubinsPaths(start, np.concatenate([part.turns for part in parts]), lengths, parts[0].radius)
 
-    def poses(self, way: Floats, radius: float) -> Floats:
+    def poses(self, way: Floats) -> Floats:
         """Compute poses (M, K, 3) after ways (M, K) along the tracks; beyond the end, that of the end."""
         pose = np.repeat(self.start[:, None], way.shape[1], 1)
         remaining = way
@@ -48,14 +67,25 @@ class DubinsPaths(NamedTuple):
             length = self.lengths[:, i, None]
             part = np.clip(remaining, 0.0, length)
             remaining = remaining - length
-            pose = _moved(pose, self.turns[:, i, None] / radius, part)
+            pose = _moved(pose, self.turns[:, i, None] / self.radius, part)
         return pose
 
-    def sampled(self, radius: float, spacing: float) -> Floats:
+    def chain(self, spacing: float) -> Floats:
+        """Sample poses (m, 3) of paths that follow each other, at most `spacing` apart, courses without jumps."""
+        parts = [self.start[:1]]
+        for row, length in enumerate(self.length.tolist()):
+            if length > 0:
+                way = np.linspace(0, length, max(1, math.ceil(length / spacing)) + 1)[None, 1:]
+                parts.append(self.take(np.array([row])).poses(way)[0])
+        poses = np.concatenate(parts)
+        poses[:, 2] = np.unwrap(poses[:, 2])
+        return poses
+
+    def sampled(self, spacing: float) -> Floats:
         """Sample poses (m, 3) of a single path at equal steps in each segment, at most `spacing` apart."""
         ends = np.concatenate([[0.0], np.cumsum(self.lengths[0])])
         ways = [np.linspace(a, b, math.ceil((b - a) / spacing) + 1)[1:] for a, b in pairwise(ends) if b > a]
-        return np.asarray(self.poses(np.concatenate([[0.0], *ways])[None], radius)[0])
+        return np.asarray(self.poses(np.concatenate([[0.0], *ways])[None])[0])
 
 
 def words(start: Floats, goal: Floats, radius: float) -> Floats:
@@ -125,7 +155,7 @@ def shortest_paths(start: Floats, goal: Floats, radius: float) -> DubinsPaths:
     """Find the shortest paths between M pairs of poses (M, 3)."""
     lengths = words(start, goal, radius)
     best = lengths.sum(-1).argmin(-1)
-    return DubinsPaths(start, TURNS[best], lengths[np.arange(len(best)), best])
+    return DubinsPaths(start, TURNS[best], lengths[np.arange(len(best)), best], radius)
 
 
 def _turn(angle: Floats) -> Floats:

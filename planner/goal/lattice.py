@@ -60,7 +60,7 @@ class RouteLimits:
             order = order[len(rows) :]
             count = max(2, math.ceil(float(length[rows[-1]]) / step) + 1)
             way = np.linspace(0, 1, count) * length[rows, None]
-            poses = tracks.take(rows).poses(way, self.radius)
+            poses = tracks.take(rows).poses(way)
             result[rows] = (self.clearance(poses, space) >= margin).all(1)
         return result
 
@@ -115,7 +115,7 @@ class Lattice:
     def _clearance(self, track: DubinsPaths) -> Floats:
         """Bound the clearance (nx, ny) along the track of one joint from below, by its place in the lattice."""
         count = max(2, math.ceil(float(track.length[0]) / _STEP) + 1)
-        poses = track.poses(np.linspace(0, track.length, count).T, self.limits.radius)[0]
+        poses = track.poses(np.linspace(0, track.length, count).T)[0]
         heading = poses[:, 2] - self.limits.drift.slip_along(poses[:, 2])
         centres = self.limits.body.centres(np.stack([poses[:, 0], poses[:, 1], heading], 1)).reshape(-1, 2)
         offsets = np.rint(centres / self.map.step).astype(int) + self._pad * _CELLS

@@ -9,7 +9,7 @@ direct joints between places on it. Lengths in l.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -38,33 +38,12 @@ class NoWayError(BlockedError):
     status = 3
 
 
-@dataclass(frozen=True)
-class Route:
-    """A track as a chain of words."""
-
-    tracks: DubinsPaths
-    radius: float
-
-    @property
-    def length(self) -> float:
-        return float(self.tracks.length.sum())
-
-    def poses(self, spacing: float) -> Floats:
-        """Sample poses (m, 3) at most `spacing` apart, courses without jumps."""
-        parts = [self.tracks.start[:1]]
-        for row, length in enumerate(self.tracks.length.tolist()):
-            if length > 0:
-                way = np.linspace(0, length, max(1, math.ceil(length / spacing)) + 1)[None, 1:]
-                parts.append(self.tracks.take(np.array([row])).poses(way, self.radius)[0])
-        poses = np.concatenate(parts)
-        poses[:, 2] = np.unwrap(poses[:, 2])
-        return poses
-
-
 Lattices = dict[tuple[float, int], Lattice]
 
 
-def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lattices, robot: Swimmer) -> Route:
+def route(
+    stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lattices, robot: Swimmer
+) -> DubinsPaths:
     """Find a short route through the stops.
 
     Args:
@@ -83,7 +62,7 @@ def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lat
     if limits.space.empty and direct is not None:
         return direct
     shortest = _direct(stops, replace(limits, space=FreeSpace()), margin)
-    if direct is not None and shortest is not None and direct.length < _ENOUGH * shortest.length:
+    if direct is not None and shortest is not None and direct.total < _ENOUGH * shortest.total:
         return direct
     for spacing, courses in LEVELS:
         if (spacing, courses) not in lattices:
@@ -91,7 +70,7 @@ def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lat
         around = _around(stops, lattices[spacing, courses], margin)
         candidates = [candidate for candidate in (direct, around) if candidate is not None]
         if candidates:
-            return min(candidates, key=lambda candidate: candidate.length)
+            return min(candidates, key=lambda candidate: candidate.total)
     kept, radius, step = (in_lab(x, robot) for x in (margin, limits.radius, LEVELS[-1][0] * limits.radius))
     raise NoWayError(
         f"there is no way to the goal that leaves {kept} around the robot and turns with a radius of {radius}, on "
@@ -113,16 +92,17 @@ def _check(stop: Floats, number: int, count: int, limits: RouteLimits, margin: f
     )
 
 
-def _direct(stops: list[Floats], limits: RouteLimits, margin: float) -> Route | None:
+def _direct(stops: list[Floats], limits: RouteLimits, margin: float) -> DubinsPaths | None:
     """Join successive stops by one word each, and refine the courses of the stops."""
     chosen, best = stops, None
     for finer in range(_FINER + 1):
         shortest = _chosen(chosen, limits, margin)
         if shortest is None:
             return best
-        if best is None or shortest.length < best.length:
+        if best is None or shortest.total < best.total:
             best = shortest
-        chosen = [_finer(stop, pose, finer) for stop, pose in zip(stops, _ends(best), strict=True)]
+        places = [*best.start, best.ends[-1]]
+        chosen = [_finer(stop, pose, finer) for stop, pose in zip(stops, places, strict=True)]
         if all(len(stop) == len(poses) for stop, poses in zip(stops, chosen, strict=True)):
             break
     return best
@@ -138,13 +118,7 @@ def _finer(stop: Floats, pose: Floats, level: int) -> Floats:
     return poses
 
 
-def _ends(track: Route) -> list[Floats]:
-    """Return the poses at the starts of the tracks and at the end of the last one."""
-    last = track.tracks.take(np.array([-1]))
-    return [*track.tracks.start, last.poses(last.length[:, None], track.radius)[0, 0]]
-
-
-def _chosen(stops: list[Floats], limits: RouteLimits, margin: float) -> Route | None:
+def _chosen(stops: list[Floats], limits: RouteLimits, margin: float) -> DubinsPaths | None:
     """Find the shortest chain of one word between successive stops, among all their poses.
 
     Words are checked only when they are on the shortest chain. Those that are not free are excluded.
@@ -165,22 +139,18 @@ def _chosen(stops: list[Floats], limits: RouteLimits, margin: float) -> Route | 
                                             strict=True):  # fmt: skip
             came = int(before[at])
             word = int(length[came, at].argmin())
-            track = DubinsPaths(starts[came : came + 1], TURNS[word : word + 1], leg[came, at, word][None])
+            track = DubinsPaths(starts[came : came + 1], TURNS[word : word + 1], leg[came, at, word][None],
+                                limits.radius)  # fmt: skip
             chain.append((track, length, (came, at, word)))
             at = came
-        joined = chained([track for track, _, _ in chain[::-1]], limits.radius)
-        free = np.ones(len(chain), dtype=bool) if limits.space.empty else limits.free(joined.tracks, margin)[::-1]
+        joined = DubinsPaths.joined([track for track, _, _ in chain[::-1]])
+        free = np.ones(len(chain), dtype=bool) if limits.space.empty else limits.free(joined, margin)[::-1]
         if free.all():
             return joined
         for (_, length, place), good in zip(chain, free.tolist(), strict=True):
             if not good:
                 length[place] = np.inf
     return None
-
-
-def chained(parts: list[DubinsPaths], radius: float) -> Route:
-    """Join tracks, one after another."""
-    return Route(DubinsPaths.joined(parts), radius)
 
 
 def _lattice(stops: list[Floats], limits: RouteLimits, spacing: float, courses: int) -> Lattice:
@@ -194,7 +164,7 @@ def _lattice(stops: list[Floats], limits: RouteLimits, spacing: float, courses: 
     return Lattice(limits, low, high, spacing, courses)
 
 
-def _around(stops: list[Floats], lattice: Lattice, margin: float) -> Route | None:
+def _around(stops: list[Floats], lattice: Lattice, margin: float) -> DubinsPaths | None:
     """Find a route over a lattice and shorten it; None where there is none on this lattice."""
     limits = lattice.limits
     stops = [stop[::_THIN] if len(stop) == COURSES else stop for stop in stops]
@@ -210,19 +180,15 @@ def _around(stops: list[Floats], lattice: Lattice, margin: float) -> Route | Non
         leg = ways[at]
         parts.insert(0, shortened(shortest_paths(leg[:-1], leg[1:], limits.radius), lattice, margin))
         at = int(np.abs(stop - leg[0]).sum(1).argmin())
-    return chained(parts, limits.radius)
+    return DubinsPaths.joined(parts)
 
 
 def shortened(leg: DubinsPaths, lattice: Lattice, margin: float) -> DubinsPaths:
     """Shorten a leg by joints between places on it, where one is free and shorter than that part of the leg."""
     limits = lattice.limits
     for round_number in range(_ROUNDS):
-        places = _cut(
-            leg, max(float(leg.length.sum()) / _PLACES, limits.radius / 4) / (1 + round_number), limits.radius
-        )
-        starts = places.start
-        last = places.take(np.array([-1]))
-        poses = np.concatenate([starts, last.poses(last.length[:, None], limits.radius)[:, 0]])
+        places = _cut(leg, max(float(leg.length.sum()) / _PLACES, limits.radius / 4) / (1 + round_number))
+        poses = np.concatenate([places.start, places.ends[-1:]])
         way = np.concatenate([[0.0], np.cumsum(places.length)])
         i, j = np.triu_indices(len(poses), 2)
         tracks = shortest_paths(poses[i], poses[j], limits.radius)
@@ -245,7 +211,7 @@ def shortened(leg: DubinsPaths, lattice: Lattice, margin: float) -> DubinsPaths:
     return leg
 
 
-def _cut(leg: DubinsPaths, spacing: float, radius: float) -> DubinsPaths:
+def _cut(leg: DubinsPaths, spacing: float) -> DubinsPaths:
     """Cut the tracks of a leg into parts of at most `spacing`."""
     parts = []
     for row, length in enumerate(leg.length.tolist()):
@@ -256,6 +222,6 @@ def _cut(leg: DubinsPaths, spacing: float, radius: float) -> DubinsPaths:
         before = np.concatenate([[0.0], ends[:-1]])
         lengths = np.maximum(np.minimum(ends, edges[1:, None]) - np.maximum(before, edges[:-1, None]), 0.0)
         turns = leg.take(np.full(len(edges) - 1, row)).turns
-        poses = leg.take(np.array([row])).poses(edges[None, :-1], radius)[0]
-        parts.append(DubinsPaths(poses, turns, lengths))
+        poses = leg.take(np.array([row])).poses(edges[None, :-1])[0]
+        parts.append(DubinsPaths(poses, turns, lengths, leg.radius))
     return DubinsPaths.joined(parts)

@@ -135,9 +135,8 @@ class _Track:
         """Yield circles at places from the end of the track to its beginning."""
         for way in self._places(radius):
             for side in (1, -1):
-                arc = DubinsPaths(self.at(way)[None], np.array([[side, 0, 0]]),
-                                  np.array([[2 * math.pi * radius * circles, 0.0, 0.0]]))  # fmt: skip
-                yield _Candidate(way, way, arc.sampled(radius, _SPACING), circles)
+                arc = DubinsPaths.circles(self.at(way), side, circles, radius)
+                yield _Candidate(way, way, arc.sampled(_SPACING), circles)
 
     def swung(self, rest: float, circles: int, radius: float) -> Iterator[_Candidate]:
         """Yield swings that gain `rest` besides their circles, from the end of the track to its beginning."""
@@ -155,8 +154,8 @@ class _Track:
                 joins_at = self._root(leaves, joins[row], joins[row + 1], word, rest, radius)
                 turns, lengths = three_arcs(self.at(leaves), self.at(joins_at), radius)
                 parts = lengths[word] + np.array([2 * math.pi * radius * circles, 0.0, 0.0])
-                path = DubinsPaths(self.at(leaves)[None], turns[word][None], parts[None])
-                yield _Candidate(leaves, joins_at, path.sampled(radius, _SPACING), circles)
+                path = DubinsPaths(self.at(leaves)[None], turns[word][None], parts[None], radius)
+                yield _Candidate(leaves, joins_at, path.sampled(_SPACING), circles)
 
     def joined(self, candidate: _Candidate) -> tuple[Reference, Swing]:
         """Put a candidate into the track."""

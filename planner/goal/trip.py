@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from planner.goal.dubins import DubinsPaths
 from planner.goal.last_dwells import Ending
 from planner.goal.lattice import RouteLimits
-from planner.goal.route import COURSES, Lattices, NoWayError, Route, route
+from planner.goal.route import COURSES, Lattices, NoWayError, route
 from planner.goal.swings import Delay
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.tractrix import Drift, Reference
@@ -129,16 +130,16 @@ def to_goal(
     lattices: dict[Drift, Lattices] = {}
 
     @cache
-    def track(drift: Drift, margin: float) -> Route:
+    def track(drift: Drift, margin: float) -> DubinsPaths:
         limits = RouteLimits(vehicle.pivot_radius, tracked.body, space, drift)
         stops = _stops(start, goal, via, vehicle.pivot_distance, drift)
         return route(stops, limits, margin, lattices.setdefault(drift, {}), robot)
 
     def source(setting: Setting) -> Declared:
         way = track(setting.drift, setting.margin or 0.0)
-        if way.length > LONGEST:
-            raise InputError(f"the way is {in_lab(way.length, robot)} long; at most {LONGEST:g} l can be planned")
-        poses = way.poses(_SPACING)
+        if way.total > LONGEST:
+            raise InputError(f"the way is {in_lab(way.total, robot)} long; at most {LONGEST:g} l can be planned")
+        poses = way.chain(_SPACING)
         if len(poses) < 2:
             raise InputError("start and goal are the same; nothing to do")
         # The guaranteed bound is for paths that turn less than the robot can; these arcs turn as much as it can.
@@ -151,7 +152,7 @@ def to_goal(
         ending=Ending(goal, least_dwell, _SHORTER), zigzags=_ZIGZAGS, longer=False, blocked=NoWayError,
     )  # fmt: skip
     plan = solve(task, tracked, request, progress)
-    length = track(plan.drift, 0.0 if plan.kept_clear is None else plan.kept_clear.margin).length
+    length = track(plan.drift, 0.0 if plan.kept_clear is None else plan.kept_clear.margin).total
     return plan.with_job(Trip(goal, plan.end, tuple(via), length))
 
 

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from planner.goal.dubins import DubinsPaths
-from planner.goal.route import Route, chained
 from planner.jobs.shortest_order import EXACT, MOST, Order, shortest_order
 from planner.jobs.travel import SLACK, Travel, pivot_poses, plan_track, preferred_setting
 from planner.paths.distance import distance_to
@@ -286,18 +285,17 @@ def _ordered(cut: Floats, travel: Travel, tracked: TrackedVehicle, drift: Drift)
     return _Lanes(np.array(ends), order)
 
 
-def _track(ends: Floats, travel: Travel, tracked: TrackedVehicle, drift: Drift) -> Route:
+def _track(ends: Floats, travel: Travel, tracked: TrackedVehicle, drift: Drift) -> DubinsPaths:
     """Join lanes by the quickest tracks between them."""
     begin, end = (poses[:, 0] for poses in _ends(ends, tracked, drift))
     length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
     parts = []
     for k in range(len(ends)):
-        parts.append(
-            DubinsPaths(begin[k : k + 1], np.zeros((1, 3), dtype=np.int64), np.array([[length[k], 0, 0]]))
-        )
+        lane = np.array([[length[k], 0.0, 0.0]])
+        parts.append(DubinsPaths(begin[k : k + 1], np.zeros((1, 3), dtype=np.int64), lane, travel.radius))
         if k + 1 < len(ends):
             parts.append(travel.tracks(end[k : k + 1], begin[k + 1 : k + 2]))
-    return chained(parts, travel.radius)
+    return DubinsPaths.joined(parts)
 
 
 def across(field: Field, angle: float) -> float:

@@ -23,7 +23,7 @@ import numpy as np
 
 from planner.goal.dubins import shortest_paths
 from planner.goal.lattice import Lattice, RouteLimits
-from planner.goal.route import AROUND, LEVELS, Route, shortened
+from planner.goal.route import AROUND, LEVELS, shortened
 from planner.paths.distance import nearest
 from planner.paths.nearest_path import nearest_poses, tracked_points
 from planner.paths.obstacles import Footprint, FreeSpace
@@ -215,9 +215,9 @@ class Detours:
                     way = ways[best]
                     leave = int(leaves[np.abs(starts - way[0]).sum(1).argmin()])
                     tracks = shortest_paths(way[:-1], way[1:], self.limits.radius)
-                    route = Route(shortened(tracks, lattice, margin), self.limits.radius)
+                    route = shortened(tracks, lattice, margin)
                     part = Reference.of_pivot(
-                        route.poses(_SPACING), self.tracked.rod, self.drift, float(reference.heading[leave])
+                        route.chain(_SPACING), self.tracked.rod, self.drift, float(reference.heading[leave])
                     )
                     return Way(leave, int(joins[best]), part)
         robot = self.tracked.robot

@@ -173,10 +173,10 @@ class Timetable:
 def circle_reference(plan: Plan, circle: WaitingCircle) -> Reference:
     """Make the reference of a waiting circle; it begins and ends at the place, and ends a whole turn further."""
     reference, drift, radius = plan.declared.reference, plan.drift, plan.tracked.vehicle.pivot_radius / ROOM
-    begin = reference.part(circle.place, circle.place + 1).courses(drift)
-    turn = DubinsPaths(begin, np.array([[circle.side, 0, 0]]), np.array([[2 * math.pi * radius, 0.0, 0.0]]))
+    (begin,) = reference.part(circle.place, circle.place + 1).courses(drift)
+    turn = DubinsPaths.circles(begin, circle.side, 1, radius)
     heading = float(reference.heading[circle.place])
-    return Reference.of_pivot(turn.sampled(radius, _SPACING), plan.tracked.rod, drift, heading)
+    return Reference.of_pivot(turn.sampled(_SPACING), plan.tracked.rod, drift, heading)
 
 
 def with_circles(plan: Plan[J], circles: Sequence[WaitingCircle]) -> Plan[J]:

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planner.goal.route import Route
+from planner.goal.dubins import DubinsPaths
 from planner.jobs.shortest_order import EXACT, best_options, shortest_order
 from planner.jobs.travel import SLACK, Travel, pivot_poses, plan_track, preferred_setting
 from planner.paths.distance import distance_to
@@ -210,11 +210,11 @@ class _Tour:
             choices = chosen[:, None] + step * np.arange(-3, 4)
         return chosen, total
 
-    def track(self, found: _Ordered, drift: Drift) -> Route:
+    def track(self, found: _Ordered, drift: Drift) -> DubinsPaths:
         """Join the places by tracks of the pivot."""
         travel = replace(found.travel, limits=replace(found.travel.limits, drift=drift))
         poses = pivot_poses(self.places[list(found.order)], found.courses, self.tracked, drift)
-        return Route(travel.tracks(poses[:-1], poses[1:]), travel.radius)
+        return travel.tracks(poses[:-1], poses[1:])
 
     def visits(self, plan: Plan, found: _Ordered) -> Visits:
         """Compare the predicted track with the places.

@@ -15,7 +15,6 @@ import numpy as np
 
 from planner.goal.dubins import TURNS, DubinsPaths, words
 from planner.goal.lattice import RouteLimits
-from planner.goal.route import Route
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D, axis_at
 from planner.paths.tractrix import Drift, Reference
@@ -68,10 +67,6 @@ class Travel:
         """Find the quickest tracks between M pairs of poses."""
         return self._best(start, goal, self.margin)[0]
 
-    def time(self, tracks: DubinsPaths) -> float:
-        """Compute the time of a chain of tracks."""
-        return float((tracks.lengths / self._speed(tracks.turns)).sum())
-
     def _best(self, start: Floats, goal: Floats, margin: float) -> tuple[DubinsPaths, Floats]:
         lengths = words(start, goal, self.radius)
         times = (lengths / self._speed(TURNS)).sum(-1)
@@ -83,7 +78,7 @@ class Travel:
             blocked = rows
             for k in range(WORDS):
                 tried = order[blocked, k]
-                tracks = DubinsPaths(start[blocked], TURNS[tried], lengths[blocked, tried])
+                tracks = DubinsPaths(start[blocked], TURNS[tried], lengths[blocked, tried], self.radius)
                 exists = np.isfinite(times[blocked, tried])
                 free = np.zeros(len(blocked), dtype=bool)
                 free[exists] = self.limits.free(tracks.take(np.flatnonzero(exists)), margin, step=_STEP)
@@ -93,7 +88,7 @@ class Travel:
             time[blocked] = times[blocked, order[blocked, 0]] + DETOUR * self.radius / self.straight
             unreached = (self.limits.clearance(goal) < margin) | (self.limits.clearance(start) < margin)
             time[unreached] = np.inf
-        return DubinsPaths(start, TURNS[word], lengths[rows, word]), time
+        return DubinsPaths(start, TURNS[word], lengths[rows, word], self.radius), time
 
     def _speed(self, turns: Integers) -> Floats:
         return np.where(turns == 0, self.straight, self.turning)
@@ -113,7 +108,7 @@ def pivot_poses(places: Floats, courses: Floats, tracked: TrackedVehicle, drift:
 
 
 def plan_track(
-    track: Callable[[Drift], Route], preferred: Setting, request: PlanRequest, progress: Progress | None
+    track: Callable[[Drift], DubinsPaths], preferred: Setting, request: PlanRequest, progress: Progress | None
 ) -> Plan[None]:
     """Plan for the pivot's track that a job gives for a drift.
 
@@ -123,7 +118,7 @@ def plan_track(
     tracked, space = preferred.tracked, request.space
 
     def source(setting: Setting) -> Declared:
-        reference = Reference.of_pivot(track(setting.drift).poses(_SPACING), tracked.rod, setting.drift)
+        reference = Reference.of_pivot(track(setting.drift).chain(_SPACING), tracked.rod, setting.drift)
         return Declared(reference, float(np.abs(reference.curvature).max()))
 
     drawn = Path2D(source(preferred).reference.p, False)

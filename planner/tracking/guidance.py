@@ -158,7 +158,7 @@ class TrackerGuidance(LineOfSight):
         targets, radius = np.stack([x, y, course], 1), self._radius()
         track, target = shortest_way(start, targets, left_out, self._stride, radius)
         at = min(place + target, self._last)
-        self._way = Way.of(track, radius, at)
+        self._way = Way.of(track, at)
         turns = round((self._way.course - course[target]) / (2 * math.pi))
         self._leg, self._along = 0, 0.0
         self.place, self.share = at, 0.0
@@ -288,10 +288,10 @@ class Way(NamedTuple):
     target: int
 
     @staticmethod
-    def of(track: DubinsPaths, radius: float, target: int) -> Way:
-        """Make a way of a single track with arcs of `radius`."""
-        lengths, curvatures = track.lengths[0], track.turns[0] / radius
-        starts = track.poses((np.cumsum(lengths) - lengths)[None], radius)[0]
+    def of(track: DubinsPaths, target: int) -> Way:
+        """Make a way of a single track."""
+        lengths, curvatures = track.lengths[0], track.turns[0] / track.radius
+        starts = track.poses((np.cumsum(lengths) - lengths)[None])[0]
         rows = np.column_stack([starts, curvatures, lengths]).tolist()
         return Way([Segment(*row) for row in rows], target)
 
@@ -330,4 +330,4 @@ def shortest_way(
 
     coarse = best(np.arange(0, len(targets), stride))[0]
     target, lengths, word = best(np.arange(max(coarse - stride + 1, 0), min(coarse + stride, len(targets))))
-    return DubinsPaths(np.array([start]), TURNS[word : word + 1], lengths[None]), target
+    return DubinsPaths(np.array([start]), TURNS[word : word + 1], lengths[None], radius), target

@@ -142,7 +142,7 @@ def _shortest(plan: Plan, start: POSE, place: int, drift: Drift) -> tuple[Floats
     left_out = reference.arc[place:-1] - reference.arc[place]
     radius = _radius(plan)
     track, target = shortest_way(start, targets, left_out, stride(plan), radius, _WORTH)
-    return track.sampled(radius, _SPACING), place + target
+    return track.sampled(_SPACING), place + target
 
 
 def _radius(plan: Plan) -> float:
@@ -169,9 +169,9 @@ def _around(plan: Plan, start: POSE, place: int, limits: RouteLimits, margin: fl
     stop = np.array([start])
     lattices: Lattices = {}
     best = route([stop, targets], limits, margin, lattices, plan.robot)
-    end = best.poses(_SPACING)[-1]
+    end = best.ends[-1]
     join = int(rows[int(np.hypot(*(targets[:, :2] - end[:2]).T).argmin())])
-    cost = best.length + _WORTH * (reference.arc[join] - reference.arc[place])
+    cost = best.total + _WORTH * (reference.arc[join] - reference.arc[place])
     left_out = _WORTH * (reference.arc[rows] - reference.arc[place])
     bounds = words(stop, targets, limits.radius).sum(-1).min(-1) + left_out  # obstacles make ways longer
     for k in np.argsort(bounds).tolist():
@@ -181,9 +181,9 @@ def _around(plan: Plan, start: POSE, place: int, limits: RouteLimits, margin: fl
             way = route([stop, targets[k : k + 1]], limits, margin, lattices, plan.robot)
         except NoWayError:
             continue
-        if way.length + left_out[k] < cost:
-            best, join, cost = way, int(rows[k]), way.length + left_out[k]
-    return best.poses(_SPACING), join
+        if way.total + left_out[k] < cost:
+            best, join, cost = way, int(rows[k]), way.total + left_out[k]
+    return best.chain(_SPACING), join
 
 
 def _planned(plan: Plan, path: Reference, pose: POSE, way: int, join: int) -> Plan[None]:

@@ -175,8 +175,8 @@ def test_every_word_ends_at_its_goal(word: int) -> None:
     pieces = words(start, goal, RADIUS)[:, word]
     exists = np.isfinite(pieces.sum(-1))
     assert exists.sum() > 40
-    tracks = DubinsPaths(start[exists], np.repeat(TURNS[word][None], exists.sum(), 0), pieces[exists])
-    missed = tracks.poses(tracks.length[:, None], RADIUS)[:, 0] - goal[exists]
+    tracks = DubinsPaths(start[exists], np.repeat(TURNS[word][None], exists.sum(), 0), pieces[exists], RADIUS)
+    missed = tracks.ends - goal[exists]
     missed[:, 2] = (missed[:, 2] + np.pi) % (2 * np.pi) - np.pi
     assert np.abs(missed).max() < 1e-9
 
@@ -188,8 +188,8 @@ def test_no_random_track_is_shorter() -> None:
     end, length = start, np.zeros(3000)
     for _ in range(4):
         turn, piece = rng.integers(-1, 2, (3000, 1)), rng.uniform(0, 1, (3000, 1))
-        track = DubinsPaths(end, np.repeat(turn, 3, 1), np.concatenate([piece, 0 * piece, 0 * piece], 1))
-        end, length = track.poses(piece, RADIUS)[:, 0], length + piece[:, 0]
+        track = DubinsPaths(end, np.repeat(turn, 3, 1), np.concatenate([piece, 0 * piece, 0 * piece], 1), RADIUS)
+        end, length = track.ends, length + piece[:, 0]
     assert (shortest_paths(start, end, RADIUS).length <= length + 1e-9).all()
 
 
@@ -202,8 +202,8 @@ def test_all_words_of_three_arcs_end_at_the_goal() -> None:
     for word in range(4):
         exists = np.isfinite(lengths[:, word]).all(-1)
         assert exists.sum() > 50
-        track = DubinsPaths(start[exists], np.tile(turns[word], (exists.sum(), 1)), lengths[exists, word])
-        end = track.poses(track.length[:, None], 0.7)[:, 0]
+        track = DubinsPaths(start[exists], np.tile(turns[word], (exists.sum(), 1)), lengths[exists, word], 0.7)
+        end = track.ends
         assert end[:, :2] == pytest.approx(goal[exists, :2], abs=1e-9)
         assert np.cos(end[:, 2] - goal[exists, 2]) == pytest.approx(1.0)
         assert (lengths[exists, word, 1] / 0.7 >= np.pi - 1e-9).all() == (word in (0, 2))
@@ -219,7 +219,7 @@ def test_a_route_keeps_its_distance_and_its_radius(seed: int) -> None:
     circles = tuple(Circle(x, y, 0.5) for x, y in rng.uniform([1.5, -2], [4.5, 2], (3, 2)))
     limits = RouteLimits(RADIUS, BODY, FreeSpace(circles), STILL)
     found = route([stop(0, 0, 0), stop(6.5, 0, 1.0)], limits, 0.1, {}, CONTROL)
-    track = found.poses(0.01)
+    track = found.chain(0.01)
     assert limits.clearance(track).min() >= 0.1 - 1e-3
     assert track[-1] == pytest.approx([6.5, 0, 1.0 + 2 * np.pi * round((track[-1, 2] - 1) / 2 / np.pi)], abs=1e-6)
     steps = np.hypot(*np.diff(track[:, :2], axis=0).T)
@@ -238,9 +238,9 @@ def test_a_route_through_places_is_as_short_as_with_the_best_courses() -> None:
     first = words(ends[0], one, RADIUS).sum(-1).min(-1)
     middle = words(one[:, None], other[None], RADIUS).sum(-1).min(-1)
     last = words(other, ends[1], RADIUS).sum(-1).min(-1)
-    assert found.length <= (first[:, None] + middle + last).min() + 1e-3
+    assert found.total <= (first[:, None] + middle + last).min() + 1e-3
     for place in places:
-        assert np.hypot(*(found.poses(0.005)[:, :2] - place).T).min() < 0.005
+        assert np.hypot(*(found.chain(0.005)[:, :2] - place).T).min() < 0.005
 
 
 @pytest.mark.parametrize("gap", [1.4, 0.3])
@@ -250,7 +250,7 @@ def test_a_wall_without_a_gap_leaves_no_way(gap: float) -> None:
     limits = RouteLimits(RADIUS, BODY, FreeSpace(tuple(map(Polygon.of, walls)), Polygon.of(room)), STILL)
     ends = [stop(0, 0, 0), stop(3, 0, 0)]
     if gap > 1:
-        assert route(ends, limits, 0.05, {}, CONTROL).length == pytest.approx(3.0, rel=0.05)
+        assert route(ends, limits, 0.05, {}, CONTROL).total == pytest.approx(3.0, rel=0.05)
         return
     leaves = r"there is no way to the goal that leaves 5\.5 mm \(0\.05 l\) .* 4\.07 cm \(0\.37 l\)"
     with pytest.raises(NoWayError, match=leaves):

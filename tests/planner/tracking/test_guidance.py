@@ -145,7 +145,7 @@ def test_from_anywhere_it_is_back_in_little_more_than_the_least_time(seeds: rang
 def test_the_way_leads_to_the_target_and_is_short() -> None:
     targets = np.stack([np.linspace(0, 9, 901), np.zeros(901), np.zeros(901)], 1)
     track, target = shortest_way((4.0, 1.5, math.pi / 2), targets, np.linspace(0, 9, 901), 18, 0.4)
-    way = Way.of(track, 0.4, target)
+    way = Way.of(track, target)
     last = way.segments[-1]
     x, y, _ = targets[way.target]
     ends = [last.project(x, y, last.length)]
