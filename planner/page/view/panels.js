@@ -5,12 +5,12 @@ import { transformed } from "./editor.js";
 import { FIELDS, labValues, OPTIONS } from "./state.js";
 
 /* The sentence that a screen reader is told when a plan is finished. */
-function summary(plan) {
-  const time = duration(plan.seconds);
-  const within = (size) => `95 of 100 such robots stay within ${length(size)} of the path to follow`;
-  const exact = plan.calibrated ? "" : "if the coefficients are exact, ";
-  const guessed = plan.unmeasured === null ? "" : ` With coefficients of another robot: ${length(plan.unmeasured)}.`;
-  return `${time}, ${plan.dwells.length} dwells: ${exact}${within(plan.stated)}.${guessed}`;
+function summary({ seconds, dwells, calibrated, stated, offDrawn, missed, unmeasured }) {
+  const exact = calibrated ? "" : "if the coefficients are exact, ", away = Math.max(offDrawn, missed);
+  const off = away > stated ? `, which leaves the drawn one by up to ${length(away)}` : "";
+  const guessed = unmeasured === null ? "" : ` With coefficients of another robot: ${length(unmeasured)}.`;
+  return `${duration(seconds)}, ${dwells.length} dwells: ${exact}95 of 100 such robots stay within ${length(stated)} of `
+    + `the path to follow${off}.${guessed}`;
 }
 
 /* Show the numbers of a plan; with `tails` also in tail lengths and time units. */
@@ -41,8 +41,8 @@ class RobotForm {
     this.changed = changed;
     this.settled = settled;
     this.inputs = new Map();
-    for (const field of FIELDS)
-      byId(field.first ? "first-fields" : "more-fields").append(this.field(field, limits[field.key]));
+    const place = ({ first }) => byId(first ? "first-fields" : "more-fields");
+    for (const field of FIELDS) place(field).append(this.field(field, limits[field.key]));
   }
 
   field({ key, words, unit, step, optional }, [low, high]) {

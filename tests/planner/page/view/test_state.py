@@ -122,6 +122,15 @@ def test_poses_between_samples() -> None:
     assert [each["dwell"] for each in poses] == [0, 0, 1, 1, 1]
 
 
+def test_a_plan_is_summed_up_and_tells_where_it_leaves_the_drawn_path() -> None:
+    plan = {"seconds": 600, "dwells": [300, 300], "calibrated": True, "stated": 0.5, "offDrawn": 0.2,
+            "missed": 0.4, "unmeasured": None}  # fmt: skip
+    words = "10.0 min, 2 dwells: 95 of 100 such robots stay within 0.500 cm of the path to follow"
+    assert answer("view/panels.js", "summary", plan) == f"{words}."
+    off = answer("view/panels.js", "summary", plan | {"missed": 3.0})
+    assert off == f"{words}, which leaves the drawn one by up to 3.00 cm."
+
+
 def test_no_tail_is_drawn_behind_another() -> None:
     for tails in range(1, 9):
         across = sorted(answers([("view/scene.js", "acrossOf", k, tails) for k in range(tails)]))
