@@ -288,8 +288,7 @@ def _replay(
     from planner.api import check
     from sim.inputs import load_robot
     from sim.io.files import write_csv
-    from sim.model.plan_file import read_plan_file
-    from sim.model.schedule import load_schedule
+    from sim.model.schedule import load_schedule, read_plan_file
     from sim.motion.replay import replay, replay_error
     from sim.motion.shape_files import check_name, equal_times, write_shapes
     from sim.motion.shapes import scheduled_shapes

@@ -128,8 +128,7 @@ def _film(plan: str, *, out: str, speed: float | None = None, width: int = 640) 
     """
     from tqdm import tqdm
 
-    from sim.model.plan_file import read_plan_file
-    from sim.model.schedule import load_schedule
+    from sim.model.schedule import load_schedule, read_plan_file
     from sim.motion.film import Film, fitting_speed, write_film
 
     if not 100 <= width <= 2000:

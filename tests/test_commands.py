@@ -22,8 +22,8 @@ from planner.files.saved_plan import load_plan
 from sim.inputs import load_robot
 from sim.io.errors import InputError, run_command
 from sim.io.units import format_time
-from sim.model.plan_file import plan_id
 from sim.model.presets import PRESETS
+from sim.model.schedule import plan_id
 from softflagella.__main__ import PACKAGES, main
 from surrogate.table_file import SHIPPED, load
 from tests.calibration.toy_tables import (

@@ -22,10 +22,9 @@ from sim.effects import catalogue
 from sim.inputs import load_robot
 from sim.io.errors import InputError, run_command
 from sim.model.groups import DWELL, GROUP_COLUMNS
-from sim.model.plan_file import FORMAT
 from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
-from sim.model.schedule import load_schedule
+from sim.model.schedule import FORMAT, load_schedule
 from sim.motion.batches import steady_columns
 from sim.motion.replay import replay
 from softflagella.__main__ import main

@@ -37,8 +37,8 @@ from planner.vehicle.zigzag import Objective, Zigzag
 from sim.io.errors import InputError, naming
 from sim.io.keywords import checks_keywords
 from sim.io.reading import ContentError, read_json
-from sim.model.plan_file import check_format, read_plan_file
 from sim.model.robot import Robot
+from sim.model.schedule import check_format, read_plan_file
 from surrogate.interface import LookupTable
 from surrogate.table_file import load_table
 

@@ -28,9 +28,8 @@ from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.notebook import Shown, given_axes
 from sim.io.units import column_units, format_time
-from sim.model.plan_file import FORMAT, plan_id
 from sim.model.robot import Robot
-from sim.model.schedule import Schedule
+from sim.model.schedule import FORMAT, Schedule, plan_id
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -5,12 +5,12 @@ from __future__ import annotations
 import difflib
 import importlib
 import pkgutil
-import sys
 from collections.abc import Mapping
 from functools import cache
 
 from sim.io.errors import InputError
 from sim.model.effect import Effect
+from sim.model.groups import check_finite
 from sim.model.laws import Law, read_law
 
 __all__ = ["Effect", "catalogue", "check_effects", "check_size", "effect_named", "is_effect"]
@@ -71,7 +71,6 @@ def check_effects(effects: Mapping[str, float]) -> None:
 def check_size(name: str, size: float) -> None:
     """Reject an unknown effect, or a size that is not a number or outside its bounds."""
     low, high = effect_named(name).bounds
-    if not isinstance(size, int | float) or not abs(size) < sys.float_info.max:  # there are larger integers
-        raise InputError(f"{name} = {size}; it must be a finite number")
+    check_finite(name, size)
     if not low <= size <= high:
         raise InputError(f"{name} = {size:g}; its size must lie from {low:g} to {high:g}")

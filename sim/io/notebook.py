@@ -28,6 +28,11 @@ class Shown:
         return as_html(repr(self), getattr(self, "plot", None))
 
 
+def picture(png: bytes, description: str) -> str:
+    """Write a picture into HTML, with a description for people who cannot see it."""
+    return f'<img alt="{html.escape(description)}" src="data:image/png;base64,{base64.b64encode(png).decode()}">'
+
+
 def as_html(text: str, draw: Callable[[Axes], Any] | None = None) -> str:
     """Write lines of text as HTML that keeps their layout, with a picture below them that `draw` draws on axes."""
     words = f'<pre style="white-space: pre-wrap">{html.escape(text)}</pre>'
@@ -38,5 +43,4 @@ def as_html(text: str, draw: Callable[[Axes], Any] | None = None) -> str:
     figure, store = Figure(figsize=(4.5, 4.5)), io.BytesIO()
     draw(figure.add_subplot())
     figure.savefig(store, format="png", dpi=90, bbox_inches="tight")
-    data = base64.b64encode(store.getvalue()).decode()
-    return f'{words}<img alt="{html.escape(text.partition(chr(10))[0])}" src="data:image/png;base64,{data}">'
+    return words + picture(store.getvalue(), text.partition("\n")[0])

@@ -8,7 +8,6 @@ they are readable on a telephone.
 
 from __future__ import annotations
 
-import base64
 import html
 import io
 import re
@@ -16,6 +15,8 @@ from typing import Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+
+from sim.io.notebook import picture
 
 INK, SOFT, PALE, GRID = "#1c2733", "#5b6a78", "#b8c2cc", "#dde3e9"
 BLUE, ORANGE, GREEN, VIOLET, RED = "#2a7fba", "#e08a1e", "#3d9a5f", "#8a4fa3", "#c8452f"
@@ -51,16 +52,15 @@ def figure_markup(figure: Figure, description: str, *, number: int) -> str:
         description: for people who cannot see it.
         number: of the figure on its page.
     """
-    words = html.escape(description)
     with mpl.rc_context(_SETTINGS):
         store = io.StringIO()
         figure.savefig(store, format="svg", bbox_inches="tight", transparent=True, metadata={"Date": None})
         svg = store.getvalue()
     if len(svg) <= _LARGEST:
-        return _themed(svg, words, number)
+        return _themed(svg, html.escape(description), number)
     png = io.BytesIO()
     figure.savefig(png, format="png", dpi=110, bbox_inches="tight")
-    return f'<img alt="{words}" src="data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}">'
+    return picture(png.getvalue(), description)
 
 
 def _themed(svg: str, words: str, number: int) -> str:

@@ -7,7 +7,6 @@ backticks are set as code. The template is page.html.
 
 from __future__ import annotations
 
-import base64
 import html
 import re
 from collections.abc import Iterable, Sequence
@@ -19,6 +18,7 @@ from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
 from sim.io.files import write_text
+from sim.io.notebook import picture
 from sim.io.page_figures import figure_markup, variables
 
 _TEMPLATE = Path(__file__).with_name("page.html")
@@ -92,8 +92,7 @@ class Page:
 
     def picture(self, png: bytes, description: str) -> None:
         """Add a picture, with a description for people who cannot see it."""
-        data = base64.b64encode(png).decode()
-        self._add('<img src="data:image/png;base64,{}" alt="{}">', data, description)
+        self._add("{}", Markup(picture(png, description)))
 
     def write(self, path: str | Path, footer: str) -> None:
         """Write the page completely or not at all."""

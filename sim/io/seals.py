@@ -1,6 +1,6 @@
 """Digests that files carry of their own content, so that a reader notices damage and edits.
 
-plan.json has one as its `id` (`sim.model.plan_file`). A text that is made to be edited, such as corrected.toml,
+plan.json has one as its `id` (`sim.model.schedule`). A text that is made to be edited, such as corrected.toml,
 has it as its last line, and a first line that says so: a text without its last line was cut short and is refused.
 A text that fits another digest was edited or damaged, and is read with a warning. One without either is read.
 """

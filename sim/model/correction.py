@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -160,13 +160,8 @@ def monomials(x: Floats, powers: tuple[tuple[int, ...], ...]) -> Floats:
 
 def correction_tables(correction: Correction) -> dict[str, Any]:
     """Write the table [correction] of a robot.toml, as plain content."""
-    names = [f.name for f in fields(Correction) if f.name not in ("weights", "powers")]
-    found: dict[str, Any] = {}
-    for name in names:
-        value = getattr(correction, name)
-        found[name] = list(value) if isinstance(value, tuple) else value
-    found["powers"] = [list(term) for term in correction.powers]
-    return found | {name: list(row) for name, row in correction.weights.items()}
+    content = asdict(correction)
+    return content | content.pop("weights")
 
 
 def read_correction(table: Any, place: str) -> Correction:

@@ -1,23 +1,35 @@
-"""A schedule: when the motor flips, for which robot, from which pose. Plans contain one; replays need one."""
+"""A schedule: when the motor flips, for which robot, from which pose. Plans contain one; replays need one.
+
+The planner writes a schedule into plan.json and reads it again, and the simulator replays it. Both check the file
+here: its format, finite numbers, the speed of its motor, and its id, a digest of the content.
+"""
 
 from __future__ import annotations
 
+import json
+import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
-from sim.model.plan_file import read_plan_file
+from sim.io.reading import ContentError, read_json
+from sim.io.seals import digest_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from sim.model.robot import Robot
+
+FORMAT = 2
+_ID = re.compile("p[0-9a-f]{11}")  # ids of older versions have another form
+FASTEST = 1e4  # ω̄ above which the file is taken for edited
 
 
 @dataclass(frozen=True)
@@ -128,3 +140,60 @@ def load_schedule(path: str | Path) -> Schedule:
         raise InputError(f"{path} has no entry {missing}; give a plan.json of the planner") from None
     except (TypeError, ValueError, AttributeError, OverflowError) as wrong:
         raise InputError(f"{path}: {wrong}; give a plan.json of the planner") from None
+
+
+def read_plan_file(path: str | Path) -> dict[str, Any]:
+    """Read the content of a plan.json.
+
+    Raises:
+        InputError: the file cannot be read, is no plan.json of this format, has a number that is not finite, a
+            motor speed that cannot be, or an id that is not that of its content.
+    """
+    if Path(path, "plan.json").is_file():
+        raise InputError(f"{path} is the folder of a plan; give {Path(path, 'plan.json')}")
+    try:
+        content = read_json(path, parse_constant=_finite, parse_float=_finite)
+    except ContentError as unreadable:
+        reason = str(unreadable).removeprefix(f"{path} ")
+        raise InputError(f"{path} is not a plan.json of the planner ({reason}); plan again") from None
+    check_format(content, path)
+    found = plan_id(content)
+    if content.setdefault("id", found) != found and _ID.fullmatch(str(content["id"])):
+        raise InputError(
+            f"{path} was edited or damaged after it was written: the id of its content is {found}, not "
+            f"{content['id']}; plan again, or delete the id to read the file as it is"
+        )
+    return dict(content)
+
+
+def plan_id(content: Mapping[str, Any]) -> str:
+    """Return the `id` of the content of a plan.json: a digest of all the rest but the version of the code."""
+    rest = {name: value for name, value in content.items() if name not in ("id", "code_version")}
+    return f"p{digest_of(json.dumps(rest))}"  # a letter first: no reader of plan.csv takes it for a number
+
+
+def check_format(content: Any, name: str | Path) -> None:
+    """Check the format of a plan.json, and the speed of its motor; `name` is that of the file in messages.
+
+    Raises:
+        InputError: it is no plan.json of this format, or has a motor speed that cannot be.
+    """
+    if not isinstance(content, dict) or "format" not in content:
+        raise InputError(f"{name} is not a plan.json of the planner (it has no format); plan again")
+    if content["format"] != FORMAT:
+        raise InputError(f"{name} has format {content['format']}, this version reads {FORMAT}: plan again")
+    if isinstance(content.get("robot"), dict) and "vehicle" in content["robot"]:  # that was measured
+        return
+    try:
+        speed = float(content["robot"]["groups"]["omega_bar"])
+    except (KeyError, TypeError, ValueError, OverflowError) as broken:
+        raise InputError(f"{name} is not a plan.json of the planner ({broken}); plan again") from None
+    if not 0 < abs(speed) <= FASTEST:
+        raise InputError(f"{name}: omega_bar is not between 0 and {FASTEST:g}; plan again")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is no finite number")
+    return value

@@ -18,9 +18,8 @@ from planner.files.plan_files import write_plan
 from planner.files.saved_plan import load_goal, load_plan
 from planner.goal.trip import FORMAT as GOAL_FORMAT
 from sim.io.errors import InputError, run_command
-from sim.model.plan_file import FORMAT, plan_id
 from sim.model.presets import PRESETS
-from sim.model.schedule import load_schedule
+from sim.model.schedule import FORMAT, load_schedule, plan_id
 from tests.planner.plans import WALLS, hindered_trip, planned
 from tests.shared import shared
 

@@ -24,8 +24,8 @@ from planner.tracking.tracker import Tracker
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.inputs import save_robot
 from sim.io.errors import InputError, run_command
-from sim.model.plan_file import plan_id
 from sim.model.robot import Robot
+from sim.model.schedule import plan_id
 from surrogate.table_file import load
 from tests.planner.compiled import CompiledTracker
 from tests.planner.plans import BIASED, CONTROL, CORNER, around, hindered_trip, own_table, planned, trip

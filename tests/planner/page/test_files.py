@@ -25,10 +25,10 @@ from sim.inputs import load_robot
 from sim.io.errors import InputError
 from sim.io.provenance import code_version
 from sim.io.seals import sealed
-from sim.model.plan_file import plan_id
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml
+from sim.model.schedule import plan_id
 from sim.model.uncertainty import Sigma
 from tests.planner.page.cases import CONTROL, PATHS, followed, planned, shipped
 from tests.planner.page.page_core import (
