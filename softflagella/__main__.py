@@ -27,6 +27,7 @@ WORDS = {  # the most important commands -> package and command
 }
 PACKAGES = {
     "sim": "simulate robots: steady motion, branches, films, presets",
+    "camera": "describe the camera that films a tank",
     "dataset": "simulate sweeps into data sets, report and verify them",
     "surrogate": "train look-up tables and query them",
     "planner": "plan switching schedules for paths, replay them, check tracks",

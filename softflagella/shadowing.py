@@ -10,7 +10,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
-PACKAGES = ("sim", "dataset", "surrogate", "planner", "calibration")
+PACKAGES = ("sim", "camera", "dataset", "surrogate", "planner", "calibration")
 _INSTALLED = {"site-packages", "dist-packages"}
 
 

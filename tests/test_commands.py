@@ -16,6 +16,7 @@ import pytest
 
 from calibration.statistics.statistical_model import start_values
 from calibration.verdict.record import verdict_record
+from camera.view import read_setup
 from dataset.build import build
 from dataset.design import Axis, load_design
 from planner.files.saved_plan import load_plan
@@ -292,6 +293,12 @@ def planner_check(made: Path, out: Path) -> str:
     done("planner", "check", made / "plan" / "plan.json", made / "track.csv", "--out", out / "overlay.png")
     assert (out / "overlay.png").read_bytes().startswith(b"\x89PNG")
     return "within the stated error"
+
+
+def camera_view(made: Path, out: Path) -> str:
+    done("camera", "view", "--out", out / "view.toml")
+    assert read_setup(out / "view.toml").robots[0].colours == {"front": "red", "rear": "green"}
+    return "view.toml"
 
 
 def calibration_calibrate(made: Path, out: Path) -> str:

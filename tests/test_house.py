@@ -15,7 +15,15 @@ import pytest
 from tests.processes import LIMIT
 
 ROOT = Path(__file__).parents[1]
-ORDER = ("sim", "dataset", "surrogate", "planner", "calibration", "softflagella")  # each imports those before it
+ORDER = (
+    "sim",
+    "camera",
+    "dataset",
+    "surrogate",
+    "planner",
+    "calibration",
+    "softflagella",
+)  # each imports those before it
 ROBOTS = {"model", "effects", "inputs", "mechanics", "solve", "motion"}  # rooms of `sim` that know robots
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("softflagella", "sim", "dataset", "surrogate", "planner", "calibration")
+PACKAGES = ("softflagella", "sim", "camera", "dataset", "surrogate", "planner", "calibration")
 CODE = (".py", ".pyc", ".nbi", ".nbc")
 
 

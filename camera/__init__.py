@@ -1,0 +1,1 @@
+"""From a film of a tank to tracks of robots: markers, poses with errors, spins."""

@@ -1,0 +1,379 @@
+"""Poses of robots in single pictures: by two coloured bands around the head, or by an ArUco or AprilTag marker.
+
+The head spins about its axis, so a marker that is seen in every picture goes around the head: two bands of tape of
+different colours, front and rear. A dot, or a tag that is fixed to the head, is seen for a part of each turn.
+
+A colour is a direction in the plane of chroma, linear in the picture's red, green and blue,
+
+    α = R − (G + B)/2,   β = √3/2 (G − B),   p = α cos h + β sin h,   q = β cos h − α sin h,
+
+and a pixel has the weight p of a hue h if |q| < p tan 30° and p is above the noise and `_EDGE` of
+the marker's own p. Blur and mixing with grey shrink p and leave the hue. So the weighted mean of the pixels is
+the band's centre to a fraction of a pixel.
+
+A robot that was seen lately is looked for around its last pose, at full resolution; any other in the whole
+picture, smaller. Of several candidates the pair counts whose distance is that of the bands, which is given or
+learnt from the pictures before.
+
+The standard error of a centre is that of a weighted mean with the picture's own noise, and `_BIAS` and `_SHIFT`
+for what noise does not explain: shading, glare, compression. What the distance of the bands is wrong by is added.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from camera.view import Markers, View, opencv
+from sim.arrays import Floats
+from sim.io.errors import InputError
+
+_CONE = math.tan(math.radians(30))  # of hues that count as one colour
+_FAINT = 14.0  # p of the faintest marker, of 255
+_EDGE = 0.3  # of a marker's p
+_RIVAL = 0.45  # of the strongest p in a picture, of what may be a marker, too
+_WIDTH = 480  # pixels of the picture in which a lost robot is looked for
+_FINE = 40.0  # pixels between the bands; where they are further apart, the picture is made smaller
+_CANDIDATES = 6
+_PIXEL = 0.02  # standard error of a centre besides [pixels]
+_ALIKE = 0.2  # relative difference of the bands' distance from the known one
+_BIAS = 0.0025  # of the bands' distance, standard error of a centre that does not come from noise
+_SHIFT = 0.0065  # of the bands' distance, of what shifts both: light from one side, glare
+_WHOLE = 0.3  # of the bands' distance, half the length of a band that must be in the picture
+_END = 0.18  # of the bands' distance, by which a band's centre moves for a whole band that is hidden from one end
+_HIDDEN = 0.8  # of a band's usual area
+_MEMORY = 20.0  # pictures over which distance and areas are averaged
+_REACH = {"head": (-0.7, 0.7, 0.75), "tail": (-3.0, -0.6, 1.5)}  # where dots are: along the axis, to the side
+
+
+class Pose(NamedTuple):
+    """Where a robot is, in the tank's frame."""
+
+    robot: str
+    x: float  # of the head's centre [m]
+    y: float
+    heading: float  # counter-clockwise from x [rad], -π to π
+    sigma_x: float  # standard error of x, and of y [m]
+    sigma_heading: float  # [rad]
+    dots: Mapping[str, tuple[float, float]] = {}  # "head", "tail": left of the axis [m], seen area [m²]
+    marks: tuple[tuple[float, float], ...] = ()  # places of front and rear, or of the tag's corners [pixels]
+
+
+class Lost(NamedTuple):
+    """A robot that is not seen, and why."""
+
+    robot: str
+    why: str
+
+
+@dataclass
+class _Memory:
+    """What is known of a robot from the pictures before."""
+
+    places: dict[str, Floats] = field(default_factory=dict)  # of front and rear [pixels]; none: to be looked for
+    apart: float = math.nan  # distance of front and rear, or side of the tag [m]
+    areas: dict[str, float] = field(default_factory=dict)  # of the bands [m²]
+    seen: int = 0  # pictures
+    missed: int = 0  # pictures in a row
+
+
+class _Blob(NamedTuple):
+    centre: Floats  # (2,) pixels
+    area: float  # pixels
+    error: float  # of the centre [pixels]
+
+
+class Detector:
+    """Find the marked robots in one picture after another."""
+
+    def __init__(
+        self, robots: Sequence[Markers], view: View, *, head_length: float = math.nan, ground: Any = None
+    ) -> None:
+        """Prepare for pictures of one camera.
+
+        Args:
+            robots: their markers.
+            view: of the camera; where a tag gives its scale, `view` is complete once the tag was seen.
+            head_length: of the robots, which the bands cannot be further apart than [m].
+            ground: the picture without robots (`camera.film.ground`); what has a marker's colour there does not
+                count.
+
+        Raises:
+            InputError: OpenCV is not installed.
+        """
+        self.view, self._robots, self._head_length = view, tuple(robots), head_length
+        self._cv, self._ground = opencv(), ground
+        self._mask: Any = None
+        self._memory = [_Memory() for _ in self._robots]
+        self._readers = {each.dictionary: self._reader(each.dictionary) for each in robots if each.tag is not None}
+        if view.tag is not None:
+            self._readers.setdefault("4x4_50", self._reader("4x4_50"))
+
+    def poses(self, frame: Any, time: float) -> list[Pose | Lost]:
+        """Return the pose of each robot, or why it is not seen, in the order of the robots.
+
+        Args:
+            frame: picture (H, W, 3), blue, green and red, uint8.
+            time: of the picture [s]; pictures come in order.
+
+        Raises:
+            InputError: the picture has another shape, or the tag of the scale is seen too slantwise.
+        """
+        if frame.ndim != 3 or frame.shape[2] != 3:
+            raise InputError("a picture without colours; film in colour")
+        if self.view.region is not None and self._mask is None:
+            self._mask = np.zeros(frame.shape[:2], np.uint8)
+            self._cv.fillPoly(self._mask, [np.round(self.view.region).astype(np.int32)], 255)
+        tags = self._all_tags(frame)
+        if self.view.homography is None:
+            assert self.view.tag is not None
+            corners = tags["4x4_50"].get(self.view.tag[0])
+            if corners is None:
+                return [
+                    Lost(each.name, f"no tag {self.view.tag[0]} that gives the scale") for each in self._robots
+                ]
+            self.view = self.view.with_tag(corners)
+        found = []
+        for markers, memory in zip(self._robots, self._memory, strict=True):
+            look = self._by_bands if markers.tag is None else self._by_tag
+            known = bool(memory.places)
+            pose = look(markers, memory, frame, tags)
+            if known and isinstance(pose, Lost):  # where it was expected
+                memory.places.clear()
+                pose = look(markers, memory, frame, tags)
+            if isinstance(pose, Lost):
+                memory.places.clear()
+                memory.missed += 1
+                if memory.missed > memory.seen:  # what was seen may have been something else
+                    memory.seen = 0
+                    memory.areas.clear()
+            else:
+                memory.seen, memory.missed = memory.seen + 1, 0
+            found.append(pose)
+        return found
+
+    # Tags
+
+    def _reader(self, dictionary: str) -> Any:
+        aruco = self._cv.aruco
+        options = aruco.DetectorParameters()
+        options.cornerRefinementMethod = aruco.CORNER_REFINE_SUBPIX
+        known = aruco.getPredefinedDictionary(getattr(aruco, f"DICT_{dictionary.upper()}"))
+        return aruco.ArucoDetector(known, options)
+
+    def _all_tags(self, frame: Any) -> dict[str, dict[int, Floats]]:
+        if not self._readers:
+            return {}
+        grey, tags = self._cv.cvtColor(frame, self._cv.COLOR_BGR2GRAY), {}
+        for name, reader in self._readers.items():
+            corners, numbers, _ = reader.detectMarkers(grey)
+            known = [] if numbers is None else np.asarray(numbers).reshape(-1).tolist()
+            tags[name] = {n: np.asarray(c, dtype=float)[0] for n, c in zip(known, corners, strict=False)}
+        return tags
+
+    def _by_tag(
+        self, markers: Markers, memory: _Memory, frame: Any, tags: Mapping[str, Mapping[int, Floats]]
+    ) -> Pose | Lost:
+        """Fit a square to the corners: first the front left one, then clockwise, as seen from above."""
+        corners = tags[markers.dictionary].get(int(markers.tag or 0))
+        if corners is None or not self._inside(corners.mean(axis=0)):
+            return Lost(markers.name, f"no tag {markers.tag}")
+        places = self.view.to_tank(corners)
+        centre = places.mean(axis=0)
+        square = np.array([1 + 1j, 1 - 1j, -1 - 1j, -1 + 1j])  # forward + i left
+        arms = (places - centre) @ [1, 1j]
+        turn = (square.conj() @ arms) / 8
+        misfit = float(np.abs(arms - turn * square).std())
+        heading, half = float(np.angle(turn)), abs(turn)
+        sigma = max(misfit / 2, 0.1 * self.view.metres(corners.mean(axis=0)))
+        memory.apart = 2 * half
+        marks = tuple((float(u), float(v)) for u, v in corners)
+        return self._pose(markers, centre, heading, sigma, sigma / half, memory, frame, marks)
+
+    # Bands
+
+    def _by_bands(self, markers: Markers, memory: _Memory, frame: Any, tags: object) -> Pose | Lost:
+        hues = {"front": markers.front, "rear": markers.rear}
+        searched = not memory.places
+        places = self._search(markers, memory, frame, hues) if searched else memory.places
+        if isinstance(places, str):
+            return Lost(markers.name, places)
+        distance = float(np.linalg.norm(places["front"] - places["rear"]))
+        first = distance * (0.4 if searched else 0.5)
+        blobs = {}
+        for name, hue in hues.items():
+            centre = places[name]
+            for reach in (first, 0.45 * distance, 0.45 * distance):
+                blob = self._blob(frame, hue, centre, reach, distance)
+                if blob is None:
+                    return Lost(markers.name, f"no {markers.colours[name]}")
+                blobs[name], centre = blob, blob.centre
+        return self._pair(markers, memory, frame, blobs)
+
+    def _pair(self, markers: Markers, memory: _Memory, frame: Any, blobs: Mapping[str, _Blob]) -> Pose | Lost:
+        """Check a pair of bands against what is known of them, and return its pose."""
+        marks = np.stack([blob.centre for blob in blobs.values()])
+        places = self.view.to_tank(marks)
+        arm, distance = places[0] - places[1], float(np.linalg.norm(marks[0] - marks[1]))
+        apart = float(np.hypot(*arm))
+        known = memory.apart if memory.seen else markers.apart
+        if not distance > 0 or abs(apart / known - 1) > _ALIKE:
+            return Lost(markers.name, _wrong(markers))
+        side = _WHOLE * (marks[0] - marks[1])[::-1] * [1, -1]  # from a band's centre to its end
+        ends = np.concatenate([marks + side, marks - side])
+        if (ends < 0).any() or (ends > np.array(frame.shape[1::-1]) - 1).any():
+            return Lost(markers.name, "at the edge of the picture")
+        if not all(self._inside(mark) for mark in marks):
+            return Lost(markers.name, "outside the region of the tank")
+        metres, forget = apart / distance, min(memory.seen + 1, _MEMORY)
+        bias = math.hypot(_BIAS * distance, _PIXEL)
+        variance = 0.0  # of the difference of the centres, in squares of pixels
+        for name, blob in blobs.items():
+            area = blob.area * self.view.metres(blob.centre) ** 2
+            usual = memory.areas.get(name, area)
+            if area < _HIDDEN * usual:
+                return Lost(markers.name, f"{markers.colours[name]} partly hidden")
+            memory.areas[name] = usual + (area - usual) / forget
+            hidden = _END * distance * max(1 - area / usual, 0.0)
+            variance += blob.error**2 + bias**2 + hidden**2
+        memory.apart = known + (apart - known) / forget if memory.seen else apart
+        memory.places = {name: blob.centre for name, blob in blobs.items()}
+        error = metres * math.sqrt(variance)
+        sigma = math.hypot(error / 2, (apart - memory.apart) / 2, _SHIFT * apart)
+        shown = tuple((float(u), float(v)) for u, v in marks)
+        heading = math.atan2(arm[1], arm[0])
+        return self._pose(markers, places.mean(axis=0), heading, sigma, error / apart, memory, frame, shown)
+
+    def _pose(
+        self, markers: Markers, centre: Floats, heading: float, sigma: float, sigma_heading: float,
+        memory: _Memory, frame: Any, marks: tuple[tuple[float, float], ...],
+    ) -> Pose:  # fmt: skip
+        """Move the pose to the head's centre, and look for the dots."""
+        axis = np.array([math.cos(heading), math.sin(heading)])
+        x, y = (centre - markers.ahead * axis).tolist()
+        sigma = math.hypot(sigma, markers.ahead * sigma_heading)
+        dots = {name: self._dot(frame, hue, centre, axis, name, memory) for name, hue in markers.dots.items()}
+        return Pose(markers.name, x, y, heading, sigma, sigma_heading, dots, marks)
+
+    def _dot(
+        self, frame: Any, hue: float, centre: Floats, axis: Floats, name: str, memory: _Memory
+    ) -> tuple[float, float]:
+        """Return how far a dot is left of the axis [m] and its seen area [m²]; (nan, 0) where it is not seen."""
+        back, ahead, side = (memory.apart * reach for reach in _REACH[name])
+        left = np.array([-axis[1], axis[0]])
+        corners = np.array([centre + a * axis + b * left for a in (back, ahead) for b in (-side, side)])
+        outline = self.view.to_picture(corners)
+        middle, reach = outline.mean(axis=0), float(np.ptp(outline, axis=0).max()) / 2
+        metres = self.view.metres(middle)
+        blob = self._blob(frame, hue, middle, reach, memory.apart / metres)
+        if blob is None:
+            return math.nan, 0.0
+        offset = self.view.to_tank(blob.centre)[0] - centre
+        along, across = float(offset @ axis), float(offset @ left)
+        if not (back <= along <= ahead and abs(across) <= side):
+            return math.nan, 0.0
+        return across, blob.area * metres**2
+
+    # Colours
+
+    def _inside(self, pixel: Floats) -> bool:
+        if self.view.region is None:
+            return True
+        return bool(self._cv.pointPolygonTest(self.view.region.astype(np.float32), pixel.tolist(), False) >= 0)
+
+    def _weights(self, picture: Any, hue: float) -> Any:
+        """Return p of a hue where it counts as that hue, 0 elsewhere."""
+        c, s, root = math.cos(math.radians(hue)), math.sin(math.radians(hue)), math.sqrt(3) / 2
+        alpha, beta = np.array([-0.5, -0.5, 1.0]), np.array([-root, root, 0.0])  # of blue, green, red
+        mixed = self._cv.transform(
+            picture.astype(np.float32), np.array([c * alpha + s * beta, c * beta - s * alpha], np.float32)
+        )
+        p, q = mixed[..., 0], mixed[..., 1]
+        return np.where(np.abs(q) < _CONE * p, p, np.float32(0))
+
+    def _weights_in(self, picture: Any, hue: float, box: tuple[slice, slice], size: tuple[int, int]) -> Any:
+        """Return the weights of a part of the picture, made smaller, without what is no robot's."""
+
+        def part(whole: Any) -> Any:
+            return self._cv.resize(whole[box], size, interpolation=self._cv.INTER_AREA)
+
+        weights = self._weights(part(picture), hue)
+        if self._mask is not None:
+            weights[part(self._mask) < 128] = 0
+        if self._ground is not None:
+            weights[self._weights(part(self._ground), hue) > 0.5 * np.maximum(weights, _FAINT)] = 0
+        return weights
+
+    def _blob(self, frame: Any, hue: float, centre: Floats, reach: float, distance: float) -> _Blob | None:
+        """Return the weighted mean of the pixels of a hue around a place; None if there are none to speak of."""
+        height, width = frame.shape[:2]
+        fold = max(int(distance / _FINE), 1)  # pixels that become one, each way
+        left, top = (max(int(value - reach), 0) for value in centre)
+        across, down = ((min(int(c + reach) + 2, n) - low) // fold for c, n, low in
+                        ((centre[0], width, left), (centre[1], height, top)))  # fmt: skip
+        if across < 3 or down < 3:
+            return None
+        box = (slice(top, top + down * fold), slice(left, left + across * fold))
+        weights = self._weights_in(frame, hue, box, (across, down))
+        steps = np.diff(frame[box][:: 2 * fold, ::fold, 1].astype(np.float32), axis=1)
+        noise = max(1.05 * float(np.median(np.abs(steps))), 0.5)
+        peak = float(np.partition(weights.ravel(), -6)[-6])
+        if peak < max(_FAINT, 5 * noise / fold):
+            return None
+        weights = np.maximum(weights - _EDGE * peak, 0)
+        counted, total = weights > 0, float(weights.sum())
+        place, spread = [], 0.0
+        for axis, count in enumerate((across, down)):
+            at = np.arange(count)
+            place.append(float(weights.sum(axis=axis) @ at) / total)
+            spread += float(counted.sum(axis=axis) @ (at - place[-1]) ** 2) / 2
+        error = 1.2 * noise * math.sqrt(spread) / total  # p has √(3/2) times the noise of a colour; × fold / fold
+        low = np.array([left, top])
+        area = float(np.count_nonzero(counted)) * fold**2
+        return _Blob(low + (np.array(place) + 0.5) * fold - 0.5, area, error)
+
+    def _search(
+        self, markers: Markers, memory: _Memory, frame: Any, hues: Mapping[str, float]
+    ) -> dict[str, Floats] | str:
+        """Look for the pair in the whole picture, made smaller; return its places, or why it is not there."""
+        height, width = frame.shape[:2]
+        factor = max(width / _WIDTH, 1.0)
+        size = (round(width / factor), round(height / factor))
+        found: dict[str, list[tuple[float, Floats]]] = {}
+        for name, hue in hues.items():
+            weights = self._cv.blur(self._weights_in(frame, hue, (slice(None), slice(None)), size), (3, 3))
+            weights[weights < max(_FAINT / 2, _RIVAL * float(weights.max()))] = 0
+            found[name] = [(p, (place + 0.5) * factor - 0.5) for p, place in self._patches(weights)]
+            if not found[name]:
+                return f"no {markers.colours[name]}"
+        known = memory.apart if memory.seen else markers.apart
+        best, chosen = 0.0, None
+        for strength, front in found["front"]:
+            for other, rear in found["rear"]:
+                apart = float(np.hypot(*np.diff(self.view.to_tank(np.stack([front, rear])), axis=0)[0]))
+                if known > 0:
+                    fit = math.exp(-(((apart / known - 1) / _ALIKE) ** 2))
+                else:
+                    fit = 1 / apart if apart < 1.1 * self._head_length or math.isnan(self._head_length) else 0.0
+                if np.linalg.norm(front - rear) > 3 and fit * min(strength, other) > best:
+                    best, chosen = fit * min(strength, other), {"front": front, "rear": rear}
+        return chosen or _wrong(markers)
+
+    def _patches(self, weights: Any) -> list[tuple[float, Floats]]:
+        """Return the strongest connected patches: their largest weights, and their centres (2,)."""
+        count, labels, _, centres = self._cv.connectedComponentsWithStats(
+            self._cv.dilate((weights > 0).astype(np.uint8), np.ones((3, 3), np.uint8))
+        )
+        strengths = np.zeros(count)
+        np.maximum.at(strengths, labels.ravel(), weights.ravel())
+        strengths[0] = 0
+        order = np.argsort(-strengths)[:_CANDIDATES]
+        return [(float(strengths[label]), centres[label]) for label in order if strengths[label] > 0]
+
+
+def _wrong(markers: Markers) -> str:
+    return f"{markers.colours['front']} and {markers.colours['rear']} at a wrong distance"

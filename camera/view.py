@@ -1,0 +1,372 @@
+"""A camera's view of a tank, and the file view.toml that describes it with the robots' markers.
+
+A picture's coordinates are pixels (u, v) from its upper left corner, u to the right and v down; those of the tank
+are metres (x, y), seen from above, y counter-clockwise from x. Between them stand the lens, with the radial and
+tangential distortion of OpenCV, and a homography H of the plane in which the robot swims:
+
+    (x, y, 1) ~ H (u', v', 1),     (u', v') the pixel without distortion.
+
+H comes from two points of a ruler and their distance (a camera that looks straight down; the origin is the
+first point, x points to the right in the picture), from four or more points and their places in the tank (any
+camera), or from an ArUco tag of known size that lies in the picture. Ruler, points or tag lie at the height of the
+robot: one that lies lower by the share s of the camera's height makes lengths too large by s.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.io.errors import InputError, naming
+from sim.io.reading import read_toml
+from sim.io.units import split, to_si
+
+HUES = {"red": 0, "orange": 30, "yellow": 60, "green": 120, "cyan": 180, "blue": 240, "magenta": 300}  # degrees
+DOTS = ("head", "tail")  # markers that come and go as the robot spins
+_CLICK = 1.0  # pixels, standard deviation of a point that a person reads off a picture
+_CORNER = 0.3  # pixels, of the corner of a tag
+_STRETCH = 1.15  # greatest ratio of the sides of a tag from which the scale alone is taken
+_DICTIONARIES = ("4x4_50", "5x5_100", "6x6_250", "7x7_1000", "apriltag_36h11")
+_KEYS = {
+    "": ("looks", "scale", "lens", "tank", "robots"),
+    "scale": ("points_px", "points", "length", "tag", "tag_id"),
+    "lens": ("focal_px", "centre_px", "distortion"),
+    "tank": ("region_px",),
+    "robots": ("name", "front", "rear", "head", "tail", "tag", "dictionary", "ahead", "apart"),
+}
+EXAMPLE = """\
+# Pixels count from the picture's upper left corner, x to the right and y down.
+looks = "down"                       # the camera; "up" through the bottom of the tank
+
+[scale]                              # two points of a ruler at the robot's height, and their distance
+points_px = [[100, 650], [900, 650]]
+length_cm = 30
+# points_cm = [[0, 0], [30, 0], [30, 20], [0, 20]]  # instead of the length: places of four points or more
+# tag_cm = 4                         # instead of points: the side of an ArUco tag, number tag_id, in the picture
+
+# [lens]                             # from pictures of a chessboard: softflagella camera lens
+# [tank]
+# region_px = [[50, 50], [1230, 50], [1230, 670], [50, 670]]  # a polygon; nothing outside is a marker
+
+[[robots]]                           # once for each robot
+front = "red"                        # bands of tape around the head; red, orange, yellow, green, cyan, blue,
+rear = "green"                       # magenta, or a colour of the picture, "#c03020"
+# head = "blue"                      # a dot on the head's side, which comes and goes as the head spins
+# tail = "yellow"                    # a dot on one tail
+# ahead_mm = 0                       # how far the middle of front and rear is ahead of the head's centre
+"""
+
+
+def opencv() -> Any:
+    """Return the module cv2.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    try:
+        import cv2
+    except ImportError:
+        raise InputError("films need OpenCV: pip install 'softflagella[camera]'") from None
+    return cv2
+
+
+class Markers(NamedTuple):
+    """How a robot is marked: by two colours, front and rear, or by a tag; and the dots on head and tail."""
+
+    name: str
+    front: float = math.nan  # hue [deg]
+    rear: float = math.nan
+    dots: Mapping[str, float] = {}  # "head" or "tail" -> hue [deg]
+    colours: Mapping[str, str] = {}  # marker -> the colour as it was given
+    tag: int | None = None
+    dictionary: str = _DICTIONARIES[0]
+    ahead: float = 0.0  # of the markers' middle from the head's centre [m]
+    apart: float = math.nan  # distance of front and rear [m]; NaN: learnt from the film
+
+
+class Lens(NamedTuple):
+    """A pinhole camera with the distortion (k1, k2, p1, p2, k3) of OpenCV."""
+
+    focal: Floats  # (2,) pixels
+    centre: Floats  # (2,) pixels
+    distortion: Floats  # (5,)
+
+    @property
+    def matrix(self) -> Floats:
+        """The matrix (3, 3) of the pinhole camera."""
+        return np.array([[self.focal[0], 0, self.centre[0]], [0, self.focal[1], self.centre[1]], [0, 0, 1.0]])
+
+
+@dataclass(frozen=True)
+class View:
+    """The lens, the plane of the tank, the region in which robots are."""
+
+    homography: Floats | None = None  # (3, 3) from pixels without distortion to metres; None: see `tag`
+    scale_error: float = 0.0  # standard deviation of its scale, relative
+    lens: Lens | None = None
+    region: Floats | None = None  # (n, 2) pixels, a polygon
+    tag: tuple[int, float] | None = None  # number and side [m] of the tag that gives the scale
+    up: bool = False  # the camera looks up
+
+    def to_tank(self, pixels: Floats) -> Floats:
+        """Map pixels (n, 2) to places in the tank (n, 2) [m]."""
+        assert self.homography is not None
+        plane: Any = np.asarray(pixels, dtype=float).reshape(-1, 2)
+        if self.lens is not None:
+            matrix = self.lens.matrix
+            plane = np.asarray(
+                opencv().undistortPoints(plane[:, None], matrix, self.lens.distortion, P=matrix)[:, 0],
+                dtype=np.float64,
+            )
+        return _projected(self.homography, plane)
+
+    def to_picture(self, places: Floats) -> Floats:
+        """Map places (n, 2) in the tank [m] to pixels (n, 2)."""
+        assert self.homography is not None
+        inverse: Any = np.linalg.inv(self.homography)
+        pixels = _projected(inverse, np.asarray(places, dtype=float))
+        if self.lens is None:
+            return pixels
+        rays = np.column_stack([(pixels - self.lens.centre) / self.lens.focal, np.ones(len(pixels))])
+        zero = np.zeros(3)
+        seen = opencv().projectPoints(rays, zero, zero, self.lens.matrix, self.lens.distortion)[0]
+        return np.asarray(seen[:, 0], dtype=float)
+
+    def metres(self, pixel: Floats) -> float:
+        """Return the length that one pixel has at a place in the picture [m]."""
+        corners = self.to_tank(pixel + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+        across, down = corners[1:] - corners[0]
+        return math.sqrt(abs(float(across[0] * down[1] - across[1] * down[0])))
+
+    def with_tag(self, corners: Floats) -> View:
+        """Return the view with the scale of its tag, whose corners (4, 2) are seen in a picture.
+
+        Raises:
+            InputError: the tag is seen too slantwise for a scale.
+        """
+        assert self.tag is not None
+        unscaled = replace(self, homography=np.eye(3))
+        plane = unscaled.to_tank(corners)
+        sides = np.linalg.norm(plane - np.roll(plane, 1, axis=0), axis=1)
+        if sides.max() > _STRETCH * sides.min():
+            raise InputError(
+                f"tag {self.tag[0]} is seen slantwise, {sides.min():.0f} to {sides.max():.0f} pixels a side; "
+                "let the camera look straight down, or give four points, points_px and points_cm"
+            )
+        size = float(sides.mean())
+        error = _CORNER * math.sqrt(2) / size
+        return replace(
+            self, homography=_scaled(plane.mean(axis=0), self.tag[1] / size, self.up), scale_error=error
+        )
+
+
+class Setup(NamedTuple):
+    """What a view.toml holds."""
+
+    view: View
+    robots: tuple[Markers, ...]
+
+
+def read_setup(path: str | Path) -> Setup:
+    """Read a view.toml (`EXAMPLE`).
+
+    Raises:
+        InputError: an entry is unknown, missing or impossible; the message names it.
+    """
+    with naming(path):
+        return _setup(read_toml(path))
+
+
+def _projected(homography: Any, points: Any) -> Floats:
+    mapped = np.column_stack([points, np.ones(len(points))]) @ homography.T
+    return mapped[:, :2] / mapped[:, 2:]
+
+
+def _scaled(origin: Floats, scale: float, up: bool) -> Floats:
+    """Return the homography of a camera that looks straight down, or straight up: one scale, y upwards or down."""
+    side = scale if up else -scale
+    return np.array([[scale, 0, -scale * origin[0]], [0, side, -side * origin[1]], [0, 0, 1.0]])
+
+
+def _setup(content: dict[str, Any]) -> Setup:
+    given = {"": content, **{name: content.get(name, {}) for name in ("scale", "lens", "tank")}}
+    robots = content.get("robots", [])
+    for table, entries in given.items():
+        if not isinstance(entries, dict):
+            raise InputError(f"{table} is no table; write [{table}] and its entries below")
+        _check_keys(table, entries)
+    if not isinstance(robots, list) or not robots or not all(isinstance(robot, dict) for robot in robots):
+        raise InputError('no robot; write [[robots]] with front = "red" and rear = "green", or tag = 0')
+    looks = content.get("looks", "down")
+    if looks not in ("down", "up"):
+        raise InputError(
+            f'looks = {looks!r}; give "down" (the camera above the tank) or "up" (through its bottom)'
+        )
+    lens = _lens(given["lens"]) if given["lens"] else None
+    region = _points(given["tank"], "region_px", 3) if "region_px" in given["tank"] else None
+    view = _with_scale(View(lens=lens, region=region, up=looks == "up"), given["scale"])
+    marked = tuple(_markers(robot, number + 1) for number, robot in enumerate(robots))
+    if len({each.name for each in marked}) < len(marked):
+        raise InputError("two robots have one name; give each [[robots]] a name of its own")
+    if len({each.tag if each.tag is not None else (each.front, each.rear) for each in marked}) < len(marked):
+        raise InputError("two robots have the same markers; give each its own colours or tag")
+    return Setup(view, marked)
+
+
+def _check_keys(table: str, entries: Mapping[str, Any]) -> None:
+    for key in entries:
+        quantity, unit = split(key)
+        if key not in _KEYS[table] and not (unit and quantity in _KEYS[table]):
+            near = difflib.get_close_matches(quantity, _KEYS[table], n=1)
+            place = f"[{table}] " if table else ""
+            raise InputError(f"unknown entry {place}{key}{f'; is it {near[0]}?' if near else ''}")
+
+
+def _with_scale(view: View, table: Mapping[str, Any]) -> View:
+    tag, length = (_length(table, name, "scale") for name in ("tag", "length"))
+    if not math.isnan(tag):
+        if not tag > 0:
+            raise InputError("[scale] the tag's side is not above 0; give its length, tag_cm = 4")
+        return replace(view, tag=(_whole(table.get("tag_id", 0), "[scale] tag_id"), tag))
+    if "points_px" not in table:
+        raise InputError(
+            "no scale; give [scale] points_px = [[100, 650], [900, 650]] and length_cm = 30, two points of a "
+            "ruler, or tag_cm, the side of an ArUco tag"
+        )
+    pixels = _points(table, "points_px", 2)
+    plane = replace(view, homography=np.eye(3)).to_tank(pixels)
+    places = next((key for key in table if split(key).quantity == "points" and key != "points_px"), None)
+    if places is not None:
+        return _from_places(view, plane, to_si(_points(table, places, 4), str(places).rpartition("_")[2]))
+    if len(pixels) != 2 or math.isnan(length):
+        raise InputError(
+            "[scale] gives no scale; give two points and length_cm, or four points or more and points_cm, a place "
+            "for each"
+        )
+    distance = float(np.linalg.norm(plane[1] - plane[0]))
+    if not (length > 0 and distance > 0):
+        raise InputError("[scale] the two points or their distance are the same; give two ends of a ruler")
+    error = _CLICK * math.sqrt(2) / distance
+    return replace(view, homography=_scaled(plane[0], length / distance, view.up), scale_error=error)
+
+
+def _from_places(view: View, plane: Floats, places: Floats) -> View:
+    """Fit a homography to points (n, 2) and their places (n, 2) by the direct linear transformation."""
+    if len(places) != len(plane):
+        raise InputError(f"[scale] {len(plane)} points_px and {len(places)} places; give a place for each point")
+    shift, size = plane.mean(axis=0), float(plane.std()) or 1.0
+    unit, far = (plane - shift) / size, float(np.abs(places).max()) or 1.0
+    rows = []
+    for (u, v), (x, y) in zip(unit, places / far, strict=True):
+        rows += [[u, v, 1, 0, 0, 0, -x * u, -x * v, -x], [0, 0, 0, u, v, 1, -y * u, -y * v, -y]]
+    *_, values, solution = np.linalg.svd(np.array(rows))
+    homography = np.diag([far, far, 1.0]) @ solution[-1].reshape(3, 3)
+    homography = homography @ np.array([[1, 0, -shift[0]], [0, 1, -shift[1]], [0, 0, size]]) / size
+    if values[7] < 1e-6 * values[0] or not abs(homography[2, 2]) > 0:
+        raise InputError("[scale] the points lie on a line; give the corners of a rectangle")
+    homography = homography / (homography[2] @ [*shift, 1.0])
+    mirrored = np.linalg.det(homography) > 0
+    if mirrored != view.up:
+        other = "down" if view.up else "up"
+        raise InputError(
+            "[scale] points_px and their places are mirror images of each other: give places with y "
+            f'counter-clockwise from x, seen from above, or looks = "{other}"'
+        )
+    return replace(view, homography=homography, scale_error=_CLICK * math.sqrt(2 / len(plane)) / (2 * size))
+
+
+def _lens(table: Mapping[str, Any]) -> Lens:
+    parts = []
+    for name, count in (("focal_px", 2), ("centre_px", 2), ("distortion", 5)):
+        numbers = table.get(name)
+        if not isinstance(numbers, list) or len(numbers) != count or not all(map(_is_number, numbers)):
+            raise InputError(f"[lens] {name}: give {count} numbers, as softflagella camera lens writes them")
+        parts.append(np.array(numbers, dtype=float))
+    if not (parts[0] > 0).all():
+        raise InputError("[lens] focal_px: give numbers above 0")
+    return Lens(*parts)
+
+
+def _markers(table: Mapping[str, Any], number: int) -> Markers:
+    where = f"[[robots]] {number}: "
+    try:
+        _check_keys("robots", table)
+        tag = table.get("tag")
+        needed = () if tag is not None else ("front", "rear")
+        colours = {key: table[key] for key in ("front", "rear", *DOTS) if key in table}
+        if missing := [key for key in needed if key not in colours]:
+            raise InputError(
+                f'no {missing[0]}; give two bands of other colours, front = "red" and rear = "green", or a tag'
+            )
+        hues = {key: _hue(colour, key) for key, colour in colours.items()}
+        for one in hues:
+            for other in hues:
+                if one < other and abs((hues[one] - hues[other] + 180) % 360 - 180) < 40:
+                    raise InputError(f"{one} and {other} have nearly the same colour; give them others")
+        dictionary = str(table.get("dictionary", _DICTIONARIES[0])).lower()
+        if dictionary not in _DICTIONARIES:
+            raise InputError(f"dictionary {dictionary!r}; give one of {', '.join(_DICTIONARIES)}")
+        ahead, apart = (_length(table, name, "robots") for name in ("ahead", "apart"))
+        return Markers(
+            str(table.get("name", number)),
+            hues.pop("front", math.nan),
+            hues.pop("rear", math.nan),
+            hues,
+            {key: str(colour) for key, colour in colours.items()},
+            None if tag is None else _whole(tag, "tag"),
+            dictionary,
+            0.0 if math.isnan(ahead) else ahead,
+            apart,
+        )
+    except InputError as refusal:
+        raise InputError(f"{where}{refusal}") from None
+
+
+def _hue(colour: object, key: str) -> float:
+    """Return the hue of a colour [deg], red 0, green 120, blue 240."""
+    if colour in HUES:
+        return float(HUES[str(colour)])
+    if not isinstance(colour, str) or not re.fullmatch(r"#[0-9a-fA-F]{6}", colour):
+        raise InputError(f'{key} = {colour!r}; give {", ".join(HUES)}, or a colour of the picture, "#c03020"')
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    along, across = red - (green + blue) / 2, math.sqrt(3) / 2 * (green - blue)
+    if math.hypot(along, across) < 30:
+        raise InputError(f'{key} = "{colour}" is nearly grey; give the marker a strong colour')
+    return math.degrees(math.atan2(across, along)) % 360
+
+
+def _length(table: Mapping[str, Any], quantity: str, where: str) -> float:
+    """Return a length in metres, in whatever unit its key has; NaN if it is not there."""
+    for key, value in table.items():
+        name, unit = split(key)
+        if name == quantity and unit is not None:
+            if unit.kind != "length" or not _is_number(value):
+                raise InputError(f"[{where}] {key} = {value!r}; give a number, {quantity}_cm or in another unit")
+            return float(to_si(float(value), unit.suffix))
+    return math.nan
+
+
+def _points(table: Mapping[str, Any], key: str, fewest: int) -> Floats:
+    rows = table[key]
+    good = isinstance(rows, list) and len(rows) >= fewest
+    if not good or not all(isinstance(p, list) and len(p) == 2 and all(map(_is_number, p)) for p in rows):
+        raise InputError(f"{key}: give {fewest} points or more, [[100, 650], [900, 650], …]")
+    return np.array(rows, dtype=float)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e9
+
+
+def _whole(value: object, key: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 1000:
+        raise InputError(f"{key} = {value!r}; give the number of a tag, 0 to 999")
+    return value

@@ -1,0 +1,161 @@
+"""Poses in single pictures, of tanks whose truth is known: errors, stated errors, why a robot is lost."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from camera.detector import Detector, Lost, Pose
+from camera.view import read_setup
+from sim.arrays import Floats
+from tests.oracles.tank import APART, LENGTH, TAIL, Tank, circling
+
+TANKS: dict[str, dict[str, Any]] = {
+    "plain": {},
+    "noise": {"noise": 8.0},
+    "blur": {"blur": 2.0},
+    "glare": {"glare": 150.0},
+    "uneven light": {"shade": 0.6},
+    "slanting": {"tilt": 0.25},
+    "lens": {"distortion": -0.2},
+    "all": {"distortion": -0.2, "tilt": 0.2, "glare": 120.0, "shade": 0.4, "noise": 5.0},
+    "clutter": {"clutter": True},
+    "small": {"width": 320, "height": 240, "scale": 0.001},
+    "large": {"width": 1280, "height": 960, "scale": 0.00025},
+    "rolling shutter": {"readout": 0.03},
+}
+
+
+def detector_of(tank: Tank, folder: Path, **given: Any) -> Detector:
+    file = folder / "view.toml"
+    file.write_text(tank.view_toml(**given))
+    setup = read_setup(file)
+    return Detector(setup.robots, setup.view, head_length=LENGTH)
+
+
+def off(pose: Pose, truth: tuple[float, ...]) -> Floats:
+    return np.array([pose.x - truth[0], pose.y - truth[1], math.remainder(pose.heading - truth[2], math.tau)])
+
+
+def exposed(tank: Tank, pose: Pose, time: float) -> float:
+    """Return when the row of the robot was exposed."""
+    return float(time + tank.readout * np.mean(pose.marks, axis=0)[1] / tank.height)
+
+
+@pytest.mark.parametrize("name", TANKS)
+def test_poses_are_within_a_fiftieth_of_a_tail_and_a_degree_and_their_errors_hold(
+    name: str, tmp_path: Path
+) -> None:
+    tank, motion = Tank(**TANKS[name]), circling()
+    detector, times = detector_of(tank, tmp_path), np.arange(0, 20, 2.1 if name == "large" else 0.7)
+    poses = [detector.poses(tank.frame(motion, time), time)[0] for time in times]
+    pairs = zip(poses, times, strict=True)
+    seen = [(pose, off(pose, motion(exposed(tank, pose, time)))) for pose, time in pairs if isinstance(pose, Pose)]
+    assert len(seen) >= 0.9 * len(times), poses
+    errors = np.array([error for _, error in seen])
+    sigmas = np.array([(pose.sigma_x, pose.sigma_x, pose.sigma_heading) for pose, _ in seen])
+    assert np.abs(errors[:, :2]).max() < 0.02 * TAIL
+    assert np.abs(errors[:, 2]).max() < math.radians(1)
+    assert (np.abs(errors) < 1.96 * sigmas).mean() >= 0.9
+    assert np.median(sigmas, axis=0) == pytest.approx([0.005 * TAIL, 0.005 * TAIL, math.radians(0.4)], rel=0.5)
+
+
+def test_a_lost_robot_is_named_with_the_reason_and_found_again(tmp_path: Path) -> None:
+    tank, motion = Tank(), circling()
+    detector = detector_of(tank, tmp_path)
+    assert isinstance(detector.poses(tank.frame(motion, 0.0), 0.0)[0], Pose)
+    bare = Tank(colours=("", "", "", ""))
+    assert detector.poses(bare.frame(motion, 0.1), 0.1) == [Lost("1", "no red")]
+    half = Tank(colours=("red", "", "", ""))
+    assert detector.poses(half.frame(motion, 0.2), 0.2) == [Lost("1", "no green")]
+    for _ in range(8):
+        detector.poses(bare.frame(motion, 0.3), 0.3)
+    again = detector.poses(tank.frame(motion, 9.0), 9.0)[0]
+    assert isinstance(again, Pose)
+    assert np.abs(off(again, motion(9.0))).max() < 0.02
+
+
+def test_a_hand_over_the_robot_loses_it_and_moves_no_pose(tmp_path: Path) -> None:
+    tank, motion = Tank(), circling(radius=0.05)
+    detector, lost = detector_of(tank, tmp_path), 0
+    for index in range(30):
+        tank.hand = (index - 5) / 20 if 5 <= index < 25 else -1.0
+        (pose,) = detector.poses(tank.frame(motion, 0.2 * index), 0.2 * index)
+        lost += isinstance(pose, Lost)
+        if isinstance(pose, Pose):
+            error = np.abs(off(pose, motion(0.2 * index)))
+            assert error[:2].max() < 0.02 * TAIL
+            assert error[2] < max(math.radians(1), 2.5 * pose.sigma_heading)
+    assert 3 < lost < 20
+
+
+def test_dots_are_seen_at_their_side_of_the_axis(tmp_path: Path) -> None:
+    tank, motion = Tank(), circling(head=-1.0, tails=1.0)
+    detector = detector_of(tank, tmp_path)
+    for time in np.arange(0, 7, 0.5):
+        (pose,) = detector.poses(tank.frame(motion, time), time)
+        assert isinstance(pose, Pose)
+        (left, area), (side, _) = pose.dots["head"], pose.dots["tail"]
+        *_, head, tails = motion(time)
+        if math.cos(head) > 0.3:
+            assert left == pytest.approx(-0.016 * math.sin(head), abs=0.002)
+            assert area > 2e-5
+        if math.cos(head) < -0.5:
+            assert area == 0
+            assert math.isnan(left)
+        assert side == pytest.approx(-0.016 * math.sin(tails), abs=0.002)
+
+
+def test_two_robots_are_told_apart_by_their_colours(tmp_path: Path) -> None:
+    tank = Tank(width=640)
+    file = tmp_path / "view.toml"
+    first, second = ("red", "green"), ("blue", "yellow")
+    robots = "".join(f'[[robots]]\nname = "{n}"\nfront = "{f}"\nrear = "{r}"\n'
+                     for n, (f, r) in zip("ab", (first, second), strict=True))  # fmt: skip
+    file.write_text(tank.view_toml(robots=robots))
+    setup = read_setup(file)
+    detector = Detector(setup.robots, setup.view, head_length=LENGTH)
+    one, other = circling(centre=(0.12, 0.12)), circling(rate=-0.2, centre=(0.31, 0.12))
+    for time in (0.0, 1.0, 2.0):
+        picture = tank.drawn([(one, (*first, "", "")), (other, (*second, "", ""))], time)
+        poses = detector.poses(picture, time)
+        assert [pose.robot for pose in poses] == ["a", "b"]
+        for pose, motion in zip(poses, (one, other), strict=True):
+            assert isinstance(pose, Pose)
+            assert np.abs(off(pose, motion(time))[:2]).max() < 0.02 * TAIL
+
+
+@pytest.mark.parametrize("quarter", range(4))
+def test_a_tag_gives_pose_and_scale(quarter: int, tmp_path: Path) -> None:
+    """The robot's tag, 4 cm wide, points along the picture's edges; the other, of 5 cm, gives the scale."""
+    import cv2
+
+    picture, known = np.full((480, 640), 160, np.uint8), cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    for number, size, (u, v), turns in ((3, 80, (200, 150), quarter), (7, 100, (450, 300), 0)):
+        tag = np.rot90(np.pad(cv2.aruco.generateImageMarker(known, number, size), 20, constant_values=255), turns)
+        picture[v : v + size + 40, u : u + size + 40] = tag
+    file = tmp_path / "view.toml"
+    file.write_text("[scale]\ntag_cm = 5\ntag_id = 7\n[[robots]]\ntag = 3\nahead_mm = 10\n")
+    setup = read_setup(file)
+    noisy = picture[..., None] + np.random.default_rng(0).normal(scale=3, size=(480, 640, 3))
+    (pose,) = Detector(setup.robots, setup.view).poses(np.clip(noisy, 0, 255).astype(np.uint8), 0.0)
+    assert isinstance(pose, Pose)
+    heading = math.pi / 2 * (1 + quarter)
+    axis = np.array([math.cos(heading), math.sin(heading)])
+    metres = 0.05 / 100
+    middle = metres * np.array([200 + 60 - (450 + 70), (300 + 70) - (150 + 60)])
+    assert [pose.x, pose.y] == pytest.approx(middle - 0.01 * axis, abs=0.001)
+    assert math.remainder(pose.heading - heading, math.tau) == pytest.approx(0, abs=0.01)
+
+
+def test_the_distance_of_the_bands_cannot_exceed_the_head(tmp_path: Path) -> None:
+    tank = Tank()
+    file = tmp_path / "view.toml"
+    file.write_text(tank.view_toml())
+    setup = read_setup(file)
+    short = Detector(setup.robots, setup.view, head_length=0.8 * APART)
+    assert short.poses(tank.frame(circling(), 0.0), 0.0) == [Lost("1", "red and green at a wrong distance")]
