@@ -291,7 +291,7 @@ def _replay(
     from sim.model.schedule import load_schedule, read_plan_file
     from sim.motion.replay import replay, replay_error
     from sim.motion.shape_files import check_name, equal_times, write_shapes
-    from sim.motion.shapes import scheduled_shapes
+    from sim.motion.shapes import shapes_and_track
 
     if out is None and shapes is None:
         raise InputError("name a file: --out for the track, or --shapes for the shapes")
@@ -306,16 +306,18 @@ def _replay(
             total=count, desc=what, unit="dwell", delay=BAR_AFTER, disable=None
         )  # None: on a terminal alone
 
-    if shapes is not None:
+    if shapes is None:
+        with bar("replay") as shown:
+            track = replay([schedule], progress=shown.update)[0]
+    else:
         check_name(shapes)
         times = equal_times(schedule, every)
         with bar("replay") as shown:
-            write_shapes(shapes, scheduled_shapes(schedule, times, progress=shown.update), schedule, swimmer)
+            simulated, track = shapes_and_track(schedule, times, progress=shown.update)
+        write_shapes(shapes, simulated, schedule, swimmer)
         print(f"{len(times)} shapes, {format_time(times[-1] * schedule.time_scale)} -> {shapes}")
     if out is None:
         return
-    with bar("replay") as shown:
-        track = replay([schedule], progress=shown.update)[0]
     own_error = ""
     if error:
         with bar("on a coarser mesh") as shown:

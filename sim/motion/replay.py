@@ -7,11 +7,13 @@ head's centre, seen from above. Lengths are in l, times in μ0 l⁴/EI and in se
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from sim.arrays import Floats
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.mechanics import planar
@@ -25,7 +27,19 @@ from sim.solve.march import YAW, X, Y
 if TYPE_CHECKING:
     import pandas as pd
 
-_SAMPLES = 12  # track points in a dwell, at most
+_SAMPLES = 12  # track points in a dwell, or up to twice as many where it has few steps
+_NONE = np.empty(0)
+
+
+class Stretch(NamedTuple):
+    """A stretch of a simulated schedule."""
+
+    run: Run  # at the end of the stretch, until the next one is simulated
+    dwell: int  # index
+    direction: int  # of the motor
+    times: Floats  # (K,) of the steps, from the start of the schedule
+    poses: Floats  # (K, 6) after the steps, see `sim.solve.march`
+    stops: bool  # it ends at a stop, else at the end of the dwell
 
 
 def replay(
@@ -46,7 +60,9 @@ def replay(
         time_bar, x_over_l, y_over_l, heading_rad, direction, dwell (index of the dwell that ends at or after the
         sample), plan_id (if the schedule is that of a plan).
     """
-    return [_replay(schedule, resolution, progress) for schedule in schedules]
+    return [
+        track_of(schedule, stretches(schedule, resolution=resolution, progress=progress)) for schedule in schedules
+    ]
 
 
 def replay_error(
@@ -93,36 +109,55 @@ def run_at_rest(schedule: Schedule, resolution: Resolution | None = None) -> Run
     return run
 
 
-def _replay(
-    schedule: Schedule, resolution: Resolution | None, progress: Callable[[int], object] | None
-) -> pd.DataFrame:
+def stretches(
+    schedule: Schedule,
+    *,
+    stops: Floats = _NONE,
+    resolution: Resolution | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> Iterator[Stretch]:
+    """Simulate a schedule in stretches that end at the stops, (F,) and increasing, and where dwells end.
+
+    Raises:
+        InputError: the schedule cannot be simulated.
+    """
     run = run_at_rest(schedule, resolution)
-    direction, time = schedule.first_direction, 0.0
-    rows: list[tuple[float, ...]] = [(0.0, 0.0, 0.0, 0.0, direction, 0)]
-    for index, dwell in enumerate(schedule.dwells.tolist()):
+    ends, direction, now = np.cumsum(schedule.dwells), schedule.first_direction, 0.0
+    dwell_of_stop = np.minimum(np.searchsorted(ends, stops, side="right"), len(ends) - 1)
+    for index, dwell_end in enumerate(ends.tolist()):
         if index:
             run.flip()
             direction = -direction
-        times, poses = run.go(dwell)
-        if run.failed:
-            raise InputError(f"the simulation failed in dwell {index + 1} of the schedule; a finer step may help")
-        count = len(poses)
-        stride = max(1, count // _SAMPLES)
-        for i in range(1, count + 1):
-            if i % stride == 0 or i == count:
-                x, y, yaw = poses[i - 1, [X, Y, YAW]].tolist()
-                rows.append((time + times[i - 1], x, y, yaw, direction, index))
-        time += dwell
+        for stop in (*stops[dwell_of_stop == index].tolist(), None):
+            until = max(dwell_end if stop is None else stop, now)
+            times, poses = run.go(until - now) if until > now else (_NONE, np.empty((0, 6)))
+            if run.failed:
+                raise InputError(
+                    f"the simulation failed in dwell {index + 1} of the schedule; a finer step may help"
+                )
+            yield Stretch(run, index, direction, now + times, poses, stop is not None)
+            now = until
         if progress is not None:
             progress(1)
-    return _track(schedule, rows)
+
+
+def track_of(schedule: Schedule, simulated: Iterable[Stretch]) -> pd.DataFrame:
+    """Tabulate the track of a schedule, see `replay`, with about 12 samples in each dwell and one at its end."""
+    rows = [np.array([[0.0, 0.0, 0.0, 0.0, schedule.first_direction, 0]])]
+    for index, parts in groupby(simulated, lambda stretch: stretch.dwell):
+        dwell = list(parts)
+        times, poses = (np.concatenate(all_of) for all_of in zip(*(part[3:5] for part in dwell), strict=True))
+        step = np.arange(1, len(times) + 1)
+        kept = (step % max(1, len(times) // _SAMPLES) == 0) | (step == len(times))
+        said = np.broadcast_to([dwell[0].direction, index], (len(times), 2))
+        rows.append(np.column_stack([times, poses[:, [X, Y, YAW]], said])[kept])
+    return _track(schedule, np.concatenate(rows))
 
 
 @np.errstate(over="ignore")  # seconds of an absurd time scale
-def _track(schedule: Schedule, rows: list[tuple[float, ...]]) -> pd.DataFrame:
+def _track(schedule: Schedule, table: Floats) -> pd.DataFrame:
     import pandas as pd  # slow to import, and batches of steady motions need no track
 
-    table = np.array(rows)
     pose = planar.compose(np.array(schedule.start), table[:, 1:4])
     lab = {}
     if schedule.tail_length is not None:

@@ -39,7 +39,7 @@ class Run:
         self.state = new_state(tails, resolution.edges, body.offset) if state is None else state
         self.time_step = time_step(body.omega, resolution)
         self.failed = ""
-        self._jumped = state is None
+        self.jumped = state is None  # velocities are not yet those of the motor's speed
         self._work_of_a_step = resolution.work_of_a_step(body, tails)
         self._work_left = MOST_WORK if most_work is None else most_work
 
@@ -66,7 +66,7 @@ class Run:
         if not self.can_afford(duration, flips=1):
             return np.empty(0), np.empty((0, 6))
         parts = []
-        if self._jumped:
+        if self.jumped:
             share = min(self.time_step, duration / 2 / (2 * sum(_GRADES)))
             parts = [(2, 2 * share * grade) for grade in _GRADES]
         remaining = duration - sum(part for _, part in parts)
@@ -76,7 +76,7 @@ class Run:
             times.append(now + part * np.arange(1, count + 1) / count)
             poses.append(self.steps(count, part)[0])
             now += part
-        self._jumped = False
+        self.jumped = False
         times[-1][-1] = duration
         return np.concatenate(times), np.concatenate(poses)
 
@@ -98,7 +98,7 @@ class Run:
         self.body, self.reverse = self.reverse, self.body
         self.state.u[:] *= REVERSED
         self.state.x_dot[:] = 0.0
-        self._jumped = True
+        self.jumped = True
 
     @property
     def pose(self) -> Floats:

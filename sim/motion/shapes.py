@@ -8,7 +8,7 @@ at the clamp. Units: l, μ0 l⁴/EI, EI/l².
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -20,13 +20,16 @@ from sim.mechanics.balance import motor_gain, tail_spin
 from sim.model.body import Body
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule
-from sim.motion.replay import run_at_rest
+from sim.motion.replay import stretches, track_of
 from sim.motion.run import Run
 from sim.solve.assembly import bodies
 from sim.solve.march import PHASE, YAW, State, X, Y
 from sim.solve.rates import FIRST_PHASE
 from sim.solve.refinement import PHASES_FOR_SLOPES, REASONS, SOLVED, orbit_on_mesh, refined_orbit
 from sim.solve.residual import fluid_forces
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _JUST_AFTER = 1e-3  # of a time step: when forces are taken after a jump of the motor's speed
 
@@ -97,37 +100,32 @@ def scheduled_shapes(
     Raises:
         InputError: the schedule cannot be simulated.
     """
-    run = run_at_rest(schedule)
-    start, now, head_angle, direction = np.array(schedule.start), 0.0, 0.0, schedule.first_direction
-    heads, angles, shown, directions, track = [], [], [], [], [np.zeros((1, 3))]
-    ends = np.cumsum(schedule.dwells)
-    dwell_of_frame = np.minimum(np.searchsorted(ends, times, side="right"), len(ends) - 1)
-    for index, dwell_end in enumerate(ends.tolist()):
-        if index:
-            run.flip()
-            direction = -direction
-        jumped = True
-        for end in (*times[dwell_of_frame == index].tolist(), None):
-            until = dwell_end if end is None else end
-            if until > now:
-                phase = run.state.pose[PHASE]
-                steps, poses = run.go(until - now)
-                track.append(np.column_stack([now + steps, poses[:, [X, Y]]]))
-                turned = run.state.pose[PHASE] - phase - run.body.omega * (until - now)
-                head_angle += turned / motor_gain(run.body)
-                now, jumped = until, False
-            if run.failed:
-                raise InputError(f"the simulation failed in dwell {index + 1} of the schedule")
-            if end is not None:
-                heads.append(planar.compose(start, run.state.pose[[X, Y, YAW]]))
-                angles.append((head_angle, run.state.pose[PHASE]))
-                shown.append(_in_lab(run.body, run.state, _moving(run) if jumped else run.state, heads[-1]))
-                directions.append(direction)
-        if progress is not None:
-            progress(1)
-    path = np.concatenate(track)
-    path[:, 1:] = planar.turn(path[:, 1:], start[2]) + start[:2]
-    return _stacked(times, np.array(heads), np.array(angles), shown, np.array(directions), path)
+    return shapes_and_track(schedule, times, progress=progress)[0]
+
+
+def shapes_and_track(
+    schedule: Schedule, times: Floats, *, progress: Callable[[int], object] | None = None
+) -> tuple[Shapes, pd.DataFrame]:
+    """Simulate a schedule; return what `scheduled_shapes` and `sim.motion.replay.replay` do."""
+    start, head_angle, phase, now = np.array(schedule.start), 0.0, 0.0, 0.0
+    heads, angles, shown, directions, simulated = [], [], [], [], []
+    for stretch in stretches(schedule, stops=times, progress=progress):
+        simulated.append(stretch)
+        run, pose = stretch.run, stretch.run.state.pose
+        if len(stretch.times):
+            head_angle += (pose[PHASE] - phase - run.body.omega * (stretch.times[-1] - now)) / motor_gain(run.body)
+            phase, now = pose[PHASE], stretch.times[-1]
+        if stretch.stops:
+            heads.append(planar.compose(start, pose[[X, Y, YAW]]))
+            angles.append((head_angle, phase))
+            shown.append(_in_lab(run.body, run.state, _moving(run) if run.jumped else run.state, heads[-1]))
+            directions.append(stretch.direction)
+    places = np.concatenate([np.zeros((1, 2)), *(stretch.poses[:, [X, Y]] for stretch in simulated)])
+    path = np.column_stack(
+        [np.append(0.0, np.concatenate([s.times for s in simulated])), planar.turn(places, start[2]) + start[:2]]
+    )
+    shapes = _stacked(times, np.array(heads), np.array(angles), shown, np.array(directions), path)
+    return shapes, track_of(schedule, simulated)
 
 
 def _moving(run: Run) -> State:
