@@ -171,13 +171,10 @@ function keyOf({ quantity, unit }, other = unit) {
 
 /* Say what is wrong with a key, and name what may be meant. */
 function unknown(table, key) {
-  const { quantity } = splitName(key.endsWith(SIGMA) ? key.slice(0, -SIGMA.length) : key);
-  const entries = ENTRIES.filter((entry) => entry.table === table), tables = new Set(ENTRIES.map((entry) => entry.table));
-  const near = closeMatch(quantity, entries.map((entry) => entry.quantity));
-  const advice = !entries.length ? `a robot has [${[...tables].join("], [")}]`
-    : near && near !== quantity ? `is it ${keyOf(entries.find((entry) => entry.quantity === near))}?`
-    : `[${table}] has ${entries.map((entry) => keyOf(entry)).join(", ")}, in any usual unit`;
-  return `unknown entry [${table}] ${key}; ${advice}`;
+  const known = ENTRIES.map((entry) => `[${entry.table}] ${keyOf(entry)}`), tables = new Set(ENTRIES.map((entry) => entry.table));
+  const near = closeMatch(`[${table}] ${key.replace("diameter", "radius")}`, known), half = key.includes("diameter");
+  const hint = near ? `is it ${near}${half ? ", half of it" : ""}?` : `a robot has [${[...tables].join("], [")}]`;
+  return `unknown entry [${table}] ${key}; ${hint}`;
 }
 
 /* Convert a number of the file to SI units. */

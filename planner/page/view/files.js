@@ -23,10 +23,8 @@ async function oneFile(files) {
 
 /* What is wrong with the last file or link, beside the part of the page that it is for; the next one takes it away. */
 class Problem {
-  constructor() {
-    this.place = null;
-    this.words = "";
-  }
+  place = null;
+  words = "";
 
   /* Say it beside a part, such as path; empty words: nothing is wrong. */
   tell(part, words) {

@@ -28,8 +28,10 @@ class Page {
     this.view.editor = this.editor;
     this.player = new Player((pose, time) => this.played(pose, time));
     this.form = new RobotForm(data.limits, (values, key) => this.setRobot(values, key), () => this.history.settle());
-    this.initial = this.firstState();
+    const { robot, shape, options } = data.first, { fields } = this.robots.get(robot);
+    this.initial = { robot: { name: robot, values: labValues(fields) }, path: this.ofShape(shape), options };
     this.plan = null;
+    this.refused = false; // whether the newest wish is
     this.track = null;
     this.fileProblem = new Problem();
     this.linkProblem = new Problem(); // until the next change
@@ -59,11 +61,6 @@ class Page {
     const worker = new Worker(URL.createObjectURL(new Blob([this.planner], { type: "text/javascript" })));
     worker.postMessage({ id: 0, what: "start", content: this.data.planner });
     return worker;
-  }
-
-  firstState() {
-    const { robot, shape, options } = this.data.first;
-    return { robot: { name: robot, values: labValues(this.robots.get(robot).fields) }, path: this.ofShape(shape), options };
   }
 
   /* The path of a shape that the page offers. */
@@ -189,7 +186,9 @@ class Page {
     if (!answer.broken) this.problem("");
     say(byId("options-problem"), "", true);
     if (answer.refusal) say(byId(`${answer.about ?? "path"}-problem`), answer.refusal, true);
-    byId("saves").querySelectorAll("button").forEach((button) => (button.disabled = Boolean(answer.refusal)));
+    this.refused = Boolean(answer.refusal);
+    this.hint();
+    byId("saves").querySelectorAll("button").forEach((button) => (button.disabled = this.refused));
     if (answer.refusal) {
       say(byId("message"), this.plan ? "Picture and numbers are those of the last plan that could be made." : "");
       this.show();
@@ -348,11 +347,16 @@ class Page {
     this.refresh();
   }
 
+  /* Whether what most people do next is to take the schedule of their path along. */
+  get saves() {
+    return Boolean(this.state.path.points) && !this.refused;
+  }
+
   /* Say what the pointer does, and offer what most people do next. */
   hint() {
     say(byId("mode-words"), this.editor.words);
     const draw = this.editor.mode === "draw" ? "Draw one stroke in the picture" : "Draw your own path";
-    byId("next").textContent = this.state.path.points ? "Save the schedule" : draw;
+    byId("next").textContent = this.saves ? "Save the schedule" : draw;
   }
 
   mode(name, anew = false) {

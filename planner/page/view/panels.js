@@ -121,7 +121,7 @@ function listen(kind, listeners) {
 function connectButtons(page) {
   const points = () => page.editor.path.points;
   listen("click", {
-    next: () => (page.state.path.points ? page.saveFile("schedule.h") : byId("draw").click()),
+    next: () => (page.saves ? page.saveFile("schedule.h") : byId("draw").click()),
     undo: () => page.step(-1),
     redo: () => page.step(1),
     open: () => byId("pick").click(),

@@ -32,14 +32,12 @@ class PlannerClient {
 
   receive(data) {
     const question = this.waiting.get(data.id);
-    if (!question) return;
-    if (data.progress) {
-      question.progress?.(data.progress);
-      return;
+    if (data.progress) question?.progress?.(data.progress);
+    else if (question) {
+      this.waiting.delete(data.id);
+      if (data.broken) this.failed(`The page has made an error: ${data.broken}`);
+      question.resolve(data);
     }
-    this.waiting.delete(data.id);
-    if (data.broken) this.failed(`The page has made an error: ${data.broken}`);
-    question.resolve(data);
   }
 
   /* Plan the newest wish. A plan that is being made is finished first; wishes between are dropped. */

@@ -78,6 +78,7 @@ def test_a_file_is_refused_in_the_words_of_the_command(
         assert text_of(page, "#message") == OLD
         assert page.locator("#scene .old").count() == 1
         assert page.get_by_role("button", name="schedule.h").is_disabled()
+        assert text_of(page, "#next") == "Draw your own path"  # there is no schedule to save
         return
     assert "dwells" in text_of(page, "#message")  # the plan is that of the path as before
     parts = (ours.split("(")[0], theirs.split("(")[0]) if name.endswith(".json") else (ours, theirs)
