@@ -164,8 +164,8 @@ def influences() -> dict[str, Influence]:
 
 
 @cache
-def stated_influence(name: str) -> Influence | None:
-    """Find an effect that states itself in its name, such as the term of a law; None if it is none."""
+def influence_of_law(name: str) -> Influence | None:
+    """Return the influence of the term of a law, by the law's name; None if it is none."""
     return _plain(effect_named(name)) if is_effect(name) and name not in catalogue() else None
 
 

@@ -30,12 +30,12 @@ from calibration.swimmer.influences import (
     TACHOMETER,
     TRACKED_POINT,
     Influence,
+    influence_of_law,
     influences,
     is_odd,
     nuisance_parameters,
     reason_untestable,
     robot_number,
-    stated_influence,
 )
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.observation import Observation
@@ -318,7 +318,7 @@ class SwimmerModel:
         ]
 
     def _influence(self, name: str) -> Influence | None:
-        return self._influences.get(name) or stated_influence(name)
+        return self._influences.get(name) or influence_of_law(name)
 
     @cached_property
     def _drivers(self) -> dict[str, Floats]:

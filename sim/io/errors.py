@@ -71,10 +71,6 @@ def run_command(main: Callable[[list[str] | None], None], argv: list[str] | None
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or the interpreter complains when it flushes at its end
         return CLOSED_PIPE
-    except FileNotFoundError as missing:
-        return _end(f"no such file: {missing.filename}; check the path", 2)
-    except RecursionError:
-        return _end("the input is nested too deeply; give a simpler one", 2)
     except KeyboardInterrupt as stop:
         print(str(stop) or "interrupted", file=sys.stderr)
         return getattr(stop, "status", INTERRUPTED)
@@ -90,6 +86,8 @@ def _refused(error: BaseException) -> str | None:
     """Say what the operating system refused, a file or, at the root of the error, its limits; None if neither."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
+    if isinstance(error, RecursionError):
+        return "the input is nested too deeply; give a simpler one"
     root: BaseException | None = error
     while root is not None:
         if isinstance(root, MemoryError):

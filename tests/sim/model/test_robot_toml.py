@@ -77,7 +77,13 @@ REFUSALS = {
     "sigma no number": ("length_cm = 9", "length_cm = 9\nlength_cm_sigma = true", "a number in the unit of its"),
     "sigma below 0": ("length_cm = 9", "length_cm = 9\nlength_cm_sigma = -1", "from 0 to half"),
     "sigma in per cent": ("length_cm = 9", 'length_cm = 9\nlength_cm_sigma = "60 %"', "from 0 to half"),
-    "sigma of a count": ("count = 3", "count = 3\ncount_sigma = 1", "takes no standard"),
+    "sigma of a count": ("count = 3", "count = 3\ncount_sigma = 1", "[tails] count_sigma: this number takes no"),
+    "a diameter": ("radius_mm = 16", "diameter_mm = 32", "is it [head] radius_mm, half of it?"),
+    "misspelt": ("length_cm = 9", "lenght_cm = 9", "unknown entry [tails] lenght_cm; is it [tails] length_cm?"),
+    "no such unit": ("speed_rpm = 90", "speed_V = 6", "unknown entry [motor] speed_V; is it [motor] speed_rpm?"),
+    "another table": ("C_t = 3.0", "C_t = 3.0\nlength_mm = 16", "[drag] length_mm; is it [head] length_mm?"),
+    "misspelt table": ("[motor]", "[moter]", "unknown entry [moter] speed_rpm; is it [motor] speed_rpm?"),
+    "like no other": ("[motor]", "colour = 1\n[motor]", "[fluid] colour; a robot has [tails], [head]"),
 }  # fmt: skip
 
 
@@ -85,35 +91,10 @@ REFUSALS = {
 def test_what_is_no_robot_is_refused(case: str, tmp_path: Path) -> None:
     old, new, words = REFUSALS[case]
     assert old in LAB
-    with pytest.raises(InputError, match=re.escape(words)):
+    with pytest.raises(InputError, match=re.escape(words)) as refusal:
         read(LAB.replace(old, new, 1), tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        (
-            "[head]\nradius_mm = 16",
-            "[head]\ndiameter_mm = 32",
-            "unknown entry [head] diameter_mm; is it [head] radius_mm, half of it?",
-        ),
-        ("length_cm = 9", "lenght_cm = 9", "unknown entry [tails] lenght_cm; is it [tails] length_cm?"),
-        ("speed_rpm = 90", "speed_V = 6", "unknown entry [motor] speed_V; is it [motor] speed_rpm?"),
-        ("C_t = 3.0", "C_t = 3.0\nlength_mm = 16", "unknown entry [drag] length_mm; is it [head] length_mm?"),
-        ("C_t = 3.0", "C_t = 3.0\nC_t_sigma = 0.1", "[drag] C_t_sigma: this number takes no standard deviation"),
-        ("[motor]", "[moter]", "unknown entry [moter] speed_rpm; is it [motor] speed_rpm?"),
-        (
-            "[motor]",
-            "colour = 1\n[motor]",
-            "unknown entry [fluid] colour; a robot has [tails], [head], [fluid], [motor], [drag]",
-        ),
-    ],
-)
-def test_an_unknown_key_is_told_which_one_is_near(old: str, new: str, words: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError) as caught:
-        read(LAB.replace(old, new), tmp_path)
-    assert str(caught.value).endswith(f": {words}")
-    assert len(str(caught.value).removeprefix(str(tmp_path))) < 100
+    assert "robot.toml" in str(refusal.value)
+    assert "\n" not in str(refusal.value)
 
 
 def test_a_standard_deviation_may_have_a_unit_of_its_own(tmp_path: Path) -> None:
