@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
+from functools import partial
 from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
@@ -167,9 +168,13 @@ def _track(
     noise: str = "0.01l",
     noise_rad: float = 0.01,
     latency: float = 0.0,
+    camera: str | None = None,
+    view: str | None = None,
+    serial: str | None = None,
+    lost: float = 2.0,
     **given: Any,
 ) -> None:
-    """Keep a robot on a path or a saved plan: poses come in on a pipe, orders go out (planner.tracking.pipe).
+    """Keep a robot on a path or a saved plan: poses come in on a pipe (planner.tracking.pipe) or from a camera.
 
     Args:
         path: a path to plan for, as for planner plan; or a plan.json, its folder, or a goal.json, tour.json or
@@ -179,7 +184,11 @@ def _track(
             a path's start; the first pose that comes in, for a saved plan).
         noise: LENGTH, standard deviation of x and y (default: 0.01l).
         noise_rad: standard deviation of the heading.
-        latency: age of a pose when it comes in, in seconds (default: 0).
+        latency: age of a pose when it comes in, or of a picture, in seconds (default: 0).
+        camera: number of a camera over the tank, such as 0, or a film; the track is printed.
+        view: the camera's view.toml.
+        serial: port of the motor's board, such as /dev/ttyACM0 (default: nothing moves).
+        lost: seconds without a pose after which the motor rests.
     """
     from planner.files.saved_plan import is_plan
     from planner.tracking.pipe import answers
@@ -189,6 +198,12 @@ def _track(
         raise InputError(f"--noise-rad {noise_rad}; give a number above 0")
     if not 0 <= latency < math.inf:
         raise InputError(f"--latency {latency}; give a number of seconds, 0 or more")
+    if not 0 < lost < math.inf:
+        raise InputError(f"--lost {lost}; give a number of seconds above 0")
+    if camera is None and (view or serial):
+        raise InputError("--view and --serial are for --camera, whose number is missing, such as --camera 0")
+    if camera is not None and (view is None or start is not None):
+        raise InputError("--camera needs --view view.toml and shows where the robot is; leave --start out")
     if isinstance(sys.stdin, TextIOWrapper):  # a damaged line must not end the tracker
         sys.stdin.reconfigure(errors="replace")
     saved = is_plan(path)
@@ -200,12 +215,44 @@ def _track(
     def begin(pose: tuple[float, float, float] | None, now: float) -> Tracker:
         return Tracker(plan, noise=deviations, latency=latency / scale, begin=now, start=pose)
 
+    if camera is not None and view is not None:
+        _live(plan, camera, view, serial, latency, lost, begin)
+        return
     if start is not None:
         tracker: Tracker | None = begin(read_pose(start, unit, plan.robot, "--start"), 0.0)
     else:
         tracker = None if saved else begin(None, 0.0)
     for answer in answers(tracker, sys.stdin, plan.robot, begin):
         print(answer, flush=True)
+
+
+def _live(
+    plan: Plan, source: str, view: str, port: str | None, latency: float, lost: float,
+    begin: Callable[[tuple[float, float, float] | None, float], Tracker],
+) -> None:  # fmt: skip
+    """Follow a plan with a camera and a motor; print the track."""
+    from planner.tracking.live import Motor, Pictures, Ride, Sight, ending_on_signals, steer, watch
+
+    length = plan.robot.length_scale
+
+    def row(sight: Sight, direction: int, error: float) -> None:
+        if sight.pose is not None:
+            x, y, heading = sight.pose
+            place = f"{100 * length * x:.4f},{100 * length * y:.4f},{math.degrees(heading):.3f}"
+            print(f"{sight.time:.4f},{place},{direction},{100 * length * error:.4f}", flush=True)
+
+    def tell(line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+    with ending_on_signals(), Motor(port) as motor:
+        print("time_s,x_cm,y_cm,heading_deg,direction,error_cm", flush=True)
+        ride, sights = Ride(), partial(watch, source, view, plan.robot.name, length, latency)
+        try:
+            with Pictures(sights) as pictures:
+                steer(ride, pictures, motor, begin, plan.robot.time_scale, lost=lost, row=row, tell=tell)
+        finally:
+            if ride.pictures:
+                tell(ride.line())
 
 
 def _planned(path: str, robot: str | None, **given: Any) -> Plan:

@@ -1,0 +1,244 @@
+"""Live tracking: a simulated tank in the loop, a pseudo-terminal for the board, a film for the camera."""
+
+from __future__ import annotations
+
+import os
+import queue
+import signal
+import subprocess
+import sys
+import time
+import tty
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.files.plan_files import write_plan
+from planner.paths.distance import distance_to
+from planner.planning.request import POSE
+from planner.tracking import live
+from planner.tracking.live import REPEAT, Motor, Pictures, Ride, Sight, steer
+from planner.tracking.swim import Swimmer
+from planner.tracking.tracker import Tracker
+from sim.io.errors import InputError
+from tests.planner.plans import planned
+from tests.processes import LIMIT
+
+UNIT = planned().robot.time_scale
+DELAY = 0.12  # s, from a picture to its pose
+LOST = 3.0
+LINE = planned(((0.7, 1.0), (2.2, 1.0)))
+
+
+class Tank(Pictures, Motor):
+    """A simulated robot under a camera that sees it twice a second, and its motor; nothing waits for the time."""
+
+    def __init__(self, blind: tuple[float, float] = (0.0, 0.0), held_up: float = np.inf, over: float = np.inf):
+        self.blind, self.held_up, self.over = blind, held_up, over
+        self.plan, self.time, self.next = planned(), 0.0, 0.5
+        self.pose = np.add(self.plan.start, (0.1, -0.05, 0.2))
+        self.swimmer: Swimmer | None = None
+        self.direction, self.rng = 0, np.random.default_rng(0)
+        self.sights: list[Sight] = []
+        self.orders: list[tuple[float, int]] = []
+        self.poses: list[np.ndarray] = []
+
+    def now(self) -> float:
+        return self.time
+
+    def get(self, timeout: float) -> Sight | None:
+        end = self.time + timeout
+        if self.time > self.held_up:
+            self.held_up = np.inf
+            self._swim_until(self.time + 1.5)
+        while True:
+            delivery = self.sights[0].time + DELAY if self.sights else np.inf
+            if min(self.next, delivery) > end:
+                self._swim_until(end)
+                raise queue.Empty
+            self._swim_until(min(self.next, delivery))
+            if delivery <= self.next:
+                return self.sights.pop(0)
+            if self.time > self.over:
+                return None
+            self.sights.append(Sight(self.time, None, "dark"))
+            if not self.blind[0] < self.time < self.blind[1]:
+                x, y, heading = (self.pose + 0.005 * self.rng.normal(size=3)).tolist()
+                self.sights[-1] = Sight(self.time, (x, y, heading))
+            self.next += 0.5
+
+    def turn(self, direction: int) -> None:
+        self.orders.append((self.time, direction))
+        if direction == 0:
+            self.swimmer = None
+        elif self.swimmer is None:
+            self.swimmer = Swimmer(self.plan.tracked.vehicle, self.plan, direction, self.pose, (0.0, 0.0))
+        elif direction != self.direction:
+            self.swimmer.flip()
+        self.direction = direction
+
+    def _swim_until(self, end: float) -> None:
+        if self.swimmer is not None and end > self.time:
+            self.pose = self.swimmer.go((end - self.time) / UNIT)[1][-1]
+        self.time = max(end, self.time)
+        self.poses.append(self.pose)
+
+
+def begin(pose: POSE | None, now: float) -> Tracker:
+    return Tracker(planned(), begin=now, start=pose, noise=(0.005, 0.005))
+
+
+def steered(tank: Tank) -> tuple[Ride, list[str]]:
+    ride, told = Ride(), list[str]()
+    steer(ride, tank, tank, begin, UNIT, lost=LOST, row=lambda *row: None, tell=told.append)
+    assert tank.orders[-1][1] == 0
+    return ride, told
+
+
+@pytest.mark.slow
+def test_the_robot_is_kept_on_the_path() -> None:
+    tank = Tank()
+    ride, told = steered(tank)
+    assert ride.finished
+    assert told == []
+    followed = np.array(tank.poses)[len(tank.poses) // 10 :, :2]
+    assert np.sqrt(np.mean(distance_to(planned().reference, followed) ** 2)) < planned().feedback_error
+    times = np.array([when for when, _ in tank.orders])
+    assert np.diff(times).max() < REPEAT + 1e-6  # the board's watchdog is fed
+    assert ride.delays == pytest.approx([DELAY] * len(ride.delays))
+    assert max(ride.late) < DELAY
+    assert f"from picture to order {1e3 * DELAY:.0f} ms" in ride.line()
+
+
+def test_the_motor_rests_while_the_robot_is_not_seen() -> None:
+    tank = Tank(blind=(20.0, 40.0), over=60.0)
+    ride, told = steered(tank)
+    resting = [when for when, direction in tank.orders if direction == 0 and 1.0 < when < 60]
+    assert 20 + LOST - 1 < min(resting) < 20 + LOST + 0.5
+    assert 40 - 1 < max(resting) < 40 + 1
+    assert ride.rests == 1
+    assert told == ["no robot for 3 s (dark); the motor rests until the robot is seen"]
+
+
+def test_the_tracker_begins_anew_where_the_board_has_stopped_the_motor() -> None:
+    tank = Tank(held_up=30.0, over=60.0)
+    ride, told = steered(tank)
+    assert ride.rests == 1
+    assert {direction for when, direction in tank.orders if 40 < when < 60} == {1, -1}
+    assert told == ["the program was held up; the motor rests until the robot is seen"]
+
+
+def test_the_motor_stops_where_the_film_ends() -> None:
+    tank = Tank(over=20.0)
+    ride, _ = steered(tank)
+    assert not ride.finished
+    assert tank.time < 21
+
+
+def pseudo_terminal() -> tuple[int, str]:
+    """Open a pseudo-terminal; return its master and the name of its port."""
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    return master, os.ttyname(slave)
+
+
+def sent(master: int) -> bytes:
+    """Read what has been written to the port so far."""
+    os.set_blocking(master, False)
+    text = b""
+    try:
+        while part := os.read(master, 65536):
+            text += part
+    except OSError:
+        pass
+    return text
+
+
+def test_each_order_is_a_line_and_the_last_one_is_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("serial", reason="needs the extra camera")
+    monkeypatch.setattr(live, "RESET", 0.0)
+    master, port = pseudo_terminal()
+    with pytest.raises(ZeroDivisionError), Motor(port) as motor:  # noqa: PT012
+        motor.turn(1)
+        motor.turn(-1)
+        motor.turn(1 // 0)
+    assert sent(master) == b"S\nF\nB\nS\n"
+    with pytest.raises(InputError, match=r"--serial /dev/none: .*; name the board's port"):
+        Motor("/dev/none")
+
+
+def test_what_a_camera_raises_comes_out_of_the_loop() -> None:
+    def gone(now: Callable[[], float]) -> None:
+        raise InputError("no picture comes any more")
+
+    tank = Tank()
+    with pytest.raises(InputError, match="no picture comes any more"):
+        steer(Ride(), Pictures(gone), tank, begin, UNIT, lost=LOST, row=print, tell=print)  # type: ignore[arg-type]
+
+
+def swum(time: float) -> tuple[float, float, float]:
+    """Return the pose [m, rad] of the plan's robot at a time [s], between the poses at its flips."""
+    times, length = np.append(0.0, np.cumsum(LINE.seconds)), LINE.robot.length_scale
+    x, y, heading = (float(np.interp(time, times, values)) for values in LINE.poses.T)
+    return x * length, y * length, heading
+
+
+@pytest.fixture(scope="module")
+def tank_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Write a plan for a line across a tank, a film of a robot that swims as planned, and a view.toml."""
+    pytest.importorskip("cv2", reason="needs the extra camera")
+    pytest.importorskip("serial", reason="needs the extra camera")
+    from tests.oracles import tank
+
+    folder = tmp_path_factory.mktemp("tank")
+    write_plan(LINE, folder)
+    camera = tank.Tank()
+    (folder / "view.toml").write_text(camera.view_toml())
+    camera.film(folder / "film.avi", lambda time: (*swum(time), 0.0, 0.0), 6.0, 5.0, codec="MJPG")
+    return folder
+
+
+def tracking(folder: Path, port: str) -> subprocess.Popen[str]:
+    """Begin to track the robot of the film."""
+    words = ["--camera", str(folder / "film.avi"), "--view", str(folder / "view.toml"), "--serial", port]
+    return subprocess.Popen(
+        [sys.executable, "-m", "softflagella", "track", str(folder / "plan.json"), *words],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=Path(__file__).parents[3],
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_film_moves_the_motor(tank_files: Path) -> None:
+    """The pose in the track is that of the film, orders come often enough, and stop is the first and the last."""
+    master, port = pseudo_terminal()
+    out, err = (process := tracking(tank_files, port)).communicate(timeout=LIMIT)
+    assert process.returncode == 0, err
+    header, *lines = out.splitlines()
+    assert header == "time_s,x_cm,y_cm,heading_deg,direction,error_cm"
+    rows = np.array([[float(word) for word in line.split(",")] for line in lines])
+    assert len(rows) > 20
+    expected = np.array([swum(time - rows[0, 0]) for time in rows[:, 0]]) * [100, 100, 180 / np.pi]
+    assert np.abs(np.median(rows[:, 1:4] - expected, 0)).max() < 1.0
+    orders = sent(master).decode().split()
+    assert (orders[0], orders[-1]) == ("S", "S")
+    assert {"F", "B"} <= set(orders)
+    assert len(orders) > 5.0 / REPEAT
+    assert "not ended; the robot seen in" in err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_stops_the_motor(tank_files: Path, number: signal.Signals) -> None:
+    master, port = pseudo_terminal()
+    process, text = tracking(tank_files, port), b""
+    while not {b"F", b"B"} & set(text.split()) and process.poll() is None:
+        time.sleep(0.1)
+        text += sent(master)
+    process.send_signal(number)
+    _, err = process.communicate(timeout=LIMIT)
+    assert process.returncode == 128 + number, err
+    assert (text + sent(master)).split()[-1] == b"S"
+    assert "from picture to order" in err
+    assert "Traceback" not in err
