@@ -84,6 +84,16 @@ def test_it_shows_the_path_from_the_robot(monkeypatch: pytest.MonkeyPatch) -> No
     assert reward == pytest.approx(-(1 + error / env.plan.predicted_rms) * share)
 
 
+def test_each_seed_draws_another_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sg, "START", (0.0, 0.0, 0.0))
+    env, ends = sg.PathEnv(planned(), noise=QUIET), []
+    for seed in (0, 1, 0):
+        env.reset(seed=seed)
+        ends.append([env.step(0)[0]["pose"] for _ in range(100)][-1])
+    assert np.abs(ends[1] - ends[0]).max() > 1e-4
+    assert np.array_equal(ends[2], ends[0])
+
+
 def test_a_flip_before_the_shortest_dwell_does_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     env = certain_env(monkeypatch, actions=3)
     env.reset(seed=0)
