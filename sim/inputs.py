@@ -161,12 +161,12 @@ def _read_robot(path: Path) -> Robot:
     tables = read_toml(path)
     name = tables.pop("name", path.stem)
     tables.pop("calibration", None)  # read by planner.vehicle.calibration_table
-    correction = read_correction(tables.pop("correction"), str(path)) if "correction" in tables else None
-    learnt_from = read_learnt_range(tables.pop("learnt_from"), str(path)) if "learnt_from" in tables else None
+    correction = read_correction(tables.pop("correction")) if "correction" in tables else None
+    learnt_from = read_learnt_range(tables.pop("learnt_from")) if "learnt_from" in tables else None
     effects = tables.pop("effects", {})
     if not isinstance(effects, dict):
-        raise InputError(f"{path}: effects = {effects!r}; write a table [effects] with lines name = size")
-    values = read_robot(tables, str(path))
+        raise InputError(f"effects = {effects!r}; write a table [effects] with lines name = size")
+    values = read_robot(tables)
     check_effects(effects)
     return Robot(name=str(name), effects=dict(effects), correction=correction, learnt_from=learnt_from, **values)
 

@@ -127,7 +127,7 @@ def robot_rows(robots: Robots, robot: OneRobot | None = None, *beside: str) -> R
     given = [robots] if isinstance(robots, Robot | str | Path) else list(robots)
     if not given:
         raise InputError("no robots; give at least one")
-    loaded = tuple(robot if isinstance(robot, Robot) else load_robot(robot) for robot in given)
+    loaded = tuple(map(one_robot, given))
     return RobotRows(check_columns(group_columns(loaded)), loaded)
 
 

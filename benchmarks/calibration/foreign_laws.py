@@ -53,7 +53,7 @@ def foreign(setting: Setting, seed: int) -> Truth:
         sizes = {}
         for place, law, way in zip(chosen, powers, sign, strict=True):
             signal = setting.slope(place) * np.exp(setting.logarithm(law))[:, None]
-            sizes[place.effect(law).name] = way * score / setting.score(signal)
+            sizes[place.law(law).name] = way * score / setting.score(signal)
         return Truth(kind, score, [place.name for place in chosen], lambda: setting.table(sizes, seed))
     if kind == "tail load":
         load = TailLoad.of(powers[0])
@@ -64,7 +64,7 @@ def foreign(setting: Setting, seed: int) -> Truth:
         return Truth(kind, score, [place.name for place in terms if place.wrench == "Fz"], lambda: table)
     factor = _factor(kind, setting, rng)
     size = sign[0] * score / setting.score(setting.slope(chosen[0]) * factor[:, None])
-    name = chosen[0].effect(Powers()).name
+    name = chosen[0].law(Powers()).name
     return Truth(kind, score, [chosen[0].name], lambda: _with_sizes(setting, name, size * factor, seed))
 
 

@@ -112,10 +112,10 @@ def hidden_law(setting: Setting, seed: int, *, nothing: bool) -> Truth:
     factor = np.exp(logs) if place.is_term else logs
     size = signed / setting.score(setting.slope(place, lever) * factor[:, None])
     if place.is_term:
-        effects = {place.effect(powers, lever).name: size}
+        effects = {place.law(powers, lever).name: size}
     else:
         powers = Powers(*(np.clip(size * p, -4, 4) for p in (powers.speed, powers.length, powers.tails)))
-        effects = {place.effect(powers).name: 1.0}
+        effects = {place.law(powers).name: 1.0}
     exponents = dict(zip(EXPONENTS, (powers.speed, powers.length, powers.tails), strict=True))
     exponents |= {LEVER: lever} if place.lever_unit else {}
     return Truth("hidden", score, [place.name], lambda: setting.table(effects, seed), exponents)

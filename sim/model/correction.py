@@ -87,7 +87,7 @@ def learnt_range(robots: Iterable[Mapping[str, float]]) -> LearntRange:
     return LearntRange(tuple(inputs.min(0).round(6).tolist()), tuple(inputs.max(0).round(6).tolist()))
 
 
-def read_learnt_range(table: Any, place: str) -> LearntRange:
+def read_learnt_range(table: Any) -> LearntRange:
     """Read the table [learnt_from] of a robot.toml.
 
     Raises:
@@ -95,14 +95,11 @@ def read_learnt_range(table: Any, place: str) -> LearntRange:
     """
     try:
         if set(table) != {"low", "high"}:
-            raise InputError(f"{place}: [learnt_from] needs the lines low and high, and no others")
+            raise ValueError("it needs the lines low and high, and no others")
         low, high = (tuple(float(value) for value in table[name]) for name in ("low", "high"))
-    except (TypeError, ValueError, OverflowError) as broken:
-        raise InputError(f"{place}: [learnt_from] cannot be read: {broken}") from None
-    try:
         return LearntRange(low, high)
-    except InputError as wrong:
-        raise InputError(f"{place}: [learnt_from] {wrong}") from None
+    except (TypeError, ValueError, OverflowError) as broken:
+        raise InputError(f"[learnt_from] cannot be read: {broken}") from None
 
 
 @dataclass(frozen=True)
@@ -164,7 +161,7 @@ def correction_tables(correction: Correction) -> dict[str, Any]:
     return content | content.pop("weights")
 
 
-def read_correction(table: Any, place: str) -> Correction:
+def read_correction(table: Any) -> Correction:
     """Read the correction from its table in a robot.toml.
 
     Raises:
@@ -179,7 +176,7 @@ def read_correction(table: Any, place: str) -> Correction:
         error, without = (float(content.pop(name)) for name in ("error", "error_without"))
         weights = {str(name): tuple(map(float, row)) for name, row in content.items()}
     except KeyError as missing:
-        raise InputError(f"{place}: [correction] has no entry {missing}; copy it from the calibration") from None
+        raise InputError(f"[correction] has no entry {missing}; copy it from the calibration") from None
     except (TypeError, ValueError, OverflowError) as broken:
-        raise InputError(f"{place}: [correction] cannot be read: {broken}") from None
+        raise InputError(f"[correction] cannot be read: {broken}") from None
     return Correction(centre, scale, low, high, powers, weights, error, without)

@@ -78,12 +78,11 @@ _NOTES = {
 _NO_EFFECTS = "# [effects]                       # their sizes, if there are any\n# end_over_end_drag = 5.0"
 
 
-def read_robot(tables: Mapping[str, Any], where: str) -> dict[str, Any]:
+def read_robot(tables: Mapping[str, Any]) -> dict[str, Any]:
     """Read the fields of `Robot` in SI units, and `sigmas`, from the tables of a robot.toml.
 
     Args:
         tables: as parsed, without name, effects, correction, learnt_from and calibration.
-        where: the file's name, for messages.
 
     Raises:
         InputError: an entry is unknown, missing, given twice, without a unit, or no number.
@@ -95,21 +94,21 @@ def read_robot(tables: Mapping[str, Any], where: str) -> dict[str, Any]:
         for key, value in content.items() if isinstance(content, dict) else [("", content)]:
             entry = _entry(table, key.removesuffix(_SIGMA))
             if entry is None:
-                raise InputError(f"{where}: {_unknown(table, key)}")
+                raise InputError(_unknown(table, key))
             if key.endswith(_SIGMA) and entry.field not in DEFAULTS:
-                raise InputError(f"{where}: [{table}] {key}: this number takes no standard deviation")
+                raise InputError(f"[{table}] {key}: this number takes no standard deviation")
             if key.endswith(_SIGMA):
                 stated.append((entry, key, value))
             elif entry.field in values:
-                raise InputError(f"{where}: [{table}] {keys[entry.field]} and {key} are the same number; drop one")
+                raise InputError(f"[{table}] {keys[entry.field]} and {key} are the same number; drop one")
             else:
-                values[entry.field], keys[entry.field] = _number(value, key, f"{where}: [{table}] {key}"), key
+                values[entry.field], keys[entry.field] = _number(value, key, f"[{table}] {key}"), key
     for entry in ENTRIES:
         if entry.field not in values and not entry.optional:
-            raise InputError(f"{where}: missing entry [{entry.table}] {entry.key}")
+            raise InputError(f"missing entry [{entry.table}] {entry.key}")
     scales = {**values, "disc_offset": values.get("disc_offset", values["head_radius"])}  # by default
     sigmas = {
-        entry.field: _read_sigma(value, scales[entry.field], key, f"{where}: [{entry.table}] {key}")
+        entry.field: _read_sigma(value, scales[entry.field], key, f"[{entry.table}] {key}")
         for entry, key, value in stated
     }
     return {**values, "sigmas": sigmas}

@@ -48,7 +48,7 @@ def groups(factor: Floats, *, is_term: bool = True, error: float = 0.02, exponen
 
 def table_of(kind: str) -> pd.DataFrame:
     """A couple on the head from the spin of the tails: a resonance at 112 rpm, a threshold at 95, or a power."""
-    name = place_named(PLACE).effect(Powers()).name
+    name = place_named(PLACE).law(Powers()).name
     u = np.array(SPEEDS)
     shapes = {"resonance": 100 / ((u - 112) ** 2 + 100), "threshold": np.maximum(u / 95 - 1, 0), "power": u / 110}
     sizes, design = (SIZES[kind] * shapes[kind]).tolist(), {"motor_rpm": SPEEDS}

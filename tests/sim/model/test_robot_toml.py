@@ -152,7 +152,7 @@ def test_what_is_written_is_read_back_to_the_last_bit(
     )  # fmt: skip
     tables = tomllib.loads(robot_toml(robot))
     name = tables.pop("name")
-    assert Robot(name=name, **read_robot(tables, "robot.toml")) == robot
+    assert Robot(name=name, **read_robot(tables)) == robot
 
 
 def test_numbers_of_the_presets() -> None:
