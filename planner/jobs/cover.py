@@ -18,11 +18,10 @@ import numpy as np
 
 from planner.goal.dubins import DubinsPaths
 from planner.jobs.shortest_order import EXACT, MOST, Order, shortest_order
-from planner.jobs.travel import SLACK, Travel, pivot_poses, plan_track, preferred_setting
+from planner.jobs.travel import SLACK, Travel, plan_track, preferred_setting
 from planner.paths.distance import distance_to
 from planner.paths.obstacles import Circle, FreeSpace, Region
 from planner.paths.path import arc_length, points_at
-from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab
 from planner.planning.picture import DECLARED
 from planner.planning.plan import Job, Plan
@@ -165,13 +164,6 @@ class _Cut(NamedTuple):
     left_out: float
 
 
-class _Lanes(NamedTuple):
-    """Lanes in an order, each with the end at which it begins."""
-
-    ends: Floats  # (k, 2, 2), in the order and direction in which they are swum
-    order: Order
-
-
 def cover(
     field: Field,
     width: float,
@@ -185,7 +177,7 @@ def cover(
     With feedback, the share that is certain is the one within the error with it.
     """
     robot, space, setting = tracked.robot, request.space, preferred_setting(tracked, request)
-    straight, drift = setting.straight, setting.drift
+    straight = setting.straight
     swath = width - 2 * straight.largest
     if not (math.isfinite(width) and swath > 0.3 * width):
         zigzags = in_lab(2 * straight.largest, robot)
@@ -193,14 +185,14 @@ def cover(
             f"width {in_lab(width, robot)}: the robot's zigzag alone is {zigzags} wide; give a larger width, or "
             "shorter dwells"
         )
-    travel = Travel.of(tracked, straight, space, drift, 0.0)
+    travel = Travel.of(setting, space, 0.0)
     apart = _CROSSED * travel.radius
     angles = _angles(field) if angle is None else [angle]
     angles = [each for each in angles if across(field, each) < MOST * swath]
     if not angles:
         raise InputError(f"the region needs more than {MOST} lanes: widen them, or cover it in parts")
     cut = min(
-        (_clear(lanes(field, swath, each, apart=apart), travel, tracked, drift) for each in angles),
+        (_clear(lanes(field, swath, each, apart=apart), travel) for each in angles),
         key=partial(_estimate, travel),
     ).ends
     if not len(cut):
@@ -209,8 +201,8 @@ def cover(
         raise InputError(
             f"the region needs {len(cut)} lanes; at most {MOST} can be ordered: widen them, or cover it in parts"
         )
-    ordered = _ordered(cut, travel, tracked, drift)
-    plan = plan_track(partial(_track, ordered.ends, travel, tracked), setting, request, progress)
+    ends, order = _ordered(cut, travel)
+    plan = plan_track(lambda drift: _track(ends, travel.drifting(drift)), setting, request, progress)
 
     def sure(error: float) -> float:
         return share_covered(field, plan.reference, width - 2 * error) if width > 2 * error else 0.0
@@ -220,13 +212,13 @@ def cover(
     job = Coverage(
         field=field,
         width=width,
-        lanes=ordered.ends,
+        lanes=ends,
         share=share_covered(field, plan.track, width),
         sure=tracked_sure if request.feedback else sure(plan.stated_error),
         sure_tracked=tracked_sure,
         bound=len(points) * cell / (width * straight.net_speed),
         exact=len(cut) <= EXACT and space.empty,
-        gap=ordered.order.gap,
+        gap=order.gap,
     )
     return plan.with_job(job)
 
@@ -247,7 +239,7 @@ def _estimate(travel: Travel, cut: _Cut) -> float:
     return length / travel.straight + len(cut.ends) * 1.5 * math.pi * travel.radius / travel.turning
 
 
-def _clear(cut: Floats, travel: Travel, tracked: TrackedVehicle, drift: Drift) -> _Cut:
+def _clear(cut: Floats, travel: Travel) -> _Cut:
     """Move the ends of lanes to where the robot is clear, and leave out those for which there is no such place."""
     if travel.limits.space.empty:
         return _Cut(cut, 0.0)
@@ -256,38 +248,36 @@ def _clear(cut: Floats, travel: Travel, tracked: TrackedVehicle, drift: Drift) -
     result, found = cut.copy(), np.zeros(len(cut), dtype=bool)
     for more in _LONGER:
         moved = np.stack([cut[:, 0] - more * along, cut[:, 1] + more * along], 1)
-        begin, end = _ends(moved, tracked, drift)
+        begin, end = _ends(moved, travel)
         room = np.minimum(travel.limits.clearance(begin), travel.limits.clearance(end))
         better = (room > travel.margin + SLACK).any(1) & ~found & (length + 2 * more > 0)
         result[better], found = moved[better], found | better
     return _Cut(result[found], float(length[~found].sum()))
 
 
-def _ends(cut: Floats, tracked: TrackedVehicle, drift: Drift) -> tuple[Floats, Floats]:
+def _ends(cut: Floats, travel: Travel) -> tuple[Floats, Floats]:
     """Return the pivot's poses (k, 2, 3) at the begin and at the end of lanes, swum forwards and backwards."""
     along = cut[:, 1] - cut[:, 0]
     course = np.arctan2(along[:, 1], along[:, 0])
     courses = np.stack([course, course + math.pi], 1)
-    begin = pivot_poses(cut, courses, tracked, drift)
-    end = pivot_poses(cut[:, ::-1], courses, tracked, drift)
-    return begin, end
+    return travel.poses(cut, courses), travel.poses(cut[:, ::-1], courses)
 
 
-def _ordered(cut: Floats, travel: Travel, tracked: TrackedVehicle, drift: Drift) -> _Lanes:
-    """Order the lanes, and choose the end at which each begins."""
-    begin, end = _ends(cut, tracked, drift)
+def _ordered(cut: Floats, travel: Travel) -> tuple[Floats, Order]:
+    """Order the lanes (k, 2, 2), and choose the end at which each begins."""
+    begin, end = _ends(cut, travel)
     count = len(cut)
     starts, goals = end.reshape(-1, 3), begin.reshape(-1, 3)
     rows, columns = (part.ravel() for part in np.indices((2 * count, 2 * count)))
     costs = travel.times(starts[rows], goals[columns]).reshape(count, 2, count, 2)
     order = shortest_order(costs, np.zeros((count, 2)), np.zeros((count, 2)))
     ends = [cut[k] if option == 0 else cut[k, ::-1] for k, option in zip(order.visits, order.options, strict=True)]
-    return _Lanes(np.array(ends), order)
+    return np.array(ends), order
 
 
-def _track(ends: Floats, travel: Travel, tracked: TrackedVehicle, drift: Drift) -> DubinsPaths:
+def _track(ends: Floats, travel: Travel) -> DubinsPaths:
     """Join lanes by the quickest tracks between them."""
-    begin, end = (poses[:, 0] for poses in _ends(ends, tracked, drift))
+    begin, end = (poses[:, 0] for poses in _ends(ends, travel))
     length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
     parts = []
     for k in range(len(ends)):

@@ -13,18 +13,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from planner.goal.dubins import DubinsPaths
 from planner.jobs.shortest_order import EXACT, best_options, shortest_order
-from planner.jobs.travel import SLACK, Travel, pivot_poses, plan_track, preferred_setting
+from planner.jobs.travel import SLACK, Travel, plan_track, preferred_setting
 from planner.paths.distance import distance_to
-from planner.paths.obstacles import FreeSpace
 from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.picture import REPLAYED, label_points
@@ -118,17 +117,15 @@ def tour(
     progress: Progress | None = None,
 ) -> Plan[Visits]:
     """Plan a tour in which the tracked point passes places, see `planner.api.tour`."""
-    task = _Tour(_checked(places), tracked, request.space, any_start=any_start, back=back)
-    setting = preferred_setting(tracked, request)
-    straight, drift = setting.straight, setting.drift
-    margin = 1.5 * straight.largest
+    task, setting = _Tour(_checked(places), any_start, back), preferred_setting(tracked, request)
+    margin = 1.5 * setting.straight.largest
     for _ in range(_MARGINS):
-        found = task.ordered(Travel.of(tracked, straight, task.space, drift, margin))
+        found = task.ordered(Travel.of(setting, request.space, margin))
         plan = plan_track(partial(task.track, found), setting, request, progress)
         if plan.kept_clear is None or not plan.kept_clear.detours or plan.kept_clear.margin <= margin:
             break
         margin = plan.kept_clear.margin
-    return plan.with_job(task.visits(plan, found))
+    return plan.with_job(task.visits(plan, found.job))
 
 
 def _checked(places: Sequence[Sequence[float]]) -> Floats:
@@ -143,42 +140,34 @@ def _checked(places: Sequence[Sequence[float]]) -> Floats:
     return table
 
 
-@dataclass(frozen=True)
-class _Ordered:
+class _Ordered(NamedTuple):
     """An order of places with a direction of motion at each."""
 
-    order: tuple[int, ...]  # indices of places
-    courses: Floats
-    estimate: float
-    exact: bool
-    gap: float
-    tried: int  # directions of motion at each place
+    job: Visits  # without times and distances
+    courses: Floats  # (k,)
     travel: Travel
 
 
-@dataclass
-class _Tour:
-    """The places of a tour, and the vehicle that visits them."""
+class _Tour(NamedTuple):
+    """The places of a tour, and how it begins and ends."""
 
     places: Floats
-    tracked: TrackedVehicle
-    space: FreeSpace
-    any_start: bool = field(kw_only=True)
-    back: bool = field(kw_only=True)
+    any_start: bool
+    back: bool
 
     def ordered(self, travel: Travel) -> _Ordered:
         """Find the order, and refine the directions of motion."""
         count = len(self.places)
-        exact = count - (not self.any_start) <= EXACT and self.space.empty
+        exact = count - (not self.any_start) <= EXACT and travel.limits.space.empty
         options = COURSES if exact else FEWER_COURSES
         courses = 2 * math.pi * np.arange(options) / options
-        poses = pivot_poses(self.places[:, None], np.tile(courses, (count, 1)), self.tracked, travel.limits.drift)
+        poses = travel.poses(self.places[:, None], np.tile(courses, (count, 1)))
         free = travel.limits.clearance(poses) >= travel.margin + SLACK
         if not free.any(1).all():
             blocked = int(free.any(1).argmin())
             x, y = self.places[blocked].tolist()
             raise InputError(
-                f"place {blocked + 1} at {place_in_lab(x, y, self.tracked.robot)} cannot be visited: with "
+                f"place {blocked + 1} at {place_in_lab(x, y, travel.tracked.robot)} cannot be visited: with "
                 "every heading the robot touches what it must keep clear of; move the place away from it"
             )
         flat = poses.reshape(-1, 3)
@@ -196,7 +185,9 @@ class _Tour:
             order += order[: self.back]
             refined.append((*self._refined(order, courses, travel), order))
         chosen, estimate, order = min(refined, key=itemgetter(1))
-        return _Ordered(tuple(order), chosen, estimate, exact, best.gap, options, travel)
+        unknown = np.zeros(0)
+        job = Visits(self.places, tuple(order), exact, best.gap, estimate, unknown, unknown, options)
+        return _Ordered(job, chosen, travel)
 
     def _refined(self, order: list[int], courses: Floats, travel: Travel) -> tuple[Floats, float]:
         """Find the directions of motion with which an order takes the least time."""
@@ -204,7 +195,7 @@ class _Tour:
         step = float(courses[1])
         choices = np.tile(courses, (len(order), 1))
         for _ in range(_FINER + 1):
-            poses = pivot_poses(places[:, None], choices, self.tracked, travel.limits.drift)
+            poses = travel.poses(places[:, None], choices)
             chosen, total = _quickest(poses, travel)
             step /= 3
             choices = chosen[:, None] + step * np.arange(-3, 4)
@@ -212,31 +203,29 @@ class _Tour:
 
     def track(self, found: _Ordered, drift: Drift) -> DubinsPaths:
         """Join the places by tracks of the pivot."""
-        travel = replace(found.travel, limits=replace(found.travel.limits, drift=drift))
-        poses = pivot_poses(self.places[list(found.order)], found.courses, self.tracked, drift)
+        travel = found.travel.drifting(drift)
+        poses = travel.poses(self.places[list(found.job.order)], found.courses)
         return travel.tracks(poses[:-1], poses[1:])
 
-    def visits(self, plan: Plan, found: _Ordered) -> Visits:
+    def visits(self, plan: Plan, job: Visits) -> Visits:
         """Compare the predicted track with the places.
 
         Raises:
             InputError: a way around leaves a place aside.
         """
-        visited = self.places[list(found.order)]
+        visited = self.places[list(job.order)]
         aside = distance_to(plan.reference, visited)
         if aside.max() > _MISSED:
             worst = int(aside.argmax())
             x, y = visited[worst].tolist()
             raise InputError(
-                f"place {found.order[worst] + 1} at {place_in_lab(x, y, plan.robot)} cannot be visited: the way "
+                f"place {job.order[worst] + 1} at {place_in_lab(x, y, plan.robot)} cannot be visited: the way "
                 f"around obstacles passes it at {in_lab(float(aside[worst]), plan.robot)}; move it away from them"
             )
         samples = (len(plan.track) - 1) // len(plan.dwells)
         times = np.concatenate([[0.0], np.cumsum(np.repeat(plan.dwells / samples, samples))])
         reached, distance = _passed(plan.track, times, visited, before=plan.predicted_max)
-        return Visits(
-            self.places, found.order, found.exact, found.gap, found.estimate, reached, distance, found.tried
-        )
+        return replace(job, reached=reached, distance=distance)
 
 
 def _quickest(poses: Floats, travel: Travel) -> tuple[Floats, float]:

@@ -9,7 +9,7 @@ Poses whose body is not free are not reached. Times in μ0 l⁴/EI, lengths in l
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest, Progress
 from planner.planning.solve import Change, Setting, Task, solve
 from planner.vehicle.tracked_point import TrackedVehicle
-from planner.vehicle.zigzag import Zigzag, dwells_for
+from planner.vehicle.zigzag import dwells_for
 from sim.arrays import Floats, Integers
 
 WORDS = 3  # tried among obstacles
@@ -39,19 +39,28 @@ _SPACING = 0.02  # l, of the reference's points
 class Travel:
     """The pivot's turns, its speeds, and what its tracks must keep clear of."""
 
+    tracked: TrackedVehicle  # who travels
     limits: RouteLimits  # its turn radius is wider than the narrowest one, as for a path that is followed as drawn
     margin: float  # around the body
     straight: float  # speed on straight lines
     turning: float  # speed in turns
 
     @staticmethod
-    def of(tracked: TrackedVehicle, zigzag: Zigzag, space: FreeSpace, drift: Drift, margin: float) -> Travel:
+    def of(setting: Setting, space: FreeSpace, margin: float) -> Travel:
         """Take the vehicle's radius and speeds."""
-        vehicle = tracked.vehicle
-        own = float(np.abs(vehicle.twist[:, 0]).mean())
-        straight = zigzag.net_speed
-        limits = RouteLimits(vehicle.pivot_radius / AS_DRAWN, tracked.body, space, drift)
-        return Travel(limits, margin, straight, straight + AS_DRAWN * (own - straight))
+        tracked, straight = setting.tracked, setting.straight.net_speed
+        own = float(np.abs(tracked.vehicle.twist[:, 0]).mean())
+        limits = RouteLimits(tracked.vehicle.pivot_radius / AS_DRAWN, tracked.body, space, setting.drift)
+        return Travel(tracked, limits, margin, straight, straight + AS_DRAWN * (own - straight))
+
+    def drifting(self, drift: Drift) -> Travel:
+        """Travel with another drift."""
+        return replace(self, limits=replace(self.limits, drift=drift))
+
+    def poses(self, places: Floats, courses: Floats) -> Floats:
+        """Return the pivot's poses (..., 3), place and course, where the tracked point is at places (..., 2)."""
+        axis = axis_at(courses - self.limits.drift.slip_along(courses))
+        return np.concatenate([places - self.tracked.rod * axis, courses[..., None]], -1)
 
     @property
     def radius(self) -> float:
@@ -98,13 +107,6 @@ def preferred_setting(tracked: TrackedVehicle, request: PlanRequest) -> Setting:
     """Return the vehicle with the dwell that the objective prefers."""
     least = request.least_dwell(tracked.robot)
     return Setting.of(tracked, request.dwell or dwells_for(tracked.vehicle, request.objective, least)[0])
-
-
-def pivot_poses(places: Floats, courses: Floats, tracked: TrackedVehicle, drift: Drift) -> Floats:
-    """Return the pivot's poses (..., 3), place and course, where the tracked point is at places (..., 2)."""
-    heading = courses - drift.slip_along(courses)
-    axis = axis_at(heading)
-    return np.concatenate([places - tracked.rod * axis, courses[..., None]], -1)
 
 
 def plan_track(
