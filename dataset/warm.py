@@ -10,8 +10,8 @@ from scipy.stats import qmc
 import dataset.workers  # noqa: F401
 from dataset.schema import rows_version
 from dataset.simulate import HISTORY, simulate
-from sim.compiling import all_compiled
 from sim.model.presets import PRESETS
+from sim.motion.warm import all_compiled
 
 rows_version()
 qmc.Sobol(1)  # reads its numbers

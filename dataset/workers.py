@@ -186,13 +186,12 @@ def simulate_here(points: dict[str, Any], sensitivities: bool) -> dict[str, Any]
 
 def compile_on_this_host() -> None:
     """Compile the simulator's loops unless that has been done; one process of a host does, the others wait."""
-    from sim.compiling import CACHE, all_compiled
+    from sim.jit import CACHE
+    from sim.motion.warm import all_compiled, compile_all
 
     if all_compiled():
         return
     with open(CACHE / f"{socket.gethostname()}.lock", "a") as lock:  # nobody else can put a link there
         fcntl.flock(lock, fcntl.LOCK_EX)
-        from sim.motion.warm import compile_once
-
-        if not compile_once():
-            raise InputError("the simulator's loops do not compile; softflagella sim compile says why")
+        if not all_compiled():
+            compile_all()

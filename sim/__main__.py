@@ -87,8 +87,6 @@ def _branches(
         raise InputError(f"{what}; give the range of one input, such as --speed 20:200")
     ((name, words),) = given.items()
     low, high = read_range(name, words)
-    from sim.compile_stages import saying_first_use
-    from sim.compiling import CACHE
     from sim.inputs import load_robot
     from sim.motion.batches import one_thread
     from sim.motion.branch_report import special_rows, summary, write_branches
@@ -96,7 +94,7 @@ def _branches(
     from sim.motion.swept_input import SweptInput
 
     swept = SweptInput(load_robot(robot), name, low, high)
-    with one_thread(), saying_first_use("sim", CACHE):
+    with one_thread():
         result = find_branches(swept, steps=steps, progress=lambda line: print(line, file=sys.stderr, flush=True))
     files = write_branches(result, out)
     print(summary(result))
@@ -174,7 +172,7 @@ def _check() -> None:
 @program.command("compile")
 def _compile() -> None:
     """Compile the simulator's loops now rather than on first use."""
-    from sim.compiling import CACHE
+    from sim.jit import CACHE
     from sim.motion.warm import compile_all
 
     print(f"loops compiled in {compile_all():.0f} s -> {CACHE}")

@@ -16,8 +16,7 @@ from numba import types
 from numba.core.cgutils import get_or_insert_function, unpack_tuple
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.typeconv import Conversion
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, lower_cast, models, overload, register_model
+from numba.extending import lower_builtin, lower_cast, models, overload, register_model, type_callable
 from numba.np.arrayobj import make_array, populate_array
 
 from sim import lanes as plain
@@ -54,16 +53,18 @@ def _kind(*arguments: Any) -> Lanes | None:
     return found[0] if found and others and len(set(found)) == 1 else None
 
 
-def constant(kind: Lanes, value: float) -> Any:
-    """Return a vector with a number in all lanes."""
+def constant(kind: Any, value: float) -> Any:
+    """Return a number, in all lanes where the type is one of vectors."""
+    if not isinstance(kind, Lanes):
+        return ir.Constant(ir.DoubleType(), value)
     return ir.Constant(ir.VectorType(ir.DoubleType(), kind.width), [value] * kind.width)
 
 
-def _mask(builder: Any, value: Any, kind: Lanes) -> Any:
+def _mask(builder: Any, value: Any, kind: Any) -> Any:
     return builder.fcmp_unordered("!=", value, constant(kind, 0.0))
 
 
-def _from_mask(builder: Any, mask: Any, kind: Lanes) -> Any:
+def _from_mask(builder: Any, mask: Any, kind: Any) -> Any:
     return builder.select(mask, constant(kind, 1.0), constant(kind, 0.0))
 
 
@@ -86,17 +87,14 @@ _BINARY = {
 }
 
 
-def _teach_operator(symbol: Any, instruction: str) -> None:
+def _operate(symbol: Any, instruction: str) -> None:
     """Teach numba an operator of two vectors, or of a vector and a number."""
 
-    class _Template(AbstractTemplate):
-        key = symbol
+    def typed(a: Any, b: Any) -> Any:
+        kind = _kind(a, b)
+        return kind and kind(kind, kind)
 
-        def generic(self, args: Any, kws: Any) -> Any:
-            kind = _kind(*args) if len(args) == 2 else None
-            return kind and signature(kind, kind, kind)
-
-    infer_global(symbol)(_Template)
+    type_callable(symbol)(lambda context: typed)
 
     @lower_builtin(symbol, Lanes, Lanes)
     def _(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -105,15 +103,9 @@ def _teach_operator(symbol: Any, instruction: str) -> None:
 
 for _instruction, _symbols in _BINARY.items():
     for _symbol in _symbols:
-        _teach_operator(_symbol, _instruction)
+        _operate(_symbol, _instruction)
 
-
-@infer_global(operator.neg)
-class _Negative(AbstractTemplate):
-    key = operator.neg
-
-    def generic(self, args: Any, kws: Any) -> Any:
-        return signature(args[0], args[0]) if isinstance(args[0], Lanes) else None
+type_callable(operator.neg)(lambda context: lambda a: a if isinstance(a, Lanes) else None)
 
 
 @lower_builtin(operator.neg, Lanes)
@@ -130,30 +122,9 @@ def _call(builder: Any, name: str, arguments: Any) -> Any:
     )
 
 
-def _elementwise(name: str) -> Any:
-    """Make an intrinsic of LLVM's function of one vector."""
-
-    @intrinsic
-    def function(typingctx: Any, a: Any) -> Any:
-        def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            return _call(builder, name, args)
-
-        return signature(a, a), code
-
-    return function
-
-
-_root, _magnitude = _elementwise("sqrt"), _elementwise("fabs")
-
-
-@overload(np.sqrt, strict=False)
-def _sqrt(a: Any) -> Any:
-    return (lambda a: _root(a)) if isinstance(a, Lanes) else None
-
-
-@overload(abs, strict=False)
-def _abs(a: Any) -> Any:
-    return (lambda a: _magnitude(a)) if isinstance(a, Lanes) else None
+for _function, _name in ((np.sqrt, "sqrt"), (abs, "fabs")):
+    type_callable(_function)(lambda context: lambda a: a if isinstance(a, Lanes) else None)
+    lower_builtin(_function, Lanes)(lambda context, builder, sig, args, name=_name: _call(builder, name, args))
 
 
 def _by_lane(function: Any) -> Any:
@@ -179,99 +150,105 @@ overload(np.cos, strict=False)(_by_lane(np.cos))
 overload(np.sin, strict=False)(_by_lane(np.sin))
 
 
-@intrinsic
-def _fused(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
-    kind = _kind(a, b, c) or types.float64
+def _teach(function: Any, typed: Any) -> Any:
+    """Teach numba a function of `sim.lanes`: its signature for some types, or None, and its code (a decorator).
 
-    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return _call(builder, "fma", args) if isinstance(kind, Lanes) else builder.fma(*args)
-
-    return signature(kind, kind, kind, kind), code
-
-
-@intrinsic
-def _less(typingctx: Any, a: Any, b: Any) -> Any:
-    kind = _kind(a, b)
-
-    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return _from_mask(builder, builder.fcmp_ordered("<", *args), kind)
-
-    return signature(kind, kind, kind), code
+    The code stands in each caller; an overload would be a function of its own, compiled for each of its types.
+    """
+    type_callable(function)(lambda context: typed)
+    return lower_builtin(function, types.VarArg(types.Any))
 
 
-@intrinsic
-def _choose(typingctx: Any, condition: Any, a: Any, b: Any) -> Any:
-    kind = _kind(condition, a, b)
-
-    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.select(_mask(builder, args[0], kind), args[1], args[2])
-
-    return signature(kind, kind, kind, kind), code
+def _numbers(*arguments: Any) -> Any:
+    """Return the type of vectors among some arguments, float64 if all are numbers, None if they are neither."""
+    plain_numbers = all(isinstance(a, types.Integer | types.Float | types.Boolean) for a in arguments)
+    return _kind(*arguments) or (types.float64 if plain_numbers else None)
 
 
-@intrinsic
-def _larger(typingctx: Any, a: Any, b: Any) -> Any:
-    kind = _kind(a, b)
-
-    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        first = builder.or_(builder.fcmp_ordered(">", *args), builder.fcmp_unordered("uno", args[0], args[0]))
-        return builder.select(first, *args)
-
-    return signature(kind, kind, kind), code
+def _two(a: Any, b: Any) -> Any:
+    kind = _numbers(a, b)
+    return kind and kind(kind, kind)
 
 
-@intrinsic
-def _somewhere(typingctx: Any, condition: Any) -> Any:
-    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        mask = _mask(builder, args[0], sig.args[0])
-        bits = builder.bitcast(mask, ir.IntType(sig.args[0].width))
-        return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
-
-    return signature(types.boolean, condition), code
+def _three(a: Any, b: Any, c: Any) -> Any:
+    kind = _numbers(a, b, c)
+    return kind and kind(kind, kind, kind)
 
 
-@intrinsic
-def _lane(typingctx: Any, value: Any, i: Any) -> Any:
-    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.extract_element(args[0], builder.trunc(args[1], ir.IntType(32)))
-
-    return signature(types.float64, value, types.int64), code
+@_teach(plain.fma, _three)
+def _fma(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return _call(builder, "fma", args) if isinstance(sig.return_type, Lanes) else builder.fma(*args)
 
 
-@intrinsic
-def _with_lane(typingctx: Any, value: Any, i: Any, number: Any) -> Any:
-    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.insert_element(args[0], args[2], builder.trunc(args[1], ir.IntType(32)))
-
-    return signature(value, value, types.int64, types.float64), code
+@_teach(plain.less, _two)
+def _less(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return _from_mask(builder, builder.fcmp_ordered("<", *args), sig.return_type)
 
 
-@intrinsic
-def _view(typingctx: Any, array: Any, width: Any) -> Any:
+@_teach(plain.choose, _three)
+def _choose(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.select(_mask(builder, args[0], sig.return_type), args[1], args[2])
+
+
+@_teach(plain.larger, _two)
+def _larger(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    first = builder.or_(builder.fcmp_ordered(">", *args), builder.fcmp_unordered("uno", args[0], args[0]))
+    return builder.select(first, *args)
+
+
+@_teach(plain.smaller, _two)
+def _smaller(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.select(builder.fcmp_ordered("<", *args), *args)
+
+
+@_teach(plain.somewhere, lambda condition: types.boolean(_numbers(condition)))
+def _somewhere(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    mask = _mask(builder, args[0], sig.args[0])
+    if not isinstance(sig.args[0], Lanes):
+        return mask
+    bits = builder.bitcast(mask, ir.IntType(sig.args[0].width))
+    return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+
+
+@_teach(plain.lane, lambda value, i: types.float64(_numbers(value), types.int64))
+def _lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    if not isinstance(sig.args[0], Lanes):
+        return args[0]
+    return builder.extract_element(args[0], builder.trunc(args[1], ir.IntType(32)))
+
+
+@_teach(plain.with_lane, lambda value, i, number: _numbers(value)(_numbers(value), types.int64, types.float64))
+def _with_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    if not isinstance(sig.args[0], Lanes):
+        return args[2]
+    return builder.insert_element(args[0], args[2], builder.trunc(args[1], ir.IntType(32)))
+
+
+@_teach(plain.count_lanes, lambda value: types.int64(_numbers(value)))
+def _count_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return context.get_constant(types.int64, sig.args[0].width if isinstance(sig.args[0], Lanes) else 1)
+
+
+def _vectors(array: Any, width: Any) -> Any:
+    return types.Array(Lanes(len(width)), array.ndim - 1, "C", aligned=False)(array, width)
+
+
+@_teach(plain.lanes, _vectors)
+def _view(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     """View numbers (…, W) as vectors (…)."""
-    kind = types.Array(Lanes(len(width)), array.ndim - 1, "C", aligned=False)
-
-    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        numbers = make_array(sig.args[0])(context, builder, args[0])
-        vectors = make_array(kind)(context, builder)
-        pointer = context.get_data_type(kind.dtype).as_pointer()
-        populate_array(
-            vectors,
-            data=builder.bitcast(numbers.data, pointer),
-            shape=unpack_tuple(builder, numbers.shape)[:-1],
-            strides=unpack_tuple(builder, numbers.strides)[:-1],
-            itemsize=context.get_constant(types.intp, 8 * kind.dtype.width),
-            meminfo=numbers.meminfo,
-            parent=numbers.parent,
-        )
-        return impl_ret_borrowed(context, builder, kind, vectors._getvalue())
-
-    return signature(kind, array, width), code
-
-
-@overload(plain.lanes, strict=False)
-def _lanes(array: Any, width: Any) -> Any:
-    return lambda array, width: _view(array, width)
+    kind = sig.return_type
+    numbers = make_array(sig.args[0])(context, builder, args[0])
+    vectors = make_array(kind)(context, builder)
+    populate_array(
+        vectors,
+        data=builder.bitcast(numbers.data, context.get_data_type(kind.dtype).as_pointer()),
+        shape=unpack_tuple(builder, numbers.shape)[:-1],
+        strides=unpack_tuple(builder, numbers.strides)[:-1],
+        itemsize=context.get_constant(types.intp, 8 * kind.dtype.width),
+        meminfo=numbers.meminfo,
+        parent=numbers.parent,
+    )
+    return impl_ret_borrowed(context, builder, kind, vectors._getvalue())
 
 
 def _allocated(allocate: Any) -> Any:
@@ -289,7 +266,7 @@ def _allocated(allocate: Any) -> Any:
                 size *= extent
             numbers = allocate(size + LINE)
             first = (-numbers.ctypes.data // 8) % LINE
-            return _view(numbers[first : first + size].reshape((*shape, count)), width)
+            return plain.lanes(numbers[first : first + size].reshape((*shape, count)), width)
 
         return code
 
@@ -300,73 +277,16 @@ overload(plain.zeros, strict=False)(_allocated(np.zeros))
 overload(plain.empty, strict=False)(_allocated(np.empty))
 
 
-@overload(plain.lane, strict=False)
-def _lane_of(value: Any, i: Any) -> Any:
-    return (lambda value, i: _lane(value, i)) if isinstance(value, Lanes) else (lambda value, i: value)
+def _named(like: Any, values: Any) -> Any:
+    return types.NamedUniTuple(values.dtype, len(like), like.instance_class)(like, values)
 
 
-@overload(plain.count_lanes, strict=False)
-def _count_lanes(value: Any) -> Any:
-    count = value.width if isinstance(value, Lanes) else 1
-    return lambda value: count
-
-
-@overload(plain.with_lane, strict=False)
-def _lane_set(value: Any, i: Any, number: Any) -> Any:
-    if isinstance(value, Lanes):
-        return lambda value, i, number: _with_lane(value, i, number)
-    return lambda value, i, number: number
-
-
-@intrinsic
-def _named_like(typingctx: Any, like: Any, values: Any) -> Any:
-    kind = types.NamedUniTuple(values.dtype, len(like), like.instance_class)
-
-    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        first = make_array(sig.args[1])(context, builder, args[1]).data
-        places = (builder.gep(first, [context.get_constant(types.intp, i)]) for i in range(len(kind)))
-        return context.make_tuple(builder, kind, [builder.load(place, align=8) for place in places])
-
-    return signature(kind, like, values), code
-
-
-@overload(plain.named_like, strict=False)
-def _under_names(like: Any, values: Any) -> Any:
-    return lambda like, values: _named_like(like, values)
-
-
-@overload(plain.fma, strict=False)
-def _fma(a: Any, b: Any, c: Any) -> Any:
-    return lambda a, b, c: _fused(a, b, c)
-
-
-@overload(plain.less, strict=False)
-def _is_less(a: Any, b: Any) -> Any:
-    return (lambda a, b: _less(a, b)) if _kind(a, b) else (lambda a, b: 1.0 if a < b else 0.0)
-
-
-@overload(plain.choose, strict=False)
-def _chosen(condition: Any, a: Any, b: Any) -> Any:
-    if _kind(condition, a, b):
-        return lambda condition, a, b: _choose(condition, a, b)
-    return lambda condition, a, b: a if condition != 0 else b
-
-
-@overload(plain.larger, strict=False)
-def _larger_of(a: Any, b: Any) -> Any:
-    return (lambda a, b: _larger(a, b)) if _kind(a, b) else (lambda a, b: a if a > b or a != a else b)
-
-
-@overload(plain.smaller, strict=False)
-def _smaller_of(a: Any, b: Any) -> Any:
-    return (lambda a, b: _choose(_less(a, b), a, b)) if _kind(a, b) else (lambda a, b: a if a < b else b)
-
-
-@overload(plain.somewhere, strict=False)
-def _is_somewhere(condition: Any) -> Any:
-    if isinstance(condition, Lanes):
-        return lambda condition: _somewhere(condition)
-    return lambda condition: condition != 0
+@_teach(plain.named_like, _named)
+def _named_like(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    kind = sig.return_type
+    first = make_array(sig.args[1])(context, builder, args[1]).data
+    places = (builder.gep(first, [context.get_constant(types.intp, i)]) for i in range(len(kind)))
+    return context.make_tuple(builder, kind, [builder.load(place, align=8) for place in places])
 
 
 def _place(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -376,28 +296,12 @@ def _place(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.gep(matrix.data, [builder.add(builder.mul(args[1], columns), args[2])])
 
 
-@intrinsic
-def _load(typingctx: Any, matrix: Any, i: Any, j: Any) -> Any:
-    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.load(_place(context, builder, sig, args), align=8)
-
-    return signature(matrix.dtype, matrix, types.intp, types.intp), code
+@_teach(plain.load, lambda matrix, i, j: matrix.dtype(matrix, types.intp, types.intp))
+def _load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.load(_place(context, builder, sig, args), align=8)
 
 
-@intrinsic
-def _store(typingctx: Any, matrix: Any, i: Any, j: Any, value: Any) -> Any:
-    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        builder.store(args[3], _place(context, builder, sig, args), align=8)
-        return context.get_dummy_value()
-
-    return signature(types.void, matrix, types.intp, types.intp, value), code
-
-
-@overload(plain.load, strict=False)
-def _loaded(matrix: Any, i: Any, j: Any) -> Any:
-    return (lambda matrix, i, j: _load(matrix, i, j)) if matrix.layout == "C" else None
-
-
-@overload(plain.store, strict=False)
-def _stored(matrix: Any, i: Any, j: Any, value: Any) -> Any:
-    return (lambda matrix, i, j, value: _store(matrix, i, j, value)) if matrix.layout == "C" else None
+@_teach(plain.store, lambda matrix, i, j, value: types.void(matrix, types.intp, types.intp, matrix.dtype))
+def _store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    builder.store(args[3], _place(context, builder, sig, args), align=8)
+    return context.get_dummy_value()

@@ -4,7 +4,7 @@ A compiled loop works on arrays of vectors with W lanes, a group of W robots. Ve
 compared like numbers; so a formula for one robot is one for a group as well. A lane never sees another lane. So
 the result of a robot depends neither on its neighbours in a group nor on W: operations are those of IEEE 754, in
 the order of the source, and products are only fused where the source says so (`fma`). Such loops are compiled by
-`sim.compiling.compiled_exactly`.
+`sim.jit.compiled`.
 
 A condition on lanes is a vector of 1 (true) and 0 (false), by which `choose` picks.
 

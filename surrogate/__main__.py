@@ -156,15 +156,15 @@ def _compile() -> None:
 
     import numpy as np
 
-    from sim.compiling import folder_of_package
     from sim.inputs import group_columns
+    from sim.jit import CACHE
     from sim.model.presets import PRESETS
     from surrogate.table_file import load
 
     began = perf_counter()
     robot = group_columns([PRESETS["paper-control"]])
     load().query({**robot, "dwell_bar": np.ones(1)}, intervals=True)
-    print(f"loops compiled in {perf_counter() - began:.0f} s -> {folder_of_package(Path(__file__).parent)}")
+    print(f"loops compiled in {perf_counter() - began:.0f} s -> {CACHE}")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Flags, Floats
-from sim.compiling import compiled
+from sim.jit import compiled_fast
 from surrogate.network import BLOCK, Layers, evaluate
 from surrogate.tails import (
     RESISTANCE,
@@ -33,7 +33,7 @@ _CHUNK = 1024  # robots whose states are in use at a time
 _SINGLE = len(SINGLE_INPUTS)
 
 
-@compiled
+@compiled_fast
 def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
     """Write `surrogate.tails.INPUTS` of one robot to x (7,)."""
     beta = np.arctan2(motion[0], motion[2])
@@ -41,7 +41,7 @@ def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
         x[i] = value
 
 
-@compiled
+@compiled_fast
 def network_inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
     """Write the inputs of the network of one robot to x: SINGLE_INPUTS to x (13,), else INPUTS to x (7,)."""
     if len(x) == _SINGLE:
@@ -51,7 +51,7 @@ def network_inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
         inputs_at(tail, motion, x)
 
 
-@compiled
+@compiled_fast
 def _residual(robot: Floats, motion: Floats, y: Floats, left: Floats) -> None:
     """Write what is left of the balance of forces for numbers y of the tails to left (4,)."""
     tail = robot[TAILS:]
@@ -65,7 +65,7 @@ def _residual(robot: Floats, motion: Floats, y: Floats, left: Floats) -> None:
             left[i] -= robot[RESISTANCE + 5 * i + j] * motion[j]
 
 
-@compiled
+@compiled_fast
 def _eliminate(rows: Floats) -> None:
     """Turn the left square of rows (n, m) into the identity, by Gauss and Jordan's method."""
     count = len(rows)
@@ -86,7 +86,7 @@ def _eliminate(rows: Floats) -> None:
                     rows[k, j] -= factor * rows[i, j]
 
 
-@compiled
+@compiled_fast
 def _first_guess(robot: Floats, motion: Floats, rows: Floats) -> None:
     """Write the motion with the torque and thrust of linear theory and the side forces of straight tails."""
     speed, gain, tail = robot[0], robot[1], robot[TAILS:]
@@ -111,7 +111,7 @@ def _first_guess(robot: Floats, motion: Floats, rows: Floats) -> None:
     motion[:3] = equations[:, 3]
 
 
-@compiled
+@compiled_fast
 def _first_inverse(robot: Floats, motion: Floats, y: Floats, left: Floats, inverse: Floats, room: Floats) -> None:
     """Write the inverse of the derivative of the balance with y fixed, by differences; `room` is (6, 8)."""
     rows, moved, after, largest = room[:4], room[4, :5], room[5, :4], 0.0
@@ -130,7 +130,7 @@ def _first_inverse(robot: Floats, motion: Floats, y: Floats, left: Floats, inver
     inverse[:] = rows[:, 4:]
 
 
-@compiled
+@compiled_fast
 def _update(inverse: Floats, step: Floats, before: Floats, left: Floats, room: Floats) -> None:
     """Update the inverse of the derivative after a step (Broyden's good update); `room` is (6, 8)."""
     change, predicted, along, size = room[0], room[1], room[2], 0.0
@@ -148,7 +148,7 @@ def _update(inverse: Floats, step: Floats, before: Floats, left: Floats, room: F
                 inverse[i, j] += (step[i] - predicted[i]) * along[j] / size
 
 
-@compiled
+@compiled_fast
 def _take_step(robot: Floats, motion: Floats, left: Floats, inverse: Floats, step: Floats) -> float:
     """Take a step, and return the size of the correction; NaN if the tails no longer turn with the motor."""
     for i in range(4):
@@ -166,7 +166,7 @@ def _take_step(robot: Floats, motion: Floats, left: Floats, inverse: Floats, ste
     return size if motion[4] > 0 else np.nan
 
 
-@compiled
+@compiled_fast
 def _solve(network: Layers, robots: Floats, motion: Floats, found: Flags) -> None:
     """Write the motions of robots, and which were found."""
     count, inputs = len(robots), network.first.shape[2]
@@ -199,7 +199,7 @@ def _solve(network: Layers, robots: Floats, motion: Floats, found: Flags) -> Non
             break
 
 
-@compiled
+@compiled_fast
 def solve(network: Layers, robots: Floats) -> tuple[Floats, Flags]:
     """Return (v_x, v_z, ω_yr, ω_h, ω_t) for a positive motor, (M, 5), and which were found, (M,).
 

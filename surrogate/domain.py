@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Integers
-from sim.compiling import compiled
+from sim.jit import compiled_fast
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from surrogate.network import BLOCK, product
 
@@ -133,7 +133,7 @@ def _monomials(x: Floats) -> Floats:
     return np.column_stack(columns)
 
 
-@compiled
+@compiled_fast
 def put_novelty(support: SupportNumbers, inputs: Floats, novelty: Floats) -> None:
     """Write `Support.novelty` at inputs (M, F) of a block to novelty (M,)."""
     count, size = inputs.shape
@@ -154,7 +154,7 @@ def put_novelty(support: SupportNumbers, inputs: Floats, novelty: Floats) -> Non
         novelty[k] = max(total, away) if away > _END else total
 
 
-@compiled
+@compiled_fast
 def novelty_of(shift: Floats, scale: Floats, inverse: Floats, products: Integers, inputs: Floats) -> Floats:
     """Return `Support.novelty` at inputs (M, F), (M,)."""
     novelty = np.empty(len(inputs))

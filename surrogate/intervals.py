@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Flags, Floats, Integers
-from sim.compiling import compiled
+from sim.jit import compiled_fast
 from surrogate.errors import ITSELF, ONE, OUTPUTS, SCALES, SPEED, SURGE
 
 COVERAGE = 0.90
@@ -170,7 +170,7 @@ def _conformal_quantile(scores: Floats) -> float:
     return float(np.sort(scores)[rank - 1])
 
 
-@compiled
+@compiled_fast
 def _put_design(features: Floats, shift: Floats, scale: Floats, x: Floats, design: Floats) -> None:
     """Write 1, x and all products of two, (P,), for features as x (F,), held to five standard deviations."""
     count, place = len(x), 1 + len(x)
@@ -184,7 +184,7 @@ def _put_design(features: Floats, shift: Floats, scale: Floats, x: Floats, desig
             place += 1
 
 
-@compiled
+@compiled_fast
 def designs_of(features: Floats, shift: Floats, scale: Floats) -> Floats:
     """Return the terms of the logarithm of a local width, (M, P), for features (M, F)."""
     count, size = features.shape
@@ -194,7 +194,7 @@ def designs_of(features: Floats, shift: Floats, scale: Floats) -> Floats:
     return designs
 
 
-@compiled
+@compiled_fast
 def intervals_of(
     shift: Floats, scale: Floats, weights: Floats, bounds: Floats, middle: Floats, factors: Floats,
     kinds: Integers, places: Integers, features: Floats, couples: Flags, outputs: Floats,

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.arrays import Flags, Floats, Integers
-from sim.compiling import compiled
+from sim.jit import compiled_fast
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.balance import inputs_at, network_inputs_at, solve
 from surrogate.domain import FAST_YAW, INSIDE, MAX_YAW_SHARE, NO_MOTION, NOVEL, SupportNumbers, put_novelty
@@ -69,7 +69,7 @@ def rows_by_network(kind: Integers) -> Iterator[tuple[int, Integers | slice]]:
         yield k, slice(None) if len(present) == 1 else np.flatnonzero(kind == k)
 
 
-@compiled
+@compiled_fast
 def motions_of(
     w0: Floats, w1: Floats, w2: Floats, w3: Floats, w4: Floats, w5: Floats, g0: Floats, g1: Floats, g2: Floats,
     g3: Floats, g4: Floats, g5: Floats, shift: Floats, scale: Floats, inverse: Floats, products: Integers,
@@ -128,7 +128,7 @@ def motions_of(
     return motion, inputs, features, outside, outputs
 
 
-@compiled
+@compiled_fast
 def _put_outputs(robot: Floats, motion: Floats, share: float, outputs: Floats) -> None:
     """Write STEADY_OUTPUTS for a gap that is this share of the distance of the clamps."""
     sense, tail = robot[SENSE], robot[TAILS:]

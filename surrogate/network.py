@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.jit import compiled_fast
 
 BLOCK = 64  # robots that are evaluated together
 SHARED = ("shift", "scale", "mean", "spread")  # what the members have in common
@@ -129,7 +129,7 @@ def state_shapes(*, inputs: int, outputs: int, width: int, depth: int, members: 
     }
 
 
-@compiled
+@compiled_fast
 def tanh(x: float) -> float:
     """Return tanh x within 1e-15: p/q, the Padé approximant at x/4, whose argument is doubled twice.
 
@@ -144,7 +144,7 @@ def tanh(x: float) -> float:
     return p / q
 
 
-@compiled
+@compiled_fast
 def product(w: Floats, bias: Floats, x: Floats, y: Floats, triangular: bool) -> None:
     """Write W x + bias of robots x (M, F) to y (M, O), for an even O; entries above the diagonal may be left out.
 
@@ -178,7 +178,7 @@ def product(w: Floats, bias: Floats, x: Floats, y: Floats, triangular: bool) -> 
             y[k, j] = total
 
 
-@compiled
+@compiled_fast
 def evaluate(layers: Layers, x: Floats, y: Floats) -> None:
     """Write the mean of the members at inputs x (M, F) to y (M, O)."""
     count, inputs, width = len(x), x.shape[1], layers.first.shape[1]
@@ -204,7 +204,7 @@ def evaluate(layers: Layers, x: Floats, y: Floats) -> None:
                 y[row, j] += own[row, j]
 
 
-@compiled
+@compiled_fast
 def evaluate_all(
     shift: Floats, first: Floats, hidden: Floats, last: Floats, biases: Floats, rest: Floats, x: Floats
 ) -> Floats:

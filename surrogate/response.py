@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Integers
-from sim.compiling import compiled
+from sim.jit import compiled_fast
 from sim.mechanics.planar import zigzag_speed
 from sim.model.response import BEFORE, DWELLS, at_equal_dwells
 from sim.motion.steady_motion import STEADY_OUTPUTS
@@ -114,7 +114,7 @@ def along_axes(speeds: Floats, shape: tuple[int, ...]) -> Floats:
     return speeds.reshape(len(speeds), *[1] * (len(shape) - 1), 3)
 
 
-@compiled
+@compiled_fast
 def _put_flip_inputs(robot: Floats, motion: Floats, inputs: Floats, x: Floats, speeds: Floats) -> None:
     """Write the inputs of the networks of a flip (15,), and what their curves are multiplied by (3,)."""
     tail = robot[TAILS:]
@@ -126,7 +126,7 @@ def _put_flip_inputs(robot: Floats, motion: Floats, inputs: Floats, x: Floats, s
     speeds[0], speeds[1], speeds[2] = np.hypot(motion[1], SMALL_SURGE * sway), sway, motion[2]
 
 
-@compiled
+@compiled_fast
 def flip_inputs(robots: Floats, motion: Floats, inputs: Floats) -> tuple[Floats, Floats]:
     """Return inputs of the networks (M, 15), and (w, v_x, ω_yr), what the curves are divided by, (M, 3).
 
@@ -141,7 +141,7 @@ def flip_inputs(robots: Floats, motion: Floats, inputs: Floats) -> tuple[Floats,
     return x, speeds
 
 
-@compiled
+@compiled_fast
 def write_flips(
     l0: Floats, l1: Floats, l2: Floats, l3: Floats, l4: Floats, l5: Floats, m0: Floats, m1: Floats, m2: Floats,
     m3: Floats, m4: Floats, m5: Floats, mean: Floats, vectors: Floats, components: int, knots: Floats,

@@ -48,9 +48,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Flags, Floats, Integers
-from sim.compiling import compiled, formula
 from sim.effects import effect_named
 from sim.io.errors import InputError
+from sim.jit import compiled_fast, formula
 from sim.mechanics.drag import head_resistance, tail_coefficients
 from sim.model.groups import Groups
 from sim.solve.assembly import assemble
@@ -162,7 +162,7 @@ def robots_of(columns: Mapping[str, Floats]) -> Robots:
     )  # fmt: skip
 
 
-@compiled
+@compiled_fast
 def robots_of_groups(groups: Floats) -> Floats:
     """Return robots without effects as `pack_robots` packs them, (M, 39).
 

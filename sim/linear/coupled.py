@@ -24,7 +24,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.arrays import Floats
-from sim.compiling import compiled_exactly
+from sim.jit import compiled
 from sim.lanes import empty, fma, zeros
 from sim.linear.blocks import block, block_at
 from sim.linear.chains import Chains
@@ -52,7 +52,7 @@ class Coupling(NamedTuple):
     differentiation: Floats  # D, (M, M)
 
 
-@compiled_exactly
+@compiled
 def new_coupled(like: Floats, n: int, chains: int, instants: int) -> Coupled:
     """Allocate room for n ≥ 2 nodes in M chains and four unknowns of the body at each of P instants.
 
@@ -70,7 +70,7 @@ def new_coupled(like: Floats, n: int, chains: int, instants: int) -> Coupled:
     )
 
 
-@compiled_exactly
+@compiled
 def _fill(system: Coupled, chains: Chains, coupling: Coupling, s: Floats, k: int) -> None:
     """Fill the row of node k."""
     resistance, speed, differentiation = coupling
@@ -97,7 +97,7 @@ def _fill(system: Coupled, chains: Chains, coupling: Coupling, s: Floats, k: int
                 row[here, first + c] = chains.border[k, i, c, a]
 
 
-@compiled_exactly
+@compiled
 def factor_and_solve(system: Coupled, chains: Chains, coupling: Coupling, s: Floats, t: Floats) -> None:
     """Factor the equations and solve them: s (n, m) becomes δx, t (u,) becomes δu."""
     n, m, width = system.folded.shape
@@ -130,7 +130,7 @@ def factor_and_solve(system: Coupled, chains: Chains, coupling: Coupling, s: Flo
     _substitute(system, chains, s, t)
 
 
-@compiled_exactly
+@compiled
 def _multiply_blocks(a: Floats, blocks: Floats, out: Floats, first: int) -> None:
     """Set columns of `out` (m, ·) from `first` on to a (m, m) times a matrix of 3×3 blocks (M, 3, 3)."""
     for row in range(0, len(a), 3):
@@ -139,7 +139,7 @@ def _multiply_blocks(a: Floats, blocks: Floats, out: Floats, first: int) -> None
             multiply_block(block_at(a, row, at), blocks[chain], 0, 0, out, row, first + at, 3)
 
 
-@compiled_exactly
+@compiled
 def _fold_two_up(system: Coupled, chains: Chains, i: int) -> None:
     """Subtract A_{i−2,i} Z_i from row i − 2; the columns of node i − 1 go to A_{i−2,i−1}."""
     row, upper, folded = system.rows[(i - 2) % 3], system.upper[i - 1], system.folded[i]
@@ -152,7 +152,7 @@ def _fold_two_up(system: Coupled, chains: Chains, i: int) -> None:
         add_block_product(factor, folded, at, body + m, row, at, body, m)
 
 
-@compiled_exactly
+@compiled
 def _reduce_body(system: Coupled, chains: Chains) -> None:
     """Form the body's equations with all nodes eliminated, and factor them."""
     instants, count = chains.corner.shape[0], chains.diagonal.shape[1]
@@ -168,7 +168,9 @@ def _reduce_body(system: Coupled, chains: Chains) -> None:
     schur = system.schur
     schur[:] = 0.0
     for p in range(instants):
-        schur[4 * p : 4 * p + 4, 4 * p : 4 * p + 4] = chains.corner[p]
+        for a in range(4):
+            for c in range(4):
+                schur[4 * p + a, 4 * p + c] = chains.corner[p, a, c]
     for i in range(count):
         for c in range(4):
             row = schur[4 * (i % instants) + c]
@@ -179,7 +181,7 @@ def _reduce_body(system: Coupled, chains: Chains) -> None:
     factor_dense(schur, system.exchanged)
 
 
-@compiled_exactly
+@compiled
 def solve(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
     """Solve with the factors, in place: s (n, m) becomes δx, t (u,) becomes δu."""
     n, m = s.shape
@@ -199,7 +201,7 @@ def solve(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
     _substitute(system, chains, s, t)
 
 
-@compiled_exactly
+@compiled
 def _substitute(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
     """Solve for the body, then for the nodes from root to tip; on entry s has the values after the elimination."""
     n, m, width = system.folded.shape

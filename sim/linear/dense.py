@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from sim.arrays import Floats
-from sim.compiling import compiled_exactly
+from sim.jit import compiled
 from sim.lanes import choose, fma, less, somewhere
 from sim.linear.blocks import block_at
 from sim.linear.products import add_block_product, multiply_block
 from sim.linear.vectors import inverse, negative
 
 
-@compiled_exactly
+@compiled
 def invert(a: Floats) -> None:
     """Invert `a` (m, m) in place: Gauss-Jordan with 3×3 pivots, without exchanges."""
     m = a.shape[0]
@@ -31,7 +31,7 @@ def invert(a: Floats) -> None:
                 add_block_product(negative(factor), a, k, 0, a, i, 0, m)
 
 
-@compiled_exactly
+@compiled
 def factor_dense(a: Floats, exchanged: Floats) -> None:
     """Factor a (n, n) in place for `solve_factored`, with pivoting in each lane.
 
@@ -50,7 +50,7 @@ def factor_dense(a: Floats, exchanged: Floats) -> None:
             _subtract(a, k, i, k + 1, a[i, k])
 
 
-@compiled_exactly
+@compiled
 def solve_factored(a: Floats, exchanged: Floats, b: Floats) -> None:
     """Solve b = a⁻¹ b (n, K) in place with the factors that `factor_dense` left."""
     n = len(a)
@@ -63,7 +63,7 @@ def solve_factored(a: Floats, exchanged: Floats, b: Floats) -> None:
     _substitute(a, b)
 
 
-@compiled_exactly
+@compiled
 def _exchange(a: Floats, k: int, i: int, first: int, where: Any) -> None:
     """Exchange rows k and i from column `first` on, in the lanes where a condition holds."""
     for j in range(first, a.shape[1]):
@@ -71,14 +71,14 @@ def _exchange(a: Floats, k: int, i: int, first: int, where: Any) -> None:
         a[k, j], a[i, j] = choose(where, lower, upper), choose(where, upper, lower)
 
 
-@compiled_exactly
+@compiled
 def _subtract(a: Floats, k: int, i: int, first: int, factor: Any) -> None:
     """Subtract a multiple of row k from row i, from column `first` on."""
     for j in range(first, a.shape[1]):
         a[i, j] = fma(-factor, a[k, j], a[i, j])
 
 
-@compiled_exactly
+@compiled
 def _substitute(a: Floats, b: Floats) -> None:
     """Solve b = u⁻¹ b (n, K) in place, with u the upper triangle of a."""
     n, columns = b.shape

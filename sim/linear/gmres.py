@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled_exactly
+from sim.jit import compiled
 from sim.lanes import choose, empty, less, zeros
 from sim.linear.lane_arrays import divide, scalar_product, subtract_multiple
 
@@ -31,7 +31,7 @@ class Krylov(NamedTuple):
     right: Floats
 
 
-@compiled_exactly
+@compiled
 def new_krylov(like: Floats, size: int, most: int) -> Krylov:
     """Allocate room for `most` steps on vectors of `size` entries, of the kind of number that `like` holds."""
     return Krylov(
@@ -39,7 +39,7 @@ def new_krylov(like: Floats, size: int, most: int) -> Krylov:
     )
 
 
-@compiled_exactly
+@compiled
 def start(krylov: Krylov, b: Floats) -> Any:
     """Begin with the right-hand side b; returns its norm."""
     norm = np.sqrt(scalar_product(b, b))
@@ -48,7 +48,7 @@ def start(krylov: Krylov, b: Floats) -> Any:
     return norm
 
 
-@compiled_exactly
+@compiled
 def extend(krylov: Krylov, i: int, w: Floats, going: Any) -> Any:
     """Take in w, the image of basis vector i, where `going` is 1; w is changed. Returns the residual's norm."""
     basis, triangle, rotation, right = krylov
@@ -71,7 +71,7 @@ def extend(krylov: Krylov, i: int, w: Floats, going: Any) -> Any:
     return abs(left)
 
 
-@compiled_exactly
+@compiled
 def solution(krylov: Krylov, count: int, x: Floats) -> None:
     """Combine the first `count` basis vectors to the solution x."""
     right = krylov.right

@@ -10,26 +10,26 @@ from __future__ import annotations
 from typing import Any
 
 from sim.arrays import Floats
-from sim.compiling import compiled_exactly, formula
+from sim.jit import compiled, formula
 from sim.lanes import fma, load, store
 from sim.linear.vectors import Matrix, Vector
 
 _Four = tuple[Any, Any, Any, Any]
 
 
-@compiled_exactly
+@compiled
 def multiply(a: Floats, b: Floats, from_b: int, c: Floats, from_c: int, count: int) -> None:
     """Set `count` columns of c (m, ·) from `from_c` on to a (m, k) times those of b (k, ·) from `from_b` on."""
     _multiply(a, b, from_b, c, from_c, count, False)
 
 
-@compiled_exactly
+@compiled
 def subtract_product(a: Floats, b: Floats, from_b: int, c: Floats, from_c: int, count: int) -> None:
     """Subtract a (m, k) times `count` columns of b (k, ·) from columns of c (m, ·), as in `multiply`."""
     _multiply(a, b, from_b, c, from_c, count, True)
 
 
-@compiled_exactly
+@compiled
 def _multiply(a: Floats, b: Floats, from_b: int, c: Floats, from_c: int, count: int, subtract: bool) -> None:
     whole = count - count % 4
     for j in range(0, whole, 4):
@@ -112,7 +112,7 @@ def _put_three(c: Any, row: Any, at: Any, v: Vector) -> None:
     store(c, row + 2, at, v[2])
 
 
-@compiled_exactly
+@compiled
 def multiply_block(
     a: Matrix, b: Floats, row_b: int, from_b: int, c: Floats, row_c: int, from_c: int, count: int
 ) -> None:
@@ -131,7 +131,7 @@ def multiply_block(
         )
 
 
-@compiled_exactly
+@compiled
 def add_block_product(
     a: Matrix, b: Floats, row_b: int, from_b: int, c: Floats, row_c: int, from_c: int, count: int
 ) -> None:
@@ -150,7 +150,7 @@ def add_block_product(
         )
 
 
-@compiled_exactly
+@compiled
 def apply(a: Floats, from_a: int, x: Floats, count: int, y: Floats) -> None:
     """Set y (m,) to `count` columns of a (m, ·) from `from_a` on, times x."""
     for i in range(0, a.shape[0], 3):

@@ -11,10 +11,10 @@ from functools import cache
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled_exactly
+from sim.jit import compiled
 
 
-@compiled_exactly
+@compiled
 def differentiation(phases: int) -> Floats:
     """Differentiate the interpolant: the matrix d/dφ, (M, M)."""
     matrix = np.zeros((phases, phases))

@@ -4,14 +4,14 @@ A vector is (a_x, a_y, a_z); a matrix is a tuple of three such rows. A component
 multiplied: a number in a compiled loop, or a tensor with an entry for each node and robot. So a formula of
 `sim.mechanics` is written once and used by both.
 
-`sim.compiling.formula` marks such a function.
+`sim.jit.formula` marks such a function.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from sim.compiling import formula
+from sim.jit import formula
 
 Vector = tuple[Any, Any, Any]
 Matrix = tuple[Vector, Vector, Vector]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.jit import compiled
 
 
 @compiled

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.jit import compiled
 from sim.model.body import Body
 
 CREEP = 1e-3  # l EI/(μ0 l⁴)

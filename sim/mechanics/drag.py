@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.compiling import formula
+from sim.jit import formula
 from sim.linear.vectors import Matrix, Vector, dot, minus, outer, plus, plus_identity, times
 
 

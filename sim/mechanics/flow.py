@@ -35,7 +35,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Integers
-from sim.compiling import compiled
+from sim.jit import compiled
 from sim.linear.blocks import add, add_at, put_at, vector, vector_at
 from sim.linear.vectors import E_Z, ZERO, Vector, cross, dot, minus, plus, times
 from sim.mechanics.balance import Motion, head_drag, motion_at

@@ -25,7 +25,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled, formula
+from sim.jit import compiled, formula
 from sim.linear.blocks import add, add_at, put, vector
 from sim.linear.vectors import ZERO, Vector, cross, dot, minus, plus, times
 from sim.mechanics.balance import Motion

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled_exactly
+from sim.jit import compiled
 from sim.lanes import zeros
 from sim.linear.blocks import put, vector
 from sim.linear.vectors import ZERO, Matrix, Vector, dot, minus, plus, times
@@ -33,7 +33,7 @@ class Geometry(NamedTuple):
     force: Floats  # (n, M, 3) ∂E/∂e
 
 
-@compiled_exactly
+@compiled
 def new_geometry(like: Floats, n: int, tails: int) -> Geometry:
     """Allocate room for M tails of n edges, of the kind of number that `like` holds."""
     return Geometry(
@@ -54,7 +54,7 @@ def straight(n: int, tails: int, offset: Any) -> Floats:
     return x
 
 
-@compiled_exactly
+@compiled
 def turned_edges(x: Floats, share: Any, dx: Floats, offset: float) -> Floats:
     """Compute the free nodes (n, M, 3) after a correction share · dx that turns the edges.
 
@@ -77,7 +77,7 @@ def turned_edges(x: Floats, share: Any, dx: Floats, offset: float) -> Floats:
     return out
 
 
-@compiled_exactly
+@compiled
 def measure(geometry: Geometry, x: Floats, offset: float, axial_stiffness: float) -> None:
     """Fill `geometry` for free nodes x (n, M, 3) of tails clamped at (offset, 0, 0) along −e_z."""
     n, tails, _ = x.shape
@@ -110,13 +110,13 @@ def measure(geometry: Geometry, x: Floats, offset: float, axial_stiffness: float
             put(forces, k, m, force)
 
 
-@compiled_exactly
+@compiled
 def inverse_voronoi(k: int, n: int) -> float:
     """Compute 1/l_k of the bending energy of joint k: 2n at the clamp, n elsewhere."""
     return 2.0 * n if k == 0 else 1.0 * n
 
 
-@compiled_exactly
+@compiled
 def edge_block(geometry: Geometry, k: int, m: int, axial_stiffness: float) -> Matrix:
     """Compute ∂²E/∂e_k²."""
     n = geometry.length.shape[0]
@@ -132,7 +132,7 @@ def edge_block(geometry: Geometry, k: int, m: int, axial_stiffness: float) -> Ma
     )  # fmt: skip
 
 
-@compiled_exactly
+@compiled
 def joint_block(geometry: Geometry, k: int, m: int) -> Matrix:
     """Compute ∂²E/∂e_{k−1} ∂e_k of joint k."""
     c, first, second = vector(geometry.joint, k, m)
@@ -143,7 +143,7 @@ def joint_block(geometry: Geometry, k: int, m: int) -> Matrix:
     )  # fmt: skip
 
 
-@compiled_exactly
+@compiled
 def node_tangent(geometry: Geometry, k: int, m: int) -> tuple[Vector, float]:
     """Compute the unit tangent of node k (0: clamp), the mean of the adjacent edges', and |S| of their sum S."""
     total = vector(geometry.tangent, k, m)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.arrays import Floats
-from sim.compiling import formula
+from sim.jit import formula
 
 Poses = Floats  # (..., 3)
 

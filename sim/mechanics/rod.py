@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from sim.compiling import formula
+from sim.jit import formula
 from sim.linear.vectors import (
     Matrix,
     Vector,

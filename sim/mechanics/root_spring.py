@@ -8,7 +8,7 @@ tails (`sim.mechanics.rod`). Units: EI = 1, l = 1.
 from __future__ import annotations
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.jit import compiled
 from sim.linear.blocks import add, add_at, vector
 from sim.linear.vectors import times
 from sim.mechanics.geometry import ROOT_TANGENT, Geometry, inverse_voronoi

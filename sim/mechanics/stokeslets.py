@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.compiling import formula
+from sim.jit import formula
 from sim.linear.vectors import Vector, cross, dot, minus, plus, times
 
 

@@ -28,7 +28,7 @@ from math import erfc
 import numpy as np
 
 from sim.arrays import Floats, Integers
-from sim.compiling import compiled
+from sim.jit import compiled
 from sim.linear.blocks import add, add_at, put, put_at, vector, vector_at
 from sim.linear.vectors import ZERO, Vector, cross, dot, minus, plus, times
 from sim.mechanics.balance import body_wrench, motion_at

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.compiling import compiled
+from sim.jit import compiled
 from sim.linear.vectors import Vector, dot, times
 from sim.mechanics.drag import node_drag
 from sim.mechanics.geometry import Geometry, node_tangent

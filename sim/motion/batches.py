@@ -16,8 +16,6 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from sim.arrays import Floats, Integers
-from sim.compile_stages import saying_first_use
-from sim.compiling import CACHE
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.model.groups import Groups
@@ -73,7 +71,6 @@ def run_batches(
         compile_once()
     with (
         one_thread() if in_this_process else nullcontext(),
-        saying_first_use("sim", CACHE) if in_this_process else nullcontext(),
         tqdm(total=sum(sizes), desc=title, unit="row", delay=1.0, disable=not title) as bar,
     ):
         if count <= 1:

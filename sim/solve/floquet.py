@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled_exactly
+from sim.jit import compiled
 from sim.lanes import choose, lanes, less, somewhere, zeros
 from sim.linear.blocks import block, put, vector
 from sim.linear.lane_arrays import choose_all, combine, divide, largest_entry, scalar_product, subtract_multiple
@@ -43,7 +43,7 @@ _CANCELS = 0.1  # smaller parts of a vector are made orthogonal again
 _STEP = 1e-6  # finite-difference step of the largest entry, in l
 
 
-@compiled_exactly
+@compiled
 def arnoldi(
     numbers: Floats, names: Any, x: Floats, u: Floats, shifts: Floats, by_phase: Floats, first: Floats,
     wanted: Floats, projected: Floats, width: Any,
@@ -90,7 +90,7 @@ def arnoldi(
             divide(basis[i + 1], vector_of_image, size)
 
 
-@compiled_exactly
+@compiled
 def _orthogonalise(basis: Floats, i: int, image: Floats, projected: Floats) -> Any:
     """Make an image orthogonal to the first i + 1 vectors, again where digits cancelled; return its length."""
     size = np.sqrt(scalar_product(image, image))
@@ -109,7 +109,7 @@ def _orthogonalise(basis: Floats, i: int, image: Floats, projected: Floats) -> A
     return size
 
 
-@compiled_exactly
+@compiled
 def _by_rate(
     body: Body, rates: Rates, x: Floats, u: Floats, where: Any, work: Workspace, q: Floats, dx: Floats, du: Floats
 ) -> None:

@@ -6,6 +6,7 @@ nothing is asked of them. In compiled loops the numbers of a group are one `Body
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Any
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Flags, Floats
-from sim.compiling import compiled_exactly, processor_has
+from sim.jit import compiled
 from sim.lanes import GROUP, HALF_GROUP, lane, less, named_like, zeros
 from sim.linear.lane_arrays import take_lane
 from sim.model.body import Body
@@ -32,7 +33,11 @@ def slices(count: int) -> list[slice]:
 @cache
 def group_width() -> tuple[int, ...]:
     """Return the width of groups on this processor, as a tuple: eight lanes with AVX-512, else four."""
-    return GROUP if processor_has("avx512f") else HALF_GROUP
+    from llvmlite.binding import get_host_cpu_features
+
+    given = os.environ.get("NUMBA_CPU_FEATURES")
+    wide = get_host_cpu_features().get("avx512f", False) if given is None else "+avx512f" in given.split(",")
+    return GROUP if wide else HALF_GROUP
 
 
 def by_kind(robots: Iterable[int], kind: Callable[[int], object]) -> list[list[int]]:
@@ -65,7 +70,7 @@ def wanted_lanes(wanted: Flags) -> Floats:
     return groups
 
 
-@compiled_exactly
+@compiled
 def body_in_lanes(numbers: Floats, names: Any) -> Body:
     """Return the robots of a group as one.
 
@@ -84,7 +89,7 @@ def body_in_lanes(numbers: Floats, names: Any) -> Body:
     )
 
 
-@compiled_exactly
+@compiled
 def body_of_lane(body: Body, i: int) -> Body:
     """Return the robot in lane i, with plain numbers."""
     resistance, terms = np.empty((4, 5)), np.empty(len(body.nonlocal_terms))
@@ -109,7 +114,7 @@ def body_of_lane(body: Body, i: int) -> Body:
     )
 
 
-@compiled_exactly
+@compiled
 def reaches_further(body: Body) -> Any:
     """Tell where an effect reaches further than one node, as 1 or 0."""
     total = 0.0 * body.omega

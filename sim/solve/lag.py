@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled_exactly, formula
+from sim.jit import compiled, formula
 from sim.lanes import choose, less, zeros
 from sim.linear.dense import factor_dense, solve_factored
 from sim.linear.spectral import differentiation
@@ -25,7 +25,7 @@ from sim.mechanics.balance import tail_spin
 from sim.model.body import Body
 
 
-@compiled_exactly
+@compiled
 def turning(columns: int, instants: int) -> Floats:
     """Differentiate λ in φ: the matrix (Q, Q) for Q phases of λ."""
     if instants % 2 == 0 or instants == 1:
@@ -33,7 +33,7 @@ def turning(columns: int, instants: int) -> Floats:
     return columns // instants * differentiation(instants)
 
 
-@compiled_exactly
+@compiled
 def advance_lag(
     body: Body, u: Floats, twist: Floats, time: Any, rate: Any, start: Floats, by_phase: Floats, lag: Floats
 ) -> None:
@@ -74,7 +74,7 @@ def advance_lag(
         lag[p, 0], lag[p, 1] = plane[p, 0], plane[p, 1]
 
 
-@compiled_exactly
+@compiled
 def _instants(body: Body, u: Floats, fields: int) -> Floats:
     """Compute (v_z, h_x, ω_yr, ω_t) at every instant of a turn, or their mean over time."""
     motion = zeros(u, (u.shape[0], 4))

@@ -23,9 +23,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled_exactly
+from sim.jit import compiled
 from sim.lanes import lanes, less, somewhere, zeros
-from sim.linear.lane_arrays import combine
+from sim.linear.lane_arrays import combine, copy
 from sim.mechanics.balance import tail_spin
 from sim.mechanics.geometry import straight
 from sim.model.body import Body
@@ -48,7 +48,7 @@ class State(NamedTuple):
     u: Floats  # (4,): v_x, v_z (of J), ω_yr, ω_h
 
 
-@compiled_exactly
+@compiled
 def _march(
     numbers: Floats, names: Any, given: State, dt: float, count: int, tolerance: float, wanted: Floats,
     poses: Floats, shapes: Floats, width: Any,
@@ -64,7 +64,10 @@ def _march(
     work = new_workspace(in_stage(1.0, 0.0, star.x), state.x, u)
     for i in range(count):
         now, before = before, now
-        now.x[:], now.x_dot[:], now.pose[:], now.u[:] = state.x, state.x_dot, state.pose, state.u
+        copy(now.x, state.x)
+        copy(now.x_dot, state.x_dot)
+        copy(now.pose, state.pose)
+        copy(now.u, state.u)
         for stage in range(2 if i == 0 else 1):
             tau = _begin_stage(state, star, now, before, dt, i, stage)
             rates = in_stage(1 / tau, star.pose[PHASE], star.x)
@@ -73,21 +76,21 @@ def _march(
                 return False
             combine(state.x_dot, 1 / tau, state.x, -1 / tau, star.x)
             _advance_pose(body, state.u, tau, star.pose, state.pose)
-        all_poses[i] = state.pose
+        copy(all_poses[i], state.pose)
         late = i - (count - len(all_shapes))
         if late >= 0:
-            all_shapes[late] = state.x
+            copy(all_shapes[late], state.x)
     return True
 
 
-@compiled_exactly
+@compiled
 def _new_like(state: State) -> State:
     """Allocate arrays for a state."""
     x, pose, u = state.x, state.pose, state.u
     return State(zeros(x, x.shape), zeros(x, x.shape), zeros(x, pose.shape), zeros(x, u.shape))
 
 
-@compiled_exactly
+@compiled
 def _begin_stage(state: State, star: State, now: State, before: State, dt: float, step: int, stage: int) -> float:
     """Fill x* and the pose's part of `star`, predict x and u in `state`; returns τ.
 
@@ -103,7 +106,8 @@ def _begin_stage(state: State, star: State, now: State, before: State, dt: float
         return dt * 2 / 3
     tau = GAMMA * dt
     if stage == 0:
-        star.x[:], star.pose[:] = now.x, now.pose
+        copy(star.x, now.x)
+        copy(star.pose, now.pose)
         combine(state.x, 1.0, now.x, tau, now.x_dot)
     else:  # state.x_dot and state.pose are those of the first stage
         share = (1 - GAMMA) * dt / tau
@@ -113,7 +117,7 @@ def _begin_stage(state: State, star: State, now: State, before: State, dt: float
     return tau
 
 
-@compiled_exactly
+@compiled
 def _advance_pose(body: Body, u: Floats, tau: float, star: Floats, pose: Floats) -> None:
     """Set the pose at the end of a stage that begins at `star`: pose = star + τ d(pose)/dt."""
     sway, surge = u[0] + u[2] * body.head_length / 2, u[1]

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled_exactly
+from sim.jit import compiled
 from sim.lanes import choose, empty, larger, less, somewhere, zeros
 from sim.linear import chains as separate
 from sim.linear import coupled
@@ -46,7 +46,7 @@ class Workspace(NamedTuple):
     system: Coupled
 
 
-@compiled_exactly
+@compiled
 def new_workspace(rates: Rates, x: Floats, u: Floats) -> Workspace:
     """Allocate arrays for unknowns like x (n, M, 3) and u (P, 4)."""
     n, columns, instants = x.shape[0], x.shape[1], u.shape[0]
@@ -62,13 +62,13 @@ class Unknowns(NamedTuple):
     u: Floats  # (P, 4)
 
 
-@compiled_exactly
+@compiled
 def new_unknowns(x: Floats, u: Floats) -> Unknowns:
     """Allocate arrays like x and u."""
     return Unknowns(empty(x, x.shape), empty(u, u.shape))
 
 
-@compiled_exactly
+@compiled
 def newton(
     body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tolerance: float, going: Any
 ) -> tuple[int, Any]:
@@ -97,7 +97,7 @@ def newton(
     return count, size
 
 
-@compiled_exactly
+@compiled
 def correct(
     body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, anew: bool, going: Any, dx: Floats, du: Floats
 ) -> None:
@@ -110,13 +110,13 @@ def correct(
     solve_linear(body, rates, x, u, work, anew, RELATIVE_TOLERANCE, going, dx, du)
 
 
-@compiled_exactly
+@compiled
 def largest_move(body: Body) -> Any:
     """Bound the move of a node in one correction, in l; tails in contact must not pass through each other."""
     return choose(abs(body.nonlocal_terms.tail_contact), body.tail_radius, LARGEST_MOVE)
 
 
-@compiled_exactly
+@compiled
 def move(body: Body, x: Floats, share: Any, dx: Floats, going: Any) -> None:
     """Correct the nodes x (n, M, 3) by share · dx in the lanes where `going` is 1.
 
@@ -128,7 +128,7 @@ def move(body: Body, x: Floats, share: Any, dx: Floats, going: Any) -> None:
     add_chosen(x, share, dx, going - further)
 
 
-@compiled_exactly
+@compiled
 def negate(equations: Equations, dx: Floats, du: Floats) -> None:
     """Negate the residual: the right-hand sides of Newton's equations."""
     n, columns, _ = dx.shape
@@ -141,7 +141,7 @@ def negate(equations: Equations, dx: Floats, du: Floats) -> None:
             du[p, a] = -equations.t[p, a]
 
 
-@compiled_exactly
+@compiled
 def solve_linear(
     body: Body,
     rates: Rates,
@@ -171,7 +171,7 @@ def solve_linear(
         _solve_nonlocal(body, rates, x, u, work, tolerance, further, dx, du)
 
 
-@compiled_exactly
+@compiled
 def factor_and_solve(body: Body, rates: Rates, u: Floats, work: Workspace, dx: Floats, du: Floats) -> None:
     """Factorise Newton's matrix without non-local effects, which `linearise` left in `work`, and solve with it.
 
@@ -190,7 +190,7 @@ def factor_and_solve(body: Body, rates: Rates, u: Floats, work: Workspace, dx: F
     coupled.factor_and_solve(work.system, chains, coupling, dx.reshape((n, 3 * columns)), du.reshape(du.size))
 
 
-@compiled_exactly
+@compiled
 def solve_local(rates: Rates, work: Workspace, dx: Floats, du: Floats) -> None:
     """Solve with the factors, in place: dx (n, M, 3) and du (P, 4) come in as right-hand sides."""
     if not is_periodic(rates):
@@ -200,7 +200,7 @@ def solve_local(rates: Rates, work: Workspace, dx: Floats, du: Floats) -> None:
         coupled.solve(work.system, work.equations.chains, dx.reshape(n, 3 * columns), du.reshape(du.size))
 
 
-@compiled_exactly
+@compiled
 def _solve_nonlocal(
     body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tolerance: float, going: Any, dx: Floats,
     du: Floats,
@@ -242,7 +242,7 @@ def _solve_nonlocal(
         velocities[i] = choose(wanted, image[dx.size + i] * scale, velocities[i])
 
 
-@compiled_exactly
+@compiled
 def _join(out: Floats, dx: Floats, du: Floats, scale: Any) -> None:
     """Set a vector to the entries of dx and of du/scale."""
     flat, velocities = dx.reshape(dx.size), du.reshape(du.size)
@@ -252,7 +252,7 @@ def _join(out: Floats, dx: Floats, du: Floats, scale: Any) -> None:
         out[len(flat) + i] = velocities[i] / scale
 
 
-@compiled_exactly
+@compiled
 def _displace(out: Unknowns, x: Floats, u: Floats, step: Any, scale: Any, direction: Floats) -> None:
     """Move x and u by a step along a direction whose velocities are divided by `scale`."""
     combine(out.x, 1.0, x, step, direction[: x.size])

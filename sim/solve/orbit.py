@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Flags, Floats
-from sim.compiling import compiled_exactly
+from sim.jit import compiled
 from sim.lanes import lanes
 from sim.linear.lane_arrays import largest_entry
 from sim.linear.spectral import with_phases
@@ -129,7 +129,7 @@ def smallest_gaps(rows: Floats, x: Floats, tails: int) -> Floats:
     return contact.smallest_gaps(shapes, body.offset, body.tail_radius)
 
 
-@compiled_exactly
+@compiled
 def _solve_groups(
     numbers: Floats, names: Any, x: Floats, u: Floats, tolerance: float, wanted: Floats, sizes: Floats, width: Any
 ) -> None:
@@ -151,7 +151,7 @@ def _solve_groups(
         size[g] = newton(body, rates, shapes[g], velocities[g], work, tolerance, going[g])[1]
 
 
-@compiled_exactly
+@compiled
 def _fill_residuals(
     numbers: Floats, names: Any, x: Floats, u: Floats, wanted: Floats, r: Floats, t: Floats, force: Floats,
     width: Any,
@@ -168,7 +168,7 @@ def _fill_residuals(
         largest[g] = largest_entry(scratch.geometry.force)
 
 
-@compiled_exactly
+@compiled
 def _solve_linear_in_groups(
     numbers: Floats, names: Any, x: Floats, u: Floats, wanted: Floats, dx: Floats, du: Floats, width: Any
 ) -> None:

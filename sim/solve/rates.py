@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled_exactly
+from sim.jit import compiled
 from sim.lanes import zeros
 from sim.linear.blocks import put, vector
 from sim.linear.spectral import differentiation
@@ -36,40 +36,40 @@ class Rates(NamedTuple):
     start: Floats  # x*, (n, M, 3); empty for an orbit
 
 
-@compiled_exactly
+@compiled
 def on_orbit(x: Floats) -> Rates:
     """Collocate x (n, M, 3) at M equal phases."""
     none = 0.0 * x[0, 0, 0]
     return Rates(none, none + FIRST_PHASE, differentiation(x.shape[1]), zeros(x, (0, 0, 0)))
 
 
-@compiled_exactly
+@compiled
 def in_stage(rate: Any, phase: Any, start: Floats) -> Rates:
     """Describe a stage with ẋ = rate (x − start) and φ = phase + ω_t/rate."""
     none = 0.0 * start[0, 0, 0]
     return Rates(none + rate, none + phase, np.zeros((0, 0)), start)
 
 
-@compiled_exactly
+@compiled
 def in_transient(rate: Any, by_phase: Floats, start: Floats) -> Rates:
     """Describe a stage with ẋ = ω_t ∂x/∂φ + rate (x − start), at M equal phases; `by_phase` is D, (M, M)."""
     none = 0.0 * start[0, 0, 0]
     return Rates(none + rate, none + FIRST_PHASE, by_phase, start)
 
 
-@compiled_exactly
+@compiled
 def is_periodic(rates: Rates) -> bool:
     """Tell whether the columns are phases, joined to each other by ∂x/∂φ."""
     return rates.differentiation.shape[0] > 0
 
 
-@compiled_exactly
+@compiled
 def base_phase(rates: Rates, body: Body, u: Floats) -> Any:
     """Return the phase of column 0, for velocities u (P, 4); column m is 2π m/M later."""
     return rates.phase + (0.0 if is_periodic(rates) else tail_spin(body, u[0]) / rates.rate)
 
 
-@compiled_exactly
+@compiled
 def fill_rates(rates: Rates, body: Body, x: Floats, u: Floats, x_dot: Floats, by_spin: Floats) -> None:
     """Compute the velocities of the free nodes in the disc frame and what a faster spin changes in them.
 
@@ -102,7 +102,7 @@ def fill_rates(rates: Rates, body: Body, x: Floats, u: Floats, x_dot: Floats, by
                 put(x_dot, k, m, change)
 
 
-@compiled_exactly
+@compiled
 def phase_gain(rates: Rates, body: Body) -> Any:
     """Compute ∂φ/∂ω_h."""
     return 0.0 if is_periodic(rates) else motor_gain(body) / rates.rate

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled, compiled_exactly
+from sim.jit import compiled
 from sim.lanes import count_lanes, lane, somewhere, zeros
 from sim.linear.blocks import add, put, vector, vector_at
 from sim.linear.lane_arrays import put_lane, take_lane
@@ -57,7 +57,7 @@ class Scratch(NamedTuple):
     by_spin: Floats  # (n, M, 3), see `sim.solve.rates`
 
 
-@compiled_exactly
+@compiled
 def new_scratch(x: Floats, u: Floats) -> Scratch:
     """Allocate arrays for unknowns like x (n, M, 3) and u (P, 4)."""
     n, columns, _ = x.shape
@@ -66,7 +66,7 @@ def new_scratch(x: Floats, u: Floats) -> Scratch:
     return Scratch(new_geometry(x, n, columns), around, zeros(x, x.shape), zeros(x, x.shape))
 
 
-@compiled_exactly
+@compiled
 def fill_residual(
     body: Body, rates: Rates, x: Floats, u: Floats, where: Any, scratch: Scratch, r: Floats, t: Floats
 ) -> None:
@@ -107,13 +107,13 @@ def fill_residual(
             t[m % instants, a] += wrench[a]
 
 
-@compiled_exactly
+@compiled
 def _velocity(motion: Motion, position: Vector, x_dot: Vector, flow: Vector) -> Vector:
     """Compute the velocity of a node through the fluid."""
     return minus(plus(plus(motion.linear, cross(motion.spin, position)), x_dot), flow)
 
 
-@compiled_exactly
+@compiled
 def _surround_lanes(body: Body, base: Any, x: Floats, u: Floats, where: Any, scratch: Scratch) -> None:
     """Add up all non-local effects of the robots in the lanes where `where` is 1, one robot after the other."""
     columns, instants = x.shape[1], u.shape[0]
@@ -136,7 +136,7 @@ def _surround_lanes(body: Body, base: Any, x: Floats, u: Floats, where: Any, scr
         put_lane(scratch.around.wrench, i, alone.around.wrench)
 
 
-@compiled_exactly
+@compiled
 def surround(body: Body, x: Floats, u: Floats, phase: float, p: int, instants: int, scratch: Scratch) -> None:
     """Add all non-local effects of one robot at instant p, its columns p, p + P, …
 

@@ -25,9 +25,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Flags, Floats, Integers
-from sim.compiling import compiled_exactly, formula
+from sim.jit import compiled, formula
 from sim.lanes import choose, lane, lanes, larger, less, smaller, somewhere, with_lane, zeros
-from sim.linear.lane_arrays import add_chosen, choose_all, largest_entry, put_lane, take_lane
+from sim.linear.lane_arrays import add_chosen, choose_all, copy, largest_entry, put_lane, take_lane
 from sim.linear.spectral import differentiation
 from sim.model.body import Body
 from sim.solve.grouping import body_in_lanes
@@ -99,7 +99,7 @@ class _Course(NamedTuple):
     places: Integers  # times at which the lag is known
 
 
-@compiled_exactly
+@compiled
 def follow(jump: Jump, names: Any, marks: Floats, times: Floats, tolerance: float, width: Any) -> Followed:
     """Follow robots from their shapes at a jump of the motor's speed.
 
@@ -178,14 +178,14 @@ def follow(jump: Jump, names: Any, marks: Floats, times: Floats, tolerance: floa
     return found
 
 
-@compiled_exactly
+@compiled
 def _new_state(like: Floats, n: int, columns: int, instants: int, fields: int) -> _State:
     """Allocate the state of the lanes."""
     x, lag = (n, columns, 3), (fields, 3)
     return _State(zeros(like, x), zeros(like, (instants, 4)), zeros(like, x), zeros(like, lag), zeros(like, lag))
 
 
-@compiled_exactly
+@compiled
 def _load(jump: Jump, robot: int, i: int, numbers: Floats, twist: Floats, at: _State, course: _Course) -> None:
     """Put a robot at its jump into lane i; one without numbers can only come to its end."""
     course.robot[i] = robot
@@ -200,7 +200,7 @@ def _load(jump: Jump, robot: int, i: int, numbers: Floats, twist: Floats, at: _S
     put_lane(at.lag_rate, i, np.zeros(at.lag.shape))
 
 
-@compiled_exactly
+@compiled
 def _has_ended(jump: Jump, course: _Course, i: int, at: _State, now: float, found: Followed) -> bool:
     """Tell whether the robot of lane i has come to its end, or cannot; keep its shape at the end."""
     robot = course.robot[i]
@@ -211,21 +211,21 @@ def _has_ended(jump: Jump, course: _Course, i: int, at: _State, now: float, foun
     return bool(course.steps[i] >= _MOST_STEPS or course.rejected[i] >= _MOST_REJECTED)
 
 
-@compiled_exactly
+@compiled
 def _goal(jump: Jump, course: _Course, i: int, marks: Floats) -> float:
     """Return the time at which a step of lane i must end next."""
     until, mark = jump.until[course.robot[i]], course.marks[i]
     return float(marks[mark]) if mark < len(marks) and marks[mark] < until else float(until)
 
 
-@compiled_exactly
+@compiled
 def _try_step(
     body: Body, twist: Floats, at: _State, new: _State, now: Any, dt: Any, going: Any, step: _Step, work: Workspace
 ) -> Any:
     """Solve both stages; `new` and `step` hold the end of the step. Return where Newton's method converged."""
     tau = GAMMA * dt
     solved = going
-    new.u[:] = at.u
+    copy(new.u, at.u)
     for stage in range(2):
         _begin_stage(at, new, step, stage, dt, tau)
         rates = in_transient(1 / tau, step.by_phase, step.start)
@@ -239,7 +239,7 @@ def _try_step(
     return solved
 
 
-@compiled_exactly
+@compiled
 def _begin_stage(at: _State, new: _State, step: _Step, stage: int, dt: Any, tau: Any) -> None:
     """Fill the starts of a stage, and guess its shape."""
     n, columns, _ = at.x.shape
@@ -259,7 +259,7 @@ def _begin_stage(at: _State, new: _State, step: _Step, stage: int, dt: Any, tau:
                 step.lag_start[p, c] += (1 - GAMMA) * dt * step.lag_slope[0, p, c]
 
 
-@compiled_exactly
+@compiled
 def _solve_stage(
     body: Body, rates: Rates, x: Floats, u: Floats, anew: bool, going: Any, step: _Step, work: Workspace
 ) -> Any:
@@ -282,7 +282,7 @@ def _solve_stage(
     return solved
 
 
-@compiled_exactly
+@compiled
 def _rate_of_change(out: Floats, end: Floats, start: Floats, tau: Any) -> None:
     """Set out = (end − start)/tau."""
     flat, last, first = out.reshape(out.size), end.reshape(end.size), start.reshape(start.size)
@@ -290,7 +290,7 @@ def _rate_of_change(out: Floats, end: Floats, start: Floats, tau: Any) -> None:
         flat[i] = (last[i] - first[i]) / tau
 
 
-@compiled_exactly
+@compiled
 def _accept(at: _State, new: _State, step: _Step, accepted: Any) -> None:
     """Let accepted steps be the state."""
     choose_all(at.x, accepted, new.x, at.x)
@@ -300,7 +300,7 @@ def _accept(at: _State, new: _State, step: _Step, accepted: Any) -> None:
     choose_all(at.lag_rate, accepted, step.lag_slope[1], at.lag_rate)
 
 
-@compiled_exactly
+@compiled
 def _record(
     i: int, course: _Course, at: _State, new: _State, new_rate: Floats, now: Any, new_now: Any, marks: Floats,
     times: Floats, found: Followed,
@@ -348,7 +348,7 @@ def _shorter_step(dt: Any, error: Any, solved: Any, tolerance: Any) -> Any:
     return dt * choose(solved, larger(0.2, 0.9 * np.sqrt(tolerance / error)), 0.3)
 
 
-@compiled_exactly
+@compiled
 def _embedded_error(slope: Floats, dt: Any) -> Any:
     """Compare with the embedded method, (1/2, 1/2) in place of (1 − γ, γ), in the largest entry.
 

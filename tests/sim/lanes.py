@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled_exactly
+from sim.jit import compiled
 from sim.lanes import lanes
 from sim.linear.chains import Chains
 from sim.model.body import Body
@@ -42,7 +42,7 @@ def residual(body: Body, rates: Plain, x: Floats, u: Floats, noise: float = 0.0)
     return r[..., 0], t[..., 0]
 
 
-@compiled_exactly
+@compiled
 def _fill(
     numbers: Floats, names: Any, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats,
     wanted: Floats, noise: float, r: Floats, t: Floats, width: Any,
@@ -80,7 +80,7 @@ def linear(body: Body, rates: Plain, x: Floats, u: Floats, dx: Floats, du: Float
     return Linear(Chains(*first[:9]), *first[9:])
 
 
-@compiled_exactly
+@compiled
 def _linear(
     numbers: Floats, names: Any, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats, dx: Floats,
     du: Floats, chains: Chains, resistance: Floats, r: Floats, t: Floats, width: Any,
@@ -113,7 +113,7 @@ def corrections(body: Body, rates: Plain, x: Floats, u: Floats, tolerance: float
     return int(count), float(sizes[0, 0])
 
 
-@compiled_exactly
+@compiled
 def _newton(
     numbers: Floats, names: Any, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats,
     wanted: Floats, tolerance: float, sizes: Floats, width: Any,

@@ -32,7 +32,7 @@ from sim.inputs import group_columns, load_robot
 from surrogate.table_file import load
 load().query(group_columns([load_robot("paper-control")]))
 from surrogate.motions import motions_of
-print(sum(motions_of.dispatcher.stats.cache_misses.values()))
+print(sum(motions_of.kernel.stats.cache_misses.values()))
 """
 counts = pytest.mark.parametrize("count", [128, pytest.param(512, marks=pytest.mark.rates)])
 
