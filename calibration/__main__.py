@@ -171,8 +171,8 @@ def _tracks(
     """
     from sim.io.pose_tracks import read_tracks
 
-    _refuse_early(runs)
     read_tracks(tracks, **given)
+    _refuse_early(runs)
     from calibration.report.figures import draw_tracks
     from calibration.swimmer.camera_tracks import measure_tracks
     from sim.inputs import load_robot
