@@ -18,7 +18,7 @@ from sim.io.pages import Page
 from sim.io.provenance import code_version
 from sim.motion.branches import Branch, Branches, Motion
 from sim.motion.stability import DOUBLING, FOLD, HOPF
-from sim.motion.swept_input import Settled
+from sim.motion.swept_input import SweptState
 
 UP, DOWN = "time steps, up", "time steps, down"
 _MARKS = {FOLD: ("o", RED), HOPF: ("s", VIOLET), DOUBLING: ("D", GREEN)}
@@ -144,7 +144,7 @@ def draw_branches(result: Branches) -> Figure:
     return figure
 
 
-def _draw_sweep(axes: Any, result: Branches, sweep: list[Settled], label: str, mark: str) -> None:
+def _draw_sweep(axes: Any, result: Branches, sweep: list[SweptState], label: str, mark: str) -> None:
     """Draw where time steps ended; unsettled motions are pale."""
     for settled in (True, False):
         points = [m for m in sweep if m.settled == settled and np.isfinite(m.means).all()]

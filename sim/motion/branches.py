@@ -31,7 +31,7 @@ from sim.motion.continuation import Equations, Point, first_point, follow, locat
 from sim.motion.revolution import Revolutions
 from sim.motion.shapes import state_from_orbit
 from sim.motion.stability import FOLD, Leading, leading_exponent
-from sim.motion.swept_input import Settled, SweptInput, from_rest, perturbed, settled_from, slow_sweep
+from sim.motion.swept_input import SweptInput, SweptState, from_rest, perturbed, settled_from, slow_sweep
 from sim.motion.tails_alike import EDGES, TailsAlike, orbit_from_turn
 from sim.solve.march import State
 from sim.solve.refinement import difference
@@ -101,8 +101,8 @@ class Branches:
 
     swept: SweptInput
     branches: list[Branch]
-    up: list[Settled]
-    down: list[Settled]
+    up: list[SweptState]
+    down: list[SweptState]
     incomplete: bool = False  # more branches were begun than are followed
 
     def at(self, s: float) -> list[Motion]:
@@ -167,7 +167,7 @@ def find_branches(
     return Branches(swept, search.branches, up, down, search.full)
 
 
-def _stepped(search: _Search, way: str, places: Floats, start: Settled | None = None) -> list[Settled]:
+def _stepped(search: _Search, way: str, places: Floats, start: SweptState | None = None) -> list[SweptState]:
     """Sweep slowly through `places`."""
     found = list(slow_sweep(search.swept.body_at, search.tails, map(float, places), EDGES, start))
     settled = sum(motion.settled for motion in found)
@@ -182,7 +182,7 @@ def _from_straight_tails(search: _Search, s: float) -> None:
         _follow_both_ways(search, search.alike, y, alike=True)
 
 
-def _from_time_steps(search: _Search, motion: Settled) -> None:
+def _from_time_steps(search: _Search, motion: SweptState) -> None:
     """Follow the motion in which time steps ended, unless it is known."""
     if not motion.settled or search.full:
         return

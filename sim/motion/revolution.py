@@ -28,6 +28,7 @@ import numpy as np
 from sim.arrays import Floats
 from sim.mechanics.balance import motor_gain, tail_spin
 from sim.model.body import Body
+from sim.motion.run import copied
 from sim.motion.stability import Leading
 from sim.solve.march import PHASE, SURGE, SWAY, YAW, State, advance, new_state
 
@@ -97,7 +98,7 @@ class Revolutions:
     def timed(self, state: State, s: float, time: float, *, shapes: bool = False) -> Turn | None:
         """Step by a turn, and find the time that it takes."""
         for _ in range(6):
-            turn = self.turn(_copied(state), s, time, shapes=shapes)
+            turn = self.turn(copied(state), s, time, shapes=shapes)
             if turn is None:
                 return None
             if abs(turn.time / time - 1) < 1e-3:
@@ -107,12 +108,12 @@ class Revolutions:
 
     def start(self, state: State, s: float, time: float) -> Floats:
         """Return y for a state at disc phase 0, and keep its velocities as a guess for those of its neighbours."""
-        self._state, self._time = _copied(state), time
+        self._state, self._time = copied(state), time
         return np.append(state.x.ravel() / self._scale, s)
 
     def state(self, y: Floats) -> State:
         """Return the state at disc phase 0."""
-        guess = _copied(self._state)
+        guess = copied(self._state)
         return State(y[:-1].reshape(guess.x.shape) * self._scale, guess.x_dot, guess.pose, guess.u)
 
     def at(self, y: Floats) -> Turn | None:
@@ -121,7 +122,7 @@ class Revolutions:
         if key != self._last[0]:
             turn = self.timed(self.state(y), float(y[-1]), self._time)
             if turn is not None:
-                self._state, self._time = _copied(turn.state), turn.time
+                self._state, self._time = copied(turn.state), turn.time
             self._last = key, turn
         return self._last[1]
 
@@ -205,7 +206,3 @@ class Revolutions:
         operator = LinearOperator((size, size), matvec=product, dtype=float)
         solution, _ = gmres(operator, right, rtol=residual, atol=0.0, restart=_PRODUCTS, maxiter=1)
         return np.asarray(solution)
-
-
-def _copied(state: State) -> State:
-    return State(*(array.copy() for array in state))

@@ -47,7 +47,7 @@ class Run:
         """Return an independent copy of this run."""
         duplicate = object.__new__(Run)
         duplicate.__dict__ |= vars(self)
-        duplicate.state = State(*(array.copy() for array in self.state))
+        duplicate.state = copied(self.state)
         return duplicate
 
     def can_afford(self, duration: float, *, flips: float = 0) -> bool:
@@ -109,3 +109,8 @@ class Run:
     def omega_t(self) -> float:
         """Spin of the tails."""
         return float(tail_spin(self.body, self.state.u))
+
+
+def copied(state: State) -> State:
+    """Return an independent copy of a state, which time steps change in place."""
+    return State(*(array.copy() for array in state))

@@ -97,7 +97,7 @@ class SweptInput:
 
 
 @dataclass(frozen=True)
-class Settled:
+class SweptState:
     """Where time steps ended at one value of the input."""
 
     s: float
@@ -108,7 +108,7 @@ class Settled:
     steps: int  # in a turn
 
 
-def from_rest(body_at: Callable[[float], Body], tails: int, s: float, edges: int) -> Settled | None:
+def from_rest(body_at: Callable[[float], Body], tails: int, s: float, edges: int) -> SweptState | None:
     """Step from straight tails at rest; None where the robot breaks down or completes no turn."""
     body = body_at(s)
     run = settle_one(body, tails, Resolution(edges, STEPS))
@@ -126,7 +126,7 @@ def from_rest(body_at: Callable[[float], Body], tails: int, s: float, edges: int
     return settled_from(body_at, tails, s, state, time)
 
 
-def settled_from(body_at: Callable[[float], Body], tails: int, s: float, state: State, time: float) -> Settled:
+def settled_from(body_at: Callable[[float], Body], tails: int, s: float, state: State, time: float) -> SweptState:
     """Step a state at disc phase 0 (not changed) until its motion repeats; `time` is about that of a turn."""
     body = body_at(s)
     steps = min(int(np.ceil(STEPS * abs(body.omega) * time / (2 * np.pi))), MOST_STEPS)
@@ -140,8 +140,8 @@ def settled_from(body_at: Callable[[float], Body], tails: int, s: float, state: 
         change = float(difference(means, turn.means))
         before, time, means = turn.state, turn.time, turn.means
         if count >= _FEWEST and change < _DRIFT and moved < _REPEATS:
-            return Settled(s, means, True, before, time, steps)
-    return Settled(s, means, False, before, time, steps)
+            return SweptState(s, means, True, before, time, steps)
+    return SweptState(s, means, False, before, time, steps)
 
 
 def perturbed(state: State, size: float, seed: int) -> State:
@@ -153,8 +153,12 @@ def perturbed(state: State, size: float, seed: int) -> State:
 
 
 def slow_sweep(
-    body_at: Callable[[float], Body], tails: int, places: Iterable[float], edges: int, start: Settled | None = None
-) -> Iterator[Settled]:
+    body_at: Callable[[float], Body],
+    tails: int,
+    places: Iterable[float],
+    edges: int,
+    start: SweptState | None = None,
+) -> Iterator[SweptState]:
     """Step through the values of the input at `places`, from rest at the first one or from `start`."""
     here = start
     for seed, s in enumerate(places):

@@ -16,8 +16,9 @@ import numpy as np
 
 from sim.mechanics.balance import tail_spin
 from sim.model.body import Body
+from sim.motion.run import copied
 from sim.motion.shapes import state_on_orbit
-from sim.solve.march import PHASE, State, advance
+from sim.solve.march import PHASE, advance
 from sim.solve.orbit import mean_motion
 from sim.solve.rates import FIRST_PHASE
 from sim.solve.refinement import MESHES, orbit_on_mesh
@@ -45,7 +46,7 @@ def stepped_growth(body: Body, tails: int, revolutions: float, *, edges: int = M
         return np.nan
     omega_t, omega_h = mean_motion(body, u)[:2]
     revolution = 2 * np.pi / abs(omega_t - omega_h)
-    bent = State(*(array.copy() for array in straight))
+    bent = copied(straight)
     bend = (np.arange(1, edges + 1) / edges)[:, None, None] ** 2
     bent.x[:] += _SIZE * bend * np.random.default_rng(0).normal(size=bent.x.shape)
     count = max(4, math.ceil(_STEPS * revolutions / _SAMPLES))
