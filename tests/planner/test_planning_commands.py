@@ -78,6 +78,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("tour path.csv R", "path.csv: its lengths have no unit"),
         ("cover box:0,0,300,200 --width 4cm R", "box:0,0,300,200: 300 has no unit"),
         ("cover box:0,0,3l,2l --width 4 R", "--width: 4 has no unit"),
+        ("cover x_mm.csv --width 4cm --unit cm R", "x_mm.csv: --unit cm: it has a size of its own"),
         ("hold 2,1 R", "place 2,1: 2 has no unit"),
         ("page --path square:3 R", "square:3: its lengths have no unit"),
         # paths, regions, cameras, times

@@ -12,7 +12,7 @@ import pytest
 
 from planner.files.saved_plan import restore_plan
 from planner.files.tracks import tracking_error
-from planner.jobs.detours import Hindered
+from planner.jobs.detours import Hindered, _runs
 from planner.jobs.plan import make_plan
 from planner.jobs.timetable import WaitingCircle, circle_reference, with_circles
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
@@ -44,6 +44,11 @@ def test_a_hindrance_is_what_the_discs_lack_and_its_derivatives_are_those_of_dif
     for i, step in enumerate(1e-5 * np.eye(3)):
         difference = (hindered(POSES + step)[0] - hindered(POSES - step)[0]) / 2e-5
         assert slopes[..., i] == pytest.approx(difference, abs=1e-4)
+
+
+def test_blocked_stretches_that_are_near_are_one() -> None:
+    flags = np.array([0, 1, 1, 0, 1, 0, 0, 0, 1], dtype=bool)
+    assert _runs(flags, np.arange(9.0), 2.5) == [(1, 4), (8, 8)]
 
 
 def check_clear(result: Plan, space: FreeSpace) -> None:

@@ -85,7 +85,11 @@ def test_laps_close(path: Path2D) -> None:
     assert plan.duration == pytest.approx(once.duration, rel=0.02)
     assert plan.predicted_max < 1.3 * once.predicted_max
     assert plan.lap is not None
-    assert max(plan.lap.closes, plan.lap.closes_turn) < 1e-4
+    closes, turned, drift, drift_turn = plan.lap
+    assert max(closes, turned) < 1e-4
+    assert plan.lap.to_dict() == {
+        "closes_over_l": closes, "closes_rad": turned, "drift_over_l": drift, "drift_rad": drift_turn,
+    }  # fmt: skip
     many = Switches(plan.first_direction, np.tile(plan.dwells, 6), plan.poses[:1])
     after = roll_out(tracked().vehicle, many).flips[count::count]
     turn = 0.0 if path is EIGHT else 2 * np.pi

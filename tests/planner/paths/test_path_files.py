@@ -253,6 +253,7 @@ def test_distances_of_regions() -> None:
     room = FreeSpace((Circle(0, 0, 1),), Polygon.of([[-3, -2], [3, -2], [3, 2], [-3, 2]]))
     found = room.distance(np.array([[0, 0], [2, 0], [0, 1.75], [0, 3.0], [-2.9, 0]]))
     assert found == pytest.approx([-1, 1, 0.25, -1, 0.1])
+    assert Circle(1, 2, 3).distance(Circle(1, 2, 3).corners) == pytest.approx(0.0, abs=1e-12)
     notch = Polygon.of([[0, 0], [4, 0], [4, 3], [2, 1], [0, 3]])
     assert notch.distance(np.array([[2.0, 2.0], [2.0, 0.5]])) == pytest.approx([np.sqrt(0.5), -0.5])
     with pytest.raises(InputError, match="not on one line"):

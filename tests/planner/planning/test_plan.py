@@ -140,6 +140,7 @@ def test_dwells_have_a_shortest_time_and_should_not_be_far_too_long() -> None:
 
 LAB = CONTROL.tail_length / CONTROL.time_scale  # m/s of one l per time unit
 FAST = CalibrationKnowledge(current=(0.0, 0.5 * LAB))
+AGAINST = CalibrationKnowledge(current=(-0.05 * LAB, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -161,13 +162,14 @@ FAST = CalibrationKnowledge(current=(0.0, 0.5 * LAB))
         (circle(2.0), "objective", {"objective": "speed"}),
         (circle(3.0), "allow shorter ones: it turns too far", {"minimum_seconds": 400.0}),
         (circle(3.0), "as fast as the robot", {"knowledge": FAST}),
+        ([[0, 0], [6, 0]], "as fast as the robot", {"knowledge": AGAINST, "point": "pivot"}),
         (circle(2.0), r"outside the look-up table: motor .* rpm \(omega_bar = 500\)",
          {"robot": CONTROL.with_motor(500.0)}),
         (circle(2.0), r"outside the look-up table: disc offset 1.6 mm \(a_over_R = 0.1\)",
          {"robot": replace(CONTROL, disc_offset=0.0016)}),
         (circle(2.0), "tail_sag .*surrogate robot", {"robot": replace(CONTROL, effects={"tail_sag": 0.1})}),
     ],
-    ids=range(19),
+    ids=range(20),
 )  # fmt: skip
 def test_refusals(path: Any, expected: str, options: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=expected) as caught:

@@ -21,7 +21,7 @@ from planner.vehicle.calibration_table import (
 from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, interpolated, lag_table
-from planner.vehicle.zigzag import zigzag
+from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.inputs import load_robot
 from sim.io.errors import InputError
 from sim.mechanics import planar
@@ -82,6 +82,16 @@ def test_an_even_robot_swims_straight_and_a_lopsided_one_at_an_angle() -> None:
     assert even.drift == pytest.approx(0.0, abs=1e-12)
     assert even.dwells == pytest.approx((0.8, 0.8))
     assert odd.dwells[0] == pytest.approx(0.8)
+    assert Zigzag.from_dict(odd.to_dict()) == odd
+    names = ("speed_bar", "swing_rad", "sway_over_l", "drift_bar", "rms_over_l", "largest_over_l")
+    assert [odd.to_dict()[name] for name in names] == [
+        odd.speed,
+        odd.swing,
+        odd.sway,
+        odd.drift,
+        odd.rms,
+        odd.largest,
+    ]
     assert odd.dwells[1] / odd.dwells[0] == pytest.approx(1.3 / 0.7, rel=0.02)
     # With (T+, T−) that turn as far, the mean sideways speed is (Ω− v+ − Ω+ v−)/(Ω+ + Ω−), v without lags.
     assert odd.drift == pytest.approx(0.0424 * (0.7 - 1.3) / 2, rel=0.05)
