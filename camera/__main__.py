@@ -1,6 +1,10 @@
-"""Command line of the camera: `view`."""
+"""Command line of the camera: `view`, `tracks`."""
 
 from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
 
 from sim.io.commands import Program
 
@@ -21,6 +25,55 @@ def _view(*, out: str) -> None:
     with whole_file(out) as part:
         part.write_text(EXAMPLE)
     print(f"-> {out}")
+
+
+@program.command("tracks")
+def _tracks(
+    film: str,
+    *,
+    robot: str,
+    view: str,
+    out: str,
+    check: str | None = None,
+    start: float = 0.0,
+    end: float = math.inf,
+) -> None:
+    """Track the robots of a film: poses with errors, dots that come and go, frames lost and why.
+
+    Args:
+        film: mp4, avi, mkv or what else OpenCV reads.
+        view: TOML, scale, lens and markers; softflagella camera view writes one to edit.
+        out: CSV; of several robots, one for each, with its name.
+        check: PNG, draw tracks and fitted circles over a frame.
+        start: SECONDS, in the film, of time 0.
+        end: SECONDS, in the film (default: its end).
+    """
+    from camera.tracks import track_film, write_check
+    from camera.view import read_setup
+    from sim.inputs import load_robot
+    from sim.io.files import whole_file, write_csv
+
+    setup, known = read_setup(view), load_robot(robot)
+
+    def tell(done: int, count: int) -> None:
+        if sys.stderr.isatty():
+            print(f"\r{100 * done // count} %", end="", file=sys.stderr)
+
+    tracked = track_film(film, setup, head_length=known.head_length, start=start, end=end, progress=tell)
+    for note in tracked.notes:
+        print(note, file=sys.stderr)
+    written = []
+    for name, table in tracked.tables.items():
+        file = Path(out)
+        if len(tracked.tables) > 1:
+            file = file.with_stem(f"{file.stem}-{name}")
+        write_csv(table, file, digits=7)
+        written.append(f"{len(table)} poses -> {file}")
+    if check:
+        with whole_file(check) as part:
+            write_check(part, tracked, setup.robots)
+        written.append(f"picture -> {check}")
+    print(", ".join(written))
 
 
 if __name__ == "__main__":

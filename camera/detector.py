@@ -39,13 +39,13 @@ _RIVAL = 0.45  # of the strongest p in a picture, of what may be a marker, too
 _WIDTH = 480  # pixels of the picture in which a lost robot is looked for
 _FINE = 40.0  # pixels between the bands; where they are further apart, the picture is made smaller
 _CANDIDATES = 6
-_PIXEL = 0.02  # standard error of a centre besides [pixels]
+_PIXEL = 0.3  # standard error of a centre besides [pixels]: films have a colour for each 2 × 2 pixels
 _ALIKE = 0.2  # relative difference of the bands' distance from the known one
 _BIAS = 0.0025  # of the bands' distance, standard error of a centre that does not come from noise
 _SHIFT = 0.0065  # of the bands' distance, of what shifts both: light from one side, glare
 _WHOLE = 0.3  # of the bands' distance, half the length of a band that must be in the picture
 _END = 0.18  # of the bands' distance, by which a band's centre moves for a whole band that is hidden from one end
-_HIDDEN = 0.8  # of a band's usual area
+_HIDDEN = 0.87  # of a band's usual area
 _MEMORY = 20.0  # pictures over which distance and areas are averaged
 _REACH = {"head": (-0.7, 0.7, 0.75), "tail": (-3.0, -0.6, 1.5)}  # where dots are: along the axis, to the side
 
@@ -90,23 +90,19 @@ class _Blob(NamedTuple):
 class Detector:
     """Find the marked robots in one picture after another."""
 
-    def __init__(
-        self, robots: Sequence[Markers], view: View, *, head_length: float = math.nan, ground: Any = None
-    ) -> None:
+    def __init__(self, robots: Sequence[Markers], view: View, *, head_length: float = math.nan) -> None:
         """Prepare for pictures of one camera.
 
         Args:
             robots: their markers.
             view: of the camera; where a tag gives its scale, `view` is complete once the tag was seen.
             head_length: of the robots, which the bands cannot be further apart than [m].
-            ground: the picture without robots (`camera.film.ground`); what has a marker's colour there does not
-                count.
 
         Raises:
             InputError: OpenCV is not installed.
         """
         self.view, self._robots, self._head_length = view, tuple(robots), head_length
-        self._cv, self._ground = opencv(), ground
+        self._cv = opencv()
         self._mask: Any = None
         self._memory = [_Memory() for _ in self._robots]
         self._readers = {each.dictionary: self._reader(each.dictionary) for each in robots if each.tag is not None}
@@ -150,6 +146,7 @@ class Detector:
                 memory.missed += 1
                 if memory.missed > memory.seen:  # what was seen may have been something else
                     memory.seen = 0
+                if memory.missed > _MEMORY:  # the light may have changed
                     memory.areas.clear()
             else:
                 memory.seen, memory.missed = memory.seen + 1, 0
@@ -237,6 +234,8 @@ class Detector:
             usual = memory.areas.get(name, area)
             if area < _HIDDEN * usual:
                 return Lost(markers.name, f"{markers.colours[name]} partly hidden")
+            if area * _HIDDEN > usual:
+                return Lost(markers.name, f"more that is {markers.colours[name]} beside it")
             memory.areas[name] = usual + (area - usual) / forget
             hidden = _END * distance * max(1 - area / usual, 0.0)
             variance += blob.error**2 + bias**2 + hidden**2
@@ -304,8 +303,6 @@ class Detector:
         weights = self._weights(part(picture), hue)
         if self._mask is not None:
             weights[part(self._mask) < 128] = 0
-        if self._ground is not None:
-            weights[self._weights(part(self._ground), hue) > 0.5 * np.maximum(weights, _FAINT)] = 0
         return weights
 
     def _blob(self, frame: Any, hue: float, centre: Floats, reach: float, distance: float) -> _Blob | None:

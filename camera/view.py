@@ -52,7 +52,7 @@ length_cm = 30
 # points_cm = [[0, 0], [30, 0], [30, 20], [0, 20]]  # instead of the length: places of four points or more
 # tag_cm = 4                         # instead of points: the side of an ArUco tag, number tag_id, in the picture
 
-# [lens]                             # from pictures of a chessboard: softflagella camera lens
+# [lens]                             # focal_px, centre_px, distortion, as OpenCV calibrates them
 # [tank]
 # region_px = [[50, 50], [1230, 50], [1230, 670], [50, 670]]  # a polygon; nothing outside is a marker
 
@@ -288,7 +288,7 @@ def _lens(table: Mapping[str, Any]) -> Lens:
     for name, count in (("focal_px", 2), ("centre_px", 2), ("distortion", 5)):
         numbers = table.get(name)
         if not isinstance(numbers, list) or len(numbers) != count or not all(map(_is_number, numbers)):
-            raise InputError(f"[lens] {name}: give {count} numbers, as softflagella camera lens writes them")
+            raise InputError(f"[lens] {name}: give {count} numbers, as OpenCV calibrates them")
         parts.append(np.array(numbers, dtype=float))
     if not (parts[0] > 0).all():
         raise InputError("[lens] focal_px: give numbers above 0")

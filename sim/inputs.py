@@ -57,6 +57,7 @@ RUN_NOTES = ("elapsed_min", "temperature_C", "tank_diameter_cm", "course_deg")
 RUN_SIGMAS = ("camera_scale_sigma_percent", "heading_zero_sigma_deg", "tachometer_sigma_percent")
 RUN_ERRORS = (  # of `calibration.swimmer.camera_tracks`; not used, since repeats give the noise
     "omega_yr_error", "R_yr_error", "theta_error", "v_error", "drift_x_cm_s", "drift_y_cm_s", "drift_error",
+    "omega_h_error", "omega_t_error",
 )  # fmt: skip
 RUN_COLUMNS = (
     *RUN, *(column for column, _, _ in MEASURED.values()), "run", "trial", "session", "robot", *RUN_NOTES,

@@ -14,7 +14,8 @@ _IMPORTANT = (
     ("planner", "plan goal tour cover hold fleet track page replan"),
     ("dataset", "sweep"),
     ("surrogate", "train"),
-    ("calibration", "tracks calibrate"),
+    ("camera", "tracks"),
+    ("calibration", "calibrate"),
     ("planner", "replay check"),
     ("sim", "film"),
     ("surrogate", "query"),
@@ -27,7 +28,7 @@ WORDS = {  # the most important commands -> package and command
 }
 PACKAGES = {
     "sim": "simulate robots: steady motion, branches, films, presets",
-    "camera": "describe the camera that films a tank",
+    "camera": "track robots in films",
     "dataset": "simulate sweeps into data sets, report and verify them",
     "surrogate": "train look-up tables and query them",
     "planner": "plan switching schedules for paths, replay them, check tracks",

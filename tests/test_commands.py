@@ -39,6 +39,7 @@ from tests.calibration.toy_tables import (
 )
 from tests.calibration.track import RADIUS, track
 from tests.dataset.sweeps import SMALL, design, invented
+from tests.oracles.tank import Tank, circling
 from tests.processes import LIMIT
 from tests.shared import FOLDER, shared
 
@@ -299,6 +300,16 @@ def camera_view(made: Path, out: Path) -> str:
     done("camera", "view", "--out", out / "view.toml")
     assert read_setup(out / "view.toml").robots[0].colours == {"front": "red", "rear": "green"}
     return "view.toml"
+
+
+def camera_tracks(made: Path, out: Path) -> str:
+    pytest.importorskip("cv2", reason="the extra camera is not installed")
+    tank = Tank(width=320, height=240, scale=0.001)
+    (out / "view.toml").write_text(tank.view_toml())
+    film = tank.film(out / "film.mp4", circling(), 1.0)
+    done("camera", "tracks", film, "--robot", "paper-control", "--view", out / "view.toml", "--out", out / "t.csv")
+    assert len(pd.read_csv(out / "t.csv")) == 15
+    return "15 poses -> "
 
 
 def calibration_calibrate(made: Path, out: Path) -> str:

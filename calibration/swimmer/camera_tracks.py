@@ -6,32 +6,24 @@ the turn, the size of the motion.
 The tracked point must be the head's centre; with another point the calibration finds `tracked_point`. Columns in
 other units than COLUMNS are converted. Angles are counter-clockwise, seen from above (docs/reference/signs.md).
 
-A run at constant motor speed is a circle with a heading that turns at the same rate,
-
-    x = c_x + R cos α,  y = c_y + R sin α,  heading = h0 + ω_yr t,   α = α0 + ω_yr t,
-
-fitted to all samples of a run at once (least squares; positions and heading weighted by their own scatter). A run
-of a whole turn or more also shows whether the circle drifts in a current, c → c + U t. Then its radius and speed
-are those relative to the fluid. The slip angle is the angle between the heading and the tangent of the circle. The
-speed is R |ω_yr|. Samples of a camera are not independent, because the robot wobbles as its disc turns. So
-standard errors are widened by the correlation time of the residuals. A run that turns by less than LEAST_TURN is
-fitted by a straight line. It gives only a speed and a slip angle.
+`camera.circle` fits each run; a run that turns by less than LEAST_TURN gives only a speed and a slip angle.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple, Unpack
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import least_squares
 
 from calibration.swimmer.measured_table import OUTPUTS
 from calibration.swimmer.possible_runs import check_factor
+from camera.circle import TrackedRun, TrackFit, fit_track
+from camera.spin import fit_spin
 from sim.arrays import Floats
 from sim.inputs import RUN, RUN_SYNONYMS, run_columns
 from sim.io.errors import InputError, naming
@@ -44,36 +36,12 @@ from sim.motion.batches import steady_columns
 from sim.motion.lab_units import lab_motion
 
 COLUMNS = ("run", "time_s", "x_cm", "y_cm", "heading_deg")
+_DOTS = ("head_left_cm", "head_area_mm2", "tail_left_cm", "tail_area_mm2")  # of films, see `camera.tracks`
 _SYNONYMS = {"t": "time"}
-LEAST_TURN = math.radians(20)  # smallest turn of a run to which a circle is fitted
 _LARGEST = 1e9  # of a sample
 _FEWEST = 12  # samples that a run needs
 _LISTED = 8  # names of runs in a message
 _ALIKE = 1.3  # ratio of the angles by which path and heading turn
-
-
-@dataclass(frozen=True)
-class TrackedRun:
-    """Results of one track; NaN where it does not give a result; errors are standard errors."""
-
-    omega_yr_rad_s: float = math.nan
-    omega_yr_error: float = math.nan
-    R_yr_cm: float = math.nan
-    R_yr_error: float = math.nan
-    theta_deg: float = math.nan
-    theta_error: float = math.nan
-    v_cm_s: float = math.nan
-    v_error: float = math.nan
-    drift_x_cm_s: float = math.nan  # of the circle
-    drift_y_cm_s: float = math.nan
-    drift_error: float = math.nan
-
-
-class TrackFit(NamedTuple):
-    """Results of a track, and the fitted positions (m, 2) in cm."""
-
-    result: TrackedRun
-    path: Floats
 
 
 class Track(NamedTuple):
@@ -151,7 +119,9 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
     for name in COLUMNS:
         if name not in samples:
             raise InputError(f"the tracks have no column {name!r}; they need {', '.join(COLUMNS)}")
-    values = pd.DataFrame({name: numbers_of(samples[name]) for name in COLUMNS[1:]}).reset_index(drop=True)
+    dots = [name for name in _DOTS if name in samples]
+    values = pd.DataFrame({name: numbers_of(samples[name]) for name in (*COLUMNS[1:], *dots)})
+    values = values.reset_index(drop=True)
     values[~(values.abs() < _LARGEST)] = np.nan
     of_run = {str(name): track for name, track in values.groupby(_names(samples["run"]).to_numpy(), sort=False)}
     nothing = values.iloc[:0]
@@ -162,10 +132,11 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
     aside = [f"{len(unnamed)} samples have no name of a run"] if len(unnamed) else []
     aside += [f"run {name}: a track, but no row among the runs" for name in of_run if name not in runs]
     tracked: list[TrackedRun] = []
+    spins: list[dict[str, float]] = [{} for _ in runs]
     fitted: list[Track] = []
-    for run in runs:
+    for index, run in enumerate(runs):
         track = of_run.get(run, nothing)
-        known_samples = track.notna().all(axis=1)
+        known_samples = track[list(COLUMNS[1:])].notna().all(axis=1)
         if not known_samples.all():
             aside.append(f"run {run}: {int((~known_samples).sum())} samples with a value that is not a number")
         track = track[known_samples]
@@ -188,7 +159,9 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
             aside.append(f"run {run}: neither a circle nor a line fits its samples")
             continue
         fitted.append(Track(run, x, side * y, fit))
-    columns = pd.DataFrame([asdict(p) for p in tracked], index=table.index)
+        spins[index], reasons = _spins(track, table.iloc[index], fit.result.omega_yr_rad_s)
+        aside += [f"run {run}: {reason}" for reason in reasons]
+    columns = pd.DataFrame([asdict(p) | s for p, s in zip(tracked, spins, strict=True)], index=table.index)
     known = [c for c in columns if columns[c].notna().any()]
     if not known:
         raise InputError(f"no track gives a number{f' ({aside[0]})' if aside else ''}; check the tracks")
@@ -196,6 +169,26 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
     if robot is not None:
         _check_motion(robot, table, columns)
     return MeasuredTracks(pd.concat([table, columns[known]], axis=1), aside, fitted, ())
+
+
+def _spins(track: pd.DataFrame, run: pd.Series, yaw: float) -> tuple[dict[str, float], list[str]]:
+    """Return the spins that a run's dots show, signed as the motor where a dot has no sign, and what failed."""
+    given = float(pd.to_numeric(run.get("omega_rpm", math.nan), errors="coerce"))
+    direction = math.copysign(1.0, given if math.isfinite(given) else yaw)
+    spins: dict[str, float] = {}
+    reasons = []
+    for body, letter, sense in (("head", "h", -1.0), ("tail", "t", 1.0)):
+        noted = f"omega_{letter}_rpm" in run
+        if noted or f"{body}_left_cm" not in track or not math.isfinite(given):
+            continue
+        time, left, area = (track[c].to_numpy() for c in ("time_s", f"{body}_left_cm", f"{body}_area_mm2"))
+        spin = fit_spin(time, left, area, abs(given) * math.pi / 30)
+        if isinstance(spin, str):
+            reasons.append(f"no spin of the {body}: {spin}")
+            continue
+        signed = spin.omega if spin.sign_seen else direction * sense * abs(spin.omega)
+        spins |= {f"omega_{letter}_rpm": signed * 30 / math.pi, f"omega_{letter}_error": spin.error * 30 / math.pi}
+    return spins, reasons
 
 
 def _names(column: pd.Series) -> pd.Series:
@@ -248,7 +241,11 @@ def _check_sides(runs: pd.DataFrame, measured: pd.DataFrame, y_down: bool) -> No
         return
     sides = np.sign(pd.to_numeric(runs["omega_rpm"], errors="coerce") * measured["omega_yr_rad_s"])
     if (sides < 0).any() and not (sides > 0).any():
-        remedy = "leave out --y-down" if y_down else "give --y-down if the camera's y axis points down"
+        remedy = (
+            "leave out --y-down"
+            if y_down
+            else 'give --y-down if the camera\'s y axis points down, or of a film looks = "up" in view.toml'
+        )
         raise InputError(
             "all runs turn to the other side than their motors make them (seen from above, a positive omega_rpm "
             f"turns to the left): {remedy}, or change the sign of omega_rpm"
@@ -275,89 +272,3 @@ def _check_motion(robot: Robot, runs: pd.DataFrame, measured: pd.DataFrame) -> N
         factors = np.abs(measured[column][usable].to_numpy(dtype=float) / simulated[column])
         if np.isfinite(factors).any():
             check_factor(output, float(np.nanmedian(factors)))
-
-
-def fit_track(time: Floats, x: Floats, y: Floats, heading_deg: Floats) -> TrackFit:
-    """Fit a circle or a line to one track; arrays (m,), in s, cm and degrees."""
-    time = time - time.mean()
-    heading = np.unwrap(np.radians(heading_deg))
-    rate, middle = np.polyfit(time, heading, 1)
-    if abs(rate) * np.ptp(time) < LEAST_TURN:
-        return _line(time, x, y, heading)
-    scatter_h = max(float(np.std(heading - rate * time - middle)), 1e-9)
-    # On the circle the position is linear in (c_x, c_y, R cos α0, R sin α0) for a given rate.
-    drifts = abs(rate) * np.ptp(time) >= 2 * math.pi
-    turn = np.exp(1j * rate * time)
-    design = np.stack([np.ones_like(turn), turn, *([time] if drifts else [])], 1)
-    weights = np.linalg.lstsq(design, x + 1j * y, rcond=None)[0]
-    centre, arm, *drift = weights
-    scatter = max(float(np.abs(x + 1j * y - design @ weights).std() / math.sqrt(2)), 1e-9)
-    start = [centre.real, centre.imag, abs(arm), np.angle(arm), rate, middle]
-    start += [part for u in drift for part in (u.real, u.imag)]
-
-    def path(p: Floats) -> Floats:
-        angle = p[3] + p[4] * time
-        u, w = (p[6], p[7]) if drifts else (0.0, 0.0)
-        return np.stack([p[0] + u * time + p[2] * np.cos(angle), p[1] + w * time + p[2] * np.sin(angle)])
-
-    def residual(p: Floats) -> Floats:
-        off_x, off_y = (np.stack([x, y]) - path(p)) / scatter
-        return np.concatenate([off_x, off_y, (heading - p[5] - p[4] * time) / scatter_h])
-
-    fitted = least_squares(residual, start, x_scale=np.maximum(np.abs(start), 1e-3))
-    covariance = _covariance(np.asarray(fitted.jac), fitted.fun, 3)
-    radius, angle, rate, middle, *drift = fitted.x[2:]
-    drifted = [*map(float, drift), math.sqrt((covariance[6, 6] + covariance[7, 7]) / 2)] if drifts else []
-    tangent = angle + math.copysign(math.pi / 2, rate)
-    slip = abs(math.remainder(middle - tangent, 2 * math.pi))
-    slip_error = math.sqrt(covariance[3, 3] + covariance[5, 5] - 2 * covariance[3, 5])
-    speed_error = math.sqrt(
-        rate**2 * covariance[2, 2] + radius**2 * covariance[4, 4] + 2 * abs(rate) * radius * covariance[2, 4]
-        * math.copysign(1, rate)
-    )  # fmt: skip
-    result = TrackedRun(
-        float(rate), math.sqrt(covariance[4, 4]), float(radius), math.sqrt(covariance[2, 2]), math.degrees(slip),
-        math.degrees(slip_error), float(abs(rate) * radius), speed_error,
-        *drifted,
-    )  # fmt: skip
-    return TrackFit(result, path(fitted.x).T)
-
-
-def _line(time: Floats, x: Floats, y: Floats, heading: Floats) -> TrackFit:
-    design = np.stack([np.ones_like(time), time], 1)
-    fits, variances = [], []
-    for values in (x, y, heading):
-        line = np.linalg.lstsq(design, values, rcond=None)[0]
-        fits.append(line)
-        variances.append(_covariance(design, values - design @ line, 1))
-    v_x, v_y = fits[0][1], fits[1][1]
-    speed = math.hypot(v_x, v_y)
-    error = math.sqrt((v_x**2 * variances[0][1, 1] + v_y**2 * variances[1][1, 1]) / speed**2)
-    slip = abs(math.remainder(fits[2][0] - math.atan2(v_y, v_x), 2 * math.pi))
-    slip_error = math.sqrt(variances[2][0, 0] + (error / speed) ** 2)
-    result = TrackedRun(
-        theta_deg=math.degrees(slip), theta_error=math.degrees(slip_error), v_cm_s=speed, v_error=error
-    )
-    return TrackFit(result, np.stack([design @ fits[0], design @ fits[1]], 1))
-
-
-def _covariance(J: Floats, residual: Floats, parts: int) -> Floats:
-    """Estimate the covariance of a fit to `parts` series in time, each with its own scatter and correlation."""
-    inverse = np.linalg.pinv(J.T @ J)
-    middle = np.zeros_like(inverse)
-    for rows, series in zip(np.split(J, parts), np.split(residual, parts), strict=True):
-        variance = float(series @ series) / max(len(series) - J.shape[1] / parts, 1)
-        middle += variance * _correlation_time(series) * rows.T @ rows
-    return np.asarray(inverse @ middle @ inverse)
-
-
-def _correlation_time(residual: Floats) -> float:
-    """Compute the integrated autocorrelation time in samples, at least 1 (summed up to its first zero)."""
-    centred = residual - residual.mean()
-    power = np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2
-    correlation = np.fft.irfft(power)[: len(centred)]
-    if correlation[0] <= 0:
-        return 1.0
-    correlation = correlation / correlation[0]
-    end = int(np.argmax(correlation <= 0)) or len(correlation)
-    return float(max(1.0, 1 + 2 * correlation[1:end].sum()))

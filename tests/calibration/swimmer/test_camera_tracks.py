@@ -10,7 +10,8 @@ import pandas as pd
 import pytest
 
 from calibration.report.figures import draw_tracks
-from calibration.swimmer.camera_tracks import fit_track, measure_tracks
+from calibration.swimmer.camera_tracks import measure_tracks
+from camera.circle import fit_track
 from sim.inputs import load_robot
 from sim.io.errors import InputError
 from sim.motion.steady import steady

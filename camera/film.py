@@ -1,0 +1,111 @@
+"""Frames of a film with the time that the file states for each, decoded in a thread of their own.
+
+Frame rates may vary: a frame's time is its time stamp, from the film's beginning. Converters to a constant rate
+show a frame twice where the camera dropped one; such a copy differs from the frame before by far less than others
+do, and is left out, since what it shows is older than its time stamp says.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from queue import Queue
+from threading import Event, Thread
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from camera.view import opencv
+from sim.io.errors import InputError
+
+_AHEAD = 4  # decoded frames that wait
+_COPY = 0.2  # of the usual difference of two frames in a row, the difference of a copy
+_USUAL = 30  # frames from which the usual difference is taken
+
+
+class Frame(NamedTuple):
+    """One picture of a film."""
+
+    number: int  # in the file, from 0
+    time_s: float  # from the film's beginning
+    picture: Any  # (H, W, 3) uint8, blue, green, red
+    doubled: bool = False  # a copy of the frame before
+
+
+class Film:
+    """A film file."""
+
+    def __init__(self, path: str | Path) -> None:
+        """Open a film.
+
+        Raises:
+            InputError: there is no such file, or no film that OpenCV reads.
+        """
+        cv = opencv()
+        if not Path(path).is_file():
+            raise InputError(f"{path}: no such file; check the path")
+        self.path, self._cv = str(path), cv
+        self._capture = cv.VideoCapture(self.path, cv.CAP_FFMPEG, [cv.CAP_PROP_N_THREADS, 2])
+        if not self._capture.isOpened() or not self._capture.grab():
+            raise InputError(f"{path} is no film that can be read; convert it: ffmpeg -i FILM film.mp4")
+        self.count = max(int(self._capture.get(cv.CAP_PROP_FRAME_COUNT)), 1)
+        self.rate = float(self._capture.get(cv.CAP_PROP_FPS))  # frames per second, as the file states
+        self._capture = cv.VideoCapture(self.path, cv.CAP_FFMPEG, [cv.CAP_PROP_N_THREADS, 2])
+
+    def samples(self, number: int) -> Iterator[Any]:
+        """Yield pictures at equal distances over the film."""
+        seeking = self._cv.VideoCapture(self.path, self._cv.CAP_FFMPEG)
+        for index in np.linspace(0, self.count - 1, number).astype(int):
+            seeking.set(self._cv.CAP_PROP_POS_FRAMES, int(index))
+            good, picture = seeking.read()
+            if good:
+                yield picture
+
+    def frames(self, start: float = 0.0, end: float = math.inf) -> Iterator[Frame]:
+        """Yield the frames from `start` to `end` [s], once; copies are marked.
+
+        Raises:
+            InputError: the time stamps do not increase.
+        """
+        waiting: Queue[Frame | None] = Queue(_AHEAD)
+        stop = Event()
+        reader = Thread(target=self._read, args=(start, end, waiting, stop), daemon=True)
+        reader.start()
+        differences: list[float] = []
+        before, time = None, -math.inf
+        try:
+            while (frame := waiting.get()) is not None:
+                if frame.time_s <= time:
+                    raise InputError(
+                        f"{self.path}: the time stamp of frame {frame.number} is not after the one before; write "
+                        "the film again with a frame rate: ffmpeg -r 30 -i FILM film.mp4"
+                    )
+                time, coarse = frame.time_s, frame.picture[::4, ::4].astype(np.int16)
+                doubled = False
+                if before is not None:
+                    difference = float(np.abs(coarse - before).mean())
+                    doubled = bool(differences) and difference < _COPY * float(np.median(differences))
+                    if not doubled:
+                        differences = [*differences[1 - _USUAL :], difference]
+                before = coarse
+                yield frame._replace(doubled=doubled)
+        finally:
+            stop.set()
+            while reader.is_alive():  # it may wait for a place in the queue
+                while not waiting.empty():
+                    waiting.get_nowait()
+                reader.join(0.01)
+
+    def _read(self, start: float, end: float, waiting: Queue[Frame | None], stop: Event) -> None:
+        index = 0
+        while not stop.is_set() and self._capture.grab():
+            time = float(self._capture.get(self._cv.CAP_PROP_POS_MSEC)) / 1000
+            if time > end:
+                break
+            if time >= start:
+                good, picture = self._capture.retrieve()
+                if good:
+                    waiting.put(Frame(index, time, picture))
+            index += 1
+        waiting.put(None)

@@ -1,0 +1,192 @@
+"""Tracks of the robots in a film, as tables that `softflagella check` and `calibration tracks` read.
+
+A row is a frame in which the robot was seen: run, frame, time_s, x_cm, y_cm, heading_deg, their standard errors
+x_error_cm (of y, too) and heading_error_deg, and for a dot on the head or on a tail head_left_cm or tail_left_cm
+(left of the axis, empty out of sight) and head_area_mm2 or tail_area_mm2. Frames without a pose are counted by
+their reason.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from camera.circle import fit_track
+from camera.detector import Detector, Lost, Pose
+from camera.film import Film
+from camera.view import Markers, Setup, View, opencv
+from sim.io.errors import InputError, naming
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_SAMPLES = 12  # pictures from which the distance of the bands is learnt
+_SHOWN = 10  # poses in the picture of a track
+_GAP = 1.5  # usual times between two frames, at which frames are missing
+_LEAST = 0.05  # of the head's length, of which the bands are apart
+
+
+class FilmTracks(NamedTuple):
+    """The tracks of a film."""
+
+    tables: dict[str, pd.DataFrame]  # robot -> its track
+    notes: list[str]  # frames that were lost, doubled or missing, and why
+    view: View
+    picture: Any  # the last frame
+
+
+def track_film(
+    path: str | Path,
+    setup: Setup,
+    *,
+    head_length: float = math.nan,
+    start: float = 0.0,
+    end: float = math.inf,
+    progress: Callable[[int, int], object] | None = None,
+) -> FilmTracks:
+    """Track the robots of a film.
+
+    Args:
+        path: the film.
+        setup: scale, lens, region and markers.
+        head_length: of the robots [m].
+        start: time in the film that becomes time_s = 0 [s].
+        end: of what is tracked [s].
+        progress: is called with the frames done and the frames of the film.
+
+    Raises:
+        InputError: the film cannot be read, or a robot is not seen in it; the message says what to change.
+    """
+    with naming(path):
+        film = Film(path)
+        detector = Detector(_with_distances(film, setup, head_length), setup.view, head_length=head_length)
+        rows: dict[str, list[dict[str, float]]] = {each.name: [] for each in setup.robots}
+        why = {each.name: Counter[str]() for each in setup.robots}
+        times, doubled, picture = [], 0, None
+        for frame in film.frames(start, end):
+            if progress is not None and frame.number % 100 == 0:
+                progress(frame.number, film.count)
+            times.append(frame.time_s)
+            if frame.doubled:
+                doubled += 1
+                continue
+            picture = frame.picture
+            for each in detector.poses(picture, frame.time_s):
+                if isinstance(each, Lost):
+                    why[each.robot][each.why] += 1
+                else:
+                    rows[each.robot].append(_row(each, frame.number, frame.time_s - start))
+        if picture is None:
+            raise InputError(f"no frame between {start:g} and {end:g} s; the film has {film.count} frames")
+        return FilmTracks(
+            _tables(Path(path).stem, setup, rows, why, len(times) - doubled),
+            _notes(np.array(times), doubled, why),
+            detector.view,
+            picture,
+        )
+
+
+def _with_distances(film: Film, setup: Setup, head_length: float) -> list[Markers]:
+    """Learn from some pictures how far the bands of each robot are apart, and compare with its head.
+
+    Raises:
+        InputError: the bands are further apart than the head is long, or hardly apart.
+    """
+    seen: dict[str, list[float]] = {each.name: [] for each in setup.robots}
+    for picture in film.samples(_SAMPLES):
+        detector = Detector(setup.robots, setup.view)
+        for each in detector.poses(picture, 0.0):
+            if isinstance(each, Pose) and len(each.marks) == 2:
+                front, rear = detector.view.to_tank(np.array(each.marks))
+                seen[each.robot].append(float(np.hypot(*(front - rear))))
+    learnt = []
+    for markers in setup.robots:
+        known = markers.apart
+        if seen[markers.name] and math.isnan(known):
+            known = float(np.median(seen[markers.name]))
+            if known > 1.05 * head_length or known < _LEAST * head_length:
+                raise InputError(
+                    f"the bands are {100 * known:.3g} cm apart, and the head of the robot is "
+                    f"{100 * head_length:.3g} cm long: correct [scale] in view.toml, or give the right robot"
+                )
+        learnt.append(markers._replace(apart=known))
+    return learnt
+
+
+def _row(pose: Pose, index: int, time: float) -> dict[str, float]:
+    row = {
+        "frame": index,
+        "time_s": time,
+        "x_cm": 100 * pose.x,
+        "y_cm": 100 * pose.y,
+        "heading_deg": math.degrees(pose.heading),
+        "x_error_cm": 100 * pose.sigma_x,
+        "heading_error_deg": math.degrees(pose.sigma_heading),
+    }
+    for name, (left, area) in pose.dots.items():
+        row |= {f"{name}_left_cm": 100 * left, f"{name}_area_mm2": 1e6 * area}
+    return row
+
+
+def _tables(
+    film: str, setup: Setup, rows: dict[str, list[dict[str, float]]], why: dict[str, Counter[str]], count: int
+) -> dict[str, pd.DataFrame]:
+    import pandas as pd
+
+    tables = {}
+    for each in setup.robots:
+        if not rows[each.name]:
+            remedy = (
+                'give its markers as they look in the picture, front = "#c03020", or light the tank'
+                if each.tag is None
+                else "check its number, its dictionary and its white border, and that the film is not mirrored"
+            )
+            reason = why[each.name].most_common(1)[0][0]
+            raise InputError(f"no robot {each.name} in {count} frames ({reason}): {remedy}")
+        table = pd.DataFrame(rows[each.name])
+        table.insert(0, "run", film if len(setup.robots) == 1 else f"{film}-{each.name}")
+        tables[each.name] = table
+    return tables
+
+
+def _notes(times: Any, doubled: int, why: dict[str, Counter[str]]) -> list[str]:
+    notes = []
+    steps = np.diff(times)
+    if len(steps) and (missing := int((steps > _GAP * np.median(steps)).sum())):
+        notes.append(f"{missing} gaps in the time stamps: the camera dropped frames")
+    if doubled:
+        notes.append(f"{doubled} of {len(times)} frames are copies of the frame before, and left out")
+    for robot, reasons in why.items():
+        for reason, count in reasons.most_common():
+            notes.append(f"robot {robot}: {count} of {len(times)} frames without a pose: {reason}")
+    return notes
+
+
+def write_check(path: Path, tracks: FilmTracks, robots: tuple[Markers, ...]) -> None:
+    """Write a PNG of the last frame with each track, its fitted circle, and some of its poses."""
+    cv2, picture = opencv(), tracks.picture.copy()
+    size = picture.shape[1] / 100
+    for markers in robots:
+        table = tracks.tables[markers.name]
+        places = table[["x_cm", "y_cm"]].to_numpy() / 100
+        lines = [(places, (255, 255, 255))]
+        if len(places) >= _SHOWN:
+            fit = fit_track(*(table[name].to_numpy() for name in ("time_s", "x_cm", "y_cm", "heading_deg")))
+            lines.append((fit.path / 100, (0, 160, 255)))
+        for line, colour in lines:
+            pixels = np.round(tracks.view.to_picture(line) * 8).astype(np.int32)
+            cv2.polylines(picture, [pixels], False, colour, max(int(size / 5), 1), cv2.LINE_AA, 3)
+        stride = max(len(places) // _SHOWN, 1)
+        angle = np.radians(table["heading_deg"].to_numpy())
+        ahead = places + 0.02 * np.stack([np.cos(angle), np.sin(angle)], 1)
+        ends = np.round([tracks.view.to_picture(part[::stride]) for part in (places, ahead)]).astype(int)
+        for foot, tip in zip(*ends.tolist(), strict=True):
+            cv2.arrowedLine(picture, foot, tip, (0, 0, 0), max(int(size / 4), 1), cv2.LINE_AA, tipLength=0.3)
+    good, data = cv2.imencode(".png", picture)
+    assert good
+    path.write_bytes(data.tobytes())

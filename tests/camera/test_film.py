@@ -1,0 +1,140 @@
+"""Films to tracks: poses, spins, missing and doubled frames, and a line for each film that cannot be used."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from calibration.swimmer.camera_tracks import measure_tracks
+from camera.film import Film
+from camera.tracks import track_film
+from camera.view import Setup, read_setup
+from sim.io.errors import InputError, run_command
+from softflagella.__main__ import main
+from tests.oracles.tank import LENGTH, TAIL, Tank, circling
+from tests.shared import FOLDER, shared
+
+RATE, SECONDS = 12.0, 20.0
+HEAD, TAILS, YAW, RADIUS = -4.6, 6.2, 0.25, 0.06  # rad/s, m
+DOUBLED = (77, 150)
+SWUM = circling(YAW, RADIUS, head=HEAD, tails=TAILS)
+
+
+def setup_of(tank: Tank, folder: Path) -> Setup:
+    (folder / "view.toml").write_text(tank.view_toml())
+    return read_setup(folder / "view.toml")
+
+
+def small(**given: float) -> Tank:
+    return Tank(width=320, height=240, scale=0.001, **given)  # type: ignore[arg-type]
+
+
+@shared
+def film() -> Path:
+    """Film a robot for 20 s with an uneven light, dropped and doubled frames and a hand; with its view.toml."""
+    folder = FOLDER / "film"
+    folder.mkdir(exist_ok=True)
+    tank = small(shade=0.3)
+    setup_of(tank, folder)
+    return tank.film(folder / "swim.mp4", SWUM, SECONDS, RATE, doubled=DOUBLED, hand=(180, 200))
+
+
+def test_a_film_gives_poses_at_its_time_stamps_and_says_what_it_left_out() -> None:
+    tracked = track_film(film(), read_setup(film().parent / "view.toml"), head_length=LENGTH)
+    table = tracked.tables["1"]
+    assert len(table) > 0.88 * RATE * SECONDS
+    truth = np.array([SWUM(time) for time in table["time_s"]])
+    assert np.hypot(*(table[["x_cm", "y_cm"]].to_numpy().T / 100 - truth[:, :2].T)).max() < 0.02 * TAIL
+    turned = (table["heading_deg"] - np.degrees(truth[:, 2]) + 180) % 360 - 180
+    assert np.sqrt((turned**2).mean()) < 1
+    assert (np.abs(turned) < 1.96 * table["heading_error_deg"]).mean() > 0.9
+    assert not set(DOUBLED) & set(table["frame"])
+    assert tracked.notes[0] == f"{len(DOUBLED)} of 240 frames are copies of the frame before, and left out"
+    assert any(re.search("frames without a pose: (no red|no green|red|green)", note) for note in tracked.notes[1:])
+
+
+def test_spins_and_circle_of_a_film_are_those_that_were_drawn() -> None:
+    tracked = track_film(film(), read_setup(film().parent / "view.toml"), head_length=LENGTH)
+    rpm = (TAILS - HEAD) * 30 / math.pi
+    runs = pd.DataFrame({"run": ["swim"], "N": [2], "l_cm": [11.0], "omega_rpm": [rpm]})
+    measured = measure_tracks(tracked.tables["1"], runs)
+    assert measured.excluded == []
+    row = measured.table.iloc[0]
+    for column, truth in (("omega_h", HEAD), ("omega_t", TAILS)):
+        error = row[f"{column}_rpm"] * math.pi / 30 - truth
+        assert abs(error) < 0.005 * abs(truth)
+        assert abs(error) < 3 * row[f"{column}_error"] * math.pi / 30 < 0.02 * abs(truth)
+    noted = measure_tracks(tracked.tables["1"], runs.assign(omega_h_rpm=-44.0)).table
+    assert list(noted["omega_h_rpm"]) == [-44.0]
+    assert row["omega_yr_rad_s"] == pytest.approx(YAW, rel=0.005)
+    assert row["R_yr_cm"] == pytest.approx(100 * RADIUS, rel=0.01)
+    assert row["theta_deg"] == pytest.approx(math.degrees(1.17), abs=1)
+
+
+def test_the_command_writes_a_track_that_planner_and_calibration_read_and_a_picture(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    view = film().parent / "view.toml"
+    words = ["tracks", film(), "--robot", "paper-control", "--view", view, "--start", 5, "--end", 12,
+             "--out", tmp_path / "tracks.csv", "--check", tmp_path / "check.png"]  # fmt: skip
+    assert run_command(main, [str(word) for word in words]) == 0
+    assert "poses -> " in capsys.readouterr().out
+    table = pd.read_csv(tmp_path / "tracks.csv")
+    assert table["time_s"].iloc[0] == pytest.approx(0, abs=1e-6)
+    assert table["time_s"].iloc[-1] == pytest.approx(7, abs=0.2)
+    assert (tmp_path / "check.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_frames_that_the_camera_dropped_are_gaps_in_the_time_stamps(tmp_path: Path) -> None:
+    """A GIF has a duration for each frame."""
+    from PIL import Image
+
+    pictures = [Image.fromarray(np.full((32, 48, 3), 10 * k, np.uint8)) for k in range(8)]
+    times = [100, 100, 300, 100, 100, 200, 100, 100]
+    pictures[0].save(tmp_path / "film.gif", save_all=True, append_images=pictures[1:], duration=times)
+    seen = [frame.time_s for frame in Film(tmp_path / "film.gif").frames()]
+    assert seen == pytest.approx([0, 0.1, 0.2, 0.5, 0.6, 0.7, 0.9, 1.0])
+
+
+def test_films_that_cannot_be_used_are_refused_with_what_to_change(tmp_path: Path) -> None:
+    bare = Tank(width=320, height=240, scale=0.001, colours=("", "", "", ""))
+    view = setup_of(small(), tmp_path)
+    nothing = bare.film(tmp_path / "bare.mp4", SWUM, 1.0, RATE)
+    with pytest.raises(InputError, match=r"no robot 1 in 12 frames \(no red\): give its markers as they look"):
+        track_film(nothing, view)
+    good = small().film(tmp_path / "good.mp4", SWUM, 1.0, RATE)
+    with pytest.raises(
+        InputError, match=r"bands are 4.4 cm apart, and the head of the robot is 0.6 cm long: correct"
+    ):
+        track_film(good, view, head_length=LENGTH / 10)
+    with pytest.raises(InputError, match=r"no frame between 5 and 9 s; the film has 12 frames"):
+        track_film(good, view, start=5, end=9)
+    (tmp_path / "text.mp4").write_text("no film")
+    with pytest.raises(InputError, match=r"text\.mp4 is no film that can be read"):
+        Film(tmp_path / "text.mp4")
+    with pytest.raises(InputError, match="no such file"):
+        Film(tmp_path / "none.mp4")
+
+
+@pytest.mark.parametrize(("mirrored", "rate"), [(True, RATE), (False, 5.0)])
+def test_mirrored_and_slow_films_are_named_when_runs_are_measured(
+    mirrored: bool, rate: float, tmp_path: Path
+) -> None:
+    tank = small(mirrored=mirrored)
+    table = track_film(tank.film(tmp_path / "a.mp4", SWUM, 6.0, rate), setup_of(tank, tmp_path)).tables["1"]
+    runs = pd.DataFrame({"run": ["a"], "N": [2], "l_cm": [11.0], "omega_rpm": [150.0]})
+    if mirrored:
+        with pytest.raises(InputError, match=r'all runs turn to the other side .* of a film looks = "up"'):
+            measure_tracks(table, runs)
+        return
+    measured = measure_tracks(table, runs)
+    assert measured.excluded[0] == (
+        "run a: no spin of the head: 5 frames a second cannot tell spins up to 150 rpm apart (aliasing); film "
+        "with 10 or more, or slow the motor down"
+    )
+    assert measured.table["R_yr_cm"][0] == pytest.approx(100 * RADIUS, rel=0.02)
