@@ -1,28 +1,48 @@
-"""Compile all kernels of the simulator, with progress, so that the first use need not wait for it."""
+"""Compile all kernels of the simulator, with progress, so that the first use need not wait for it.
+
+Two processes compile, where there are two processors: one what orbits need, the other what time steps need.
+"""
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+
 from sim.jit import CACHE
 from sim.model.presets import PRESETS
+from sim.motion.flips import Flip, follow_flips
 from sim.motion.response import responses
 from sim.motion.sensitivity import sensitivities
 from sim.motion.settling import settle
 from sim.motion.steady import steady
+from sim.solve.assembly import numbers
+from sim.solve.orbit import straight_starts
 
-_ROBOT = PRESETS["paper-control"]
-_STAGES: tuple[tuple[str, Callable[[], object]], ...] = (
-    ("orbits", lambda: steady(_ROBOT.groups(), stability=False)),
-    ("stability", lambda: steady(_ROBOT.groups())),
-    ("derivatives", lambda: sensitivities(_ROBOT.groups(), ("C_t",))),
-    ("flips", lambda: responses(_ROBOT.groups())),
-    ("time steps", lambda: settle(_ROBOT.groups())),
+_ROBOT = PRESETS["paper-control"].groups()
+Stage = tuple[str, Callable[[], object]]
+
+
+def _flip() -> None:
+    """Follow straight tails for a moment."""
+    rows = numbers(_ROBOT)
+    (x,), (u,) = straight_starts(rows, 4, 3 * _ROBOT.N, _ROBOT.N)
+    follow_flips([Flip(rows[0], x, u, np.zeros(3), 1e-3)], np.array([1e-3]), 1e-3)
+
+
+_OF_ORBITS: tuple[Stage, ...] = (
+    ("orbits", lambda: steady(_ROBOT, stability=False)),
+    ("stability", lambda: steady(_ROBOT)),
+    ("derivatives", lambda: sensitivities(_ROBOT, ("C_t",))),
 )
+_OF_TIME: tuple[Stage, ...] = (("flips", _flip), ("time steps", lambda: settle(_ROBOT)))
+_ALL = (*_OF_ORBITS, *_OF_TIME)
 
 
 @cache
@@ -38,6 +58,19 @@ def all_compiled() -> bool:
     return _mark().exists()
 
 
+def _compile(stages: tuple[Stage, ...]) -> None:
+    for stage in stages:
+        began = time.perf_counter()
+        stage[1]()
+        line = f"{_ALL.index(stage) + 1}/{len(_ALL)} {stage[0]}, {time.perf_counter() - began:.0f} s"
+        print(line, file=sys.stderr, flush=True)
+
+
+def compile_for_time_steps() -> None:
+    """Compile what time steps need, in a process of its own."""
+    _compile(_OF_TIME)
+
+
 def compile_all() -> float:
     """Call every kernel once, with progress on stderr. Kernels that are compiled already are only loaded.
 
@@ -45,10 +78,19 @@ def compile_all() -> float:
         The time that it took, in seconds.
     """
     began = time.perf_counter()
-    for i, (name, call) in enumerate(_STAGES):
-        print(f"{i + 1}/{len(_STAGES)} {name} …", end=" ", file=sys.stderr, flush=True)
-        call()
-        print(f"{time.perf_counter() - began:.0f} s", file=sys.stderr, flush=True)
+    if len(os.sched_getaffinity(0)) > 1 and not all_compiled():
+        code = f"import sys; sys.path[:] = {sys.path!r}; import {__name__} as warm; warm.compile_for_time_steps()"
+        other = subprocess.Popen([sys.executable, "-c", code])
+        try:
+            _compile(_OF_ORBITS)
+            other.wait()
+        finally:
+            other.kill()
+        for _, call in _OF_TIME:  # what the other process has compiled is read here
+            call()
+    else:
+        _compile(_ALL)
+    responses(_ROBOT)
     _mark().touch()
     return time.perf_counter() - began
 
