@@ -28,16 +28,31 @@ def _to_stderr(line: str) -> None:
 
 @program.command("calibrate", of="calibration.api:calibrate", robot="--robot", paths="path", progress="")
 def _calibrate(
-    table: str, *, robot: str, out: str, paths: Sequence[str] | None = None, no_path: bool = False, **given: Any
+    table: str = "",
+    *,
+    robot: str,
+    out: str,
+    films: str | None = None,
+    view: str | None = None,
+    paths: Sequence[str] | None = None,
+    no_path: bool = False,
+    **given: Any,
 ) -> None:
     """Fit a table, find what the model lacks, correct the robot.
 
     Args:
+        table: CSV or Parquet of measured runs; or --films and --view.
+        films: TABLE, of runs with their films, in a column film; the measured table goes into the folder.
+        view: TOML, scale, lens and markers of the films.
         paths: a path, as for softflagella plan, on which the error is stated before and after (default:
             square:3l).
         no_path: state no error on a path, which takes some seconds, up to two minutes where the parts of the robot
             move in each other's flow or touch.
     """
+    if bool(table) == bool(films) or bool(films) != bool(view):
+        raise InputError("give a table of runs, or --films runs.csv with --view view.toml")
+    if films and view:
+        table = _filmed(films, view, robot, out)
     _refuse_early(table)
     from calibration.api import calibrate
     from calibration.report.path_error import DEFAULT_PATHS
@@ -58,6 +73,21 @@ def _calibrate(
     for line in result.summary_of_excluded:
         print(f"excluded: {line}")
     print(f"-> {', '.join(map(str, files))}")
+
+
+def _filmed(films: str, view: str, robot: str, out: str) -> str:
+    """Measure films; write table.csv and return its path."""
+    from calibration.films import measure_films
+    from sim.inputs import load_robot
+    from sim.io.files import make_folder, write_csv
+
+    measured = measure_films(films, view, load_robot(robot), tell=_to_stderr)
+    for line in measured.excluded:
+        _to_stderr(f"excluded: {line}")
+    make_folder(out)
+    table = f"{out}/table.csv"
+    write_csv(measured.table, table, digits=6)
+    return table
 
 
 @program.command("decide", of="calibration.api:decide", robot="--robot")

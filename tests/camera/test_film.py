@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.films import measure_films
 from calibration.swimmer.camera_tracks import measure_tracks
 from camera.film import Film
 from camera.tracks import track_film
 from camera.view import Setup, read_setup
+from sim.inputs import load_robot
 from sim.io.errors import InputError, run_command
 from softflagella.__main__ import main
 from tests.oracles.tank import LENGTH, TAIL, Tank, circling
@@ -119,6 +122,28 @@ def test_films_that_cannot_be_used_are_refused_with_what_to_change(tmp_path: Pat
         Film(tmp_path / "text.mp4")
     with pytest.raises(InputError, match="no such file"):
         Film(tmp_path / "none.mp4")
+
+
+def test_films_of_runs_become_a_measured_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    robot = replace(load_robot("paper-control"), motor_speed=TAILS - HEAD)
+    rpm = (TAILS - HEAD) * 30 / math.pi
+    table = pd.DataFrame({"film": ["swim.mp4"] * 2, "N": 2, "l_cm": 11.0, "omega_rpm": rpm, "start_s": [0.0, 7.0]})
+    table.assign(end_s=[8.0, 15.0]).to_csv(film().parent / "runs.csv", index=False)
+    said: list[str] = []
+    measured = measure_films(film().parent / "runs.csv", film().parent / "view.toml", robot, tell=said.append)
+    assert said[0].startswith("swim.mp4: 1 of 97 frames are copies")
+    for column, truth in (("omega_h_rpm", HEAD * 30 / math.pi), ("omega_t_rpm", TAILS * 30 / math.pi),
+                          ("omega_yr_rad_s", YAW), ("R_yr_cm", 100 * RADIUS)):  # fmt: skip
+        assert measured.table[column].to_numpy() == pytest.approx(np.full(2, truth), rel=0.01)
+    assert 0 < measured.table["camera_scale_sigma_percent"].max() < 2
+    words = ["calibrate", "--films", film().parent / "runs.csv", "--view", film().parent / "view.toml",
+             "--robot", "paper-control", "--out", tmp_path / "out"]  # fmt: skip
+    assert run_command(main, [str(word) for word in words]) == 2
+    assert "2 usable runs; a calibration needs at least 24" in capsys.readouterr().err
+    assert len(pd.read_csv(tmp_path / "out" / "table.csv")) == 2
+    table.drop(columns="film").to_csv(tmp_path / "runs.csv", index=False)
+    with pytest.raises(InputError, match=r"runs\.csv has no column 'film'"):
+        measure_films(tmp_path / "runs.csv", film().parent / "view.toml", robot)
 
 
 @pytest.mark.parametrize(("mirrored", "rate"), [(True, RATE), (False, 5.0)])

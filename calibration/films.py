@@ -1,0 +1,62 @@
+"""Films of runs to a table of measured runs: `softflagella calibrate --films runs.csv --view view.toml`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+
+from calibration.swimmer.camera_tracks import MeasuredTracks, measure_tracks
+from camera.tracks import track_film
+from camera.view import read_setup
+from sim.io.errors import InputError
+from sim.io.quantities import numbers_of
+from sim.io.tables import read_table, row_name
+from sim.model.robot import Robot
+
+
+def measure_films(
+    runs: str | Path, view: str | Path, robot: Robot, *, tell: Callable[[str], object] = lambda line: None
+) -> MeasuredTracks:
+    """Track the film of each run, and measure its motion and spins.
+
+    Args:
+        runs: a table with `film`, a file beside it or its path, and what was noted of a measured table:
+            `N`, `l_cm`, `omega_rpm`, `session`; `start_s` and `end_s`, if a run is a part of its film.
+        view: view.toml with one robot.
+        robot: the robot as given.
+        tell: is told what was left out of a film.
+
+    Raises:
+        InputError: a film or the table cannot be used; the message names it.
+    """
+    table, setup = read_table(runs), read_setup(view)
+    if "film" not in table:
+        raise InputError(f"{runs} has no column 'film' that names the film of each run")
+    if len(setup.robots) > 1:
+        raise InputError(f"{view} has {len(setup.robots)} robots; films of runs show one")
+    parts = {name: numbers_of(table[name]) for name in ("start_s", "end_s") if name in table}
+    tracks = []
+    for index, film in enumerate(table["film"]):
+        if not isinstance(film, str):
+            raise InputError(f"{runs}: {row_name(table, index)} has no film")
+        start, end = (
+            float(parts[name].iloc[index]) if name in parts else math.nan for name in ("start_s", "end_s")
+        )
+        tracked = track_film(
+            Path(runs).parent / film,
+            setup,
+            head_length=robot.head_length,
+            start=0.0 if math.isnan(start) else start,
+            end=math.inf if math.isnan(end) else end,
+        )
+        for note in tracked.notes:
+            tell(f"{film}: {note}")
+        tracks.append(next(iter(tracked.tables.values())).assign(run=index + 1))
+    scale = 100 * tracked.view.scale_error
+    noted = table.drop(columns=["film", *parts]).assign(run=range(1, len(table) + 1))
+    if "camera_scale_sigma_percent" not in noted:
+        noted["camera_scale_sigma_percent"] = scale
+    return measure_tracks(pd.concat(tracks, ignore_index=True), noted, robot=robot)
