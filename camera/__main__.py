@@ -1,9 +1,10 @@
-"""Command line of the camera: `view`, `tracks`."""
+"""Command line of the camera: `view`, `lens`, `tracks`."""
 
 from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from sim.io.commands import Program
@@ -25,6 +26,22 @@ def _view(*, out: str) -> None:
     with whole_file(out) as part:
         part.write_text(EXAMPLE)
     print(f"-> {out}")
+
+
+@program.command("lens")
+def _lens(pictures: Sequence[str], *, squares: str = "10x7") -> None:
+    """Print the lens lines of a view.toml from pictures of a chessboard in several poses.
+
+    Args:
+        pictures: PNG or JPEG, three or more of one camera; ten, tilted and near the edges, are good.
+        squares: COLUMNSxROWS, squares of the board.
+    """
+    from camera.lens import calibrate_lens
+
+    fit = calibrate_lens(pictures, squares=squares)
+    for note in fit.notes:
+        print(note, file=sys.stderr)
+    print(fit.lines(), end="")
 
 
 @program.command("tracks")

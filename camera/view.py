@@ -52,7 +52,7 @@ length_cm = 30
 # points_cm = [[0, 0], [30, 0], [30, 20], [0, 20]]  # instead of the length: places of four points or more
 # tag_cm = 4                         # instead of points: the side of an ArUco tag, number tag_id, in the picture
 
-# [lens]                             # focal_px, centre_px, distortion, as OpenCV calibrates them
+# [lens]                             # what softflagella camera lens prints, from pictures of a chessboard
 # [tank]
 # region_px = [[50, 50], [1230, 50], [1230, 670], [50, 670]]  # a polygon; nothing outside is a marker
 

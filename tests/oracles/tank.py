@@ -76,14 +76,17 @@ class Tank:
     def focal(self) -> float:
         return 1.2 * self.width
 
-    def places(self, pixels: Floats) -> tuple[Floats, Floats]:
-        """Trace pixels (..., 2) back to places in the tank."""
-        middle = np.array([(self.width - 1) / 2, (self.height - 1) / 2])
-        seen = (pixels - middle) / self.focal
+    def rays(self, pixels: Floats) -> Floats:
+        """Trace pixels (..., 2) back through the lens, to points one focal length ahead."""
+        seen = (pixels - np.array([(self.width - 1) / 2, (self.height - 1) / 2])) / self.focal
         ray = seen
         for _ in range(12):
             ray = seen / (1 + self.distortion * (ray**2).sum(-1, keepdims=True))
-        plane = ray * self.focal * self.scale
+        return ray
+
+    def places(self, pixels: Floats) -> tuple[Floats, Floats]:
+        """Trace pixels (..., 2) back to places in the tank."""
+        plane = self.rays(pixels) * self.focal * self.scale
         depth = 1 + self.tilt * plane[..., 1] / (self.height * self.scale)  # nearer at the lower edge
         x = plane[..., 0] / depth + self.width * self.scale / 2
         y = -plane[..., 1] / depth + self.height * self.scale / 2
@@ -186,3 +189,28 @@ class Tank:
             writer.write(last)
         writer.release()
         return path
+
+
+def board(tank: Tank, pose: Sequence[float], squares: tuple[int, int] = (10, 7)) -> Any:
+    """Draw a chessboard in front of the camera of a tank.
+
+    Args:
+        tank: with the lens, the size of the picture and the noise.
+        pose: turns about the picture's horizontal and vertical axis [rad]; place of the board's middle to the
+            right and down, and in front of the camera [squares].
+        squares: of the board.
+    """
+    import cv2
+    from scipy.spatial.transform import Rotation
+
+    fine = 3  # samples a pixel, each way
+    grid = np.meshgrid(*((np.arange(n * fine) + 0.5) / fine - 0.5 for n in (tank.width, tank.height)))
+    rays = np.concatenate([tank.rays(np.stack(grid, -1)), np.ones((*grid[0].shape, 1))], -1)
+    turn, middle = Rotation.from_euler("xy", pose[:2]).as_matrix(), np.array(pose[2:])
+    normal = turn[:, 2]
+    points = (rays * (middle @ normal / (rays @ normal))[..., None] - middle) @ turn[:, :2] + np.array(squares) / 2
+    on = ((points >= 0) & (points < squares)).all(-1)
+    dark = on & (np.floor(points).sum(-1) % 2 == 0)
+    picture = cv2.resize(np.where(dark, 40.0, 220.0), (tank.width, tank.height), interpolation=cv2.INTER_AREA)
+    picture += np.random.default_rng(0).normal(scale=tank.noise, size=picture.shape)
+    return np.clip(np.round(picture), 0, 255).astype(np.uint8)
