@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from typing import Any
 
-from sim.io.commands import Program
+from sim.io.commands import Call, Program
 from sim.io.errors import InputError
 
 program = Program("calibration", "Find from measured runs what the model of a robot lacks, and correct it.")
@@ -28,6 +27,7 @@ def _to_stderr(line: str) -> None:
 
 @program.command("calibrate", of="calibration.api:calibrate", robot="--robot", paths="path", progress="")
 def _calibrate(
+    calibrate: Call,
     table: str = "",
     *,
     robot: str,
@@ -36,7 +36,6 @@ def _calibrate(
     view: str | None = None,
     paths: Sequence[str] | None = None,
     no_path: bool = False,
-    **given: Any,
 ) -> None:
     """Fit a table, find what the model lacks, correct the robot.
 
@@ -54,7 +53,6 @@ def _calibrate(
     if films and view:
         table = _filmed(films, view, robot, out)
     _refuse_early(table)
-    from calibration.api import calibrate
     from calibration.report.path_error import DEFAULT_PATHS
     from calibration.statistics.budget import stopped_by_interrupt
 
@@ -62,7 +60,7 @@ def _calibrate(
         raise InputError("--path and --no-path exclude each other")
     stated = () if no_path else paths or DEFAULT_PATHS
     with stopped_by_interrupt():
-        result = calibrate(table, robot, paths=stated, tell=_to_stderr, **given)
+        result = calibrate(table=table, robot=robot, paths=stated, tell=_to_stderr)
     files = result.save(out)
     print(result.sentence)
     print(result.errors_in_words)
@@ -91,13 +89,11 @@ def _filmed(films: str, view: str, robot: str, out: str) -> str:
 
 
 @program.command("decide", of="calibration.api:decide", robot="--robot")
-def _decide(table: str, verdict: str, *, robot: str, **given: Any) -> None:
-    """Say which of several explanations new runs speak for."""
+def _decide(decide: Call, table: str) -> None:
     _refuse_early(table)
-    from calibration.api import decide
     from calibration.verdict.next_runs import GIVEN_UP
 
-    decision = decide(table, verdict, robot, **given)
+    decision = decide(table=table)
     print(f"{decision.new_runs} new runs. An explanation that is behind by more than {GIVEN_UP:.1f} is given up.")
     for explanation in decision.standings:
         print(f"  {explanation.title}: {f'behind by {explanation.behind:.1f}' if explanation.behind else 'best'}")
@@ -183,43 +179,21 @@ def _simulate(
 
 
 @program.command("tracks", of="calibration.api:tracks", written_by="from")
-def _tracks(
-    tracks: str,
-    runs: str,
-    *,
-    robot: str | None = None,
-    y_down: bool = False,
-    check: str | None = None,
-    out: str,
-    **given: Any,
-) -> None:
+def _tracks(tracks: Call, runs: str, *, check: str | None = None, out: str) -> None:
     """Turn camera tracks into a table of runs.
 
     Args:
-        check: PNG, draw the fitted circles over the tracks.
         out: CSV.
     """
-    from sim.io.pose_tracks import read_tracks
-
-    read_tracks(tracks, **given)
     _refuse_early(runs)
-    from calibration.report.figures import draw_tracks
-    from calibration.swimmer.camera_tracks import measure_tracks
-    from sim.inputs import load_robot
-    from sim.io.files import whole_file, write_csv
+    from sim.io.files import write_csv
 
-    known = None if robot is None else load_robot(robot)
-    measured = measure_tracks(tracks, runs, y_down=y_down, robot=known, **given)
-    for line in measured.converted:
-        print(line, file=sys.stderr)
-    for line in measured.excluded:
-        print(f"excluded: {line}", file=sys.stderr)
-    write_csv(measured.table, out, digits=6)
-    if check:
-        with whole_file(check) as part:
-            draw_tracks(measured.tracks).savefig(part, format="png", dpi=110)
+    table = tracks(runs=runs, check=check)
+    for line in table.attrs["converted"]:
+        _to_stderr(line)
+    write_csv(table, out, digits=6)
     pictures = f", {check}" if check else ""
-    print(f"{len(measured.table)} runs -> {out}{pictures}")
+    print(f"{len(table)} runs -> {out}{pictures}")
 
 
 if __name__ == "__main__":

@@ -24,7 +24,8 @@ from calibration.verdict.calibrate import calibrate as find_what_is_missing
 from calibration.verdict.next_runs import Decision, read_explanations
 from calibration.verdict.next_runs import decide as decide_between
 from calibration.verdict.verdict import Verdict
-from sim.io.errors import InputError
+from sim.io.errors import InputError, InputWarning
+from sim.io.files import whole_file
 from sim.io.keywords import checks_keywords
 from sim.io.track_options import TrackOptions
 from sim.io.units import LengthUnit
@@ -144,6 +145,7 @@ def tracks(
     *,
     y_down: bool = False,
     robot: OneRobot | None = None,
+    check: str | Path | None = None,
     **options: Unpack[TrackOptions],
 ) -> pd.DataFrame:
     """Turn camera tracks into a measured table: yaw rate, turn radius, slip angle and speed of each run.
@@ -154,11 +156,12 @@ def tracks(
         y_down: y and headings are those of a picture, whose y axis points down.
         robot: the robot as given, its robot.toml, or the name of a preset, with whose simulated motion the tracks
             are compared.
+        check: PNG, draw the fitted circles over the tracks.
         options: of tracks that another program has written, see `TrackOptions`.
 
     Returns:
         The runs with `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s` and their errors. What was left out is in
-        `attrs["excluded"]`, and is warned of.
+        `attrs["excluded"]`, and is warned of; what was converted is in `attrs["converted"]`.
 
     Raises:
         InputError: the tracks cannot be used; the message says why.
@@ -176,7 +179,12 @@ def tracks(
     known = None if robot is None else one_robot(robot)
     measured = measure_tracks(tracks, runs, y_down=y_down, robot=known, **options)
     for line in measured.excluded:
-        warnings.warn(f"excluded: {line}", stacklevel=2)
+        warnings.warn(f"excluded: {line}", InputWarning, stacklevel=2)
     table = with_units(measured.table)
-    table.attrs["excluded"] = list(measured.excluded)
+    table.attrs |= {"excluded": list(measured.excluded), "converted": list(measured.converted)}
+    if check is not None:
+        from calibration.report.figures import draw_tracks
+
+        with whole_file(check) as part:
+            draw_tracks(measured.tracks).savefig(part, format="png", dpi=110)
     return table

@@ -5,29 +5,27 @@ from __future__ import annotations
 import os
 import shlex
 import threading
-from typing import Any
 
-from sim.io.commands import Program
+from sim.io.commands import Call, Program
 
 program = Program("dataset", "Simulate sweeps of robots into data sets.")
 main = program.main
 
 
 @program.command("build", of="dataset.api:sweep", resume="")
-def _build(*, out: str, config: str | None = None, **given: Any) -> None:
+def _build(sweep: Call, *, out: str, config: str | None = None) -> None:
     """Simulate a sweep into Parquet.
 
     Args:
         config: sweep.toml (default: the one that comes with the package).
         out: folder, or a URL that fsspec knows (s3://…).
     """
-    from dataset.api import sweep
     from dataset.build import Interrupted
 
-    written = {"config": config, "out": out, **given, "force": None}
+    written = {"config": config, "out": out, **sweep.given, "force": None}
     words = [word for name, value in written.items() if value is not None for word in (f"--{name}", str(value))]
     try:
-        manifest = sweep(config, out, resume=shlex.join(["softflagella", "sweep", *words]), **given)
+        manifest = sweep(config=config, out=out, resume=shlex.join(["softflagella", "sweep", *words]))
     except Interrupted as stop:
         emergency = threading.Timer(1.0, os._exit, (stop.status,))  # clusters wait at an ordinary one
         emergency.daemon = True

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
 from planner.paths.units import in_lab, read_length, read_pose
-from sim.io.commands import Program
+from sim.io.commands import Call, Program
 from sim.io.errors import InputError, naming
 from sim.io.units import format_length, format_time
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from planner.jobs.fleet_plan import FleetPlan
     from planner.planning.plan import Plan
     from planner.tracking.tracker import Tracker
@@ -61,16 +59,21 @@ def _progress_bar() -> Iterator[Callable[[float], object]]:
         yield show
 
 
+def _planned(call: Call, **further: Any) -> Plan:
+    """Plan with a public function and a bar."""
+    with _progress_bar() as progress:
+        plan: Plan = call(progress=progress, **further)
+    return plan
+
+
 @program.command("plan", of="planner.api:plan", robot=ROBOT)
-def _plan(
-    path: str, *, robot: str, out: str, trade_off: bool = False, arduino: str | None = None, **given: Any
-) -> None:
+def _plan(plan: Call, *, out: str, trade_off: bool = False, arduino: str | None = None) -> None:
     """Plan the switching times for a path.
 
     Args:
         trade_off: draw error against time and flips, for ten dwells.
     """
-    result = _planned(path, robot, **given)
+    result = _planned(plan, tell=print)
     pictures = {}
     if trade_off:
         from planner.files.pictures import draw_trade_off
@@ -84,21 +87,14 @@ def _plan(
     _write(result, out, f"{drawn}declared path", arduino=arduino, pictures=pictures)
 
 
-def _planned_by(word: str, given: Mapping[str, Any]) -> Plan:
-    """Plan as a command does, with its public function and a bar."""
-    with _progress_bar() as progress:
-        plan: Plan = program.commands[word].call(progress=progress, **given)
-    return plan
-
-
 @program.command("goal", of="planner.api:to_goal", robot=ROBOT)
 def _goal(
+    to_goal: Call,
     *,
     goal: tuple[str, str, str],
     start: tuple[str, str, str] = ("0", "0", "0"),
     out: str,
     arduino: str | None = None,
-    **given: Any,
 ) -> None:
     """Plan the way from one pose to another, around obstacles; exit status 3 where there is none.
 
@@ -106,25 +102,14 @@ def _goal(
         goal: X Y DEGREES, of the head's centre at the end.
         start: X Y DEGREES, of the head's centre at the start, at rest (default: 0 0 0).
     """
-    _write(_planned_by("goal", {"start": start, "goal": goal, **given}), out, arduino=arduino)
-
-
-@program.command("tour", of="planner.api:tour", robot=ROBOT, back="return")
-def _tour(*, out: str, arduino: str | None = None, **given: Any) -> None:
-    """Visit places in the order that takes the robot the least time."""
-    _write(_planned_by("tour", given), out, arduino=arduino)
-
-
-@program.command("cover", of="planner.api:cover", robot=ROBOT, width="--width", holes="hole")
-def _cover(*, out: str, arduino: str | None = None, **given: Any) -> None:
-    """Sweep a region with a camera, magnet or sampler under the robot."""
-    _write(_planned_by("cover", given), out, arduino=arduino)
+    _write(_planned(to_goal, start=start, goal=goal), out, arduino=arduino)
 
 
 @program.command("hold", of="planner.api:hold", robot=ROBOT, seconds="for")
-def _hold(*, out: str, arduino: str | None = None, **given: Any) -> None:
-    """Stay about a place, on the smallest orbit that the robot can keep."""
-    _write(_planned_by("hold", given), out, arduino=arduino)
+@program.command("cover", of="planner.api:cover", robot=ROBOT, width="--width", holes="hole")
+@program.command("tour", of="planner.api:tour", robot=ROBOT, back="return")
+def _job(job: Call, *, out: str, arduino: str | None = None) -> None:
+    _write(_planned(job), out, arduino=arduino)
 
 
 @program.command("fleet")
@@ -146,12 +131,9 @@ def _fleet(fleet: str, *, apart: str | None = None, feedback: bool = False, out:
     members = []
     for robot in asked.robots:
         with naming(f"{fleet}: {robot.name}"):
-            command = program.commands[robot.command]
-            given = vars(command.parser(robot.command).parse_args(["--out", out, *robot.words]))
-            options = {
-                name: given[name] for name in given.keys() - {"out", "trade_off", *(["feedback"] * feedback)}
-            }
-            plan = command.call(**options, **({"feedback": True} if feedback else {}))
+            call, own = program.commands[robot.command].read(robot.command, ["--out", out, *robot.words])
+            poses = {name: own[name] for name in own.keys() & {"start", "goal"}}
+            plan = call(**poses, **{"feedback": True} if feedback else {})
             members.append(Member(robot.name, plan, robot.delay))
     distance = distance_apart(apart, asked.unit, [member.plan.robot for member in members])
     with _progress_bar() as progress:
@@ -161,6 +143,7 @@ def _fleet(fleet: str, *, apart: str | None = None, feedback: bool = False, out:
 
 @program.command("track", of="planner.api:plan", robot=ROBOT)
 def _track(
+    plan_path: Call,
     path: str,
     *,
     robot: str | None = None,
@@ -172,7 +155,6 @@ def _track(
     view: str | None = None,
     serial: str | None = None,
     lost: float = 2.0,
-    **given: Any,
 ) -> None:
     """Keep a robot on a path or a saved plan: poses come in on a pipe (planner.tracking.pipe) or from a camera.
 
@@ -208,8 +190,13 @@ def _track(
         sys.stdin.reconfigure(errors="replace")
     saved = is_plan(path)
     with redirect_stdout(sys.stderr):
-        plan = _saved(path, robot=robot, **given) if saved else _planned(path, robot, **given)
-    unit, scale = given.get("unit"), plan.robot.time_scale
+        if saved:
+            plan = _saved(path, robot=robot, **plan_path.given)
+        elif robot is None:
+            raise InputError(f"{path} is no saved plan, so --robot is needed: a robot.toml or a preset")
+        else:
+            plan = _planned(plan_path, path=path, robot=robot, tell=print)
+    unit, scale = plan_path.given.get("unit"), plan.robot.time_scale
     deviations = (read_length(noise, unit, plan.robot, "--noise", above_zero=True), noise_rad)
 
     def begin(pose: tuple[float, float, float] | None, now: float) -> Tracker:
@@ -255,13 +242,6 @@ def _live(
                 tell(ride.line())
 
 
-def _planned(path: str, robot: str | None, **given: Any) -> Plan:
-    """Plan for a path, with a bar and a line on the path."""
-    if robot is None:
-        raise InputError(f"{path} is no saved plan, so --robot is needed: a robot.toml or a preset")
-    return _planned_by("plan", {"path": path, "robot": robot, "tell": print, **given})
-
-
 def _saved(path: str, *, unit: str | None = None, lookup: str | None = None, own_table: bool = False,
            **planning: Any) -> Plan:  # fmt: skip
     """Make a saved plan again; options of planning are refused beside it."""
@@ -274,41 +254,20 @@ def _saved(path: str, *, unit: str | None = None, lookup: str | None = None, own
 
 
 @program.command("page", of="planner.api:write_page", path="", robot="--robot", paths="path")
-def _page(*, out: str, paths: Sequence[str] = (), **given: Any) -> None:
+def _page(write_page: Call, *, out: str) -> None:
     """Write one HTML file that plans: draw a path in the browser, take the schedule along.
 
     Args:
-        paths: a path that the page offers: CSV, SVG, or a shape such as circle:20cm.
         out: the page, HTML.
     """
-    page = program.commands["page"].call(path=out, paths=paths, **given)
+    page = write_page(path=out)
     print(f"{page.stat().st_size / 1e6:.2f} MB, opens in a browser -> {page}")
 
 
 @program.command("replan", of="planner.api:replan", written_by="from")
-def _replan(plan: str, track: str, *, out: str, arduino: str | None = None, **given: Any) -> None:
-    """Plan the rest of a saved plan from where a robot is now.
-
-    Args:
-        plan: plan.json, its folder, or a goal.json, tour.json or cover.json beside it.
-        track: table of the robot so far: time_s, x_cm, y_cm, heading_deg; in its last row the robot is now, at
-            rest.
-    """
-    with naming(track):
-        result = program.commands["replan"].call(plan=plan, track=_read_track(track, given), **given)
-    _write(result, out, arduino=arduino)
-
-
-def _read_track(track: str, given: dict[str, Any]) -> pd.DataFrame:
-    """Read a track with its options among those given, and say what of it is lost."""
-    from planner.files.tracks import read_track
-    from sim.io.track_options import TrackOptions
-
-    options = {name: given.pop(name) for name in given.keys() & TrackOptions.__annotations__.keys()}
-    table = read_track(track, **options)
-    for line in table.attrs.pop("lost", ()):
-        print(line, file=sys.stderr)
-    return table
+def _replan(replan: Call, *, out: str, arduino: str | None = None) -> None:
+    """Plan the rest of a saved plan from where a robot is now."""
+    _write(replan(), out, arduino=arduino)
 
 
 @program.command("replay")
@@ -384,25 +343,19 @@ def _replay(
 
 
 @program.command("check", of="planner.api:check", written_by="from")
-def _check(plan: str, track: str, *, out: str | None = None, **given: Any) -> None:
+def _check(check: Call, plan: str, *, out: str | None = None) -> None:
     """Tracking error of a replayed track.
 
     Args:
-        plan: plan.json.
-        track: table written by softflagella replay, or with time_s, x_cm, y_cm, heading_deg.
         out: overlay picture, PNG.
     """
-    from planner.api import check
-    from planner.files.saved_plan import load_plan
-
-    content = load_plan(plan)
-    with naming(track):
-        error = check(content, _read_track(track, given))
+    error = check(plan=plan)
     print(error.line)
     if out is not None:
+        from planner.files.saved_plan import load_plan
         from planner.files.tracks import write_overlay
 
-        write_overlay(out, content, error)
+        write_overlay(out, load_plan(plan), error)
         print(f"-> {out}")
 
 

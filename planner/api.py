@@ -39,7 +39,7 @@ from planner.paths.units import describe, in_lab, in_tails, read_degrees
 from planner.planning.plan import Plan
 from planner.planning.request import Camera
 from planner.vehicle.zigzag import Objective
-from sim.io.errors import InputError, naming
+from sim.io.errors import InputError, InputWarning, naming
 from sim.io.keywords import checks_keywords
 from sim.io.track_options import TrackOptions
 from sim.model.robot import Robot
@@ -178,7 +178,7 @@ def tour(
     any_start: bool = False,
     **options: Unpack[JobOptions],
 ) -> Plan[Visits]:
-    """Plan a tour of places in the order that takes the robot the least time, with free headings.
+    """Visit places in the order that takes the robot the least time, with free headings.
 
     Args:
         places: X,Y of each, or one CSV or SVG with a point for each; or x, y of each [l]. The tour begins at the
@@ -215,12 +215,12 @@ def cover(
     angle: float | str | None = None,
     **options: Unpack[JobOptions],
 ) -> Plan[Coverage]:
-    """Plan lanes and turns that sweep a region with a round footprint about the tracked point.
+    """Sweep a region, in lanes and turns, with a camera, magnet or sampler under the robot.
 
     Args:
         region: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline; or a `Circle`, or
             corners (n, 2) [l].
-        width: LENGTH, of the footprint, such as 4cm.
+        width: LENGTH, of the round footprint about the tracked point, such as 4cm.
         robot: robot.toml or the name of a preset, or the robot; or a measured vehicle, or its vehicle.toml.
         holes: REGION, a part that need not be swept, and may be crossed, as is what `keep_out` has.
         angle: DEGREES, direction of the lanes; a number is in rad (default: the quickest).
@@ -256,7 +256,7 @@ def hold(
     seconds: float | str | None = None,
     **options: Unpack[JobOptions],
 ) -> Plan[Orbit]:
-    """Plan the smallest orbit about a place that the robot can keep with a camera; it repeats.
+    """Stay about a place, on the smallest orbit that the robot can keep with a camera; it repeats.
 
     Args:
         place: X,Y; or x, y [l].
@@ -346,9 +346,9 @@ def check(
     """Compare a replayed or measured track with its plan.
 
     Args:
-        plan: a plan, the path of its plan.json, or its content.
-        track: `time_s`, `x_cm`, `y_cm`, `heading_deg` of the head's centre, as a camera gives them, or the columns
-            that `replay` returns; or its file.
+        plan: plan.json; or its content, or a plan.
+        track: table with `time_s`, `x_cm`, `y_cm`, `heading_deg` of the head's centre, as a camera gives them, or
+            with the columns that `replay` writes.
         options: of a file that another program has written, see `TrackOptions`.
 
     Returns:
@@ -380,7 +380,7 @@ def _poses(track: pd.DataFrame | str | Path, options: TrackOptions) -> pd.DataFr
 
     poses = read_track(track, **options)
     for line in poses.attrs.get("lost", ()):
-        warnings.warn(line, stacklevel=3)
+        warnings.warn(line, InputWarning, stacklevel=3)
     return poses
 
 
@@ -400,9 +400,9 @@ def replan(
     the goal is planned again, through the places that are left.
 
     Args:
-        plan: a plan, or the path of its plan.json or of its folder.
-        track: `time_s`, `x_cm`, `y_cm`, `heading_deg` of the head's centre so far, or in other units, or the
-            columns that `replay` returns; or its file. One row is enough.
+        plan: plan.json, its folder, or a goal.json, tour.json or cover.json beside it; or a plan.
+        track: table of the robot so far: `time_s`, `x_cm`, `y_cm`, `heading_deg` of the head's centre, or in other
+            units, or the columns that `replay` writes; in its last row the robot is now, at rest.
         lookup: the look-up table with which a saved plan was made, or its file; see `restore_plan`.
         own_table: a saved plan was made with the robot's own table, which is simulated.
         options: of a track that another program has written, see `TrackOptions`.
@@ -498,7 +498,7 @@ def write_page(
         path: the file.
         robot: robot.toml or the name of a preset, or the robot, that the page begins with. Robots with effects or
             a calibration cannot be changed in the page.
-        paths: PATH, that the page offers: CSV, SVG, or a shape such as circle:20cm; or points (n, 2) or a Path2D
+        paths: a path that the page offers: CSV, SVG, or a shape such as circle:20cm; or points (n, 2) or a Path2D
             by name, in tail lengths l. The first one is planned when the page opens.
         smooth: LENGTH, smooth drawn strokes over this length, such as 1cm.
         title: of the page.

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from sim.io.commands import Program
+from sim.io.commands import Call, Program
 from sim.io.errors import InputError
 from sim.model.sweepable import SWEEPABLE, read_range
 
@@ -19,7 +19,7 @@ main = program.main
 
 @program.command("steady", of="sim.api:steady")
 def _steady(
-    robots: str, *, robot: str | None = None, out: str | None = None, shapes: str | None = None, **given: Any
+    steady: Call, robots: str, *, robot: str | None = None, out: str | None = None, shapes: str | None = None
 ) -> None:
     """Mean motion of a robot, or of many, at constant motor speed.
 
@@ -37,7 +37,7 @@ def _steady(
     if shapes is not None:
         _write_steady_shapes(rows.robots, shapes)
     with rows.naming():
-        motion = steady_columns(rows.columns, title="steady" if rows.file else "", **given)
+        motion = steady_columns(rows.columns, title="steady" if rows.file else "", **steady.given)
     if rows.file:
         said = _counts(rows.columns, motion)
     else:

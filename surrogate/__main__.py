@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-from sim.io.commands import Program
+from sim.io.commands import Call, Program
 from sim.io.errors import InputError
 
 program = Program("surrogate", "Train look-up tables and query them.")
@@ -61,7 +61,7 @@ def _train(
 
 @program.command("query", of="surrogate.api:query", derivatives="")
 def _query(
-    robots: str, *, robot: str | None = None, out: str | None = None, lookup: str | None = None, **given: Any
+    query: Call, robots: str, *, robot: str | None = None, out: str | None = None, lookup: str | None = None
 ) -> None:
     """Predict the motion of a robot, or of many, with intervals, without simulating.
 
@@ -78,7 +78,7 @@ def _query(
     from surrogate.table_file import load_table
 
     rows = command_rows(robots, robot, out, DWELL)
-    answer = answer_rows(rows, load_table(lookup), **given)
+    answer = answer_rows(rows, load_table(lookup), **query.given)
     if rows.file:
         return write_motion(rows, answer, out, f"{len(answer['v_z'])} rows")
     said = describe_motion(rows.robots[0], answer, error="relative error of the look-up table (90 %)")
@@ -90,17 +90,15 @@ def _query(
 
 
 @program.command("inverse", of="surrogate.api:inverse")
-def _inverse(targets: str, *, out: str, **given: Any) -> None:
+def _inverse(inverse: Call, *, out: str) -> None:
     """Find robots that have given motions.
 
     Args:
-        targets: CSV: the given inputs of the robots, and outputs that they shall have.
         out: CSV: a row for each solution.
     """
     from sim.io.files import write_csv
-    from surrogate.api import inverse
 
-    table = inverse(targets, **given)
+    table = inverse()
     write_csv(table, out)
     print(f"solutions: {len(table)}, targets: {table.attrs['targets']} -> {out}")
 

@@ -2,19 +2,21 @@
 
     program = Program("sim", "Simulate swimming robots.")
 
-    @program.command("steady", of="sim.api:steady")
-    def _steady(robots: str, *, out: str | None = None, **given: Any) -> None:
-        '''Simulate the mean motion of a robot, or of many.
+    @program.command("decide", of="calibration.api:decide", robot="--robot")
+    def _decide(decide: Call, *, out: str | None = None) -> None:
+        '''Say which of several explanations new runs speak for.
 
         Args:
-            out: CSV with the motion.
+            out: TXT, the answer.
         '''
+        ... decide() ...
 
 The command has the parameters of the public function `of` whose types can be written as words, and its own; what
-its docstring describes is its own. Parameters before the * are positional, the others options. A bool is a flag,
-`--no-NAME` with "do not" before its description if its default is True. A description that begins LOW:HIGH, or
-X Y, names the values. The function is called with what was written, so defaults stand in its signature alone.
-Signatures are read from the source, not imported: help needs no libraries.
+its docstring describes is its own; a function without one has the first sentence of the public function's.
+Parameters before the * are positional, the others options. A bool is a flag, `--no-NAME` with "do not" before its
+description if its default is True. A description that begins LOW:HIGH, or X Y, names the values. The function is
+called with what was written, so defaults stand in its signature alone: first with the public function and what is
+written for that, then with its own. Signatures are read from the source, not imported: help needs no libraries.
 
 `softflagella sim steady …` runs the function; the most important commands have a word of their own, such as
 `softflagella plan …` (`softflagella.__main__`).
@@ -25,15 +27,16 @@ from __future__ import annotations
 import ast
 import re
 import sys
+import warnings
 from argparse import SUPPRESS, ArgumentParser
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn, TypeVar
 
-from sim.io.errors import InputError, run_command
+from sim.io.errors import InputError, InputWarning, run_command
 
 _HELP = {  # of parameters that no docstring describes
     "out": "folder",
@@ -75,10 +78,18 @@ def _source(file: Path) -> dict[str, ast.stmt]:
     return names
 
 
-def read_function(file: Path, name: str) -> dict[str, Parameter]:
-    """Read a function's parameters from the source, those of **options: Unpack[Options] among them."""
+def _function(place: str) -> tuple[ast.FunctionDef, Path]:
+    """Find a function, module:name, in its source."""
+    module, _, name = place.partition(":")
+    file = Path(str(find_spec(module).origin))  # type: ignore[union-attr]
     function = _source(file)[name]
     assert isinstance(function, ast.FunctionDef)
+    return function, file
+
+
+def read_function(place: str) -> dict[str, Parameter]:
+    """Read a function's parameters from the source, those of **options: Unpack[Options] among them."""
+    function, file = _function(place)
     signature, about = function.args, _read_docstring(function)
     plain = [*signature.posonlyargs, *signature.args]
     defaults = [*[None] * (len(plain) - len(signature.defaults)), *signature.defaults, *signature.kw_defaults]
@@ -88,11 +99,8 @@ def read_function(file: Path, name: str) -> dict[str, Parameter]:
         parameters[node.arg] = Parameter(node.arg, node.annotation, file, value, default is None,
                                          node in plain, about.get(node.arg))  # fmt: skip
     options = signature.kwarg.annotation if signature.kwarg else None
-    return (
-        _read_options(ast.unparse(options.slice), file) | parameters
-        if isinstance(options, ast.Subscript)
-        else parameters
-    )
+    further = _read_options(ast.unparse(options.slice), file) if isinstance(options, ast.Subscript) else {}
+    return further | parameters
 
 
 def _read_options(name: str, file: Path) -> dict[str, Parameter]:
@@ -173,60 +181,91 @@ class Parser(ArgumentParser):
         raise InputError(f"{message}; {self.prog} --help lists what can be given")
 
 
+class Call(NamedTuple):
+    """A public function, imported when called, with what was written for it."""
+
+    of: str  # module:name
+    given: Mapping[str, Any]
+
+    def __call__(self, **further: Any) -> Any:
+        """Call the function; further arguments replace those that were written."""
+        module, _, name = self.of.partition(":")
+        return getattr(import_module(module), name)(**{**self.given, **further})
+
+
 class Command(NamedTuple):
-    """A command of a program: a function that is called with what was written."""
+    """A command of a program: a function that is called with what was written.
+
+    Its names map a parameter to its argument, where that differs: "--name" makes a positional one an option,
+    "--name --synonym" gives it two names, "" leaves it out.
+    """
 
     run: Callable[..., None]
-    name: str
-    help: str
-    of: str = ""  # the public function whose parameters it has, module:name
-    names: Mapping[str, str] = {}  # parameter -> the option that it is called in the command; "": none
+    of: str = ""  # module:name of the public function whose parameters it has
+    names: Mapping[str, str] = {}
     further: Mapping[str, str] = {}  # options of words for its **given -> help
 
-    def parameters(self) -> dict[str, Parameter]:
-        """Return the parameters of the public function, with those of its own."""
-        code = self.run.__code__
-        own = read_function(Path(code.co_filename), code.co_name)
-        if not self.of:
-            return own
-        module, _, name = self.of.partition(":")
-        theirs = read_function(Path(str(find_spec(module).origin)), name)  # type: ignore[union-attr]
-        return theirs | {name: each for name, each in own.items() if each.help is not None or name not in theirs}
+    @property
+    def place(self) -> str:
+        """The function that runs it, module:name."""
+        return f"{self.run.__module__}:{self.run.__name__}"
 
-    def call(self, **given: Any) -> Any:
-        """Call the public function."""
-        module, _, name = self.of.partition(":")
-        return getattr(import_module(module), name)(**given)
+    @property
+    def help(self) -> str:
+        """The sentence for overviews: the first paragraph of its docstring, or of the public function's."""
+        text = ast.get_docstring(_function(self.place if self.run.__doc__ else self.of)[0]) or ""
+        words = " ".join(text.split("\n\n")[0].split()).removesuffix(".")
+        return words[0].lower() + words[1:]
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the arguments to a parser."""
-        for parameter in self.parameters().values():
+    def parameters(self) -> tuple[dict[str, Parameter], dict[str, Parameter]]:
+        """Return the parameters of the public function, and its own, without the first, which is that function."""
+        theirs, own = read_function(self.of) if self.of else {}, read_function(self.place)
+        if self.of:
+            del own[next(iter(own))]
+        return theirs, own
+
+    def parser(self, prog: str) -> ArgumentParser:
+        """Return a parser of this command alone."""
+        sentence = f"{self.help[0].upper()}{self.help[1:]}."
+        parser = Parser(prog=prog, description=sentence, argument_default=SUPPRESS)
+        theirs, own = self.parameters()
+        described = {name: each for name, each in own.items() if each.help is not None or name not in theirs}
+        for parameter in (theirs | described).values():
             name = self.names.get(parameter.name, parameter.name)
             words = _from_words(parameter.hint, parameter.file) if parameter.hint else None
             if name and words is not None:
                 _add(parser, parameter, name.replace("_", "-"), words)
         for name, about in self.further.items():
             _add(parser, Parameter(name, None, Path(), help=about), name, {})
-
-    def parser(self, prog: str) -> ArgumentParser:
-        """Return a parser of this command alone."""
-        parser = Parser(
-            prog=prog, description=self.help[0].upper() + self.help[1:] + ".", argument_default=SUPPRESS
-        )
-        self.add_arguments(parser)
         return parser
+
+    def read(self, prog: str, words: list[str]) -> tuple[Call, dict[str, Any]]:
+        """Parse words: the public function with what is written for it, and what is for the command itself."""
+        given, names = vars(self.parser(prog).parse_args(words)), {*self.parameters()[1], *self.further}
+        own = {name: given.pop(name) for name in [*given] if name in names}
+        return Call(self.of, given), own
 
     def main(self, prog: str, words: list[str]) -> None:
         """Parse words and run the command."""
-        self.run(**vars(self.parser(prog).parse_args(words)))
+        call, own = self.read(prog, words)
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", InputWarning)
+            warnings.showwarning = partial(_show_warning, warnings.showwarning)
+            self.run(*([call] if self.of else []), **own)
+
+
+def _show_warning(otherwise: Callable[..., None], message: Warning | str, *place: Any) -> None:
+    """Print a warning of the input as one line, and others as Python does."""
+    if isinstance(message, InputWarning):
+        print(message, file=sys.stderr)
+    else:
+        otherwise(message, *place)
 
 
 def _add(parser: ArgumentParser, parameter: Parameter, name: str, words: dict[str, Any]) -> None:
     """Add a parameter to a parser, as a positional argument or as an option."""
-    about, default = (
-        (parameter.help or _HELP.get(parameter.name, "")).replace("%", "%%"),
-        parameter.default,
-    )  # % is argparse's own sign
+    about = (parameter.help or _HELP.get(parameter.name, "")).replace("%", "%%")  # % is argparse's own sign
+    default = parameter.default
     if default not in (None, "") and not isinstance(default, bool) and "default" not in about.lower():
         about = f"{about} (default: {default})".lstrip()
     many, flag = words.pop("many", False), words.get("type") is bool
@@ -259,20 +298,10 @@ class Program:
     def command(
         self, name: str, *, of: str = "", further: Mapping[str, str] | None = None, **names: str
     ) -> Callable[[F], F]:
-        """Decorate the function that runs a command; its docstring begins with a sentence for overviews.
-
-        Args:
-            name: what a user types.
-            of: the public function whose parameters the command has, such as "sim.api:steady".
-            further: options of words for the function's **given, with their help.
-            names: parameter -> the name of its argument, where it differs; "--name" makes a positional one an
-                option, "--name --synonym" with two names, "" leaves one out.
-        """
+        """Decorate the function that runs a command with what a user types for it, and fields of `Command`."""
 
         def add(run: F) -> F:
-            summary = " ".join((run.__doc__ or "").split("\n\n")[0].split()).removesuffix(".")
-            summary = summary[0].lower() + summary[1:]
-            self.commands[name] = Command(run, name, summary, of, names, further or {})
+            self.commands[name] = Command(run, of, names, further or {})
             return run
 
         return add
@@ -286,8 +315,8 @@ class Program:
         """Return the parser of the commands' names."""
         parser = Parser(prog=self.prog, description=self.about)
         subparsers = parser.add_subparsers(required=True, metavar="COMMAND")
-        for command in self.commands.values():
-            subparsers.add_parser(command.name, help=command.help)
+        for name, command in self.commands.items():
+            subparsers.add_parser(name, help=command.help)
         return parser
 
     def main(self, argv: list[str] | None = None) -> None:

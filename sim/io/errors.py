@@ -37,6 +37,10 @@ class InputError(ValueError):
     status = 2  # of a command
 
 
+class InputWarning(UserWarning):
+    """A part of the input is left out; a command prints the message as a line on stderr."""
+
+
 @contextmanager
 def naming(source: object) -> Iterator[None]:
     """Write the name of a file before the message of an `InputError` that does not have it.

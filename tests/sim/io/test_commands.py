@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import Any, Literal
 
 import pytest
 
-from sim.io.commands import Program
-from sim.io.errors import InputError
+from sim.io.commands import Call, Program
+from sim.io.errors import InputError, InputWarning
 from softflagella.__main__ import PACKAGES
 from softflagella.__main__ import program as top
 
+Capsys = pytest.CaptureFixture[str]
 Shape = Literal["round", "square"]
 Colour = Shape | None
 
@@ -49,7 +51,9 @@ called: list[dict[str, Any]] = []
 
 
 @program.command("paint", of="tests.sim.io.test_commands:paint", tin="--tin", spots="spot", further={"C_t": "a"})
-def _paint(where: str, *, tin: str, wet: bool = False, length: float | None = None, **given: Any) -> None:
+def _paint(
+    paint: Call, where: str, *, tin: str, wet: bool = False, length: float | None = None, **given: str
+) -> None:
     """Paint walls. Or floors.
 
     Args:
@@ -57,7 +61,7 @@ def _paint(where: str, *, tin: str, wet: bool = False, length: float | None = No
         wet: on wet walls.
         length: LENGTH, of the brush.
     """
-    called.append({"where": where, "tin": tin, "wet": wet, "length": length, **given})
+    called.append({"where": where, "tin": tin, "wet": wet, "length": length, **given, **paint.given})
 
 
 def test_the_function_is_called_with_what_was_written() -> None:
@@ -69,6 +73,27 @@ def test_the_function_is_called_with_what_was_written() -> None:
         "where": "hall", "tin": "red", "wet": True, "length": -1000.0, "dry": False, "coats": 3, "C_t": "x",
         "spots": [["1", "2"], ["-3cm", "4"]], "shape": "square",
     }  # fmt: skip
+
+
+def leave_out(rooms: int) -> None:
+    """Sweep some rooms.
+
+    Args:
+        rooms: how many.
+    """
+    warnings.warn(f"{rooms} rooms left out", InputWarning, stacklevel=2)
+
+
+@program.command("sweep", of="tests.sim.io.test_commands:leave_out")
+def _sweep(leave_out: Call) -> None:
+    leave_out()
+    leave_out(rooms=3)
+
+
+def test_a_command_says_what_is_left_out_and_has_the_sentence_of_its_function(capsys: Capsys) -> None:
+    program.main(["sweep", "2"])
+    assert capsys.readouterr().err == "2 rooms left out\n3 rooms left out\n"
+    assert program.commands["sweep"].help == "sweep some rooms"
 
 
 def test_help_is_the_docstring() -> None:
@@ -92,7 +117,7 @@ def test_help_is_the_docstring() -> None:
         ("paint hall --tin red --shape long", "invalid choice: 'long' (choose from 'round', 'square')"),
         ("paint hall --tin red --spot 1", "--spot: expected 2 arguments"),
         ("paint hall --tin red --told x", "unrecognized arguments: --told x"),
-        ("sweep", "invalid choice: 'sweep'"),
+        ("mop", "invalid choice: 'mop'"),
     ],
 )
 def test_wrong_words_are_refused(words: str, expected: str) -> None:
