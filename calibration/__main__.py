@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from sim.io.commands import Call, Program
 from sim.io.errors import InputError
 
-program = Program("calibration", "Find from measured runs what the model of a robot lacks, and correct it.")
+program = Program("calibration", "find from measured runs what the model of a robot lacks, and correct it")
 main = program.main
 _LISTED = 8  # laws
 
@@ -105,8 +105,7 @@ def _laws(table: str, *, robot: str, out: str, seed: int = 0, jobs: int | None =
     """Describe a residual that no effect explains: where a term acts, and on which inputs it depends.
 
     Args:
-        seed: of the bootstrap (default: 0).
-        jobs: threads (default: all processors).
+        seed: of the bootstrap.
     """
     _refuse_early(table)
     from calibration.report.robot_verdict import find_robot_laws
@@ -154,8 +153,7 @@ def _simulate(
     Args:
         out: CSV.
         effects: NAME=SIZE, hidden effect.
-        seed: of the noise (default: 0).
-        jobs: threads (default: all processors).
+        seed: of the noise.
     """
     from dataclasses import replace
 

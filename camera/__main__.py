@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sim.io.commands import Program
 
-program = Program("camera", "From films of a tank to tracks.")
+program = Program("camera", "track robots in films")
 main = program.main
 
 

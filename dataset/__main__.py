@@ -8,7 +8,7 @@ import threading
 
 from sim.io.commands import Call, Program
 
-program = Program("dataset", "Simulate sweeps of robots into data sets.")
+program = Program("dataset", "simulate sweeps into data sets, report and verify them")
 main = program.main
 
 

@@ -16,7 +16,8 @@ import softflagella
 from dataset.schema import FLAGS, INPUTS, OUTPUTS
 from sim.effects import catalogue
 from sim.model.effect import Effect
-from softflagella.__main__ import PACKAGES, WORDS, command
+from softflagella.__main__ import WORDS, command, program_of
+from softflagella.shadowing import PACKAGES
 
 
 def write_generated_pages(folder: Path) -> None:
@@ -102,9 +103,10 @@ def commands_page() -> Iterator[str]:
     for word, (package, name) in WORDS.items():
         same = "" if package == "softflagella" else f"The same as `softflagella {package} {name}`."
         yield from (f"## {word}", same, usage(command(word).parser(f"softflagella {word}").format_help()))
-    for package, what in PACKAGES.items():
-        yield f"## {package}\n\n{what[0].upper()}{what[1:]}."
-        for name, packaged in import_module(f"{package}.__main__").program.commands.items():
+    for package in PACKAGES:
+        program = program_of(package)
+        yield f"## {package}\n\n{program.parser().description}"
+        for name, packaged in program.commands.items():
             yield f"### {package} {name}"
             yield usage(packaged.parser(f"softflagella {package} {name}").format_help())
 

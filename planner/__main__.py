@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from planner.planning.plan import Plan
     from planner.tracking.tracker import Tracker
 
-program = Program("planner", "Plan switching schedules for paths, without simulating.")
+program = Program("planner", "plan switching schedules for paths, replay them, check tracks")
 main = program.main
 BAR_AFTER = 1.0  # s
 ROBOT = "--robot --vehicle"  # options that mean the same
@@ -164,9 +164,9 @@ def _track(
         robot: robot.toml or the name of a preset; a saved plan has its own.
         start: X Y DEGREES, of the head's centre, at rest; the robot finds its way to the path from there (default:
             a path's start; the first pose that comes in, for a saved plan).
-        noise: LENGTH, standard deviation of x and y (default: 0.01l).
+        noise: LENGTH, standard deviation of x and y.
         noise_rad: standard deviation of the heading.
-        latency: age of a pose when it comes in, or of a picture, in seconds (default: 0).
+        latency: age of a pose when it comes in, or of a picture, in seconds.
         camera: number of a camera over the tank, such as 0, or a film; the track is printed.
         view: the camera's view.toml.
         serial: port of the motor's board, such as /dev/ttyACM0 (default: nothing moves).

@@ -13,7 +13,7 @@ from sim.model.sweepable import SWEEPABLE, read_range
 if TYPE_CHECKING:
     from sim.model.robot import Robot
 
-program = Program("sim", "Simulate swimming robots.")
+program = Program("sim", "simulate robots: steady motion, branches, films, presets")
 main = program.main
 
 

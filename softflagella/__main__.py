@@ -8,6 +8,7 @@ from importlib import import_module
 
 from sim.io.commands import Command, Program
 from sim.io.errors import run_command
+from softflagella.shadowing import PACKAGES
 
 _IMPORTANT = (
     ("sim", "robot steady branches effects"),
@@ -26,15 +27,7 @@ WORDS = {  # the most important commands -> package and command
     for package, words in _IMPORTANT
     for word in words.split()
 }
-PACKAGES = {
-    "sim": "simulate robots: steady motion, branches, films, presets",
-    "camera": "track robots in films",
-    "dataset": "simulate sweeps into data sets, report and verify them",
-    "surrogate": "train look-up tables and query them",
-    "planner": "plan switching schedules for paths, replay them, check tracks",
-    "calibration": "find from measured runs what the model lacks",
-}
-program = Program("softflagella", "Soft flagellated robots near a surface.")
+program = Program("softflagella", "soft flagellated robots near a surface")
 
 
 @program.command("demo")
@@ -49,18 +42,23 @@ def _demo(*, out: str = "reports/demo.html") -> None:
     run_demo(out)
 
 
+def program_of(package: str) -> Program:
+    """Return the commands of a package."""
+    packaged: Program = import_module(f"{package}.__main__").program
+    return packaged
+
+
 def command(word: str) -> Command:
     """Return the command that a word stands for."""
     package, name = WORDS[word]
-    commands: dict[str, Command] = import_module(f"{package}.__main__").program.commands
-    return commands[name]
+    return program_of(package).commands[name]
 
 
 def _overview() -> str:
     lines = ["usage: softflagella COMMAND …", "", "commands:"]
     lines += [f"  {word:12} {command(word).help}" for word in WORDS]
     lines += ["", "further commands, by package (softflagella PACKAGE COMMAND …):"]
-    lines += [f"  {name:12} {what}" for name, what in PACKAGES.items()]
+    lines += [f"  {name:12} {program_of(name).about}" for name in PACKAGES]
     lines += ["", "--help after a command or a package tells more; --version prints the version."]
     return "\n".join(lines)
 
@@ -68,7 +66,7 @@ def _overview() -> str:
 def _suggestion(word: str) -> str:
     """Suggest a command for a word that is none: one of a package, one that is spelt nearly so, or all."""
     for package in PACKAGES:
-        if word in import_module(f"{package}.__main__").program.commands:
+        if word in program_of(package).commands:
             return f"it is softflagella {package} {word}"
     near = difflib.get_close_matches(word, (*WORDS, *PACKAGES), 1)
     return f"is it {near[0]}?" if near else f"there are {', '.join((*WORDS, *PACKAGES))}"
@@ -86,8 +84,7 @@ def main(argv: list[str] | None = None) -> None:
     elif words[0] in WORDS:
         command(words[0]).main(f"softflagella {words[0]}", words[1:])
     elif words[0] in PACKAGES:
-        packaged: Program = import_module(f"{words[0]}.__main__").program
-        packaged.main(words[1:])
+        program_of(words[0]).main(words[1:])
     else:
         print(f"error: no command {words[0]!r}; {_suggestion(words[0])}", file=sys.stderr)
         raise SystemExit(2)

@@ -10,7 +10,7 @@ from typing import Literal
 from sim.io.commands import Call, Program
 from sim.io.errors import InputError
 
-program = Program("surrogate", "Train look-up tables and query them.")
+program = Program("surrogate", "train look-up tables and query them")
 main = program.main
 
 
@@ -24,7 +24,7 @@ def _train(
         data: folders made by softflagella sweep.
         out: model file.
         epochs: this many epochs, and as many iterations after them.
-        device: where to train (default: cpu); auto: on a CUDA device if there is one.
+        device: where to train; auto: on a CUDA device if there is one.
     """
     from dataclasses import replace
 
@@ -35,7 +35,7 @@ def _train(
         raise InputError(f"--epochs {epochs}; give a whole number from 1")
     for folder in data:  # before torch is loaded
         read_manifest(folder)
-    from surrogate.errors import error_table, shortcomings
+    from surrogate.errors import shortcomings
     from surrogate.training.fits import CURVES
     from surrogate.training.model_card import model_card
     from surrogate.training.networks import Settings, device_named, remove_states
@@ -51,9 +51,7 @@ def _train(
     card = Path(out).with_suffix(".md")
     write_text(card, model_card(lookup, held_out(data)))
     remove_states(states)
-    rows = lookup.provenance["rows"]
-    print(f"model {lookup.identity}: {rows['train']} rows, held-out error on {rows['held_out']}")
-    print(error_table(lookup.errors))
+    _errors(lookup=out)
     for words in shortcomings(lookup.errors):
         print(f"warning: {words}", file=sys.stderr)
     print(f"-> {out}, {card}")

@@ -6,7 +6,6 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from tempfile import mkdtemp
 
@@ -25,7 +24,8 @@ from sim.io.errors import InputError, run_command
 from sim.io.units import format_time
 from sim.model.presets import PRESETS
 from sim.model.schedule import plan_id
-from softflagella.__main__ import PACKAGES, main
+from softflagella.__main__ import main, program_of
+from softflagella.shadowing import PACKAGES
 from surrogate.table_file import SHIPPED, load
 from tests.calibration.toy_tables import (
     DRAG,
@@ -44,9 +44,7 @@ from tests.processes import LIMIT
 from tests.shared import FOLDER, shared
 
 FILES = {"plan.json", "plan.csv", "plan.svg", "schedule.h", "tracker.h"}
-COMMANDS = [
-    (package, name) for package in PACKAGES for name in import_module(f"{package}.__main__").program.commands
-]
+COMMANDS = [(package, name) for package in PACKAGES for name in program_of(package).commands]
 
 
 def done(*words: object) -> None:

@@ -1,6 +1,6 @@
 """Command lines from functions: a function's parameters, their types and its docstring are the parser.
 
-    program = Program("sim", "Simulate swimming robots.")
+    program = Program("calibration", "find from measured runs what the model lacks")
 
     @program.command("decide", of="calibration.api:decide", robot="--robot")
     def _decide(decide: Call, *, out: str | None = None) -> None:
@@ -40,6 +40,7 @@ from sim.io.errors import InputError, InputWarning, run_command
 
 _HELP = {  # of parameters that no docstring describes
     "out": "folder",
+    "jobs": "threads (default: all processors)",
     "arduino": "DIR, an Arduino library with the schedule, and sketches that drive the motor",
     "robot": "robot.toml or the name of a preset",
     "plan": "plan.json",
@@ -181,6 +182,10 @@ class Parser(ArgumentParser):
         raise InputError(f"{message}; {self.prog} --help lists what can be given")
 
 
+def _sentence(about: str) -> str:
+    return f"{about[0].upper()}{about[1:]}."
+
+
 class Call(NamedTuple):
     """A public function, imported when called, with what was written for it."""
 
@@ -226,8 +231,7 @@ class Command(NamedTuple):
 
     def parser(self, prog: str) -> ArgumentParser:
         """Return a parser of this command alone."""
-        sentence = f"{self.help[0].upper()}{self.help[1:]}."
-        parser = Parser(prog=prog, description=sentence, argument_default=SUPPRESS)
+        parser = Parser(prog=prog, description=_sentence(self.help), argument_default=SUPPRESS)
         theirs, own = self.parameters()
         described = {name: each for name, each in own.items() if each.help is not None or name not in theirs}
         for parameter in (theirs | described).values():
@@ -291,7 +295,7 @@ def _add(parser: ArgumentParser, parameter: Parameter, name: str, words: dict[st
 class Program:
     """The commands of one package."""
 
-    def __init__(self, package: str, about: str):
+    def __init__(self, package: str, about: str):  # begins with a small letter, for overviews
         self.package, self.about = package, about
         self.commands: dict[str, Command] = {}
 
@@ -313,7 +317,7 @@ class Program:
 
     def parser(self) -> ArgumentParser:
         """Return the parser of the commands' names."""
-        parser = Parser(prog=self.prog, description=self.about)
+        parser = Parser(prog=self.prog, description=_sentence(self.about))
         subparsers = parser.add_subparsers(required=True, metavar="COMMAND")
         for name, command in self.commands.items():
             subparsers.add_parser(name, help=command.help)

@@ -11,7 +11,7 @@ from pkgutil import resolve_name
 import pytest
 
 import softflagella as sf
-from softflagella.__main__ import PACKAGES
+from softflagella.shadowing import PACKAGES
 from tests.docs.pages import DOCS, PAGES, ROOT
 
 TOP = "|".join((*PACKAGES, "softflagella", "benchmarks", "tests"))

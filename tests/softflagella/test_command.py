@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 import softflagella as sf
 from sim.io.errors import run_command
-from softflagella.__main__ import PACKAGES, WORDS, command, main
+from softflagella.__main__ import WORDS, command, main, program_of
+from softflagella.shadowing import PACKAGES
 
 
 def test_one_command_has_those_of_all_packages(capsys: pytest.CaptureFixture[str]) -> None:
@@ -19,7 +19,7 @@ def test_one_command_has_those_of_all_packages(capsys: pytest.CaptureFixture[str
         assert ended.value.code == 0
         said = capsys.readouterr().out
         assert f"usage: softflagella {package}" in said
-        assert all(name in said for name in import_module(f"{package}.__main__").program.commands)
+        assert all(name in said for name in program_of(package).commands)
 
 
 def test_words_are_commands_of_packages_and_stand_first(capsys: pytest.CaptureFixture[str]) -> None:
@@ -30,7 +30,7 @@ def test_words_are_commands_of_packages_and_stand_first(capsys: pytest.CaptureFi
     assert places == sorted(places)
     assert max(places) < lines.index("further commands, by package (softflagella PACKAGE COMMAND …):")
     for word, (package, name) in WORDS.items():
-        packaged = import_module(f"{package}.__main__").program.commands[name]
+        packaged = program_of(package).commands[name]
         assert command(word) is packaged
         with pytest.raises(SystemExit) as ended:
             main([word, "--help"])

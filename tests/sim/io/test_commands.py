@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from importlib import import_module
 from typing import Any, Literal
 
 import pytest
 
 from sim.io.commands import Call, Program
 from sim.io.errors import InputError, InputWarning
-from softflagella.__main__ import PACKAGES
 from softflagella.__main__ import program as top
+from softflagella.__main__ import program_of
+from softflagella.shadowing import PACKAGES
 
 Capsys = pytest.CaptureFixture[str]
 Shape = Literal["round", "square"]
@@ -46,7 +46,7 @@ def paint(
     """
 
 
-program = Program("house", "Keep a house.")
+program = Program("house", "keep a house")
 called: list[dict[str, Any]] = []
 
 
@@ -126,7 +126,7 @@ def test_wrong_words_are_refused(words: str, expected: str) -> None:
     assert expected in str(refusal.value)
 
 
-PROGRAMS = {name: import_module(f"{name}.__main__").program for name in PACKAGES} | {"softflagella": top}
+PROGRAMS = {name: program_of(name) for name in PACKAGES} | {"softflagella": top}
 COMMANDS = [(package, name) for package, each in PROGRAMS.items() for name in each.commands]
 
 
