@@ -74,7 +74,7 @@ class Lost(NamedTuple):
 class _Memory:
     """What is known of a robot from the pictures before."""
 
-    places: dict[str, Floats] = field(default_factory=dict)  # of front and rear [pixels]; none: to be looked for
+    places: dict[str, Floats] = field(default_factory=dict)  # of the markers [pixels]; none: to be looked for
     apart: float = math.nan  # distance of front and rear, or side of the tag [m]
     areas: dict[str, float] = field(default_factory=dict)  # of the bands [m²]
     seen: int = 0  # pictures
@@ -106,6 +106,7 @@ class Detector:
         self._mask: Any = None
         self._memory = [_Memory() for _ in self._robots]
         self._readers = {each.dictionary: self._reader(each.dictionary) for each in robots if each.tag is not None}
+        self._seen_tags: dict[str, dict[int, Floats]] = {}  # in the whole of the picture at hand
         if view.tag is not None:
             self._readers.setdefault("4x4_50", self._reader("4x4_50"))
 
@@ -124,10 +125,10 @@ class Detector:
         if self.view.region is not None and self._mask is None:
             self._mask = np.zeros(frame.shape[:2], np.uint8)
             self._cv.fillPoly(self._mask, [np.round(self.view.region).astype(np.int32)], 255)
-        tags = self._all_tags(frame)
+        self._seen_tags.clear()
         if self.view.homography is None:
             assert self.view.tag is not None
-            corners = tags["4x4_50"].get(self.view.tag[0])
+            corners = self._tags("4x4_50", frame).get(self.view.tag[0])
             if corners is None:
                 return [
                     Lost(each.name, f"no tag {self.view.tag[0]} that gives the scale") for each in self._robots
@@ -137,10 +138,10 @@ class Detector:
         for markers, memory in zip(self._robots, self._memory, strict=True):
             look = self._by_bands if markers.tag is None else self._by_tag
             known = bool(memory.places)
-            pose = look(markers, memory, frame, tags)
+            pose = look(markers, memory, frame)
             if known and isinstance(pose, Lost):  # where it was expected
                 memory.places.clear()
-                pose = look(markers, memory, frame, tags)
+                pose = look(markers, memory, frame)
             if isinstance(pose, Lost):
                 memory.places.clear()
                 memory.missed += 1
@@ -162,23 +163,30 @@ class Detector:
         known = aruco.getPredefinedDictionary(getattr(aruco, f"DICT_{dictionary.upper()}"))
         return aruco.ArucoDetector(known, options)
 
-    def _all_tags(self, frame: Any) -> dict[str, dict[int, Floats]]:
-        if not self._readers:
-            return {}
-        grey, tags = self._cv.cvtColor(frame, self._cv.COLOR_BGR2GRAY), {}
-        for name, reader in self._readers.items():
-            corners, numbers, _ = reader.detectMarkers(grey)
-            known = [] if numbers is None else np.asarray(numbers).reshape(-1).tolist()
-            tags[name] = {n: np.asarray(c, dtype=float)[0] for n, c in zip(known, corners, strict=False)}
+    def _tags(self, dictionary: str, frame: Any, around: Floats | None = None) -> dict[int, Floats]:
+        """Read the tags of a picture, or of its part around corners (4, 2) [pixels]; number -> corners."""
+        low = np.zeros(2, int)
+        if around is not None:
+            side = np.ptp(around, axis=0).max()
+            low = np.maximum((around.min(axis=0) - side).astype(int), 0)
+            right, down = (around.max(axis=0) + side).astype(int)
+            frame = frame[low[1] : down, low[0] : right]
+        elif dictionary in self._seen_tags:
+            return self._seen_tags[dictionary]
+        grey = self._cv.cvtColor(frame, self._cv.COLOR_BGR2GRAY)
+        corners, numbers, _ = self._readers[dictionary].detectMarkers(grey)
+        known = [] if numbers is None else np.asarray(numbers).reshape(-1).tolist()
+        tags = {n: low + np.asarray(c, dtype=float)[0] for n, c in zip(known, corners, strict=False)}
+        if around is None:
+            self._seen_tags[dictionary] = tags
         return tags
 
-    def _by_tag(
-        self, markers: Markers, memory: _Memory, frame: Any, tags: Mapping[str, Mapping[int, Floats]]
-    ) -> Pose | Lost:
+    def _by_tag(self, markers: Markers, memory: _Memory, frame: Any) -> Pose | Lost:
         """Fit a square to the corners: first the front left one, then clockwise, as seen from above."""
-        corners = tags[markers.dictionary].get(int(markers.tag or 0))
+        corners = self._tags(markers.dictionary, frame, memory.places.get("tag")).get(int(markers.tag or 0))
         if corners is None or not self._inside(corners.mean(axis=0)):
             return Lost(markers.name, f"no tag {markers.tag}")
+        memory.places = {"tag": corners}
         places = self.view.to_tank(corners)
         centre = places.mean(axis=0)
         square = np.array([1 + 1j, 1 - 1j, -1 - 1j, -1 + 1j])  # forward + i left
@@ -193,7 +201,7 @@ class Detector:
 
     # Bands
 
-    def _by_bands(self, markers: Markers, memory: _Memory, frame: Any, tags: object) -> Pose | Lost:
+    def _by_bands(self, markers: Markers, memory: _Memory, frame: Any) -> Pose | Lost:
         hues = {"front": markers.front, "rear": markers.rear}
         searched = not memory.places
         places = self._search(markers, memory, frame, hues) if searched else memory.places

@@ -129,6 +129,29 @@ def test_two_robots_are_told_apart_by_their_colours(tmp_path: Path) -> None:
             assert np.abs(off(pose, motion(time))[:2]).max() < 0.02 * TAIL
 
 
+def test_a_tag_is_followed_in_a_part_of_the_picture_and_found_again_after_a_jump(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import cv2
+
+    tag = cv2.aruco.generateImageMarker(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50), 3, 60)
+    tag, read = np.pad(tag, 12, constant_values=255), list[int]()
+    file = tmp_path / "view.toml"
+    file.write_text("[scale]\npoints_px = [[0, 479], [100, 479]]\nlength_cm = 10\n[[robots]]\ntag = 3\n")
+    setup, grey = read_setup(file), cv2.cvtColor
+    monkeypatch.setattr(cv2, "cvtColor", lambda part, code: read.append(part.size) or grey(part, code))
+    detector, searches = Detector(setup.robots, setup.view), []
+    for u, v in ((100, 100), (110, 95), (125, 90), (500, 300), (495, 310)):
+        picture = np.full((480, 640, 3), 160, np.uint8)
+        picture[v : v + 84, u : u + 84] = tag[..., None]
+        read.clear()
+        (pose,) = detector.poses(picture, 0.0)
+        searches.append([size == picture.size for size in read])
+        assert isinstance(pose, Pose)
+        assert 1000 * np.array([pose.x, pose.y]) == pytest.approx([u + 41.5, 479 - (v + 41.5)], abs=0.2)
+    assert searches == [[True], [False], [False], [False, True], [False]]
+
+
 @pytest.mark.parametrize("quarter", range(4))
 def test_a_tag_gives_pose_and_scale(quarter: int, tmp_path: Path) -> None:
     """The robot's tag, 4 cm wide, points along the picture's edges; the other, of 5 cm, gives the scale."""
