@@ -13,7 +13,7 @@ from __future__ import annotations
 import itertools
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -137,7 +137,7 @@ class SweepDesign:
         from scipy.stats import qmc  # slow to import, and only workers need points
 
         rows = len(self.indices(start, stop))
-        names = [name for name in _order() if name in self.axes]
+        names = _ordered(self.axes)
         sampler = qmc.Sobol(len(names), scramble=True, rng=np.random.default_rng(self.seed))
         if start:
             sampler.fast_forward(start)
@@ -160,9 +160,10 @@ class SweepDesign:
         return self if rows is None else replace(self, rows=_check_rows(rows))
 
 
-def _order() -> tuple[str, ...]:
-    """Return all inputs in the order of the sequence's dimensions, whatever the order in sweep.toml."""
-    return (*GROUP_COLUMNS, *OPTIONAL_COLUMNS, "tails", *WITH_UNIT, *catalogue())
+def _ordered(inputs: Iterable[str]) -> list[str]:
+    """Order inputs as the sequence's dimensions, whatever the order in sweep.toml; laws come last."""
+    known = [*GROUP_COLUMNS, *OPTIONAL_COLUMNS, "tails", *WITH_UNIT, *catalogue()]
+    return sorted(inputs, key=lambda name: (known.index(name) if name in known else len(known), name))
 
 
 def load_design(path: str | Path = SWEEP_TOML) -> SweepDesign:
@@ -222,7 +223,7 @@ def _design(content: Mapping[str, Any], folder: Path) -> SweepDesign:
         raise InputError(f"inputs = {inputs!r}; write a table [inputs]")
     robot = robot_of_sweep(content["robot"], folder) if "robot" in content else None
     read = _inputs(inputs) if robot is None else _inputs_of_robot(inputs, isinstance(content["robot"], dict))
-    axes = {name: _axis(*read[name]) for name in _order() if name in read}
+    axes = {name: _axis(*read[name]) for name in _ordered(read)}
     _check_ends(axes, robot)
     seed, every, slopes = (content.get(name, value) for name, value in _SETTINGS.items())
     if type(seed) is not int or seed < 0:
@@ -236,14 +237,14 @@ def _design(content: Mapping[str, Any], folder: Path) -> SweepDesign:
 
 def _inputs(inputs: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
     """Check the names of dimensionless inputs; return name and entry of each."""
-    allowed = {*GROUP_COLUMNS, *OPTIONAL_COLUMNS, *catalogue()}
+    groups = {*GROUP_COLUMNS, *OPTIONAL_COLUMNS}
     for name in inputs:
         if name == DWELL:
             raise InputError(f"{name} is no longer an input, rows hold all dwells; remove the line")
-        if name not in allowed:
+        if name not in groups and not is_effect(name):
+            allowed = ", ".join(sorted({*groups, *catalogue()}))
             raise InputError(
-                f"unknown input {name!r}; allowed are {', '.join(sorted(allowed))}; "
-                "with an entry robot, the numbers of a robot"
+                f"unknown input {name!r}; allowed are {allowed}; with an entry robot, the numbers of a robot"
             )
     for name in GROUP_COLUMNS:
         if name not in inputs:

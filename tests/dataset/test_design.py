@@ -168,6 +168,26 @@ def test_a_sweep_around_a_robot_is_built_read_and_verified(tmp_path: Path) -> No
         build(stiffer, tmp_path / "data", jobs=1)
 
 
+LAW = "law_Fx_wh_speed-93_length425_tails0"
+
+
+def test_a_law_is_swept_as_an_effect_is(tmp_path: Path) -> None:
+    design = around(tmp_path, f"{AROUND}{LAW} = {{ range = [-0.5, 0.5] }}")
+    assert design.effects == ["end_over_end_drag", LAW]
+    build(design, tmp_path / "data", jobs=1)
+    sizes = read(tmp_path / "data")[LAW]
+    assert np.array_equal(sizes, design.points()[LAW])
+    assert sizes.min() < 0 < sizes.max()
+    assert loaded(tmp_path, f"{SMALL}{LAW} = {{ range = [-0.5, 0.5] }}").effects == [LAW]
+
+
+def test_a_law_of_the_robot_that_is_not_swept_is_a_column(tmp_path: Path) -> None:
+    save_robot(replace(ROBOT, effects={LAW: 0.2}), tmp_path / "robot.toml")
+    design = loaded(tmp_path, AROUND)
+    assert design.effects == ["end_over_end_drag", LAW]
+    assert set(design.points()[LAW]) == {0.2}
+
+
 BAD_AROUND = [
     ("tail_length_cm =", "tail_length =", "input 'tail_length' has no unit; give one of tail_l"),
     ("tail_length_cm =", "tail_length_rpm =", "unknown input 'tail_length_rpm' of a robot; allowed are N"),
