@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from planner.goal.trip import to_goal
-from planner.paths.distance import distance_to, two_sided
+from planner.paths.distance import distance_to, farthest
 from planner.paths.obstacles import FreeSpace
 from planner.paths.units import length_in_lab
 from planner.planning.plan import Plan
@@ -107,7 +107,7 @@ def tracking_error(plan: Mapping[str, Any], track: pd.DataFrame) -> TrackingErro
         largest=float(declared.max()),
         raw_rms=float(np.sqrt((weight * raw**2).sum())),
         raw_largest=float(raw.max()),
-        missed=float(two_sided(np.array(plan["raw_path"]), tracked)[0]),
+        missed=farthest(np.array(plan["raw_path"]), tracked),
         stated=float(plan["stated_error_over_l"]),
         track=tracked,
         tail_length=float(plan["robot"]["tail_length_m"]),

@@ -78,7 +78,12 @@ def closest_segment(
 
 def two_sided(first: Floats, second: Floats) -> tuple[float, float]:
     """Compute the largest distance of any point of the first polyline from the second, and the reverse."""
-    return float(distance_to(second, _filled(first)).max()), float(distance_to(first, _filled(second)).max())
+    return farthest(first, second), farthest(second, first)
+
+
+def farthest(polyline: Floats, other: Floats) -> float:
+    """Compute the largest distance of any point of a polyline, longer than 0, from another."""
+    return float(distance_to(other, _filled(polyline)).max())
 
 
 def _filled(polyline: Floats) -> Floats:

@@ -243,6 +243,15 @@ def test_the_track_of_another_robot_or_plan_is_refused() -> None:
         tracking_error(record, track.assign(plan_id="p0123456789a"))
 
 
+def test_a_robot_that_stays_where_it_is_is_away_from_its_path() -> None:
+    record, track = tracks()
+    still = track.assign(**track.loc[0, ["x_over_l", "y_over_l", "heading_rad"]])
+    error = tracking_error(record, still)
+    away = np.hypot(*(np.array(record["raw_path"]) - error.track[0]).T)
+    assert error.rms == pytest.approx(error.largest)
+    assert error.missed == pytest.approx(away.max(), rel=1e-3)
+
+
 def test_a_track_that_cannot_be_read_is_refused() -> None:
     record, track = tracks()
     camera = {"time_s": [0.0], "x_cm": [0.0], "y_cm": [0.0], "heading_deg": [0.0]}
