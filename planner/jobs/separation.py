@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -40,7 +40,6 @@ from planner.planning.errors import LEVEL, WOBBLE, deviations_open_loop, error_g
 from planner.planning.plan import Plan
 from planner.vehicle.rollout import roll_out
 from planner.vehicle.tracked_point import TrackedVehicle
-from planner.vehicle.vehicle import Mode
 from planner.vehicle.zigzag import zigzag
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError
@@ -282,7 +281,8 @@ def _lag(plan: Plan, arcs: Floats) -> Floats:
     lags = []
     for mode in tracked.vehicle.modes:
         try:
-            late = _passing_times(path, _changed(tracked, mode), plan.minimum_dwell) - planned
+            changed = tracked._replace(vehicle=tracked.vehicle.off_by(mode))
+            late = _passing_times(path, changed, plan.minimum_dwell) - planned
         except InputError:  # such a robot does not get ahead; the others tell enough
             continue
         lags.append(plan.straight.net_speed * late)
@@ -296,14 +296,6 @@ def _lag(plan: Plan, arcs: Floats) -> Floats:
     if lags:
         late = _band(np.abs(normals(0, 0, _DRAWS * len(lags)).reshape(_DRAWS, -1) @ np.array(lags)))
     return np.asarray(late + bias * np.interp(arcs, declared.arc, outside))
-
-
-def _changed(tracked: TrackedVehicle, mode: Mode) -> TrackedVehicle:
-    """Return a vehicle that is off by one standard deviation of a mode."""
-    vehicle = tracked.vehicle
-    lag = vehicle.lag if mode.lag is None else vehicle.lag + mode.lag
-    changed = replace(vehicle, twist=vehicle.twist + mode.twist, lag=lag, current=vehicle.current + mode.current)
-    return tracked._replace(vehicle=changed)
 
 
 def _passing_times(path: Path2D, tracked: TrackedVehicle, dwell: float) -> Floats:

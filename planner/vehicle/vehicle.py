@@ -64,12 +64,15 @@ class Vehicle:
 
     def drawn(self, rng: np.random.Generator, size: float = 1.0) -> Vehicle:
         """Draw a vehicle within what is uncertain of this one, times a size."""
-        twist, lag, current = self.twist.copy(), self.lag.copy(), self.current.copy()
+        drawn = self
         for mode, z in zip(self.modes, size * rng.standard_normal(len(self.modes)), strict=True):
-            twist += z * mode.twist
-            lag += 0.0 if mode.lag is None else z * mode.lag
-            current += z * mode.current
-        return replace(self, twist=twist, lag=lag, current=current)
+            drawn = drawn.off_by(mode, z)
+        return drawn
+
+    def off_by(self, mode: Mode, z: float = 1.0) -> Vehicle:
+        """Return a vehicle that is off by z standard deviations of a mode."""
+        lag = self.lag if mode.lag is None else self.lag + z * mode.lag
+        return replace(self, twist=self.twist + z * mode.twist, lag=lag, current=self.current + z * mode.current)
 
     @property
     def yaw_rate(self) -> float:
