@@ -252,7 +252,11 @@ def watch(
         if not live:
             time.sleep(max(began + device.get(cv.CAP_PROP_POS_MSEC) / 1e3 - now(), 0.0))
         taken = now() - latency
-        (seen,) = detector.poses(device.retrieve()[1], taken)
+        good, picture = device.retrieve()
+        if not good:
+            yield Sight(taken, None, "a damaged picture")
+            continue
+        (seen,) = detector.poses(picture, taken)
         if isinstance(seen, Lost):
             yield Sight(taken, None, seen.why)
         else:

@@ -178,6 +178,36 @@ def test_what_a_camera_raises_comes_out_of_the_loop() -> None:
         steer(Ride(), Pictures(gone), tank, begin, UNIT, lost=LOST, row=print, tell=print)  # type: ignore[arg-type]
 
 
+def test_a_damaged_picture_shows_no_robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A camera that compresses its pictures sends one now and then that cannot be decoded."""
+    cv2 = pytest.importorskip("cv2", reason="needs the extra camera")
+    from tests.oracles import tank
+
+    class Damaged:
+        def __init__(self, source: str):
+            self.left = 2
+
+        def grab(self) -> bool:
+            self.left -= 1
+            return self.left >= 0
+
+        def retrieve(self) -> tuple[bool, None]:
+            return False, None
+
+        def isOpened(self) -> bool:
+            return True
+
+        def get(self, name: int) -> float:
+            return 0.0
+
+        def set(self, name: int, value: float) -> None: ...
+
+    monkeypatch.setattr(cv2, "VideoCapture", Damaged)
+    (tmp_path / "view.toml").write_text(tank.Tank().view_toml())
+    seen = list(live.watch("film.avi", str(tmp_path / "view.toml"), "robot", 0.11, 0.0, lambda: 1.0))
+    assert seen == [Sight(1.0, None, "a damaged picture")] * 2
+
+
 def swum(time: float) -> tuple[float, float, float]:
     """Return the pose [m, rad] of the plan's robot at a time [s], between the poses at its flips."""
     times, length = np.append(0.0, np.cumsum(LINE.seconds)), LINE.robot.length_scale
