@@ -104,13 +104,17 @@ def _poses(seen: Seen, path: Path, program: Program, options: TrackOptions) -> p
     if "heading" in points and not {"front", "rear"} & set(options):
         poses = points[points["robot"] != ""]
     else:
-        front = _rows(points, path, options.get("front", "front"))
-        rear = _rows(points, path, options.get("rear", "rear"))
+        names = options.get("front", "front"), options.get("rear", "rear")
+        front, rear = (_rows(points, path, name) for name in names)
+        if names[0] == names[1]:
+            raise InputError(f"--front and --rear are both {names[0]!r}; a heading needs two points")
         poses = front.merge(rear, on=["robot", "time"], how="outer", suffixes=("_front", "_rear"))
         along, aside = (poses[f"{axis}_front"] - poses[f"{axis}_rear"] for axis in "xy")
         poses["heading"] = np.arctan2(-aside if program.y_down else aside, along)
         poses["x"], poses["y"] = poses["x_rear"] + along / 2, poses["y_rear"] + aside / 2
     x, y = options.get("origin", (0.0, 0.0))
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise InputError(f"--origin {x:g} {y:g}; give two finite numbers")
     up, run = (-1 if program.y_down else 1), path.stem
     if program is PROGRAMS["deeplabcut"]:
         run = run.partition("DLC")[0].rstrip("_-") or run

@@ -86,6 +86,8 @@ def test_each_robot_of_a_film_and_each_film_of_a_folder_is_a_run(tmp_path: Path)
     ("run3DLC_resnet50_swim.csv", {"fps": 25.0, "scale": "0.5"}, r"--scale 0.5; give the length of a pixel"),
     ("run3DLC_resnet50_swim.csv", {"fps": 25.0, "scale": "2s"}, r"--scale 2s; give the length of a pixel"),
     ("run3DLC_resnet50_swim.csv", {**FILMED, "rear": "tail"}, "has no point 'tail' but front, rear; a heading"),
+    ("run3DLC_resnet50_swim.csv", {**FILMED, "rear": "front"}, "--front and --rear are both 'front'; a heading"),
+    ("run3DLC_resnet50_swim.csv", {**FILMED, "origin": (np.nan, 0.0)}, "--origin nan 0; give two finite numbers"),
     ("spots.csv", FILMED, "has its own units; leave out --fps"),
     ("take.csv", {"scale": "0.5mm"}, "has its own units; leave out --scale"),
 ])  # fmt: skip
