@@ -67,7 +67,7 @@ def _check(folder: Path) -> None:
     """Refuse a folder with files that are no such library.
 
     Raises:
-        InputError: it has other files, one of which the message names, or it is a file.
+        InputError: it has other files, one of which the message names.
     """
     files = sorted(path for path in folder.rglob("*") if not path.is_dir()) if folder.is_dir() else []
     other = next((path for path in files if path.relative_to(folder).as_posix() not in _FILES), None)
