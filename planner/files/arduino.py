@@ -69,12 +69,10 @@ def _check(folder: Path) -> None:
     Raises:
         InputError: it has other files, one of which the message names.
     """
-    files = sorted(path for path in folder.rglob("*") if not path.is_dir()) if folder.is_dir() else []
-    other = next((path for path in files if path.relative_to(folder).as_posix() not in _FILES), None)
-    if other is not None:
-        raise InputError(
-            f"{folder} has other files, such as {other.relative_to(folder)}; give a folder of its own"
-        )
+    for path in folder.rglob("*"):
+        name = path.relative_to(folder).as_posix()
+        if name not in _FILES and not path.is_dir():
+            raise InputError(f"{folder} has other files, such as {name}; give a folder of its own")
 
 
 def _properties(result: Plan) -> str:

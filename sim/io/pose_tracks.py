@@ -1,6 +1,6 @@
 """Tracks as tables of poses, also of what other programs have tracked: run, time_s, x_cm, y_cm, heading_deg.
 
-A pose needs two points on the axis of the robot, equally far before and behind the head's centre:
+A pose needs two points on the axis of the robot, equally far ahead of and behind the head's centre:
 
     (x, y) = (front + rear) / 2,   heading = atan2(y_front - y_rear, x_front - x_rear)
 

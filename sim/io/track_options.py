@@ -12,8 +12,8 @@ class TrackOptions(TypedDict, total=False):
 
     Attributes:
         written_by: the program that wrote the tracks; each file of a folder is a run.
-        front: NAME, of the point before the head's centre (default: front).
-        rear: NAME, of the point as far behind it (default: rear).
+        front: NAME, of the point ahead of the head's centre (default: front).
+        rear: NAME, of the point equally far behind it (default: rear).
         scale: LENGTH, of a pixel, or of the file's unit of length, such as 0.2mm.
         fps: frames per second, where the file counts frames.
         origin: X Y, of the point that becomes 0 0, as the file has it (default: 0 0).
