@@ -179,7 +179,7 @@ def tracks(
     known = None if robot is None else one_robot(robot)
     measured = measure_tracks(tracks, runs, y_down=y_down, robot=known, **options)
     for line in measured.excluded:
-        warnings.warn(f"excluded: {line}", InputWarning, stacklevel=2)
+        warnings.warn(f"excluded: {line}", InputWarning, stacklevel=3)
     table = with_units(measured.table)
     table.attrs |= {"excluded": list(measured.excluded), "converted": list(measured.converted)}
     if check is not None:

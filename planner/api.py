@@ -380,7 +380,7 @@ def _poses(track: pd.DataFrame | str | Path, options: TrackOptions) -> pd.DataFr
 
     poses = read_track(track, **options)
     for line in poses.attrs.get("lost", ()):
-        warnings.warn(line, InputWarning, stacklevel=3)
+        warnings.warn(line, InputWarning, stacklevel=4)
     return poses
 
 

@@ -210,9 +210,10 @@ def test_a_track_of_another_program_has_the_error_of_the_same_track(
     main(["check", str(json_file), str(file), *words, "--origin", "900", "700"])
     told = capsys.readouterr()
     assert told.err == f"{file}: 1 of {len(track) + 1} poses are lost\n"
-    with pytest.warns(UserWarning, match="1 of .* poses are lost"):
+    with pytest.warns(UserWarning, match="1 of .* poses are lost") as warned:
         error = check(json_file, file, written_by="deeplabcut", front="tip", rear="disc", scale="0.5mm", fps=25.0,
                       origin=(900.0, 700.0))  # fmt: skip
+    assert [each.filename for each in warned] == [__file__]
     assert told.out == f"{error.line}\n"
     assert error.rms == pytest.approx(tracking_error(record, track).rms, rel=0.01)
     file.write_text(file.read_text().replace("bodyparts", "individuals" + 3 * ",a" + 3 * ",b" + "\nbodyparts"))

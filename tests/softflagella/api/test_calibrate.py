@@ -23,8 +23,9 @@ def circle_track(run: int, samples: int) -> pd.DataFrame:
 def test_tracks_that_are_left_out_are_warned_of() -> None:
     samples = pd.concat([circle_track(1, 200), circle_track(2, 5)])
     runs = pd.DataFrame({"run": [1, 2], "N": 2, "l_cm": 11.0, "omega_rpm": 43.0})
-    with pytest.warns(UserWarning, match="excluded: run 2: 5 samples"):
+    with pytest.warns(UserWarning, match="excluded: run 2: 5 samples") as warned:
         table = sf.tracks(samples, runs)
+    assert warned[0].filename == __file__
     assert table["R_yr_cm"].round(6).tolist()[0] == 9.0
     assert np.isnan(table["R_yr_cm"].iloc[1])
     assert len(table.attrs["excluded"]) == 1
