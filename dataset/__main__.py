@@ -12,13 +12,12 @@ program = Program("dataset", "simulate sweeps into data sets, report and verify 
 main = program.main
 
 
-@program.command("build", of="dataset.api:sweep", resume="")
+@program.command("build", of="dataset.api:sweep", out="--out", resume="")
 def _build(sweep: Call, *, out: str, config: str | None = None) -> None:
     """Simulate a sweep into Parquet.
 
     Args:
         config: sweep.toml (default: the one that comes with the package).
-        out: folder, or a URL that fsspec knows (s3://…).
     """
     from dataset.build import Interrupted
 

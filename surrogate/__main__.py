@@ -130,17 +130,16 @@ def _robot(robot: str, *, out: str) -> None:
 
 
 @program.command("export")
-def _export(model: str | None = None, *, small: str) -> None:
+def _export(lookup: str | None = None, *, small: str) -> None:
     """Write a look-up table for other programs.
 
     Args:
-        model: look-up table (default: the one that comes with the package).
         small: FOLDER, at most 150 kB, for a microcontroller, with a reader in C.
     """
     from surrogate.small_copy import export
     from surrogate.table_file import load
 
-    table = load(model)
+    table = load(lookup)
     print(export(small, lookup=table))
     print(f"model {table.identity} -> {small}")
 

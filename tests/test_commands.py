@@ -38,6 +38,7 @@ from tests.calibration.toy_tables import (
     toy_table,
 )
 from tests.calibration.track import RADIUS, track
+from tests.camera.test_lens import POSES, boards
 from tests.dataset.sweeps import SMALL, design, invented
 from tests.oracles.tank import Tank, circling
 from tests.processes import LIMIT
@@ -298,6 +299,12 @@ def camera_view(made: Path, out: Path) -> str:
     done("camera", "view", "--out", out / "view.toml")
     assert read_setup(out / "view.toml").robots[0].colours == {"front": "red", "rear": "green"}
     return "view.toml"
+
+
+def camera_lens(made: Path, out: Path) -> str:
+    pytest.importorskip("cv2", reason="the extra camera is not installed")
+    done("camera", "lens", *boards(out, POSES))
+    return "[lens]  # 8 pictures of a chessboard"
 
 
 def camera_tracks(made: Path, out: Path) -> str:
