@@ -77,7 +77,7 @@ class Loop:
 
     def __init__(self, function: Callable[..., Any], **options: Any):
         update_wrapper(self, function)
-        self.py_func, self.options = function, _OPTIONS | options
+        self.py_func, self.targetoptions = function, _OPTIONS | options  # as numba's inliner calls them
         _functions.add(function)
 
     @cached_property
@@ -88,14 +88,14 @@ class Loop:
         with _lock:
             before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(CACHE / own)
             try:
-                return numba.njit(cache=True, **self.options)(self.py_func)
+                return numba.njit(cache=True, **self.targetoptions)(self.py_func)
             finally:
                 numba.config.CACHE_DIR = before
 
     @cached_property
     def part(self) -> Any:
         """What compiled loops call."""
-        return _numba().njit(no_cpython_wrapper=True, **self.options)(self.py_func)
+        return _numba().njit(no_cpython_wrapper=True, **self.targetoptions)(self.py_func)
 
     def __call__(self, *arguments: Any) -> Any:
         return self.kernel(*arguments)
@@ -117,6 +117,14 @@ def compiled(function: F) -> F:
 def compiled_fast(function: F) -> F:
     """Compile as `compiled` does, with sums reordered and products fused: long sums become vector instructions."""
     return cast(F, Loop(function, fastmath=_FAST))
+
+
+def inlined(function: F) -> F:
+    """Write a function out in the compiled loops that call it, which spares the work of linking what it calls.
+
+    numba optimises a function together with all that it calls, and again in each caller.
+    """
+    return cast(F, Loop(function, inline="always"))
 
 
 def formula(function: F) -> F:

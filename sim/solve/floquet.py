@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Floats
-from sim.jit import compiled
+from sim.jit import compiled, inlined
 from sim.lanes import choose, lanes, less, somewhere, zeros
 from sim.linear.blocks import block, put, vector
 from sim.linear.lane_arrays import choose_all, combine, divide, largest_entry, scalar_product, subtract_multiple
@@ -109,7 +109,7 @@ def _orthogonalise(basis: Floats, i: int, image: Floats, projected: Floats) -> A
     return size
 
 
-@compiled
+@inlined
 def _by_rate(
     body: Body, rates: Rates, x: Floats, u: Floats, where: Any, work: Workspace, q: Floats, dx: Floats, du: Floats
 ) -> None:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.jit import compiled
+from sim.jit import compiled, inlined
 from sim.lanes import choose, empty, larger, less, somewhere, zeros
 from sim.linear import chains as separate
 from sim.linear import coupled
@@ -68,7 +68,7 @@ def new_unknowns(x: Floats, u: Floats) -> Unknowns:
     return Unknowns(empty(x, x.shape), empty(u, u.shape))
 
 
-@compiled
+@inlined
 def newton(
     body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tolerance: float, going: Any
 ) -> tuple[int, Any]:
@@ -97,7 +97,7 @@ def newton(
     return count, size
 
 
-@compiled
+@inlined
 def correct(
     body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, anew: bool, going: Any, dx: Floats, du: Floats
 ) -> None:
@@ -141,7 +141,7 @@ def negate(equations: Equations, dx: Floats, du: Floats) -> None:
             du[p, a] = -equations.t[p, a]
 
 
-@compiled
+@inlined
 def solve_linear(
     body: Body,
     rates: Rates,
@@ -171,7 +171,7 @@ def solve_linear(
         _solve_nonlocal(body, rates, x, u, work, tolerance, further, dx, du)
 
 
-@compiled
+@inlined
 def factor_and_solve(body: Body, rates: Rates, u: Floats, work: Workspace, dx: Floats, du: Floats) -> None:
     """Factorise Newton's matrix without non-local effects, which `linearise` left in `work`, and solve with it.
 
@@ -190,7 +190,7 @@ def factor_and_solve(body: Body, rates: Rates, u: Floats, work: Workspace, dx: F
     coupled.factor_and_solve(work.system, chains, coupling, dx.reshape((n, 3 * columns)), du.reshape(du.size))
 
 
-@compiled
+@inlined
 def solve_local(rates: Rates, work: Workspace, dx: Floats, du: Floats) -> None:
     """Solve with the factors, in place: dx (n, M, 3) and du (P, 4) come in as right-hand sides."""
     if not is_periodic(rates):
@@ -200,7 +200,7 @@ def solve_local(rates: Rates, work: Workspace, dx: Floats, du: Floats) -> None:
         coupled.solve(work.system, work.equations.chains, dx.reshape(n, 3 * columns), du.reshape(du.size))
 
 
-@compiled
+@inlined
 def _solve_nonlocal(
     body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tolerance: float, going: Any, dx: Floats,
     du: Floats,

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.jit import compiled
+from sim.jit import compiled, inlined
 from sim.lanes import count_lanes, lane, somewhere, zeros
 from sim.linear.blocks import add, put, vector, vector_at
 from sim.linear.lane_arrays import put_lane, take_lane
@@ -113,7 +113,7 @@ def _velocity(motion: Motion, position: Vector, x_dot: Vector, flow: Vector) -> 
     return minus(plus(plus(motion.linear, cross(motion.spin, position)), x_dot), flow)
 
 
-@compiled
+@inlined
 def _surround_lanes(body: Body, base: Any, x: Floats, u: Floats, where: Any, scratch: Scratch) -> None:
     """Add up all non-local effects of the robots in the lanes where `where` is 1, one robot after the other."""
     columns, instants = x.shape[1], u.shape[0]

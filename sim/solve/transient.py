@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Flags, Floats, Integers
-from sim.jit import compiled, formula
+from sim.jit import compiled, formula, inlined
 from sim.lanes import choose, lane, lanes, larger, less, smaller, somewhere, with_lane, zeros
 from sim.linear.lane_arrays import add_chosen, choose_all, copy, largest_entry, put_lane, take_lane
 from sim.linear.spectral import differentiation
@@ -218,7 +218,7 @@ def _goal(jump: Jump, course: _Course, i: int, marks: Floats) -> float:
     return float(marks[mark]) if mark < len(marks) and marks[mark] < until else float(until)
 
 
-@compiled
+@inlined
 def _try_step(
     body: Body, twist: Floats, at: _State, new: _State, now: Any, dt: Any, going: Any, step: _Step, work: Workspace
 ) -> Any:
@@ -259,7 +259,7 @@ def _begin_stage(at: _State, new: _State, step: _Step, stage: int, dt: Any, tau:
                 step.lag_start[p, c] += (1 - GAMMA) * dt * step.lag_slope[0, p, c]
 
 
-@compiled
+@inlined
 def _solve_stage(
     body: Body, rates: Rates, x: Floats, u: Floats, anew: bool, going: Any, step: _Step, work: Workspace
 ) -> Any:

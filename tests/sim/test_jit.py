@@ -26,7 +26,7 @@ import sim.solve.orbit, sim.motion.steady, sim.motion.response
 print("numba" in sys.modules)
 """
 LOOPS = """
-from sim.jit import compiled, formula
+from sim.jit import compiled, formula, inlined
 from someones_number import NUMBER
 
 @formula
@@ -37,9 +37,15 @@ def double(x):
 def inner(x):
     return double(x) + NUMBER
 
+@inlined
+def signed(x, y):
+    if x < 0:
+        y = y / 0.0
+    return y
+
 @compiled
 def outer(x):
-    return inner(x) / 0.0 if x < 0 else inner(x)
+    return signed(x, inner(x))
 """
 USE = """
 import numba, sys
@@ -47,9 +53,10 @@ from pathlib import Path
 from sim import jit
 jit.CACHE = Path(sys.argv[1])
 before = numba.config.OPT, numba.config.CACHE_DIR
-from someones_loops import outer, double
+from someones_loops import outer, double, signed
 print(outer(1.0), outer(-1.0), double([3]), sum(outer.kernel.stats.cache_hits.values()))
 assert (numba.config.OPT, numba.config.CACHE_DIR) == before
+assert not signed.part.signatures
 """
 
 
@@ -145,7 +152,7 @@ def test_the_version_is_named_by_all_files_that_loops_are_made_of() -> None:
     """An effect or a way to use the loops is no reason to compile them anew."""
     sources = {path for pattern in jit.SOURCES for path in SIM.glob(pattern)}
     made_of: set[Path] = set()
-    mark = re.compile(r"(?m)^@(compiled|compiled_fast|formula)$")
+    mark = re.compile(r"(?m)^@(compiled|compiled_fast|inlined|formula)$")
     loops = left = {file for file in SIM.rglob("*.py") if mark.search(file.read_text())}
     assert {SIM / "linear" / "gmres.py", SIM / "mechanics" / "drag.py", SIM / "solve" / "newton.py"} <= loops
     arguments = SIM / "solve" / "assembly.py"  # of loops, made from what the robots are
