@@ -25,7 +25,7 @@ def _to_stderr(line: str) -> None:
     print(line, file=sys.stderr)
 
 
-@program.command("calibrate", of="calibration.api:calibrate", robot="--robot", paths="path", progress="")
+@program.command("calibrate", of="calibration.api:calibrate", paths="path", progress="")
 def _calibrate(
     calibrate: Call,
     table: str = "",

@@ -12,13 +12,9 @@ program = Program("dataset", "simulate sweeps into data sets, report and verify 
 main = program.main
 
 
-@program.command("build", of="dataset.api:sweep", out="--out", resume="")
+@program.command("build", of="dataset.api:sweep", resume="")
 def _build(sweep: Call, *, out: str, config: str | None = None) -> None:
-    """Simulate a sweep into Parquet.
-
-    Args:
-        config: sweep.toml (default: the one that comes with the package).
-    """
+    """Simulate a sweep into Parquet."""
     from dataset.build import Interrupted
 
     written = {"config": config, "out": out, **sweep.given, "force": None}

@@ -32,7 +32,8 @@ def sweep(
     """Simulate a sweep into a folder of Parquet files. An interrupted sweep continues.
 
     Args:
-        config: a sweep.toml; None: the one that comes with the package; or a robot to sweep around.
+        config: sweep.toml (default: the one that comes with the package). In Python None is that one, and a robot
+            is swept around.
         out: folder, or a URL that fsspec knows (s3://…).
         inputs: around a robot, the lowest and highest value by name, in any unit; by default tail length, motor
             speed, N and the coefficients of drag.

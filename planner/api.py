@@ -77,17 +77,18 @@ def plan(
 
     Args:
         path: CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE, polygon:CORNERS:SIDE (square:24cm,
-            polygon:6:2l); or what `read_path` reads, a Path2D, or points (n, 2), in tail lengths l or in `unit`.
-        robot: robot.toml or the name of a preset, or the robot, with its motor speed in both directions; or a
-            measured vehicle, or its vehicle.toml.
+            polygon:6:2l). In Python also what `read_path` reads, a Path2D, or points (n, 2), in tail lengths l or
+            in `unit`.
+        robot: robot.toml or the name of a preset, with its motor speed in both directions; or the vehicle.toml of
+            a measured vehicle. In Python also the robot or the vehicle.
         scale: multiply the path's coordinates.
         shape: which path of an SVG with several.
         closed: join the path's end to its start.
         smooth: LENGTH, smooth the path over this length, such as 1cm.
-        arrive: TIME, when the robot is at the end, such as 12min, or in seconds: dwells are changed, or swings or
-            waiting circles added; `Plan.arrival` has it.
-        loop: a closed path is followed lap after lap, until told otherwise; `Plan.lap` says how well a lap closes,
-            whose time is only nearly `arrive`.
+        arrive: TIME, when the robot is at the end, such as 12min: dwells are changed, or swings or waiting circles
+            added. In Python also in seconds; `Plan.arrival` has it.
+        loop: a closed path is followed lap after lap, until told otherwise; the time of a lap is only nearly
+            that of `arrive`. In Python `Plan.lap` says how well a lap closes.
         tell: is told which path is planned, a line at a time.
         options: see `PathOptions`.
 
@@ -141,11 +142,11 @@ def to_goal(
     Args:
         start: x, y [l] and heading [rad] of the head's centre, at rest; or words: X, Y and degrees.
         goal: the same at the end.
-        robot: robot.toml or the name of a preset, or the robot, with its motor speed in both directions; or a
-            measured vehicle, or its vehicle.toml.
+        robot: robot.toml or the name of a preset, with its motor speed in both directions; or the vehicle.toml of
+            a measured vehicle. In Python also the robot or the vehicle.
         via: X Y, of a place that the pivot passes on its way.
-        arrive: TIME, when the robot is at the goal, such as 12min, or in seconds: dwells are changed, or swings or
-            waiting circles added.
+        arrive: TIME, when the robot is at the goal, such as 12min: dwells are changed, or swings or waiting
+            circles added. In Python also in seconds.
         objective: what decides the dwell: small error, short time, or few flips.
         progress: called now and then with the share of what is done.
         options: see `GoalOptions`.
@@ -181,10 +182,11 @@ def tour(
     """Visit places in the order that takes the robot the least time, with free headings.
 
     Args:
-        places: X,Y of each, or one CSV or SVG with a point for each; or x, y of each [l]. The tour begins at the
-            first one. Up to 12 more are ordered exactly; with more, `job.gap` says how much longer than the
-            quickest order the tour may be.
-        robot: robot.toml or the name of a preset, or the robot; or a measured vehicle, or its vehicle.toml.
+        places: X,Y of each, or one CSV or SVG with a point for each. The tour begins at the first one. Up to 12
+            more are ordered exactly; of more it is stated how much longer than the quickest order the tour may
+            be. In Python, `job.gap` states it, and a place may be x, y [l].
+        robot: robot.toml or the name of a preset, or the vehicle.toml of a measured vehicle. In Python also the
+            robot or the vehicle.
         back: end where the tour began.
         any_start: begin at any of the places.
         options: see `JobOptions`.
@@ -218,12 +220,13 @@ def cover(
     """Sweep a region, in lanes and turns, with a camera, magnet or sampler under the robot.
 
     Args:
-        region: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline; or a `Circle`, or
+        region: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline. In Python also a `Circle`, or
             corners (n, 2) [l].
         width: LENGTH, of the round footprint about the tracked point, such as 4cm.
-        robot: robot.toml or the name of a preset, or the robot; or a measured vehicle, or its vehicle.toml.
+        robot: robot.toml or the name of a preset, or the vehicle.toml of a measured vehicle. In Python also the
+            robot or the vehicle.
         holes: REGION, a part that need not be swept, and may be crossed, as is what `keep_out` has.
-        angle: DEGREES, direction of the lanes; a number is in rad (default: the quickest).
+        angle: DEGREES, direction of the lanes (default: the quickest). In Python also a number in rad.
         options: see `JobOptions`.
 
     Raises:
@@ -259,8 +262,9 @@ def hold(
     """Stay about a place, on the smallest orbit that the robot can keep with a camera; it repeats.
 
     Args:
-        place: X,Y; or x, y [l].
-        robot: robot.toml or the name of a preset, or the robot; or a measured vehicle, or its vehicle.toml.
+        place: X,Y. In Python also x, y [l].
+        robot: robot.toml or the name of a preset, or the vehicle.toml of a measured vehicle. In Python also the
+            robot or the vehicle.
         seconds: TIME, for so long, such as 30min (default: until told otherwise).
         options: see `JobOptions`.
 
@@ -346,7 +350,7 @@ def check(
     """Compare a replayed or measured track with its plan.
 
     Args:
-        plan: plan.json; or its content, or a plan.
+        plan: plan.json. In Python also its content, or a plan.
         track: table with `time_s`, `x_cm`, `y_cm`, `heading_deg` of the head's centre, as a camera gives them, or
             with the columns that `replay` writes.
         options: of a file that another program has written, see `TrackOptions`.
@@ -400,7 +404,7 @@ def replan(
     the goal is planned again, through the places that are left.
 
     Args:
-        plan: plan.json, its folder, or a goal.json, tour.json or cover.json beside it; or a plan.
+        plan: plan.json, its folder, or a goal.json, tour.json or cover.json beside it. In Python also a plan.
         track: table of the robot so far: `time_s`, `x_cm`, `y_cm`, `heading_deg` of the head's centre, or in other
             units, or the columns that `replay` writes; in its last row the robot is now, at rest.
         lookup: the look-up table with which a saved plan was made, or its file; see `restore_plan`.
@@ -496,10 +500,10 @@ def write_page(
 
     Args:
         path: the file.
-        robot: robot.toml or the name of a preset, or the robot, that the page begins with. Robots with effects or
-            a calibration cannot be changed in the page.
-        paths: a path that the page offers: CSV, SVG, or a shape such as circle:20cm; or points (n, 2) or a Path2D
-            by name, in tail lengths l. The first one is planned when the page opens.
+        robot: robot.toml or the name of a preset, that the page begins with. Robots with effects or a calibration
+            cannot be changed in the page. In Python also the robot.
+        paths: a path that the page offers: CSV, SVG, or a shape such as circle:20cm; the first one is planned when
+            the page opens. In Python also points (n, 2) or a Path2D by name, in tail lengths l.
         smooth: LENGTH, smooth drawn strokes over this length, such as 1cm.
         title: of the page.
         options: of the first plan, see `CornerOptions`.

@@ -77,13 +77,14 @@ class SpaceOptions(TypedDict, total=False):
 
     Attributes:
         keep_out: REGION, that the robot's body must not touch: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a
-            CSV or SVG outline; or a `Circle`, or corners (n, 2). Where it is in the way, a way around is chosen.
-        walls: REGION, what the body must stay within: box:…, or a CSV or SVG outline, or corners (n, 2).
+            CSV or SVG outline. Where it is in the way, a way around is chosen. In Python also a `Circle`, or
+            corners (n, 2).
+        walls: REGION, what the body must stay within: box:…, or a CSV or SVG outline. In Python also corners.
         feedback: the pose will be measured for a tracker: the margin around obstacles is the stated error with
             feedback.
         camera: NOISE RAD EVERY LATE LOST, of the stated error with feedback: standard deviations of a place and of
             a heading in rad, seconds between poses, their age in seconds, share that is lost (default: 0.01l 0.01
-            1 2 0.2); or a `Camera`.
+            1 2 0.2). In Python also a `Camera`.
         seed: of the random robots from which the stated error is computed.
     """
 

@@ -75,8 +75,8 @@ def inverse(
     """Find robots that have given motions, with a trained look-up table.
 
     Args:
-        targets: CSV: the given inputs of the robots, and outputs that they shall have, such as `omega_yr_bar`; or
-            M rows of these (single values stand for all rows).
+        targets: CSV: the given inputs of the robots, and outputs that they shall have, such as `omega_yr_bar`.
+            In Python also M rows of these (single values stand for all rows).
         free: inputs to find, with commas or as a list.
         lookup: a trained table, or its file; default: the one that comes with the package.
 

@@ -11,12 +11,13 @@
         '''
         ... decide() ...
 
-The command has the parameters of the public function `of` whose types can be written as words, and its own; what
-its docstring describes is its own; a function without one has the first sentence of the public function's.
-Parameters before the * are positional, the others options. A bool is a flag, `--no-NAME` with "do not" before its
-description if its default is True. A description that begins LOW:HIGH, or X Y, names the values. The function is
-called with what was written, so defaults stand in its signature alone: first with the public function and what is
-written for that, then with its own. Signatures are read from the source, not imported: help needs no libraries.
+The command has the parameters of the public function `of` whose types can be written as words, and its own. What
+its docstring does not describe, that of the public function does, up to a sentence that begins "In Python";
+where there is no docstring, the first sentence is that of the public function, too. Parameters before the * are
+positional, the others options. A bool is a flag, `--no-NAME` with "do not" before its description if its default
+is True. A description that begins LOW:HIGH, or X Y, names the values. The function is called with what was
+written, so defaults stand in its signature alone: first with the public function and what is written for that,
+then with its own. Signatures are read from the source, not imported: help needs no libraries.
 
 `softflagella sim steady …` runs the function; the most important commands have a word of their own, such as
 `softflagella plan …` (`softflagella.__main__`).
@@ -128,12 +129,12 @@ def _named(name: str, file: Path) -> tuple[ast.stmt | None, Path]:
 
 
 def _read_docstring(node: ast.FunctionDef | ast.ClassDef) -> dict[str, str]:
-    """Return what stands under "Args:" or "Attributes:" by name."""
+    """Return what stands under "Args:" or "Attributes:" by name, up to "In Python"."""
     text = ast.get_docstring(node) or ""
     section = re.search(r"^(?:Args|Attributes):\n((?:    .*\n|\n)*)", text + "\n", re.MULTILINE)
     entry = re.compile(r"^    (\w+(?:, \w+)*): (.*\n(?:     .*\n)*)", re.MULTILINE)
     return {
-        name: " ".join(words.split()).replace("`", "").removesuffix(".")
+        name: " ".join(words.split()).partition(" In Python")[0].replace("`", "").removesuffix(".")
         for names, words in entry.findall(section[1] if section else "")
         for name in names.split(", ")
     }
@@ -233,8 +234,8 @@ class Command(NamedTuple):
         """Return a parser of this command alone."""
         parser = Parser(prog=prog, description=_sentence(self.help), argument_default=SUPPRESS)
         theirs, own = self.parameters()
-        described = {name: each for name, each in own.items() if each.help is not None or name not in theirs}
-        for parameter in (theirs | described).values():
+        own = {name: each._replace(help=each.help or theirs.get(name, each).help) for name, each in own.items()}
+        for parameter in (theirs | own).values():
             name = self.names.get(parameter.name, parameter.name)
             words = _from_words(parameter.hint, parameter.file) if parameter.hint else None
             if name and words is not None:

@@ -33,7 +33,7 @@ def paint(
     """Paint a wall.
 
     Args:
-        where: walls.
+        where: walls. In Python also bricks.
         tin: of `paint`.
         coats: how many, 100 % of the
             wall each.
@@ -79,7 +79,7 @@ def leave_out(rooms: int) -> None:
     """Sweep some rooms.
 
     Args:
-        rooms: how many.
+        rooms: how many. In Python also all.
     """
     warnings.warn(f"{rooms} rooms left out", InputWarning, stacklevel=2)
 
@@ -94,6 +94,7 @@ def test_a_command_says_what_is_left_out_and_has_the_sentence_of_its_function(ca
     program.main(["sweep", "2"])
     assert capsys.readouterr().err == "2 rooms left out\n3 rooms left out\n"
     assert program.commands["sweep"].help == "sweep some rooms"
+    assert "how many\n" in program.commands["sweep"].parser("sweep").format_help()
 
 
 def test_help_is_the_docstring() -> None:
