@@ -20,7 +20,7 @@ from camera.view import opencv
 from sim.io.errors import InputError
 
 _AHEAD = 4  # decoded frames that wait
-_COPY = 0.2  # of the usual difference of two frames in a row, the difference of a copy
+_COPY = 0.1  # of the usual difference of two frames in a row, the difference of a copy
 _USUAL = 30  # frames from which the usual difference is taken
 
 

@@ -23,12 +23,12 @@ Motion = Callable[[float], tuple[float, float, float, float, float]]  # t -> x, 
 
 def circling(
     rate: float = 0.3, radius: float = 0.07, slip: float = 1.17, head: float = -3.0, tails: float = 4.0,
-    centre: tuple[float, float] = (0.16, 0.12),
+    centre: tuple[float, float] = (0.16, 0.12), start: float = 0.5,
 ) -> Motion:  # fmt: skip
     """Swim along a circle at constant spins; spins are positive clockwise, seen from behind."""
 
     def motion(t: float) -> tuple[float, float, float, float, float]:
-        angle = 0.5 + rate * t
+        angle = start + rate * t
         heading = angle + np.sign(rate) * (np.pi / 2 - slip)
         place = centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)
         return (*place, heading, 0.3 + head * t, 1.0 + tails * t)
@@ -54,19 +54,21 @@ class Tank:
     mirrored: bool = False
     clutter: bool = False  # a red and a green thing that lie in the tank
     colours: tuple[str, ...] = ("red", "green", "blue", "yellow")  # front, rear, head, tail; "" for none
+    fine: int = 2  # samples a pixel, each way
     seed: int = 0
     _rng: Any = field(init=False)
 
     def __post_init__(self) -> None:
         self._rng = np.random.default_rng(self.seed)
-        fine = 2  # samples a pixel, each way
-        u, v = np.meshgrid(*((np.arange(n * fine) + 0.5) / fine - 0.5 for n in (self.width, self.height)))
-        self._x, self._y = self.places(np.stack([u, v], -1))
+        u, v = np.meshgrid(
+            *((np.arange(n * self.fine) + 0.5) / self.fine - 0.5 for n in (self.width, self.height))
+        )
+        self._x, self._y = (places.astype(np.float32) for places in self.places(np.stack([u, v], -1)))
         self._row = v / self.height
         light = 1 - self.shade * u / self.width
         floor = 150 + 12 * np.sin(u / 37) * np.cos(v / 29)
-        self._floor = (floor * light)[..., None] * np.array([1.0, 1.0, 0.97])
-        self._light = light[..., None]
+        self._floor = ((floor * light)[..., None] * [1.0, 1.0, 0.97]).astype(np.float32)
+        self._light = light[..., None].astype(np.float32)
         if self.clutter:
             for place, paint in (((0.03, 0.03), "red"), ((0.05, 0.2), "green")):
                 near = np.hypot(self._x - place[0], self._y - place[1]) < 0.012
@@ -99,11 +101,14 @@ class Tank:
         middle = np.array([self.width / 2, self.height / 2])
         return least_squares(lambda p: 1e3 * (np.array(self.places(p)) - [x, y]), middle, xtol=1e-12).x
 
-    def view_toml(self, *, robots: str = "", points: Sequence[tuple[float, float]] = ()) -> str:
-        """Write the view.toml of this tank: two points of a ruler, or places of four, and the lens."""
-        corners = points or ((0.05, 0.06), (0.25, 0.06), (0.25, 0.18), (0.05, 0.18))
+    def view_toml(self, *, robots: str = "", origin: tuple[float, float] = (0.0, 0.0)) -> str:
+        """Write the view.toml of this tank: four points and their places, seen from an origin, and the lens."""
+        corners = ((0.05, 0.06), (0.25, 0.06), (0.25, 0.18), (0.05, 0.18))
         pixels = [[round(float(c), 2) for c in self.pixel(*corner)] for corner in corners]
-        scale = f"points_px = {pixels}\npoints_cm = {[[round(100 * c, 6) for c in p] for p in corners]}\n"
+        places = [
+            [round(float(100 * (c - o)), 6) for c, o in zip(corner, origin, strict=True)] for corner in corners
+        ]
+        scale = f"points_px = {pixels}\npoints_cm = {places}\n"
         lens = (
             f"[lens]\nfocal_px = [{self.focal}, {self.focal}]\ncentre_px = [{(self.width - 1) / 2}, "
             f"{(self.height - 1) / 2}]\ndistortion = [{self.distortion}, 0, 0, 0, 0]\n"
@@ -120,7 +125,7 @@ class Tank:
         """Draw the picture of several robots with their colours."""
         import cv2
 
-        picture = self._floor.copy()
+        picture: Any = self._floor.copy()
         for motion, colours in robots:
             self._draw(picture, motion, colours, time)
         if self.hand >= 0:
@@ -131,19 +136,28 @@ class Tank:
         picture = cv2.resize(picture, (self.width, self.height), interpolation=cv2.INTER_AREA)
         if self.blur:
             picture = cv2.GaussianBlur(picture, (0, 0), self.blur)
-        picture = picture + self._rng.normal(scale=max(self.noise, 1e-9), size=picture.shape)
+        picture = picture + self.noise * self._rng.standard_normal(picture.shape, np.float32)
         picture = np.clip(np.round(picture), 0, 255).astype(np.uint8)
         return picture[:, ::-1].copy() if self.mirrored else picture
 
-    def _draw(self, picture: Floats, motion: Motion, colours: Sequence[str], time: float) -> None:
+    def _draw(self, picture: Any, motion: Motion, colours: Sequence[str], time: float) -> None:
         now, later = np.array(motion(time)), np.array(motion(time + self.readout))
+        axis, half = np.array([np.cos(now[2]), np.sin(now[2])]), (LENGTH + TAIL) / 2
+        middle = (now + later)[:2] / 2 - TAIL / 2 * axis
+        extent = np.abs(axis) * half + np.abs(axis[::-1]) * RADIUS + np.abs(later - now)[:2] + 0.006
+        near = (np.abs(self._x - middle[0]) < extent[0]) & (np.abs(self._y - middle[1]) < extent[1])
+        rows, columns = (np.flatnonzero(near.any(axis=along)) for along in (1, 0))
+        if not len(rows):
+            return
+        box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+        picture, light = picture[box], self._light[box]
         x, y, heading, head, tails = (
-            a + (b - a) * self._row if self.readout else np.float64(a) for a, b in zip(now, later, strict=True)
+            a + (b - a) * self._row[box] if self.readout else float(a) for a, b in zip(now, later, strict=True)
         )
-        dx, dy = self._x - x, self._y - y
+        dx, dy = self._x[box] - x, self._y[box] - y
         along = dx * np.cos(heading) + dy * np.sin(heading)
         left = dy * np.cos(heading) - dx * np.sin(heading)
-        paint = [np.array(PAINT[c], float) if c else None for c in (*colours, "", "")]
+        paint = [np.array(PAINT[c], np.float32) if c else None for c in (*colours, "", "")]
         for k in range(2):  # tails turn clockwise seen from behind: from the top to the right
             side = -RADIUS * np.sin(tails + k * np.pi)
             reach = (along < -LENGTH / 2) & (along > -LENGTH / 2 - TAIL)
@@ -151,11 +165,11 @@ class Tank:
             if k == 0 and paint[3] is not None:
                 size = 0.006 * (0.8 + 0.2 * np.cos(tails))  # deeper in the fluid it is seen less well
                 dot = np.hypot(along + LENGTH / 2 + 0.03, left - side) < size
-                picture[dot] = (paint[3] * self._light)[dot]
+                picture[dot] = (paint[3] * light)[dot]
         body = (np.abs(along) < LENGTH / 2) & (np.abs(left) < RADIUS)
         round_ = np.sqrt(np.clip(1 - (left / RADIUS) ** 2, 0, 1))[..., None]
-        lit = self._light * (0.55 + 0.45 * round_)
-        picture[body] = (225 * lit * np.ones(3))[body]
+        lit = light * (0.55 + 0.45 * round_)
+        picture[body] = 225 * lit[body]
         for paint_, place in ((paint[0], APART / 2), (paint[1], -APART / 2)):
             if paint_ is not None:
                 band = body & (np.abs(along - place) < BAND / 2)
