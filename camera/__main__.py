@@ -76,7 +76,15 @@ def _tracks(
         if sys.stderr.isatty():
             print(f"\r{100 * done // count} %", end="", file=sys.stderr)
 
-    tracked = track_film(film, setup, head_length=known.head_length, start=start, end=end, progress=tell)
+    tracked = track_film(
+        film,
+        setup,
+        head_length=known.head_length,
+        motor_speed=abs(known.motor_speed),
+        start=start,
+        end=end,
+        progress=tell,
+    )
     for note in tracked.notes:
         print(note, file=sys.stderr)
     written = []

@@ -227,7 +227,7 @@ class Detector:
         apart = float(np.hypot(*arm))
         known = memory.apart if memory.seen else markers.apart
         if not distance > 0 or abs(apart / known - 1) > _ALIKE:
-            return Lost(markers.name, _wrong(markers))
+            return Lost(markers.name, wrong_distance(markers))
         side = _WHOLE * (marks[0] - marks[1])[::-1] * [1, -1]  # from a band's centre to its end
         ends = np.concatenate([marks + side, marks - side])
         if (ends < 0).any() or (ends > np.array(frame.shape[1::-1]) - 1).any():
@@ -366,7 +366,7 @@ class Detector:
                     fit = 1 / apart if apart < 1.1 * self._head_length or math.isnan(self._head_length) else 0.0
                 if np.linalg.norm(front - rear) > 3 and fit * min(strength, other) > best:
                     best, chosen = fit * min(strength, other), {"front": front, "rear": rear}
-        return chosen or _wrong(markers)
+        return chosen or wrong_distance(markers)
 
     def _patches(self, weights: Any) -> list[tuple[float, Floats]]:
         """Return the strongest connected patches: their largest weights, and their centres (2,)."""
@@ -380,5 +380,6 @@ class Detector:
         return [(float(strengths[label]), centres[label]) for label in order if strengths[label] > 0]
 
 
-def _wrong(markers: Markers) -> str:
+def wrong_distance(markers: Markers) -> str:
+    """Say why a robot is lost whose bands have another distance than is known."""
     return f"{markers.colours['front']} and {markers.colours['rear']} at a wrong distance"

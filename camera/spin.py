@@ -27,6 +27,7 @@ from sim.arrays import Floats
 FRAMES_A_TURN = 4.0  # that a spin needs
 _FEWEST = 12  # samples of a dot
 _TURNS = 2.0  # that a track must cover
+_ROUNDED = 0.1  # frames a second, by which time stamps in milliseconds may state another rate
 _FINER = 8  # frequencies within the width of a peak of the periodogram
 
 
@@ -50,13 +51,8 @@ def fit_spin(time: Floats, left: Floats, area: Floats, fastest: float) -> Spin |
     seen = np.isfinite(left)
     if seen.sum() < _FEWEST:
         return f"the dot is seen in {int(seen.sum())} frames; check its colour"
-    rate = 1 / float(np.median(np.diff(time)))
-    if rate * math.tau < FRAMES_A_TURN * fastest:
-        rpm = fastest * 30 / math.pi
-        return (
-            f"{rate:.3g} frames a second cannot tell spins up to {rpm:.0f} rpm apart (aliasing); film with "
-            f"{math.ceil(FRAMES_A_TURN * fastest / math.tau)} or more, or slow the motor down"
-        )
+    if reason := aliasing(time, fastest):
+        return reason
     span, middle = float(np.ptp(time)), float(time.mean())
     series = [(time[seen] - middle, left[seen]), (time - middle, area / max(float(area.max()), 1e-300))]
     if np.std(series[1][1]) < 1e-9:
@@ -84,6 +80,18 @@ def fit_spin(time: Floats, left: Floats, area: Floats, fastest: float) -> Spin |
         sign_seen = math.hypot(c, d) > 0.2  # a dot that is always seen shows no front and no back
         sign = math.copysign(1.0, a * d - b * c) if sign_seen else 1.0
     return Spin(sign * omega, error, sign_seen)
+
+
+def aliasing(time: Floats, fastest: float) -> str:
+    """Say that frames at times (m,) [s] are too few for spins up to `fastest` [rad/s]; "" if they are not."""
+    rate = 1 / float(np.median(np.diff(time)))
+    needed = FRAMES_A_TURN * fastest / math.tau - _ROUNDED
+    if not rate < needed:
+        return ""
+    return (
+        f"{rate:.3g} frames a second cannot tell spins up to {fastest * 30 / math.pi:.0f} rpm apart (aliasing); "
+        f"film with {math.ceil(needed)} or more, or slow the motor down"
+    )
 
 
 def _fitted(omega: float, time: Floats, values: Floats) -> tuple[Floats, Floats]:

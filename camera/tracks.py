@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from camera.circle import fit_track
-from camera.detector import Detector, Lost, Pose
+from camera.detector import Detector, Lost, Pose, wrong_distance
 from camera.film import Film
+from camera.spin import aliasing
 from camera.view import Markers, Setup, View, opencv
 from sim.io.errors import InputError, naming
 
@@ -28,7 +29,12 @@ if TYPE_CHECKING:
 _SAMPLES = 12  # pictures from which the distance of the bands is learnt
 _SHOWN = 10  # poses in the picture of a track
 _GAP = 1.5  # usual times between two frames, at which frames are missing
-_LEAST = 0.05  # of the head's length, of which the bands are apart
+_LEAST = 0.3  # of the head's length, of which the bands are apart
+_CERTAIN = 5.0  # standard errors by which a robot that moves tail first has moved
+_SWAPPED = (
+    "it moves tail first; if it did not, exchange the colours of front and rear in view.toml (turn a tag by 180 "
+    "degrees)"
+)
 
 
 class FilmTracks(NamedTuple):
@@ -45,6 +51,7 @@ def track_film(
     setup: Setup,
     *,
     head_length: float = math.nan,
+    motor_speed: float = math.nan,
     start: float = 0.0,
     end: float = math.inf,
     progress: Callable[[int, int], object] | None = None,
@@ -55,6 +62,7 @@ def track_film(
         path: the film.
         setup: scale, lens, region and markers.
         head_length: of the robots [m].
+        motor_speed: of the robots, for whose dots the film may have too few frames [rad/s].
         start: time in the film that becomes time_s = 0 [s].
         end: of what is tracked [s].
         progress: is called with the frames done and the frames of the film.
@@ -83,16 +91,18 @@ def track_film(
                     rows[each.robot].append(_row(each, frame.number, frame.time_s - start))
         if picture is None:
             raise InputError(f"no frame between {start:g} and {end:g} s; the film has {film.count} frames")
-        return FilmTracks(
-            _tables(Path(path).stem, setup, rows, why, len(times) - doubled),
-            _notes(np.array(times), doubled, why),
-            detector.view,
-            picture,
-        )
+        tables = _tables(Path(path).stem, setup, rows, why, len(times) - doubled)
+        notes = _notes(np.array(times), doubled, why)
+        if any(each.dots for each in setup.robots) and len(times) > 1:
+            notes += filter(None, [aliasing(np.array(times), motor_speed)])
+        notes += [f"robot {name}: {_SWAPPED}" for name, table in tables.items() if _swims_backwards(table)]
+        return FilmTracks(tables, notes, detector.view, picture)
 
 
 def _with_distances(film: Film, setup: Setup, head_length: float) -> list[Markers]:
     """Learn from some pictures how far the bands of each robot are apart, and compare with its head.
+
+    A distance that view.toml gives is taken.
 
     Raises:
         InputError: the bands are further apart than the head is long, or hardly apart.
@@ -112,7 +122,8 @@ def _with_distances(film: Film, setup: Setup, head_length: float) -> list[Marker
             if known > 1.05 * head_length or known < _LEAST * head_length:
                 raise InputError(
                     f"the bands are {100 * known:.3g} cm apart, and the head of the robot is "
-                    f"{100 * head_length:.3g} cm long: correct [scale] in view.toml, or give the right robot"
+                    f"{100 * head_length:.3g} cm long: correct [scale] in view.toml, or give the right robot, or "
+                    "the bands' distance as apart_cm"
                 )
         learnt.append(markers._replace(apart=known))
     return learnt
@@ -147,6 +158,8 @@ def _tables(
                 else "check its number, its dictionary and its white border, and that the film is not mirrored"
             )
             reason = why[each.name].most_common(1)[0][0]
+            if each.tag is None and reason == wrong_distance(each):
+                remedy = "correct [scale] in view.toml, or apart, the distance of the bands, if it is given"
             raise InputError(f"no robot {each.name} in {count} frames ({reason}): {remedy}")
         table = pd.DataFrame(rows[each.name])
         table.insert(0, "run", film if len(setup.robots) == 1 else f"{film}-{each.name}")
@@ -165,6 +178,14 @@ def _notes(times: Any, doubled: int, why: dict[str, Counter[str]]) -> list[str]:
         for reason, count in reasons.most_common():
             notes.append(f"robot {robot}: {count} of {len(times)} frames without a pose: {reason}")
     return notes
+
+
+def _swims_backwards(table: pd.DataFrame) -> bool:
+    """Return whether a robot moves against its heading, by more than the errors of its poses."""
+    x, y, angle = table["x_cm"].to_numpy(), table["y_cm"].to_numpy(), np.radians(table["heading_deg"].to_numpy())
+    axis = np.exp(1j * angle)
+    surge = float(np.real(np.diff(x + 1j * y) * np.conj(axis[1:] + axis[:-1]) / 2).sum())
+    return surge < -_CERTAIN * float(table["x_error_cm"].median())
 
 
 def write_check(path: Path, tracks: FilmTracks, robots: tuple[Markers, ...]) -> None:

@@ -14,6 +14,7 @@ import pytest
 from calibration.films import measure_films
 from calibration.swimmer.camera_tracks import measure_tracks
 from camera.film import Film
+from camera.spin import Spin, fit_spin
 from camera.tracks import track_film
 from camera.view import Setup, read_setup
 from sim.inputs import load_robot
@@ -35,6 +36,10 @@ def setup_of(tank: Tank, folder: Path) -> Setup:
 
 def small(**given: float) -> Tank:
     return Tank(width=320, height=240, scale=0.001, **given)  # type: ignore[arg-type]
+
+
+def replace_robots(setup: Setup, **given: float) -> Setup:
+    return Setup(setup.view, tuple(each._replace(**given) for each in setup.robots))  # type: ignore[arg-type]
 
 
 @shared
@@ -115,6 +120,11 @@ def test_films_that_cannot_be_used_are_refused_with_what_to_change(tmp_path: Pat
         InputError, match=r"bands are 4.4 cm apart, and the head of the robot is 0.6 cm long: correct"
     ):
         track_film(good, view, head_length=LENGTH / 10)
+    apart = replace_robots(view, apart=0.06)
+    with pytest.raises(
+        InputError, match=r"\(red and green at a wrong distance\): correct \[scale\] in view\.toml, or"
+    ):
+        track_film(good, apart)
     with pytest.raises(InputError, match=r"no frame between 5 and 9 s; the film has 12 frames"):
         track_film(good, view, start=5, end=9)
     (tmp_path / "text.mp4").write_text("no film")
@@ -146,20 +156,85 @@ def test_films_of_runs_become_a_measured_table(tmp_path: Path, capsys: pytest.Ca
         measure_films(tmp_path / "runs.csv", film().parent / "view.toml", robot)
 
 
+def test_times_are_those_of_the_stamps_where_the_rate_varies_and_frames_are_dropped(tmp_path: Path) -> None:
+    """A robot that does not keep to the stamps would be 3 mm behind; a GIF has a duration for each frame."""
+    from PIL import Image
+
+    tank, fast = small(noise=0.0), circling(0.6, RADIUS, head=HEAD)
+    steps = np.full(40, 100)
+    steps[::2], steps[[10, 30]] = 60, 700  # ms
+    times = np.append(0, np.cumsum(steps)[:-1]) / 1000
+    pictures = [Image.fromarray(tank.frame(fast, time)[..., ::-1]) for time in times]
+    pictures[0].save(tmp_path / "a.gif", save_all=True, append_images=pictures[1:], duration=steps.tolist())
+    tracked = track_film(tmp_path / "a.gif", setup_of(tank, tmp_path))
+    assert tracked.notes[0] == "2 gaps in the time stamps: the camera dropped frames"
+    table = tracked.tables["1"]
+    assert len(table) > 36
+    truth = np.array([fast(time) for time in times])[table["frame"], :2]
+    assert np.hypot(*(table[["x_cm", "y_cm"]].to_numpy() / 100 - truth).T).max() < 0.02 * TAIL
+    assert table["time_s"].to_numpy() == pytest.approx(times[table["frame"]], abs=1e-6)
+
+
+@pytest.mark.parametrize("given", [{"distortion": -0.3}, {"readout": 0.03}], ids=["lens", "rolling shutter"])
+def test_errors_hold_in_films_through_a_lens_and_a_rolling_shutter(
+    given: dict[str, float], tmp_path: Path
+) -> None:
+    """Without the lens in view.toml, or with a readout of 0.3 s, a quarter of the places are within."""
+    tank, swum = small(**given), circling(YAW, 0.085, head=HEAD, tails=TAILS)
+    tracked = track_film(tank.film(tmp_path / "a.mp4", swum, 8.0, RATE), setup_of(tank, tmp_path))
+    table = tracked.tables["1"]
+    truth = np.array([swum(time) for time in table["time_s"]])
+    off = np.abs(table[["x_cm", "y_cm"]].to_numpy() / 100 - truth[:, :2])
+    turned = np.abs((table["heading_deg"] - np.degrees(truth[:, 2]) + 180) % 360 - 180)
+    assert off.max() < 0.02 * TAIL
+    assert (100 * off < 1.96 * table[["x_error_cm"]].to_numpy()).mean() > 0.95
+    assert (turned < 1.96 * table["heading_error_deg"]).mean() > 0.93
+    time, left, area = (table[name].to_numpy() for name in ("time_s", "head_left_cm", "head_area_mm2"))
+    spin = fit_spin(time, left, area, TAILS - HEAD)
+    assert isinstance(spin, Spin)
+    assert abs(spin.omega / HEAD - 1) < min(0.01, 3 * spin.error / abs(HEAD))
+
+
+def test_a_robot_whose_front_and_rear_are_exchanged_is_named(tmp_path: Path) -> None:
+    for colours in (("red", "green", "blue", ""), ("green", "red", "blue", "")):
+        tank = Tank(width=320, height=240, scale=0.001, colours=colours)
+        made = tank.film(tmp_path / "a.mp4", SWUM, 2.0, RATE)
+        notes = track_film(made, setup_of(small(), tmp_path)).notes
+        named = [note for note in notes if "it moves tail first; if it did not, exchange the colours of" in note]
+        assert len(named) == (colours[0] == "green")
+
+
+def test_a_film_that_is_upside_down_gives_the_same_circle_and_spins(tmp_path: Path) -> None:
+    """The tank's frame turns with it, and nothing else; upside down in a mirror is named."""
+    rows = []
+    for turned in (False, True):
+        tank = small(upside_down=turned)
+        table = track_film(tank.film(tmp_path / "a.mp4", SWUM, 8.0, RATE), setup_of(tank, tmp_path)).tables["1"]
+        rpm = (TAILS - HEAD) * 30 / math.pi
+        runs = pd.DataFrame({"run": ["a"], "N": [2], "l_cm": [11.0], "omega_rpm": [rpm]})
+        rows.append(measure_tracks(table, runs).table.iloc[0])
+    for column in ("omega_yr_rad_s", "R_yr_cm", "theta_deg", "omega_h_rpm", "omega_t_rpm"):
+        assert rows[1][column] == pytest.approx(rows[0][column], rel=0.02)
+
+
 @pytest.mark.parametrize(("mirrored", "rate"), [(True, RATE), (False, 5.0)])
 def test_mirrored_and_slow_films_are_named_when_runs_are_measured(
     mirrored: bool, rate: float, tmp_path: Path
 ) -> None:
     tank = small(mirrored=mirrored)
-    table = track_film(tank.film(tmp_path / "a.mp4", SWUM, 6.0, rate), setup_of(tank, tmp_path)).tables["1"]
+    made, setup = tank.film(tmp_path / "a.mp4", SWUM, 6.0, rate), setup_of(tank, tmp_path)
+    tracked = track_film(made, setup, motor_speed=150 * math.pi / 30)
+    table, slow = tracked.tables["1"], [note for note in tracked.notes if "aliasing" in note]
     runs = pd.DataFrame({"run": ["a"], "N": [2], "l_cm": [11.0], "omega_rpm": [150.0]})
     if mirrored:
         with pytest.raises(InputError, match=r'all runs turn to the other side .* of a film looks = "up"'):
             measure_tracks(table, runs)
+        assert not slow
         return
     measured = measure_tracks(table, runs)
-    assert measured.excluded[0] == (
-        "run a: no spin of the head: 5 frames a second cannot tell spins up to 150 rpm apart (aliasing); film "
-        "with 10 or more, or slow the motor down"
-    )
+    assert slow == [
+        "5 frames a second cannot tell spins up to 150 rpm apart (aliasing); film with 10 or more, or slow the "
+        "motor down"
+    ]
+    assert measured.excluded[0] == f"run a: no spin of the head: {slow[0]}"
     assert measured.table["R_yr_cm"][0] == pytest.approx(100 * RADIUS, rel=0.02)

@@ -52,6 +52,7 @@ class Tank:
     hand: float = -1.0  # where a hand reaches into the picture, share of its width; below 0: none
     readout: float = 0.0  # s, rolling shutter
     mirrored: bool = False
+    upside_down: bool = False
     clutter: bool = False  # a red and a green thing that lie in the tank
     colours: tuple[str, ...] = ("red", "green", "blue", "yellow")  # front, rear, head, tail; "" for none
     fine: int = 2  # samples a pixel, each way
@@ -138,7 +139,8 @@ class Tank:
             picture = cv2.GaussianBlur(picture, (0, 0), self.blur)
         picture = picture + self.noise * self._rng.standard_normal(picture.shape, np.float32)
         picture = np.clip(np.round(picture), 0, 255).astype(np.uint8)
-        return picture[:, ::-1].copy() if self.mirrored else picture
+        up, left = (-1 if turned else 1 for turned in (self.upside_down, self.upside_down != self.mirrored))
+        return picture[::up, ::left].copy()
 
     def _draw(self, picture: Any, motion: Motion, colours: Sequence[str], time: float) -> None:
         now, later = np.array(motion(time)), np.array(motion(time + self.readout))
