@@ -27,7 +27,7 @@ from tests.shared import FOLDER, shared
 
 RATE, SECONDS = 12.0, 30.0
 ORIGIN = 0.12, 0.1  # m, of the plan's frame in the tank
-FILM_RATE, FILMED = 10.0, 9.0  # of a run
+FILM_RATE, FILMED = 10.0, 8.0  # of a run
 BEGIN, FLIP = 2.0, 22.0  # s, of a run at constant motor speed; the motor flips after 22.08 s
 CONTROL = PRESETS["paper-control"]
 ROBOT = replace(CONTROL, motor_speed=2 * CONTROL.motor_speed)
@@ -123,7 +123,7 @@ def test_the_spins_of_a_replay_are_found_within_half_a_percent(tmp_path: Path) -
 def filmed_runs(table: pd.DataFrame, folder: Path) -> Path:
     """Film each run of a table, at its spins along its circle; return the table of the films."""
     for index, row in enumerate(table.to_dict("records")):
-        tank = Tank(width=320, height=240, scale=0.001, fine=1, seed=index)
+        tank = Tank(width=256, height=192, scale=0.00125, fine=1, seed=index)
         rate, radius, start = row["omega_yr_rad_s"], row["R_yr_cm"] / 100, 0.7 * index
         middle = start + rate * FILMED / 2
         centre = 0.16 - radius * math.cos(middle), 0.12 - radius * math.sin(middle)
