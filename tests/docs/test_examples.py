@@ -25,7 +25,7 @@ from tests.processes import LIMIT
 RUN = ("sh", "python")
 LONG = {"tutorial/schedule.md", "howto/sweep.md", "howto/goal.md", "howto/jobs.md", "howto/page.md",
         "howto/query.md", "howto/tracker.md"}  # fmt: skip
-LONGEST = {"tutorial/calibration.md", "tutorial/bad-day.md"}
+LONGEST = {"tutorial/calibration.md", "tutorial/bad-day.md", "tutorial/film.md"}
 NAMED = re.compile(r"# (?P<name>[\w-]+\.toml)$", re.MULTILINE)
 SIMPLE = re.compile(r"softflagella [^|<>$*;&`]+")  # a command that needs no shell
 SHOWN = {*RUN, "toml", "text", "c", "js"}

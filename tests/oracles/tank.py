@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from camera.view import opencv
 from sim.arrays import Floats
 
 RADIUS, LENGTH, TAIL = 0.016, 0.06, 0.11  # m, of the head and the tails
@@ -100,7 +101,11 @@ class Tank:
         from scipy.optimize import least_squares
 
         middle = np.array([self.width / 2, self.height / 2])
-        return least_squares(lambda p: 1e3 * (np.array(self.places(p)) - [x, y]), middle, xtol=1e-12).x
+
+        def off(pixel: Floats) -> Floats:
+            return 1e3 * (np.array(self.places(pixel)) - [x, y])
+
+        return np.asarray(least_squares(off, middle, xtol=1e-12).x)
 
     def view_toml(self, *, robots: str = "", origin: tuple[float, float] = (0.0, 0.0)) -> str:
         """Write the view.toml of this tank: four points and their places, seen from an origin, and the lens."""
@@ -124,8 +129,7 @@ class Tank:
 
     def drawn(self, robots: Sequence[tuple[Motion, Sequence[str]]], time: float) -> Any:
         """Draw the picture of several robots with their colours."""
-        import cv2
-
+        cv2 = opencv()
         picture: Any = self._floor.copy()
         for motion, colours in robots:
             self._draw(picture, motion, colours, time)
@@ -192,8 +196,7 @@ class Tank:
         codec: str = "mp4v",
     ) -> Path:  # fmt: skip
         """Write a film; frames may be dropped, or shown twice in the place of their followers."""
-        import cv2
-
+        cv2 = opencv()
         writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*codec), rate, (self.width, self.height))
         robots = [(motion, self.colours)] if callable(motion) else motion
         last = None
@@ -216,10 +219,9 @@ def board(tank: Tank, pose: Sequence[float], squares: tuple[int, int] = (10, 7))
             right and down, and in front of the camera [squares].
         squares: of the board.
     """
-    import cv2
     from scipy.spatial.transform import Rotation
 
-    fine = 3  # samples a pixel, each way
+    cv2, fine = opencv(), 3  # samples a pixel, each way
     grid = np.meshgrid(*((np.arange(n * fine) + 0.5) / fine - 0.5 for n in (tank.width, tank.height)))
     rays = np.concatenate([tank.rays(np.stack(grid, -1)), np.ones((*grid[0].shape, 1))], -1)
     turn, middle = Rotation.from_euler("xy", pose[:2]).as_matrix(), np.array(pose[2:])
