@@ -53,6 +53,7 @@ from calibration.attribution.wrong_numbers import (
 )
 from calibration.statistics.budget import Budget, limited, seconds_left
 from calibration.statistics.fit import Fit, fit, profile_intervals
+from calibration.statistics.gls import repeat_count
 from calibration.statistics.residual_regression import Regression, regress_residual
 from calibration.statistics.residual_tests import directions, examine_residual
 from calibration.statistics.shifted import Shifted
@@ -189,11 +190,20 @@ def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any)
 
     Returns:
         The study, the fit, and the prediction of the model as given.
+
+    Raises:
+        InputError: there are too few repeats among the runs that are fitted.
     """
     start = start_values(model)
     given = model.predict([start], title="as given" if settings.get("progress") else "")[0]
     model.check(given)
     study = Study(model, split_runs(model.runs, held_out, find_outliers(model.runs, given)), **settings)
+    fitted, outputs = study.split.fitted, model.runs.y.shape[1]
+    if (repeats := repeat_count(model.runs.repeats(fitted))) < outputs:
+        raise InputError(
+            f"{repeats} repeated runs among the {int(fitted.sum())} that are fitted, too few to estimate the noise; "
+            f"{study.split.names} is held out: measure each condition twice"
+        )
     return *fit_weighted(study, model.guess(start, study.split.fitted)), given
 
 

@@ -37,6 +37,7 @@ def commanded(table: pd.DataFrame, folder: Path) -> int:
         (lambda t: t.assign(omega_h_rad_s=1), "omega_h_rpm and omega_h_rad_s are the same quantity"),
         (lambda t: t.drop(columns=["omega_yr_rad_s", "R_yr_cm", "theta_deg"]), "at least two outputs"),
         (lambda t: t[t["trial"] == 1].assign(session=range(48)), "0 repeated runs, too few"),
+        (lambda t: t[(t["trial"] == 1) & (t["N"].isin([2, 3]))], "0 repeated runs among the 18 that are fitted"),
         (lambda t: t.assign(omega_h_rpm=-t["omega_h_rpm"]), "wrong sign .*: the head turns against the motor"),
         (lambda t: t.assign(omega_yr_rad_s=-t["omega_yr_rad_s"]), "wrong sign .* to the left"),
         (lambda t: t.assign(omega_yr_rad_s=0.05 * np.sign(t["omega_rpm"])), "does not differ between repeats"),
@@ -46,7 +47,7 @@ def commanded(table: pd.DataFrame, folder: Path) -> int:
         (lambda t: t.assign(l_cm=np.nan), "0 usable runs"),
         (lambda t: t.assign(omega_yr_rad_s=np.nan, R_yr_cm=np.nan, theta_deg=np.nan), "without any value: om"),
     ],
-    ids=["column", "twice", "spins alone", "no repeats", "sign of the spin",
+    ids=["column", "twice", "spins alone", "no repeats", "none among those fitted", "sign of the spin",
          "sign of the yaw", "constant", "unit", "three rows", "words", "no lengths", "empty outputs"],
 )  # fmt: skip
 def test_bad_tables_are_refused(change: Any, expected: str, tmp_path: Path, capsys: Any) -> None:
