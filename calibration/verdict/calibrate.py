@@ -201,8 +201,8 @@ def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any)
     fitted, outputs = study.split.fitted, model.runs.y.shape[1]
     if (repeats := repeat_count(model.runs.repeats(fitted))) < outputs:
         raise InputError(
-            f"{repeats} repeated runs among the {int(fitted.sum())} that are fitted, too few to estimate the noise; "
-            f"{study.split.names} is held out: measure each condition twice"
+            f"{repeats} repeated runs among the {int(fitted.sum())} that are fitted, too few to estimate the "
+            f"noise; {study.split.names} is held out: measure each condition twice"
         )
     return *fit_weighted(study, model.guess(start, study.split.fitted)), given
 
