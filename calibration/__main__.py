@@ -183,9 +183,13 @@ def _tracks(tracks: Call, runs: str, *, check: str | None = None, out: str) -> N
     Args:
         out: CSV.
     """
-    _refuse_early(runs)
     from sim.io.files import write_csv
+    from sim.io.pose_tracks import read_tracks
+    from sim.io.track_options import TrackOptions
 
+    options = {name: value for name, value in tracks.given.items() if name in TrackOptions.__annotations__}
+    read_tracks(tracks.given["tracks"], **options)
+    _refuse_early(runs)
     table = tracks(runs=runs, check=check)
     for line in table.attrs["converted"]:
         _to_stderr(line)
