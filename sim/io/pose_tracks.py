@@ -24,7 +24,7 @@ from sim.io.reading import read_bytes
 from sim.io.tables import read_table
 from sim.io.track_options import TrackOptions
 from sim.io.tracking_programs import PROGRAMS, Program, Seen
-from sim.io.units import find_unit
+from sim.io.units import find_unit, to_si
 
 _LISTED = 8  # names in a message
 _SIGNS = {  # how a file begins -> what may have written it
@@ -142,7 +142,7 @@ def _length(path: Path, words: str | None) -> float:
     if parts is None or unit is None or unit.kind != "length" or not 0 < float(parts[1]) < math.inf:
         given = f"--scale {words}" if words else f"{path} has no unit of length"
         raise InputError(f"{given}; give the length of a pixel, or of the file's unit, such as --scale 0.2mm")
-    return float(parts[1]) * unit.times / unit.over
+    return float(to_si(float(parts[1]), unit.suffix))
 
 
 def _rows(points: pd.DataFrame, path: Path, name: str) -> pd.DataFrame:

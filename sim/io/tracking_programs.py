@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from sim.io.errors import InputError
 from sim.io.reading import decode, read_bytes
-from sim.io.units import find_unit, split
+from sim.io.units import find_unit, split, to_si
 
 _HDF5 = (".h5", ".hdf5")
 _SPELLINGS = {"micron": "um", "microns": "um", "millimeters": "mm", "centimeters": "cm"}
@@ -103,7 +103,7 @@ def _unit(words: str, kind: str) -> float | None:
     """Return a unit in SI units; None for pixels and frames."""
     word = words.strip().strip("()").lower()
     unit = find_unit(_SPELLINGS.get(word, word))
-    return unit.times / unit.over if unit is not None and unit.kind == kind else None
+    return to_si(1.0, unit.suffix) if unit is not None and unit.kind == kind else None
 
 
 def _deeplabcut(path: Path) -> Seen:
@@ -207,7 +207,7 @@ def _tracker(path: Path) -> Seen:
             places.setdefault(mass, {})[name.quantity] = values[k]
     unit = next(name.unit for name in names if name.quantity == "x")
     seen = pd.concat(_points("", mass, values[0], at["x"], at["y"]) for mass, at in places.items())
-    return Seen(seen, None if unit is None else unit.times / unit.over, 1.0)
+    return Seen(seen, None if unit is None else to_si(1.0, unit.suffix), 1.0)
 
 
 def _numbers(words: pd.Series) -> pd.Series:
