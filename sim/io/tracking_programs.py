@@ -114,8 +114,9 @@ def _deeplabcut(path: Path) -> Seen:
             rows, names = table[:], _unpickled(bytes(table.attrs["values_block_0_kind"]))
         frames, values = rows["index"], rows["values_block_0"]
     else:
-        heads = 3 + _text(path).split("\n")[1].startswith("individuals")
-        written = _csv(path, header=list(range(heads)), index_col=0)
+        text = _text(path)
+        heads = 3 + text.split("\n", 2)[1].startswith("individuals")
+        written = pd.read_csv(io.StringIO(text), header=list(range(heads)), index_col=0)
         frames, values, names = written.index, written.to_numpy(dtype=float), written.columns
     columns = {tuple(name): values[:, k] for k, name in enumerate(names)}
     parts = dict.fromkeys(name[:-1] for name in columns)
