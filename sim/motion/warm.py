@@ -5,7 +5,6 @@ Two processes compile, where there are two processors: one what orbits need, the
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import time
@@ -77,8 +76,10 @@ def compile_all() -> float:
     Returns:
         The time that it took, in seconds.
     """
+    from sim.motion.batches import available_jobs  # which imports this file
+
     began = time.perf_counter()
-    if len(os.sched_getaffinity(0)) > 1 and not all_compiled():
+    if available_jobs() > 1 and not all_compiled():
         code = f"import sys; sys.path[:] = {sys.path!r}; import {__name__} as warm; warm.compile_for_time_steps()"
         other = subprocess.Popen([sys.executable, "-c", code])
         try:
