@@ -187,11 +187,10 @@ def simulate_here(points: dict[str, Any], sensitivities: bool) -> dict[str, Any]
 def compile_on_this_host() -> None:
     """Compile the simulator's loops unless that has been done; one process of a host does, the others wait."""
     from sim.jit import CACHE
-    from sim.motion.warm import all_compiled, compile_all
+    from sim.motion.warm import all_compiled, compile_once
 
     if all_compiled():
         return
     with open(CACHE / f"{socket.gethostname()}.lock", "a") as lock:  # nobody else can put a link there
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if not all_compiled():
-            compile_all()
+        compile_once()
