@@ -146,7 +146,8 @@ def track_of(schedule: Schedule, simulated: Iterable[Stretch]) -> pd.DataFrame:
     rows = [np.array([[0.0, 0.0, 0.0, 0.0, schedule.first_direction, 0]])]
     for index, parts in groupby(simulated, lambda stretch: stretch.dwell):
         dwell = list(parts)
-        times, poses = (np.concatenate(all_of) for all_of in zip(*(part[3:5] for part in dwell), strict=True))
+        times = np.concatenate([part.times for part in dwell])
+        poses = np.concatenate([part.poses for part in dwell])
         step = np.arange(1, len(times) + 1)
         kept = (step % max(1, len(times) // _SAMPLES) == 0) | (step == len(times))
         said = np.broadcast_to([dwell[0].direction, index], (len(times), 2))
