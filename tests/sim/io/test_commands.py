@@ -82,6 +82,7 @@ def leave_out(rooms: int) -> None:
         rooms: how many. In Python also all.
     """
     warnings.warn(f"{rooms} rooms left out", InputWarning, stacklevel=2)
+    warnings.warn("a slow library", RuntimeWarning, stacklevel=2)
 
 
 @program.command("sweep", of="tests.sim.io.test_commands:leave_out")
@@ -91,7 +92,8 @@ def _sweep(leave_out: Call) -> None:
 
 
 def test_a_command_says_what_is_left_out_and_has_the_sentence_of_its_function(capsys: Capsys) -> None:
-    program.main(["sweep", "2"])
+    with pytest.warns(RuntimeWarning, match="a slow library"):  # as Python shows it
+        program.main(["sweep", "2"])
     assert capsys.readouterr().err == "2 rooms left out\n3 rooms left out\n"
     assert program.commands["sweep"].help == "sweep some rooms"
     assert "how many\n" in program.commands["sweep"].parser("sweep").format_help()

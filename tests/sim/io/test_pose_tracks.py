@@ -79,6 +79,14 @@ def test_each_robot_of_a_film_and_each_film_of_a_folder_is_a_run(tmp_path: Path)
         read_tracks(tmp_path / "empty", written_by="tracker")
 
 
+def test_of_a_point_that_is_seen_twice_at_a_time_the_first_counts(tmp_path: Path) -> None:
+    """A track of TrackMate that splits has two spots in a frame."""
+    path = tmp_path / "spots.csv"
+    path.write_bytes(files.trackmate() + b"ID990,990,1,9.5,5,5,0,0,0,3\n")
+    table = read_tracks(path, written_by="trackmate", scale="0.5mm", **TRACKS)
+    assert table["x_cm"].to_numpy() == pytest.approx(poses()["x_cm"].to_numpy())
+
+
 @pytest.mark.parametrize(("name", "options", "words"), [
     ("run3DLC_resnet50_swim.csv", {"scale": "0.5mm"}, "counts frames; give the frames per second"),
     ("run3DLC_resnet50_swim.csv", {"fps": 0.0, "scale": "0.5mm"}, "counts frames; give the frames per second"),

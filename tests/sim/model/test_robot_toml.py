@@ -79,6 +79,7 @@ REFUSALS = {
     "sigma in per cent": ("length_cm = 9", 'length_cm = 9\nlength_cm_sigma = "60 %"', "from 0 to half"),
     "sigma of a count": ("count = 3", "count = 3\ncount_sigma = 1", "[tails] count_sigma: this number takes no"),
     "a diameter": ("radius_mm = 16", "diameter_mm = 32", "is it [head] radius_mm, half of it?"),
+    "a diameter of tails": ("radius_mm = 3", "diameter_mm = 6", "is it [tails] radius_mm, half of it?"),
     "misspelt": ("length_cm = 9", "lenght_cm = 9", "unknown entry [tails] lenght_cm; is it [tails] length_cm?"),
     "no such unit": ("speed_rpm = 90", "speed_V = 6", "unknown entry [motor] speed_V; is it [motor] speed_rpm?"),
     "another table": ("C_t = 3.0", "C_t = 3.0\nlength_mm = 16", "[drag] length_mm; is it [head] length_mm?"),

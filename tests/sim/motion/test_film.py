@@ -38,6 +38,7 @@ def test_poses_and_directions_are_those_of_a_replay() -> None:
         if k < 2:
             assert np.abs(frames.track[-1, 1 + k] - track[name].iloc[-1]) < 1e-3
     assert frames.directions.tolist() == [-1] * 14 + [1] * 10 + [-1] * 17
+    assert scheduled_shapes(wanted, np.cumsum(wanted.dwells)).directions.tolist() == [1, -1, -1]  # after the flips
 
 
 def test_no_frame_is_lost_where_rounded_dwells_end() -> None:
