@@ -70,22 +70,27 @@ const UNITS = { mm: 0.1, cm: 1, m: 100, in: 2.54 };
 /* Ask; the promise resolves with {points [cm], closed, name}, or null if the user takes none. */
 function askUnit({ paths, unit }, tailLength) {
   if (unit !== null && paths.length === 1) return Promise.resolve(inUnit(paths[0], unit));
-  const dialog = byId("unit-dialog"), asks = unit === null;
-  const scales = asks ? { ...UNITS, "tail lengths": tailLength } : { "as the file says": unit };
+  const dialog = byId("unit-dialog"), asks = unit === null, several = paths.length > 1;
+  const scales = Object.entries(asks ? { ...UNITS, "tail lengths": tailLength } : { "as the file says": unit });
   const choice = (group, value, words, checked) => {
-    return element("label", { class: "choice" }, element("input", { type: "radio", name: group, value, checked }), words);
+    const input = element("input", { type: "radio", name: group, value, checked, autofocus: checked });
+    return element("label", { class: "choice" }, input, words);
   };
-  const units = Object.entries(scales).map(([name, scale], i) => {
-    const size = bounds(paths[0].points).map(([low, high]) => digits((high - low) * scale));
-    return choice("unit", scale, `${name}: ${size.join(" × ")} cm`, i === Number(asks));
-  });
+  const chosen = (name) => Number(dialog.querySelector(`[name=${name}]:checked`)?.value ?? 0);
+  const sizes = () => {
+    const size = bounds(paths[chosen("path")].points).map(([low, high]) => high - low);
+    return scales.map(([name, scale]) => `${name}: ${size.map((value) => digits(value * scale)).join(" × ")} cm`);
+  };
   const names = paths.map((path, i) => choice("path", i, path.name || `path ${i + 1}`, i === 0));
-  byId("unit-title").textContent = asks ? "Which unit has this file?" : "Which path of this file?";
+  byId("path-choices").replaceChildren(...(several ? names : []));
+  const units = sizes().map((words, i) => choice("unit", scales[i][1], words, i === Number(asks)));
+  byId("unit-choices").replaceChildren(...units);
+  byId("unit-title").textContent = several ? "Which path of this file?" : "Which unit has this file?";
   byId("unit-words").textContent = asks ? "The file does not say its unit. Width and height would be:" : "";
-  byId("unit-choices").replaceChildren(...units, ...(paths.length > 1 ? names : []));
+  dialog.onchange = () => sizes().forEach((words, i) => (units[i].lastChild.data = words));
+  dialog.returnValue = ""; // else that of the file before, where Escape leaves it
   dialog.showModal();
   return new Promise((resolve) => {
-    const chosen = (name) => Number(dialog.querySelector(`[name=${name}]:checked`)?.value ?? 0);
     const closed = () => resolve(dialog.returnValue === "take" ? inUnit(paths[chosen("path")], chosen("unit")) : null);
     dialog.addEventListener("close", closed, { once: true });
   });

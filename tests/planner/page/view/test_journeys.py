@@ -212,6 +212,29 @@ def test_a_drawing_without_a_unit_is_asked_for_one_and_a_robot_is_opened(page: A
     assert page.input_value("input[aria-label='Number of tails N']") == str(TRIANGLE.tails)
 
 
+def test_of_several_paths_the_sizes_are_those_of_the_chosen_one(page: Any, tmp_path: Path) -> None:
+    drawing = tmp_path / "two.svg"
+    drawing.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 600 400"><path id="bend" d="M0 0L500 0L500 300"/>'
+        '<path id="slope" d="M0 0L400 200"/></svg>'
+    )
+    drop(page, drawing)
+    page.locator("#unit-dialog").wait_for()
+    assert page.locator(":focus").evaluate("focused => focused.checked")
+    assert page.get_by_label("cm: 500 × 300 cm", exact=True).is_checked()
+    page.get_by_label("mm: 50.0 × 30.0 cm").check()
+    page.get_by_label("slope").check()
+    assert page.get_by_label("mm: 40.0 × 20.0 cm").is_checked()
+    page.get_by_role("button", name="Take this path").click()
+    assert "dwells" in planned(page)
+    assert "name=slope" in address_of(page)
+    drop(page, drawing)
+    page.locator("#unit-dialog").wait_for()
+    page.keyboard.press("Escape")
+    assert "dwells" in planned(page)
+    assert "name=slope" in address_of(page)
+
+
 def test_a_track_is_shown_over_its_plan_with_its_error(page: Any, tmp_path: Path) -> None:
     result: Plan = planned_by_python("circle", objective="flips")
     starts, share = np.cumsum([0.0, *result.dwells[:-1]]), np.arange(8) / 8
