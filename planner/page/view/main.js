@@ -355,7 +355,7 @@ class Page {
   /* Say what the pointer does, and offer what most people do next. */
   hint() {
     say(byId("mode-words"), this.editor.words);
-    const draw = this.editor.mode === "draw" ? "Draw one stroke in the picture" : "Draw your own path";
+    const draw = this.editor.mode === "draw" ? "Draw in the picture" : "Draw your own path";
     byId("next").textContent = this.saves ? "Save the schedule" : draw;
   }
 
