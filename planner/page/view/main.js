@@ -292,6 +292,7 @@ class Page {
         if (!refusal) await this.opened(file.name, answer);
       });
     }
+    this.fileProblem.place?.scrollIntoView({ block: "nearest" });
     this.count(-1);
   }
 
@@ -309,6 +310,7 @@ class Page {
       await this.compare("none", { name, ...content });
     } else if (content.kind === "runs") {
       await this.runs.open(name, content.table, this.wish().robot);
+      byId("measured-title").scrollIntoView();
     }
   }
 

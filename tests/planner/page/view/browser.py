@@ -77,6 +77,11 @@ def middle_of(page: Any) -> tuple[float, float]:
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
+def is_seen(page: Any, part: str) -> bool:
+    """Say whether the top of a part is within the window."""
+    return bool(0 <= page.locator(part).bounding_box()["y"] < page.viewport_size["height"])
+
+
 def unfold(page: Any) -> None:
     """Open all parts but the error over time, for which each change plans with ten dwells."""
     page.evaluate("document.querySelectorAll('details:not(#trade)').forEach((part) => { part.open = true; })")

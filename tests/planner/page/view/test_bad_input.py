@@ -13,7 +13,7 @@ from sim.io.errors import run_command
 from softflagella.__main__ import main
 from tests.planner.page.cases import planned as planned_by_python
 from tests.planner.page.page_core import answer, without_digits
-from tests.planner.page.view.browser import address_of, drop, planned, text_of, unfold
+from tests.planner.page.view.browser import address_of, drop, is_seen, planned, text_of, unfold
 
 OLD = "Picture and numbers are those of the last plan that could be made."
 HEADER = "time_s,x_cm,y_cm,heading_deg\n"
@@ -89,7 +89,9 @@ def test_a_bad_track_leaves_the_one_before(page: Any) -> None:
     Path("good.csv").write_text(f"{HEADER}0,25,0,90\n10,25,1,90\n")
     drop(page, Path("good.csv"))
     planned(page)
+    page.evaluate("scrollTo(0, 0)")
     told(page, "measured", "still.csv", f"{HEADER}0,0,0,0\n0,1,0,0\n")
+    assert is_seen(page, "#measured-problem")
     assert "good.csv" in text_of(page, "#measured")
     page.fill("#size", "27")
     assert "dwells" in planned(page)

@@ -32,6 +32,7 @@ from tests.planner.page.view.browser import (
     address_of,
     drag,
     drop,
+    is_seen,
     middle_of,
     opened_page,
     planned,
@@ -302,9 +303,11 @@ def test_runs_are_compared_and_the_command_is_copied(page: Any, tmp_path: Path) 
     runs.rename(columns={"theta_deg": "thetta_deg"}).to_csv(tmp_path / "misspelt.csv", index=False)
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     page.select_option("#robot-name", "paper-measured")
+    page.evaluate("scrollTo(0, 0)")
     drop(page, tmp_path / "my table.csv")
     page.locator("#runs table").wait_for()
     planned(page)
+    assert is_seen(page, "#runs")
     assert page.locator("#runs tbody tr").count() == 23
     seen = text_of(page, "#runs")
     assert "answers for 23 of 23 usable runs" in seen
