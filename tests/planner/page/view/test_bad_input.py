@@ -77,6 +77,7 @@ def test_a_file_is_refused_in_the_words_of_the_command(
         assert without_digits(ours) == without_digits(answer("words.js", "inPage", theirs, {"tailLength": 0.11}))
         assert text_of(page, "#message") == OLD
         assert page.locator("#scene .old").count() == 1
+        assert page.evaluate("getComputedStyle(document.querySelector('#lens .flip')).opacity") == "0.35"
         assert page.get_by_role("button", name="schedule.h").is_disabled()
         assert text_of(page, "#next") == "Draw your own path"  # there is no schedule to save
         return
