@@ -33,6 +33,7 @@ class Page {
     this.plan = null;
     this.refused = false; // whether the newest wish is
     this.track = null;
+    this.charts = new Map(); // name: a function that draws it
     this.fileProblem = new Problem();
     this.linkProblem = new Problem(); // until the next change
     this.runs = new Runs((content, use) => this.ask("runs", content, use), () => this.saveFile("robot.toml"));
@@ -207,11 +208,19 @@ class Page {
     if (byId("trade").open) this.tradeOff();
   }
 
-  /* Draw the dwells over time, as wide as the window is now. */
+  /* Draw a chart, now and when the window has another width. */
+  draw(name, chart) {
+    this.charts.set(name, chart);
+    chart();
+  }
+
+  /* Show the dwells over time. */
   showStrip() {
     const { dwells } = this.plan, content = { times: runningSum(dwells), values: [...dwells], words: "dwell [s]", steps: true };
-    this.scale = chart(byId("strip"), content);
-    this.player.show();
+    this.draw("strip", () => {
+      this.scale = chart(byId("strip"), content);
+      this.player.show();
+    });
   }
 
   problem(words) {
@@ -257,12 +266,14 @@ class Page {
 
   async tradeOff() {
     byId("trade-off").replaceChildren();
+    this.charts.delete("trade-off");
     say(byId("trade-words"), "Planning with ten dwells…");
     const { answer, refusal, stopped } = await this.client.ask("tradeOff", this.wish());
     if (stopped) return;
     say(byId("trade-words"), refusal ?? "", true);
     const take = (dwell) => this.setOption("minimumSeconds", dwell);
-    if (answer) tradeOff(byId("trade-off"), answer, this.state.options.minimumSeconds, take);
+    const draw = () => tradeOff(byId("trade-off"), answer, this.state.options.minimumSeconds, take);
+    if (answer) this.draw("trade-off", draw);
   }
 
   setOption(key, value) {
@@ -326,15 +337,17 @@ class Page {
   }
 
   showTrack() {
-    showTrack(this.track, this.plan, byId("tails").checked, {
+    const drawErrors = showTrack(this.track, this.plan, byId("tails").checked, {
       fit: (wished) => this.compare(wished),
       saveTrack: () => save("track.csv", this.track.csv, "text/csv"),
       remove: () => {
         this.track = null;
         byId("measured").replaceChildren();
+        this.charts.delete("track");
         this.show();
       },
     });
+    this.draw("track", drawErrors);
   }
 
   newAddress() {

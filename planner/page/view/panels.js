@@ -195,7 +195,7 @@ function connectWindow(page) {
   const broken = (words) => page.problem(`The page has made an error: ${words}`);
   addEventListener("error", (event) => broken(event.message));
   addEventListener("unhandledrejection", ({ reason }) => broken(reason?.message ?? reason));
-  addEventListener("resize", () => page.plan && page.showStrip());
+  addEventListener("resize", () => page.charts.forEach((draw) => draw()));
   addEventListener("hashchange", () => page.newAddress());
   addEventListener("beforeprint", () => (byId("address").textContent = location.href));
   document.addEventListener("change", () => page.writeAddress());

@@ -2,7 +2,7 @@
 import { chart } from "./charts.js";
 import { byId, describe, digits, duration, element, figure, length, say } from "./dom.js";
 
-/* Show a track's errors; `actions` has fit(how), saveTrack() and remove(). */
+/* Show a track's errors; `actions` has fit(how), saveTrack() and remove(). Return what draws them over time. */
 function showTrack(track, plan, tails, actions) {
   const size = (value) => length(value, plan.tailLength, tails), list = element("dl");
   const { error } = track, [worstX, worstY] = error.worst.place, within = error.largest <= error.stated;
@@ -22,9 +22,8 @@ function showTrack(track, plan, tails, actions) {
     button("Remove", actions.remove),
   );
   byId("measured").replaceChildren(list, picture, buttons);
-  chart(picture, {
-    times: error.times, values: error.distances, words: "distance from the path [cm]", limit: error.stated,
-  });
+  const content = { times: error.times, values: error.distances, words: "distance from the path [cm]", limit: error.stated };
+  return () => chart(picture, content);
 }
 
 function button(words, click) {

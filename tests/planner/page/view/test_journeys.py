@@ -257,6 +257,14 @@ def test_a_track_is_shown_over_its_plan_with_its_error(page: Any, tmp_path: Path
     (tmp_path / "other.csv").write_text("time_s,x_cm,y_cm,heading_deg\n0,500,0,90\n10,600,1,90\n")
     drop(page, tmp_path / "other.csv")
     page.locator("#measured", has_text="the track is above it").wait_for()
+    size = page.viewport_size
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.wait_for_function("document.querySelector('#strip').lastChild.getBoundingClientRect().right < 390")
+    ends = page.locator("#measured svg text").evaluate_all(
+        "all => all.map((each) => each.getBoundingClientRect().right)"
+    )
+    assert max(ends) < 390  # it is drawn anew, as wide as the window is now
+    page.set_viewport_size(size)
 
 
 def test_files_and_folders_are_dragged_onto_the_picture(page: Any, tmp_path: Path) -> None:
