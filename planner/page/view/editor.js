@@ -188,4 +188,4 @@ function transformed(points, { right, up, scale, turn }) {
   });
 }
 
-export { closes, PathEditor, showCorners, transformed };
+export { PathEditor, showCorners, transformed };

@@ -178,4 +178,4 @@ function axesOf(view, width, height) {
 }
 
 export { acrossOf, axesOf, fitted, flips, lensPlace, lineData, panned, pixelOf, placeAt, planLayers, poseTransform };
-export { robotShape, ticks, tickStep, tickWords, transform, viewport, zoomed };
+export { robotShape, ticks, tickStep, transform, viewport, zoomed };
