@@ -1,4 +1,4 @@
-"""Parts of the page that need no browser: units, addresses, zoom, ticks, strokes, corners, poses."""
+"""Parts of the page that need no browser: units, addresses, zoom, ticks, corners, poses, the summary."""
 
 from __future__ import annotations
 
