@@ -248,7 +248,7 @@ def pose_of(given: Sequence[Length], unit: str | None, robot: Swimmer, name: str
         InputError: it is none, or its heading is more than one turn, as one in degrees would be.
     """
     if len(given) == 3 and any(isinstance(each, str) for each in given):
-        return read_pose([str(each) for each in given], unit, robot, name)
+        given = read_pose([str(each) for each in given], unit, robot, name)
     name = name.removeprefix("--")
     x, y, heading = _finite(given, 3, f"{name}: give x, y and heading")
     if abs(heading) > math.tau:
@@ -260,21 +260,21 @@ def pose_of(given: Sequence[Length], unit: str | None, robot: Swimmer, name: str
 
 
 def place_of(
-    given: Sequence[Length] | str, unit: str | None, robot: Swimmer, name: str = ""
+    given: Sequence[Length] | str, unit: str | None, robot: Swimmer, name: str = "place"
 ) -> tuple[float, float]:
     """Return a place in l, or read its words: X,Y in one or in two; `name` is what messages call it.
 
     Raises:
         InputError: it is no pair of finite numbers, or a word has no unit.
     """
-    parts = given.split(",") if isinstance(given, str) else list(given) if isinstance(given, Iterable) else [given]
-    name = f"place {given}" if isinstance(given, str) else name or "place"
-    if isinstance(given, str) and len(parts) != 2:
-        raise InputError(f"place {given!r}; write X,Y, for example 30cm,15cm")
+    parts: list[Any] = list(given) if isinstance(given, Iterable) else [given]
+    if isinstance(given, str):
+        parts, name = given.split(","), f"place {given}"
+        if len(parts) != 2:
+            raise InputError(f"place {given!r}; write X,Y, for example 30cm,15cm")
     if len(parts) == 2 and any(isinstance(part, str) for part in parts):
-        x, y = (read_length(str(part), unit, robot, name) for part in parts)
-    else:
-        x, y = _finite(parts, 2, f"{name}: give x and y")
+        parts = [read_length(str(part), unit, robot, name) for part in parts]
+    x, y = _finite(parts, 2, f"{name}: give x and y")
     return x, y
 
 
@@ -301,7 +301,7 @@ def _finite(values: Sequence[Any], count: int, wanted: str) -> list[float]:
     except (TypeError, ValueError):
         numbers = []
     if len(numbers) != count or not all(abs(number) < _FARTHEST for number in numbers):
-        raise InputError(f"{wanted}, as finite numbers; not {values}")
+        raise InputError(f"{wanted}, as finite numbers below {_FARTHEST:.0e}; not {values}")
     return numbers
 
 
