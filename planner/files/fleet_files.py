@@ -14,7 +14,8 @@
     delay_s = 60              # it does not begin before
 
 Instead of path or goal, a robot may have `places = [[0, 0], [40, 0]]` of a tour or a `region` to cover. All other
-keys are options of the command for such a plan, with _ for -. Files are sought beside the TOML file first.
+keys are options of the command for such a plan, with _ for -, except those of what it writes: out, arduino and
+trade_off. Files are sought beside the TOML file first.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ from sim.io.reading import read_json, read_toml
 _JOBS = {"path": "plan", "goal": "goal", "places": "tour", "region": "cover"}  # key -> command
 _OWN = ("robot", "name", "delay_s")
 _OF_ALL = ("apart", "feedback")
+_OF_NONE = ("out", "arduino", "trade_off")  # what is written for one plan alone
 _MEMBERS = ("member", "robot")  # what the array of robots is called, and what it was called before
 _FILES = ("robot", "path", "region", "lookup", "model", "walls", "keep_out", "hole")  # may be files
 _NAME = re.compile(r"\w[\w-]*")
@@ -93,6 +95,9 @@ def _robot(path: str | Path, number: int, entry: Mapping[str, Any]) -> FleetRobo
         raise InputError(f"{path}: name = {name!r}; a name has letters, digits, _ and -, as it names a folder")
     if isinstance(delay, bool) or not isinstance(delay, int | float):
         raise InputError(f"{path}: {name}: delay_s = {delay!r}; give seconds, 0 or more")
+    for key in _OF_NONE:
+        if key in entry:
+            raise InputError(f"{path}: {name}: {key} is of a plan on its own, not of a fleet's; leave it out")
     jobs = [key for key in _JOBS if key in entry]
     if len(jobs) != 1 or not isinstance(entry.get("robot"), str):
         raise InputError(f"{path}: {name}: give robot, and one of {', '.join(_JOBS)}")

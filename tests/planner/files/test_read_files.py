@@ -210,6 +210,8 @@ def test_the_command_plans_for_all_robots(tmp_path: Path, capsys: pytest.Capture
         ('path = "right.csv"', 'path = "right.csv"\ngoal = [1, 1, 1]', "one of path, goal, places, region"),
         ('path = "right.csv"', 'path = "wrong.csv"', "wrong.csv"),
         ('path = "right.csv"', 'path = "right.csv"\nspeed = 3', "--speed"),
+        ('path = "right.csv"', 'path = "right.csv"\narduino = "board"', "arduino is of a plan on its own"),
+        ('path = "right.csv"', 'path = "right.csv"\ntrade_off = true', "trade_off is of a plan on its own"),
         ('robot = "paper-control"', 'robot = "no-such"', "no robot 'no-such'"),
         ('robot = "paper-control"', "", "give robot, and one of"),
         ('apart = "3cm"', 'apart = "3cm"\nfeedback = 1', "write true or false"),
