@@ -65,7 +65,8 @@ class Body:
     def of(robot: Swimmer) -> Body:
         """Cover head and straight tails."""
         discs, length = Footprint.of(robot, 0.0), robot.length_scale
-        return Body(float(discs.places.max()) * length, float(discs.places.min()) * length, discs.radius * length)
+        front, back = discs.ends
+        return Body(front * length, back * length, discs.radius * length)
 
     @property
     def reach(self) -> float:
@@ -235,7 +236,7 @@ def error_open_loop(plan: Plan) -> tuple[Floats, Floats]:
     heading = plan.poses[growth.flips[1:], 2]
     left = np.stack([-np.sin(heading), np.cos(heading)], -1)
     sizes = []
-    for place in _ends(plan):
+    for place in Footprint.of(plan.robot, 0.0).ends:
         away = moved + turned[..., None] * place * left
         sizes.append(np.hypot(away[..., 0], away[..., 1]))
     times = plan.flip_times[growth.flips]
@@ -247,7 +248,7 @@ def error_with_feedback(plan: Plan) -> tuple[Floats, Floats]:
     declared, tracked = plan.declared.reference, plan.tracked
     arcs = np.linspace(0.0, declared.arc[-1], _PLACES)
     lag = _lag(plan, arcs)
-    levers = [place + tracked.vehicle.pivot_distance for place in _ends(plan)]
+    levers = tracked.body.ends
     along = np.zeros(_PLACES)
     for lever in levers:
         p = declared.q + lever * axis_at(declared.heading)
@@ -265,12 +266,6 @@ def times_at(plan: Plan, arcs: Floats) -> Floats:
     way = arc_length(plan.poses[:, :2] - plan.tracked.vehicle.pivot_distance * axis)
     at = arcs / float(plan.declared.reference.arc[-1]) * way[-1]
     return np.asarray(np.interp(at, way, plan.flip_times))
-
-
-def _ends(plan: Plan) -> tuple[float, float]:
-    """Return the ends of the body, forward from the head's centre."""
-    body = Footprint.of(plan.robot, 0.0)
-    return float(body.places.max()), float(body.places.min())
 
 
 def _lag(plan: Plan, arcs: Floats) -> Floats:
