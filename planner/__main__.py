@@ -307,10 +307,8 @@ def _replay(
     schedule = planned if swimmer is None else planned.swum_by(swimmer)
 
     def bar(what: str) -> Any:
-        count = len(schedule.dwells)
-        return tqdm(
-            total=count, desc=what, unit="dwell", delay=BAR_AFTER, disable=None
-        )  # None: on a terminal alone
+        """Show how many dwells are done, on a terminal alone."""
+        return tqdm(total=len(schedule.dwells), desc=what, unit="dwell", delay=BAR_AFTER, disable=None)
 
     if shapes is None:
         with bar("replay") as shown:
@@ -349,13 +347,15 @@ def _check(check: Call, plan: str, *, out: str | None = None) -> None:
     Args:
         out: overlay picture, PNG.
     """
-    error = check(plan=plan)
+    from planner.files.saved_plan import load_plan
+
+    content = load_plan(plan)
+    error = check(plan=content)
     print(error.line)
     if out is not None:
-        from planner.files.saved_plan import load_plan
         from planner.files.tracks import write_overlay
 
-        write_overlay(out, load_plan(plan), error)
+        write_overlay(out, content, error)
         print(f"-> {out}")
 
 
