@@ -45,6 +45,7 @@ def test_it_moves_as_the_planners_vehicle(monkeypatch: pytest.MonkeyPatch) -> No
         for step in range(count):
             seen, _, _, _, info = env.step(int(step == 0 and k > 0))
             assert info["flipped"] == (step == 0 and k > 0)
+            assert seen["motor"] == pytest.approx([env.plan.first_direction * (-1) ** k, env.every * (step + 1)])
         poses.append(seen["pose"])
     schedule = Switches(env.plan.first_direction, env.every * np.array(counts), np.array([env.plan.start]))
     expected = roll_out(env.plan.tracked.vehicle, schedule).flips
@@ -75,6 +76,8 @@ def test_it_shows_the_path_from_the_robot(monkeypatch: pytest.MonkeyPatch) -> No
     assert np.hypot(*(reference.p - place).T).min() < 1e-6
     assert abs(np.remainder(reference.heading[0] - heading - turned + np.pi, 2 * np.pi) - np.pi) < 0.1
     assert np.diff(np.hypot(*seen["reference"][:, :2].T)).min() > 0.1
+    apart = np.hypot(*np.diff(seen["reference"][:, :2], axis=0).T)
+    assert apart == pytest.approx([sg.APART] * len(apart), abs=float(reference.arc[1]))
     for step in range(400):
         seen, reward, _, _, info = env.step(int(step % 4 == 0))
     error = distance_to(env.plan.reference, seen["pose"][None, :2])[0]
@@ -92,6 +95,13 @@ def test_each_seed_draws_another_robot(monkeypatch: pytest.MonkeyPatch) -> None:
         ends.append([env.step(0)[0]["pose"] for _ in range(100)][-1])
     assert np.abs(ends[1] - ends[0]).max() > 1e-4
     assert np.array_equal(ends[2], ends[0])
+
+
+def test_starts_and_poses_are_drawn_as_stated() -> None:
+    env = sg.PathEnv(planned(), noise=(0.02, 0.03))
+    poses = [env.reset(seed=seed)[0]["pose"] for seed in range(300)]
+    assert np.mean(poses, 0) == pytest.approx(env.plan.start, abs=0.01)
+    assert np.std(poses, 0) == pytest.approx(np.hypot(sg.START, [0.02, 0.02, 0.03]), rel=0.15)
 
 
 def test_a_flip_before_the_shortest_dwell_does_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -113,6 +123,7 @@ def test_the_tracker_follows_the_path_and_keeping_on_does_not() -> None:
     still = sg.episode(env, lambda env: lambda seen, info: 0, 0)
     assert not still.finished
     assert still.score < -20
+    assert len(still.errors) * env.every == pytest.approx(sg.LONGEST * env.plan.duration, abs=env.every)
 
 
 def test_a_plan_file_is_read_and_wrong_arguments_are_refused(tmp_path: object) -> None:

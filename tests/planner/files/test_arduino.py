@@ -143,6 +143,7 @@ def test_the_folder_is_an_arduino_library_and_is_replaced(tmp_path: Path) -> Non
         "architectures",
     }
     assert needed <= set(properties)
+    assert properties["includes"] == "softflagella.h"
     assert once().identity in properties["sentence"]
     assert once().identity in (library / "src" / "schedule.h").read_text()
     assert "#define SCHEDULE_REPEATS" not in (library / "src" / "schedule.h").read_text()

@@ -178,8 +178,8 @@ def test_what_a_camera_raises_comes_out_of_the_loop() -> None:
         steer(Ride(), Pictures(gone), tank, begin, UNIT, lost=LOST, row=print, tell=print)  # type: ignore[arg-type]
 
 
-def test_a_damaged_picture_shows_no_robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A camera that compresses its pictures sends one now and then that cannot be decoded."""
+def test_cameras_that_fail_and_robots_that_are_not_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A camera that compresses its pictures sends one now and then that cannot be decoded; it shows no robot."""
     cv2 = pytest.importorskip("cv2", reason="needs the extra camera")
     from tests.oracles import tank
 
@@ -204,8 +204,25 @@ def test_a_damaged_picture_shows_no_robot(tmp_path: Path, monkeypatch: pytest.Mo
 
     monkeypatch.setattr(cv2, "VideoCapture", Damaged)
     (tmp_path / "view.toml").write_text(tank.Tank().view_toml())
-    seen = list(live.watch("film.avi", str(tmp_path / "view.toml"), "robot", 0.11, 0.0, lambda: 1.0))
-    assert seen == [Sight(1.0, None, "a damaged picture")] * 2
+    view = str(tmp_path / "view.toml")
+    seen = list(live.watch("film.avi", view, "robot", 0.11, 0.25, lambda: 1.0))
+    assert seen == [Sight(0.75, None, "a damaged picture")] * 2
+    with pytest.raises(InputError, match="--camera /dev/video0: no picture comes any more; check its cable"):
+        list(live.watch("/dev/video0", view, "robot", 0.11, 0.0, lambda: 1.0))
+    robots = "".join(f'[[robots]]\nname = "{n}"\nfront = "{f}"\nrear = "{r}"\n'
+                     for n, f, r in (("one", "red", "blue"), ("two", "green", "magenta")))  # fmt: skip
+    Path(view).write_text(tank.Tank().view_toml(robots=robots))
+    assert len(list(live.watch("film.avi", view, "two", 0.11, 0.0, lambda: 1.0))) == 2
+    with pytest.raises(InputError, match="several robots, one, two; call the one that swims 'robot'"):
+        list(live.watch("film.avi", view, "robot", 0.11, 0.0, lambda: 1.0))
+
+
+def test_a_terminal_that_closes_ends_the_ride_as_ctrl_c_does() -> None:
+    before = signal.getsignal(signal.SIGHUP)
+    with pytest.raises(KeyboardInterrupt, match="ended by SIGHUP") as ended, live.ending_on_signals():
+        signal.raise_signal(signal.SIGHUP)
+    assert ended.value.status == 128 + signal.SIGHUP  # type: ignore[attr-defined]
+    assert signal.getsignal(signal.SIGHUP) is before
 
 
 def swum(time: float) -> tuple[float, float, float]:
