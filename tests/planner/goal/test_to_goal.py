@@ -54,6 +54,8 @@ def test_the_motion_begins_and_ends_as_asked(seed: int) -> None:
     goal_plan = to_goal(start, goal, CONTROL, objective=("time", "error")[seed % 2])
     assert goal_plan.start == pytest.approx(tuple(start))
     check_end(goal_plan)
+    if seed == 1:  # whose track is followed closely: the last dwells keep to it, too
+        assert goal_plan.predicted_max < 2 * goal_plan.straight.largest
 
 
 @pytest.mark.rest

@@ -100,6 +100,13 @@ def test_laps_close(path: Path2D) -> None:
     assert len(plan.schedule(laps=3).dwells) == 3 * count
 
 
+def test_laps_of_short_dwells_close_exactly() -> None:
+    """Each lap begins after the same dwell; short ones leave the robot moving."""
+    lap = make_plan(circle(1.2), tracked(), PlanRequest(dwell=0.3, loop=True)).lap
+    assert lap is not None
+    assert max(lap.closes, lap.closes_turn) < 1e-7
+
+
 def test_a_path_that_no_schedule_repeats_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(last_dwells, "_closed", lambda *_: None)
     with pytest.raises(InputError, match="no schedule of this path repeats"):
