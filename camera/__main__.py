@@ -96,7 +96,7 @@ def _tracks(
         written.append(f"{len(table)} poses -> {file}")
     if check:
         with whole_file(check) as part:
-            write_check(part, tracked, setup.robots)
+            write_check(part, tracked)
         written.append(f"picture -> {check}")
     print(", ".join(written))
 

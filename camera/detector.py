@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from camera.view import Markers, View, opencv
+from camera.view import DICTIONARIES, Markers, View, opencv
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
@@ -105,17 +105,17 @@ class Detector:
         self._cv = opencv()
         self._mask: Any = None
         self._memory = [_Memory() for _ in self._robots]
-        self._readers = {each.dictionary: self._reader(each.dictionary) for each in robots if each.tag is not None}
-        self._seen_tags: dict[str, dict[int, Floats]] = {}  # in the whole of the picture at hand
+        dictionaries = {each.dictionary for each in robots if each.tag is not None}
         if view.tag is not None:
-            self._readers.setdefault("4x4_50", self._reader("4x4_50"))
+            dictionaries.add(DICTIONARIES[0])
+        self._readers = {name: self._reader(name) for name in dictionaries}
+        self._seen_tags: dict[str, dict[int, Floats]] = {}  # in the whole of the picture at hand
 
-    def poses(self, frame: Any, time: float) -> list[Pose | Lost]:
+    def poses(self, frame: Any) -> list[Pose | Lost]:
         """Return the pose of each robot, or why it is not seen, in the order of the robots.
 
         Args:
-            frame: picture (H, W, 3), blue, green and red, uint8.
-            time: of the picture [s]; pictures come in order.
+            frame: picture (H, W, 3), blue, green and red, uint8; pictures come in order.
 
         Raises:
             InputError: the picture has another shape, or the tag of the scale is seen too slantwise.
@@ -128,7 +128,7 @@ class Detector:
         self._seen_tags.clear()
         if self.view.homography is None:
             assert self.view.tag is not None
-            corners = self._tags("4x4_50", frame).get(self.view.tag[0])
+            corners = self._tags(DICTIONARIES[0], frame).get(self.view.tag[0])
             if corners is None:
                 return [
                     Lost(each.name, f"no tag {self.view.tag[0]} that gives the scale") for each in self._robots
@@ -196,8 +196,7 @@ class Detector:
         heading, half = float(np.angle(turn)), abs(turn)
         sigma = max(misfit / 2, 0.1 * self.view.metres(corners.mean(axis=0)))
         memory.apart = 2 * half
-        marks = tuple((float(u), float(v)) for u, v in corners)
-        return self._pose(markers, centre, heading, sigma, sigma / half, memory, frame, marks)
+        return self._pose(markers, centre, heading, sigma, sigma / half, memory, frame, corners)
 
     # Bands
 
@@ -251,20 +250,20 @@ class Detector:
         memory.places = {name: blob.centre for name, blob in blobs.items()}
         error = metres * math.sqrt(variance)
         sigma = math.hypot(error / 2, (apart - memory.apart) / 2, _SHIFT * apart)
-        shown = tuple((float(u), float(v)) for u, v in marks)
         heading = math.atan2(arm[1], arm[0])
-        return self._pose(markers, places.mean(axis=0), heading, sigma, error / apart, memory, frame, shown)
+        return self._pose(markers, places.mean(axis=0), heading, sigma, error / apart, memory, frame, marks)
 
     def _pose(
         self, markers: Markers, centre: Floats, heading: float, sigma: float, sigma_heading: float,
-        memory: _Memory, frame: Any, marks: tuple[tuple[float, float], ...],
+        memory: _Memory, frame: Any, marks: Floats,
     ) -> Pose:  # fmt: skip
         """Move the pose to the head's centre, and look for the dots."""
         axis = np.array([math.cos(heading), math.sin(heading)])
         x, y = (centre - markers.ahead * axis).tolist()
         sigma = math.hypot(sigma, markers.ahead * sigma_heading)
         dots = {name: self._dot(frame, hue, centre, axis, name, memory) for name, hue in markers.dots.items()}
-        return Pose(markers.name, x, y, heading, sigma, sigma_heading, dots, marks)
+        shown = tuple((float(u), float(v)) for u, v in marks)
+        return Pose(markers.name, x, y, heading, sigma, sigma_heading, dots, shown)
 
     def _dot(
         self, frame: Any, hue: float, centre: Floats, axis: Floats, name: str, memory: _Memory

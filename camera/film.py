@@ -50,7 +50,6 @@ class Film:
         if not self._capture.isOpened() or not self._capture.grab():
             raise InputError(f"{path} is no film that can be read; convert it: ffmpeg -i FILM film.mp4")
         self.count = max(int(self._capture.get(cv.CAP_PROP_FRAME_COUNT)), 1)
-        self.rate = float(self._capture.get(cv.CAP_PROP_FPS))  # frames per second, as the file states
         self._capture = cv.VideoCapture(self.path, cv.CAP_FFMPEG, [cv.CAP_PROP_N_THREADS, 2])
 
     def samples(self, number: int) -> Iterator[Any]:

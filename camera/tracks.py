@@ -84,7 +84,7 @@ def track_film(
                 doubled += 1
                 continue
             picture = frame.picture
-            for each in detector.poses(picture, frame.time_s):
+            for each in detector.poses(picture):
                 if isinstance(each, Lost):
                     why[each.robot][each.why] += 1
                 else:
@@ -110,7 +110,7 @@ def _with_distances(film: Film, setup: Setup, head_length: float) -> list[Marker
     seen: dict[str, list[float]] = {each.name: [] for each in setup.robots}
     for picture in film.samples(_SAMPLES):
         detector = Detector(setup.robots, setup.view)
-        for each in detector.poses(picture, 0.0):
+        for each in detector.poses(picture):
             if isinstance(each, Pose) and len(each.marks) == 2:
                 front, rear = detector.view.to_tank(np.array(each.marks))
                 seen[each.robot].append(float(np.hypot(*(front - rear))))
@@ -188,12 +188,11 @@ def _swims_backwards(table: pd.DataFrame) -> bool:
     return surge < -_CERTAIN * float(table["x_error_cm"].median())
 
 
-def write_check(path: Path, tracks: FilmTracks, robots: tuple[Markers, ...]) -> None:
+def write_check(path: Path, tracks: FilmTracks) -> None:
     """Write a PNG of the last frame with each track, its fitted circle, and some of its poses."""
     cv2, picture = opencv(), tracks.picture.copy()
     size = picture.shape[1] / 100
-    for markers in robots:
-        table = tracks.tables[markers.name]
+    for table in tracks.tables.values():
         places = table[["x_cm", "y_cm"]].to_numpy() / 100
         lines = [(places, (255, 255, 255))]
         if len(places) >= _SHOWN:

@@ -34,7 +34,7 @@ DOTS = ("head", "tail")  # markers that come and go as the robot spins
 _CLICK = 1.0  # pixels, standard deviation of a point that a person reads off a picture
 _CORNER = 0.3  # pixels, of the corner of a tag
 _STRETCH = 1.15  # greatest ratio of the sides of a tag from which the scale alone is taken
-_DICTIONARIES = ("4x4_50", "5x5_100", "6x6_250", "7x7_1000", "apriltag_36h11")
+DICTIONARIES = ("4x4_50", "5x5_100", "6x6_250", "7x7_1000", "apriltag_36h11")
 _KEYS = {
     "": ("looks", "scale", "lens", "tank", "robots"),
     "scale": ("points_px", "points", "length", "tag", "tag_id"),
@@ -87,7 +87,7 @@ class Markers(NamedTuple):
     dots: Mapping[str, float] = {}  # "head" or "tail" -> hue [deg]
     colours: Mapping[str, str] = {}  # marker -> the colour as it was given
     tag: int | None = None
-    dictionary: str = _DICTIONARIES[0]
+    dictionary: str = DICTIONARIES[0]
     ahead: float = 0.0  # of the markers' middle from the head's centre [m]
     apart: float = math.nan  # distance of front and rear [m]; NaN: learnt from the film
 
@@ -311,9 +311,9 @@ def _markers(table: Mapping[str, Any], number: int) -> Markers:
             for other in hues:
                 if one < other and abs((hues[one] - hues[other] + 180) % 360 - 180) < 40:
                     raise InputError(f"{one} and {other} have nearly the same colour; give them others")
-        dictionary = str(table.get("dictionary", _DICTIONARIES[0])).lower()
-        if dictionary not in _DICTIONARIES:
-            raise InputError(f"dictionary {dictionary!r}; give one of {', '.join(_DICTIONARIES)}")
+        dictionary = str(table.get("dictionary", DICTIONARIES[0])).lower()
+        if dictionary not in DICTIONARIES:
+            raise InputError(f"dictionary {dictionary!r}; give one of {', '.join(DICTIONARIES)}")
         ahead, apart = (_length(table, name, "robots") for name in ("ahead", "apart"))
         return Markers(
             str(table.get("name", number)),

@@ -32,7 +32,7 @@ def draw_film(folder: Path) -> None:
     (folder / "view.toml").write_text(tank.view_toml())
     setup = read_setup(folder / "view.toml")
     _save(next(f.picture for f in Film(film).frames() if f.number == 104), "tutorial/film-frame.png")
-    write_check(folder / "check.png", track_film(film, setup), setup.robots)
+    write_check(folder / "check.png", track_film(film, setup))
     _save(cv2.imread(str(folder / "check.png")), "tutorial/film-check.png")
 
 

@@ -256,7 +256,7 @@ def watch(
         if not good:
             yield Sight(taken, None, "a damaged picture")
             continue
-        (seen,) = detector.poses(picture, taken)
+        (seen,) = detector.poses(picture)
         if isinstance(seen, Lost):
             yield Sight(taken, None, seen.why)
         else:

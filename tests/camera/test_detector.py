@@ -52,7 +52,7 @@ def test_poses_are_within_a_fiftieth_of_a_tail_and_a_degree_and_their_errors_hol
 ) -> None:
     tank, motion = Tank(**TANKS[name]), circling()
     detector, times = detector_of(tank, tmp_path), np.arange(0, 20, 2.1 if name == "large" else 0.7)
-    poses = [detector.poses(tank.frame(motion, time), time)[0] for time in times]
+    poses = [detector.poses(tank.frame(motion, time))[0] for time in times]
     pairs = zip(poses, times, strict=True)
     seen = [(pose, off(pose, motion(exposed(tank, pose, time)))) for pose, time in pairs if isinstance(pose, Pose)]
     assert len(seen) >= 0.9 * len(times), poses
@@ -67,14 +67,14 @@ def test_poses_are_within_a_fiftieth_of_a_tail_and_a_degree_and_their_errors_hol
 def test_a_lost_robot_is_named_with_the_reason_and_found_again(tmp_path: Path) -> None:
     tank, motion = Tank(), circling()
     detector = detector_of(tank, tmp_path)
-    assert isinstance(detector.poses(tank.frame(motion, 0.0), 0.0)[0], Pose)
+    assert isinstance(detector.poses(tank.frame(motion, 0.0))[0], Pose)
     bare = Tank(colours=("", "", "", ""))
-    assert detector.poses(bare.frame(motion, 0.1), 0.1) == [Lost("1", "no red")]
+    assert detector.poses(bare.frame(motion, 0.1)) == [Lost("1", "no red")]
     half = Tank(colours=("red", "", "", ""))
-    assert detector.poses(half.frame(motion, 0.2), 0.2) == [Lost("1", "no green")]
+    assert detector.poses(half.frame(motion, 0.2)) == [Lost("1", "no green")]
     for _ in range(8):
-        detector.poses(bare.frame(motion, 0.3), 0.3)
-    again = detector.poses(tank.frame(motion, 9.0), 9.0)[0]
+        detector.poses(bare.frame(motion, 0.3))
+    again = detector.poses(tank.frame(motion, 9.0))[0]
     assert isinstance(again, Pose)
     assert np.abs(off(again, motion(9.0))).max() < 0.02
 
@@ -84,7 +84,7 @@ def test_a_hand_over_the_robot_loses_it_and_moves_no_pose(tmp_path: Path) -> Non
     detector, lost = detector_of(tank, tmp_path), 0
     for index in range(30):
         tank.hand = (index - 5) / 20 if 5 <= index < 25 else -1.0
-        (pose,) = detector.poses(tank.frame(motion, 0.2 * index), 0.2 * index)
+        (pose,) = detector.poses(tank.frame(motion, 0.2 * index))
         lost += isinstance(pose, Lost)
         if isinstance(pose, Pose):
             error = np.abs(off(pose, motion(0.2 * index)))
@@ -97,7 +97,7 @@ def test_dots_are_seen_at_their_side_of_the_axis(tmp_path: Path) -> None:
     tank, motion = Tank(), circling(head=-1.0, tails=1.0)
     detector = detector_of(tank, tmp_path)
     for time in np.arange(0, 7, 0.5):
-        (pose,) = detector.poses(tank.frame(motion, time), time)
+        (pose,) = detector.poses(tank.frame(motion, time))
         assert isinstance(pose, Pose)
         (left, area), (side, _) = pose.dots["head"], pose.dots["tail"]
         *_, head, tails = motion(time)
@@ -122,7 +122,7 @@ def test_two_robots_are_told_apart_by_their_colours(tmp_path: Path) -> None:
     one, other = circling(centre=(0.12, 0.12)), circling(rate=-0.2, centre=(0.31, 0.12))
     for time in (0.0, 1.0, 2.0):
         picture = tank.drawn([(one, (*first, "", "")), (other, (*second, "", ""))], time)
-        poses = detector.poses(picture, time)
+        poses = detector.poses(picture)
         assert [pose.robot for pose in poses] == ["a", "b"]
         for pose, motion in zip(poses, (one, other), strict=True):
             assert isinstance(pose, Pose)
@@ -145,7 +145,7 @@ def test_a_tag_is_followed_in_a_part_of_the_picture_and_found_again_after_a_jump
         picture = np.full((480, 640, 3), 160, np.uint8)
         picture[v : v + 84, u : u + 84] = tag[..., None]
         read.clear()
-        (pose,) = detector.poses(picture, 0.0)
+        (pose,) = detector.poses(picture)
         searches.append([size == picture.size for size in read])
         assert isinstance(pose, Pose)
         assert 1000 * np.array([pose.x, pose.y]) == pytest.approx([u + 41.5, 479 - (v + 41.5)], abs=0.2)
@@ -165,7 +165,7 @@ def test_a_tag_gives_pose_and_scale(quarter: int, tmp_path: Path) -> None:
     file.write_text("[scale]\ntag_cm = 5\ntag_id = 7\n[[robots]]\ntag = 3\nahead_mm = 10\n")
     setup = read_setup(file)
     noisy = picture[..., None] + np.random.default_rng(0).normal(scale=3, size=(480, 640, 3))
-    (pose,) = Detector(setup.robots, setup.view).poses(np.clip(noisy, 0, 255).astype(np.uint8), 0.0)
+    (pose,) = Detector(setup.robots, setup.view).poses(np.clip(noisy, 0, 255).astype(np.uint8))
     assert isinstance(pose, Pose)
     heading = math.pi / 2 * (1 + quarter)
     axis = np.array([math.cos(heading), math.sin(heading)])
@@ -181,4 +181,4 @@ def test_the_distance_of_the_bands_cannot_exceed_the_head(tmp_path: Path) -> Non
     file.write_text(tank.view_toml())
     setup = read_setup(file)
     short = Detector(setup.robots, setup.view, head_length=0.8 * APART)
-    assert short.poses(tank.frame(circling(), 0.0), 0.0) == [Lost("1", "red and green at a wrong distance")]
+    assert short.poses(tank.frame(circling(), 0.0)) == [Lost("1", "red and green at a wrong distance")]

@@ -52,7 +52,7 @@ def test_the_lens_is_that_which_was_drawn_and_poses_through_it_are_right(
     assert np.abs(undistorted - drawn).max() < 0.5
     detector, motion = Detector(setup.robots, setup.view, head_length=LENGTH), circling()
     for time in np.arange(0, 20, 2.5):
-        (pose,) = detector.poses(TANK.frame(motion, time), time)
+        (pose,) = detector.poses(TANK.frame(motion, time))
         assert isinstance(pose, Pose)
         assert np.hypot(*np.subtract((pose.x, pose.y), motion(time)[:2])) < 0.02 * TAIL
 
