@@ -107,26 +107,23 @@ def _with_distances(film: Film, setup: Setup, head_length: float) -> list[Marker
     Raises:
         InputError: the bands are further apart than the head is long, or hardly apart.
     """
-    seen: dict[str, list[float]] = {each.name: [] for each in setup.robots}
-    for picture in film.samples(_SAMPLES):
-        detector = Detector(setup.robots, setup.view)
+    unknown = [each for each in setup.robots if each.tag is None and math.isnan(each.apart)]
+    seen: dict[str, list[float]] = {each.name: [] for each in unknown}
+    for picture in film.samples(_SAMPLES) if unknown else ():
+        detector = Detector(unknown, setup.view)
         for each in detector.poses(picture):
-            if isinstance(each, Pose) and len(each.marks) == 2:
+            if isinstance(each, Pose):
                 front, rear = detector.view.to_tank(np.array(each.marks))
                 seen[each.robot].append(float(np.hypot(*(front - rear))))
-    learnt = []
-    for markers in setup.robots:
-        known = markers.apart
-        if seen[markers.name] and math.isnan(known):
-            known = float(np.median(seen[markers.name]))
-            if known > 1.05 * head_length or known < _LEAST * head_length:
-                raise InputError(
-                    f"the bands are {100 * known:.3g} cm apart, and the head of the robot is "
-                    f"{100 * head_length:.3g} cm long: correct [scale] in view.toml, or give the right robot, or "
-                    "the bands' distance as apart_cm"
-                )
-        learnt.append(markers._replace(apart=known))
-    return learnt
+    learnt = {name: float(np.median(distances)) for name, distances in seen.items() if distances}
+    for apart in learnt.values():
+        if apart > 1.05 * head_length or apart < _LEAST * head_length:
+            raise InputError(
+                f"the bands are {100 * apart:.3g} cm apart, and the head of the robot is "
+                f"{100 * head_length:.3g} cm long: correct [scale] in view.toml, or give the right robot, or "
+                "the bands' distance as apart_cm"
+            )
+    return [each._replace(apart=learnt.get(each.name, each.apart)) for each in setup.robots]
 
 
 def _row(pose: Pose, index: int, time: float) -> dict[str, float]:
