@@ -19,6 +19,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -37,11 +38,12 @@ _STRETCH = 1.15  # greatest ratio of the sides of a tag from which the scale alo
 DICTIONARIES = ("4x4_50", "5x5_100", "6x6_250", "7x7_1000", "apriltag_36h11")
 _KEYS = {
     "": ("looks", "scale", "lens", "tank", "robots"),
-    "scale": ("points_px", "points", "length", "tag", "tag_id"),
+    "scale": ("points_px", "tag_id"),
     "lens": ("focal_px", "centre_px", "distortion"),
     "tank": ("region_px",),
-    "robots": ("name", "front", "rear", "head", "tail", "tag", "dictionary", "ahead", "apart"),
+    "robots": ("name", "front", "rear", *DOTS, "tag", "dictionary"),
 }
+_LENGTHS = {"scale": ("points", "length", "tag"), "robots": ("ahead", "apart")}  # their keys have a unit
 EXAMPLE = """\
 # Pixels count from the picture's upper left corner, x to the right and y down.
 looks = "down"                       # the camera; "up" through the bottom of the tank
@@ -222,12 +224,16 @@ def _setup(content: dict[str, Any]) -> Setup:
 
 
 def _check_keys(table: str, entries: Mapping[str, Any]) -> None:
+    lengths = _LENGTHS.get(table, ())
     for key in entries:
         quantity, unit = split(key)
-        if key not in _KEYS[table] and not (unit and quantity in _KEYS[table]):
-            near = difflib.get_close_matches(quantity, _KEYS[table], n=1)
-            place = f"[{table}] " if table else ""
-            raise InputError(f"unknown entry {place}{key}{f'; is it {near[0]}?' if near else ''}")
+        if key in _KEYS[table] or (quantity in lengths and unit and unit.kind == "length"):
+            continue
+        place = f"[{table}] {key}" if table else key
+        if quantity in lengths:
+            raise InputError(f"{place} has no unit of length; give {quantity}_cm, or another unit")
+        near = difflib.get_close_matches(quantity, (*_KEYS[table], *lengths), n=1)
+        raise InputError(f"unknown entry {place}{f'; is it {near[0]}?' if near else ''}")
 
 
 def _with_scale(view: View, table: Mapping[str, Any]) -> View:
@@ -243,9 +249,9 @@ def _with_scale(view: View, table: Mapping[str, Any]) -> View:
         )
     pixels = _points(table, "points_px", 2)
     plane = replace(view, homography=np.eye(3)).to_tank(pixels)
-    places = next((key for key in table if split(key).quantity == "points" and key != "points_px"), None)
-    if places is not None:
-        return _from_places(view, plane, to_si(_points(table, places, 4), str(places).rpartition("_")[2]))
+    key, suffix = _key_of(table, "points")
+    if key:
+        return _from_places(view, plane, to_si(_points(table, key, 4), suffix))
     if len(pixels) != 2 or math.isnan(length):
         raise InputError(
             "[scale] gives no scale; give two points and length_cm, or four points or more and points_cm, a place "
@@ -296,8 +302,7 @@ def _lens(table: Mapping[str, Any]) -> Lens:
 
 
 def _markers(table: Mapping[str, Any], number: int) -> Markers:
-    where = f"[[robots]] {number}: "
-    try:
+    with naming(f"[[robots]] {number}"):
         _check_keys("robots", table)
         tag = table.get("tag")
         needed = () if tag is not None else ("front", "rear")
@@ -307,10 +312,9 @@ def _markers(table: Mapping[str, Any], number: int) -> Markers:
                 f'no {missing[0]}; give two bands of other colours, front = "red" and rear = "green", or a tag'
             )
         hues = {key: _hue(colour, key) for key, colour in colours.items()}
-        for one in hues:
-            for other in hues:
-                if one < other and abs((hues[one] - hues[other] + 180) % 360 - 180) < 40:
-                    raise InputError(f"{one} and {other} have nearly the same colour; give them others")
+        for one, other in combinations(sorted(hues), 2):
+            if abs(math.remainder(hues[one] - hues[other], 360)) < 40:
+                raise InputError(f"{one} and {other} have nearly the same colour; give them others")
         dictionary = str(table.get("dictionary", DICTIONARIES[0])).lower()
         if dictionary not in DICTIONARIES:
             raise InputError(f"dictionary {dictionary!r}; give one of {', '.join(DICTIONARIES)}")
@@ -326,8 +330,6 @@ def _markers(table: Mapping[str, Any], number: int) -> Markers:
             0.0 if math.isnan(ahead) else ahead,
             apart,
         )
-    except InputError as refusal:
-        raise InputError(f"{where}{refusal}") from None
 
 
 def _hue(colour: object, key: str) -> float:
@@ -345,13 +347,21 @@ def _hue(colour: object, key: str) -> float:
 
 def _length(table: Mapping[str, Any], quantity: str, where: str) -> float:
     """Return a length in metres, in whatever unit its key has; NaN if it is not there."""
-    for key, value in table.items():
+    key, suffix = _key_of(table, quantity)
+    if not key:
+        return math.nan
+    if not _is_number(table[key]):
+        raise InputError(f"[{where}] {key} = {table[key]!r}; give a number, {quantity}_cm or in another unit")
+    return float(to_si(float(table[key]), suffix))
+
+
+def _key_of(table: Mapping[str, Any], quantity: str) -> tuple[str, str]:
+    """Return the key of a quantity and the suffix of its unit; two empty words if it is not there."""
+    for key in table:
         name, unit = split(key)
         if name == quantity and unit is not None:
-            if unit.kind != "length" or not _is_number(value):
-                raise InputError(f"[{where}] {key} = {value!r}; give a number, {quantity}_cm or in another unit")
-            return float(to_si(float(value), unit.suffix))
-    return math.nan
+            return key, unit.suffix
+    return "", ""
 
 
 def _points(table: Mapping[str, Any], key: str, fewest: int) -> Floats:

@@ -1,0 +1,80 @@
+"""What a view.toml says, and a line for each that says nothing."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camera.detector import Detector, Lost, Pose
+from camera.view import EXAMPLE, read_setup
+from sim.io.errors import InputError
+from tests.oracles.tank import Tank, circling
+
+RULER, SQUARE = "length_cm = 30", "[[100, 650], [900, 650], [900, 100], [100, 100]]"
+REFUSED = {  # what of EXAMPLE is written otherwise, and the message
+    "misspelt": (RULER, "lenght_cm = 30", "unknown entry [scale] lenght_cm; is it length?"),
+    "no unit": (RULER, "length = 30", "[scale] length has no unit of length; give length_cm"),
+    "places without a unit": (RULER, f"points = {SQUARE}", "[scale] points has no unit of length; give points_cm"),
+    "no length": (RULER, "length_deg = 30", "[scale] length_deg has no unit of length"),
+    "no number": (RULER, 'length_cm = "30"', "[scale] length_cm = '30'; give a number"),
+    "one point": ("[100, 650], ", "", "points_px: give 2 points or more"),
+    "the same point": ("[100, 650], ", "[900, 650], ", "[scale] the two points or their distance are the same"),
+    "no scale": ("points_px = [[100, 650], [900, 650]]\n", "", "no scale; give [scale] points_px"),
+    "mirrored": (RULER, "points_cm = [[0, 30], [30, 30], [30, 0], [0, 0]]", "mirror images of each other"),
+    "on a line": ("[900, 100], [100, 100]]", "[500, 650], [300, 650]]", "the points lie on a line"),
+    "other robot": ("# ahead_mm = 0", "ahead = 0", "[[robots]] 1: [robots] ahead has no unit of length"),
+    "no colour": ('"green"', '"grass"', "[[robots]] 1: rear = 'grass'; give red, orange"),
+    "grey": ('"green"', '"#808890"', '[[robots]] 1: rear = "#808890" is nearly grey'),
+    "alike": ('"green"', '"orange"', "[[robots]] 1: front and rear have nearly the same colour"),
+    "alike across red": ('"green"', '"#ff0060"', "[[robots]] 1: front and rear have nearly the same colour"),
+    "side": ('"down"', '"left"', "looks = 'left'; give \"down\""),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_an_entry_that_cannot_be_used_is_named(case: str, tmp_path: Path) -> None:
+    old, new, message = REFUSED[case]
+    text = EXAMPLE
+    if case in ("mirrored", "on a line"):
+        text = text.replace("[[100, 650], [900, 650]]", SQUARE)
+    if case == "on a line":
+        text = text.replace(RULER, "points_cm = [[0, 0], [30, 0], [15, 0], [8, 0]]")
+    assert old in text
+    (tmp_path / "view.toml").write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=re.escape(message)) as refusal:
+        read_setup(tmp_path / "view.toml")
+    assert str(refusal.value).startswith(f"{tmp_path / 'view.toml'}: ")
+
+
+def test_y_points_up_in_the_picture_unless_the_camera_looks_up(tmp_path: Path) -> None:
+    for looks, y in (("down", 0.15), ("up", -0.15)):
+        (tmp_path / "view.toml").write_text(EXAMPLE.replace('"down"  ', f'"{looks}"  '))
+        view = read_setup(tmp_path / "view.toml").view
+        assert view.to_tank(np.array([500.0, 250.0]))[0] == pytest.approx([0.15, y])
+        assert view.to_picture(np.array([[0.15, y]]))[0] == pytest.approx([500, 250])
+
+
+def test_a_robot_with_a_band_that_the_region_cuts_is_lost(tmp_path: Path) -> None:
+    tank, motion = Tank(), circling()
+    (tmp_path / "view.toml").write_text(tank.view_toml())
+    setup = read_setup(tmp_path / "view.toml")
+    (pose,) = Detector(setup.robots, setup.view).poses(tank.frame(motion, 0.0))
+    assert isinstance(pose, Pose)
+    (u, v), _ = pose.marks
+    for right, found in ((100, Pose), (0, Lost)):
+        region = np.array([[0, 0], [u + right, 0], [u + right, v + 100], [0, v + 100]])
+        (pose,) = Detector(setup.robots, replace(setup.view, region=region)).poses(tank.frame(motion, 0.0))
+        assert isinstance(pose, found)
+
+
+def test_a_tag_that_is_seen_slantwise_gives_no_scale(tmp_path: Path) -> None:
+    (tmp_path / "view.toml").write_text("[scale]\ntag_cm = 5\ntag_id = 7\n[[robots]]\ntag = 3\n")
+    view = read_setup(tmp_path / "view.toml").view
+    square = np.array([[100, 100], [200, 100], [200, 200], [100, 200.0]])
+    assert view.with_tag(square).metres(np.array([150, 150])) == pytest.approx(0.05 / 100)
+    with pytest.raises(InputError, match="tag 7 is seen slantwise, 80 to 100 pixels a side"):
+        view.with_tag(square * [0.8, 1])
