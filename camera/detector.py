@@ -43,7 +43,7 @@ _PIXEL = 0.3  # standard error of a centre besides [pixels]: films have a colour
 _ALIKE = 0.2  # relative difference of the bands' distance from the known one
 _BIAS = 0.0025  # of the bands' distance, standard error of a centre that does not come from noise
 _SHIFT = 0.0065  # of the bands' distance, of what shifts both: light from one side, glare
-_WHOLE = 0.3  # of the bands' distance, half the length of a band that must be in the picture
+_WHOLE = 0.3  # of the bands' distance, half the length of a band that must be in the picture, and in the region
 _END = 0.18  # of the bands' distance, by which a band's centre moves for a whole band that is hidden from one end
 _HIDDEN = 0.87  # of a band's usual area
 _MEMORY = 20.0  # pictures over which distance and areas are averaged
@@ -231,7 +231,7 @@ class Detector:
         ends = np.concatenate([marks + side, marks - side])
         if (ends < 0).any() or (ends > np.array(frame.shape[1::-1]) - 1).any():
             return Lost(markers.name, "at the edge of the picture")
-        if not all(self._inside(mark) for mark in marks):
+        if not all(self._inside(end) for end in ends):
             return Lost(markers.name, "outside the region of the tank")
         metres, forget = apart / distance, min(memory.seen + 1, _MEMORY)
         bias = math.hypot(_BIAS * distance, _PIXEL)
