@@ -50,14 +50,14 @@ def _calibrate(
     """
     if bool(table) == bool(films) or bool(films) != bool(view):
         raise InputError("give a table of runs, or --films runs.csv with --view view.toml")
+    if no_path and paths:
+        raise InputError("--path and --no-path exclude each other")
     if films and view:
         table = _filmed(films, view, robot, out)
     _refuse_early(table)
     from calibration.report.path_error import DEFAULT_PATHS
     from calibration.statistics.budget import stopped_by_interrupt
 
-    if no_path and paths:
-        raise InputError("--path and --no-path exclude each other")
     stated = () if no_path else paths or DEFAULT_PATHS
     with stopped_by_interrupt():
         result = calibrate(table=table, robot=robot, paths=stated, tell=_to_stderr)

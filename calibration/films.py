@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from calibration.swimmer.camera_tracks import MeasuredTracks, measure_tracks
+from camera.film import Film
 from camera.tracks import track_film
 from camera.view import read_setup
 from sim.io.errors import InputError
@@ -38,10 +39,12 @@ def measure_films(
     if len(setup.robots) > 1:
         raise InputError(f"{view} has {len(setup.robots)} robots; films of runs show one")
     parts = {name: numbers_of(table[name]) for name in ("start_s", "end_s") if name in table}
-    tracks = []
     for index, film in enumerate(table["film"]):
         if not isinstance(film, str):
             raise InputError(f"{runs}: {row_name(table, index)} has no film")
+        Film(Path(runs).parent / film)  # refused before the first is tracked, which takes a while
+    tracks = []
+    for index, film in enumerate(table["film"]):
         start, end = (
             float(parts[name].iloc[index]) if name in parts else math.nan for name in ("start_s", "end_s")
         )
