@@ -17,6 +17,7 @@ import numpy as np
 
 from camera.view import Lens, opencv
 from sim.io.errors import InputError, naming
+from sim.io.reading import read_bytes
 
 _FEWEST = 3  # pictures
 _REFINED = (3, 50, 1e-3)  # at most 50 steps, down to steps of 0.001 pixels
@@ -65,7 +66,8 @@ def calibrate_lens(pictures: Sequence[str | Path], *, squares: str = "10x7") -> 
     size, seen, notes = (0, 0), list[Any](), list[str]()
     for path in pictures:
         with naming(path):
-            picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) if Path(path).is_file() else None
+            data = np.frombuffer(read_bytes(path), np.uint8)
+            picture = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if len(data) else None
             if picture is None:
                 raise InputError("no picture that can be read; give a PNG or a JPEG")
             own = (picture.shape[1], picture.shape[0])
