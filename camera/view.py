@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -77,6 +78,8 @@ def opencv() -> Any:
         import cv2
     except ImportError:
         raise InputError("films need OpenCV: pip install 'softflagella[camera]'") from None
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what it would say is said by an InputError
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
     return cv2
 
 

@@ -109,7 +109,9 @@ def test_frames_that_the_camera_dropped_are_gaps_in_the_time_stamps(tmp_path: Pa
     assert seen == pytest.approx([0, 0.1, 0.2, 0.5, 0.6, 0.7, 0.9, 1.0])
 
 
-def test_films_that_cannot_be_used_are_refused_with_what_to_change(tmp_path: Path) -> None:
+def test_films_that_cannot_be_used_are_refused_with_what_to_change(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     bare = Tank(width=320, height=240, scale=0.001, colours=("", "", "", ""))
     view = setup_of(small(), tmp_path)
     nothing = bare.film(tmp_path / "bare.mp4", SWUM, 1.0, RATE)
@@ -130,6 +132,7 @@ def test_films_that_cannot_be_used_are_refused_with_what_to_change(tmp_path: Pat
     (tmp_path / "text.mp4").write_text("no film")
     with pytest.raises(InputError, match=r"text\.mp4 is no film that can be read"):
         Film(tmp_path / "text.mp4")
+    assert capfd.readouterr().err == ""
     with pytest.raises(InputError, match="no such file"):
         Film(tmp_path / "none.mp4")
 
@@ -151,6 +154,11 @@ def test_films_of_runs_become_a_measured_table(tmp_path: Path, capsys: pytest.Ca
     assert run_command(main, [str(word) for word in words]) == 2
     assert "2 usable runs; a calibration needs at least 24" in capsys.readouterr().err
     assert len(pd.read_csv(tmp_path / "out" / "table.csv")) == 2
+    said.clear()
+    table.assign(film=["swim.mp4", "none.mp4"]).to_csv(film().parent / "missing.csv", index=False)
+    with pytest.raises(InputError, match=r"none\.mp4: no such file"):
+        measure_films(film().parent / "missing.csv", film().parent / "view.toml", robot, tell=said.append)
+    assert not said
     table.drop(columns="film").to_csv(tmp_path / "runs.csv", index=False)
     with pytest.raises(InputError, match=r"runs\.csv has no column 'film'"):
         measure_films(tmp_path / "runs.csv", film().parent / "view.toml", robot)

@@ -73,6 +73,8 @@ def test_pictures_that_do_not_serve_are_refused_with_what_to_change(tmp_path: Pa
         calibrate_lens(files, squares="12x9")
     with pytest.raises(InputError, match=r"squares '9'; give those of the board"):
         calibrate_lens(files, squares="9")
+    with pytest.raises(InputError, match=r"none\.png: no such file"):
+        calibrate_lens([*files, tmp_path / "none.png"])
     (tmp_path / "text.png").write_text("no picture")
     with pytest.raises(InputError, match=r"text\.png.*no picture that can be read"):
         calibrate_lens([*files, tmp_path / "text.png"])
