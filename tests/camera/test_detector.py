@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -79,6 +80,27 @@ def test_a_lost_robot_is_named_with_the_reason_and_found_again(tmp_path: Path) -
     assert np.abs(off(again, motion(9.0))).max() < 0.02
 
 
+def test_a_thing_beside_a_band_loses_the_robot_until_it_is_taken_for_a_part_of_it(tmp_path: Path) -> None:
+    tank, motion = Tank(), circling()
+    detector, picture = detector_of(tank, tmp_path), tank.frame(motion, 0.0)
+    (pose,) = detector.poses(picture)
+    assert isinstance(pose, Pose)
+    (u, v), (across, down) = np.array(pose.marks)[0], np.diff(pose.marks, axis=0)[0] * 0.15
+    cv2.circle(picture, (round(u - across), round(v - down)), 7, (40, 40, 205), -1)
+    for _ in range(21):
+        assert detector.poses(picture) == [Lost("1", "more that is red beside it")]
+    assert isinstance(detector.poses(picture)[0], Pose)
+
+
+def test_a_robot_that_the_edge_of_the_picture_cuts_is_lost(tmp_path: Path) -> None:
+    tank = Tank()
+    detector = detector_of(tank, tmp_path)
+    for x, seen in ((0.03, Pose), (0.008, Lost)):
+        (pose,) = detector.poses(tank.frame(circling(0.0, 0.0, centre=(x, 0.12), start=1.5), 0.0))
+        assert isinstance(pose, seen)
+    assert pose == Lost("1", "at the edge of the picture")
+
+
 def test_a_hand_over_the_robot_loses_it_and_moves_no_pose(tmp_path: Path) -> None:
     tank, motion = Tank(), circling(radius=0.05)
     detector, lost = detector_of(tank, tmp_path), 0
@@ -132,8 +154,6 @@ def test_two_robots_are_told_apart_by_their_colours(tmp_path: Path) -> None:
 def test_a_tag_is_followed_in_a_part_of_the_picture_and_found_again_after_a_jump(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import cv2
-
     tag = cv2.aruco.generateImageMarker(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50), 3, 60)
     tag, read = np.pad(tag, 12, constant_values=255), list[int]()
     file = tmp_path / "view.toml"
@@ -155,8 +175,6 @@ def test_a_tag_is_followed_in_a_part_of_the_picture_and_found_again_after_a_jump
 @pytest.mark.parametrize("quarter", range(4))
 def test_a_tag_gives_pose_and_scale(quarter: int, tmp_path: Path) -> None:
     """The robot's tag, 4 cm wide, points along the picture's edges; the other, of 5 cm, gives the scale."""
-    import cv2
-
     picture, known = np.full((480, 640), 160, np.uint8), cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
     for number, size, (u, v), turns in ((3, 80, (200, 150), quarter), (7, 100, (450, 300), 0)):
         tag = np.rot90(np.pad(cv2.aruco.generateImageMarker(known, number, size), 20, constant_values=255), turns)

@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -84,6 +85,17 @@ def test_spins_and_circle_of_a_film_are_those_that_were_drawn() -> None:
     assert row["theta_deg"] == pytest.approx(math.degrees(1.17), abs=1)
 
 
+def test_a_dot_that_shows_no_spin_is_named() -> None:
+    time = np.arange(0, 20, 1 / RATE)
+    left, area = np.random.default_rng(0).normal(size=(2, len(time)))
+    for count, fastest, reason in ((len(time), 15.0, "the dot does not come and go regularly; check its colour"),
+                                   (30, 4.0, "the track is too short for a spin; film at least three turns"),
+                                   (11, 15.0, "the dot is seen in 11 frames; check its colour")):  # fmt: skip
+        said = fit_spin(time[:count], left[:count], np.abs(area[:count]), fastest)
+        assert isinstance(said, str)
+        assert said.startswith(reason)
+
+
 def test_the_command_writes_a_track_that_planner_and_calibration_read_and_a_picture(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -122,6 +134,13 @@ def test_films_that_cannot_be_used_are_refused_with_what_to_change(
         InputError, match=r"bands are 4.4 cm apart, and the head of the robot is 0.6 cm long: correct"
     ):
         track_film(good, view, head_length=LENGTH / 10)
+    with pytest.raises(InputError, match=r"bands are 4.4 cm apart, and the head of the robot is 60 cm long"):
+        track_film(good, view, head_length=10 * LENGTH)
+    stopped = Film(good)
+    seen = stopped._capture
+    stopped._capture = SimpleNamespace(grab=seen.grab, retrieve=seen.retrieve, get=lambda key: 40.0)
+    with pytest.raises(InputError, match=r"good\.mp4: the time stamp of frame 1 is not after the one before"):
+        list(stopped.frames())
     apart = replace_robots(view, apart=0.06)
     with pytest.raises(
         InputError, match=r"\(red and green at a wrong distance\): correct \[scale\] in view\.toml, or"

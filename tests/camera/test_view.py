@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -54,6 +55,7 @@ def test_y_points_up_in_the_picture_unless_the_camera_looks_up(tmp_path: Path) -
     for looks, y in (("down", 0.15), ("up", -0.15)):
         (tmp_path / "view.toml").write_text(EXAMPLE.replace('"down"  ', f'"{looks}"  '))
         view = read_setup(tmp_path / "view.toml").view
+        assert view.scale_error == pytest.approx(math.sqrt(2) / 800)  # each end of the ruler is off by a pixel
         assert view.to_tank(np.array([500.0, 250.0]))[0] == pytest.approx([0.15, y])
         assert view.to_picture(np.array([[0.15, y]]))[0] == pytest.approx([500, 250])
 
