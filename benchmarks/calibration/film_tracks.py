@@ -21,11 +21,8 @@ from camera.view import opencv
 
 SIZE, RATE = (1920, 1080), 30.0  # pixels; frames per second
 SCALE = 30.0  # pixels per cm
-HEAD, BAND, APART = (
-    (180, 96),
-    21,
-    132,
-)  # pixels: length and width of the head; a band's width, distance of the bands
+HEAD = 180, 96  # pixels, length and width
+BAND, APART = 21, 132  # pixels, a band's width, distance of the bands
 BANDS, TAG = '[[robots]]\nfront = "red"\nrear = "green"\n', "[[robots]]\ntag = 3\n"
 VIEW = f"[scale]\npoints_px = [[100, 1000], [1000, 1000]]\nlength_cm = {900 / SCALE}\n"
 
