@@ -29,6 +29,7 @@ _KEPT = 3  # folders of other versions
 _LEVEL = 1  # of optimisation: as fast as level 3, compiled in less than half the time
 _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _FAST = {"contract", "reassoc", "nsz", "arcp"}  # what fast sums and products may do; NaN keeps its meaning
+beforehand = False  # loops are compiled by a command that says so
 _lock = RLock()  # over numba's settings
 _functions: set[Callable[..., Any]] = set()  # of loops
 
@@ -151,7 +152,8 @@ def _numba() -> Any:
 
         def on_start(self, event: Any) -> None:
             if event.data["dispatcher"].py_func in _functions:
-                _say_first_use()
+                if not beforehand:
+                    _say_first_use()
                 self.levels.append(config.OPT)
                 config.OPT = type(config.OPT)(_LEVEL)
 

@@ -32,7 +32,7 @@ def zeros(like: Any, shape: Any) -> Any:
 
 
 def empty(like: Any, shape: Any) -> Any:
-    """Allocate room of the kind of number that the array `like` holds."""
+    """Allocate an array of the kind of number that the array `like` holds."""
     return np.empty(shape, like.dtype)
 
 

@@ -146,20 +146,22 @@ def _export(lookup: str | None = None, *, small: str) -> None:
 
 @program.command("compile")
 def _compile() -> None:
-    """Compile the loops of queries now rather than on first use."""
+    """Compile the loops of queries and plans now rather than on first use."""
     from time import perf_counter
 
     import numpy as np
 
+    from sim import jit
     from sim.inputs import group_columns
-    from sim.jit import CACHE
     from sim.model.presets import PRESETS
     from surrogate.table_file import load
 
-    began = perf_counter()
-    robot = group_columns([PRESETS["paper-control"]])
-    load().query({**robot, "dwell_bar": np.ones(1)}, intervals=True)
-    print(f"loops compiled in {perf_counter() - began:.0f} s -> {CACHE}")
+    jit.beforehand, began = True, perf_counter()
+    robot, table = group_columns([PRESETS["paper-control"]]), load()
+    table.query({**robot, "dwell_bar": np.ones(1)}, intervals=True)
+    table.response(robot)
+    table.error_modes(robot)
+    print(f"loops compiled in {perf_counter() - began:.0f} s -> {jit.CACHE}")
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ class Chains(NamedTuple):
 
 @compiled
 def new_chains(like: Floats, n: int, chains: int, instants: int) -> Chains:
-    """Allocate room for M chains of n ≥ 2 nodes and P instants, of the kind of number that `like` holds."""
+    """Allocate the arrays for M chains of n ≥ 2 nodes and P instants, of numbers as in `like`."""
     return Chains(
         zeros(like, (n, chains, 3, 3)),
         zeros(like, (n, chains, 3, 3)),

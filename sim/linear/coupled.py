@@ -54,7 +54,7 @@ class Coupling(NamedTuple):
 
 @compiled
 def new_coupled(like: Floats, n: int, chains: int, instants: int) -> Coupled:
-    """Allocate room for n ≥ 2 nodes in M chains and four unknowns of the body at each of P instants.
+    """Allocate scratch arrays for n ≥ 2 nodes in M chains and four unknowns of the body at each of P instants.
 
     `like` is an array of the kind of number that the equations have.
     """

@@ -33,7 +33,7 @@ class Krylov(NamedTuple):
 
 @compiled
 def new_krylov(like: Floats, size: int, most: int) -> Krylov:
-    """Allocate room for `most` steps on vectors of `size` entries, of the kind of number that `like` holds."""
+    """Allocate the arrays for `most` steps on vectors of `size` entries, of numbers as in `like`."""
     return Krylov(
         empty(like, (most + 1, size)), zeros(like, (most, most)), zeros(like, (most, 2)), zeros(like, (most + 1,))
     )

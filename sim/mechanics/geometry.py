@@ -35,7 +35,7 @@ class Geometry(NamedTuple):
 
 @compiled
 def new_geometry(like: Floats, n: int, tails: int) -> Geometry:
-    """Allocate room for M tails of n edges, of the kind of number that `like` holds."""
+    """Allocate scratch arrays for M tails of n edges, of the kind of number that `like` holds."""
     return Geometry(
         zeros(like, (n + 1, tails, 3)),
         zeros(like, (n, tails)),

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.jit import CACHE
+from sim import jit
 from sim.model.presets import PRESETS
 from sim.motion.flips import Flip, follow_flips
 from sim.motion.response import responses
@@ -41,7 +41,6 @@ _OF_ORBITS: tuple[Stage, ...] = (
     ("derivatives", lambda: sensitivities(_ROBOT, ("C_t",))),
 )
 _OF_TIME: tuple[Stage, ...] = (("flips", _flip), ("time steps", lambda: settle(_ROBOT)))
-_ALL = (*_OF_ORBITS, *_OF_TIME)
 
 
 @cache
@@ -49,7 +48,7 @@ def _mark() -> Path:
     """Return the file that tells that all kernels are there for this kind of processor."""
     from llvmlite.binding import get_host_cpu_name
 
-    return CACHE / f"all-for-{get_host_cpu_name()}"
+    return jit.CACHE / f"all-for-{get_host_cpu_name()}"
 
 
 def all_compiled() -> bool:
@@ -58,11 +57,11 @@ def all_compiled() -> bool:
 
 
 def _compile(stages: tuple[Stage, ...]) -> None:
+    jit.beforehand = True
     for stage in stages:
         began = time.perf_counter()
         stage[1]()
-        line = f"{_ALL.index(stage) + 1}/{len(_ALL)} {stage[0]}, {time.perf_counter() - began:.0f} s"
-        print(line, file=sys.stderr, flush=True)
+        print(f"compiled {stage[0]}, {time.perf_counter() - began:.0f} s", file=sys.stderr, flush=True)
 
 
 def compile_for_time_steps() -> None:
@@ -90,7 +89,7 @@ def compile_all() -> float:
         for _, call in _OF_TIME:  # what the other process has compiled is read here
             call()
     else:
-        _compile(_ALL)
+        _compile(_OF_ORBITS + _OF_TIME)
     responses(_ROBOT)
     _mark().touch()
     return time.perf_counter() - began

@@ -196,11 +196,10 @@ def fluid_forces(body: Body, x: Floats, x_dot: Floats, u: Floats, phase: float) 
         motion = motion_at(body, u, phase + 2 * np.pi * m / tails)
         for k in range(n + 1):
             cell = 0.5 / n if k in (0, n) else 1.0 / n
-            position = (body.offset, 0.0, 0.0) if k == 0 else vector(x, k - 1, m)
-            velocity = plus(motion.linear, cross(motion.spin, position))
-            velocity = minus(velocity, vector(scratch.around.flow, k, m))
+            position, rate = (body.offset, 0.0, 0.0), ZERO
             if k > 0:
-                velocity = plus(velocity, vector(x_dot, k - 1, m))
+                position, rate = vector(x, k - 1, m), vector(x_dot, k - 1, m)
+            velocity = _velocity(motion, position, rate, vector(scratch.around.flow, k, m))
             tangent, _ = node_tangent(scratch.geometry, k, m)
             force = node_drag(
                 tangent, velocity, cell * body.zeta_perp, cell * (body.zeta_parallel - body.zeta_perp)

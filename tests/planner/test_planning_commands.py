@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import json
 import math
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +21,7 @@ from planner.tracking.tracker import Tracker
 from sim.inputs import save_robot
 from sim.io.errors import run_command
 from tests.planner.plans import CONTROL, planned, trip
+from tests.processes import LIMIT
 
 pytestmark = pytest.mark.slow
 
@@ -270,3 +273,26 @@ def test_another_robot_carries_out_a_plan_and_its_tracking_error_is_told(
     twin = write_plan(planned("circle:1.2l", objective="flips"), tmp_path / "twin")[0]
     assert run_command(main, ["check", str(twin), words[2]]) == 2
     assert f"is of plan {result.identity}, not of" in capsys.readouterr().err
+
+
+_COMPILED = """
+import sys
+from planner.__main__ import main as planner
+from sim.jit import Loop
+from surrogate.__main__ import main as surrogate
+def loops():
+    modules = list(sys.modules.values())
+    known = {each for module in modules for each in vars(module).values() if isinstance(each, Loop)}
+    return {(each.__name__, types) for each in known if "kernel" in vars(each) for types in each.kernel.signatures}
+surrogate(["compile"])
+before = loops()
+planner(["plan", "circle:2l", "--robot", "paper-control", "--feedback", "--out", sys.argv[1]])
+assert before and loops() == before, loops() - before
+"""
+
+
+def test_a_plan_needs_no_loops_but_those_that_are_compiled_beforehand(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", _COMPILED, str(tmp_path)], capture_output=True, text=True, timeout=LIMIT
+    )
+    assert done.returncode == 0, done.stderr
