@@ -8,10 +8,10 @@ do, and is left out, since what it shows is older than its time stamp says.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from queue import Queue
-from threading import Event, Thread
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,6 +49,7 @@ class Film:
         self._capture = cv.VideoCapture(self.path, cv.CAP_FFMPEG, [cv.CAP_PROP_N_THREADS, 2])
         if not self._capture.isOpened() or not self._capture.grab():
             raise InputError(f"{path} is no film that can be read; convert it: ffmpeg -i FILM film.mp4")
+        self._number = 0  # of the next frame
         self.count = max(int(self._capture.get(cv.CAP_PROP_FRAME_COUNT)), 1)
         self._capture = cv.VideoCapture(self.path, cv.CAP_FFMPEG, [cv.CAP_PROP_N_THREADS, 2])
 
@@ -67,14 +68,12 @@ class Film:
         Raises:
             InputError: the time stamps do not increase.
         """
-        waiting: Queue[Frame | None] = Queue(_AHEAD)
-        stop = Event()
-        reader = Thread(target=self._read, args=(start, end, waiting, stop), daemon=True)
-        reader.start()
         differences: list[float] = []
         before, time = None, -math.inf
-        try:
-            while (frame := waiting.get()) is not None:
+        with ThreadPoolExecutor(1) as reader:
+            waiting = deque(reader.submit(self._next, start, end) for _ in range(_AHEAD))
+            while (frame := waiting.popleft().result()) is not None:
+                waiting.append(reader.submit(self._next, start, end))
                 if frame.time_s <= time:
                     raise InputError(
                         f"{self.path}: the time stamp of frame {frame.number} is not after the one before; write "
@@ -89,22 +88,16 @@ class Film:
                         differences = [*differences[1 - _USUAL :], difference]
                 before = coarse
                 yield frame._replace(doubled=doubled)
-        finally:
-            stop.set()
-            while reader.is_alive():  # it may wait for a place in the queue
-                while not waiting.empty():
-                    waiting.get_nowait()
-                reader.join(0.01)
 
-    def _read(self, start: float, end: float, waiting: Queue[Frame | None], stop: Event) -> None:
-        index = 0
-        while not stop.is_set() and self._capture.grab():
+    def _next(self, start: float, end: float) -> Frame | None:
+        """Decode the next frame from `start` to `end`; None: there is none."""
+        while self._capture.grab():
+            number, self._number = self._number, self._number + 1
             time = float(self._capture.get(self._cv.CAP_PROP_POS_MSEC)) / 1000
             if time > end:
                 break
             if time >= start:
                 good, picture = self._capture.retrieve()
                 if good:
-                    waiting.put(Frame(index, time, picture))
-            index += 1
-        waiting.put(None)
+                    return Frame(number, time, picture)
+        return None

@@ -141,6 +141,9 @@ def test_films_that_cannot_be_used_are_refused_with_what_to_change(
     stopped._capture = SimpleNamespace(grab=seen.grab, retrieve=seen.retrieve, get=lambda key: 40.0)
     with pytest.raises(InputError, match=r"good\.mp4: the time stamp of frame 1 is not after the one before"):
         list(stopped.frames())
+    stopped._capture = SimpleNamespace(grab=seen.grab, retrieve=lambda: 1 / 0, get=seen.get)
+    with pytest.raises(ZeroDivisionError):  # what happens in the thread that decodes
+        list(stopped.frames())
     apart = replace_robots(view, apart=0.06)
     with pytest.raises(
         InputError, match=r"\(red and green at a wrong distance\): correct \[scale\] in view\.toml, or"
