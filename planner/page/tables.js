@@ -6,7 +6,8 @@ import { findUnit, splitName, timesOf, toSi } from "./units.js";
 import { InputError, naming, quoted, refusing, repr, whole } from "./words.js";
 
 const { NUMBER, MISSING, COMMA, POINT, THOUSANDS, WHOLE_LINE, THREE, OTHER, FORMULA } = CONSTANTS.number_words;
-const { COMMENT, MARKED_NUMBER, SEPARATORS } = CONSTANTS.tables, BLANKS = new RegExp(CONSTANTS.tables.BLANKS, "g");
+const { COMMENT, MARKED_NUMBER, BLANKS, SEPARATORS } = CONSTANTS.tables;
+const EACH_BLANK = new RegExp(BLANKS, "g");
 
 /* Say whether a word is a number, with a decimal point or comma; whether it stands for a missing value; and whether a
  * line is a comment. */
@@ -207,7 +208,7 @@ function rowsOf(lines, start, separator, where, most = Infinity) {
   const rows = [], mark = separator === " " ? "\t" : separator;
   let words = [], word = "", state = "start"; // of a cell; "plain", "quoted" or "closed" within it
   for (let i = start; i < lines.length && rows.length < most; i++) {
-    const line = separator === " " ? lines[i].trim().replace(BLANKS, (_, held) => held ?? "\t") : lines[i];
+    const line = separator === " " ? lines[i].trim().replace(EACH_BLANK, (_, held) => held ?? "\t") : lines[i];
     const broken = (reason) =>
       new InputError(`${where} is no CSV table (line ${i + 1}: ${reason}); give a header and one row per line`);
     for (const sign of line) {

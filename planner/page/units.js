@@ -9,7 +9,8 @@ const { UNITS: KNOWN, TEXTS, SPELLINGS, SIGNS, MOST_PARTS } = CONSTANTS.units;
 const UNITS = new Map(Object.entries(KNOWN));
 const RPM = (2 * Math.PI) / 60; // rad/s
 const CASE_COUNTS = new Set(["l", "r"]); // L and R are the head's
-const { EPOCH, LATEST } = CONSTANTS.quantities, CLOCK = whole(CONSTANTS.quantities.CLOCK);
+const { CLOCK, EPOCH, LATEST } = CONSTANTS.quantities;
+const WHOLE_CLOCK = whole(CLOCK);
 const DATE = /^(\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d)?)?)(?:(?<=:\d\d:\d\d)[.,](\d+))?(?:Z|([+-]\d\d):?(\d\d))?$/;
 
 /* Find a unit by its suffix or another spelling ("deg/s", "°", "U/min"); null if it is no known unit. */
@@ -131,7 +132,7 @@ function earliest(values) {
 }
 
 function clockOf(word) {
-  const match = CLOCK.exec(word);
+  const match = WHOLE_CLOCK.exec(word);
   if (!match) return NaN;
   const [days, hours, minutes, seconds] = match.slice(1).map((part) => Number((part ?? "0").replace(",", ".")));
   return 86400 * days + 3600 * hours + 60 * minutes + seconds;

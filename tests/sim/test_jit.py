@@ -74,7 +74,8 @@ def test_numba_is_not_imported_before_the_first_call() -> None:
 def test_another_process_reads_what_one_has_compiled_until_the_sources_change(tmp_path: Path) -> None:
     def used(number: int) -> tuple[str, str]:
         (tmp_path / "someones_number.py").write_text(f"NUMBER = {number}\n")
-        done = python("-c", USE, str(tmp_path / "cache"), folder=tmp_path)
+        # Within a second, Python would take the new number's file for the one that it has the code of.
+        done = python("-B", "-c", USE, str(tmp_path / "cache"), folder=tmp_path)
         return done.stdout, done.stderr
 
     said = "compiling loops for first use; softflagella sim compile does so beforehand\n"
