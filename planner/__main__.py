@@ -312,7 +312,7 @@ def _replay(
 
     if shapes is None:
         with bar("replay") as shown:
-            track = replay([schedule], progress=shown.update)[0]
+            track = replay(schedule, progress=shown.update)
     else:
         check_name(shapes)
         times = equal_times(schedule, every)

@@ -5,21 +5,22 @@ What robots are is said in `sim.robot_rows`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import pandas as pd
 
+from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.model.groups import DWELL, Groups
-from sim.model.response import BEFORE, DWELLS, Responses
+from sim.model.response import BEFORE, DWELLS, LAGS
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule, load_schedule
-from sim.motion.batches import sensitivity_columns, split, steady_columns
-from sim.motion.replay import replay as replay_schedules
+from sim.motion.batches import RESPONSE_ROWS, in_batches, sensitivity_columns, steady_columns
+from sim.motion.replay import replay as replay_schedule
 from sim.motion.response import responses
 from sim.robot_rows import NAME, OneRobot, RobotRows, one_robot, robot_rows, with_units
 
@@ -128,30 +129,29 @@ def response(robots: Robots) -> pd.DataFrame:
     return with_units(pd.concat(tables, ignore_index=True))
 
 
-def _responses(rows: RobotRows, direction: int) -> Responses:
+def _responses(rows: RobotRows, direction: int) -> dict[str, Floats]:
     """Simulate the response of all robots, with the motor in one direction after the flip."""
+
+    def work(groups: Groups) -> dict[str, Floats]:
+        return {name: curve for name, curve in vars(responses(groups)).items() if name != "before"}
+
     columns = {**rows.columns, "omega_bar": direction * rows.columns["omega_bar"]}
-    batches = split(columns["N"], len(columns["N"]))
-    flips = [responses(Groups.from_columns({k: v[batch] for k, v in columns.items()})) for batch in batches]
-    for batch, flip in zip(batches, flips, strict=True):
-        for row in batch[flip.failed]:
-            name = rows.robots[row].name if rows.robots else f"the robot in row {row + 1}"
-            raise InputError(f"{name}: the response to a flip breaks down; try a slower motor")
-    order = np.argsort(np.concatenate(batches))
-    parts = {name: np.concatenate([getattr(flip, name) for flip in flips])[order]
-             for name in ("lag", "memory", "rest", "spread", "net_speed", "failed", "stepped")}  # fmt: skip
-    return Responses(**parts)
+    flips = in_batches(work, columns, RESPONSE_ROWS)
+    for row in np.flatnonzero(flips["failed"]):
+        name = rows.robots[row].name if rows.robots else f"the robot in row {row + 1}"
+        raise InputError(f"{name}: the response to a flip breaks down; try a slower motor")
+    return flips
 
 
-def _curves(flip: Responses, row: int, direction: int) -> pd.DataFrame:
+def _curves(flips: Mapping[str, Floats], row: int, direction: int) -> pd.DataFrame:
     """Tabulate the curves of one robot."""
-    curves = {np.inf: flip.lag[row], 0.0: flip.rest[row]}
-    curves |= {float(T): flip.lag[row] + memory for T, memory in zip(BEFORE, flip.memory[row], strict=True)}
+    lag, memory, rest, speed = (flips[name][row] for name in ("lag", "memory", "rest", "net_speed"))
+    curves = {np.inf: lag, 0.0: rest, **dict(zip(BEFORE.tolist(), lag + memory, strict=True))}
     tables = []
     for before, lag in curves.items():
         table = pd.DataFrame({"direction": direction, "before_bar": before, DWELL: DWELLS})
-        table[["lag_z", "lag_x", "lag_psi_rad"]] = lag
-        table["net_speed_bar"] = flip.net_speed[row] if before == np.inf else np.nan
+        table[list(LAGS)] = lag
+        table["net_speed_bar"] = speed if before == np.inf else np.nan
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
 
@@ -228,5 +228,5 @@ def replay(schedule: Schedule | Scheduled | str | Path, robot: OneRobot | None =
     elif not isinstance(schedule, Schedule):
         schedule = schedule.schedule()
     swum = schedule if robot is None else schedule.swum_by(one_robot(robot))
-    track = replay_schedules([swum])[0]
+    track = replay_schedule(swum)
     return with_units(track if robot is None else schedule.in_own_units(track))

@@ -197,7 +197,7 @@ def steer(models: Mapping[str, Robot], truth: Robot, path: Path2D) -> dict[str, 
     runs = {}
     for label, model in models.items():
         planned = plan(path, model, lookup=tabulate(model))
-        track = replay([planned.schedule(truth)])[0]
+        track = replay(planned.schedule(truth))
         track[["x_over_l", "y_over_l"]] *= truth.tail_length / model.tail_length
         runs[label] = (planned.to_dict(), check(planned, track))
     return runs

@@ -22,9 +22,8 @@ from sim.io.errors import InputError
 from sim.io.files import write_text
 from sim.io.notebook import Shown, given_axes
 from sim.io.reading import ContentError, read_json
-from sim.mechanics import planar
-from sim.model.response import DWELLS, Responses, at_equal_dwells
-from sim.motion.steady_motion import STEADY_OUTPUTS, twists
+from sim.model.response import DWELLS, Responses
+from sim.motion.steady_motion import STEADY_OUTPUTS, net_speeds, twists
 from surrogate.domain import ROBOT
 from surrogate.error_modes import error_modes
 from surrogate.interface import ErrorModes
@@ -87,7 +86,7 @@ class RobotTable(Shown):
         lag, memory, rest, spread = (np.array(getattr(self, name))[side] for name in _CURVES)
         outputs, sense = self.query(columns), np.where(side == 0, 1.0, -1.0)
         twist = twists(outputs["v_z"], outputs["v_x"], outputs["omega_yr_bar"], sense)
-        speed = planar.net_speed(twist[:, None], lag + at_equal_dwells(memory, before), DWELLS)
+        speed = net_speeds(twist, lag, memory, before)
         none = np.zeros(len(side), dtype=bool)
         return Responses(lag, memory, rest, spread, speed, none, none, before)
 

@@ -25,10 +25,9 @@ from sim.effects import catalogue, effect_named
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.io.notebook import Shown, given_axes
-from sim.mechanics import planar
 from sim.model.groups import DWELL, checked_values
-from sim.model.response import DWELLS, Responses, at_equal_dwells
-from sim.motion.steady_motion import STEADY_OUTPUTS, twists
+from sim.model.response import DWELLS, Responses
+from sim.motion.steady_motion import STEADY_OUTPUTS, net_speeds, twists
 from surrogate.domain import INSIDE, NO_RESPONSE, NOT_LEARNED, ROBOT, Support, reason_of
 from surrogate.error_modes import CURVE_ERRORS, NORMAL_90, STEADY, CurveErrors, error_modes, joined
 from surrogate.errors import OUTPUTS, RELATIVE, certified_error, error_scale
@@ -146,8 +145,7 @@ class NeuralTable(Shown):
         self._check_known(values, motions, flag=flag)
         steady, sense = motions.steady, motions.robots[:, SENSE]
         twist = twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], sense)
-        lag = curves["lag"] + at_equal_dwells(curves["memory"])
-        speed = planar.net_speed(twist[:, None], lag, DWELLS)
+        speed = net_speeds(twist, curves["lag"], curves["memory"])
         none = np.zeros(len(speed), dtype=bool)
         return Responses(**curves, net_speed=speed, failed=none, stepped=none)
 

@@ -173,7 +173,7 @@ def _missed(table: RobotTable) -> tuple[Floats, Floats]:
         Differences (M, 3), and the spread (M, 3) of the lag over the disc's phase.
     """
     dwells = np.exp(np.random.default_rng(0).uniform(math.log(_RANGE[0]), math.log(_RANGE[1]), _CHECKED))
-    track = replay([Schedule(table.robot, 1, dwells, (0.0, 0.0, 0.0), 1.0)])[0]
+    track = replay(Schedule(table.robot, 1, dwells, (0.0, 0.0, 0.0), 1.0))
     flips = track.groupby("dwell").last()[["x_over_l", "y_over_l", "heading_rad"]].to_numpy()
     poses = np.concatenate([np.zeros((1, 3)), flips])
     moved = planar.between(poses[:-1], poses[1:])

@@ -261,7 +261,7 @@ def test_any_plan_is_replayed_or_refused(content: object, tmp_path: Path, monkey
     monkeypatch.setattr("sim.motion.replay.MOST_REPLAY_WORK", 1e5)
     (tmp_path / "plan.json").write_text(json.dumps(content))
     with suppress(InputError):
-        track = replay([load_schedule(tmp_path / "plan.json")])[0]
+        track = replay(load_schedule(tmp_path / "plan.json"))
         assert np.isfinite(track[["x_over_l", "y_over_l", "heading_rad"]].to_numpy()).all()
 
 

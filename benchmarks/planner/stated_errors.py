@@ -96,7 +96,7 @@ def swum(seed: int) -> Swum | str:
         path = random_path(rng, plan(circle(4.0), robot, lookup=table).tracked.vehicle.turn_radius)
         result = plan(path, robot, lookup=table, knowledge=knowledge)
         moved = {name: getattr(robot, name) * np.exp(SIGMA * rng.normal()) for name in COEFFICIENTS}
-        track = replay([result.schedule(replace(robot, **moved))])[0]
+        track = replay(result.schedule(replace(robot, **moved)))
     except InputError as refused:
         return f"{seed}: {refused}"
     wrong = tracking_error(result.to_dict(), track).largest

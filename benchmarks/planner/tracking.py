@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import time
 
-import pandas as pd
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
@@ -37,7 +36,7 @@ def main() -> None:
         spent.append(time.perf_counter() - began)
     schedules = [p.schedule() for p in plans]
     with tqdm(total=sum(len(p.dwells) for p in plans), desc="replay", unit="dwell") as bar:
-        tracks: list[pd.DataFrame] = replay(schedules, progress=bar.update)
+        tracks = [replay(schedule, progress=bar.update) for schedule in schedules]
     print("\nOpen-loop replay against the declared path, in tail lengths l")
     print(f"{'case':30}{'dwells':>8}{'rms':>9}{'max':>9}{'stated':>9}{'raw rms':>9}{'ms/switch':>11}")
     for (name, _, _), result, track, seconds in zip(CASES, plans, tracks, spent, strict=True):

@@ -58,7 +58,7 @@ def outcome(seed: int, in_time_steps: bool) -> Outcome | str:
     features = lookup.width_features(lookup.solve(columns))
     replayed = error = float("nan")
     if in_time_steps and schedule.dwells.sum() * schedule.robot["omega_bar"] * schedule.robot["N"] < _LITTLE:
-        track = replay([schedule])[0]
+        track = replay(schedule)
         replayed, error = tracking_error(result.to_dict(), track).largest, replay_error(schedule, track)
     return Outcome(
         seed, len(result.dwells), result.drawn.length, float(features[0, _NOVELTY]), result.predicted_max,

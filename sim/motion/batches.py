@@ -1,15 +1,15 @@
-"""Many robots in parallel: rows are split into batches of one N, which run in threads or processes.
+"""Many robots in parallel: rows are split into batches of one N, which run in threads.
 
-Each worker uses one thread. More threads inside small operations would only compete with the other workers.
+Each thread uses one processor. More threads inside small operations would only compete with the others.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -24,13 +24,11 @@ from sim.motion.sensitivity import Sensitivities, sensitivities
 from sim.motion.settling import settle
 from sim.motion.steady import steady
 from sim.motion.steady_motion import STABILITY_COLUMNS
-from sim.motion.warm import compile_once
-from sim.solve.refinement import PHASES_FOR_SLOPES
 
 _DIRECT_ROWS, _SLOPE_ROWS, _STEPPED_ROWS = 128, 16, 4  # robots a batch: the progress bar moves after each
-
-Job = TypeVar("Job")
-Result = TypeVar("Result")
+RESPONSE_ROWS = 16
+_KINDS = ("values", "derivatives")  # of `Sensitivities`
+one_thread = partial(threadpool_limits, 1, user_api="blas")  # a context in which matrix operations use one thread
 
 
 def split(tails: Floats, rows: int) -> list[Integers]:
@@ -41,63 +39,46 @@ def split(tails: Floats, rows: int) -> list[Integers]:
 
 
 def available_jobs() -> int:
-    """Count the processes to use by default: the processors that this process may run on."""
+    """Count the threads to use by default: the processors that this process may run on."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def run_batches(
-    work: Callable[[Job], Result],
-    jobs_to_do: Sequence[Job],
+def in_batches(
+    work: Callable[[Groups], Mapping[Any, Any]],
+    columns: Mapping[str, Floats],
+    rows: int,
     *,
-    sizes: Sequence[int],
     jobs: int | None = None,
     title: str = "",
-    threads: bool = False,
-) -> list[Result]:
-    """Apply `work` to every job in parallel processes, with a progress bar over rows.
+) -> dict[Any, Any]:
+    """Apply `work` to batches of robots of one N in threads, and join its columns in the order of the robots.
 
-    Results have the order of the jobs. The longest jobs should come first. With `threads`, jobs run in threads of
-    this process; use it for compiled loops, which do not hold the interpreter's lock.
+    Args:
+        work: compiled loops, which do not hold the interpreter's lock: from robots to columns, a row for each.
+        columns: robots by column name, each (M,).
+        rows: the most robots of a batch; the progress bar moves after each.
+        jobs: threads; default all processors.
+        title: of the progress bar; empty for none.
+
+    Raises:
+        InputError: fewer than one thread, or a robot is not possible.
     """
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs = {jobs}; give at least 1, or nothing for all processors")
-    count = min(jobs or available_jobs(), len(jobs_to_do))
-    in_this_process = (
-        threads or count <= 1
-    )  # the number of threads is a setting of the process: set it once, not in each worker
-    task = work if in_this_process else partial(_single_threaded, work)
-    results: list[Result] = []
-    if not in_this_process:
-        compile_once()
+    batches = split(columns["N"], rows)
+    parts = [Groups.from_columns({name: array[batch] for name, array in columns.items()}) for batch in batches]
+    count = min(jobs or available_jobs(), len(parts))
+    found = []
     with (
-        one_thread() if in_this_process else nullcontext(),
-        tqdm(total=sum(sizes), desc=title, unit="row", delay=1.0, disable=not title) as bar,
+        one_thread(),  # a setting of the process: set once, not in each thread
+        ThreadPoolExecutor(count) as threads,
+        tqdm(total=len(columns["N"]), desc=title, unit="row", delay=1.0, disable=not title) as bar,
     ):
-        if count <= 1:
-            done = map(task, jobs_to_do)
-        else:
-            from joblib import Parallel, delayed  # slow to import, and one job needs none of it
-
-            parallel = Parallel(
-                n_jobs=count, return_as="generator", pre_dispatch="2*n_jobs", prefer="threads" if threads else None
-            )
-            done = parallel(delayed(task)(job) for job in jobs_to_do)
-        for result, size in zip(done, sizes, strict=True):
-            results.append(result)
-            bar.update(size)
-    return results
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Let matrix operations of this process use one thread each."""
-    with threadpool_limits(1, user_api="blas"):
-        yield
-
-
-def _single_threaded(work: Callable[[Job], Result], job: Job) -> Result:
-    with one_thread():
-        return work(job)
+        for part in map(work, parts) if count == 1 else threads.map(work, parts):
+            found.append(part)
+            bar.update(len(batches[len(found) - 1]))
+    order = np.argsort(np.concatenate(batches))
+    return {name: np.concatenate([part[name] for part in found])[order] for name in found[0]}
 
 
 def steady_columns(
@@ -115,16 +96,18 @@ def steady_columns(
         The columns of `Steady.columns`, each (M,), in the order of the rows; without STABILITY_COLUMNS if these
         are not computed.
     """
-    values = check_columns(columns)
-    work = partial(_steady_batch, stability=stability)
-    return _in_batches(work, values, split(values["N"], _DIRECT_ROWS), jobs=jobs, title=title)
+
+    def work(groups: Groups) -> dict[str, Any]:
+        motion = steady(groups, stability=stability).columns()
+        return {name: column for name, column in motion.items() if stability or name not in STABILITY_COLUMNS}
+
+    return in_batches(work, check_columns(columns), _DIRECT_ROWS, jobs=jobs, title=title)
 
 
 def sensitivity_columns(
     columns: Mapping[str, Floats],
     parameters: Sequence[str],
     *,
-    phases: int = PHASES_FOR_SLOPES,
     jobs: int | None = None,
     title: str = "sensitivities",
 ) -> Sensitivities:
@@ -133,27 +116,22 @@ def sensitivity_columns(
     Args:
         columns: robots by column name, each (M,).
         parameters: names out of `sim.model.sweepable.SLOPE_INPUTS` and `sim.effects.catalogue()`, K of them.
-        phases: number of phases to begin with, see `sim.motion.sensitivity`.
         jobs: threads; default all processors.
         title: of the progress bar; empty for none.
     """
-    values = check_columns(columns)
-    batches = split(values["N"], _SLOPE_ROWS)
-    parts = [Groups.from_columns({name: array[rows] for name, array in values.items()}) for rows in batches]
-    work = partial(sensitivities, parameters=tuple(parameters), phases=phases)
-    done = run_batches(work, parts, sizes=[len(b) for b in batches], jobs=jobs, title=title, threads=True)
-    order = np.argsort(np.concatenate(batches))
-    return Sensitivities(
-        tuple(parameters),
-        {name: np.concatenate([d.values[name] for d in done])[order] for name in done[0].values},
-        {name: np.concatenate([d.derivatives[name] for d in done])[order] for name in done[0].derivatives},
-    )
+
+    def work(groups: Groups) -> dict[tuple[str, str], Floats]:
+        found = sensitivities(groups, parameters)
+        return {(kind, name): array for kind in _KINDS for name, array in getattr(found, kind).items()}
+
+    found = in_batches(work, check_columns(columns), _SLOPE_ROWS, jobs=jobs, title=title)
+    parts = ({name: array for (kind, name), array in found.items() if kind == wanted} for wanted in _KINDS)
+    return Sensitivities(tuple(parameters), *parts)
 
 
 def stepped_columns(
     columns: Mapping[str, Floats],
     *,
-    resolution: Resolution | None = None,
     finer: int = 1,
     jobs: int | None = None,
     title: str = "time stepping",
@@ -162,38 +140,12 @@ def stepped_columns(
 
     Args:
         columns: robots by column name, each (M,).
-        resolution: mesh and step of all rows; by default what each needs.
-        finer: a factor; edge length and time step are divided by it.
+        finer: a factor by which edge length and time step are divided.
         jobs: threads; default all processors.
         title: of the progress bar; empty for none.
     """
-    values = check_columns(columns)
-    work = partial(_settle_batch, chosen=resolution, finer=finer)
-    return _in_batches(work, values, split(values["N"], _STEPPED_ROWS), jobs=jobs, title=title)
 
+    def work(groups: Groups) -> dict[str, Any]:
+        return settle(groups, resolution=lambda speed: Resolution.fitting(speed).finer(finer)).columns()
 
-def _in_batches(
-    work: Callable[[dict[str, Floats]], dict[str, Any]],
-    values: dict[str, Floats],
-    batches: list[Integers],
-    *,
-    jobs: int | None,
-    title: str,
-) -> dict[str, Any]:
-    parts = [{name: array[rows] for name, array in values.items()} for rows in batches]
-    sizes = [len(b) for b in batches]
-    done = run_batches(work, parts, sizes=sizes, jobs=jobs, title=title, threads=True)
-    order = np.argsort(np.concatenate(batches))
-    return {name: np.concatenate([d[name] for d in done])[order] for name in done[0]}
-
-
-def _steady_batch(columns: dict[str, Floats], *, stability: bool) -> dict[str, Any]:
-    motion = steady(Groups.from_columns(columns), stability=stability).columns()
-    return {name: column for name, column in motion.items() if stability or name not in STABILITY_COLUMNS}
-
-
-def _settle_batch(columns: dict[str, Floats], *, chosen: Resolution | None, finer: int) -> dict[str, Any]:
-    def resolution(speed: float) -> Resolution:
-        return (chosen or Resolution.fitting(speed)).finer(finer)
-
-    return settle(Groups.from_columns(columns), resolution=resolution).columns()
+    return in_batches(work, check_columns(columns), _STEPPED_ROWS, jobs=jobs, title=title)

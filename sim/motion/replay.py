@@ -7,7 +7,7 @@ head's centre, seen from above. Lengths are in l, times in μ0 l⁴/EI and in se
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -43,26 +43,24 @@ class Stretch(NamedTuple):
 
 
 def replay(
-    schedules: Sequence[Schedule],
+    schedule: Schedule,
     *,
     resolution: Resolution | None = None,
     progress: Callable[[int], object] | None = None,
-) -> list[pd.DataFrame]:
-    """Simulate schedules, one after the other.
+) -> pd.DataFrame:
+    """Simulate a schedule.
 
     Args:
-        schedules: any robots.
+        schedule: of any robot.
         resolution: mesh and step; default `Resolution.for_tracks`.
         progress: called after each dwell with the number of dwells done since the last call.
 
     Returns:
-        A track for each schedule: time_s, x_cm and y_cm (if the schedule has a tail length), heading_deg,
+        The track: time_s, x_cm and y_cm (if the schedule has a tail length), heading_deg,
         time_bar, x_over_l, y_over_l, heading_rad, direction, dwell (index of the dwell that ends at or after the
         sample), plan_id (if the schedule is that of a plan).
     """
-    return [
-        track_of(schedule, stretches(schedule, resolution=resolution, progress=progress)) for schedule in schedules
-    ]
+    return track_of(schedule, stretches(schedule, resolution=resolution, progress=progress))
 
 
 def replay_error(
@@ -78,7 +76,7 @@ def replay_error(
         track: its track, as `replay` gives it by default.
         progress: as for `replay`.
     """
-    coarse = replay([schedule], resolution=_resolution(schedule).coarser(), progress=progress)[0]
+    coarse = replay(schedule, resolution=_resolution(schedule).coarser(), progress=progress)
     ends = [part.groupby("dwell").last()[["x_over_l", "y_over_l"]].to_numpy() for part in (track, coarse)]
     return float(np.hypot(*(ends[0] - ends[1]).T).max() / (COARSER**2 - 1))
 

@@ -17,11 +17,11 @@ from sim.effects import effect_named
 from sim.mechanics import planar
 from sim.mechanics.geometry import straight
 from sim.model.groups import Groups
-from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED, Responses, at_equal_dwells
+from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED, Responses
 from sim.motion.flips import NO_MARKS, Flip, follow_flips, orbits_with_phases
 from sim.motion.run import REVERSED
 from sim.motion.steady import check_groups, steady
-from sim.motion.steady_motion import Steady, twists
+from sim.motion.steady_motion import Steady, net_speeds, twists
 from sim.motion.stepped_response import stepped_response
 from sim.solve.assembly import numbers, reversed_numbers, unpacked
 from sim.solve.grouping import slices
@@ -52,7 +52,6 @@ class _Wanted(NamedTuple):
 
     tails: int
     even: bool  # a reversed motor gives the mirror image
-    before: Floats
     tolerance: float
 
 
@@ -62,7 +61,6 @@ def responses(
     motion: Steady | None = None,
     *,
     history: bool = True,
-    before: Floats = BEFORE,
     tolerance: float = TOLERANCE,
     meshes: tuple[int, int] = MESHES,
     extrapolated_memory: bool = False,
@@ -74,7 +72,6 @@ def responses(
         motion: the robots' steady motion, if it is at hand.
         history: simulate memory and rest, too; it takes four times as long. Without, both are NaN, and so is the
             net speed of dwells shorter than FORGOTTEN.
-        before: T̄ of the dwell before, (K,), increasing, below FORGOTTEN.
         tolerance: on the shape of the tails in one time step, in l; the default leaves 1e-4 to 1e-3 of a turn per
             time unit in the curves.
         meshes: edges of a tail on the two meshes; errors go as 1/n², extrapolated.
@@ -83,7 +80,7 @@ def responses(
     check_groups(groups)
     motion = steady(groups, stability=False) if motion is None else motion
     even = all(effect_named(name).symmetry == "even" for name in groups.effects)
-    wanted = _Wanted(groups.N, even, before, tolerance)
+    wanted = _Wanted(groups.N, even, tolerance)
     rows, reverse_rows = numbers(groups), reversed_numbers(groups)
     both = history and extrapolated_memory
     solved = [
@@ -99,7 +96,7 @@ def responses(
         if curves is None:
             body, reverse = unpacked(rows[[i]])[0], unpacked(reverse_rows[[i]])[0]
             values = stepped_response(
-                body, groups.N, DWELLS, before, reverse=reverse, history=history, settled=SETTLED
+                body, groups.N, DWELLS, BEFORE, reverse=reverse, history=history, settled=SETTLED
             )
             curves = Curves(*values)
         by_robot.append(curves)
@@ -108,11 +105,11 @@ def responses(
     twist = twists(motion.v_z, motion.v_x, motion.omega_yr, sense)
     if not history:
         memory[:], rest[:] = np.nan, np.nan
-    speed = planar.net_speed(twist[:, None], lag + at_equal_dwells(memory, before), DWELLS)
+    speed = net_speeds(twist, lag, memory)
     failed = ~np.isfinite(speed[:, -1])
     for array in (lag, memory, rest, spread, speed):
         array[failed] = np.nan
-    return Responses(lag, memory, rest, spread, speed, failed, stepped, before)
+    return Responses(lag, memory, rest, spread, speed, failed, stepped)
 
 
 def _on_meshes(
@@ -152,7 +149,7 @@ def _on_mesh(
     ]
     courses = follow_flips(flips, _TIMES, wanted.tolerance)
     pasts: list[tuple[Floats, Floats] | None]
-    pasts = [(np.zeros((len(wanted.before), len(DWELLS), 3)), np.zeros((len(DWELLS), 3)))] * len(rows)
+    pasts = [(np.zeros((len(BEFORE), len(DWELLS), 3)), np.zeros((len(DWELLS), 3)))] * len(rows)
     if history:
         solved = [flip if course else None for flip, course in zip(flips, courses, strict=True)]
         same = [course.lag[_UNTIL_SAME].mean(1) if course else None for course in courses]
@@ -175,7 +172,7 @@ def _flips_back(
     wanted: _Wanted,
 ) -> list[Flip | None]:
     """Flip from the steady motion after the flip; an even robot's flip back is the mirror image of its flip."""
-    last = float(wanted.before[-1])
+    last = float(BEFORE[-1])
     if wanted.even:
         return [flip and flip._replace(until=last) for flip in flips]
     return [
@@ -194,9 +191,9 @@ def _histories(
         back: flips in the other direction.
         same: lag after a long dwell, at DWELLS up to the time from which the memory is constant, (D, 3).
     """
-    count = len(wanted.before)
+    count = len(BEFORE)
     later: list[Flip | None] = []
-    for flip, course in zip(flips, follow_flips(back, _TIMES, wanted.tolerance, wanted.before), strict=True):
+    for flip, course in zip(flips, follow_flips(back, _TIMES, wanted.tolerance, BEFORE), strict=True):
         if flip is None or course is None:
             later += [None] * (count + 1)
             continue

@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Flags, Floats, Integers, Words
+from sim.mechanics import planar
+from sim.model.response import BEFORE, DWELLS, at_equal_dwells
 
 DIRECT, STEPPING = "direct", "stepping"
 STEADY_OUTPUTS = (
@@ -100,3 +102,14 @@ def twists(surge: Floats, sway: Floats, yaw_rate: Floats, sense: Floats) -> Floa
         sense: direction of the motor, ±1, (B,).
     """
     return np.stack([surge, sense * sway, sense * yaw_rate], -1)
+
+
+def net_speeds(twist: Floats, lag: Floats, memory: Floats, before: Floats = BEFORE) -> Floats:
+    """Compute the net speed (B, D) of equal dwells DWELLS.
+
+    Args:
+        twist: steady twists (B, 3), as `twists` returns them.
+        lag, memory: curves of the response, (B, D, 3) and (B, K, D, 3), see `sim.model.response`.
+        before: T̄ of the dwell before, (K,).
+    """
+    return planar.net_speed(twist[:, None], lag + at_equal_dwells(memory, before), DWELLS)

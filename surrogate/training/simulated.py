@@ -22,7 +22,7 @@ from sim.arrays import Flags, Floats, Integers
 from sim.effects import effect_named, is_effect
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, LAG_PARTS
-from sim.motion.batches import run_batches, split
+from sim.motion.batches import in_batches
 from sim.motion.response import TOLERANCE, responses
 from sim.motion.steady import orbits
 from surrogate.domain import DOMAIN, MOST_TAILS, ROBOT, WIDE
@@ -145,29 +145,22 @@ def simulate_robots(
         tolerance: of the curves, see `sim.motion.response.responses`.
         title: of the progress bar; empty for none.
     """
-    batches = split(np.asarray(robots["N"]), _CURVE_BATCH if curves else _BATCH)
-    parts = [{name: array[rows] for name, array in robots.items()} for rows in batches]
     work = partial(_with_curves, tolerance=tolerance) if curves else _motion
-    done = run_batches(work, parts, sizes=[len(b) for b in batches], title=title, threads=True)
-    order = np.argsort(np.concatenate(batches))
-    columns = {name: np.concatenate([part[name] for part in done])[order] for name in done[0]}
+    columns = in_batches(work, robots, _CURVE_BATCH if curves else _BATCH, title=title)
     motion = {name: columns[name] for name in MOTION}
     kept = {name: columns[name] for name in columns if name not in (*MOTION, "solved")}
     everything = SimulatedRobots({name: np.asarray(array) for name, array in robots.items()}, motion, kept)
     return everything.at(columns["solved"])
 
 
-def _motion(robots: dict[str, Floats]) -> dict[str, Any]:
-    groups = Groups.from_columns(robots)
+def _motion(groups: Groups) -> dict[str, Any]:
     motion = orbits(groups, phases=_PHASES.get(groups.N, 3))
     columns = motion.columns()
     return {name: columns[name] for name in MOTION} | {"solved": motion.converged}
 
 
-def _with_curves(robots: dict[str, Floats], *, tolerance: float) -> dict[str, Any]:
-    groups = Groups.from_columns(robots)
-    motion = orbits(groups)
-    response = responses(groups, motion, tolerance=tolerance)
-    columns = _motion(robots)
+def _with_curves(groups: Groups, *, tolerance: float) -> dict[str, Any]:
+    response = responses(groups, orbits(groups), tolerance=tolerance)
+    columns = _motion(groups)
     curves = {name: getattr(response, name) for name in ("lag", "memory", "rest", "spread", "net_speed")}
     return columns | curves | {"solved": columns["solved"] & ~response.failed & ~response.stepped}

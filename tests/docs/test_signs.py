@@ -33,7 +33,7 @@ TABLE = {column: (words, {"+": 1, "−": -1}[sign]) for words, column, sign in R
 @cache
 def steady_part(direction: int) -> pd.DataFrame:
     """Simulate two thirds of a circle from rest, without its beginning."""
-    track = replay([Schedule(CONTROL_VALUES, direction, np.array([90.0]), (0.3, -0.2, 0.4), 2.0)])[0]
+    track = replay(Schedule(CONTROL_VALUES, direction, np.array([90.0]), (0.3, -0.2, 0.4), 2.0))
     return track[track["time_bar"] > 6].reset_index(drop=True)
 
 
@@ -114,7 +114,7 @@ def test_five_seconds_at_plus_one_turn_left_on_the_bench() -> None:
     """From rest with straight tails."""
     for robot in PRESETS.values():
         five = np.array([5 / robot.time_scale])
-        track = replay([Schedule(robot.group_values(), 1, five, (0.0, 0.0, 0.0), robot.time_scale)])[0]
+        track = replay(Schedule(robot.group_values(), 1, five, (0.0, 0.0, 0.0), robot.time_scale))
         assert (np.diff(track["heading_rad"]) > 0).all()
         assert (np.diff(track["y_over_l"]) > 0).all()
         if robot is ROBOT:

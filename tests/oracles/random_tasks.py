@@ -28,7 +28,7 @@ def goal_behind_circles(rng: np.random.Generator) -> dict[str, Any]:
 
 def replayed_clearance(goal_plan: Plan) -> tuple[float, float, float]:
     """Replay a plan; return least clearance [l], distance from the goal [l] and error of the heading [rad]."""
-    track = replay([goal_plan.schedule()])[0]
+    track = replay(goal_plan.schedule())
     poses = np.stack([track[name].to_numpy(float) for name in ("x_over_l", "y_over_l", "heading_rad")], 1)
     clearance = Footprint.of(goal_plan.robot, 0.0).clearance(poses, goal_plan.kept_clear.free_space).min()
     turn = (poses[-1, 2] - goal_plan.job.goal[2] + np.pi) % (2 * np.pi) - np.pi

@@ -131,7 +131,7 @@ def test_a_robot_with_an_effect_is_planned_and_stays_within_the_stated_error(eff
     robot = ROBOT if effect in ROBOT.effects else replace(ROBOT, effects={effect: 0.2})
     (robot_table(5.0) if robot is ROBOT else tabulate(robot)).save(tmp_path / "robot.json")
     result = plan(polygon(4, 2.5), robot, lookup=load_table(tmp_path / "robot.json"))
-    error = tracking_error(result.to_dict(), replay([result.schedule()])[0])
+    error = tracking_error(result.to_dict(), replay(result.schedule()))
     assert error.largest < error.stated
     assert error.rms < (0.03 if robot is ROBOT else 1.5 * result.predicted_rms + 0.005)
 

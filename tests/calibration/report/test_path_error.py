@@ -65,7 +65,7 @@ def error_of(knowledge: str = "sure") -> PathError:
 def test_the_error_is_that_of_a_replay_in_time_steps() -> None:
     error = error_of()
     carried = error.carried_out["as_given"]
-    track = replay([carried.plan.schedule(CORRECTED)])[0]
+    track = replay(carried.plan.schedule(CORRECTED))
     places = CORRECTED.tail_length * track[["x_over_l", "y_over_l"]].to_numpy()
     distance = distance_to(error.polyline, places)
     weight = np.gradient(track["time_bar"].to_numpy())

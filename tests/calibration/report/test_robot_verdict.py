@@ -170,7 +170,7 @@ def _swum(schedule: Schedule, planned: Robot, truth: Robot) -> pd.DataFrame:
         truth.group_values(), schedule.first_direction, schedule.dwells * time, (x * length, y * length, heading),
         truth.time_scale,
     )  # fmt: skip
-    track = replay([schedule_of_truth])[0]
+    track = replay(schedule_of_truth)
     track[["x_over_l", "y_over_l"]] /= length
     return track
 

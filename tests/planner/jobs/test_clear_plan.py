@@ -106,7 +106,7 @@ def test_a_closed_path_that_is_blocked_at_its_start_begins_elsewhere() -> None:
 
 
 def test_the_simulator_stays_clear() -> None:
-    track = replay([around().schedule()])[0]
+    track = replay(around().schedule())
     poses = np.stack([track[name].to_numpy(float) for name in ("x_over_l", "y_over_l", "heading_rad")], 1)
     assert Footprint.of(CONTROL, 0.0).clearance(poses, ROCK).min() > 0
 
@@ -203,7 +203,7 @@ def test_circles_keep_clear_of_obstacles() -> None:
 @pytest.mark.rest
 def test_the_simulator_follows_swings() -> None:
     plan = waiting()
-    track = replay([plan.schedule()])[0]
+    track = replay(plan.schedule())
     assert float(track["time_s"].iloc[-1]) == pytest.approx(float(plan.seconds.sum()))
     error = tracking_error(plan.to_dict(), track)
     assert error.largest < 1.1 * plan.stated_error  # which 95 % of robots keep

@@ -183,7 +183,7 @@ def test_ninety_five_per_cent_of_random_robots_keep_within_the_error_in_place() 
 
 def test_they_keep_apart_in_the_simulator() -> None:
     pair = two()
-    tracks = replay([each.schedule() for each in pair.plans])
+    tracks = [replay(each.schedule()) for each in pair.plans]
     times = np.arange(0.0, pair.duration_s, 0.5)
     poses = [
         np.stack([np.interp(times - begin, track["time_s"], track[name])

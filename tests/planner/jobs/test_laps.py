@@ -129,7 +129,7 @@ def test_a_lap_drifts_as_stated() -> None:
 @pytest.mark.rest
 def test_the_simulator_swims_lap_after_lap() -> None:
     assert laps().lap is not None
-    track = replay([laps().schedule(laps=2)])[0]
+    track = replay(laps().schedule(laps=2))
     assert float(track["time_bar"].iloc[-1]) == pytest.approx(2 * laps().duration)
     poses = track[["x_over_l", "y_over_l", "heading_rad"]].to_numpy(float)
     one = poses[int(np.abs(track["time_bar"].to_numpy(float) - laps().duration).argmin())]
@@ -258,7 +258,7 @@ def test_the_simulator_circles_about_the_place_at_constant_direction() -> None:
         place.still_start,
         CONTROL.time_scale,
     )
-    track = replay([still])[0][["x_over_l", "y_over_l"]].to_numpy(float)
+    track = replay(still)[["x_over_l", "y_over_l"]].to_numpy(float)
     assert np.abs(np.hypot(*(track - PLACE).T) / place.smallest - 1).max() < 0.02
 
 

@@ -155,7 +155,7 @@ def test_among_obstacles_it_keeps_clear() -> None:
 
 def test_the_simulator_visits_all_places() -> None:
     result = tour(PLACES[:3], tracked(), QUICK)
-    track = replay([result.schedule()])[0]
+    track = replay(result.schedule())
     points = track[["x_over_l", "y_over_l"]].to_numpy(float)
     assert distance_to(points, np.array(PLACES[:3])).max() < result.stated_error + 0.05
 
@@ -259,7 +259,7 @@ def test_keep_outs_are_not_touched() -> None:
 @pytest.mark.rest
 def test_the_simulator_covers_the_same() -> None:
     swept = cover(FIELD, 0.5, tracked(), QUICK)
-    track = replay([swept.schedule()])[0][["x_over_l", "y_over_l"]].to_numpy(float)
+    track = replay(swept.schedule())[["x_over_l", "y_over_l"]].to_numpy(float)
     assert share_covered(FIELD, track, 0.5) == pytest.approx(swept.job.share, abs=0.02)
     assert share_covered(FIELD, track, 0.5) >= swept.job.sure
 

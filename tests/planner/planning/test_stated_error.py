@@ -142,7 +142,7 @@ def test_the_modes_of_the_phase_are_lags() -> None:
 def test_a_straight_line_of_two_tails_bends_as_stated() -> None:
     """With equal dwells the disc's phase adds to the heading at each pair."""
     result = plan_of(((0.0, 0.0), (12.0, 0.0)), dwell=1.8)
-    track = replay([result.schedule()])[0]
+    track = replay(result.schedule())
     aside = np.abs(track["y_over_l"]).max()
     assert 1.5 * result.predicted_max < aside < result.stated_error
 

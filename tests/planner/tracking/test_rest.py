@@ -80,7 +80,7 @@ def test_a_robot_that_was_moved_finds_back(name: str, moved: tuple[float, float,
 
 def test_the_rest_in_the_simulator_ends_where_the_path_ends() -> None:
     after = rest("square", 0.92, 0.3, -0.5, 0.8)
-    track = replay([after.schedule()])[0]
+    track = replay(after.schedule())
     end = track[["x_over_l", "y_over_l"]].iloc[-1].to_numpy()
     assert np.hypot(*(end - PLANS["square"]().reference[-1])) < after.stated_error + 0.02
 

@@ -13,7 +13,7 @@ from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.model.groups import Groups
 from sim.model.sweepable import SLOPE_INPUTS, SLOPE_OUTPUTS
-from sim.motion.batches import run_batches, sensitivity_columns, split
+from sim.motion.batches import in_batches, sensitivity_columns, split
 from sim.motion.sensitivity import sensitivities
 from sim.motion.steady import orbits
 from sim.solve.refinement import PHASES_FOR_SLOPES
@@ -28,7 +28,7 @@ def test_batches_hold_every_row_once_and_one_n_each() -> None:
     with pytest.raises(InputError, match="no parameter 'colour'"):
         sensitivities(control(), ["colour"])
     with pytest.raises(InputError, match="jobs = 0; give at least 1"):
-        run_batches(len, [[1]], sizes=[1], jobs=0)
+        in_batches(vars, {}, 1, jobs=0)
 
 
 def blas_threads() -> set[int]:
@@ -39,12 +39,13 @@ def test_threads_at_work_leave_the_number_of_threads_alone() -> None:
     """Workers that overlap and end in the order in which they began."""
     with threadpool_limits(2, user_api="blas"):
 
-        def work(pause: float) -> set[int]:
-            time.sleep(pause)
-            return blas_threads()
+        def work(groups: Groups) -> dict[str, np.ndarray]:
+            time.sleep(groups.omega_bar[0])
+            return {"threads": np.array(list(blas_threads()))}
 
-        seen = run_batches(work, [0.1, 0.2, 0.2, 0.2], sizes=[1] * 4, jobs=2, threads=True)
-        assert seen == [{1}] * 4
+        columns = {name: np.full(4, value) for name, value in CONTROL_VALUES.items()}
+        seen = in_batches(work, {**columns, "omega_bar": np.array([0.1, 0.2, 0.2, 0.2])}, 1, jobs=2)
+        assert seen["threads"].tolist() == [1] * 4
         assert blas_threads() == {2}
 
 

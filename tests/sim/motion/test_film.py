@@ -31,7 +31,7 @@ def schedule(*dwells: float) -> Schedule:
 
 def test_poses_and_directions_are_those_of_a_replay() -> None:
     wanted = schedule(1.1, 0.8, 1.3)
-    track = replay([wanted])[0]
+    track = replay(wanted)
     frames = scheduled_shapes(wanted, np.linspace(0, 3.2, 41))
     for k, name in enumerate(("x_over_l", "y_over_l", "heading_rad")):
         assert np.abs(frames.heads[:, k] - np.interp(frames.times, track.time_bar, track[name])).max() < 3e-3

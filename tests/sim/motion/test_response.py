@@ -52,7 +52,7 @@ def test_a_random_schedule_is_the_product_of_its_responses(tails: float, ends: t
     """A replay in the lab against lag, memory and arc of every dwell, with nothing fitted."""
     dwells = np.random.default_rng(4).uniform(*ends, 12)
     values = {**CONTROL_VALUES, "N": tails, "omega_bar": 15.0}
-    track = replay([Schedule(values, 1, dwells, (0.0, 0.0, 0.0), 1.0)])[0]
+    track = replay(Schedule(values, 1, dwells, (0.0, 0.0, 0.0), 1.0))
     flips = track.groupby("dwell").last()[["x_over_l", "y_over_l", "heading_rad"]].to_numpy()
     predicted = composed(responses(control(N=tails, omega_bar=15.0)), control(N=tails, omega_bar=15.0), dwells)
     travelled = np.abs(np.diff(flips[:, 2])).sum()
@@ -124,7 +124,7 @@ def test_a_replay_turns_at_the_rate_of_each_direction() -> None:
     """With an odd effect the two directions differ; each flip must change the effect, too."""
     values = {**CONTROL_VALUES, "omega_bar": 15.0, "left_right_bias": 0.3}
     both = steady(control(2, omega_bar=np.array([15.0, -15.0]), left_right_bias=0.3))
-    track = replay([Schedule(values, 1, np.array([8.0, 8.0]), (0.0, 0.0, 0.0), 1.0)])[0]
+    track = replay(Schedule(values, 1, np.array([8.0, 8.0]), (0.0, 0.0, 0.0), 1.0))
     for dwell, rate in enumerate(both.omega_yr):
         late = track[(track["dwell"] == dwell) & (track["time_bar"] > 8.0 * dwell + 4.0)]
         turned = np.diff(late["heading_rad"].to_numpy()[[0, -1]]) / np.diff(late["time_bar"].to_numpy()[[0, -1]])
