@@ -44,9 +44,11 @@ _ALIKE = 0.2  # relative difference of the bands' distance from the known one
 _BIAS = 0.0025  # of the bands' distance, standard error of a centre that does not come from noise
 _SHIFT = 0.0065  # of the bands' distance, of what shifts both: light from one side, glare
 _WHOLE = 0.3  # of the bands' distance, half the length of a band that must be in the picture, and in the region
-_END = 0.18  # of the bands' distance, by which a band's centre moves for a whole band that is hidden from one end
-_HIDDEN = 0.87  # of a band's usual area
-_MEMORY = 20.0  # pictures over which distance and areas are averaged
+_END = 0.18  # of the bands' distance, by which a band's centre moves for a whole band that is hidden at one end
+_CHANGED = 0.13  # of a band's usual area, by which another area shows that it is hidden or has a thing beside it
+_NOISE = 20.0  # pixels, three standard deviations of a band's area in a compressed film
+_OTHER = 0.3  # of a band's usual area, by which it may differ where the robot was not seen for _MEMORY pictures
+_MEMORY = 20  # pictures over which distance and areas are averaged
 _REACH = {"head": (-0.7, 0.7, 0.75), "tail": (-3.0, -0.6, 1.5)}  # where dots are: along the axis, to the side
 
 
@@ -147,7 +149,7 @@ class Detector:
                 memory.missed += 1
                 if memory.missed > memory.seen:  # what was seen may have been something else
                     memory.seen = 0
-                if memory.missed > _MEMORY:  # the light may have changed
+                if memory.missed > max(memory.seen, _MEMORY):
                     memory.areas.clear()
             else:
                 memory.seen, memory.missed = memory.seen + 1, 0
@@ -233,21 +235,22 @@ class Detector:
             return Lost(markers.name, "at the edge of the picture")
         if not all(self._inside(end) for end in ends):
             return Lost(markers.name, "outside the region of the tank")
-        metres, forget = apart / distance, min(memory.seen + 1, _MEMORY)
+        metres, forget, anew = apart / distance, min(memory.seen + 1, _MEMORY), memory.missed > _MEMORY
         bias = math.hypot(_BIAS * distance, _PIXEL)
-        variance = 0.0  # of the difference of the centres, in squares of pixels
+        variance, areas = 0.0, {}  # of the difference of the centres, in squares of pixels
         for name, blob in blobs.items():
-            area = blob.area * self.view.metres(blob.centre) ** 2
+            pixel = self.view.metres(blob.centre) ** 2
+            area = blob.area * pixel
             usual = memory.areas.get(name, area)
-            if area < _HIDDEN * usual:
+            least = 1 - (_OTHER if anew else min(max(_CHANGED, _NOISE * pixel / usual), _OTHER))
+            if area < least * usual:
                 return Lost(markers.name, f"{markers.colours[name]} partly hidden")
-            if area * _HIDDEN > usual:
+            if area * least > usual:
                 return Lost(markers.name, f"more that is {markers.colours[name]} beside it")
-            memory.areas[name] = usual + (area - usual) / forget
-            hidden = _END * distance * max(1 - area / usual, 0.0)
-            variance += blob.error**2 + bias**2 + hidden**2
+            areas[name] = area if anew else usual + (area - usual) / forget  # the light may have changed
+            variance += blob.error**2 + bias**2 + (_END * distance * (1 - area / usual)) ** 2
         memory.apart = known + (apart - known) / forget if memory.seen else apart
-        memory.places = {name: blob.centre for name, blob in blobs.items()}
+        memory.places, memory.areas = {name: blob.centre for name, blob in blobs.items()}, areas
         error = metres * math.sqrt(variance)
         sigma = math.hypot(error / 2, (apart - memory.apart) / 2, _SHIFT * apart)
         heading = math.atan2(arm[1], arm[0])
@@ -330,6 +333,7 @@ class Detector:
             return None
         weights = np.maximum(weights - _EDGE * peak, 0)
         counted, total = weights > 0, float(weights.sum())
+        area = float(np.minimum(weights / (_EDGE * peak), 1).sum()) * fold**2  # a pixel at its edge counts in part
         place, spread = [], 0.0
         for axis, count in enumerate((across, down)):
             at = np.arange(count)
@@ -337,7 +341,6 @@ class Detector:
             spread += float(counted.sum(axis=axis) @ (at - place[-1]) ** 2) / 2
         error = 1.2 * noise * math.sqrt(spread) / total  # p has √(3/2) times the noise of a colour; × fold / fold
         low = np.array([left, top])
-        area = float(np.count_nonzero(counted)) * fold**2
         return _Blob(low + (np.array(place) + 0.5) * fold - 0.5, area, error)
 
     def _search(

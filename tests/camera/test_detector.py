@@ -101,6 +101,19 @@ def test_a_robot_that_the_edge_of_the_picture_cuts_is_lost(tmp_path: Path) -> No
     assert pose == Lost("1", "at the edge of the picture")
 
 
+def test_a_hand_that_rests_on_the_robot_is_not_taken_for_a_band(tmp_path: Path) -> None:
+    tank, motion = Tank(width=320, height=240, scale=0.001), circling(0.5, 0.06)
+    detector, seen = detector_of(tank, tmp_path), 0
+    for index in range(110):
+        tank.hand = (index - 40) / 60 if 40 <= index < 100 else -1.0
+        (pose,) = detector.poses(tank.frame(motion, 0.1 * index))
+        if isinstance(pose, Pose):
+            seen += 1
+            sigmas = np.array([pose.sigma_x, pose.sigma_x, pose.sigma_heading])
+            assert (np.abs(off(pose, motion(0.1 * index))) < 5 * sigmas).all()  # 40, where any area was taken
+    assert seen > 65
+
+
 def test_a_hand_over_the_robot_loses_it_and_moves_no_pose(tmp_path: Path) -> None:
     tank, motion = Tank(), circling(radius=0.05)
     detector, lost = detector_of(tank, tmp_path), 0

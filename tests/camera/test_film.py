@@ -205,6 +205,19 @@ def test_times_are_those_of_the_stamps_where_the_rate_varies_and_frames_are_drop
     assert table["time_s"].to_numpy() == pytest.approx(times[table["frame"]], abs=1e-6)
 
 
+@pytest.mark.parametrize("scale", [0.0014, 0.0016])
+def test_a_robot_with_bands_of_five_pixels_is_not_lost(scale: float, tmp_path: Path) -> None:
+    tank = Tank(width=320, height=240, scale=scale, shade=0.3)
+    swum = circling(0.5, RADIUS, centre=(160 * scale, 120 * scale))
+    table = track_film(tank.film(tmp_path / "a.mp4", swum, 10.0, RATE), setup_of(tank, tmp_path)).tables["1"]
+    assert len(table) >= 119
+    truth = np.array([swum(time) for time in table["time_s"]])
+    off = np.abs(table[["x_cm", "y_cm"]].to_numpy() / 100 - truth[:, :2])
+    turned = np.abs((table["heading_deg"] - np.degrees(truth[:, 2]) + 180) % 360 - 180)
+    assert (100 * off < 1.96 * table[["x_error_cm"]].to_numpy()).mean() > 0.95
+    assert (turned < 1.96 * table["heading_error_deg"]).mean() > 0.93
+
+
 @pytest.mark.parametrize("given", [{"distortion": -0.3}, {"readout": 0.03}], ids=["lens", "rolling shutter"])
 def test_errors_hold_in_films_through_a_lens_and_a_rolling_shutter(
     given: dict[str, float], tmp_path: Path
