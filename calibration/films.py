@@ -9,10 +9,11 @@ from pathlib import Path
 import pandas as pd
 
 from calibration.swimmer.camera_tracks import MeasuredTracks, measure_tracks
+from calibration.swimmer.measured_table import convert_measured
 from camera.film import Film
 from camera.tracks import track_film
 from camera.view import read_setup
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 from sim.io.quantities import numbers_of
 from sim.io.tables import read_table, row_name
 from sim.model.robot import Robot
@@ -39,11 +40,13 @@ def measure_films(
     if len(setup.robots) > 1:
         raise InputError(f"{view} has {len(setup.robots)} robots; films of runs show one")
     parts = {name: numbers_of(table[name]) for name in ("start_s", "end_s") if name in table}
+    with naming(runs):
+        noted, converted = convert_measured(table.drop(columns=["film", *parts]), str(runs))
     for index, film in enumerate(table["film"]):
         if not isinstance(film, str):
             raise InputError(f"{runs}: {row_name(table, index)} has no film")
         Film(Path(runs).parent / film)  # refused before the first is tracked, which takes a while
-    tracks = []
+    tracks, scale_error = [], 0.0
     for index, film in enumerate(table["film"]):
         start, end = (
             float(parts[name].iloc[index]) if name in parts else math.nan for name in ("start_s", "end_s")
@@ -58,8 +61,9 @@ def measure_films(
         for note in tracked.notes:
             tell(f"{film}: {note}")
         tracks.append(next(iter(tracked.tables.values())).assign(run=index + 1))
-    scale = 100 * tracked.view.scale_error
-    noted = table.drop(columns=["film", *parts]).assign(run=range(1, len(table) + 1))
+        scale_error = max(scale_error, tracked.view.scale_error)  # of a tag, whose scale each film has anew
     if "camera_scale_sigma_percent" not in noted:
-        noted["camera_scale_sigma_percent"] = scale
-    return measure_tracks(pd.concat(tracks, ignore_index=True), noted, robot=robot)
+        noted["camera_scale_sigma_percent"] = 100 * scale_error
+    noted["run"] = range(1, len(noted) + 1)
+    measured = measure_tracks(pd.concat(tracks, ignore_index=True), noted, robot=robot)
+    return measured._replace(converted=(*converted, *measured.converted))

@@ -57,7 +57,7 @@ from sim.inputs import MEASURED, RUN_COLUMNS, RUN_NOTES, RUN_SIGMAS
 from sim.inputs import RUN as INPUTS
 from sim.inputs import RUN_SYNONYMS as SYNONYMS
 from sim.io.errors import InputError, naming
-from sim.io.quantities import convert_columns, numbers_of
+from sim.io.quantities import Converted, convert_columns, numbers_of
 from sim.io.tables import read_table, row_name
 from sim.io.units import to_si
 
@@ -128,20 +128,29 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
         return _read(source)
 
 
-def _read(source: str | Path | pd.DataFrame) -> Measurements:
-    table, where = (source, "the table") if isinstance(source, pd.DataFrame) else (read_table(source), str(source))
-    outputs_columns = (column for column, _, _ in OUTPUTS.values())
+def convert_measured(table: pd.DataFrame, where: str) -> Converted:
+    """Rename and convert the columns of a measured table, which may lack its outputs.
+
+    Raises:
+        InputError: a column is missing, misspelt or there twice.
+    """
     table, converted = convert_columns(table, INPUTS, where, SYNONYMS)
     for name in INPUTS:  # before the others: a table without them is no measured table
         if name not in table:
             raise InputError(f"the table has no column {name!r}; it needs {', '.join(INPUTS)}")
-    table, others = convert_columns(table, (*outputs_columns, *RUN_NOTES, *RUN_SIGMAS), where, SYNONYMS)
-    converted = (*converted, *others)
-    unknown = [str(c) for c in table if c not in RUN_COLUMNS]
-    for name in unknown:
+    outputs = (column for column, _, _ in OUTPUTS.values())
+    table, others = convert_columns(table, (*outputs, *RUN_NOTES, *RUN_SIGMAS), where, SYNONYMS)
+    for name in (str(c) for c in table if c not in RUN_COLUMNS):
         near = difflib.get_close_matches(name, RUN_COLUMNS, n=1)
         if near:
             raise InputError(f"unknown column {name!r}: is it {near[0]!r}? rename or drop it")
+    return Converted(table, (*converted, *others))
+
+
+def _read(source: str | Path | pd.DataFrame) -> Measurements:
+    table, where = (source, "the table") if isinstance(source, pd.DataFrame) else (read_table(source), str(source))
+    table, converted = convert_measured(table, where)
+    unknown = [str(c) for c in table if c not in RUN_COLUMNS]
     empty = [str(c) for c in table if c not in (*INPUTS, *unknown) and _is_empty(table[c])]
     table = table.drop(columns=empty)
     outputs = tuple(name for name, (column, _, _) in OUTPUTS.items() if column in table)

@@ -16,7 +16,7 @@ from calibration.films import measure_films
 from calibration.swimmer.camera_tracks import measure_tracks
 from camera.film import Film
 from camera.spin import Spin, fit_spin
-from camera.tracks import track_film
+from camera.tracks import FilmTracks, track_film
 from camera.view import Setup, read_setup
 from sim.inputs import load_robot
 from sim.io.errors import InputError, run_command
@@ -180,10 +180,35 @@ def test_films_of_runs_become_a_measured_table(tmp_path: Path, capsys: pytest.Ca
     table.assign(film=["swim.mp4", "none.mp4"]).to_csv(film().parent / "missing.csv", index=False)
     with pytest.raises(InputError, match=r"none\.mp4: no such file"):
         measure_films(film().parent / "missing.csv", film().parent / "view.toml", robot, tell=said.append)
+    for wrong, words in ((table.drop(columns="N"), "the table has no column 'N'; it needs N, l_cm"),
+                         (table.rename(columns={"l_cm": "l"}), "column 'l' has no unit; name it one of l_m"),
+                         (table.assign(sesion="a"), "unknown column 'sesion': is it 'session'")):  # fmt: skip
+        wrong.to_csv(film().parent / "wrong.csv", index=False)
+        with pytest.raises(InputError, match=rf"wrong\.csv: {words}"):
+            measure_films(film().parent / "wrong.csv", film().parent / "view.toml", robot, tell=said.append)
     assert not said
     table.drop(columns="film").to_csv(tmp_path / "runs.csv", index=False)
     with pytest.raises(InputError, match=r"runs\.csv has no column 'film'"):
         measure_films(tmp_path / "runs.csv", film().parent / "view.toml", robot)
+
+
+def test_the_largest_error_of_a_tag_s_scale_counts_for_all_films(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = small().film(tmp_path / "a.mp4", SWUM, 3.0, RATE)
+    setup_of(small(), tmp_path)
+    errors = iter((0.02, 0.01))
+
+    def tracked(*words: object, **given: float) -> FilmTracks:
+        tracks = track_film(*words, **given)  # type: ignore[arg-type]
+        return tracks._replace(view=replace(tracks.view, scale_error=next(errors)))
+
+    monkeypatch.setattr("calibration.films.track_film", tracked)
+    runs = pd.DataFrame({"film": [made.name] * 2, "N": 2, "l_cm": 11.0, "rpm": (TAILS - HEAD) * 30 / math.pi})
+    runs.to_csv(tmp_path / "runs.csv", index=False)
+    measured = measure_films(tmp_path / "runs.csv", tmp_path / "view.toml", load_robot("paper-control"))
+    assert measured.table["camera_scale_sigma_percent"].tolist() == [2.0, 2.0]
+    assert measured.converted == ("column rpm read as omega_rpm",)
 
 
 def test_times_are_those_of_the_stamps_where_the_rate_varies_and_frames_are_dropped(tmp_path: Path) -> None:
