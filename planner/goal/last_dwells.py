@@ -121,22 +121,13 @@ def _least_squares(
     """
     from scipy.optimize import least_squares  # here, for it takes longer to load than most plans to make
 
-    known: dict[bytes, tuple[Floats, Floats]] = {}
-
-    def at(dwells: Floats) -> tuple[Floats, Floats]:
-        """Compute residuals (R,) and derivatives (R, K) together."""
-        key = dwells.tobytes()
-        if key not in known:
-            values = residuals(np.concatenate([dwells[None], dwells + _STEP * np.eye(len(dwells))]))
-            known.clear()
-            known[key] = values[0], (values[1:] - values[0]).T / _STEP
-        return known[key]
-
     def values(dwells: Floats) -> Floats:
-        return at(dwells)[0]
+        return residuals(dwells[None])[0]
 
     def slopes(dwells: Floats) -> Floats:
-        return at(dwells)[1]
+        """Compute derivatives (R, K), all dwells at once."""
+        at = residuals(np.concatenate([dwells[None], dwells + _STEP * np.eye(len(dwells))]))
+        return np.asarray((at[1:] - at[0]).T / _STEP)
 
     return np.asarray(least_squares(values, first, slopes, bounds=(least, np.inf), **options).x)
 

@@ -9,6 +9,7 @@ direct joints between places on it. Lengths in l.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -29,6 +30,7 @@ _PLACES = 40  # on a leg, between which shorter joints are sought
 _ENOUGH = 1.005  # a chain at most this much longer than the shortest one without obstacles needs no lattice
 _THIN = 3  # of the courses at a stop, every third one is joined to the lattice
 _MOST_CHECKS = 300  # chains of words
+_FREE = np.zeros(1)  # cost of any option
 AROUND = 6.0  # radii that the lattice reaches beyond stops and obstacles
 
 
@@ -126,31 +128,40 @@ def _chosen(stops: list[Floats], limits: RouteLimits, margin: float) -> DubinsPa
     legs = [words(starts[:, None], ends[None], limits.radius) for starts, ends in pairwise(stops)]
     lengths = [leg.sum(-1) for leg in legs]
     for _ in range(_MOST_CHECKS):
-        costs, back = np.zeros(len(stops[0])), []
-        for length in lengths:
-            total = costs[:, None] + length.min(-1)
-            back.append(total.argmin(0))
-            costs = total.min(0)
-        at = int(costs.argmin())
-        if not np.isfinite(costs[at]):
+        options, total = best_options([length.min(-1) for length in lengths])
+        if not np.isfinite(total):
             return None
-        chain = []
-        for leg, length, before, starts in zip(reversed(legs), reversed(lengths), reversed(back), stops[-2::-1],
-                                            strict=True):  # fmt: skip
-            came = int(before[at])
-            word = int(length[came, at].argmin())
-            track = DubinsPaths(starts[came : came + 1], TURNS[word : word + 1], leg[came, at, word][None],
-                                limits.radius)  # fmt: skip
-            chain.append((track, length, (came, at, word)))
-            at = came
-        joined = DubinsPaths.joined([track for track, _, _ in chain[::-1]])
-        free = np.ones(len(chain), dtype=bool) if limits.space.empty else limits.free(joined, margin)[::-1]
+        ends = list(pairwise(options))
+        chosen = [int(length[pair].argmin()) for length, pair in zip(lengths, ends, strict=True)]
+        start = np.array([stop[k] for stop, k in zip(stops[:-1], options[:-1], strict=True)])
+        parts = np.array([leg[pair][word] for leg, pair, word in zip(legs, ends, chosen, strict=True)])
+        joined = DubinsPaths(start, TURNS[chosen], parts, limits.radius)
+        free = np.ones(len(ends), dtype=bool) if limits.space.empty else limits.free(joined, margin)
         if free.all():
             return joined
-        for (_, length, place), good in zip(chain, free.tolist(), strict=True):
-            if not good:
-                length[place] = np.inf
+        for k in np.flatnonzero(~free).tolist():
+            lengths[k][(*ends[k], chosen[k])] = np.inf
     return None
+
+
+def best_options(legs: Sequence[Floats], start: Floats = _FREE, end: Floats = _FREE) -> tuple[list[int], float]:
+    """Choose an option at each stop of a chain; return the options and what the chain costs.
+
+    Args:
+        legs: (C, C') each, from the options of a stop to those of the next one.
+        start: (C,), of the options of the first stop; default: all are free.
+        end: (C',), of those of the last one.
+    """
+    total, back = start, []
+    for leg in legs:
+        sums = total[:, None] + leg
+        back.append(sums.argmin(0))
+        total = sums.min(0)
+    total = total + end
+    options = [int(total.argmin())]
+    for came in reversed(back):
+        options.append(int(came[options[-1]]))
+    return options[::-1], float(total.min())
 
 
 def _lattice(stops: list[Floats], limits: RouteLimits, spacing: float, courses: int) -> Lattice:

@@ -140,6 +140,11 @@ class _Track:
 
     def swung(self, rest: float, circles: int, radius: float) -> Iterator[_Candidate]:
         """Yield swings that gain `rest` besides their circles, from the end of the track to its beginning."""
+        from scipy.optimize import brentq  # here, for it takes longer to load than most plans to make
+
+        def beyond(joins: float, leaves: float, word: int) -> float:
+            return float(self._gained(leaves, np.array([joins]), radius)[0, word]) - rest
+
         for leaves in self._places(radius):
             until = np.searchsorted(self._arc, leaves + _LONGEST * radius)
             joins = self._arc[np.searchsorted(self._arc, leaves) + 1 : until]
@@ -151,7 +156,7 @@ class _Track:
                 jumps = np.abs(np.diff(gained, axis=0)) > _JUMP * radius
                 crossed = ((gained[:-1] - rest) * (gained[1:] - rest) <= 0) & ~jumps
             for row, word in sorted(np.argwhere(crossed).tolist()):
-                joins_at = self._root(leaves, joins[row], joins[row + 1], word, rest, radius)
+                joins_at = brentq(beyond, joins[row], joins[row + 1], (leaves, word))
                 turns, lengths = three_arcs(self.at(leaves), self.at(joins_at), radius)
                 parts = lengths[word] + np.array([2 * math.pi * radius * circles, 0.0, 0.0])
                 path = DubinsPaths(self.at(leaves)[None], turns[word][None], parts[None], radius)
@@ -190,14 +195,3 @@ class _Track:
         """Compute the lengths (m, 4) that swings between two places gain."""
         ends = points_at(joins, self._arc, self._poses)
         return np.asarray(three_arcs(self.at(leaves), ends, radius)[1].sum(-1) - (joins - leaves)[:, None])
-
-    def _root(self, leaves: float, low: float, high: float, word: int, rest: float, radius: float) -> float:
-        """Find the place to join between two, by bisection."""
-        above = self._gained(leaves, np.array([low]), radius)[0, word] > rest
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2
-            if (self._gained(leaves, np.array([middle]), radius)[0, word] > rest) == above:
-                low = middle
-            else:
-                high = middle
-        return (low + high) / 2

@@ -21,7 +21,7 @@ from planner.jobs.shortest_order import EXACT, MOST, Order, shortest_order
 from planner.jobs.travel import SLACK, Travel, plan_track, preferred_setting
 from planner.paths.distance import distance_to
 from planner.paths.obstacles import Circle, FreeSpace, Region
-from planner.paths.path import arc_length, points_at
+from planner.paths.path import arc_length, points_at, runs_of
 from planner.paths.units import in_lab
 from planner.planning.picture import DECLARED
 from planner.planning.plan import Job, Plan
@@ -315,15 +315,9 @@ def lanes(field: Field, width: float, angle: float, *, apart: float) -> Floats:
         middle = low[1] + (k + 0.5) * spacing
         y = middle + spacing * (np.arange(_ACROSS) / (_ACROSS - 1) - 0.5) * 0.999
         points = np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2) @ turn
-        wanted = field.contains(points).reshape(len(x), _ACROSS).any(1)
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], wanted, [False]]).astype(int)))
-        runs: list[list[float]] = []
-        for first, last in zip(x[edges[::2]].tolist(), x[edges[1::2] - 1].tolist(), strict=True):
-            if runs and first - runs[-1][1] < apart:
-                runs[-1][1] = last
-            else:
-                runs.append([first, last])
-        found += [[[first, middle], [max(last, first + step), middle]] for first, last in runs]
+        wanted = np.asarray(field.contains(points).reshape(len(x), _ACROSS).any(1))
+        for first, last in runs_of(wanted, x, apart):
+            found.append([[x[first], middle], [max(x[last], x[first] + step), middle]])
     return np.array(found).reshape(-1, 2, 2) @ turn
 
 

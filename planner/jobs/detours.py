@@ -27,7 +27,7 @@ from planner.goal.route import AROUND, LEVELS, shortened
 from planner.paths.distance import nearest
 from planner.paths.nearest_path import nearest_poses, tracked_points
 from planner.paths.obstacles import Footprint, FreeSpace
-from planner.paths.path import Path2D, arc_length, points_at
+from planner.paths.path import Path2D, arc_length, points_at, runs_of
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.tractrix import reference as follow_path
 from planner.paths.units import in_lab, place_in_lab
@@ -272,7 +272,7 @@ def _turned(reference: Reference, blocked: Flags) -> Reference:
 
 def _stretches(blocked: Flags, arc: Floats, radius: float) -> list[Stretch]:
     """Find blocked stretches; those that are near one another are one."""
-    runs, stretches = _runs(blocked, arc, 2 * radius), []
+    runs, stretches = runs_of(blocked, arc, 2 * radius), []
     for k, (first, last) in enumerate(runs):
         middle_before = 0 if k == 0 else _halfway(arc, runs[k - 1][1], first)
         middle_behind = len(arc) - 1 if k == len(runs) - 1 else _halfway(arc, last, runs[k + 1][0]) - 1
@@ -307,7 +307,7 @@ def _compared(reference: Reference, changed: Reference) -> tuple[Detour, ...]:
     distance, segment, _ = nearest(reference.p, changed.p)
     arc = arc_length(changed.p)
     detours = []
-    for first, last in _runs(distance > _OFF, arc, _APART):
+    for first, last in runs_of(distance > _OFF, arc, _APART):
         a, b = max(first - 1, 0), min(last + 1, len(arc) - 1)
         farthest = float(distance[a : b + 1].max())
         if farthest > _FAR:
@@ -315,18 +315,6 @@ def _compared(reference: Reference, changed: Reference) -> tuple[Detour, ...]:
             places = _place(changed.p[a]), _place(changed.p[b])
             detours.append(Detour(*places, float(arc[b] - arc[a]), replaced, farthest))
     return tuple(detours)
-
-
-def _runs(flags: Flags, arc: Floats, apart: float) -> list[tuple[int, int]]:
-    """List first and last index of each run of true flags; those less than `apart` along the arc are one."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    runs: list[tuple[int, int]] = []
-    for first, last in zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True):
-        if runs and arc[first] - arc[runs[-1][1]] < apart:
-            runs[-1] = (runs[-1][0], last)
-        else:
-            runs.append((first, last))
-    return runs
 
 
 class Hindered:

@@ -187,8 +187,7 @@ class _Fleet:
     def _resting(self, k: int, when: float) -> Places:
         """Return the place of a robot before (0) or after (1) its motion."""
         motion = self.motions[k]
-        times = np.array([when * motion.duration])
-        return Places(motion.body, motion.poses(times), motion.error(times))
+        return motion.places(np.array([when * motion.duration]))
 
     def refusal(self, search: Priorities[Scheduled]) -> str:
         """Say which robots cannot keep apart, and why."""
@@ -212,8 +211,7 @@ class _Fleet:
     def _in_the_way(self, resting: int, moving: int) -> list[str]:
         """Say whether a robot starts or ends on the way of another one."""
         motion = self.motions[moving]
-        times = np.arange(0.0, motion.duration, self._step(moving, ()))
-        along = Places(motion.body, motion.poses(times), motion.error(times))
+        along = motion.places(np.arange(0.0, motion.duration, self._step(moving, ())))
         names = self.members[resting].name, self.members[moving].name
         return [
             f"{names[0]} {word} on the way of {names[1]}"

@@ -174,7 +174,7 @@ class FleetPlan(Shown):
                 draw_regions(axes, plan.kept_clear.free_space, plan.robot.length_scale)
             poses = each.places(np.linspace(each.begin, each.end, 2000)).poses
             axes.plot(*(100 * poses[:, :2].T), color=colour, lw=1.0, label=self.names[k])
-            ends = 100 * each.motion.body.ends(poses[0])
+            ends = 100 * each.motion.body.centres(poses[0])
             axes.plot(*ends.T, color=colour, lw=4, alpha=0.35, solid_capstyle="round")
             shown = marks[(60 * marks > each.begin) & (60 * marks < each.end)]
             places = 100 * each.places(60 * shown).poses[:, :2]

@@ -30,12 +30,13 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from shapely import distance, linestrings
 
 from planner.draws import normals
 from planner.paths.obstacles import Footprint
 from planner.paths.path import Path2D, arc_length, axis_at, points_at
 from planner.paths.tractrix import reference
-from planner.paths.units import Swimmer
 from planner.planning.errors import LEVEL, WOBBLE, deviations_open_loop, error_growth
 from planner.planning.plan import Plan
 from planner.vehicle.rollout import roll_out
@@ -48,35 +49,8 @@ from sim.mechanics import planar
 _PLACES = 300  # along a path
 _DRAWS = 400
 _SPACING = 0.05  # l, of the points of a tractrix
-_ROWS = 200  # of a table of pairs at once
 _FINER = 6  # instants in a dwell
 _MOST = 40_000  # instants
-
-
-@dataclass(frozen=True)
-class Body:
-    """A line along the robot's axis, with a width. Lengths in m."""
-
-    front: float  # end of the line, forward from the head's centre
-    back: float  # other end, negative
-    radius: float  # of the body around the line
-
-    @staticmethod
-    def of(robot: Swimmer) -> Body:
-        """Cover head and straight tails."""
-        discs, length = Footprint.of(robot, 0.0), robot.length_scale
-        front, back = discs.ends
-        return Body(front * length, back * length, discs.radius * length)
-
-    @property
-    def reach(self) -> float:
-        """Largest distance of a point of the body from the head's centre."""
-        return max(self.front, -self.back) + self.radius
-
-    def ends(self, poses: Floats) -> Floats:
-        """Compute the ends (..., 2, 2) of the line at poses (..., 3) of the head's centre."""
-        axis = axis_at(poses[..., 2])
-        return np.asarray(poses[..., None, :2] + np.array([[self.front], [self.back]]) * axis[..., None, :])
 
 
 @dataclass(frozen=True)
@@ -92,9 +66,15 @@ class TimedMotion:
         return self.plan.duration * self.plan.robot.time_scale
 
     @cached_property
-    def body(self) -> Body:
-        """What must keep apart from other bodies."""
-        return Body.of(self.plan.robot)
+    def body(self) -> Footprint:
+        """The ends of the line that covers the body; all in m."""
+        robot = self.plan.robot
+        discs, length = Footprint.of(robot, 0.0), robot.length_scale
+        return Footprint(length * np.array(discs.ends), length * discs.radius)
+
+    def places(self, times: Floats) -> Places:
+        """Return poses and errors at times (K,)."""
+        return Places(self.body, self.poses(times), self.error(times))
 
     def poses(self, times: Floats) -> Floats:
         """Predict the poses (K, 3) of the head's centre [m, rad] at times (K,) [s]; it rests before and after."""
@@ -142,21 +122,21 @@ class Scheduled:
 
     def places(self, times: Floats) -> Places:
         """Return poses and errors at times (K,) of the fleet."""
-        own = times - self.begin
-        return Places(self.motion.body, self.motion.poses(own), self.motion.error(own))
+        return self.motion.places(times - self.begin)
 
 
 @dataclass(frozen=True)
 class Places:
     """A body at K poses, with its error in place at each."""
 
-    body: Body
+    body: Footprint  # the ends of its line
     poses: Floats  # (K, 3)
     error: Floats  # (K,)
 
-    def middles(self) -> Floats:
-        """Return the middles (K, 2) of the body's line."""
-        return self.body.ends(self.poses).mean(-2)
+    @cached_property
+    def lines(self) -> NDArray[np.object_]:
+        """The body's line (K,) at each pose."""
+        return np.asarray(linestrings(self.body.centres(self.poses)))
 
 
 def instants(scheduled: Sequence[Scheduled]) -> Floats:
@@ -168,7 +148,7 @@ def instants(scheduled: Sequence[Scheduled]) -> Floats:
 
 def distances(first: Places, second: Places) -> Floats:
     """Compute the distances (K,) of two bodies at the same K instants, negative where they overlap."""
-    lines = line_distance(first.body.ends(first.poses), second.body.ends(second.poses))
+    lines = distance(first.lines, second.lines)
     return np.asarray(lines - first.body.radius - second.body.radius)
 
 
@@ -190,42 +170,14 @@ def approach(first: Scheduled, second: Scheduled) -> Approach:
 
 def too_near(first: Places, second: Places, apart: float) -> Flags:
     """Tell for all pairs of poses (I, J) whether bodies may be nearer than `apart`."""
-    ends, other_ends = first.body.ends(first.poses), second.body.ends(second.poses)
-    middles, others = first.middles(), second.middles()
-    widths = first.body.radius + second.body.radius + apart
-    halves = (first.body.front - first.body.back + second.body.front - second.body.back) / 2
-    near = np.zeros((len(middles), len(others)), dtype=bool)
-    gap = np.maximum(middles.min(0) - others.max(0), others.min(0) - middles.max(0)).max()
-    if gap > widths + halves + first.error.max() + second.error.max():
-        return near
-    for begin in range(0, len(middles), _ROWS):
-        rows = slice(begin, begin + _ROWS)
-        needed = widths + first.error[rows, None] + second.error
-        away = np.hypot(middles[rows, None, 0] - others[:, 0], middles[rows, None, 1] - others[:, 1])
-        i, j = np.nonzero(away < needed + halves)
-        near[begin + i, j] = line_distance(ends[begin + i], other_ends[j]) < needed[i, j]
+    one, other = (each.body.centres(each.poses).mean(-2) for each in (first, second))
+    needed = first.body.radius + second.body.radius + apart + first.error[:, None] + second.error
+    halves = (np.ptp(first.body.places) + np.ptp(second.body.places)) / 2
+    away = np.hypot(one[:, None, 0] - other[:, 0], one[:, None, 1] - other[:, 1])
+    i, j = np.nonzero(away < needed + halves)  # distances of lines take longer
+    near = np.zeros(needed.shape, dtype=bool)
+    near[i, j] = distance(first.lines[i], second.lines[j]) < needed[i, j]
     return near
-
-
-def line_distance(first: Floats, second: Floats) -> Floats:
-    """Compute the distances (...) of straight lines with ends (..., 2, 2); 0 where they cross."""
-    a, b, c, d = first[..., 0, :], first[..., 1, :], second[..., 0, :], second[..., 1, :]
-    squares = [_to_line(a, c, d), _to_line(b, c, d), _to_line(c, a, b), _to_line(d, a, b)]
-    crossing = (_side(a, b, c) * _side(a, b, d) < 0) & (_side(c, d, a) * _side(c, d, b) < 0)
-    return np.where(crossing, 0.0, np.sqrt(np.minimum.reduce(squares)))
-
-
-def _to_line(point: Floats, begin: Floats, end: Floats) -> Floats:
-    """Compute squared distances (...) of points (..., 2) from lines."""
-    edge, away = end - begin, point - begin
-    share = np.clip((away * edge).sum(-1) / np.maximum((edge**2).sum(-1), 1e-300), 0.0, 1.0)
-    return np.asarray(((away - share[..., None] * edge) ** 2).sum(-1))
-
-
-def _side(begin: Floats, end: Floats, point: Floats) -> Floats:
-    """Tell by the sign on which side of a line points lie."""
-    edge, away = end - begin, point - begin
-    return np.asarray(edge[..., 0] * away[..., 1] - edge[..., 1] * away[..., 0])
 
 
 def error_open_loop(plan: Plan) -> tuple[Floats, Floats]:

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.goal.route import best_options
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
 
@@ -66,26 +67,6 @@ def shortest_order(costs: Floats, start: Floats, end: Floats) -> Order:
     if not np.isfinite(order.cost):
         raise InputError("there is no way from each of the visits to another one")
     return order
-
-
-def best_options(legs: Sequence[Floats], start: Floats, end: Floats) -> tuple[list[int], float]:
-    """Choose an option at each stop of a chain; return the options and what the chain costs.
-
-    Args:
-        legs: (C, C') each, from the options of a stop to those of the next one.
-        start: (C,), of the options of the first stop.
-        end: (C',), of those of the last one.
-    """
-    total, back = start, []
-    for leg in legs:
-        sums = total[:, None] + leg
-        back.append(sums.argmin(0))
-        total = sums.min(0)
-    total = total + end
-    options = [int(total.argmin())]
-    for came in reversed(back):
-        options.append(int(came[options[-1]]))
-    return options[::-1], float(total.min())
 
 
 def _exact(costs: Floats, start: Floats, end: Floats) -> Order:

@@ -81,8 +81,7 @@ class Timetable:
                                self.motion.duration)  # fmt: skip
         last = max([self.earliest, *(other.end for other in self.others)])
         self._steps = math.ceil(last / self.step) + len(self._own) + 2
-        body, error = self.motion.body, self.motion.error(self._own)
-        self._free = self._unhindered(Places(body, self.motion.poses(self._own), error))
+        self._free = self._unhindered(self.motion.places(self._own))
 
     def find(self, turns: Sequence[Turn] = ()) -> Timing | None:
         """Find the timing with the fewest circles; None if there is none with MOST_CIRCLES or fewer."""

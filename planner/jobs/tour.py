@@ -21,7 +21,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from planner.goal.dubins import DubinsPaths
-from planner.jobs.shortest_order import EXACT, best_options, shortest_order
+from planner.goal.route import best_options
+from planner.jobs.shortest_order import EXACT, shortest_order
 from planner.jobs.travel import SLACK, Travel, plan_track, preferred_setting
 from planner.paths.distance import distance_to
 from planner.paths.tractrix import Drift
@@ -233,8 +234,7 @@ def _quickest(poses: Floats, travel: Travel) -> tuple[Floats, float]:
     stops, options, _ = poses.shape
     here, there = np.repeat(poses[:-1], options, 1), np.tile(poses[1:], (1, options, 1))
     times = travel.times(here.reshape(-1, 3), there.reshape(-1, 3))
-    free = np.zeros(options)
-    chosen, total = best_options(list(times.reshape(stops - 1, options, options)), free, free)
+    chosen, total = best_options(list(times.reshape(stops - 1, options, options)))
     return poses[np.arange(stops), chosen, 2], total
 
 

@@ -7,7 +7,7 @@ distance of any disc from any region, negative inside. Lengths in l.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -128,15 +128,6 @@ class FreeSpace:
     walls: Polygon | None = None  # that it must stay within; None: there are none
 
     @staticmethod
-    def of(
-        keep_out: Sequence[Circle | Polygon | Path2D | ArrayLike] = (),
-        walls: Polygon | Path2D | ArrayLike | None = None,
-    ) -> FreeSpace:
-        """Make free space from regions and walls; polygons may be given as points (n, 2)."""
-        regions = tuple(shape if isinstance(shape, Circle | Polygon) else Polygon.of(shape) for shape in keep_out)
-        return FreeSpace(regions, walls if isinstance(walls, Polygon) or walls is None else Polygon.of(walls))
-
-    @staticmethod
     def from_dict(content: Mapping[str, Any]) -> FreeSpace:
         """Read the content that `to_dict` returns.
 
@@ -148,7 +139,7 @@ class FreeSpace:
             Circle(*map(float, region["circle"])) if "circle" in region else Polygon.of(region["polygon"])
             for region in content["keep_out"]
         ]
-        return FreeSpace.of(regions, content["walls"])
+        return FreeSpace(tuple(regions), None if content["walls"] is None else Polygon.of(content["walls"]))
 
     @property
     def empty(self) -> bool:

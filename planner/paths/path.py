@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planner.paths.units import number_and_unit
-from sim.arrays import Floats
+from sim.arrays import Flags, Floats
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 
@@ -133,6 +133,18 @@ def arc_length(polyline: Floats) -> Floats:
 def points_at(at: Floats, known: Floats, points: Floats) -> Floats:
     """Interpolate points (m, c), known at increasing lengths (m,), at others (K,), (K, c)."""
     return np.stack([np.interp(at, known, column) for column in points.T], -1)
+
+
+def runs_of(flags: Flags, arc: Floats, apart: float) -> list[tuple[int, int]]:
+    """List first and last index of each run of true flags; those less than `apart` along the arc are one."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    runs: list[tuple[int, int]] = []
+    for first, last in zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True):
+        if runs and arc[first] - arc[runs[-1][1]] < apart:
+            runs[-1] = (runs[-1][0], last)
+        else:
+            runs.append((first, last))
+    return runs
 
 
 def resample(polyline: Floats, spacing: float) -> Floats:

@@ -12,11 +12,11 @@ import pytest
 
 from planner.files.saved_plan import restore_plan
 from planner.files.tracks import tracking_error
-from planner.jobs.detours import Hindered, _runs
+from planner.jobs.detours import Hindered
 from planner.jobs.plan import make_plan
 from planner.jobs.timetable import WaitingCircle, circle_reference, with_circles
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
-from planner.paths.path import Path2D, circle
+from planner.paths.path import Path2D, circle, runs_of
 from planner.planning.arrive import EXACT
 from planner.planning.feasible import TIGHTEST
 from planner.planning.plan import Plan
@@ -48,7 +48,7 @@ def test_a_hindrance_is_what_the_discs_lack_and_its_derivatives_are_those_of_dif
 
 def test_blocked_stretches_that_are_near_are_one() -> None:
     flags = np.array([0, 1, 1, 0, 1, 0, 0, 0, 1], dtype=bool)
-    assert _runs(flags, np.arange(9.0), 2.5) == [(1, 4), (8, 8)]
+    assert runs_of(flags, np.arange(9.0), 2.5) == [(1, 4), (8, 8)]
 
 
 def check_clear(result: Plan, space: FreeSpace) -> None:
@@ -97,7 +97,7 @@ def test_a_path_that_is_clear_stays() -> None:
 
 @pytest.mark.rest
 def test_a_closed_path_that_is_blocked_at_its_start_begins_elsewhere() -> None:
-    space = FreeSpace.of([Circle(2.5, 0, 0.4)])
+    space = FreeSpace((Circle(2.5, 0, 0.4),))
     result = make_plan(circle(2.5), tracked(), replace(QUICK, space=space))
     check_clear(result, space)
     assert result.start[0] < -1.5
@@ -135,7 +135,7 @@ def test_random_obstacles(seed: int) -> None:
     angle = np.linspace(0, 5, 200)
     path = Path2D.of(np.stack([1.6 * angle, rng.uniform(0.3, 1) * np.sin(1.5 * angle)], 1))
     rocks = [Circle(*(path.points[i] + rng.normal(0, 0.3, 2)).tolist(), rng.uniform(0.2, 0.6)) for i in (70, 130)]
-    space = FreeSpace.of(rocks)
+    space = FreeSpace(tuple(rocks))
     check_clear(make_plan(path, tracked(), replace(QUICK, space=space)), space)
 
 
@@ -191,7 +191,7 @@ def test_a_swing_takes_less_time_than_a_circle() -> None:
 
 
 def test_circles_keep_clear_of_obstacles() -> None:
-    space = FreeSpace.of([Circle(3.5, 0.3, 0.3)])
+    space = FreeSpace((Circle(3.5, 0.3, 0.3),))
     own = make_plan(BENT, tracked(), FEW)
     plan = make_plan(BENT, tracked(), replace(FEW, arrive_seconds=2.2 * float(own.seconds.sum()), space=space))
     check_arrival(plan)

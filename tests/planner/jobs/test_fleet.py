@@ -12,7 +12,7 @@ import pytest
 from planner.jobs.fleet import Member, NoTimingError, Priorities, fleet
 from planner.jobs.fleet_plan import FleetPlan
 from planner.jobs.plan import make_plan
-from planner.jobs.separation import Body, Places, Scheduled, distances, instants, line_distance, too_near
+from planner.jobs.separation import Places, Scheduled, TimedMotion, distances, instants, too_near
 from planner.paths.obstacles import Circle, Footprint, FreeSpace
 from planner.paths.path import Path2D
 from planner.planning.plan import Plan
@@ -22,7 +22,6 @@ from planner.tracking.tracker import Tracker
 from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import tracked_vehicle
 from sim.io.errors import InputError
-from sim.model.presets import PRESETS
 from sim.motion.replay import replay
 from tests.planner.plans import CONTROL, LINE, planned
 from tests.planner.vehicles import FINE
@@ -30,7 +29,7 @@ from tests.shared import shared
 
 pytestmark = pytest.mark.slow
 
-BODY = Body(0.02, -0.13, 0.02)
+BODY = Footprint(np.array([0.02, -0.13]), 0.02)
 TAIL = CONTROL.tail_length
 APART = 0.3 * TAIL
 FAR = [((20.0 + 4 * k, 20.0), (21.0 + 4 * k, 20.0)) for k in range(4)]
@@ -126,7 +125,7 @@ def test_robots_far_away_change_nothing() -> None:
 def test_waiting_circles_keep_clear_of_walls() -> None:
     passing, across = straight((-1.0, -3.0), (-1.0, 3.5)), straight((3.2, -2.8), (3.2, 3.5))
     tracked = tracked_vehicle(CONTROL, None, "head_centre", None)
-    rock = FreeSpace.of([Circle(1.0, 1.3, 0.3)])
+    rock = FreeSpace((Circle(1.0, 1.3, 0.3),))
     waiting = make_plan(Path2D.of(LINE), tracked, PlanRequest(space=rock))
     result = keep_apart([passing, across, waiting])
     kept = result.plans[2].kept_clear
@@ -171,11 +170,11 @@ def test_ninety_five_per_cent_of_random_robots_keep_within_the_error_in_place() 
     made = motion.plan
     times = np.concatenate([[0.0], np.cumsum(made.seconds)])
     rng, held = np.random.default_rng(0), []
-    error, expected = motion.error(times), motion.body.ends(motion.poses(times))
+    error, expected = motion.error(times), motion.body.centres(motion.poses(times))
     for _ in range(100):
         robot = made.tracked.vehicle.drawn(rng)
         poses = roll_out(robot, Switches(made.first_direction, made.dwells, made.poses)).flips
-        ends = motion.body.ends(poses * [TAIL, TAIL, 1.0])
+        ends = motion.body.centres(poses * [TAIL, TAIL, 1.0])
         off = np.hypot(*np.moveaxis(ends - expected, -1, 0)).max(1)
         held.append((off <= error + 1e-12).all())
     assert 0.9 <= np.mean(held) <= 1.0
@@ -220,15 +219,16 @@ def random_places(rng: np.random.Generator, count: int) -> Places:
 
 def test_distances_of_lines_are_those_of_their_points() -> None:
     rng = np.random.default_rng(0)
-    first, second = rng.normal(size=(2, 100, 2, 2))
-    share = np.linspace(0, 1, 401)[:, None, None]
-    points, others = (line[:, 0] + share * (line[:, 1] - line[:, 0]) for line in (first, second))
-    sampled = [
-        np.hypot(*np.moveaxis(points[:, None, k] - others[None, :, k], -1, 0)).min() for k in range(len(first))
-    ]
-    assert line_distance(first, second) == pytest.approx(sampled, abs=0.02)
-    assert (line_distance(first, second) == 0).sum() > 3
-    assert (line_distance(first, second) <= np.array(sampled) + 1e-12).all()
+    first, second = random_places(rng, 200), random_places(rng, 200)
+    along = Footprint(np.linspace(-0.13, 0.02, 401), 0.02)
+    points, others = along.centres(first.poses), along.centres(second.poses)
+    sampled = np.array(
+        [math.sqrt(((a[:, None] - b) ** 2).sum(-1).min()) for a, b in zip(points, others, strict=True)]
+    )
+    between = distances(first, second) + 2 * BODY.radius
+    assert between == pytest.approx(sampled, abs=0.001)
+    assert (between == 0).sum() > 3
+    assert (between <= sampled + 1e-12).all()
 
 
 def test_the_table_of_pairs_agrees_with_the_distances() -> None:
@@ -243,16 +243,9 @@ def test_the_table_of_pairs_agrees_with_the_distances() -> None:
 
 
 def test_the_body_covers_head_and_tails() -> None:
-    robot = PRESETS["paper-control"]
-    body, discs = Body.of(robot), Footprint.of(robot, 0.0)
-    pose = np.array([[0.3, 0.2, 1.0]])
-    centres = discs.centres(pose)[0] * robot.tail_length
-    ends = body.ends(pose * [robot.tail_length, robot.tail_length, 1.0])[0]
-    lines = np.stack([centres, centres], 1)
-    assert line_distance(lines, np.broadcast_to(ends, lines.shape)) == pytest.approx(
-        np.zeros(len(lines)), abs=1e-12
-    )
-    assert body.radius == pytest.approx(discs.radius * robot.tail_length)
+    body, discs = TimedMotion(crossing()[0], False).body, Footprint.of(CONTROL, 0.0)
+    assert body.places == pytest.approx(TAIL * discs.places[[-1, 0]])
+    assert body.radius == pytest.approx(TAIL * discs.radius)
 
 
 def meet(first: Motion, second: Motion) -> float:

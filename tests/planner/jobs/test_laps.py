@@ -278,7 +278,7 @@ def test_a_tracked_robot_stays(current: float, wrong: float) -> None:
 
 @pytest.mark.parametrize("x", [3.2, pytest.param(5.5, marks=pytest.mark.rest)])
 def test_there_must_be_room(x: float) -> None:
-    space = FreeSpace.of([Circle(x, 1.0, 0.2)])
+    space = FreeSpace((Circle(x, 1.0, 0.2),))
     if x > 5:
         assert hold(PLACE, tracked(), replace(FEW, space=space)).job.laps is None
         return

@@ -143,7 +143,7 @@ def test_the_point_that_is_asked_for_passes() -> None:
 
 
 def test_among_obstacles_it_keeps_clear() -> None:
-    space = FreeSpace.of([Circle(1.0, 0.6, 0.3)])
+    space = FreeSpace((Circle(1.0, 0.6, 0.3),))
     result = tour(PLACES[:3], tracked(), PlanRequest(objective="flips", space=space))
     kept = result.kept_clear
     assert kept is not None

@@ -274,10 +274,9 @@ BAD = {  # outlines, and where they are wrong
 def test_outlines_that_cross_touch_or_repeat_themselves_are_refused(
     points: list[tuple[float, float]], place: str, tmp_path: Path
 ) -> None:
-    for space in ({"keep_out": [points]}, {"walls": points}):
-        with pytest.raises(InputError) as refusal:
-            FreeSpace.of(**space)
-        assert f"elf-intersection of an outline at {place} l; draw it so" in str(refusal.value)
+    with pytest.raises(InputError) as refusal:
+        Polygon.of(points)
+    assert f"elf-intersection of an outline at {place} l; draw it so" in str(refusal.value)
     rows = "".join(f"{x},{y}\n" for x, y in points)
     path = " ".join(f"{x} {-y}" for x, y in points)
     for name, text, unit, told in (
