@@ -79,7 +79,7 @@ def opencv() -> Any:
     except ImportError:
         raise InputError("films need OpenCV: pip install 'softflagella[camera]'") from None
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what it would say is said by an InputError
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     return cv2
 
 
@@ -360,11 +360,12 @@ def _length(table: Mapping[str, Any], quantity: str, where: str) -> float:
 
 def _key_of(table: Mapping[str, Any], quantity: str) -> tuple[str, str]:
     """Return the key of a quantity and the suffix of its unit; two empty words if it is not there."""
-    for key in table:
-        name, unit = split(key)
-        if name == quantity and unit is not None:
-            return key, unit.suffix
-    return "", ""
+    keys = {
+        key: unit.suffix for key in table for name, unit in [split(key)] if name == quantity and unit is not None
+    }
+    if len(keys) > 1:
+        raise InputError(f"{' and '.join(keys)} are the same quantity; drop all but one")
+    return next(iter(keys.items()), ("", ""))
 
 
 def _points(table: Mapping[str, Any], key: str, fewest: int) -> Floats:

@@ -6,7 +6,6 @@ import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
-from functools import partial
 from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
@@ -59,8 +58,17 @@ def _progress_bar() -> Iterator[Callable[[float], object]]:
         yield show
 
 
-def _planned(call: Call, **further: Any) -> Plan:
+def _refuse_early(arduino: str | None) -> None:
+    """Refuse a folder that no library can be written into, before a plan is made for it."""
+    if arduino is not None:
+        from planner.files.arduino import check_library
+
+        check_library(arduino)
+
+
+def _planned(call: Call, *, arduino: str | None = None, **further: Any) -> Plan:
     """Plan with a public function and a bar."""
+    _refuse_early(arduino)
     with _progress_bar() as progress:
         plan: Plan = call(progress=progress, **further)
     return plan
@@ -73,7 +81,7 @@ def _plan(plan: Call, *, out: str, trade_off: bool = False, arduino: str | None 
     Args:
         trade_off: draw error against time and flips, for ten dwells.
     """
-    result = _planned(plan, tell=print)
+    result = _planned(plan, arduino=arduino, tell=print)
     pictures = {}
     if trade_off:
         from planner.files.pictures import draw_trade_off
@@ -102,14 +110,14 @@ def _goal(
         goal: X Y DEGREES, of the head's centre at the end.
         start: X Y DEGREES, of the head's centre at the start, at rest (default: 0 0 0).
     """
-    _write(_planned(to_goal, start=start, goal=goal), out, arduino=arduino)
+    _write(_planned(to_goal, arduino=arduino, start=start, goal=goal), out, arduino=arduino)
 
 
 @program.command("hold", of="planner.api:hold", robot=ROBOT, seconds="for")
 @program.command("cover", of="planner.api:cover", robot=ROBOT, width="--width", holes="hole")
 @program.command("tour", of="planner.api:tour", robot=ROBOT, back="return")
 def _job(job: Call, *, out: str, arduino: str | None = None) -> None:
-    _write(_planned(job), out, arduino=arduino)
+    _write(_planned(job, arduino=arduino), out, arduino=arduino)
 
 
 @program.command("fleet")
@@ -154,7 +162,7 @@ def _track(
     camera: str | None = None,
     view: str | None = None,
     serial: str | None = None,
-    lost: float = 2.0,
+    lost: float | None = None,
 ) -> None:
     """Keep a robot on a path or a saved plan: poses come in on a pipe (planner.tracking.pipe) or from a camera.
 
@@ -170,7 +178,7 @@ def _track(
         camera: number of a camera over the tank, such as 0, or a film; the track is printed.
         view: the camera's view.toml.
         serial: port of the motor's board, such as /dev/ttyACM0 (default: nothing moves).
-        lost: seconds without a pose after which the motor rests.
+        lost: seconds without a pose after which the motor rests (default: 2).
     """
     from planner.files.saved_plan import is_plan
     from planner.tracking.pipe import answers
@@ -180,10 +188,12 @@ def _track(
         raise InputError(f"--noise-rad {noise_rad}; give a number above 0")
     if not 0 <= latency < math.inf:
         raise InputError(f"--latency {latency}; give a number of seconds, 0 or more")
-    if not 0 < lost < math.inf:
+    if lost is not None and not 0 < lost < math.inf:
         raise InputError(f"--lost {lost}; give a number of seconds above 0")
-    if camera is None and (view or serial):
-        raise InputError("--view and --serial are for --camera, whose number is missing, such as --camera 0")
+    if camera is None and (view or serial or lost):
+        raise InputError(
+            "--view, --serial and --lost are for --camera, whose number is missing, such as --camera 0"
+        )
     if camera is not None and (view is None or start is not None):
         raise InputError("--camera needs --view view.toml and shows where the robot is; leave --start out")
     if isinstance(sys.stdin, TextIOWrapper):  # a damaged line must not end the tracker
@@ -203,7 +213,7 @@ def _track(
         return Tracker(plan, noise=deviations, latency=latency / scale, begin=now, start=pose)
 
     if camera is not None and view is not None:
-        _live(plan, camera, view, serial, latency, lost, begin)
+        _live(plan, camera, view, serial, latency, lost or 2.0, begin)
         return
     if start is not None:
         tracker: Tracker | None = begin(read_pose(start, unit, plan.robot, "--start"), 0.0)
@@ -231,9 +241,9 @@ def _live(
     def tell(line: str) -> None:
         print(line, file=sys.stderr, flush=True)
 
+    sights, ride = watch(source, view, plan.robot.name, length, latency), Ride()
     with ending_on_signals(), Motor(port) as motor:
         print("time_s,x_cm,y_cm,heading_deg,direction,error_cm", flush=True)
-        ride, sights = Ride(), partial(watch, source, view, plan.robot.name, length, latency)
         try:
             with Pictures(sights) as pictures:
                 steer(ride, pictures, motor, begin, plan.robot.time_scale, lost=lost, row=row, tell=tell)
@@ -267,6 +277,7 @@ def _page(write_page: Call, *, out: str) -> None:
 @program.command("replan", of="planner.api:replan", written_by="from")
 def _replan(replan: Call, *, out: str, arduino: str | None = None) -> None:
     """Plan the rest of a saved plan from where a robot is now."""
+    _refuse_early(arduino)
     _write(replan(), out, arduino=arduino)
 
 

@@ -49,8 +49,7 @@ def write_arduino(result: Plan | FleetPlan, folder: str | Path) -> Path:
     """
     if not isinstance(result, Plan):
         raise InputError("a board drives one robot; give one plan of the fleet, such as result.plans[0]")
-    library = Path(folder)
-    _check(library)
+    library = check_library(folder)
     contents = {
         "library.properties": _properties(result),
         "src/schedule.h": schedule_header(result, result.identity),
@@ -63,16 +62,20 @@ def write_arduino(result: Plan | FleetPlan, folder: str | Path) -> Path:
     return library
 
 
-def _check(folder: Path) -> None:
-    """Refuse a folder with files that are no such library.
+def check_library(folder: str | Path) -> Path:
+    """Return the path of a folder that a library can be written into.
 
     Raises:
-        InputError: it has other files, one of which the message names.
+        InputError: it is a file, or it has other files, one of which the message names.
     """
-    for path in folder.rglob("*"):
-        name = path.relative_to(folder).as_posix()
+    library = Path(folder)
+    if library.exists() and not library.is_dir():
+        raise InputError(f"{library} is a file; give a folder for the library")
+    for path in library.rglob("*"):
+        name = path.relative_to(library).as_posix()
         if name not in _FILES and not path.is_dir():
-            raise InputError(f"{folder} has other files, such as {name}; give a folder of its own")
+            raise InputError(f"{library} has other files, such as {name}; give a folder of its own")
+    return library
 
 
 def _properties(result: Plan) -> str:

@@ -46,6 +46,10 @@ class Sight(NamedTuple):
     why: str = ""  # there is no pose
 
 
+Clock = Callable[[], float]  # -> time since the beginning [s]
+Sights = Callable[[Clock], Iterator[Sight]]
+
+
 class Motor:
     """A board on a serial port that turns the motor; it stops at the end of a `with` block.
 
@@ -95,7 +99,7 @@ class Pictures:
         sights: yields it, given a function that tells the time; it ends with a `with` block.
     """
 
-    def __init__(self, sights: Callable[[Callable[[], float]], Iterator[Sight]]):
+    def __init__(self, sights: Sights):
         self._began, self._sights = time.monotonic(), sights
         self._inbox = queue.Queue[Sight | BaseException | None]()
         self._over = threading.Event()
@@ -217,21 +221,18 @@ def steer(
     motor.turn(0)
 
 
-def watch(
-    source: str, view: str, robot: str, length: float, latency: float, now: Callable[[], float]
-) -> Iterator[Sight]:
-    """Yield what a camera sees, or a film at its own pace.
+def watch(source: str, view: str, robot: str, length: float, latency: float) -> Sights:
+    """Open a camera, or a film, and return what yields its sights; a film keeps its own pace.
 
     Args:
         source: number or device of a camera, or a film.
         view: the file view.toml, with scale and markers.
         robot: whose markers are looked for, if there are several.
         length: of a tail [m].
-        latency: of the camera.
-        now: tells the time.
+        latency: of the camera [s].
 
     Raises:
-        InputError: OpenCV is missing, camera, film or file cannot be read, or the camera has gone.
+        InputError: OpenCV is missing, camera, film or file cannot be read, or, later, the camera has gone.
     """
     from camera.detector import Detector, Lost
     from camera.view import opencv, read_setup
@@ -247,22 +248,23 @@ def watch(
     if not device.isOpened():
         raise InputError(f"--camera {source}: no such {'camera, or another program has it' if live else 'film'}")
     device.set(cv.CAP_PROP_BUFFERSIZE, 1)  # the latest picture, not one that has waited
-    began = now()
-    while device.grab():
-        if not live:
-            time.sleep(max(began + device.get(cv.CAP_PROP_POS_MSEC) / 1e3 - now(), 0.0))
-        taken = now() - latency
-        good, picture = device.retrieve()
-        if not good:
-            yield Sight(taken, None, "a damaged picture")
-            continue
-        (seen,) = detector.poses(picture)
-        if isinstance(seen, Lost):
-            yield Sight(taken, None, seen.why)
-        else:
-            yield Sight(taken, (seen.x / length, seen.y / length, seen.heading))
-    if live:
-        raise InputError(f"--camera {source}: no picture comes any more; check its cable")
+
+    def sights(now: Clock) -> Iterator[Sight]:
+        began = now()
+        while device.grab():
+            if not live:
+                time.sleep(max(began + device.get(cv.CAP_PROP_POS_MSEC) / 1e3 - now(), 0.0))
+            taken = now() - latency
+            good, picture = device.retrieve()
+            (seen,) = detector.poses(picture) if good else (Lost(robot, "a damaged picture"),)
+            if isinstance(seen, Lost):
+                yield Sight(taken, None, seen.why)
+            else:
+                yield Sight(taken, (seen.x / length, seen.y / length, seen.heading))
+        if live:
+            raise InputError(f"--camera {source}: no picture comes any more; check its cable")
+
+    return sights
 
 
 @contextmanager

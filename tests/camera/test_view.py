@@ -20,6 +20,7 @@ REFUSED = {  # what of EXAMPLE is written otherwise, and the message
     "misspelt": (RULER, "lenght_cm = 30", "unknown entry [scale] lenght_cm; is it length?"),
     "no unit": (RULER, "length = 30", "[scale] length has no unit of length; give length_cm"),
     "places without a unit": (RULER, f"points = {SQUARE}", "[scale] points has no unit of length; give points_cm"),
+    "two lengths": (RULER, f"{RULER}\nlength_mm = 310", "length_cm and length_mm are the same quantity; drop"),
     "no length": (RULER, "length_deg = 30", "[scale] length_deg has no unit of length"),
     "no number": (RULER, 'length_cm = "30"', "[scale] length_cm = '30'; give a number"),
     "one point": ("[100, 650], ", "", "points_px: give 2 points or more"),

@@ -128,7 +128,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("track made/tour.json", "tour.json"),
         ("track made --camera 0", "--camera needs --view view.toml"),
         ("track made --camera 0 --view view.toml --start 0 0 0", "leave --start out"),
-        ("track made --serial /dev/ttyACM0", "--view and --serial are for --camera"),
+        ("track made --serial /dev/ttyACM0", "--view, --serial and --lost are for --camera"),
+        ("track made --lost 5", "--view, --serial and --lost are for --camera"),
         ("track made --camera 0 --view view.toml --lost 0", "--lost 0.0; give a number of seconds above 0"),
         ("track made --camera film.mp4 --view none.toml", "none.toml: no such file"),
         ("replan made no_heading.csv", "no column 'heading_deg'"),
@@ -153,8 +154,10 @@ def test_refusals_are_one_line_and_write_nothing(
     if given[0] in ("plan", "tour", "cover", "hold"):
         given += ["--objective", "flips"]
     assert run_command(main, [*given, *([] if given[0] == "track" else ["--out", "out"])]) == 2
-    *said, error = capsys.readouterr().err.splitlines()
+    out, err = capsys.readouterr()
+    *said, error = err.splitlines()
     assert expected in error
+    assert not (out and given[0] == "track")  # no header of a track that there is not
     assert not said or words.startswith("track circle")  # it prints the plan first
     assert not Path("out").exists()
 

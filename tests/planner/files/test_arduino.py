@@ -155,7 +155,9 @@ def test_a_fleet_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_folder_with_other_files_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_with_other_files_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "src").mkdir()
     (tmp_path / "src" / "thesis.tex").write_text("")
     with pytest.raises(InputError, match=r"has other files, such as src/thesis.tex; give a folder of its own"):
@@ -164,6 +166,10 @@ def test_a_folder_with_other_files_is_refused(tmp_path: Path, capsys: pytest.Cap
     with pytest.raises(InputError, match="has other files"):
         main([*words, "--arduino", str(tmp_path)])
     assert not (tmp_path / "plan").exists()
+    goal = ["goal", "--goal", "5l", "0", "0", *words[2:], "--arduino", str(tmp_path / "src" / "thesis.tex")]
+    monkeypatch.setattr("planner.api.to_goal", None)  # it is refused before
+    with pytest.raises(InputError, match=r"thesis.tex is a file; give a folder"):
+        main(goal)
     main([*words, "--arduino", str(tmp_path / "library")])
     assert capsys.readouterr().out.rstrip().endswith(f", {tmp_path / 'library'}")
     header = (tmp_path / "library" / "src" / "schedule.h").read_text()

@@ -10,6 +10,7 @@ import sys
 import time
 import tty
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -205,16 +206,28 @@ def test_cameras_that_fail_and_robots_that_are_not_named(tmp_path: Path, monkeyp
     monkeypatch.setattr(cv2, "VideoCapture", Damaged)
     (tmp_path / "view.toml").write_text(tank.Tank().view_toml())
     view = str(tmp_path / "view.toml")
-    seen = list(live.watch("film.avi", view, "robot", 0.11, 0.25, lambda: 1.0))
+    seen = list(live.watch("film.avi", view, "robot", 0.11, 0.25)(lambda: 1.0))
     assert seen == [Sight(0.75, None, "a damaged picture")] * 2
     with pytest.raises(InputError, match="--camera /dev/video0: no picture comes any more; check its cable"):
-        list(live.watch("/dev/video0", view, "robot", 0.11, 0.0, lambda: 1.0))
+        list(live.watch("/dev/video0", view, "robot", 0.11, 0.0)(lambda: 1.0))
     robots = "".join(f'[[robots]]\nname = "{n}"\nfront = "{f}"\nrear = "{r}"\n'
                      for n, f, r in (("one", "red", "blue"), ("two", "green", "magenta")))  # fmt: skip
     Path(view).write_text(tank.Tank().view_toml(robots=robots))
-    assert len(list(live.watch("film.avi", view, "two", 0.11, 0.0, lambda: 1.0))) == 2
+    assert len(list(live.watch("film.avi", view, "two", 0.11, 0.0)(lambda: 1.0))) == 2
     with pytest.raises(InputError, match="several robots, one, two; call the one that swims 'robot'"):
-        list(live.watch("film.avi", view, "robot", 0.11, 0.0, lambda: 1.0))
+        live.watch("film.avi", view, "robot", 0.11, 0.0)
+
+
+def test_a_camera_that_is_not_there_is_refused_in_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("cv2", reason="needs the extra camera")
+    from tests.oracles import tank
+
+    (tmp_path / "view.toml").write_text(tank.Tank().view_toml())
+    with pytest.raises(InputError, match="--camera 77: no such camera, or another program has it"):
+        live.watch("77", str(tmp_path / "view.toml"), "robot", 0.11, 0.0)
+    assert capfd.readouterr().err == ""
 
 
 def test_a_terminal_that_closes_ends_the_ride_as_ctrl_c_does() -> None:
@@ -253,6 +266,7 @@ def tracking(folder: Path, port: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-m", "softflagella", "track", str(folder / "plan.json"), *words],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=Path(__file__).parents[3],
+        preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),  # ignored in the background of a shell
     )  # fmt: skip
 
 
