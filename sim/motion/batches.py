@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
@@ -71,10 +70,14 @@ def in_batches(
     found = []
     with (
         one_thread(),  # a setting of the process: set once, not in each thread
-        ThreadPoolExecutor(count) as threads,
         tqdm(total=len(columns["N"]), desc=title, unit="row", delay=1.0, disable=not title) as bar,
     ):
-        for part in map(work, parts) if count == 1 else threads.map(work, parts):
+        done = map(work, parts)
+        if count > 1:
+            from joblib import Parallel, delayed  # slow to import, and one thread needs none of it
+
+            done = Parallel(n_jobs=count, prefer="threads", return_as="generator")(map(delayed(work), parts))
+        for part in done:
             found.append(part)
             bar.update(len(batches[len(found) - 1]))
     order = np.argsort(np.concatenate(batches))
