@@ -83,8 +83,8 @@ class PathEnv(gymnasium.Env[Observation, np.int64]):
     ):
         if model not in ("table", "simulator"):
             raise InputError(f"model {model!r}; give 'table' or 'simulator'")
-        if actions < 1:
-            raise InputError(f"actions is {actions}; give 1 or more")
+        if not isinstance(actions, int | np.integer) or actions < 1:
+            raise InputError(f"actions is {actions!r}; give a whole number, 1 or more")
         if plan is None:
             plan = plan_path(polygon(4, side=3.0), "paper-control")
         self.plan = plan if isinstance(plan, Plan) else restore_plan(plan)

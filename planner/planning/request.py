@@ -50,15 +50,18 @@ class Camera:
     seed: int | np.random.Generator = 0  # of the random numbers, or their generator
 
     def __post_init__(self) -> None:
-        for name, values, low, high, allowed in (
-            ("noise", self.noise, 0.0, math.inf, "numbers above 0"),
-            ("every_s", (self.every_s,), 0.0, math.inf, "a number above 0"),
-            ("delay_s", (self.delay_s,), -1e-300, math.inf, "0 or more"),
-            ("lost", (self.lost,), -1e-300, 1 + 1e-12, "0 to 1"),
-            ("wrong", (self.wrong,), -1e-300, 1 + 1e-12, "0 to 1"),
+        for name, shape, low, high, allowed in (
+            ("noise", (2,), 0.0, math.inf, "two numbers above 0"),
+            ("every_s", (), 0.0, math.inf, "a number above 0"),
+            ("delay_s", (), -1e-300, math.inf, "0 or more"),
+            ("lost", (), -1e-300, 1 + 1e-12, "0 to 1"),
+            ("wrong", (), -1e-300, 1 + 1e-12, "0 to 1"),
         ):
-            if not all(low < value < high for value in values):
-                raise InputError(f"camera: {name} is {getattr(self, name)}; give {allowed}")
+            values = np.array(getattr(self, name), dtype=object)
+            if values.shape != shape or not all(
+                isinstance(v, int | float | np.number) and low < v < high for v in values.flat
+            ):
+                raise InputError(f"camera: {name} is {getattr(self, name)!r}; give {allowed}")
 
     def to_dict(self) -> dict[str, Any]:
         """Return what the stated error depends on, for plan.json."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -131,7 +132,9 @@ def test_a_plan_file_is_read_and_wrong_arguments_are_refused(tmp_path: object) -
     assert sg.PathEnv(f"{tmp_path}/plan.json").plan.duration == pytest.approx(planned().duration)
     with pytest.raises(InputError, match="model 'tables'; give 'table' or 'simulator'"):
         sg.PathEnv(planned(), model="tables")  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="actions is 0; give 1 or more"):
-        sg.PathEnv(planned(), actions=0)
-    with pytest.raises(InputError, match="noise is"):
-        sg.PathEnv(planned(), noise=(0.0, 0.01))
+    for actions in (0, "4", 2.5):
+        with pytest.raises(InputError, match=f"actions is {actions!r}; give a whole number, 1 or more"):
+            sg.PathEnv(planned(), actions=actions)  # type: ignore[arg-type]
+    for noise in ((0.0, 0.01), 0.1, "0.1", (0.01, "0.1"), (0.01,)):
+        with pytest.raises(InputError, match=re.escape(f"camera: noise is {noise!r}; give two numbers above 0")):
+            sg.PathEnv(planned(), noise=noise)  # type: ignore[arg-type]
