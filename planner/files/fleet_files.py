@@ -28,10 +28,11 @@ from typing import Any, NamedTuple
 
 from planner.files.plan_files import EXTRA, FILES, write_plan_files
 from planner.jobs.fleet_plan import FleetPlan
-from planner.paths.units import Swimmer, number_and_unit, read_length
+from planner.paths.units import Swimmer, read_length
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_text
 from sim.io.reading import read_json, read_toml
+from sim.io.units import number_and_unit
 
 _JOBS = {"path": "plan", "goal": "goal", "places": "tour", "region": "cover"}  # key -> command
 _OWN = ("robot", "name", "delay_s")

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
 from sim.io.errors import InputError
-from sim.io.units import LENGTHS, format_length, format_time, of_kind, to_si
+from sim.io.units import LENGTHS, format_length, format_time, number_and_unit, of_kind, to_si
 
 if TYPE_CHECKING:  # the command needs them before it loads NumPy
     from planner.paths.path import Path2D
@@ -116,16 +116,6 @@ def in_tails(unit: str, robot: Swimmer) -> float:
     if unit not in LENGTHS:
         raise InputError(f"unit {unit!r}; allowed are {', '.join(LENGTHS)}")
     return 1.0 if unit == "l" else to_si(1.0, unit) / robot.length_scale
-
-
-def number_and_unit(words: str) -> tuple[float, str | None]:
-    """Split a length: 24cm into 24.0 and cm, 3 into 3.0 and None; what is no number into nan."""
-    text = words.strip()
-    unit = next((unit for unit in reversed(LENGTHS) if text.endswith(unit)), None)
-    try:
-        return float(text.removesuffix(unit or "")), unit
-    except ValueError:
-        return math.nan, unit
 
 
 def read_length(words: str, unit: str | None, robot: Swimmer, name: str, *, above_zero: bool = False) -> float:

@@ -11,7 +11,6 @@ program is not sure of a point (`Program.likely`), the pose is lost.
 from __future__ import annotations
 
 import math
-import re
 import warnings
 from pathlib import Path
 from typing import Unpack
@@ -24,7 +23,7 @@ from sim.io.reading import read_bytes
 from sim.io.tables import read_table
 from sim.io.track_options import TrackOptions
 from sim.io.tracking_programs import PROGRAMS, Program, Seen
-from sim.io.units import find_unit, to_si
+from sim.io.units import number_and_unit, of_kind, to_si
 
 _LISTED = 8  # names in a message
 _SIGNS = {  # how a file begins -> what may have written it
@@ -54,7 +53,7 @@ def read_tracks(path: str | Path, **options: Unpack[TrackOptions]) -> pd.DataFra
     if source is None:
         if others := options.keys() - {"written_by"}:
             raise InputError(f"--{min(others)} is for tracks of another program; say which with --from")
-        start = read_bytes(path)[:80].decode("latin-1") if path.is_file() else ""
+        start = read_bytes(path, first=80).decode("latin-1") if path.is_file() else ""
         if sign := next(filter(start.removeprefix("ï»¿").startswith, _SIGNS), None):
             raise InputError(f"{path} is no table of poses; say what wrote it: --from {_SIGNS[sign]}")
         return read_table(path)
@@ -137,12 +136,11 @@ def _poses(seen: Seen, path: Path, program: Program, options: TrackOptions) -> p
 
 def _length(path: Path, words: str | None) -> float:
     """Read the length of a pixel, in metres."""
-    parts = re.fullmatch(r"\s*(\d*\.?\d+(?:e-?\d+)?)\s*([^\W\d]+)\s*", words or "")
-    unit = find_unit(parts[2]) if parts else None
-    if parts is None or unit is None or unit.kind != "length" or not 0 < float(parts[1]) < math.inf:
+    value, unit = number_and_unit(words or "", of_kind("length"))
+    if unit is None or not 0 < value < math.inf:
         given = f"--scale {words}" if words else f"{path} has no unit of length"
         raise InputError(f"{given}; give the length of a pixel, or of the file's unit, such as --scale 0.2mm")
-    return float(to_si(float(parts[1]), unit.suffix))
+    return float(to_si(value, unit))
 
 
 def _rows(points: pd.DataFrame, path: Path, name: str) -> pd.DataFrame:

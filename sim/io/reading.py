@@ -23,15 +23,15 @@ class ContentError(InputError):
     """A file can be read, but its content is not what it should be."""
 
 
-def read_bytes(path: str | Path) -> bytes:
-    """Read a file, or a pipe.
+def read_bytes(path: str | Path, *, first: int = MOST_BYTES + 1) -> bytes:
+    """Read a file, or a pipe, or its first bytes.
 
     Raises:
         InputError: there is no such file, it cannot be read, or it is larger than MOST_BYTES.
     """
     try:
         with open(path, "rb") as file:
-            data = file.read(MOST_BYTES + 1)
+            data = file.read(first)
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; check the path") from None
     except IsADirectoryError:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from functools import cache
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -123,6 +123,16 @@ def split(name: str) -> Name:
         if unit is not None and unit.suffix != "1":  # x_1 is a name
             return Name("_".join(parts[:first]), unit)
     return Name(name.strip(), None)
+
+
+def number_and_unit(words: str, units: Collection[str] = LENGTHS) -> tuple[float, str | None]:
+    """Split a quantity: 24cm into 24.0 and cm, 3 into 3.0 and None; what is none, or in another unit, into nan."""
+    number, _, word = re.split(r"(\s*)(?=[^\W\d]*$)", words.strip(), maxsplit=1)
+    unit = next((u for u in (word, getattr(find_unit(word), "suffix", "")) if u in units), None)
+    try:
+        return float(number) if unit or not word else math.nan, unit
+    except ValueError:
+        return math.nan, unit
 
 
 def of_kind(kind: str) -> list[str]:
