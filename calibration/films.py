@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from calibration.swimmer.camera_tracks import MeasuredTracks, measure_tracks
+from calibration.swimmer.camera_tracks import MIRRORED, MeasuredTracks, measure_tracks
 from calibration.swimmer.measured_table import convert_measured
 from camera.film import Film
-from camera.tracks import track_film
+from camera.tracks import track_film, turn_sense
 from camera.view import read_setup
 from sim.io.errors import InputError, naming
 from sim.io.quantities import numbers_of
@@ -42,6 +42,7 @@ def measure_films(
     parts = {name: numbers_of(table[name]) for name in ("start_s", "end_s") if name in table}
     with naming(runs):
         noted, converted = convert_measured(table.drop(columns=["film", *parts]), str(runs))
+    omega = numbers_of(noted["omega_rpm"])
     for index, film in enumerate(table["film"]):
         if not isinstance(film, str):
             raise InputError(f"{runs}: {row_name(table, index)} has no film")
@@ -55,12 +56,16 @@ def measure_films(
             Path(runs).parent / film,
             setup,
             head_length=robot.head_length,
+            motor_speed=abs(omega.iloc[index]) * math.pi / 30,
             start=0.0 if math.isnan(start) else start,
             end=math.inf if math.isnan(end) else end,
         )
-        for note in tracked.notes:
+        track, notes = next(iter(tracked.tables.values())), tracked.notes
+        if turn_sense(track) * omega.iloc[index] < 0:
+            notes = [*notes, f"the robot turns to the other side than omega_rpm makes it: {MIRRORED}"]
+        for note in notes:
             tell(f"{film}: {note}")
-        tracks.append(next(iter(tracked.tables.values())).assign(run=index + 1))
+        tracks.append(track.assign(run=index + 1))
         scale_error = max(scale_error, tracked.view.scale_error)  # of a tag, whose scale each film has anew
     if "camera_scale_sigma_percent" not in noted:
         noted["camera_scale_sigma_percent"] = 100 * scale_error

@@ -11,6 +11,7 @@ from sim.io.commands import Program
 
 program = Program("camera", "track robots in films")
 main = program.main
+_TURNS = {1: ", turning left as with the motor at +1", -1: ", turning right as with the motor at −1", 0: ""}
 
 
 @program.command("view")
@@ -65,7 +66,7 @@ def _tracks(
         start: SECONDS, in the film, of time 0.
         end: SECONDS, in the film (default: its end).
     """
-    from camera.tracks import track_film, write_check
+    from camera.tracks import track_film, turn_sense, write_check
     from camera.view import read_setup
     from sim.inputs import load_robot
     from sim.io.files import whole_file, write_csv
@@ -93,7 +94,7 @@ def _tracks(
         if len(tracked.tables) > 1:
             file = file.with_stem(f"{file.stem}-{name}")
         write_csv(table, file, digits=7)
-        written.append(f"{len(table)} poses -> {file}")
+        written.append(f"{len(table)} poses{_TURNS[turn_sense(table)]} -> {file}")
     if check:
         with whole_file(check) as part:
             write_check(part, tracked)

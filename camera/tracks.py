@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from camera.circle import fit_track
+from camera.circle import LEAST_TURN, fit_track
 from camera.detector import Detector, Lost, Pose, wrong_distance
 from camera.film import Film
-from camera.spin import aliasing
+from camera.spin import Spin, aliasing, fit_spin
 from camera.view import Markers, Setup, View, opencv
 from sim.io.errors import InputError, naming
 
@@ -31,10 +31,7 @@ _SHOWN = 10  # poses in the picture of a track
 _GAP = 1.5  # usual times between two frames, at which frames are missing
 _LEAST = 0.3  # of the head's length, of which the bands are apart
 _CERTAIN = 5.0  # standard errors by which a robot that moves tail first has moved
-_SWAPPED = (
-    "it moves tail first; if it did not, exchange the colours of front and rear in view.toml (turn a tag by 180 "
-    "degrees)"
-)
+_EXCHANGE = "exchange the colours of front and rear in view.toml (turn a tag by 180 degrees)"
 
 
 class FilmTracks(NamedTuple):
@@ -95,7 +92,11 @@ def track_film(
         notes = _notes(np.array(times), doubled, why)
         if any(each.dots for each in setup.robots) and len(times) > 1:
             notes += filter(None, [aliasing(np.array(times), motor_speed)])
-        notes += [f"robot {name}: {_SWAPPED}" for name, table in tables.items() if _swims_backwards(table)]
+        for name, table in tables.items():
+            if _spin_sense(table, motor_speed) * turn_sense(table) > 0:
+                notes.append(f"robot {name}: its head spins as if front and rear were exchanged; {_EXCHANGE}")
+            elif _swims_backwards(table):
+                notes.append(f"robot {name}: it moves tail first; if it did not, {_EXCHANGE}")
         return FilmTracks(tables, notes, detector.view, picture)
 
 
@@ -175,6 +176,25 @@ def _notes(times: Any, doubled: int, why: dict[str, Counter[str]]) -> list[str]:
         for reason, count in reasons.most_common():
             notes.append(f"robot {robot}: {count} of {len(times)} frames without a pose: {reason}")
     return notes
+
+
+def turn_sense(table: pd.DataFrame) -> int:
+    """Return 1 for a robot that turns to the left all the time, −1 to the right, 0 if it does neither."""
+    heading = np.unwrap(np.radians(table["heading_deg"].to_numpy()))
+    halves = np.diff(heading[[0, len(heading) // 2, -1]])
+    return int(np.sign(halves[0])) if halves.prod() > 0 and np.abs(halves).min() > LEAST_TURN / 2 else 0
+
+
+def _spin_sense(table: pd.DataFrame, motor_speed: float) -> int:
+    """Return 1 for a head that spins clockwise, seen from behind, −1 for the other sense, 0 where no dot shows it.
+
+    A motor at +1 spins the head at −1 and turns the robot to the left, and a mirror changes all three.
+    """
+    if "head_left_cm" not in table or not motor_speed > 0:
+        return 0
+    time, left, area = (table[name].to_numpy() for name in ("time_s", "head_left_cm", "head_area_mm2"))
+    spin = fit_spin(time, left, area, motor_speed)
+    return int(np.sign(spin.omega)) if isinstance(spin, Spin) and spin.sign_seen else 0
 
 
 def _swims_backwards(table: pd.DataFrame) -> bool:

@@ -41,6 +41,8 @@ _SYNONYMS = {"t": "time"}
 _LARGEST = 1e9  # of a sample
 _FEWEST = 12  # samples that a run needs
 _LISTED = 8  # names of runs in a message
+_TAIL_FIRST = 100.0  # degrees of slip; the model stays below 92, with any effect of the catalogue
+MIRRORED = 'give --y-down if the camera\'s y axis points down, or of a film looks = "up" in view.toml'
 _ALIKE = 1.3  # ratio of the angles by which path and heading turn
 
 
@@ -165,7 +167,7 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
     known = [c for c in columns if columns[c].notna().any()]
     if not known:
         raise InputError(f"no track gives a number{f' ({aside[0]})' if aside else ''}; check the tracks")
-    _check_sides(table, columns, y_down)
+    _check_senses(table, columns, y_down)
     if robot is not None:
         _check_motion(robot, table, columns)
     return MeasuredTracks(pd.concat([table, columns[known]], axis=1), aside, fitted, ())
@@ -231,25 +233,33 @@ def _check_radians(run: object, x: Floats, y: Floats, heading_deg: Floats) -> No
         )
 
 
-def _check_sides(runs: pd.DataFrame, measured: pd.DataFrame, y_down: bool) -> None:
-    """Compare the side to which each run turns with the direction of its motor.
+def _check_senses(runs: pd.DataFrame, measured: pd.DataFrame, y_down: bool) -> None:
+    """Compare the senses in which each run turns and its head spins with the direction of its motor.
 
     Raises:
-        InputError: all runs turn to the wrong side.
+        InputError: all runs turn to the wrong side, or all swim tail first.
     """
-    if "omega_rpm" not in runs:
-        return
-    sides = np.sign(pd.to_numeric(runs["omega_rpm"], errors="coerce") * measured["omega_yr_rad_s"])
-    if (sides < 0).any() and not (sides > 0).any():
-        remedy = (
-            "leave out --y-down"
-            if y_down
-            else 'give --y-down if the camera\'s y axis points down, or of a film looks = "up" in view.toml'
-        )
+    omega = numbers_of(runs["omega_rpm"]).to_numpy() if "omega_rpm" in runs else math.nan
+    outputs = measured.reindex(columns=["omega_yr_rad_s", "omega_h_rpm", "theta_deg"])
+    yaw, head, slip = outputs.to_numpy(dtype=float, copy=True).T
+    if _all_above_zero(-omega * yaw):
         raise InputError(
             "all runs turn to the other side than their motors make them (seen from above, a positive omega_rpm "
-            f"turns to the left): {remedy}, or change the sign of omega_rpm"
+            f"turns to the left): {'leave out --y-down' if y_down else MIRRORED}, or change the sign of omega_rpm"
         )
+    tails = numbers_of(runs["N"]).to_numpy() if "N" in runs else math.nan
+    slip[np.isnan(yaw) | (tails == 1)] = math.nan  # a line may drift, and some robots with one tail go tail first
+    if _all_above_zero(omega * head) or _all_above_zero(slip - _TAIL_FIRST):
+        raise InputError(
+            "all runs swim tail first, or their heads spin with the motors: front and rear are exchanged; of a "
+            "film exchange their colours in view.toml (turn a tag by 180 degrees), of other tracks --front and "
+            "--rear"
+        )
+
+
+def _all_above_zero(values: Floats) -> bool:
+    """Tell whether there are values above 0, and none below."""
+    return bool((values > 0).any() and not (values < 0).any())
 
 
 def _check_motion(robot: Robot, runs: pd.DataFrame, measured: pd.DataFrame) -> None:

@@ -16,7 +16,7 @@ from calibration.films import measure_films
 from calibration.swimmer.camera_tracks import measure_tracks
 from camera.film import Film
 from camera.spin import Spin, fit_spin
-from camera.tracks import FilmTracks, track_film
+from camera.tracks import FilmTracks, track_film, turn_sense
 from camera.view import Setup, read_setup
 from sim.inputs import load_robot
 from sim.io.errors import InputError, run_command
@@ -103,7 +103,7 @@ def test_the_command_writes_a_track_that_planner_and_calibration_read_and_a_pict
     words = ["tracks", film(), "--robot", "paper-control", "--view", view, "--start", 5, "--end", 12,
              "--out", tmp_path / "tracks.csv", "--check", tmp_path / "check.png"]  # fmt: skip
     assert run_command(main, [str(word) for word in words]) == 0
-    assert "poses -> " in capsys.readouterr().out
+    assert " poses, turning left as with the motor at +1 -> " in capsys.readouterr().out
     table = pd.read_csv(tmp_path / "tracks.csv")
     assert table["time_s"].iloc[0] == pytest.approx(0, abs=1e-6)
     assert table["time_s"].iloc[-1] == pytest.approx(7, abs=0.2)
@@ -167,6 +167,7 @@ def test_films_of_runs_become_a_measured_table(tmp_path: Path, capsys: pytest.Ca
     said: list[str] = []
     measured = measure_films(film().parent / "runs.csv", film().parent / "view.toml", robot, tell=said.append)
     assert said[0].startswith("swim.mp4: 1 of 97 frames are copies")
+    assert not any("turns to the other side" in line for line in said)
     for column, truth in (("omega_h_rpm", HEAD * 30 / math.pi), ("omega_t_rpm", TAILS * 30 / math.pi),
                           ("omega_yr_rad_s", YAW), ("R_yr_cm", 100 * RADIUS)):  # fmt: skip
         assert measured.table[column].to_numpy() == pytest.approx(np.full(2, truth), rel=0.01)
@@ -176,6 +177,10 @@ def test_films_of_runs_become_a_measured_table(tmp_path: Path, capsys: pytest.Ca
     assert run_command(main, [str(word) for word in words]) == 2
     assert "2 usable runs; a calibration needs at least 24" in capsys.readouterr().err
     assert len(pd.read_csv(tmp_path / "out" / "table.csv")) == 2
+    said.clear()
+    table.assign(omega_rpm=[rpm, -rpm], end_s=[7.0, 15.0]).to_csv(film().parent / "wrong.csv", index=False)
+    measure_films(film().parent / "wrong.csv", film().parent / "view.toml", robot, tell=said.append)
+    assert sum("swim.mp4: the robot turns to the other side than omega_rpm makes it" in line for line in said) == 1
     said.clear()
     table.assign(film=["swim.mp4", "none.mp4"]).to_csv(film().parent / "missing.csv", index=False)
     with pytest.raises(InputError, match=r"none\.mp4: no such file"):
@@ -263,13 +268,45 @@ def test_errors_hold_in_films_through_a_lens_and_a_rolling_shutter(
     assert abs(spin.omega / HEAD - 1) < min(0.01, 3 * spin.error / abs(HEAD))
 
 
-def test_a_robot_whose_front_and_rear_are_exchanged_is_named(tmp_path: Path) -> None:
-    for colours in (("red", "green", "blue", ""), ("green", "red", "blue", "")):
-        tank = Tank(width=320, height=240, scale=0.001, colours=colours)
-        made = tank.film(tmp_path / "a.mp4", SWUM, 2.0, RATE)
-        notes = track_film(made, setup_of(small(), tmp_path)).notes
-        named = [note for note in notes if "it moves tail first; if it did not, exchange the colours of" in note]
-        assert len(named) == (colours[0] == "green")
+@pytest.mark.parametrize("dot", ["blue", ""])
+def test_a_robot_whose_front_and_rear_are_exchanged_is_named_and_its_runs_are_refused(
+    dot: str, tmp_path: Path
+) -> None:
+    """A dot on the head is certain of it; the way it swims is not."""
+    rpm = (TAILS - HEAD) * 30 / math.pi
+    runs = pd.DataFrame({"run": ["a"], "N": [2], "l_cm": [11.0], "omega_rpm": [rpm]})
+    for front, rear in (("red", "green"), ("green", "red")):
+        tank = Tank(width=320, height=240, scale=0.001, colours=(front, rear, dot, ""))
+        made = tank.film(tmp_path / "a.mp4", SWUM, 6.0, RATE)
+        setup = setup_of(Tank(width=320, height=240, scale=0.001, colours=("red", "green", dot, "")), tmp_path)
+        tracked = track_film(made, setup, motor_speed=TAILS - HEAD)
+        named = (
+            "its head spins as if front and rear were exchanged; " if dot else "it moves tail first; if it did "
+        )
+        assert [f"robot 1: {named}" in note for note in tracked.notes] == [True] * (front == "green")
+        if front == "red":
+            measure_tracks(tracked.tables["1"], runs)
+            continue
+        with pytest.raises(InputError, match=r"all runs swim tail first, .*: front and rear are exchanged; of a"):
+            measure_tracks(tracked.tables["1"], runs)
+
+
+def test_a_place_that_drifts_leaves_the_circle(tmp_path: Path) -> None:
+    """A camera that sags moves the picture, as a current moves the robot; a turn shows it."""
+
+    def drifting(time: float) -> tuple[float, float, float, float, float]:
+        x, y, heading, head, tails = SWUM(time)
+        return x + 0.0006 * time, y - 0.0008 * time, heading, head, tails
+
+    table = track_film(small().film(tmp_path / "a.mp4", drifting, 28.0, 8.0), setup_of(small(), tmp_path)).tables[
+        "1"
+    ]
+    runs = pd.DataFrame({"run": ["a"], "N": [2], "l_cm": [11.0], "omega_rpm": [150.0]})
+    row = measure_tracks(table, runs).table.iloc[0]
+    assert row["omega_yr_rad_s"] == pytest.approx(YAW, rel=0.005)
+    assert row["R_yr_cm"] == pytest.approx(100 * RADIUS, rel=0.01)
+    assert row["theta_deg"] == pytest.approx(math.degrees(1.17), abs=1)
+    assert [row["drift_x_cm_s"], row["drift_y_cm_s"]] == pytest.approx([0.06, -0.08], abs=0.005)
 
 
 def test_a_film_that_is_upside_down_gives_the_same_circle_and_spins(tmp_path: Path) -> None:
@@ -292,6 +329,7 @@ def test_mirrored_and_slow_films_are_named_when_runs_are_measured(
     tank = small(mirrored=mirrored)
     made, setup = tank.film(tmp_path / "a.mp4", SWUM, 6.0, rate), setup_of(tank, tmp_path)
     tracked = track_film(made, setup, motor_speed=150 * math.pi / 30)
+    assert turn_sense(tracked.tables["1"]) == (-1 if mirrored else 1)
     table, slow = tracked.tables["1"], [note for note in tracked.notes if "aliasing" in note]
     runs = pd.DataFrame({"run": ["a"], "N": [2], "l_cm": [11.0], "omega_rpm": [150.0]})
     if mirrored:
