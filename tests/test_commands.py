@@ -18,7 +18,7 @@ from calibration.verdict.record import verdict_record
 from camera.view import read_setup
 from dataset.build import build
 from dataset.design import Axis, load_design
-from planner.files.saved_plan import load_plan
+from planner.files.saved_plan import load_goal, load_plan
 from sim.inputs import load_robot
 from sim.io.errors import InputError, run_command
 from sim.io.units import format_time
@@ -249,19 +249,32 @@ def planner_track(made: Path, out: Path) -> str:
 
 
 def planner_goal(made: Path, out: Path) -> str:
-    words = ["--robot", made / "robot.toml", "--goal", "0.8l", "0.2l", 30, "--keep-out", "circle:1.5l,3l,0.5l"]
+    """In centimetres, with walls from a file."""
+    walls = np.array([[-2, -3], [5, -3], [5, 4], [-2, 4]])
+    np.savetxt(out / "walls.csv", 11 * walls, delimiter=",")
+    words = ["--unit", "cm", "--goal", 8.8, 2.2, 30, "--keep-out", "circle:16.5,33,5.5"]
+    words += ["--walls", out / "walls.csv", "--robot", made / "robot.toml"]
     done("planner", "goal", *words, "--out", out / "trip")
     assert names(out / "trip") == FILES | {"goal.json", "goal.svg"}
-    end = load_plan(out / "trip" / "plan.json")["predicted_poses"][-1]
-    assert end == pytest.approx([0.8, 0.2, np.pi / 6], abs=1e-3)
+    goal, end = load_goal(out / "trip" / "goal.json"), load_plan(out / "trip" / "plan.json")["predicted_poses"][-1]
+    assert goal["goal"] == pytest.approx([0.8, 0.2, np.pi / 6])
+    assert end == pytest.approx(goal["goal"], abs=1e-3)
+    assert np.array(goal["walls"]) == pytest.approx(walls)
+    assert goal["keep_out"][0]["circle"] == pytest.approx([1.5, 3, 0.5])
     return "end: (8.80, 2.20) cm = (0.800, 0.200) l, heading 30.0 degrees"
 
 
 def planner_tour(made: Path, out: Path) -> str:
-    done("planner", "tour", "0,0", "3l,0", "1l,2l", "--robot", made / "robot.toml", "--out", out / "tour")
+    """The same places in words and in a file."""
+    (out / "places.csv").write_text("x_cm,y_cm\n0,0\n44,0\n22,11\n")
+    words = ["--objective", "flips", "--robot", made / "robot.toml", "--out"]
+    done("planner", "tour", "0,0", "4l,0", "2l,1l", *words, out / "words")
+    done("planner", "tour", out / "places.csv", *words, out / "tour")
     assert names(out / "tour") == FILES | {"tour.json", "tour.svg"}
-    assert json.loads((out / "tour" / "tour.json").read_text())["order"][0] == 0
-    return "order"
+    said, read = (json.loads((out / name / "tour.json").read_text()) for name in ("words", "tour"))
+    assert said["order"] == read["order"] == [0, 2, 1]
+    assert np.array(said["places"]) == pytest.approx(np.array(read["places"]))
+    return "order: 1 3 2; no other order is quicker"
 
 
 def planner_cover(made: Path, out: Path) -> str:
@@ -280,13 +293,21 @@ def planner_hold(made: Path, out: Path) -> str:
 
 
 def planner_fleet(made: Path, out: Path) -> str:
+    """The folder of a robot that is not there any more goes."""
     robot = f'[[member]]\nrobot = "{made / "robot.toml"}"\nunit = "l"\n'
     goals = [f"goal = [0.8, {y}, 0]\nstart = [0, {y}, 0]\n" for y in (0, 2)]
-    (out / "fleet.toml").write_text("".join(robot + goal for goal in goals))
-    done("planner", "fleet", out / "fleet.toml", "--apart", "5cm", "--out", out / "fleet")
-    assert json.loads((out / "fleet" / "fleet.json").read_text())["sure_distance_m"] > 0.05
-    assert names(out / "fleet") == {"robot-1", "robot-2", "fleet.json", "fleet.svg"}
-    return "robot-2: starts at once"
+    for name in ("right", "left"):
+        more = robot + goals[1] + "delay_s = 10\n"
+        (out / "fleet.toml").write_text(f'{robot}{goals[0]}name = "{name}"\n{more}')
+        done("planner", "fleet", out / "fleet.toml", "--apart", "5cm", "--out", out / "fleet")
+    assert names(out / "fleet") == {"left", "robot-2", "fleet.json", "fleet.svg"}
+    content = json.loads((out / "fleet" / "fleet.json").read_text())
+    assert content["sure_distance_m"] > content["apart_m"] == pytest.approx(0.05)
+    assert content["robots"][1]["begin_s"] == pytest.approx(10)
+    for each in content["robots"]:
+        assert names(out / "fleet" / each["name"]) >= FILES
+        assert load_plan(out / "fleet" / each["name"] / "plan.json")["id"] == each["plan_id"]
+    return "robot-2: starts "
 
 
 def planner_check(made: Path, out: Path) -> str:

@@ -82,6 +82,6 @@ def hindered_trip() -> Plan[Trip]:
 
 
 @shared
-def own_table() -> RobotTable:
-    """Simulate the own table of the robot whose two directions differ."""
-    return tabulate(BIASED)
+def own_table(*, biased: bool = True) -> RobotTable:
+    """Simulate the own table of the robot whose two directions differ, or of the control robot."""
+    return tabulate(BIASED if biased else CONTROL)

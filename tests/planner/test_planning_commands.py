@@ -89,6 +89,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         # paths, regions, cameras, times
         ("plan empty.csv --unit l R", "no rows"),
         ("plan path.csv --unit l --loop R", "a path that repeats is closed"),
+        ("goal --goal 5l 0 0 --keep-out circle:5l,0,1l R", "error: there is no way: at the goal"),
         ("goal --goal 5l 0 0 --keep-out boxx:0,0,1,1 R",
          "boxx:0,0,1,1: no such file or region; is it box:0,0,1,1? regions are circle:X,Y,RADIUS, box:"),
         ("plan line.csv --unit l --keep-out ring:0,1 R", "ring:0,1: no such file or region; regions are circle:X"),
@@ -98,7 +99,6 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("plan circle:1l --camera 0.02l 0.03 1.5 0.5 1.1 R", "camera: lost is 1.1"),
         ("plan circle:1l --camera 0.02 0.03 1.5 0.5 0.1 R", "0.02 has no unit"),
         ("plan circle:1l --camera 0.02l 0.03cm 1.5 0.5 0.1 R", "--camera 0.02l 0.03cm 1.5 0.5 0.1: RAD"),
-        ("plan circle:1l --camera 0.02l 0.03 1.5 0.5 10% R", "numbers without a unit"),
         ("plan circle:1l --arrive=1min R", "the fastest plan takes"),
         ("plan circle:1l --arrive=30 R", "with its unit"),
         ("plan circle:1l --arrive=-3min R", "above 0"),
@@ -112,11 +112,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("tour 0,0 2,0 4,0 --unit l --keep-out circle:2,0,0.5 R", "place 2 at"),
         ("cover box:0,0,2l,1l --width 4km R", "--width: 4km; write a length"),
         ("cover box:0,0,2l --width 4cm R", "write box"),
-        ("cover boxx:0,0,1,1 --width 4cm R", "boxx:0,0,1,1: no such file or region; is it box:0,0,1,1?"),
-        ("hold 1 --for 5min --unit cm R", "write X,Y"),
         ("hold 1,2 --for 5 --unit cm R", "with its unit"),
-        ("hold nan,0 --for 1h --unit cm R", "nan; write a length"),
-        ("hold 1e9m,0 R", "place 1e9m,0: give x and y, as finite numbers below 1e+06"),
         # saved plans
         ("track made/plan.json --smooth 0.3", "--smooth: made/plan.json is planned already"),
         ("track made R", "--robot: made is planned already"),
@@ -153,21 +149,14 @@ def test_refusals_are_one_line_and_write_nothing(
     given = words.replace(" R", " --robot paper-control").split()
     if given[0] in ("plan", "tour", "cover", "hold"):
         given += ["--objective", "flips"]
-    assert run_command(main, [*given, *([] if given[0] == "track" else ["--out", "out"])]) == 2
+    given += [] if given[0] == "track" else ["--out", "out"]
+    assert run_command(main, given) == (3 if "no way" in expected else 2)
     out, err = capsys.readouterr()
     *said, error = err.splitlines()
     assert expected in error
     assert not (out and given[0] == "track")  # no header of a track that there is not
     assert not said or words.startswith("track circle")  # it prints the plan first
     assert not Path("out").exists()
-
-
-def test_the_command_says_that_there_is_no_way(tmp_path: Path, capsys: Capture) -> None:
-    words = ["goal", "--robot", "paper-control", "--goal", "5l", "0", "0", "--keep-out", "circle:5l,0,1l"]
-    assert run_command(main, [*words, "--out", str(tmp_path / "out")]) == 3
-    (error,) = capsys.readouterr().err.splitlines()
-    assert error.startswith("error: there is no way: at the goal")
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
@@ -188,21 +177,6 @@ def test_one_square_in_many_words(words: str, tmp_path: Path, monkeypatch: pytes
     plan = json.loads(Path("out/plan.json").read_text())
     assert np.ptp(np.array(plan["raw_path"]), axis=0) == pytest.approx(0.24 / CONTROL.tail_length)
     assert plan["stated_error_over_l"] <= 0.005 / CONTROL.tail_length
-
-
-def test_a_goal_in_centimetres(tmp_path: Path) -> None:
-    box = [[-2, -3], [5, -3], [5, 3], [-2, 3]]
-    (tmp_path / "outline.csv").write_text("".join(f"{x * CM},{y * CM}\n" for x, y in box))
-    words = ["goal", "--robot", "paper-control", "--unit", "cm", "--goal", str(0.8 * CM), str(0.2 * CM), "-30"]
-    words += ["--objective", "flips"]
-    words += ["--walls", str(tmp_path / "outline.csv"), "--keep-out", f"circle:0,{3 * CM},{CM}"]
-    assert run_command(main, [*words, "--out", str(tmp_path / "out")]) == 0
-    content = json.loads((tmp_path / "out" / "goal.json").read_text())
-    assert content["goal"] == pytest.approx([0.8, 0.2, -math.pi / 6])
-    assert np.array(content["walls"]) == pytest.approx(np.array(box))
-    assert content["keep_out"][0]["circle"] == pytest.approx([0, 3, 1])
-    assert content["margin_over_l"] > 0
-    assert {"plan.json", "schedule.h", "goal.svg"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
 
 @pytest.fixture

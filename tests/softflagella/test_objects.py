@@ -17,17 +17,17 @@ from matplotlib import pyplot
 from matplotlib.figure import Figure
 
 import softflagella as sf
-from tests.softflagella.made import ROBOT, goal, own_table
+from tests.planner.plans import CONTROL, own_table
 
-CM = 100 * ROBOT.tail_length
+CM = 100 * CONTROL.tail_length
 MAKE: dict[str, Callable[[], Any]] = {
-    "robot": lambda: ROBOT,
-    "robot with effects": lambda: replace(ROBOT, effects={name: 1.0 for name in list(sf.effects())[:3]}),
-    "plan": lambda: sf.plan(sf.circle(2.0), ROBOT),
-    "goal": goal,
+    "robot": lambda: CONTROL,
+    "robot with effects": lambda: replace(CONTROL, effects={name: 1.0 for name in list(sf.effects())[:3]}),
+    "plan": lambda: sf.plan(sf.circle(2.0), CONTROL),
+    "goal": lambda: sf.to_goal((0, 0, 0), (0.8, 0.2, 0.3), CONTROL, keep_out=[sf.Circle(1.2, -1.5, 0.3)]),
     "tracker": lambda: sf.Tracker(made("plan")),
     "table": sf.load_table,
-    "own table": own_table,
+    "own table": lambda: own_table(biased=False),
 }
 
 
@@ -80,7 +80,7 @@ def test_a_plan_says_what_it_holds() -> None:
     plan, text = made("plan"), repr(made("plan"))
     assert number(r"of # cm \(12.6 l\)", text) == pytest.approx(4 * math.pi * CM, rel=0.01)
     assert number(r"# dwells of", text) == len(plan.dwells)
-    assert number(r"dwells of # s", text) == pytest.approx(plan.minimum_dwell * ROBOT.time_scale, rel=0.01)
+    assert number(r"dwells of # s", text) == pytest.approx(plan.minimum_dwell * CONTROL.time_scale, rel=0.01)
     assert number(r"more, # min", text) == pytest.approx(plan.seconds.sum() / 60, rel=0.01)
     assert number(r"stated error # mm", text) == pytest.approx(10 * CM * plan.stated_error, rel=0.01)
     assert number(r"predicted error # mm", text) == pytest.approx(10 * CM * plan.predicted_rms, rel=0.01)
@@ -88,19 +88,6 @@ def test_a_plan_says_what_it_holds() -> None:
     assert number(r"heading # degrees", text) == pytest.approx(math.degrees(plan.start[2]), abs=0.06)
     assert number(r"centre at \(#,", text) == pytest.approx(plan.start[0] * CM, rel=0.01)
     assert f"motor {plan.first_direction:+d}" in text
-
-
-def test_a_plan_as_a_table_and_as_plain_content(tmp_path: Path) -> None:
-    plan = made("plan")
-    frame = plan.to_frame()
-    assert len(frame) == len(plan.dwells)
-    assert frame["dwell_s"].sum() == pytest.approx(plan.duration * ROBOT.time_scale)
-    assert frame["x_cm"].to_numpy() == pytest.approx(CM * plan.poses[:-1, 0])
-    assert np.radians(frame["heading_deg"]).to_numpy() == pytest.approx(plan.poses[:-1, 2])
-    assert frame.attrs["units"]["x_cm"] == "cm"
-    sf.write_plan(plan, tmp_path)
-    content = sf.load_plan(tmp_path / "plan.json")
-    assert {name: content[name] for name in plan.to_dict()} == plan.to_dict()
 
 
 def test_a_goal_plan_says_where_it_ends() -> None:
@@ -115,7 +102,7 @@ def test_a_tracker_says_what_the_motor_does() -> None:
     tracker = sf.Tracker(made("plan"))
     command = tracker.update(0.0)
     until = number(r"motor \+1 until # s", repr(tracker))
-    assert until == pytest.approx(command.flip_at * ROBOT.time_scale, rel=0.01)
+    assert until == pytest.approx(command.flip_at * CONTROL.time_scale, rel=0.01)
     assert "alarm: none" in repr(tracker)
     assert tracker.pose == pytest.approx(made("plan").start)
     command = tracker.update(command.flip_at)
@@ -125,10 +112,10 @@ def test_a_tracker_says_what_the_motor_does() -> None:
 
 
 def test_robots_and_tables_say_their_numbers_and_tables_are_saved_and_loaded(tmp_path: Path) -> None:
-    text = repr(ROBOT)
+    text = repr(CONTROL)
     assert number(r"l = # cm", text) == 11
-    assert number(r"motor # rpm", text) == pytest.approx(ROBOT.motor_speed * 30 / math.pi, rel=1e-3)
-    assert number(r"unit of time # s", text) == pytest.approx(ROBOT.time_scale, rel=1e-3)
+    assert number(r"motor # rpm", text) == pytest.approx(CONTROL.motor_speed * 30 / math.pi, rel=1e-3)
+    assert number(r"unit of time # s", text) == pytest.approx(CONTROL.time_scale, rel=1e-3)
     assert list(sf.effects())[1] in repr(made("robot with effects"))
     table, own, text = made("table"), made("own table"), repr(made("table"))
     assert table.identity in text

@@ -22,10 +22,11 @@ from planner.files.plan_svg import SvgAxes
 from planner.files.tracks import tracking_error
 from planner.vehicle.rollout import Switches, roll_out
 from sim.io.errors import InputError
+from sim.io.pose_tracks import read_tracks
 from sim.model.schedule import load_schedule
 from tests.planner.compiled import compile_c
 from tests.planner.plans import CONTROL, planned
-from tests.sim.io.tracked_files import two_robots
+from tests.sim.io.tracked_files import deeplabcut, two_robots
 
 
 def test_files_of_a_plan(tmp_path: Path) -> None:
@@ -45,9 +46,12 @@ def test_files_of_a_plan(tmp_path: Path) -> None:
     assert f"SCHEDULE_COUNT {len(numbers)}" in header
     assert "<svg" in written[4].read_text()
     table = result.to_frame()
-    for name in ("x", "y"):
+    assert table["dwell_s"].sum() == pytest.approx(result.seconds.sum())
+    for k, name in enumerate(("x", "y")):
+        assert table[f"{name}_over_l"].to_numpy() == pytest.approx(result.poses[:-1, k])
         assert table[f"{name}_cm"].to_numpy() == pytest.approx(11 * table[f"{name}_over_l"].to_numpy())
     assert np.radians(table["heading_deg"].to_numpy()) == pytest.approx(table["heading_rad"].to_numpy())
+    assert table.attrs["units"]["x_cm"] == "cm"
 
 
 def test_milliseconds_carry_rounding_and_split_long_dwells() -> None:
@@ -191,40 +195,24 @@ def test_a_track_of_a_camera_has_the_error_of_the_same_track_in_tail_lengths() -
     assert f"{1000 * error.rms * CONTROL.tail_length:.3g} mm ({error.rms:.3g} l) rms" in error.line
 
 
-def test_a_track_of_another_program_has_the_error_of_the_same_track(
+def test_tracks_of_another_program_are_read_as_options_say(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Pixels of 0.5 mm, the plan's 0, 0 at (900, 700) of the picture, one frame lost."""
-    record, track = tracks()
+    """Of one robot; what is lost is told."""
     json_file, file = tmp_path / "plan.json", tmp_path / "swimDLC_resnet50.csv"
-    json_file.write_text(json.dumps(record))
-    frames = np.round(25 * CONTROL.time_scale * track["time_bar"]).astype(int)
-    pixels = CONTROL.tail_length / 0.0005
-    lines = ["scorer" + 6 * ",DLC", "bodyparts,tip,tip,tip,disc,disc,disc", "coords,x,y,likelihood,x,y,likelihood"]
-    for frame, x, y, heading in zip(frames, track.x_over_l, track.y_over_l, track.heading_rad, strict=True):
-        dots = [(x * pixels + d * np.cos(heading), y * pixels + d * np.sin(heading)) for d in (30, -30)]
-        lines.append(f"{frame}" + "".join(f",{900 + u},{700 - v},0.99" for u, v in dots))
-    lines.append(f"{frames.iloc[-1] + 1},0,0,0.1,0,0,0.1")
-    file.write_text("\n".join(lines))
-    words = ["--from", "deeplabcut", "--front", "tip", "--rear", "disc", "--scale", "0.5mm", "--fps", "25"]
-    main(["check", str(json_file), str(file), *words, "--origin", "900", "700"])
-    told = capsys.readouterr()
-    assert told.err == f"{file}: 1 of {len(track) + 1} poses are lost\n"
-    with pytest.warns(UserWarning, match="1 of .* poses are lost") as warned:
-        error = check(json_file, file, written_by="deeplabcut", front="tip", rear="disc", scale="0.5mm", fps=25.0,
-                      origin=(900.0, 700.0))  # fmt: skip
+    json_file.write_text(json.dumps(tracks()[0]))
+    file.write_bytes(deeplabcut())
+    options: dict[str, Any] = {"written_by": "deeplabcut", "scale": "0.5mm", "fps": 25.0}
+    wanted = tracking_error(tracks()[0], read_tracks(file, **options, origin=(900.0, 700.0)).drop(columns="run"))
+    words = ["--from", "deeplabcut", "--scale", "0.5mm", "--fps", "25", "--origin", "900", "700"]
+    main(["check", str(json_file), str(file), *words])
+    assert capsys.readouterr() == (f"{wanted.line}\n", f"{file}: 1 of 40 poses are lost\n")
+    with pytest.warns(UserWarning, match="1 of 40 poses are lost") as warned:
+        assert check(json_file, file, **options, origin=(900.0, 700.0)).rms == wanted.rms
     assert [each.filename for each in warned] == [__file__]
-    assert told.out == f"{error.line}\n"
-    assert error.rms == pytest.approx(tracking_error(record, track).rms, rel=0.01)
-    file.write_text(file.read_text().replace("bodyparts", "individuals" + 3 * ",a" + 3 * ",b" + "\nbodyparts"))
-    with pytest.raises(InputError, match="has no point 'front' but tip, disc"):
-        check(json_file, file, written_by="deeplabcut", scale="0.5mm", fps=25.0)
-
-
-def test_the_tracks_of_several_robots_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "swim.csv").write_bytes(two_robots())
+    file.write_bytes(two_robots())
     with pytest.raises(InputError, match="there are 2 tracks, of swim one, swim two …; give that of one robot"):
-        check(tracks()[0], tmp_path / "swim.csv", written_by="deeplabcut", scale="0.5mm", fps=25.0)
+        check(tracks()[0], file, **options)
 
 
 def test_the_track_of_another_robot_or_plan_is_refused() -> None:

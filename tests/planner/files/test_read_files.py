@@ -52,21 +52,6 @@ def test_a_changed_number_is_noticed(tmp_path: Path) -> None:
     assert load_plan(written(tmp_path, **changed, id="0123456789ab"))["id"] == "0123456789ab"
 
 
-@pytest.mark.parametrize(
-    ("changes", "expected"),
-    [
-        ({"reference": []}, "plan.json: reference must be 2 or more rows of 2 finite numbers"),
-        ({"reference": [["nan", 0.0], [1.0, 1.0]]}, "reference must be 2 or more rows of 2 finite numbers"),
-        ({"stated_error_over_l": "nan"}, "stated_error_over_l must be a finite number"),
-        ({"robot": 3}, "not a plan.json"),
-    ],
-)
-def test_edited_plans_are_refused(tmp_path: Path, changes: dict[str, Any], expected: str) -> None:
-    with pytest.raises(InputError, match=expected) as caught:
-        load_plan(written(tmp_path, **changes, id=plan_id({**record(), **changes})))
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize("reader", READERS)
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
@@ -174,25 +159,6 @@ def command(path: Path, out: Path, *words: str) -> int:
     from planner.__main__ import main
 
     return run_command(main, ["fleet", str(path), "--out", str(out), *words])
-
-
-def test_the_command_plans_for_all_robots(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path, out = write_files(tmp_path), tmp_path / "out"
-    assert command(path, out) == 0
-    assert "least distance" in capsys.readouterr().out
-    content = json.loads((out / "fleet.json").read_text())
-    assert [robot["name"] for robot in content["robots"]] == ["right", "robot-2"]
-    assert content["sure_distance_m"] >= content["apart_m"] == pytest.approx(0.03)
-    assert content["robots"][1]["begin_s"] >= 10
-    for robot in content["robots"]:
-        assert load_plan(out / robot["name"] / "plan.json")["id"] == robot["plan_id"]
-        assert {"plan.csv", "schedule.h", "tracker.h", "plan.svg"} < {
-            file.name for file in (out / robot["name"]).iterdir()
-        }
-    assert "<svg" in (out / "fleet.svg").read_text()
-    renamed = write_files(tmp_path, TWO.replace('"right"', '"left"'))
-    assert command(renamed, out) == 0
-    assert sorted(file.name for file in out.iterdir()) == ["fleet.json", "fleet.svg", "left", "robot-2"]
 
 
 @pytest.mark.parametrize(

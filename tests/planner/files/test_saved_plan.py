@@ -20,6 +20,7 @@ from planner.files.plan_files import write_plan
 from planner.files.saved_plan import is_plan, load_plan, restore_plan
 from planner.paths.path import circle
 from planner.planning.plan import Plan
+from planner.planning.request import Camera
 from planner.tracking.tracker import Tracker
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.inputs import save_robot
@@ -39,7 +40,7 @@ KNOWN = CalibrationKnowledge(("C_t",), np.array([[1e-4]]), current=(2e-4, 1e-4),
 
 @shared
 def in_current() -> Plan:
-    return plan(circle(1.5), CONTROL, knowledge=KNOWN)
+    return plan(circle(1.5), CONTROL, knowledge=KNOWN, camera=Camera((0.02, 0.03), 1.5, 0.5, 0.1))
 
 
 PLANS: dict[str, Callable[[], Plan]] = {
@@ -49,6 +50,7 @@ PLANS: dict[str, Callable[[], Plan]] = {
     "current": in_current,
     "goal": trip,
     "obstacles": around,
+    "laps": lambda: planned("circle:1.2l", objective="flips", loop=True),
 }
 
 
@@ -72,7 +74,8 @@ def test_a_restored_plan_gives_the_same_orders(name: str) -> None:
     result, content = PLANS[name](), saved(name)
     same = restore_plan(content)
     assert np.array(orders(same)) == pytest.approx(np.array(orders(result)), abs=1e-6)
-    assert same.warnings == result.warnings
+    assert (same.warnings, same.request.camera) == (result.warnings, result.request.camera)
+    assert (same.lap, same.feedback_error) == (result.lap, result.feedback_error)
     again = json.loads(json.dumps(same.to_dict()))
     assert again.keys() == content.keys()
     for key in ("reference", "predicted_poses", "dwell_s", "raw_path"):
@@ -124,6 +127,10 @@ def test_the_files_of_jobs_and_their_folder_lead_to_the_plan(tmp_path: Path) -> 
         ({"reference": [[0.0, 0.0], [1e200, 0.0]]}, "reference must be 2 or more rows of 2 finite numbers"),
         ({"off_drawn_over_l": 1.0, "guidance": {"heading_rad": [1e300, -1e300]}}, "lacks what is needed"),
         ({"robot": {"groups": {"omega_bar": 10.0}}}, "lacks what is needed"),
+        ({"robot": 3}, "not a plan.json"),
+        ({"reference": []}, "reference must be 2 or more rows of 2 finite numbers"),
+        ({"reference": [["nan", 0.0], [1.0, 1.0]]}, "reference must be 2 or more rows of 2 finite numbers"),
+        ({"stated_error_over_l": "nan"}, "stated_error_over_l must be a finite number"),
     ],
 )
 def test_edited_plans_are_refused(changes: dict[str, Any], expected: str, tmp_path: Path) -> None:

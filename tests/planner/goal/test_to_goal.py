@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from planner.files.saved_plan import load_plan
 from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, three_arcs, words
 from planner.goal.lattice import RouteLimits
 from planner.goal.route import COURSES, NoWayError, route
@@ -66,17 +63,11 @@ def test_time_is_within_5_percent_of_brute_force(seed: int) -> None:
     assert goal_plan.duration < 1.05 * brute_force(goal_plan.tracked.vehicle, goal)
 
 
-def test_a_plan_to_a_goal_gives_no_guarantee_and_is_read_again(tmp_path: Path) -> None:
-    """The guaranteed bound is for paths with wider turns."""
-    check_end(trip())
-    assert trip().errors.guaranteed is None
-    (tmp_path / "plan.json").write_text(json.dumps(trip().to_dict()))
-    assert load_plan(tmp_path / "plan.json")["guaranteed_error_over_l"] is None
-
-
 def test_moved_and_mirrored_tasks_give_moved_and_mirrored_plans() -> None:
-    """One task is moved and mirrored: about the x axis, then by a frame."""
+    """One task is moved and mirrored: about the x axis, then by a frame. The guaranteed bound is for paths."""
     one, frame = trip(), np.array([3.0, -1.0, 0.7])
+    check_end(one)
+    assert one.errors.guaranteed is None
     goal = planar.compose(frame, np.array(one.job.goal) * [1, -1, -1])
     other = to_goal(frame.tolist(), goal.tolist(), CONTROL, objective="flips")
     assert other.dwells == pytest.approx(one.dwells, rel=1e-4)

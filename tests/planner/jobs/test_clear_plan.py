@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,7 +21,7 @@ from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
-from sim.io.errors import InputError, run_command
+from sim.io.errors import InputError
 from sim.motion.replay import replay
 from tests.planner.plans import CONTROL, LINE, QUICK, ROCK, around, planned, tracked, trip
 from tests.planner.vehicles import FINE
@@ -217,19 +215,6 @@ def test_a_tracked_robot_swims_the_circles_and_arrives() -> None:
     assert result.finished
     assert result.distance.max() < 0.2
     assert result.times[-1] == pytest.approx(waiting().duration, rel=0.03)  # a robot that is 2 % faster
-
-
-def test_the_command_arrives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from planner.__main__ import main
-
-    words = ["plan", "circle:1.5l", "--robot", "paper-control", "--out", str(tmp_path / "out")]
-    for seconds in (0.0, np.nan, np.inf):
-        with pytest.raises(InputError, match="above 0"):
-            make_plan(circle(1.5), tracked(), PlanRequest(arrive_seconds=seconds))
-    assert run_command(main, [*words, "--arrive", "25min"]) == 0
-    assert "arrives after 25 min as asked" in capsys.readouterr().out
-    content = json.loads((tmp_path / "out" / "plan.json").read_text())
-    assert sum(content["dwell_s"]) == pytest.approx(1500, rel=0.002)
 
 
 def straight() -> Plan:

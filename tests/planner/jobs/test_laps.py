@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,7 +10,6 @@ import numpy as np
 import pytest
 
 from planner.files.headers import rounded
-from planner.files.saved_plan import restore_plan
 from planner.goal import last_dwells
 from planner.goal.last_dwells import looped
 from planner.jobs.hold import Orbit, hold
@@ -28,7 +26,7 @@ from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import tracked_vehicle
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
-from sim.io.errors import InputError, run_command
+from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
@@ -180,23 +178,6 @@ def test_in_c_it_goes_around_as_well(tmp_path: Path) -> None:
         if command.finished:
             break
     assert 2.9 < command.flip_at / plan.duration < 3.1
-
-
-def test_the_command_plans_laps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from planner.__main__ import main
-
-    words = ["--robot", "paper-control", "--objective", "flips", "--loop", "--out", str(tmp_path / "out")]
-    assert run_command(main, ["plan", "circle:1l", *words]) == 0
-    assert "repeat it: a lap ends where it began" in capsys.readouterr().out
-    content = json.loads((tmp_path / "out" / "plan.json").read_text())
-    assert set(content["lap"]) == {"closes_over_l", "closes_rad", "drift_over_l", "drift_rad"}
-    header = (tmp_path / "out" / "schedule.h").read_text()
-    assert "#define SCHEDULE_REPEATS 1" in header
-    assert "After the last entry go on with the first" in header
-    restored = restore_plan(tmp_path / "out")
-    assert restored.lap is not None
-    assert restored.lap.to_dict() == content["lap"]
-    assert Tracker(restored).command.flip_at == pytest.approx(content["dwell_bar"][0], rel=0.2)
 
 
 def test_the_pipe_is_told_that_this_lap_is_the_last_one() -> None:

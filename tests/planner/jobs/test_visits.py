@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from itertools import pairwise, permutations
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,7 +21,7 @@ from planner.planning.request import PlanRequest
 from planner.planning.solve import Setting
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import dwells_for
-from sim.io.errors import InputError, run_command
+from sim.io.errors import InputError
 from sim.motion.replay import replay
 from tests.planner.plans import CONTROL, tracked
 
@@ -158,21 +156,6 @@ def test_the_simulator_visits_all_places() -> None:
     track = replay(result.schedule())
     points = track[["x_over_l", "y_over_l"]].to_numpy(float)
     assert distance_to(points, np.array(PLACES[:3])).max() < result.stated_error + 0.05
-
-
-def test_the_command_reads_places_from_words_and_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from planner.__main__ import main
-
-    cm = 100 * CONTROL.tail_length
-    (tmp_path / "places.csv").write_text("x_cm,y_cm\n" + "".join(f"{cm * x},{cm * y}\n" for x, y in PLACES[:3]))
-    common = ["--robot", "paper-control", "--objective", "flips", "--out"]
-    assert run_command(main, ["tour", str(tmp_path / "places.csv"), *common, str(tmp_path / "one")]) == 0
-    assert "order: 1 3 2; no other order is quicker" in capsys.readouterr().out
-    assert run_command(main, ["tour", "0,0", "4l,0", "2l,1l", *common, str(tmp_path / "two")]) == 0
-    one, two = (json.loads((tmp_path / name / "tour.json").read_text()) for name in ("one", "two"))
-    assert one["order"] == two["order"] == [0, 2, 1]
-    assert np.array(one["places"]) == pytest.approx(np.array(two["places"]))
-    assert {"plan.json", "schedule.h", "tour.svg"} <= {path.name for path in (tmp_path / "one").iterdir()}
 
 
 FIELD = Field(Polygon.of([[0, 0], [3, 0], [3, 1.5], [0, 1.5]]))

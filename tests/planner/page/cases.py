@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -10,40 +9,27 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from planner.api import plan
 from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
-from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.tracked_point import Point, TrackedVehicle
 from planner.vehicle.vehicle import Mode, Vehicle
-from sim.io.errors import InputError
 from sim.model.presets import PRESETS
-from sim.model.robot import Robot
 from sim.motion.lab_units import lab_columns
 from surrogate.domain import ROBOT as GROUPS
 from surrogate.table import NeuralTable
 from surrogate.table_file import load
-from surrogate.tabulate import tabulate
 from surrogate.training.simulated import draw_robots
 from tests.planner.vehicles import vehicle
 from tests.shared import shared
 
-EFFECT = "left_right_bias"
 CONTROL, TRIANGLE, MEASURED = (PRESETS[f"paper-{name}"] for name in ("control", "triangle", "measured"))
 
 
 @cache
 def shipped() -> NeuralTable:
     return load()
-
-
-@shared
-def one_robot() -> tuple[Robot, Any]:
-    """Return a robot with an effect, and its own table."""
-    robot = replace(CONTROL, effects={EFFECT: 0.1})
-    return robot, tabulate(robot)
 
 
 @cache
@@ -58,27 +44,6 @@ def random_groups(count: int) -> list[dict[str, float]]:
 
 def columns_of(rows: list[dict[str, float]]) -> dict[str, np.ndarray]:
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
-
-
-@shared
-def random_robots(count: int, seed: int = 0) -> list[Robot]:
-    """Draw robots near the paper's that the table knows."""
-    rng = np.random.default_rng(seed)
-    robots: list[Robot] = []
-    while len(robots) < count:
-        robot = replace(
-            CONTROL,
-            tails=int(rng.integers(2, 6)),
-            C_t=3 * np.exp(0.3 * rng.normal()),
-            C_r=2.8 * np.exp(0.3 * rng.normal()),
-            C_yr=2 * np.exp(0.5 * rng.normal()),
-            tail_length=float(rng.uniform(0.06, 0.13)),
-            head_length=float(rng.uniform(0.04, 0.08)),
-        ).with_motor(float(rng.uniform(2, 20)))
-        with suppress(InputError):
-            table_vehicle(robot, shipped())
-            robots.append(robot)
-    return robots
 
 
 TURN, SHARE, LONG = np.linspace(0, 2 * np.pi, 400, endpoint=False), np.linspace(0, 1, 150), np.linspace(0, 9, 300)
@@ -127,37 +92,6 @@ def tracked_of(car: Vehicle, offset: float = 0.0) -> TrackedVehicle:
 def followed(path: str, car: str, offset: float = 0.0, **options: Any) -> Plan:
     """Plan for one of PATHS and one of VEHICLES."""
     return make_plan(PATHS[path], tracked_of(VEHICLES[car], offset), PlanRequest(**options))
-
-
-@shared
-def planned(path: str, robot: str = "paper-control", **options: Any) -> Plan:
-    """Plan for one of PATHS with the shipped look-up table."""
-    return plan(PATHS[path], PRESETS[robot], lookup=shipped(), **options)
-
-
-def random_case(seed: int) -> tuple[Path2D, Robot, dict[str, Any]]:
-    """Draw a robot, a path and options."""
-    rng = np.random.default_rng(seed)
-    size = float(rng.uniform(1.5, 5))
-    turn = np.linspace(0, 2 * np.pi, int(rng.integers(40, 400)), endpoint=False)
-    kind = int(rng.integers(4))
-    if kind == 0:
-        path = polygon(int(rng.integers(3, 9)), size)
-    elif kind == 1:
-        waves = sum(rng.normal() * 0.12 / k * np.cos(k * turn + rng.uniform(0, 6)) for k in (2, 3, 4))
-        path = Path2D.of(size * np.stack([np.cos(turn), np.sin(turn)], 1) * (1 + waves)[:, None], closed=True)
-    elif kind == 2:
-        path = Path2D.of(np.cumsum(rng.normal(size=(int(rng.integers(3, 8)), 2)), 0) * size)
-    else:
-        x = np.linspace(0, 3 * size, 200)
-        path = Path2D.of(np.stack([x, 0.4 * size * np.sin(x * rng.uniform(0.5, 1.2))], 1))
-    options: dict[str, Any] = {"objective": ("error", "time", "flips")[int(rng.integers(3))]}
-    if rng.random() < 0.2:
-        options["corner"] = "minimax"
-    if rng.random() < 0.2:
-        options["time_weight"] = 0.03
-    number = seed % 40
-    return path, random_robots(40 if number > 1 else 2, seed=1)[number], options
 
 
 def look_up(runs: pd.DataFrame) -> dict[str, np.ndarray]:

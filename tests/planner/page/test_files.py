@@ -30,7 +30,7 @@ from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml
 from sim.model.schedule import plan_id
 from sim.model.uncertainty import Sigma
-from tests.planner.page.cases import CONTROL, PATHS, followed, planned, shipped
+from tests.planner.page.cases import CONTROL, PATHS, followed, shipped
 from tests.planner.page.page_core import (
     TABLE,
     answer,
@@ -43,6 +43,7 @@ from tests.planner.page.page_core import (
     refusal_of,
     to_page,
 )
+from tests.planner.plans import planned
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
 
@@ -292,7 +293,7 @@ def check_plan_opened(content: dict[str, Any]) -> None:
 
 
 def test_a_plan_with_more_than_a_path_gives_it() -> None:
-    content = {**planned("circle", objective="flips").to_dict(), "lap": {"period_s": 1.0}, "arrival": None}
+    content = {**planned("circle:2l", objective="flips").to_dict(), "lap": {"period_s": 1.0}, "arrival": None}
     check_plan_opened({**content, "id": plan_id(content)})
 
 
@@ -308,7 +309,7 @@ def test_plans_with_laps_walls_or_an_arrival_give_their_paths() -> None:
 
 
 def test_an_edited_plan_and_a_robot_that_was_cut_are_refused() -> None:
-    content = {**planned("circle", objective="flips").to_dict(), "code_version": "0"}
+    content = {**planned("circle:2l", objective="flips").to_dict(), "code_version": "0"}
     check_plan_opened(content)
     content["raw_path"][1][0] += 0.1
     assert "plan.json was edited or damaged after it was written" in str(opened("plan.json", json.dumps(content)))

@@ -17,7 +17,8 @@ import softflagella as sf
 from planner.vehicle.from_table import both_directions
 from sim.io.errors import run_command
 from softflagella.__main__ import main
-from tests.planner.page.cases import EFFECT, one_robot, shipped
+from tests.planner.page.cases import shipped
+from tests.planner.plans import BIASED, own_table
 
 
 def data_of(page: Path) -> dict:
@@ -60,10 +61,9 @@ def test_paths_and_options_are_what_the_page_begins_with(tmp_path: Path) -> None
 
 @pytest.mark.rest
 def test_a_robot_with_an_effect_is_locked_and_small(tmp_path: Path) -> None:
-    robot, table = one_robot()
-    page = sf.write_page(tmp_path / "page.html", robot, lookup=table)
+    page = sf.write_page(tmp_path / "page.html", BIASED, lookup=own_table())
     data = data_of(page)
-    assert EFFECT in data["locked"]["why"]
+    assert "left_right_bias" in data["locked"]["why"]
     assert page.stat().st_size < 0.5e6
 
 

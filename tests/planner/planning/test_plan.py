@@ -82,16 +82,6 @@ def test_options_are_the_fields_of_a_request() -> None:
     assert {name: options.get(name) for name in wanted} == wanted | words
 
 
-def test_a_tolerance_shortens_the_dwell_and_says_when_it_cannot() -> None:
-    free = planned("circle:1l", objective="flips")
-    tight = plan(circle(1.0), CONTROL, objective="flips", tolerance=0.75 * free.stated_error)
-    assert tight.minimum_dwell < free.minimum_dwell
-    assert tight.stated_error <= 0.75 * free.stated_error
-    assert len(tight.dwells) > len(free.dwells)
-    with pytest.raises(InputError, match="smallest stated error is"):
-        plan(circle(1.0), CONTROL, tolerance=1e-3)
-
-
 def test_objectives_trade_error_for_time_and_flips() -> None:
     """With few flips, a measured pose does no harm."""
     error, time, flips = planned(), planned(objective="time"), planned("circle:2l", objective="flips")
@@ -148,6 +138,7 @@ AGAINST = CalibrationKnowledge(current=(-0.05 * LAB, 0.0))
     [
         ([], "empty", {}),
         ([[0, 0]], "same|two points", {}),
+        *((circle(1.5), "above 0", {"arrive": seconds}) for seconds in (0.0, float("nan"), float("inf"))),
         ([[0, 0], [0, 0]], "same", {}),
         ([[0, 0], [float("nan"), 1]], "finite", {}),
         ([[0, 0, 0], [1, 1, 1]], r"\(n, 2\)", {}),
@@ -169,7 +160,7 @@ AGAINST = CalibrationKnowledge(current=(-0.05 * LAB, 0.0))
          {"robot": replace(CONTROL, disc_offset=0.0016)}),
         (circle(2.0), "tail_sag .*surrogate robot", {"robot": replace(CONTROL, effects={"tail_sag": 0.1})}),
     ],
-    ids=range(20),
+    ids=range(23),
 )  # fmt: skip
 def test_refusals(path: Any, expected: str, options: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=expected) as caught:

@@ -5,13 +5,10 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from planner.__main__ import main
-from planner.files.saved_plan import load_plan, restore_plan
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Reference, reference
@@ -179,14 +176,6 @@ def test_the_tracker_keeps_it_in_95_percent_of_the_time(camera: Camera) -> None:
     result = plan_of("circle:1.6l", "paper-triangle", camera=camera)
     tracker = Tracker(result, noise=camera.noise)
     assert swim(tracker, result, result.tracked.vehicle, camera).within(result.feedback_error) > 0.95
-
-
-def test_the_command_takes_a_camera(tmp_path: Path) -> None:
-    words = ["plan", "circle:1.2l", "--robot", "paper-triangle", "--objective", "flips", "--out", str(tmp_path)]
-    main([*words, "--camera", "0.02l", "0.03", "1.5", "0.5", "0.1"])
-    content = load_plan(tmp_path / "plan.json")
-    assert content["camera"] == Camera((0.02, 0.03), 1.5, 0.5, 0.1).to_dict()
-    assert restore_plan(tmp_path).feedback_error == content["feedback_error_over_l"]
 
 
 def test_a_worse_camera_means_a_larger_error() -> None:

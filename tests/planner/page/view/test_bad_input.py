@@ -11,9 +11,9 @@ import pytest
 from planner.files.plan_files import write_plan
 from sim.io.errors import run_command
 from softflagella.__main__ import main
-from tests.planner.page.cases import planned as planned_by_python
 from tests.planner.page.page_core import answer, without_digits
 from tests.planner.page.view.browser import address_of, drop, is_seen, planned, text_of, unfold
+from tests.planner.plans import planned as planned_by_python
 
 OLD = "Picture and numbers are those of the last plan that could be made."
 HEADER = "time_s,x_cm,y_cm,heading_deg\n"
@@ -69,7 +69,7 @@ def test_a_file_is_refused_in_the_words_of_the_command(
 ) -> None:
     place, content, command = FILES[name]
     if place == "measured":
-        write_plan(planned_by_python("circle", objective="flips"), Path("plan"))
+        write_plan(planned_by_python("circle:2l", objective="flips"), Path("plan"))
     ours = told(page, place, name, content)
     assert run_command(main, command) == 2
     theirs = capsys.readouterr().err.strip().removeprefix("error: ")

@@ -24,8 +24,7 @@ from sim.io.errors import run_command
 from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
 from softflagella.__main__ import main
-from tests.planner.page.cases import CONTROL, EFFECT, TRIANGLE, one_robot, shipped, table_of_runs
-from tests.planner.page.cases import planned as planned_by_python
+from tests.planner.page.cases import TRIANGLE, shipped, table_of_runs
 from tests.planner.page.page_core import check_header
 from tests.planner.page.view.browser import (
     FIRST_SCREEN,
@@ -40,6 +39,8 @@ from tests.planner.page.view.browser import (
     text_of,
     unfold,
 )
+from tests.planner.plans import BIASED, CONTROL, own_table
+from tests.planner.plans import planned as planned_by_python
 
 pytestmark = pytest.mark.slow
 
@@ -237,7 +238,7 @@ def test_of_several_paths_the_sizes_are_those_of_the_chosen_one(page: Any, tmp_p
 
 
 def test_a_track_is_shown_over_its_plan_with_its_error(page: Any, tmp_path: Path) -> None:
-    result: Plan = planned_by_python("circle", objective="flips")
+    result: Plan = planned_by_python("circle:2l", objective="flips")
     starts, share = np.cumsum([0.0, *result.dwells[:-1]]), np.arange(8) / 8
     time = (starts[:, None] + result.dwells[:, None] * share).ravel() * result.robot.time_scale
     poses = roll_out(result.tracked.vehicle, result.switches).poses[:-1]
@@ -341,9 +342,10 @@ def test_runs_are_compared_and_the_command_is_copied(page: Any, tmp_path: Path) 
     page.locator("#runs-problem", has_text="unknown column 'thetta_deg': is it 'theta_deg'?").wait_for()
 
 
-@pytest.mark.parametrize("why", ["one error for all robots", pytest.param(EFFECT, marks=pytest.mark.rest)])
+@pytest.mark.parametrize("why", ["one error for all", pytest.param("left_right_bias", marks=pytest.mark.rest)])
 def test_a_locked_robot_is_planned_for_as_by_the_command(browser: Any, tmp_path: Path, why: str) -> None:
-    robot, table = one_robot() if why == EFFECT else (CONTROL, replace(shipped(), curve_errors=None))
+    one_error = replace(shipped(), curve_errors=None)
+    robot, table = (CONTROL, one_error) if "one error" in why else (BIASED, own_table())
     path = write_page(tmp_path / "page.html", robot, table, PlanRequest())
     table_of_runs().to_csv(tmp_path / "table.csv", index=False)
     with opened_page(browser, f"{path.as_uri()}#v=1&objective=flips&path=circle%3A22") as page:
