@@ -224,13 +224,13 @@ def _with_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.insert_element(args[0], args[2], builder.trunc(args[1], ir.IntType(32)))
 
 
-@_teach(plain.count_lanes, lambda value: types.int64(_numbers(value)))
-def _count_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return context.get_constant(types.int64, sig.args[0].width if isinstance(sig.args[0], Lanes) else 1)
+@_teach(plain.width, lambda: types.int64())
+def _width(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return context.get_constant(types.int64, plain.width())
 
 
-def _vectors(array: Any, width: Any) -> Any:
-    return types.Array(Lanes(len(width)), array.ndim - 1, "C", aligned=False)(array, width)
+def _vectors(array: Any) -> Any:
+    return types.Array(Lanes(plain.width()), array.ndim - 1, "C", aligned=False)(array)
 
 
 @_teach(plain.lanes, _vectors)
@@ -257,8 +257,7 @@ def _allocated(allocate: Any) -> Any:
     def typed(like: Any, shape: Any) -> Any:
         if not isinstance(like.dtype, Lanes):
             return lambda like, shape: allocate(shape)
-        width = (0,) * like.dtype.width
-        count = len(width)
+        count = like.dtype.width
 
         def code(like: Any, shape: Any) -> Any:
             size = count
@@ -266,7 +265,7 @@ def _allocated(allocate: Any) -> Any:
                 size *= extent
             numbers = allocate(size + LINE)
             first = (-numbers.ctypes.data // 8) % LINE
-            return plain.lanes(numbers[first : first + size].reshape((*shape, count)), width)
+            return plain.lanes(numbers[first : first + size].reshape((*shape, count)))
 
         return code
 

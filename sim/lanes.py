@@ -9,20 +9,30 @@ the order of the source, and products are only fused where the source says so (`
 A condition on lanes is a vector of 1 (true) and 0 (false), by which `choose` picks.
 
 The functions of this file are for compiled loops. `sim.lane_code` gives their machine code; what stands here is
-what they do to plain numbers. W is the length of a tuple (`GROUP`, `HALF_GROUP`), so that it is part of a type.
+what they do to plain numbers. W is that of this processor (`width`).
 """
 
 from __future__ import annotations
 
+import os
+from functools import cache
 from typing import Any
 
 import numpy as np
 
-GROUP, HALF_GROUP = (0,) * 8, (0,) * 4  # the widest registers hold eight numbers, others four
+
+@cache
+def width() -> int:
+    """Return W: eight where registers hold eight numbers (AVX-512), else four."""
+    from llvmlite.binding import get_host_cpu_features
+
+    given = os.environ.get("NUMBA_CPU_FEATURES")
+    wide = get_host_cpu_features().get("avx512f", False) if given is None else "+avx512f" in given.split(",")
+    return 8 if wide else 4
 
 
-def lanes(array: Any, width: Any) -> Any:
-    """View an array of numbers (…, W) as an array (…) of vectors; `width` has length W."""
+def lanes(array: Any) -> Any:
+    """View an array of numbers (…, W) as an array (…) of vectors."""
     raise TypeError("lanes are for compiled loops alone")
 
 
@@ -39,11 +49,6 @@ def empty(like: Any, shape: Any) -> Any:
 def lane(value: Any, i: int) -> Any:
     """Return lane i of a vector."""
     return value
-
-
-def count_lanes(value: Any) -> int:
-    """Count the lanes of a vector."""
-    return 1
 
 
 def with_lane(value: Any, i: int, number: Any) -> Any:

@@ -51,7 +51,8 @@ from sim.arrays import Flags, Floats, Integers
 from sim.effects import effect_named
 from sim.io.errors import InputError
 from sim.jit import compiled_fast, formula
-from sim.mechanics.drag import head_resistance, tail_coefficients
+from sim.mechanics.drag import tail_coefficients
+from sim.model.body import head_resistance
 from sim.model.groups import Groups
 from sim.solve.assembly import assemble
 from surrogate.domain import ROBOT

@@ -26,7 +26,7 @@ from calibration.examples.spheres import read_spheres
 from sim.arrays import Floats
 from sim.linear.vectors import Vector
 from sim.mechanics.drag import node_resistance, tail_coefficients
-from sim.mechanics.stokeslets import stokeslets
+from sim.mechanics.flow import stokeslets
 from tests.oracles.clamped_rod import ClampedRod, dead_load
 from tests.oracles.twirled_rod import whirling
 

@@ -37,7 +37,7 @@ from sim.motion.run import Run
 from sim.motion.settling import steady_state
 from sim.motion.stepped_response import steady_twist
 from sim.motion.warm import compile_once
-from sim.solve.assembly import bodies, reversed_bodies
+from sim.solve.assembly import bodies
 from surrogate.robot_table import RobotTable
 from surrogate.tabulate import tabulate
 from tests.oracles.switching import MEMORY
@@ -83,7 +83,7 @@ def tabulated(table: RobotTable, robot: Robot) -> tuple[Floats, Floats]:
 def stepped(robot: Robot, twist: Floats) -> Floats:
     """Compute the same pose changes (2, D, 3) by time steps, with the arcs of `twist`."""
     groups = both(robot)
-    body, reverse = bodies(groups)[0], reversed_bodies(groups)[0]
+    body, reverse = bodies(groups)[0], bodies(groups.reversed())[0]
     meshes = _MESHES_WITH_FLOW if has_flow(body) else _MESHES
     coarse, fine = (
         np.stack([_lags(body, reverse, groups.N, float(DWELLS[i]), mesh) for i in AT], 1) for mesh in meshes

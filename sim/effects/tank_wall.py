@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sim.arrays import Floats
-from sim.mechanics.drag import head_resistance
+from sim.model.body import Body, head_resistance
 from sim.model.effect import Driver, Effect
 
 if TYPE_CHECKING:
-    from sim.model.body import Body
     from sim.model.groups import Groups
 
 

@@ -16,7 +16,7 @@ only:
 The first right-hand side is eliminated together with the matrix. `solve` uses the stored factors for further ones.
 
 There is no pivoting between nodes: A is minus (drag plus stiffness), whose symmetric part is definite. Cost: about
-4 m³ multiplications for each node, m = 3 M, nearly all of them in matrix products (`sim.linear.products`).
+4 m³ multiplications for each node, m = 3 M, nearly all of them in matrix products (`sim.linear.dense`).
 """
 
 from __future__ import annotations
@@ -28,8 +28,16 @@ from sim.jit import compiled
 from sim.lanes import empty, fma, zeros
 from sim.linear.blocks import block, block_at
 from sim.linear.chains import Chains
-from sim.linear.dense import factor_dense, invert, solve_factored
-from sim.linear.products import add_block_product, apply, multiply, multiply_block, subtract_product
+from sim.linear.dense import (
+    add_block_product,
+    apply,
+    factor_dense,
+    invert,
+    multiply,
+    multiply_block,
+    solve_factored,
+    subtract_product,
+)  # fmt: skip
 from sim.linear.vectors import negative
 
 

@@ -1,15 +1,172 @@
-"""Small dense matrices in compiled loops: inverse by 3×3 pivots, and elimination with row exchanges."""
+"""Small dense matrices in compiled loops: products, inverse, and elimination with row exchanges.
+
+They are made of vectors with a lane for each robot (`sim.lanes`). Each entry of a product is summed in the same
+order by fused operations. Three rows and four columns are in registers at a time; four columns go through all rows
+before the next ones, so that they stay in the nearest cache. Matrices have 3 K rows. Inverses are Gauss-Jordan
+with 3×3 pivots.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
 from sim.arrays import Floats
-from sim.jit import compiled
-from sim.lanes import choose, fma, less, somewhere
+from sim.jit import compiled, formula
+from sim.lanes import choose, fma, less, load, somewhere, store
 from sim.linear.blocks import block_at
-from sim.linear.products import add_block_product, multiply_block
-from sim.linear.vectors import inverse, negative
+from sim.linear.vectors import Matrix, Vector, inverse, negative
+
+_Four = tuple[Any, Any, Any, Any]
+
+
+@compiled
+def multiply(a: Floats, b: Floats, from_b: int, c: Floats, from_c: int, count: int) -> None:
+    """Set `count` columns of c (m, ·) from `from_c` on to a (m, k) times those of b (k, ·) from `from_b` on."""
+    _multiply(a, b, from_b, c, from_c, count, False)
+
+
+@compiled
+def subtract_product(a: Floats, b: Floats, from_b: int, c: Floats, from_c: int, count: int) -> None:
+    """Subtract a (m, k) times `count` columns of b (k, ·) from columns of c (m, ·), as in `multiply`."""
+    _multiply(a, b, from_b, c, from_c, count, True)
+
+
+@compiled
+def _multiply(a: Floats, b: Floats, from_b: int, c: Floats, from_c: int, count: int, subtract: bool) -> None:
+    whole = count - count % 4
+    for j in range(0, whole, 4):
+        for i in range(0, a.shape[0], 3):
+            _four_columns(a, b, from_b + j, c, from_c + j, i, subtract)
+    for j in range(whole, count):
+        for i in range(0, a.shape[0], 3):
+            _one_column(a, b, from_b + j, c, from_c + j, i, subtract)
+
+
+@formula
+def _four(c: Any, i: Any, at: Any) -> _Four:
+    """Return four columns of a row."""
+    return load(c, i, at), load(c, i, at + 1), load(c, i, at + 2), load(c, i, at + 3)
+
+
+@formula
+def _add_four(x: Any, w: _Four, p: _Four) -> _Four:
+    """Compute x w + p."""
+    return fma(x, w[0], p[0]), fma(x, w[1], p[1]), fma(x, w[2], p[2]), fma(x, w[3], p[3])
+
+
+@formula
+def _put_four(c: Any, i: Any, at: Any, p: _Four) -> None:
+    """Set four columns of a row."""
+    store(c, i, at, p[0])
+    store(c, i, at + 1, p[1])
+    store(c, i, at + 2, p[2])
+    store(c, i, at + 3, p[3])
+
+
+@formula
+def _four_columns(a: Any, b: Any, from_b: Any, c: Any, from_c: Any, i: Any, subtract: Any) -> None:
+    """Compute four columns in three rows."""
+    zero = 0.0 * a[i, 0]
+    p = q = r = (zero, zero, zero, zero)
+    if subtract:
+        p, q, r = _four(c, i, from_c), _four(c, i + 1, from_c), _four(c, i + 2, from_c)
+    for k in range(a.shape[1]):
+        w = _four(b, k, from_b)
+        p = _add_four(_signed(a[i, k], subtract), w, p)
+        q = _add_four(_signed(a[i + 1, k], subtract), w, q)
+        r = _add_four(_signed(a[i + 2, k], subtract), w, r)
+    _put_four(c, i, from_c, p)
+    _put_four(c, i + 1, from_c, q)
+    _put_four(c, i + 2, from_c, r)
+
+
+@formula
+def _signed(x: Any, subtract: Any) -> Any:
+    """Return a factor, negative to subtract."""
+    return -x if subtract else x
+
+
+@formula
+def _one_column(a: Any, b: Any, from_b: Any, c: Any, from_c: Any, i: Any, subtract: Any) -> None:
+    """Compute a column in three rows."""
+    p = q = r = 0.0 * a[i, 0]
+    if subtract:
+        p, q, r = _three(c, i, from_c)
+    for k in range(a.shape[1]):
+        w = load(b, k, from_b)
+        p = fma(_signed(a[i, k], subtract), w, p)
+        q = fma(_signed(a[i + 1, k], subtract), w, q)
+        r = fma(_signed(a[i + 2, k], subtract), w, r)
+    _put_three(c, i, from_c, (p, q, r))
+
+
+@formula
+def _three(c: Any, row: Any, at: Any) -> Vector:
+    """Return three rows of a column."""
+    return load(c, row, at), load(c, row + 1, at), load(c, row + 2, at)
+
+
+@formula
+def _put_three(c: Any, row: Any, at: Any, v: Vector) -> None:
+    """Set three rows of a column."""
+    store(c, row, at, v[0])
+    store(c, row + 1, at, v[1])
+    store(c, row + 2, at, v[2])
+
+
+@compiled
+def multiply_block(
+    a: Matrix, b: Floats, row_b: int, from_b: int, c: Floats, row_c: int, from_c: int, count: int
+) -> None:
+    """Set `count` columns of three rows of c to a 3×3 block times those of three rows of b; c may be b."""
+    for j in range(count):
+        v = _three(b, row_b, from_b + j)
+        _put_three(
+            c,
+            row_c,
+            from_c + j,
+            (
+                fma(a[0][0], v[0], fma(a[0][1], v[1], a[0][2] * v[2])),
+                fma(a[1][0], v[0], fma(a[1][1], v[1], a[1][2] * v[2])),
+                fma(a[2][0], v[0], fma(a[2][1], v[1], a[2][2] * v[2])),
+            ),
+        )
+
+
+@compiled
+def add_block_product(
+    a: Matrix, b: Floats, row_b: int, from_b: int, c: Floats, row_c: int, from_c: int, count: int
+) -> None:
+    """Add a 3×3 block times `count` columns of three rows of b to those of three rows of c."""
+    for j in range(count):
+        v, p = _three(b, row_b, from_b + j), _three(c, row_c, from_c + j)
+        _put_three(
+            c,
+            row_c,
+            from_c + j,
+            (
+                fma(a[0][0], v[0], fma(a[0][1], v[1], fma(a[0][2], v[2], p[0]))),
+                fma(a[1][0], v[0], fma(a[1][1], v[1], fma(a[1][2], v[2], p[1]))),
+                fma(a[2][0], v[0], fma(a[2][1], v[1], fma(a[2][2], v[2], p[2]))),
+            ),
+        )
+
+
+@compiled
+def apply(a: Floats, from_a: int, x: Floats, count: int, y: Floats) -> None:
+    """Set y (m,) to `count` columns of a (m, ·) from `from_a` on, times x."""
+    for i in range(0, a.shape[0], 3):
+        p = q = r = s = t = v = 0.0
+        even = count - count % 2
+        for k in range(0, even, 2):
+            j = from_a + k
+            p, s = fma(a[i, j], x[k], p), fma(a[i, j + 1], x[k + 1], s)
+            q, t = fma(a[i + 1, j], x[k], q), fma(a[i + 1, j + 1], x[k + 1], t)
+            r, v = fma(a[i + 2, j], x[k], r), fma(a[i + 2, j + 1], x[k + 1], v)
+        for k in range(even, count):
+            j = from_a + k
+            p, q, r = fma(a[i, j], x[k], p), fma(a[i + 1, j], x[k], q), fma(a[i + 2, j], x[k], r)
+        y[i], y[i + 1], y[i + 2] = p + s, q + t, r + v
 
 
 @compiled

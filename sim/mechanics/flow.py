@@ -35,13 +35,12 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Integers
-from sim.jit import compiled
+from sim.jit import compiled, formula
 from sim.linear.blocks import add, add_at, put_at, vector, vector_at
 from sim.linear.vectors import E_Z, ZERO, Vector, cross, dot, minus, plus, times
 from sim.mechanics.balance import Motion, head_drag, motion_at
 from sim.mechanics.drag import node_drag
 from sim.mechanics.geometry import Geometry, node_tangent
-from sim.mechanics.stokeslets import rotlet, stokeslets
 from sim.model.body import Body
 
 HEIGHT = 1.25  # of the surface above the axis, in the larger of R and a
@@ -270,3 +269,43 @@ def _add_rotlets(body: Body, scene: Scene, nodes: int, torque: float, flow: Floa
             back = rotlet(mirrored, (0.0, 0.0, -torque / _SEGMENTS), body.head_radius)
             total = times(terms.head_flow / body.viscosity, plus(direct, times(terms.free_surface, back)))
             add_at(flow, i, total)
+
+
+@formula
+def stokeslets(at: Vector, start: Vector, end: Vector, force: Vector, spread: float) -> Vector:
+    """Compute the velocity at a point from a force that is constant on a straight segment, spread over a length.
+
+    With σ along the segment from the foot of the perpendicular c, and R² = σ² + |c|² + spread²:
+    ∫ [(1/R + spread²/R³) f + (r·f) r/R³] dσ/8π, r = c − σ t.
+    """
+    segment = minus(end, start)
+    length = np.sqrt(dot(segment, segment))
+    t = times(1 / length, segment)
+    away = minus(at, start)
+    foot = dot(away, t)
+    c = minus(away, times(foot, t))
+    square = dot(c, c) + spread * spread
+    first, last = -foot, length - foot
+    r_first, r_last = np.sqrt(first * first + square), np.sqrt(last * last + square)
+    if first > 0:
+        log = np.log((last + r_last) / (first + r_first))
+    elif last < 0:
+        log = np.log((r_first - first) / (r_last - last))
+    else:
+        log = np.log((last + r_last) * (r_first - first) / square)
+    cubes = (last / r_last - first / r_first) / square
+    first_moment = 1 / r_first - 1 / r_last
+    second_moment = log - (last / r_last - first / r_first)
+    by_c, by_t = dot(c, force), dot(t, force)
+    total = times(log + spread * spread * cubes, force)
+    total = plus(total, times(cubes * by_c - first_moment * by_t, c))
+    total = plus(total, times(second_moment * by_t - first_moment * by_c, t))
+    return times(1 / (8 * np.pi * length), total)
+
+
+@formula
+def rotlet(away: Vector, torque: Vector, spread: float) -> Vector:
+    """Compute the velocity at a distance `away` from a torque on the fluid that is spread over a length."""
+    square = dot(away, away) + spread * spread
+    scale = (square + 1.5 * spread * spread) / (8 * np.pi * square * square * np.sqrt(square))
+    return times(scale, cross(torque, away))

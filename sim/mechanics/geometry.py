@@ -3,6 +3,10 @@
 The formulas of `sim.mechanics.rod`, applied to the nodes of M tails. Every tail is in its own frame, in which its
 clamp is at (a, 0, 0). So tail j of a robot at disc phase φ is at phase φ + 2πj/N.
 
+A root may turn about its clamp as on a spring. Its compliance c is in series with the half cell at the clamp:
+1/l_0 in the energy of joint 0 becomes 1/(l_0 + c). `add_root_spring` adds the difference to the elastic forces of
+rigidly clamped tails.
+
 Arrays are (node, tail, component). Units: l, μ0 l⁴/EI, EI/l².
 """
 
@@ -15,9 +19,10 @@ import numpy as np
 from sim.arrays import Floats
 from sim.jit import compiled
 from sim.lanes import zeros
-from sim.linear.blocks import put, vector
+from sim.linear.blocks import add, add_at, put, vector
 from sim.linear.vectors import ZERO, Matrix, Vector, dot, minus, plus, times
-from sim.mechanics.rod import bend, edge_force, edge_stiffness, joint_stiffness
+from sim.mechanics.rod import bend, clamp_moment, edge_force, edge_stiffness, joint_stiffness
+from sim.model.body import Body
 
 ROOT_TANGENT = (0.0, 0.0, -1.0)
 
@@ -151,3 +156,13 @@ def node_tangent(geometry: Geometry, k: int, m: int) -> tuple[Vector, float]:
         total = plus(total, vector(geometry.tangent, k + 1, m))
     spread = np.sqrt(dot(total, total))
     return times(1 / spread, total), spread
+
+
+@compiled
+def add_root_spring(body: Body, geometry: Geometry, m: int, moments: Floats) -> None:
+    """Add the spring's forces to edge 0 of tail m, and the clamp's further moment to `moments` (M, 3)."""
+    compliance = body.nonlocal_terms.root_compliance
+    share = 1 / (1 + inverse_voronoi(0, geometry.length.shape[0]) * compliance) - 1
+    slope = share * geometry.joint[0, m, 1]  # change of dE/dc, c = cosine at the joint
+    add(geometry.force, 0, m, times(slope, vector(geometry.by_after, 0, m)))
+    add_at(moments, m, clamp_moment(ROOT_TANGENT, vector(geometry.tangent, 1, m), slope))

@@ -6,14 +6,27 @@ its fields.
 
 Some effects reach further than one node of a straight, untwisted, elastic tail. Their numbers are in
 `nonlocal_terms`, each under the name of its effect.
+
+Drag on the head at low Reynolds number, with the velocity of its centre v_c and its spin ω_h about the axis (x
+across, z along the axis), is
+
+    F = −6π μ0 R C_t v_c − C_yr μ0 R L ω_h e_x,     M_z = −8π μ0 R³ C_r ω_h.
+
+It is linear in velocity. So the drag on head and disc is a resistance matrix R times the generalized velocity
+(v_x, v_z, ω_yr, ω_h, ω_t) of the disc centre J, which is L/2 behind the head's centre:
+wrench (F_x, F_z, M_y, M_z) about J = −R (v_x, v_z, ω_yr, ω_h, ω_t). Left out: the head's end-over-end drag.
+Source: Du, Miller, Jawed (arXiv 2103.05712), hydrodynamic model.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+
+from sim.jit import formula
 
 
 class Meaning(NamedTuple):
@@ -35,7 +48,7 @@ class Body(NamedTuple):
     viscosity: Annotated[Any, Meaning("μ0", "viscosity of the fluid")]
     zeta_parallel: Annotated[Any, Meaning("μ0", "ζ∥, drag per length along a tail")]
     zeta_perp: Annotated[Any, Meaning("μ0", "ζ⊥, drag per length across a tail")]
-    resistance: Annotated[Any, Meaning("μ0, l", "(4, 5), R of head and disc about J, see sim.mechanics.drag")]
+    resistance: Annotated[Any, Meaning("μ0, l", "(4, 5), R of head and disc about J")]
     droop: Annotated[Any, Meaning("1/(μ0 l³)", "speed that the motor loses per torque")]
     tail_load: Annotated[Any, Meaning("EI/l³", "(3,), force per length on the tails along e_x, e_y, e_z")]
     nonlocal_terms: Annotated[Any, Meaning("", "numbers of the effects that reach further than one node")]
@@ -50,3 +63,26 @@ class Body(NamedTuple):
         for place, value in entries.items():
             resistance[place] = resistance[place] + value
         return self._replace(resistance=resistance)
+
+
+@formula
+def head_resistance(
+    C_t: Any, C_r: Any, C_yr: Any, head_radius: Any, head_length: Any
+) -> tuple[tuple[Any, ...], ...]:
+    """Compute R of the head about J in the paper's model: four rows of five entries.
+
+    Args:
+        C_t, C_r, C_yr: drag, spin and side-force coefficients.
+        head_radius, head_length: R/l and L/l.
+    """
+    lever = head_length / 2
+    translation = 6 * math.pi * C_t * head_radius
+    spin = 8 * math.pi * C_r * head_radius**3
+    side = C_yr * head_radius * head_length
+    none = 0.0 * translation
+    return (
+        (translation, none, translation * lever, side, none),
+        (none, translation, none, none, none),
+        (translation * lever, none, translation * lever**2, side * lever, none),
+        (none, none, none, spin, none),
+    )

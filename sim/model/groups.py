@@ -68,6 +68,10 @@ class Groups:
         groups = {name: sizes.pop(name) for name in (*GROUP_COLUMNS, *OPTIONAL_COLUMNS) if name != "N"}
         return Groups(**groups, N=int(counts[0]), effects=sizes)
 
+    def reversed(self) -> Groups:
+        """Return the same robots with their motors reversed: an odd effect changes more of them than ω̄."""
+        return replace(self, omega_bar=-self.omega_bar)
+
     def select(self, rows: Integers | Flags) -> Groups:
         """Select the robots at indices or flags."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}

@@ -30,7 +30,6 @@ to thousandths. They lie from −4 to 4.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -42,11 +41,11 @@ import numpy as np
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.linear.complex_step import magnitude, sign
+from sim.model.body import Body, head_resistance
 from sim.model.effect import Effect, Factors
 from sim.model.presets import CONTROL
 
 if TYPE_CHECKING:
-    from sim.model.body import Body
     from sim.model.groups import Groups
 
 WRENCHES = {"Fx": ("F_x", 1), "Fz": ("F_z", 1), "My": ("M_y", 2), "Mz": ("M_z", 2)}  # symbol, power of length
@@ -170,21 +169,11 @@ class FactorLaw(Law):
     """A coefficient of the head, or the drag or the stiffness of the tails, times m^ε."""
 
     def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
+        if self.place not in COEFFICIENTS:
+            return body
         more = self.factor(groups, size) - 1
-        R, L = body.head_radius, body.head_length
-        lever = L / 2
-        if self.place == "Cr":
-            return body.with_resistance({(3, 3): more * 8 * math.pi * groups.C_r * R**3})
-        if self.place == "Cyr":
-            side = more * groups.C_yr * R * L
-            return body.with_resistance({(0, 3): side, (2, 3): side * lever})
-        if self.place == "Ct":
-            drag = more * 6 * math.pi * groups.C_t * R
-            coupled = drag * lever
-            return body.with_resistance(
-                {(0, 0): drag, (1, 1): drag, (0, 2): coupled, (2, 0): coupled, (2, 2): coupled * lever}
-            )
-        return body
+        C_t, C_r, C_yr = (more * getattr(groups, C) * (at == self.place) for at, C in COEFFICIENTS.items())
+        return body.plus(resistance=np.array(head_resistance(C_t, C_r, C_yr, body.head_radius, body.head_length)))
 
     def scales(self, size: Floats, groups: Groups) -> Factors:
         """Return what a law of the tails multiplies; stiffer tails move as in a fluid of viscosity μ0 m^(−ε)."""

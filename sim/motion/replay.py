@@ -21,7 +21,7 @@ from sim.model.groups import Groups
 from sim.model.schedule import Schedule
 from sim.motion.resolution import COARSER, MOST_REPLAY_WORK, Resolution
 from sim.motion.run import Run
-from sim.solve.assembly import bodies, reversed_bodies
+from sim.solve.assembly import bodies
 from sim.solve.march import YAW, X, Y
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def run_at_rest(schedule: Schedule, resolution: Resolution | None = None) -> Run
     """
     values = check_columns({name: np.array([value]) for name, value in schedule.robot.items()})
     groups = Groups.from_columns(values)
-    body, reverse = bodies(groups)[0], reversed_bodies(groups)[0]
+    body, reverse = bodies(groups)[0], bodies(groups.reversed())[0]
     if body.omega * schedule.first_direction < 0:
         body, reverse = reverse, body
     chosen = resolution or _resolution(schedule)

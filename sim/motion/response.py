@@ -1,7 +1,7 @@
 """Simulate the response of robots to a flip of the motor (`sim.model.response` says what the curves are).
 
 One flip from the steady motion in the other direction gives the response to every dwell. Flips from the shapes
-that it passes through give the response after short dwells. Solved for directly (`sim.motion.flips`) where the
+that it passes through give the response after short dwells. Solved for directly (`sim.solve.transient`) where the
 steady motion is, on two meshes, extrapolated; by time steps where it is not. Units: l, μ0 l⁴/EI.
 """
 
@@ -18,18 +18,19 @@ from sim.mechanics import planar
 from sim.mechanics.geometry import straight
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED, Responses
-from sim.motion.flips import NO_MARKS, Flip, follow_flips, orbits_with_phases
 from sim.motion.run import REVERSED
 from sim.motion.steady import check_groups, steady
 from sim.motion.steady_motion import Steady, net_speeds, twists
 from sim.motion.stepped_response import stepped_response
-from sim.solve.assembly import numbers, reversed_numbers, unpacked
+from sim.solve.assembly import bodies, numbers
 from sim.solve.grouping import slices
-from sim.solve.refinement import OnMesh
+from sim.solve.refinement import OnMesh, coarse_orbits, orbits_on_mesh
+from sim.solve.transient import NO_MARKS, Flip, follow_flips
 
 _SAME = 1.2  # time units from which the memory is constant
 MESHES = (6, 9)  # edges
 TOLERANCE = 1e-3  # of a time step, in l: see `sim.solve.transient`
+_LEAST_INSTANTS = {1: 3, 2: 3}  # by N; with more tails the phase at the flip hardly matters
 _OFFSET = 1  # of a robot's numbers
 _MEMORY_EDGES, _MEMORY_TOLERANCE = 6, 4e-4  # mesh of `longer_memory`, and of a time step, in l
 _MEMORY_UNTIL = float(BEFORE[-1])  # from here on the difference is constant
@@ -81,7 +82,7 @@ def responses(
     motion = steady(groups, stability=False) if motion is None else motion
     even = all(effect_named(name).symmetry == "even" for name in groups.effects)
     wanted = _Wanted(groups.N, even, tolerance)
-    rows, reverse_rows = numbers(groups), reversed_numbers(groups)
+    rows, reverse_rows = numbers(groups), numbers(groups.reversed())
     both = history and extrapolated_memory
     solved = [
         _extrapolated(coarse, fine, meshes, both, row[0] < 0)
@@ -94,7 +95,8 @@ def responses(
     by_robot = []
     for i, curves in enumerate(solved):
         if curves is None:
-            body, reverse = unpacked(rows[[i]])[0], unpacked(reverse_rows[[i]])[0]
+            robot = groups.select(np.array([i]))
+            body, reverse = bodies(robot)[0], bodies(robot.reversed())[0]
             values = stepped_response(
                 body, groups.N, DWELLS, BEFORE, reverse=reverse, history=history, settled=SETTLED
             )
@@ -127,6 +129,31 @@ def _on_meshes(
         _on_mesh(rows, reverse_rows, after[mesh], starts[mesh], wanted, history[mesh])
         for mesh in range(len(meshes))
     ]
+
+
+def orbits_with_phases(
+    rows: Floats, tails: int, meshes: Sequence[int], instants: Sequence[Sequence[int]] | None = None
+) -> list[list[OnMesh | None]]:
+    """Solve for the orbits of B robots on some meshes; None where there is no solution.
+
+    Args:
+        rows: the robots' numbers (`sim.solve.assembly.numbers`), (B, K).
+        tails: N.
+        meshes: edges of a tail.
+        instants: of a turn, for every robot on every mesh; by default as many as the orbit and the response need.
+
+    Returns:
+        A list of B orbits for every mesh.
+    """
+    coarse = coarse_orbits(rows, tails)
+    enough = [_enough(len(orbit.u), tails) for orbit in coarse]
+    counts = [enough] * len(meshes) if instants is None else instants
+    return [orbits_on_mesh(rows, tails, *one) for one in zip(meshes, [coarse] * len(meshes), counts, strict=True)]
+
+
+def _enough(instants: int, tails: int) -> int:
+    """Choose a number of instants, at least as many as an orbit has; odd where the phase at the flip matters."""
+    return max(instants, _LEAST_INSTANTS[tails]) | 1 if tails in _LEAST_INSTANTS else instants
 
 
 def _on_mesh(
@@ -199,7 +226,7 @@ def _histories(
             continue
         shapes = map(mirrored, course.shapes) if wanted.even else course.shapes
         later += [flip._replace(x=shape, until=_SAME) for shape in shapes]
-        later.append(flip._replace(x=straight(flip.x.shape[0], flip.x.shape[1], float(flip.row[_OFFSET]))))
+        later.append(flip._replace(x=straight(flip.x.shape[0], flip.x.shape[1], float(flip.numbers[_OFFSET]))))
     courses = follow_flips(later, _TIMES, wanted.tolerance)
     pasts: list[tuple[Floats, Floats] | None] = []
     for i, lag in enumerate(same):
@@ -252,7 +279,7 @@ def longer_memory(groups: Groups) -> Floats:
 
 def _at_some_dwells(groups: Groups) -> Floats:
     """Simulate the difference after two dwells of _SOME_BEFORE, (B, K, D, 3), seen as for a positive motor."""
-    rows, reverse_rows, count = numbers(groups), reversed_numbers(groups), len(_SOME_BEFORE)
+    rows, reverse_rows, count = numbers(groups), numbers(groups.reversed()), len(_SOME_BEFORE)
     dwells = np.minimum(DWELLS, _MEMORY_UNTIL)
     forth = orbits_with_phases(rows, groups.N, [_MEMORY_EDGES])[0]
     instants = [len(orbit.u) if orbit else 1 for orbit in forth]

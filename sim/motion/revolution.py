@@ -70,9 +70,9 @@ class Revolutions:
         """Step a state (changed) from disc phase 0 by about a turn in a given time; None where it breaks down."""
         body = self.body_at(s)
         state.pose[:] = 0.0
-        poses = np.full((self.steps, 6), np.nan)
-        seen = np.empty((self.steps if shapes else 0, *state.x.shape))
-        if not advance(body, state, time / self.steps, self.steps, _TOLERANCE, poses, seen):
+        count = self.steps
+        solved, poses, seen = advance(body, state, time / count, count, _TOLERANCE, shapes=count * shapes)
+        if not solved:
             return None
         spin = tail_spin(body, state.u)
         end = state.pose

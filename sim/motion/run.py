@@ -32,7 +32,7 @@ class Run:
         """Start from `state` (changed in place) or from rest; `most_work`: see `sim.motion.resolution`.
 
         `reverse` is the robot with its motor reversed. By default ω̄ changes its sign, and nothing else: that is
-        right without odd effects (`sim.solve.assembly.reversed_bodies`).
+        right without odd effects (`sim.model.groups.Groups.reversed`).
         """
         self.body = body
         self.reverse = body._replace(omega=-body.omega) if reverse is None else reverse
@@ -88,10 +88,9 @@ class Run:
         if self.failed:
             return np.empty((0, 6)), np.empty((0, *self.state.x.shape))
         self._work_left -= work
-        poses, seen = np.full((count, 6), np.nan), np.empty((shapes, *self.state.x.shape))
-        if not advance(self.body, self.state, duration / count, count, TOLERANCE, poses, seen):
-            self.failed = BROKE_DOWN
-        return poses, seen
+        steps = advance(self.body, self.state, duration / count, count, TOLERANCE, shapes=shapes)
+        self.failed = "" if steps.solved else BROKE_DOWN
+        return steps.poses, steps.shapes
 
     def flip(self) -> None:
         """Reverse the motor: the shape stays, velocities become their mirror image."""

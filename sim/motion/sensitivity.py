@@ -17,11 +17,12 @@ import numpy as np
 from sim.arrays import Floats
 from sim.effects import catalogue, effect_named, is_effect
 from sim.io.errors import InputError
+from sim.lanes import width
 from sim.linear.complex_step import derivative
 from sim.model.groups import Groups
 from sim.model.sweepable import SLOPE_INPUTS, SLOPE_OUTPUTS
 from sim.solve.assembly import are_local, batch, numbers
-from sim.solve.grouping import by_kind, group_width, slices
+from sim.solve.grouping import by_kind, slices
 from sim.solve.orbit import mean_motion, residuals_on_orbits, solve_at_orbits
 from sim.solve.refinement import MESHES, PHASES_FOR_SLOPES, SOLVED, Orbit, extrapolate, refined_orbits, stacked
 
@@ -113,10 +114,10 @@ def slopes_of_orbits(rows: Floats, directions: Floats, orbits: Sequence[Orbit]) 
         orbits: of the robots, all solved.
     """
     slopes = np.empty((len(MESHES), len(rows), directions.shape[1], 5))
-    local, width = are_local(rows), len(group_width())
+    local = are_local(rows)
     for alike in by_kind(range(len(rows)), lambda i: (orbits[i].x[0].shape, bool(local[i]))):
-        for first in range(0, len(alike), width):
-            robots = alike[first : first + width]
+        for first in range(0, len(alike), width()):
+            robots = alike[first : first + width()]
             for mesh in range(len(MESHES)):
                 x, u = stacked([orbits[i] for i in robots], mesh)
                 slopes[mesh, robots] = _slopes(rows[robots], directions[robots], x, u)

@@ -22,7 +22,7 @@ from tqdm import tqdm
 
 from sim.arrays import Floats
 from sim.mechanics.balance import motor_gain
-from sim.mechanics.contact import tail_gap
+from sim.mechanics.tail_contact import tail_gap
 from sim.model.body import Body
 from sim.model.groups import Groups
 from sim.motion.resolution import Resolution, steps_in

@@ -36,7 +36,7 @@ from sim.linear.spectral import differentiation, with_phases
 from sim.model.body import Body
 from sim.solve.assembly import CONTACT, are_local, batch, row
 from sim.solve.floquet import arnoldi
-from sim.solve.grouping import NAMES, by_kind, from_groups, group_width, in_groups, wanted_lanes
+from sim.solve.grouping import NAMES, by_kind, from_groups, in_groups, wanted_lanes
 from sim.solve.orbit import mean_motion, solve_orbits_in_place
 from sim.solve.refinement import ROUGH, Orbit, stacked
 
@@ -118,7 +118,7 @@ def _projected(rows: Floats, tails: int, x: Floats, u: Floats, shifts: Floats, m
     projected = np.zeros((len(shapes), count + 1, count, shapes.shape[-1]))
     arnoldi(
         in_groups(rows), NAMES, shapes, in_groups(u), in_groups(shifts), by_phase, first / np.linalg.norm(first),
-        wanted, projected, group_width(),
+        wanted, projected,
     )  # fmt: skip
     return from_groups(projected, len(rows))
 

@@ -119,8 +119,7 @@ def from_rest(body_at: Callable[[float], Body], tails: int, s: float, edges: int
     turned = (state.pose[PHASE] * np.sign(omega_t)) % (2 * np.pi)
     rest = (2 * np.pi - turned) / abs(omega_t)
     count = max(2, int(np.ceil(rest * STEPS * abs(body.omega) / (2 * np.pi))))
-    poses, shapes = np.empty((count, 6)), np.empty((0, *state.x.shape))
-    if not advance(body, state, rest / count, count, _TOLERANCE, poses, shapes):
+    if not advance(body, state, rest / count, count, _TOLERANCE).solved:
         return None
     time = 2 * np.pi / abs(omega_t)
     return settled_from(body_at, tails, s, state, time)

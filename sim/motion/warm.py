@@ -16,13 +16,13 @@ import numpy as np
 
 from sim import jit
 from sim.model.presets import PRESETS
-from sim.motion.flips import Flip, follow_flips
 from sim.motion.response import responses
 from sim.motion.sensitivity import sensitivities
 from sim.motion.settling import settle
 from sim.motion.steady import steady
 from sim.solve.assembly import numbers
 from sim.solve.orbit import straight_starts
+from sim.solve.transient import Flip, follow_flips
 
 _ROBOT = PRESETS["paper-control"].groups()
 Stage = tuple[str, Callable[[], object]]

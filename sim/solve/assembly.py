@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import math
 from collections import namedtuple
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from sim.arrays import Flags, Floats
 from sim.effects import catalogue, effect_named
-from sim.mechanics.drag import head_resistance, tail_coefficients
-from sim.model.body import Body
+from sim.mechanics.drag import tail_coefficients
+from sim.model.body import Body, head_resistance
 from sim.model.groups import Groups
 from sim.model.laws import LOCAL_DRAG
 
@@ -104,21 +103,6 @@ def without_further(rows: Floats) -> Floats:
     return plain
 
 
-def bodies(groups: Groups) -> list[Body]:
-    """Return the robots one by one, with plain numbers."""
-    return unpacked(numbers(groups))
-
-
-def reversed_numbers(groups: Groups) -> Floats:
-    """Return the numbers of the same robots with their motors reversed: an odd effect changes more than ω̄."""
-    return numbers(replace(groups, omega_bar=-groups.omega_bar))
-
-
-def reversed_bodies(groups: Groups) -> list[Body]:
-    """Return the same robots with their motors reversed, one by one."""
-    return unpacked(reversed_numbers(groups))
-
-
 def batch(rows: Floats) -> Body:
     """Return B robots as one `Body` of arrays that end with (B,), from their `numbers` (B, K)."""
     parts: list[Floats] = []
@@ -136,17 +120,13 @@ def row(body: Body) -> Floats:
     return np.concatenate([np.ravel(part) for part in body])[None]
 
 
-def unpacked(rows: Floats) -> list[Body]:
-    """Return robots one by one, with plain numbers, from their `numbers`, (B, K)."""
-    columns: list[Any] = []
-    at = 0
-    for name in Body._fields[:-1]:
-        shape = _SHAPES.get(name, ())
-        part = rows[:, at : at + math.prod(shape)]
-        at += part.shape[1]
-        if len(shape) == 2:
-            columns.append(np.ascontiguousarray(part).reshape(-1, *shape))
-        else:
-            columns.append([tuple(values) for values in part.tolist()] if shape else part[:, 0].tolist())
-    terms = [Nonlocal(*values) for values in rows[:, at:].tolist()]
-    return [Body(*values) for values in zip(*columns, terms, strict=True)]
+def bodies(groups: Groups) -> list[Body]:
+    """Return the robots one by one, with plain numbers."""
+    body = batch(numbers(groups))
+    terms, parts = np.array(body.nonlocal_terms), [np.moveaxis(part, -1, 0) for part in body[:-1]]
+    return [
+        Body._make([*(part[i] for part in parts), Nonlocal(*terms[:, i])])._replace(
+            resistance=body.resistance[..., i].copy(), tail_load=tuple(body.tail_load[:, i])
+        )
+        for i in range(len(groups))
+    ]

@@ -46,7 +46,7 @@ _STEP = 1e-6  # finite-difference step of the largest entry, in l
 @compiled
 def arnoldi(
     numbers: Floats, names: Any, x: Floats, u: Floats, shifts: Floats, by_phase: Floats, first: Floats,
-    wanted: Floats, projected: Floats, width: Any,
+    wanted: Floats, projected: Floats,
 ) -> None:  # fmt: skip
     """Fill `projected` (G, K + 1, K, W) for orbits x (G, n, M, 3, W), u (G, P, 4, W) with shifts (G, W).
 
@@ -56,28 +56,17 @@ def arnoldi(
         by_phase: d/dφ, (M, M).
         first: a unit vector, (3 n M,).
         wanted: 1 in the lanes that are wanted, (G, W).
-        width: of the groups, see `sim.lanes`.
     """
-    given, shapes, velocities, shift = (
-        lanes(numbers, width),
-        lanes(x, width),
-        lanes(u, width),
-        lanes(shifts, width),
-    )
-    going, out = lanes(wanted, width), lanes(projected, width)
+    given, shapes, velocities, shift = lanes(numbers), lanes(x), lanes(u), lanes(shifts)
+    going, out = lanes(wanted), lanes(projected)
     count = out.shape[2]
     basis = zeros(shapes, (count + 1, first.size))
     image, du = zeros(shapes, shapes[0].shape), zeros(shapes, velocities[0].shape)
     vector_of_image = image.reshape(image.size)
     work = new_workspace(in_transient(shift[0], by_phase, shapes[0]), shapes[0], velocities[0])
     for g in range(len(given)):
-        body, at_x, at_u, where, matrix = (
-            body_in_lanes(given[g], names),
-            shapes[g],
-            velocities[g],
-            going[g],
-            out[g],
-        )
+        body, at_x, at_u, where = body_in_lanes(given[g], names), shapes[g], velocities[g], going[g]
+        matrix = out[g]
         rates = in_transient(shift[g], by_phase, at_x)
         linearise(body, rates, at_x, at_u, work.scratch, work.equations)
         for k in range(first.size):

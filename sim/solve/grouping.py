@@ -6,16 +6,14 @@ nothing is asked of them. In compiled loops the numbers of a group are one `Body
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from sim.arrays import Flags, Floats
 from sim.jit import compiled
-from sim.lanes import GROUP, HALF_GROUP, lane, less, named_like, zeros
+from sim.lanes import lane, less, named_like, width, zeros
 from sim.linear.lane_arrays import take_lane
 from sim.model.body import Body
 from sim.solve.assembly import Nonlocal
@@ -30,16 +28,6 @@ def slices(count: int) -> list[slice]:
     return [slice(first, first + AT_ONCE) for first in range(0, max(count, 1), AT_ONCE)]
 
 
-@cache
-def group_width() -> tuple[int, ...]:
-    """Return the width of groups on this processor, as a tuple: eight lanes with AVX-512, else four."""
-    from llvmlite.binding import get_host_cpu_features
-
-    given = os.environ.get("NUMBA_CPU_FEATURES")
-    wide = get_host_cpu_features().get("avx512f", False) if given is None else "+avx512f" in given.split(",")
-    return GROUP if wide else HALF_GROUP
-
-
 def by_kind(robots: Iterable[int], kind: Callable[[int], object]) -> list[list[int]]:
     """Sort robots by kind: those of one kind have arrays of the same shapes."""
     kinds: dict[object, list[int]] = {}
@@ -50,10 +38,9 @@ def by_kind(robots: Iterable[int], kind: Callable[[int], object]) -> list[list[i
 
 def in_groups(array: Floats) -> Floats:
     """Lay out an array (B, …) of B ≥ 1 robots as (G, …, W)."""
-    width, count = len(group_width()), len(array)
-    groups = -(-count // width)
-    places = np.minimum(np.arange(groups * width), count - 1)
-    lanes = array[places].reshape(groups, width, *array.shape[1:])
+    groups, count = -(-len(array) // width()), len(array)
+    places = np.minimum(np.arange(groups * width()), count - 1)
+    lanes = array[places].reshape(groups, width(), *array.shape[1:])
     return np.ascontiguousarray(np.moveaxis(lanes, 1, -1))
 
 

@@ -30,7 +30,7 @@ from sim.mechanics.balance import tail_spin
 from sim.mechanics.geometry import straight
 from sim.model.body import Body
 from sim.solve.assembly import row
-from sim.solve.grouping import NAMES, body_in_lanes, group_width, in_groups, wanted_lanes
+from sim.solve.grouping import NAMES, body_in_lanes, in_groups, wanted_lanes
 from sim.solve.newton import new_workspace, newton
 from sim.solve.rates import in_stage
 
@@ -51,14 +51,12 @@ class State(NamedTuple):
 @compiled
 def _march(
     numbers: Floats, names: Any, given: State, dt: float, count: int, tolerance: float, wanted: Floats,
-    poses: Floats, shapes: Floats, width: Any,
+    poses: Floats, shapes: Floats,
 ) -> bool:  # fmt: skip
     """Step the robots of a group until one of those that are `wanted`, (1, W), fails; arrays end with (W,)."""
-    body, going = body_in_lanes(lanes(numbers, width), names), lanes(wanted, width)[0]
-    state = State(
-        lanes(given.x, width), lanes(given.x_dot, width), lanes(given.pose, width), lanes(given.u, width)
-    )
-    all_poses, all_shapes = lanes(poses, width), lanes(shapes, width)
+    body, going = body_in_lanes(lanes(numbers), names), lanes(wanted)[0]
+    state = State(lanes(given.x), lanes(given.x_dot), lanes(given.pose), lanes(given.u))
+    all_poses, all_shapes = lanes(poses), lanes(shapes)
     star, now, before = _new_like(state), _new_like(state), _new_like(state)
     u = state.u.reshape((1, 4))
     work = new_workspace(in_stage(1.0, 0.0, star.x), state.x, u)
@@ -136,26 +134,28 @@ def new_state(tails: int, edges: int, offset: float) -> State:
     return State(x, np.zeros_like(x), np.zeros(6), np.zeros(4))
 
 
-def advance(
-    body: Body, state: State, dt: float, count: int, tolerance: float, poses: Floats, shapes: Floats
-) -> bool:
-    """Make `count` steps of dt at constant motor speed; the first is a one-step method.
+class Steps(NamedTuple):
+    """What `advance` has done."""
+
+    solved: bool  # every step converged; if not, the state is that of the step that failed
+    poses: Floats  # after every step, (count, 6); NaN from the step that failed on
+    shapes: Floats  # after each of the last K steps, (K, n, N, 3)
+
+
+def advance(body: Body, state: State, dt: float, count: int, tolerance: float, *, shapes: int = 0) -> Steps:
+    """Make `count` steps of dt at constant motor speed from a state (changed); the first is a one-step method.
 
     Args:
-        poses: (count, 6), filled with the pose after every step.
-        shapes: (K, n, N, 3), filled with the shape after each of the last K steps.
-
-    Returns:
-        Whether every step converged. If not, the state is that of the step that failed.
+        shapes: K, how many of the last shapes are kept.
     """
+    steps = Steps(False, np.full((count, 6), np.nan), np.empty((shapes, *state.x.shape)))
     if not 0 < dt < np.inf:
-        return False
-    numbers, *in_lanes = (in_groups(part[None])[0] for part in (row(body)[0], *state, poses, shapes))
+        return steps
+    kept = (*state, *steps[1:])
+    numbers, *in_lanes = (in_groups(part[None])[0] for part in (row(body)[0], *kept))
     *state_in_lanes, all_poses, all_shapes = in_lanes
     wanted = wanted_lanes(np.ones(1, bool))
-    solved = _march(
-        numbers, NAMES, State(*state_in_lanes), dt, count, tolerance, wanted, all_poses, all_shapes, group_width()
-    )
-    for part, found in zip((*state, poses, shapes), in_lanes, strict=True):
+    solved = _march(numbers, NAMES, State(*state_in_lanes), dt, count, tolerance, wanted, all_poses, all_shapes)
+    for part, found in zip(kept, in_lanes, strict=True):
         part[:] = found[..., 0]
-    return bool(solved)
+    return steps._replace(solved=bool(solved))

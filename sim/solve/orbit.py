@@ -28,12 +28,12 @@ from sim.jit import compiled
 from sim.lanes import lanes
 from sim.linear.lane_arrays import largest_entry
 from sim.linear.spectral import with_phases
-from sim.mechanics import contact
+from sim.mechanics import tail_contact
 from sim.mechanics.balance import tail_spin
 from sim.mechanics.geometry import measure, straight
 from sim.model.body import Body
 from sim.solve.assembly import batch
-from sim.solve.grouping import NAMES, body_in_lanes, from_groups, group_width, in_groups, wanted_lanes
+from sim.solve.grouping import NAMES, body_in_lanes, from_groups, in_groups, wanted_lanes
 from sim.solve.linearise import linearise
 from sim.solve.newton import new_workspace, newton, solve_linear
 from sim.solve.rates import on_orbit
@@ -65,7 +65,7 @@ def solve_orbits_in_place(
     """
     wanted = wanted_lanes(np.ones(len(rows), bool) if going is None else going)
     shapes, velocities, sizes = in_groups(x), in_groups(u), np.empty_like(wanted)
-    _solve_groups(in_groups(rows), NAMES, shapes, velocities, tolerance, wanted, sizes, group_width())
+    _solve_groups(in_groups(rows), NAMES, shapes, velocities, tolerance, wanted, sizes)
     x[:], u[:] = from_groups(shapes, len(x)), from_groups(velocities, len(u))
     return from_groups(sizes, len(x))
 
@@ -78,7 +78,7 @@ def residuals_on_orbits(rows: Floats, x: Floats, u: Floats) -> tuple[Floats, Flo
     """
     shapes, velocities, wanted = in_groups(x), in_groups(u), wanted_lanes(np.ones(len(x), bool))
     r, t, force = np.empty_like(shapes), np.empty_like(velocities), np.empty_like(wanted)
-    _fill_residuals(in_groups(rows), NAMES, shapes, velocities, wanted, r, t, force, group_width())
+    _fill_residuals(in_groups(rows), NAMES, shapes, velocities, wanted, r, t, force)
     return from_groups(r, len(x)), from_groups(t, len(x)), from_groups(force, len(x))
 
 
@@ -93,7 +93,7 @@ def solve_at_orbits(rows: Floats, x: Floats, u: Floats, r: Floats, t: Floats) ->
         The solutions, of the same shapes.
     """
     dx, du, wanted = in_groups(r), in_groups(t), wanted_lanes(np.ones(len(x), bool))
-    _solve_linear_in_groups(in_groups(rows), NAMES, in_groups(x), in_groups(u), wanted, dx, du, group_width())
+    _solve_linear_in_groups(in_groups(rows), NAMES, in_groups(x), in_groups(u), wanted, dx, du)
     return from_groups(dx, len(x)), from_groups(du, len(x))
 
 
@@ -126,12 +126,12 @@ def smallest_gaps(rows: Floats, x: Floats, tails: int) -> Floats:
     count, n, phases, _ = fine.shape
     shapes = np.ascontiguousarray(np.moveaxis(fine.reshape(count, n, tails, phases // tails, 3), 3, 1))
     body = batch(rows)
-    return contact.smallest_gaps(shapes, body.offset, body.tail_radius)
+    return tail_contact.smallest_gaps(shapes, body.offset, body.tail_radius)
 
 
 @compiled
 def _solve_groups(
-    numbers: Floats, names: Any, x: Floats, u: Floats, tolerance: float, wanted: Floats, sizes: Floats, width: Any
+    numbers: Floats, names: Any, x: Floats, u: Floats, tolerance: float, wanted: Floats, sizes: Floats
 ) -> None:
     """Improve x (G, n, M, 3, W) and u (G, P, 4, W) in place.
 
@@ -140,10 +140,9 @@ def _solve_groups(
         names: of the non-local effects.
         wanted: 1 in the lanes that are wanted, (G, W).
         sizes: of the last corrections, (G, W), filled.
-        width: of the groups, see `sim.lanes`.
     """
-    given, shapes, velocities = lanes(numbers, width), lanes(x, width), lanes(u, width)
-    going, size = lanes(wanted, width), lanes(sizes, width)
+    given, shapes, velocities = lanes(numbers), lanes(x), lanes(u)
+    going, size = lanes(wanted), lanes(sizes)
     rates = on_orbit(shapes[0])
     work = new_workspace(rates, shapes[0], velocities[0])
     for g in range(len(given)):
@@ -154,12 +153,11 @@ def _solve_groups(
 @compiled
 def _fill_residuals(
     numbers: Floats, names: Any, x: Floats, u: Floats, wanted: Floats, r: Floats, t: Floats, force: Floats,
-    width: Any,
 ) -> None:  # fmt: skip
     """Fill r (G, n, M, 3, W), t (G, P, 4, W) and force (G, W) at x and u; arguments as in `_solve_groups`."""
-    given, shapes, velocities = lanes(numbers, width), lanes(x, width), lanes(u, width)
-    where, largest = lanes(wanted, width), lanes(force, width)
-    on_nodes, on_robots = lanes(r, width), lanes(t, width)
+    given, shapes, velocities = lanes(numbers), lanes(x), lanes(u)
+    where, largest = lanes(wanted), lanes(force)
+    on_nodes, on_robots = lanes(r), lanes(t)
     rates, scratch = on_orbit(shapes[0]), new_scratch(shapes[0], velocities[0])
     for g in range(len(given)):
         body = body_in_lanes(given[g], names)
@@ -170,11 +168,11 @@ def _fill_residuals(
 
 @compiled
 def _solve_linear_in_groups(
-    numbers: Floats, names: Any, x: Floats, u: Floats, wanted: Floats, dx: Floats, du: Floats, width: Any
+    numbers: Floats, names: Any, x: Floats, u: Floats, wanted: Floats, dx: Floats, du: Floats
 ) -> None:
     """Solve in place for the right-hand sides dx (G, K, n, M, 3, W), du (G, K, P, 4, W); see `_solve_groups`."""
-    given, shapes, velocities = lanes(numbers, width), lanes(x, width), lanes(u, width)
-    going, changes, changes_of_robot = lanes(wanted, width), lanes(dx, width), lanes(du, width)
+    given, shapes, velocities = lanes(numbers), lanes(x), lanes(u)
+    going, changes, changes_of_robot = lanes(wanted), lanes(dx), lanes(du)
     rates = on_orbit(shapes[0])
     work = new_workspace(rates, shapes[0], velocities[0])
     for g in range(len(given)):

@@ -4,9 +4,9 @@
 
 `fill_residual` adds up all forces, for a robot in each lane (`sim.lanes`): local drag and the elastic forces of
 straight tails (`sim.mechanics.balance`), and the non-local effects. These are material frames (`frames`), springs
-at the roots (`root_spring`), contact between tails (`tail_contact`), flow between the parts (`flow`), thinning of
-the fluid (`thinning`), and friction of the contact line. Their formulas are for the plain numbers of one robot and
-are called lane by lane. A new non-local effect is called in `surround` and adds to what `Surroundings` holds,
+at the roots (`geometry`), contact between tails (`tail_contact`), flow between the parts (`flow`), thinning of the
+fluid, and friction of the contact line (`drag`). Their formulas are for the plain numbers of one robot and are
+called lane by lane. A new non-local effect is called in `surround` and adds to what `Surroundings` holds,
 which is zero before the first one. Units: l, μ0 l⁴/EI, EI/l².
 
 The Newton matrices of `sim.solve.linearise` leave the non-local effects out; GMRES takes them into account
@@ -21,19 +21,16 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.jit import compiled, inlined
-from sim.lanes import count_lanes, lane, somewhere, zeros
+from sim.lanes import lane, somewhere, width, zeros
 from sim.linear.blocks import add, put, vector, vector_at
 from sim.linear.lane_arrays import put_lane, take_lane
 from sim.linear.vectors import ZERO, Vector, cross, dot, minus, plus
 from sim.mechanics.balance import Motion, body_wrench, clamp_balance, head_drag, motion_at, node_balance
-from sim.mechanics.contact_line import add_contact_line
-from sim.mechanics.drag import node_drag
+from sim.mechanics.drag import add_contact_line, node_drag, thinned, thins
 from sim.mechanics.flow import add_flow, has_flow
 from sim.mechanics.frames import add_frames, has_frames
-from sim.mechanics.geometry import Geometry, measure, new_geometry, node_tangent
-from sim.mechanics.root_spring import add_root_spring
+from sim.mechanics.geometry import Geometry, add_root_spring, measure, new_geometry, node_tangent
 from sim.mechanics.tail_contact import add_contact, has_contact
-from sim.mechanics.thinning import thinned, thins
 from sim.model.body import Body
 from sim.solve.grouping import body_of_lane, reaches_further
 from sim.solve.rates import Rates, base_phase, fill_rates
@@ -118,7 +115,7 @@ def _surround_lanes(body: Body, base: Any, x: Floats, u: Floats, where: Any, scr
     """Add up all non-local effects of the robots in the lanes where `where` is 1, one robot after the other."""
     columns, instants = x.shape[1], u.shape[0]
     shape, velocities = np.empty(x.shape), np.empty(u.shape)
-    for i in range(count_lanes(body.omega)):
+    for i in range(width()):
         if lane(where, i) == 0:
             continue
         robot, first = body_of_lane(body, i), lane(base, i)

@@ -5,7 +5,7 @@ The shape of a tail depends on the time t since the motor's speed jumped and on 
     ẋ = ∂x/∂t + ω_t ∂x/∂φ
 
 At each t, x is collocated at M phases, as on an orbit (`sim.solve.orbit`). One solution holds M/N robots, one for
-each disc phase at the jump. It is smooth in t, so time steps need not resolve the turning of the disc.
+each disc phase at the flips. It is smooth in t, so time steps need not resolve the turning of the disc.
 
 Time steps are those of SDIRK2 (γ = 1 − 1/√2, L-stable, second order). Both stages use one factorisation. The
 length of a step follows the difference to the embedded method of first order. The lag behind the steady circle
@@ -20,17 +20,19 @@ Units: l, μ0 l⁴/EI. Source: Alexander (1977) for SDIRK2; Brachtendorf and oth
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Flags, Floats, Integers
+from sim.arrays import Floats, Integers
 from sim.jit import compiled, formula, inlined
-from sim.lanes import choose, lane, lanes, larger, less, smaller, somewhere, with_lane, zeros
+from sim.lanes import choose, lane, lanes, larger, less, smaller, somewhere, width, with_lane, zeros
 from sim.linear.lane_arrays import add_chosen, choose_all, copy, largest_entry, put_lane, take_lane
 from sim.linear.spectral import differentiation
 from sim.model.body import Body
-from sim.solve.grouping import body_in_lanes
+from sim.solve.assembly import are_local
+from sim.solve.grouping import NAMES, body_in_lanes, by_kind
 from sim.solve.lag import advance_lag, between, turning
 from sim.solve.march import GAMMA
 from sim.solve.newton import Workspace, correct, largest_move, move, new_workspace
@@ -43,27 +45,26 @@ _OSCILLATION = 0.1  # weight of what averages out over a turn in the error of a 
 _FIRST_STEP = 5e-3  # over √ω̄
 _LONGEST_STEP = 0.5
 _MOST_REJECTED = 60
+NO_MARKS = np.empty(0)
 
 
-class Jump(NamedTuple):
-    """B robots at a jump of the motor's speed."""
+class Flip(NamedTuple):
+    """A robot at a jump of its motor's speed, such as a flip; or B robots, in arrays (B, …)."""
 
-    numbers: Floats  # with the speed after the jump, (B, K), see `sim.solve.assembly.numbers`
-    x: Floats  # shapes, (B, n, M, 3)
-    u: Floats  # guessed velocities, (B, P, 4)
-    twist: (
-        Floats  # steady (v_z, h_x, ω_yr) after the jump, (B, 3): mean surge, sway of the head's centre, yaw rate
-    )
-    until: Floats  # times to follow, (B,)
+    numbers: Floats  # with the speed after the jump, (K,), see `sim.solve.assembly.numbers`
+    x: Floats  # shape, (n, M, 3)
+    u: Floats  # guessed velocities, (P, 4)
+    twist: Floats  # steady (v_z, h_x, ω_yr) after the jump, (3,): mean surge, sway of the head's centre, yaw rate
+    until: Any  # time to follow
 
 
-class Followed(NamedTuple):
-    """B robots after a jump of the motor's speed."""
+class Course(NamedTuple):
+    """What a robot does after a jump; or B robots, in arrays (B, …)."""
 
-    lag: Floats  # (B, T, Q, 3): (Δz, Δx, Δψ), Q phases, or one entry for the mean over a turn
-    shapes: Floats  # at the marks, (B, marks, n, M, 3)
-    end: Floats  # shapes at the end, (B, n, M, 3)
-    solved: Flags  # (B,)
+    lag: Floats  # (T, Q, 3): (Δz, Δx, Δψ), Q phases, or one entry for the mean over a turn; NaN after its end
+    shapes: Floats  # at the marks, (K, n, M, 3)
+    end: Floats  # shape at the end, (n, M, 3)
+    solved: Any
 
 
 class _State(NamedTuple):
@@ -89,7 +90,7 @@ class _Step(NamedTuple):
     lag_by_phase: Floats  # d/dφ of the lag, (Q, Q)
 
 
-class _Course(NamedTuple):
+class _Progress(NamedTuple):
     """Which robot each lane has, and how far it has come; (W,)."""
 
     robot: Integers
@@ -99,51 +100,75 @@ class _Course(NamedTuple):
     places: Integers  # times at which the lag is known
 
 
+def follow_flips(
+    flips: Sequence[Flip | None], times: Floats, tolerance: float, marks: Floats = NO_MARKS
+) -> list[Course | None]:
+    """Follow robots after flips of their motors; None where there is no flip, or no solution.
+
+    Args:
+        flips: of robots with any number of tails, phases and edges.
+        times: at which the lag is wanted, (T,), increasing.
+        tolerance: on the shape in one time step, in l.
+        marks: times at which shapes are kept, (K,), increasing.
+    """
+    courses: list[Course | None] = [None] * len(flips)
+    made = {i: flip for i, flip in enumerate(flips) if flip is not None}
+    # Fast motors take more steps: they begin, so that the last robots end together.
+    order = sorted(made, key=lambda i: -abs(made[i].numbers[0]))
+    for robots in by_kind(
+        order, lambda i: (made[i].x.shape, len(made[i].u), bool(are_local(made[i].numbers[None])[0]))
+    ):
+        stacked = Flip(*(np.array(part) for part in zip(*(made[i] for i in robots), strict=True)))
+        found = _follow(stacked, NAMES, marks, times, tolerance)
+        for at, i in enumerate(robots):
+            if found.solved[at]:
+                courses[i] = Course(*(part[at] for part in found))
+    return courses
+
+
 @compiled
-def follow(jump: Jump, names: Any, marks: Floats, times: Floats, tolerance: float, width: Any) -> Followed:
+def _follow(flips: Flip, names: Any, marks: Floats, times: Floats, tolerance: float) -> Course:
     """Follow robots from their shapes at a jump of the motor's speed.
 
     Args:
-        jump: of the robots.
+        flips: of the robots.
         names: of the non-local effects.
         marks: times at which shapes are kept, increasing.
         times: at which the lag is wanted, (T,), increasing.
         tolerance: on the shape in one step, in l.
-        width: of the group, see `sim.lanes`.
 
     Returns:
         NaN at marks and times after a robot's end.
     """
-    robots, n, columns, _ = jump.x.shape
-    count = len(width)
-    numbers = lanes(np.empty((jump.numbers.shape[1], count)), width)
-    twist = lanes(np.empty((3, count)), width)
-    by_phase, lag_by_phase = differentiation(columns), turning(columns, jump.u.shape[1])
+    robots, n, columns, _ = flips.x.shape
+    count = width()
+    numbers, twist = lanes(np.empty((flips.numbers.shape[1], count))), lanes(np.empty((3, count)))
+    by_phase, lag_by_phase = differentiation(columns), turning(columns, flips.u.shape[1])
     fields = lag_by_phase.shape[0]
-    at = _new_state(numbers, n, columns, jump.u.shape[1], fields)
-    new = _new_state(numbers, n, columns, jump.u.shape[1], fields)
+    at = _new_state(numbers, n, columns, flips.u.shape[1], fields)
+    new = _new_state(numbers, n, columns, flips.u.shape[1], fields)
     step = _Step(
         zeros(numbers, (2, n, columns, 3)), zeros(numbers, (2, fields, 3)), zeros(numbers, at.x.shape),
         zeros(numbers, (fields, 3)), zeros(numbers, at.x.shape), zeros(numbers, at.u.shape), by_phase,
         lag_by_phase,
     )  # fmt: skip
-    found = Followed(
+    found = Course(
         np.full((robots, len(times), fields, 3), np.nan),
         np.full((robots, len(marks), n, columns, 3), np.nan),
-        np.full(jump.x.shape, np.nan),
+        np.full(flips.x.shape, np.nan),
         np.zeros(robots, np.bool_),
     )
     waiting = np.full(count, -1)
-    course = _Course(waiting, waiting.copy(), waiting.copy(), waiting.copy(), waiting.copy())
+    progress = _Progress(waiting, waiting.copy(), waiting.copy(), waiting.copy(), waiting.copy())
     for i in range(count):
-        _load(jump, min(i, robots - 1), i, numbers, twist, at, course)
+        _load(flips, min(i, robots - 1), i, numbers, twist, at, progress)
     started = min(count, robots)
     body = body_in_lanes(numbers, names)
     work = new_workspace(in_transient(1.0, by_phase, at.x), at.x, at.u)
     now, dt = zeros(numbers, (1,))[0], _first_step(body)
     goal, going = now, now
     for i in range(count):
-        goal = with_lane(goal, i, _goal(jump, course, i, marks))
+        goal = with_lane(goal, i, _goal(flips, progress, i, marks))
         going = with_lane(going, i, 1.0 if i < started else 0.0)
     while somewhere(going):
         dt = choose(going, _towards(goal - now, dt), dt)
@@ -154,20 +179,20 @@ def follow(jump: Jump, names: Any, marks: Floats, times: Floats, tolerance: floa
         new_now = choose(accepted, choose(ended, goal, now + dt), now)
         for i in range(count):
             if lane(accepted, i) != 0:
-                course.steps[i] += 1
-                _record(i, course, at, new, step.lag_slope[1], now, new_now, marks, times, found)
-                goal = with_lane(goal, i, _goal(jump, course, i, marks))
+                progress.steps[i] += 1
+                _record(i, progress, at, new, step.lag_slope[1], now, new_now, marks, times, found)
+                goal = with_lane(goal, i, _goal(flips, progress, i, marks))
             elif lane(going, i) != 0:
-                course.rejected[i] += 1
+                progress.rejected[i] += 1
         _accept(at, new, step, accepted)
         now = new_now
         dt = choose(accepted, _next_step(dt, error, tolerance), _shorter_step(dt, error, solved, tolerance))
         before = started
         for i in range(count):
-            if lane(going, i) != 0 and _has_ended(jump, course, i, at, lane(now, i), found):
+            if lane(going, i) != 0 and _has_ended(flips, progress, i, at, lane(now, i), found):
                 if started < robots:
-                    _load(jump, started, i, numbers, twist, at, course)
-                    now, goal = with_lane(now, i, 0.0), with_lane(goal, i, _goal(jump, course, i, marks))
+                    _load(flips, started, i, numbers, twist, at, progress)
+                    now, goal = with_lane(now, i, 0.0), with_lane(goal, i, _goal(flips, progress, i, marks))
                     started += 1
                     going = with_lane(going, i, -1.0)
                 else:
@@ -186,35 +211,37 @@ def _new_state(like: Floats, n: int, columns: int, instants: int, fields: int) -
 
 
 @compiled
-def _load(jump: Jump, robot: int, i: int, numbers: Floats, twist: Floats, at: _State, course: _Course) -> None:
+def _load(
+    flips: Flip, robot: int, i: int, numbers: Floats, twist: Floats, at: _State, progress: _Progress
+) -> None:
     """Put a robot at its jump into lane i; one without numbers can only come to its end."""
-    course.robot[i] = robot
-    course.steps[i], course.marks[i], course.places[i] = 0, 0, 0
-    course.rejected[i] = 0 if np.isfinite(np.sum(jump.numbers[robot])) else _MOST_REJECTED
-    put_lane(numbers, i, jump.numbers[robot])
-    put_lane(twist, i, jump.twist[robot])
-    put_lane(at.x, i, jump.x[robot])
-    put_lane(at.u, i, jump.u[robot])
+    progress.robot[i] = robot
+    progress.steps[i], progress.marks[i], progress.places[i] = 0, 0, 0
+    progress.rejected[i] = 0 if np.isfinite(np.sum(flips.numbers[robot])) else _MOST_REJECTED
+    put_lane(numbers, i, flips.numbers[robot])
+    put_lane(twist, i, flips.twist[robot])
+    put_lane(at.x, i, flips.x[robot])
+    put_lane(at.u, i, flips.u[robot])
     put_lane(at.slope, i, np.zeros(at.slope.shape))
     put_lane(at.lag, i, np.zeros(at.lag.shape))
     put_lane(at.lag_rate, i, np.zeros(at.lag.shape))
 
 
 @compiled
-def _has_ended(jump: Jump, course: _Course, i: int, at: _State, now: float, found: Followed) -> bool:
+def _has_ended(flips: Flip, progress: _Progress, i: int, at: _State, now: float, found: Course) -> bool:
     """Tell whether the robot of lane i has come to its end, or cannot; keep its shape at the end."""
-    robot = course.robot[i]
-    if now >= jump.until[robot]:
+    robot = progress.robot[i]
+    if now >= flips.until[robot]:
         found.solved[robot] = True
         take_lane(found.end[robot], at.x, i)
         return True
-    return bool(course.steps[i] >= _MOST_STEPS or course.rejected[i] >= _MOST_REJECTED)
+    return bool(progress.steps[i] >= _MOST_STEPS or progress.rejected[i] >= _MOST_REJECTED)
 
 
 @compiled
-def _goal(jump: Jump, course: _Course, i: int, marks: Floats) -> float:
+def _goal(flips: Flip, progress: _Progress, i: int, marks: Floats) -> float:
     """Return the time at which a step of lane i must end next."""
-    until, mark = jump.until[course.robot[i]], course.marks[i]
+    until, mark = flips.until[progress.robot[i]], progress.marks[i]
     return float(marks[mark]) if mark < len(marks) and marks[mark] < until else float(until)
 
 
@@ -302,13 +329,13 @@ def _accept(at: _State, new: _State, step: _Step, accepted: Any) -> None:
 
 @compiled
 def _record(
-    i: int, course: _Course, at: _State, new: _State, new_rate: Floats, now: Any, new_now: Any, marks: Floats,
-    times: Floats, found: Followed,
+    i: int, progress: _Progress, at: _State, new: _State, new_rate: Floats, now: Any, new_now: Any, marks: Floats,
+    times: Floats, found: Course,
 ) -> None:  # fmt: skip
     """Keep the lags that lie in an accepted step of lane i, and the shape if the step ends at a mark."""
-    robot, begin, end = course.robot[i], lane(now, i), lane(new_now, i)
-    while course.steps[i] > 1 and course.places[i] < len(times) and times[course.places[i]] <= end:
-        place = course.places[i]
+    robot, begin, end = progress.robot[i], lane(now, i), lane(new_now, i)
+    while progress.steps[i] > 1 and progress.places[i] < len(times) and times[progress.places[i]] <= end:
+        place = progress.places[i]
         share = (times[place] - begin) / (end - begin)
         for p in range(new.lag.shape[0]):
             for c in range(3):
@@ -316,10 +343,10 @@ def _record(
                     share, end - begin, lane(at.lag[p, c], i), lane(new.lag[p, c], i),
                     lane(at.lag_rate[p, c], i), lane(new_rate[p, c], i),
                 )  # fmt: skip
-        course.places[i] += 1
-    if course.marks[i] < len(marks) and end == marks[course.marks[i]]:
-        take_lane(found.shapes[robot, course.marks[i]], new.x, i)
-        course.marks[i] += 1
+        progress.places[i] += 1
+    if progress.marks[i] < len(marks) and end == marks[progress.marks[i]]:
+        take_lane(found.shapes[robot, progress.marks[i]], new.x, i)
+        progress.marks[i] += 1
 
 
 @formula

@@ -16,7 +16,7 @@ import numpy as np
 from calibration.swimmer.swimmer import Solver
 from sim.effects import effect_named, is_effect
 from sim.inputs import check_columns
-from sim.mechanics.thinning import UNIT_OF_TIME
+from sim.mechanics.drag import UNIT_OF_TIME
 from sim.model.groups import Groups
 from sim.motion.sensitivity import Sensitivities
 from sim.solve.assembly import assemble

@@ -12,6 +12,7 @@ from dataset.simulate import simulate
 from sim.model.presets import PRESETS
 from sim.model.sweepable import SLOPE_INPUTS
 from sim.motion import response, run, settling, steady
+from sim.solve.march import Steps
 from sim.solve.refinement import LOST, NO_START, Orbit
 
 CONTROL = {**PRESETS["paper-control"].group_values(), "history": True}
@@ -98,7 +99,7 @@ def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(steady, "refined_orbits", lambda rows, *_: [lost] * len(rows))
     monkeypatch.setattr(response, "orbits_with_phases", lambda rows, _, meshes: [[None] * len(rows)] * len(meshes))
     monkeypatch.setattr(settling, "state_on_orbit", lambda *_: None)
-    monkeypatch.setattr(run, "advance", lambda *_: False)
+    monkeypatch.setattr(run, "advance", lambda *_, shapes: Steps(False, np.empty((0, 6)), np.empty(shapes)))
     columns = simulate(some_rows({}))
     assert columns["failed"].tolist() == [True]
     assert columns["converged"].tolist() == [False]

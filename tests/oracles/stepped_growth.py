@@ -51,9 +51,9 @@ def stepped_growth(body: Body, tails: int, revolutions: float, *, edges: int = M
     bent.x[:] += _SIZE * bend * np.random.default_rng(0).normal(size=bent.x.shape)
     count = max(4, math.ceil(_STEPS * revolutions / _SAMPLES))
     part = revolution * revolutions / _SAMPLES
-    poses, shapes, sizes = np.zeros((count, 6)), np.empty((0, *bent.x.shape)), []
+    sizes = []
     for _ in range(_SAMPLES):
-        if not all(advance(body, s, part / count, count, _TOLERANCE, poses, shapes) for s in (straight, bent)):
+        if not all(advance(body, s, part / count, count, _TOLERANCE).solved for s in (straight, bent)):
             return np.nan
         later = (bent.pose[PHASE] - straight.pose[PHASE]) / tail_spin(body, straight.u)
         sizes.append(np.linalg.norm(bent.x - straight.x - straight.x_dot * later))

@@ -41,7 +41,7 @@ from sim.motion.settling import steady_state
 from sim.motion.steady import check_groups, steady
 from sim.motion.steady_motion import Steady, twists
 from sim.motion.stepped_response import steady_twist
-from sim.solve.assembly import bodies, reversed_bodies
+from sim.solve.assembly import bodies
 
 MEMORY = 1.2  # time units after which a flip is forgotten: the tails turn over in about 0.7
 _AVERAGED = 2  # half-periods that the mean is taken over, where there are as many
@@ -78,7 +78,7 @@ def switch_response(
     motion = steady(groups, stability=False) if motion is None else motion
     even = all(effect_named(name).symmetry == "even" for name in groups.effects)
     robots = bodies(groups)
-    pairs = zip(robots, reversed_bodies(groups), dwell, strict=True)
+    pairs = zip(robots, bodies(groups.reversed()), dwell, strict=True)
     lag = np.array([_lag(body, reverse, groups.N, T, even, resolution) for body, reverse, T in pairs])
     sense = np.sign([body.omega for body in robots])
     twist = twists(motion.v_z, motion.v_x, motion.omega_yr, sense)

@@ -8,11 +8,11 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.jit import compiled
-from sim.lanes import lanes
+from sim.lanes import lanes, width
 from sim.linear.chains import Chains
 from sim.model.body import Body
 from sim.solve.assembly import row
-from sim.solve.grouping import NAMES, body_in_lanes, group_width, in_groups, wanted_lanes
+from sim.solve.grouping import NAMES, body_in_lanes, in_groups, wanted_lanes
 from sim.solve.linearise import linearise
 from sim.solve.newton import factor_and_solve, new_workspace, newton
 from sim.solve.rates import Rates
@@ -38,23 +38,23 @@ def residual(body: Body, rates: Plain, x: Floats, u: Floats, noise: float = 0.0)
     r, t = _stacked(x, u)
     wanted = wanted_lanes(np.ones(1, bool))
     numbers, *parts = _stacked(row(body)[0], [rates.rate, rates.phase], rates.start, x, u)
-    _fill(numbers, NAMES, rates.differentiation, *parts, wanted, noise, r, t, group_width())
+    _fill(numbers, NAMES, rates.differentiation, *parts, wanted, noise, r, t)
     return r[..., 0], t[..., 0]
 
 
 @compiled
 def _fill(
     numbers: Floats, names: Any, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats,
-    wanted: Floats, noise: float, r: Floats, t: Floats, width: Any,
+    wanted: Floats, noise: float, r: Floats, t: Floats,
 ) -> None:  # fmt: skip
-    v, at_x, at_u, given = lanes(pair, width), lanes(x, width), lanes(u, width), lanes(wanted, width)
-    rates = Rates(v[0], v[1], by_phase, lanes(start, width))
+    v, at_x, at_u, given = lanes(pair), lanes(x), lanes(u), lanes(wanted)
+    rates = Rates(v[0], v[1], by_phase, lanes(start))
     scratch = new_scratch(at_x, at_u)
     for values in (scratch.around.flow, scratch.around.drag, scratch.x_dot, scratch.by_spin):
         values[:] = noise
     scratch.around.moment[:], scratch.around.wrench[:] = noise, noise
-    body = body_in_lanes(lanes(numbers, width), names)
-    fill_residual(body, rates, at_x, at_u, given[0], scratch, lanes(r, width), lanes(t, width))
+    body = body_in_lanes(lanes(numbers), names)
+    fill_residual(body, rates, at_x, at_u, given[0], scratch, lanes(r), lanes(t))
 
 
 class Linear(NamedTuple):
@@ -75,7 +75,7 @@ def linear(body: Body, rates: Plain, x: Floats, u: Floats, dx: Floats, du: Float
     shapes = [*blocks, np.zeros((n, columns, 4, 3)), np.zeros((2, columns, 4, 3)), np.zeros((instants, 4, 4))]
     chains, equations = Chains(*_stacked(*shapes, np.zeros((4, 4)))), _stacked(blocks[0], x, u)
     numbers, *parts = _stacked(row(body)[0], [rates.rate, rates.phase], rates.start, x, u, dx, du)
-    _linear(numbers, NAMES, rates.differentiation, *parts, chains, *equations, group_width())
+    _linear(numbers, NAMES, rates.differentiation, *parts, chains, *equations)
     first = [np.ascontiguousarray(part[..., 0]) for part in (*chains, *equations, *parts[-2:])]
     return Linear(Chains(*first[:9]), *first[9:])
 
@@ -83,11 +83,11 @@ def linear(body: Body, rates: Plain, x: Floats, u: Floats, dx: Floats, du: Float
 @compiled
 def _linear(
     numbers: Floats, names: Any, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats, dx: Floats,
-    du: Floats, chains: Chains, resistance: Floats, r: Floats, t: Floats, width: Any,
+    du: Floats, chains: Chains, resistance: Floats, r: Floats, t: Floats,
 ) -> None:  # fmt: skip
-    v, at_x, at_u = lanes(pair, width), lanes(x, width), lanes(u, width)
-    rates = Rates(v[0], v[1], by_phase, lanes(start, width))
-    body, work = body_in_lanes(lanes(numbers, width), names), new_workspace(rates, at_x, at_u)
+    v, at_x, at_u = lanes(pair), lanes(x), lanes(u)
+    rates = Rates(v[0], v[1], by_phase, lanes(start))
+    body, work = body_in_lanes(lanes(numbers), names), new_workspace(rates, at_x, at_u)
     linearise(body, rates, at_x, at_u, work.scratch, work.equations)
     found = work.equations.chains
     for out, block in (
@@ -95,20 +95,18 @@ def _linear(
         (chains.lower2, found.lower2), (chains.upper2, found.upper2), (chains.border, found.border),
         (chains.foot, found.foot), (resistance, work.equations.resistance),
     ):  # fmt: skip
-        lanes(out, width)[:] = block
-    lanes(chains.corner, width)[:] = found.corner
-    lanes(r, width)[:], lanes(t, width)[:] = work.equations.r, work.equations.t
-    factor_and_solve(body, rates, at_u, work, lanes(dx, width), lanes(du, width))
+        lanes(out)[:] = block
+    lanes(chains.corner)[:] = found.corner
+    lanes(r)[:], lanes(t)[:] = work.equations.r, work.equations.t
+    factor_and_solve(body, rates, at_u, work, lanes(dx), lanes(du))
 
 
 def corrections(body: Body, rates: Plain, x: Floats, u: Floats, tolerance: float) -> tuple[int, float]:
     """Improve x (n, M, 3) and u (P, 4) in place; return the number of corrections and the size of the last one."""
     numbers, pair, start, at_x, at_u = _stacked(row(body)[0], [rates.rate, rates.phase], rates.start, x, u)
-    sizes = np.empty((1, len(group_width())))
+    sizes = np.empty((1, width()))
     wanted = wanted_lanes(np.ones(1, bool))
-    count = _newton(
-        numbers, NAMES, rates.differentiation, pair, start, at_x, at_u, wanted, tolerance, sizes, group_width()
-    )
+    count = _newton(numbers, NAMES, rates.differentiation, pair, start, at_x, at_u, wanted, tolerance, sizes)
     x[:], u[:] = at_x[..., 0], at_u[..., 0]
     return int(count), float(sizes[0, 0])
 
@@ -116,11 +114,11 @@ def corrections(body: Body, rates: Plain, x: Floats, u: Floats, tolerance: float
 @compiled
 def _newton(
     numbers: Floats, names: Any, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats,
-    wanted: Floats, tolerance: float, sizes: Floats, width: Any,
+    wanted: Floats, tolerance: float, sizes: Floats,
 ) -> int:  # fmt: skip
-    v, at_x, at_u = lanes(pair, width), lanes(x, width), lanes(u, width)
-    rates = Rates(v[0], v[1], by_phase, lanes(start, width))
-    body, going = body_in_lanes(lanes(numbers, width), names), lanes(wanted, width)[0]
+    v, at_x, at_u = lanes(pair), lanes(x), lanes(u)
+    rates = Rates(v[0], v[1], by_phase, lanes(start))
+    body, going = body_in_lanes(lanes(numbers), names), lanes(wanted)[0]
     count, size = newton(body, rates, at_x, at_u, new_workspace(rates, at_x, at_u), tolerance, going)
-    lanes(sizes, width)[0] = size
+    lanes(sizes)[0] = size
     return count

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-from typing import Any
 
 import numba
 import numpy as np
@@ -11,29 +10,29 @@ import pytest
 
 from sim.arrays import Floats
 from sim.jit import compiled
-from sim.lanes import GROUP, choose, count_lanes, fma, lane, lanes, larger, less, smaller, somewhere, with_lane
+from sim.lanes import choose, fma, lane, lanes, larger, less, smaller, somewhere, width, with_lane
 from sim.linear.dense import factor_dense, solve_factored
 
 
 @compiled
-def factored(a: Floats, exchanged: Floats, b: Floats, width: Any) -> None:
+def factored(a: Floats, exchanged: Floats, b: Floats) -> None:
     """Factor a and solve for b with the factors, twice."""
-    x, y, z = lanes(a, width), lanes(exchanged, width), lanes(b, width)
+    x, y, z = lanes(a), lanes(exchanged), lanes(b)
     factor_dense(x, y)
     solve_factored(x, y, z)
     solve_factored(x, y, z)
 
 
 def test_each_lane_exchanges_its_own_rows() -> None:
-    rng, width = np.random.default_rng(7), len(GROUP)
-    a, b = rng.normal(size=(8, 8, width)), rng.normal(size=(8, 3, width))
+    rng, count = np.random.default_rng(7), width()
+    a, b = rng.normal(size=(8, 8, count)), rng.normal(size=(8, 3, count))
     factors, found, exchanged = a.copy(), b.copy(), np.zeros_like(a)
-    factored(factors, exchanged, found, GROUP)
-    for i in range(width):
+    factored(factors, exchanged, found)
+    for i in range(count):
         matrix = a[:, :, i]
         assert matrix @ matrix @ found[:, :, i] == pytest.approx(b[:, :, i], abs=1e-9)
     assert exchanged.any(axis=(0, 1)).all()
-    assert len({part.tobytes() for part in np.moveaxis(exchanged, -1, 0)}) == width
+    assert len({part.tobytes() for part in np.moveaxis(exchanged, -1, 0)}) == count
 
 
 HOOKS = """numba.types: Array Boolean Float Integer NamedUniTuple Type VarArg
@@ -54,9 +53,9 @@ def test_numba_has_the_hooks_that_lanes_are_made_with(line: str) -> None:
 
 
 @compiled
-def operated(a: Floats, b: Floats, out: Floats, width: Any) -> None:
+def operated(a: Floats, b: Floats, out: Floats) -> None:
     """Write each operation on a and b, (1, W), to a row of out."""
-    x, y, rows = lanes(a, width)[0], lanes(b, width)[0], lanes(out, width)
+    x, y, rows = lanes(a)[0], lanes(b)[0], lanes(out)
     total = x
     total += 1
     rows[0], rows[1], rows[2], rows[3] = total - y, x * y, x / y, -x
@@ -64,18 +63,18 @@ def operated(a: Floats, b: Floats, out: Floats, width: Any) -> None:
     rows[8], rows[9] = choose(less(x, y), x, 2), abs(x)
     rows[10], rows[11], rows[12] = np.sqrt(y), np.cos(x), np.sin(x)
     rows[13] = with_lane(x, 2, lane(y, 1))
-    rows[14] = x + count_lanes(x) if somewhere(less(x, y)) and not somewhere(less(y, 0.0)) else y
+    rows[14] = x + width() if somewhere(less(x, y)) and not somewhere(less(y, 0.0)) else y
 
 
 def test_an_operation_on_vectors_is_that_on_each_number() -> None:
-    rng, width = np.random.default_rng(8), len(GROUP)
-    x, y = rng.normal(size=width), rng.uniform(1.0, 2.0, width)
-    x[0], out = np.nan, np.empty((15, width))
-    operated(x[None], y[None], out, GROUP)
+    rng, count = np.random.default_rng(8), width()
+    x, y = rng.normal(size=count), rng.uniform(1.0, 2.0, count)
+    x[0], out = np.nan, np.empty((15, count))
+    operated(x[None], y[None], out)
     moved = x.copy()
     moved[2] = y[1]
     expected = [
         x + 1 - y, x * y, x / y, -x, x * y + 1, np.maximum(x, y), np.where(x < y, x, y), x < y,
-        np.where(x < y, x, 2), abs(x), np.sqrt(y), np.cos(x), np.sin(x), moved, x + width,
+        np.where(x < y, x, 2), abs(x), np.sqrt(y), np.cos(x), np.sin(x), moved, x + count,
     ]  # fmt: skip
     assert out == pytest.approx(np.stack(expected), rel=1e-14, nan_ok=True)

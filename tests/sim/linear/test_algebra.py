@@ -11,7 +11,7 @@ import pytest
 
 from sim.arrays import Floats
 from sim.effects import catalogue
-from sim.linear.complex_step import angle, derivative, length, magnitude, sign
+from sim.linear.complex_step import derivative, magnitude, sign
 from sim.linear.dense import factor_dense, solve_factored
 from sim.linear.gmres import extend, new_krylov, solution, start
 from sim.linear.spectral import differentiation, interpolation, with_phases
@@ -84,8 +84,6 @@ PLACES = np.array([[1.3, 0.4], [-1.3, 0.4], [-0.7, -2.0], [0.7, -2.0]])  # one i
 FORMULAS: list[tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]] = [
     (lambda p: magnitude(p[:, 0]), lambda p: np.abs(p[:, 0])),
     (lambda p: sign(p[:, 0]) * p[:, 1], lambda p: np.sign(p[:, 0]) * p[:, 1]),
-    (lambda p: length(p[:, 0], p[:, 1]), lambda p: np.hypot(p[:, 0], p[:, 1])),
-    (lambda p: angle(p[:, 1], p[:, 0]), lambda p: np.arctan2(p[:, 1], p[:, 0])),
 ]
 
 

@@ -23,7 +23,7 @@ def stepped_loads(edges: int) -> tuple[float, float]:
     """Compute |F_z| [N] and |M_z| [N m] of the fluid on the filament at 8 rad/s, stepped to its lasting shape."""
     body = held_filament(8.0 * ROBOT.time_scale, SLENDERNESS, OFFSET)
     state, steps = new_state(1, edges, body.offset), math.ceil(8.0 * body.omega)
-    assert advance(body, state, 2.0 / steps, steps, 1e-8, np.empty((steps, 6)), np.empty((0, *state.x.shape)))
+    assert advance(body, state, 2.0 / steps, steps, 1e-8).solved
     forces = fluid_forces(body, state.x, state.x_dot, state.u, state.pose[0])[0][:, 0]
     nodes = np.concatenate([[[body.offset, 0.0, 0.0]], state.x[:, 0]])
     force, moment = forces.sum(0), np.cross(nodes, forces).sum(0)
@@ -88,9 +88,9 @@ def test_a_bent_tail_relaxes_at_the_rate_of_the_first_mode() -> None:
     k = BEAM_K4[0] ** 0.25
     arc = np.arange(1, 25) / 24
     ratio = (math.sinh(k) - math.sin(k)) / (math.cosh(k) + math.cos(k))
-    state, shapes = new_state(1, 24, body.offset), np.empty((100, 24, 1, 3))
+    state = new_state(1, 24, body.offset)
     state.x[:, 0, 1] += 1e-4 * (np.cosh(k * arc) - np.cos(k * arc) - ratio * (np.sinh(k * arc) - np.sin(k * arc)))
-    assert advance(body, state, 0.002, 100, 1e-10, np.empty((100, 6)), shapes)
+    shapes = advance(body, state, 0.002, 100, 1e-10, shapes=100).shapes
     rate = math.log(shapes[19, -1, 0, 1] / shapes[99, -1, 0, 1]) / (80 * 0.002)
     assert rate == pytest.approx(BEAM_K4[0] / body.zeta_perp, rel=0.01)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad_vec
 
-from sim.mechanics.stokeslets import stokeslets
+from sim.mechanics.flow import stokeslets
 from sim.solve.refinement import orbit_on_mesh
 from tests.sim.robots import control, first_body, mean_tail_wrench
 

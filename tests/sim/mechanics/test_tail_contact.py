@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from sim.mechanics.contact import tail_gap
 from sim.mechanics.geometry import straight
-from sim.mechanics.tail_contact import FIRM, SOFTNESS, contact_forces
+from sim.mechanics.tail_contact import FIRM, SOFTNESS, contact_forces, tail_gap
 from sim.model.body import Body
 from tests.sim.robots import CONTROL_VALUES, control, first_body
 

@@ -7,7 +7,7 @@ import pytest
 
 from sim.linear.spectral import differentiation
 from sim.mechanics.balance import motion_at
-from sim.mechanics.contact_line import CREEP, add_contact_line
+from sim.mechanics.drag import CREEP, add_contact_line
 from sim.model.body import Body
 from sim.model.presets import CONTROL
 from sim.motion.steady import steady

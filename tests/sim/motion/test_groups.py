@@ -10,14 +10,14 @@ import pytest
 
 from sim.arrays import Floats
 from sim.model.groups import Groups
-from sim.motion.flips import Flip, follow_flips, orbits_with_phases
-from sim.motion.response import mirrored, responses
+from sim.motion.response import mirrored, orbits_with_phases, responses
 from sim.motion.sensitivity import sensitivities, slopes_of_orbits
 from sim.motion.stability import growths
 from sim.motion.steady import orbits
 from sim.solve import grouping, refinement
 from sim.solve.assembly import Nonlocal, numbers
 from sim.solve.refinement import NO_START, PHASES, PHASES_FOR_SLOPES, refined_orbits
+from sim.solve.transient import Flip, follow_flips
 from tests.sim.motion.test_stability import UNSTABLE
 from tests.sim.robots import control, sweep_points
 
@@ -139,7 +139,7 @@ def test_a_robot_that_cannot_be_solved_leaves_the_others_of_its_group_alone() ->
 
 def with_speed(flip: Flip, omega: float) -> Flip:
     """Return the flip of the same robot with another speed of its motor."""
-    return flip._replace(row=np.array([omega, *flip.row[1:]]))
+    return flip._replace(numbers=np.array([omega, *flip.numbers[1:]]))
 
 
 def test_every_robot_is_followed_until_its_own_end() -> None:

@@ -16,7 +16,7 @@ from sim.motion.resolution import Resolution
 from sim.motion.response import responses
 from sim.motion.steady import steady
 from sim.motion.stepped_response import stepped_response
-from sim.solve.assembly import reversed_bodies
+from sim.solve.assembly import bodies
 from tests.oracles.switching import switch_response
 from tests.sim.robots import CONTROL_VALUES, control, first_body
 
@@ -39,7 +39,7 @@ def test_curves_agree_with_time_steps(omega_bar: float, changes: dict[str, float
     assert not curves.stepped.any()
     lag, memory, rest, spread = stepped_response(
         first_body(groups), groups.N, DWELLS[FEW], BEFORE[[1, 3]],
-        reverse=reversed_bodies(groups)[0], resolution=FINE,
+        reverse=bodies(groups.reversed())[0], resolution=FINE,
     )  # fmt: skip
     assert curves.lag[0, FEW] == pytest.approx(lag, abs=2.5e-4)
     assert curves.memory[0][[1, 3]][:, FEW] == pytest.approx(memory, abs=5e-4)

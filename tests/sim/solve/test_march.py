@@ -50,7 +50,7 @@ def test_all_forces_vanish_in_the_middle_of_a_transient(tails: int, omega: float
     body.resistance[3, 4] = 0.02
     body = body._replace(droop=0.2 / body.resistance[3, 3], tail_load=(0.3, -0.6, 0.2))
     state = new_state(tails, 10, body.offset)
-    assert advance(body, state, 0.15 / abs(omega), 15, 1e-12, np.empty((15, 6)), np.empty((0, *state.x.shape)))
+    assert advance(body, state, 0.15 / abs(omega), 15, 1e-12).solved
     on_node, on_robot = unbalanced(body, state)
     assert on_node < 1e-8
     assert on_robot < 1e-8
@@ -69,9 +69,7 @@ def test_all_forces_vanish_on_an_orbit(tails: int) -> None:
 def test_steps_are_of_second_order() -> None:
     body, ends = first_body(control()), []
     for count in (20, 40, 80):
-        state, poses = new_state(2, 8, body.offset), np.empty((count, 6))
-        assert advance(body, state, 0.4 / count, count, 1e-10, poses, np.empty((0, *state.x.shape)))
-        ends.append(poses[-1])
+        ends.append(advance(body, new_state(2, 8, body.offset), 0.4 / count, count, 1e-10).poses[-1])
     ratio = np.abs(ends[0] - ends[1]).max() / np.abs(ends[1] - ends[2]).max()
     assert 3 < ratio < 5.5
 
@@ -79,5 +77,4 @@ def test_steps_are_of_second_order() -> None:
 def test_a_step_that_breaks_down_is_reported() -> None:
     body = first_body(control())._replace(zeta_parallel=np.nan)
     state = new_state(2, 8, body.offset)
-    steps = np.empty((3, 6))
-    assert not advance(body, state, 0.01, 3, TOLERANCE, steps, np.empty((0, *state.x.shape)))
+    assert not advance(body, state, 0.01, 3, TOLERANCE).solved
