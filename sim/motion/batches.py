@@ -23,6 +23,7 @@ from sim.motion.sensitivity import Sensitivities, sensitivities
 from sim.motion.settling import settle
 from sim.motion.steady import steady
 from sim.motion.steady_motion import STABILITY_COLUMNS
+from sim.solve.refinement import PHASES_FOR_SLOPES
 
 _DIRECT_ROWS, _SLOPE_ROWS, _STEPPED_ROWS = 128, 16, 4  # robots a batch: the progress bar moves after each
 RESPONSE_ROWS = 16
@@ -111,6 +112,7 @@ def sensitivity_columns(
     columns: Mapping[str, Floats],
     parameters: Sequence[str],
     *,
+    phases: int = PHASES_FOR_SLOPES,
     jobs: int | None = None,
     title: str = "sensitivities",
 ) -> Sensitivities:
@@ -119,12 +121,13 @@ def sensitivity_columns(
     Args:
         columns: robots by column name, each (M,).
         parameters: names out of `sim.model.sweepable.SLOPE_INPUTS` and `sim.effects.catalogue()`, K of them.
+        phases: number of phases to begin with, see `sim.motion.sensitivity`.
         jobs: threads; default all processors.
         title: of the progress bar; empty for none.
     """
 
     def work(groups: Groups) -> dict[tuple[str, str], Floats]:
-        found = sensitivities(groups, parameters)
+        found = sensitivities(groups, parameters, phases=phases)
         return {(kind, name): array for kind in _KINDS for name, array in getattr(found, kind).items()}
 
     found = in_batches(work, check_columns(columns), _SLOPE_ROWS, jobs=jobs, title=title)
