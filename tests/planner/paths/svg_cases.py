@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 _NS = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
 _L = '<path d="M 0 0 h 600 v 300"/>'
 _CM60 = 'width="1200mm" height="600mm" viewBox="0 0 1200 600"'
@@ -81,6 +83,15 @@ ALIKE = [
     (svg(_LINE, '&size;', '<!DOCTYPE svg [<!ENTITY size "x">]>').replace("&size;", 'class="&size;"'), svg(_LINE)),
 ]  # fmt: skip
 
+BROKEN = [
+    "<svg", "", "no xml", "<svg><g></svg>", "<svg></svg><svg/>", "<svg b='1' b='2'/>", "<svg b=1/>", "<svg b='&x;'/>",
+]  # fmt: skip
+_USES = "".join(f"<g id='g{i + 1}'>" + f"<use href='#g{i}'/>" * 10 + "</g>" for i in range(7))
+_CURVES = " ".join(
+    f"C {a} {b} {c} {d} {e} {f}" for a, b, c, d, e, f in np.random.default_rng(1).random((2_000, 6))
+)
+_OWN_GROUP = "a <use> shows a group that it belongs to"
+
 # What is drawn, and the words of the refusal
 REFUSED = [
     *[(svg(body), words) for body, words in (
@@ -130,4 +141,13 @@ REFUSED = [
     (svg('<line x2="50%"/>', ""), "x2='50%' is not read"),
     (svg(f'<svg viewBox="0 0 9 9">{_LINE}</svg>', ""), "has no size"),
     (f"<html>{_LINE}</html>", "is not SVG: it begins with <html>"),
+    *[(svg(body), "no path") for body in ("", '<path d="M 0 0"/>', "<text>hi</text>")],
+    (svg('<path d="M 0 0 L 0 0"/>'), "same"),
+    # what would take minutes
+    (svg(f'<defs><g id="g0"><path d="M 0 0 L 1 1"/></g>{_USES}</defs><use href="#g7"/>'), "more than 50000 shapes"),
+    (svg('<g id="a"><use href="#a"/></g>'), _OWN_GROUP),
+    (svg('<g id="a"><use href="#b"/></g><g id="b"><use href="#a"/></g>'), _OWN_GROUP),
+    (svg("<g>" * 120 + "</g>" * 120), "more than 100 levels"),
+    (svg(f'<path d="M 0 0 {_CURVES}"/>'), "more than 200000 points"),
+    (svg(f'<path d="M 0 0{" L 1 2" * 30_000}"/>'), "more than 50000 shapes and coordinates"),
 ]  # fmt: skip

@@ -76,29 +76,29 @@ def test_names_may_be_in_a_comment_or_missing_where_that_is_allowed(tmp_path: Pa
     assert [row_name(table, row) for row in (0, 1)] == ["row 1 (line 5)", "row 2 (line 7)"]
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("x,y\n1,5,2,5\n", "more values than columns; if numbers have decimal commas"),
-        ("x;y\n1,5;2.5\n", r"decimal comma \(1,5\) and with a decimal point \(2.5\)"),
-        ("x;y\n1.234,5;2\n", "'1.234,5'; write numbers without separators of thousands"),
-        ("x,y,x\n1,2,3\n", "two columns 'x'"),
-        ("", "is empty"),
-        ("# only a comment\n", "is empty"),
-        ("x,y\n", "no rows"),
-        ("x,y\nmm,mm\n", "no rows"),
-        ("x,y\n1,2\0\n", "is no text"),
-        ("a,b,c\n1,2\n3,4\n", r"all rows have fewer values \(2\) than there are columns \(3\)"),
-        ("x,y\n\n1,2\n# 3\n1,2,3\n", "line 5 has more values than columns"),
-        ('x,y\n1,2\n"3,4\n', "line 4: unexpected end of data"),
-        ("x;y\n1,200;300\n", "'1,200', which may be 1200 or 1.2"),
-        ("x;y\n1,200;0,5\n300;0,5\n", "'1,200', which may be 1200 or 1.2"),
-        ("x;y\n1.200;1\n300;2\n", "'1.200', which may be 1200 or 1.2"),
-        ('x,y\n"1,200",300\n', "'1,200', which may be 1200 or 1.2"),
-        ("x;y\n1.200.300;1\n", "'1.200.300'; write numbers without"),
-        ("x\ty\n1\u202f200\t1\n", r"'1\\u202f200'; write numbers without"),
-    ],
-)
+REFUSED = [
+    ("x,y\n1,5,2,5\n", "more values than columns; if numbers have decimal commas"),
+    ("x;y\n1,5;2.5\n", r"decimal comma \(1,5\) and with a decimal point \(2.5\)"),
+    ("x;y\n1.234,5;2\n", "'1.234,5'; write numbers without separators of thousands"),
+    ("x,y,x\n1,2,3\n", "two columns 'x'"),
+    ("", "is empty"),
+    ("# only a comment\n", "is empty"),
+    ("x,y\n", "no rows"),
+    ("x,y\nmm,mm\n", "no rows"),
+    ("x,y\n1,2\0\n", "is no text"),
+    ("a,b,c\n1,2\n3,4\n", r"all rows have fewer values \(2\) than there are columns \(3\)"),
+    ("x,y\n\n1,2\n# 3\n1,2,3\n", "line 5 has more values than columns"),
+    ('x,y\n1,2\n"3,4\n', "line 4: unexpected end of data"),
+    ("x;y\n1,200;300\n", "'1,200', which may be 1200 or 1.2"),
+    ("x;y\n1,200;0,5\n300;0,5\n", "'1,200', which may be 1200 or 1.2"),
+    ("x;y\n1.200;1\n300;2\n", "'1.200', which may be 1200 or 1.2"),
+    ('x,y\n"1,200",300\n', "'1,200', which may be 1200 or 1.2"),
+    ("x;y\n1.200.300;1\n", "'1.200.300'; write numbers without"),
+    ("x\ty\n1\u202f200\t1\n", r"'1\\u202f200'; write numbers without"),
+]
+
+
+@pytest.mark.parametrize(("text", "words"), REFUSED)
 def test_what_is_no_table_or_could_be_two_is_refused(text: str, words: str, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(text)
     with pytest.raises(InputError, match=words) as refusal:

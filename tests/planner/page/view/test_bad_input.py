@@ -39,8 +39,6 @@ LINKS = [
     ("v=1&path=cube%3A3", "path", "The link cannot be read: it has an unknown shape, cube."),
     ("v=1&path=circle%3A-3", "path", "circle: its size must be above 0"),
     ("v=1&objective=beauty", "options", "objective 'beauty'; allowed are error, time, flips"),
-    ("v=1&corner=cut", "options", "corner 'cut'; allowed are"),
-    ("v=1&point=tail", "options", "point 'tail'; allowed are"),
 ]
 
 
