@@ -74,7 +74,7 @@ def _planned(call: Call, *, arduino: str | None = None, **further: Any) -> Plan:
     return plan
 
 
-@program.command("plan", of="planner.api:plan", robot=ROBOT)
+@program.command("plan", of="planner.jobs.plan:plan", robot=ROBOT)
 def _plan(plan: Call, *, out: str, trade_off: bool = False, arduino: str | None = None) -> None:
     """Plan the switching times for a path.
 
@@ -95,7 +95,7 @@ def _plan(plan: Call, *, out: str, trade_off: bool = False, arduino: str | None 
     _write(result, out, f"{drawn}declared path", arduino=arduino, pictures=pictures)
 
 
-@program.command("goal", of="planner.api:to_goal", robot=ROBOT)
+@program.command("goal", of="planner.goal.trip:to_goal", robot=ROBOT)
 def _goal(
     to_goal: Call,
     *,
@@ -113,9 +113,9 @@ def _goal(
     _write(_planned(to_goal, arduino=arduino, start=start, goal=goal), out, arduino=arduino)
 
 
-@program.command("hold", of="planner.api:hold", robot=ROBOT, seconds="for")
-@program.command("cover", of="planner.api:cover", robot=ROBOT, width="--width", holes="hole")
-@program.command("tour", of="planner.api:tour", robot=ROBOT, back="return")
+@program.command("hold", of="planner.jobs.hold:hold", robot=ROBOT, seconds="for")
+@program.command("cover", of="planner.jobs.cover:cover", robot=ROBOT, width="--width", holes="hole")
+@program.command("tour", of="planner.jobs.tour:tour", robot=ROBOT, back="return")
 def _job(job: Call, *, out: str, arduino: str | None = None) -> None:
     _write(_planned(job, arduino=arduino), out, arduino=arduino)
 
@@ -129,27 +129,26 @@ def _fleet(fleet: str, *, apart: str | None = None, feedback: bool = False, out:
         apart: least distance between bodies, such as 10cm (default: apart of the file).
         feedback: the poses will be measured for a tracker.
     """
-    from planner.files.fleet_files import distance_apart, read_fleet
-    from planner.jobs.fleet import Member
+    from planner.files.fleet_files import read_fleet
     from planner.jobs.fleet import fleet as keep_apart
 
     asked = read_fleet(fleet)
     if (apart := apart or asked.apart) is None:
         raise InputError(f"{fleet}: how far apart? give --apart 10cm, or apart in the file")
-    members = []
+    plans = []
     for robot in asked.robots:
         with naming(f"{fleet}: {robot.name}"):
             call, own = program.commands[robot.command].read(robot.command, ["--out", out, *robot.words])
             poses = {name: own[name] for name in own.keys() & {"start", "goal"}}
-            plan = call(**poses, **{"feedback": True} if feedback else {})
-            members.append(Member(robot.name, plan, robot.delay))
-    distance = distance_apart(apart, asked.unit, [member.plan.robot for member in members])
+            plans.append(call(**poses, **{"feedback": True} if feedback else {}))
+    names, delays = [robot.name for robot in asked.robots], [robot.delay for robot in asked.robots]
     with _progress_bar() as progress:
-        result = keep_apart(members, distance, feedback=feedback or asked.feedback, progress=progress)
+        result = keep_apart(plans, apart, names=names, delays_s=delays, unit=asked.unit,
+                            feedback=feedback or asked.feedback, progress=progress)  # fmt: skip
     _write(result, out)
 
 
-@program.command("track", of="planner.api:plan", robot=ROBOT)
+@program.command("track", of="planner.jobs.plan:plan", robot=ROBOT)
 def _track(
     plan_path: Call,
     path: str,
@@ -263,7 +262,7 @@ def _saved(path: str, *, unit: str | None = None, lookup: str | None = None, own
     return restore_plan(path, lookup=lookup, own_table=own_table)
 
 
-@program.command("page", of="planner.api:write_page", path="", robot="--robot", paths="path")
+@program.command("page", of="planner.page.write_page:write_page", path="", robot="--robot", paths="path")
 def _page(write_page: Call, *, out: str) -> None:
     """Write one HTML file that plans: draw a path in the browser, take the schedule along.
 
@@ -274,7 +273,7 @@ def _page(write_page: Call, *, out: str) -> None:
     print(f"{page.stat().st_size / 1e6:.2f} MB, opens in a browser -> {page}")
 
 
-@program.command("replan", of="planner.api:replan", written_by="from")
+@program.command("replan", of="planner.files.tracks:replan", written_by="from")
 def _replan(replan: Call, *, out: str, arduino: str | None = None) -> None:
     """Plan the rest of a saved plan from where a robot is now."""
     _refuse_early(arduino)
@@ -302,7 +301,7 @@ def _replay(
     """
     from tqdm import tqdm
 
-    from planner.api import check
+    from planner.files.tracks import check
     from sim.inputs import load_robot
     from sim.io.files import write_csv
     from sim.model.schedule import load_schedule, read_plan_file
@@ -351,7 +350,7 @@ def _replay(
         print(check(plan, track).line)
 
 
-@program.command("check", of="planner.api:check", written_by="from")
+@program.command("check", of="planner.files.tracks:check", written_by="from")
 def _check(check: Call, plan: str, *, out: str | None = None) -> None:
     """Tracking error of a replayed track.
 

@@ -15,13 +15,13 @@ from typing import Any, TypedDict
 
 from numpy.typing import ArrayLike
 
-from planner.files.own_table import table_for
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.path import Path2D, like_a_shape, shape_of
 from planner.paths.path_files import Drawing, read_path
 from planner.paths.units import Swimmer, in_tails, read_length, read_pose, read_time
 from planner.planning.request import POSE, Camera, Corner, PlanRequest
 from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
+from planner.vehicle.from_table import table_for
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import Point, TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import Objective
@@ -32,9 +32,9 @@ from sim.robot_rows import OneRobot, one_robot
 from surrogate.interface import LookupTable
 from surrogate.table_file import load_table
 
-AnyVehicle = OneRobot | MeasuredVehicle
+AnyVehicle = OneRobot | MeasuredVehicle | TrackedVehicle  # the last one as a plan has it: no table is asked again
 Length = float | str
-Region = Circle | Polygon | Path2D | ArrayLike | str
+AnyRegion = Circle | Polygon | Path2D | ArrayLike | str
 _REQUEST = tuple(field.name for field in fields(PlanRequest))
 _FARTHEST = 1e6  # l
 _SHAPES = {"circle": "circle:X,Y,RADIUS", "box": "box:LEFT,LOW,RIGHT,HIGH"}
@@ -88,8 +88,8 @@ class SpaceOptions(TypedDict, total=False):
         seed: of the random robots from which the stated error is computed.
     """
 
-    keep_out: Sequence[Region]
-    walls: Region | None
+    keep_out: Sequence[AnyRegion]
+    walls: AnyRegion | None
     feedback: bool
     camera: Camera | tuple[str, str, str, str, str]
     seed: int
@@ -145,7 +145,7 @@ def asked(robot: AnyVehicle, options: Mapping[str, Any], **own: Any) -> tuple[Tr
     """Return a robot's vehicle with its tracked point, and what is asked of its plan.
 
     Args:
-        robot: the robot, or a measured vehicle.
+        robot: the robot, or a vehicle.
         options: see the classes above.
         own: further fields of `PlanRequest`.
 
@@ -154,6 +154,8 @@ def asked(robot: AnyVehicle, options: Mapping[str, Any], **own: Any) -> tuple[Tr
     """
     swims = swimmer_of(robot)
     request = request_of(options, swims, **own)
+    if isinstance(robot, TrackedVehicle):
+        return robot, request
     if isinstance(robot, MeasuredVehicle) or isinstance(swims, MeasuredVehicle):
         if any(options.get(name) for name in ("lookup", "own_table", "knowledge")):
             raise InputError(f"{swims.name!r} is a measured vehicle; it needs no look-up table and no calibration")
@@ -164,6 +166,8 @@ def asked(robot: AnyVehicle, options: Mapping[str, Any], **own: Any) -> tuple[Tr
 
 def swimmer_of(robot: AnyVehicle) -> Robot | MeasuredVehicle:
     """Return a robot or a measured vehicle, read from its file where a path or a preset's name is given."""
+    if isinstance(robot, TrackedVehicle):
+        return robot.robot
     if isinstance(robot, str | Path) and MeasuredVehicle.is_in(robot):
         return MeasuredVehicle.load(robot)
     return robot if isinstance(robot, MeasuredVehicle) else one_robot(robot)
@@ -188,14 +192,22 @@ def table_of(
 
 
 def request_of(options: Mapping[str, Any], robot: Swimmer, **own: Any) -> PlanRequest:
-    """Return what is asked of a plan; `own` are further fields."""
+    """Return what is asked of a plan; `own` are further fields.
+
+    Raises:
+        InputError: an option cannot be, such as round walls.
+    """
     given, unit = {name: options[name] for name in _REQUEST if name in options}, options.get("unit")
     if "camera" in given:
         given["camera"] = camera_of(given["camera"], unit, robot)
     if given.get("tolerance") is not None:
         given["tolerance"] = length_of(given["tolerance"], unit, robot, "--tolerance")
-    space = free_space(options.get("keep_out", ()), options.get("walls"), unit, robot)
-    return PlanRequest(**given, **own, space=space)
+    walls = options.get("walls")
+    outline = None if walls is None else region_of(walls, unit, robot)
+    if isinstance(outline, Circle):
+        raise InputError(f"--walls {walls!r}; give a box or an outline")
+    regions = tuple(region_of(each, unit, robot) for each in options.get("keep_out", ()))
+    return PlanRequest(**given, **own, space=FreeSpace(regions, outline))
 
 
 def length_of(given: Length, unit: str | None, robot: Swimmer, name: str) -> float:
@@ -222,23 +234,11 @@ def camera_of(given: Camera | Sequence[str], unit: str | None, robot: Swimmer) -
     return Camera((noise, heading), every_s, delay_s, lost)
 
 
-def region_of(given: Region, unit: str | None, robot: Swimmer, *, agree: bool = False) -> Circle | Polygon:
+def region_of(given: AnyRegion, unit: str | None, robot: Swimmer, *, agree: bool = False) -> Circle | Polygon:
     """Return a region, or read its words, see `read_region`."""
     if isinstance(given, str | Path):
         return read_region(str(given), unit, robot, agree=agree)
     return given if isinstance(given, Circle | Polygon) else Polygon.of(given)
-
-
-def free_space(keep_out: Sequence[Region], walls: Region | None, unit: str | None, robot: Swimmer) -> FreeSpace:
-    """Return the space that regions and walls leave.
-
-    Raises:
-        InputError: the words are no regions, or the walls are round.
-    """
-    outline = None if walls is None else region_of(walls, unit, robot)
-    if isinstance(outline, Circle):
-        raise InputError(f"--walls {walls!r}; give a box or an outline")
-    return FreeSpace(tuple(region_of(each, unit, robot) for each in keep_out), outline)
 
 
 def pose_of(given: Sequence[Length], unit: str | None, robot: Swimmer, name: str) -> POSE:

@@ -37,8 +37,9 @@ from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
 from dataset.data_set import read
-from planner.api import check, plan
 from planner.files.saved_plan import load_plan
+from planner.files.tracks import check
+from planner.jobs.plan import plan
 from planner.paths.path import Path2D, polygon
 from sim.io.files import whole_file, write_csv, write_text
 from sim.model.presets import PRESETS

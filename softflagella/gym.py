@@ -29,8 +29,8 @@ from typing import Any, Literal, NamedTuple
 import gymnasium
 import numpy as np
 
-from planner.api import plan as plan_path
 from planner.files.saved_plan import restore_plan
+from planner.jobs.plan import plan as plan_path
 from planner.paths.distance import closest_segment
 from planner.paths.path import arc_length, polygon
 from planner.planning.line_of_sight import LineOfSight

@@ -87,7 +87,7 @@ for name in sys.argv[1:]:
     import_module(name)
     loaded[name] = sorted(set(sys.modules) - before)
 from planner.paths.path import circle
-from planner.api import plan
+from planner.jobs.plan import plan
 from sim.inputs import load_robot
 from surrogate.table_file import load_table
 table, robot = load_table(), load_robot("paper-control")

@@ -24,10 +24,10 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.common import heading, in_parallel, per_cent, row
 from benchmarks.planner.stated_errors import random_path
-from planner.api import plan
+from planner.jobs.plan import plan
 from planner.paths.path import circle
 from planner.planning.request import Camera
-from planner.tracking.swim import Swim, swim
+from planner.tracking.swim import Swim, swim_under
 from planner.tracking.tracker import Tracker
 from sim.io.errors import InputError
 from sim.motion.warm import compile_once
@@ -74,7 +74,7 @@ def outcomes(seed: int, vehicle: bool) -> list[Outcome] | str:
         for current in (0.0, CURRENT):
             x, y = (current * each.straight.net_speed * way for way in (math.cos(angle), math.sin(angle)))
             tracker, seen = Tracker(each, noise=camera.noise), replace(camera, seed=seed)
-            result = swim(tracker, each, truth, seen, current=(x, y))
+            result = swim_under(tracker, each, truth, seen, current=(x, y))
             found.append(_outcome(seed, name, current, each.feedback_error, result))
     return found
 

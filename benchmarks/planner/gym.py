@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import heading, row
-from planner.api import plan
+from planner.jobs.plan import plan
 from planner.paths.path import circle, polygon
 from softflagella.gym import LONGEST, Episode, Observation, PathEnv, Policy, TrackerPolicy, episode
 

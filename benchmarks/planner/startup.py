@@ -30,7 +30,7 @@ _PLAN = (
 import sys
 from planner.files.plan_files import write_plan
 from planner.paths.path import circle
-from planner.api import plan
+from planner.jobs.plan import plan
 from sim.model.presets import PRESETS
 """,
     "write_plan(plan(circle(1.5), PRESETS['paper-control']), sys.argv[1])",

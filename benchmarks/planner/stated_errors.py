@@ -19,8 +19,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.common import heading, in_parallel, per_cent, row, two_quantiles
-from planner.api import plan
 from planner.files.tracks import tracking_error
+from planner.jobs.plan import plan
 from planner.paths.path import Path2D, circle, polygon
 from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
 from sim.io.errors import InputError

@@ -12,8 +12,8 @@ import time
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from planner.api import plan
 from planner.files.tracks import tracking_error
+from planner.jobs.plan import plan
 from planner.paths.path import circle, polygon
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay

@@ -22,17 +22,15 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from planner.files.plan_files import EXTRA, FILES, write_plan_files
 from planner.jobs.fleet_plan import FleetPlan
-from planner.paths.units import Swimmer, read_length
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_text
 from sim.io.reading import read_json, read_toml
-from sim.io.units import number_and_unit
 
 _JOBS = {"path": "plan", "goal": "goal", "places": "tour", "region": "cover"}  # key -> command
 _OWN = ("robot", "name", "delay_s")
@@ -141,21 +139,6 @@ def _beside(folder: Path, key: str, value: Any) -> str:
     """Return a value as a word; the name of a file that is beside the TOML file with its folder."""
     beside = folder / str(value)
     return str(beside) if key in _FILES and beside.is_file() else str(value)
-
-
-def distance_apart(words: str | float, unit: str | None, robots: Sequence[Swimmer]) -> float:
-    """Read a distance such as 10cm in m.
-
-    Raises:
-        InputError: the words are no length above 0 or have no unit, or the robots have different tail lengths.
-    """
-    text, first = str(words), robots[0]
-    relative = (number_and_unit(text)[1] or unit) == "l"
-    if relative and any(robot.length_scale != first.length_scale for robot in robots):
-        raise InputError(
-            f"distance apart {words}: the robots have different tail lengths; say its unit, as in 10cm"
-        )
-    return read_length(text, unit, first, "distance apart", above_zero=True) * first.length_scale
 
 
 def write_fleet(fleet: FleetPlan, folder: str | Path) -> list[Path]:

@@ -18,7 +18,6 @@ from typing import Any, get_args
 
 import numpy as np
 
-from planner.files.own_table import table_for
 from planner.goal.trip import FORMAT, Trip
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
@@ -30,6 +29,7 @@ from planner.planning.line_of_sight import Guidance
 from planner.planning.plan import GUARANTEE, KINDS, Plan
 from planner.planning.request import DOCUMENTED, Camera, PlanRequest
 from planner.vehicle.calibration_table import CalibrationKnowledge
+from planner.vehicle.from_table import table_for
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle

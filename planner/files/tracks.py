@@ -9,6 +9,7 @@ again, through the places that are left; of any other plan the rest of its path 
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,20 +18,22 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 import pandas as pd
 
+from planner.files.saved_plan import load_plan, restore_plan
 from planner.goal.trip import to_goal
 from planner.paths.distance import distance_to, farthest
 from planner.paths.obstacles import FreeSpace
 from planner.paths.units import length_in_lab
 from planner.planning.plan import Plan
-from planner.planning.request import PlanRequest
 from planner.tracking.rest import place_reached, rest_of
 from sim.arrays import Floats
-from sim.io.errors import InputError
+from sim.io.errors import InputError, InputWarning, naming
+from sim.io.keywords import checks_keywords
 from sim.io.pose_tracks import read_tracks
 from sim.io.quantities import convert_columns, numbers_of
 from sim.io.track_options import TrackOptions
 from sim.io.units import format_length
 from sim.mechanics import planar
+from surrogate.interface import LookupTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -76,6 +79,40 @@ class TrackingError:
         )
 
 
+@checks_keywords
+def check(
+    plan: Plan | Mapping[str, Any] | str | Path,
+    track: pd.DataFrame | str | Path,
+    **options: Unpack[TrackOptions],
+) -> TrackingError:
+    """Compare a replayed or measured track with its plan.
+
+    Args:
+        plan: plan.json. In Python also its content, or a plan.
+        track: table with `time_s`, `x_cm`, `y_cm`, `heading_deg` of the head's centre, as a camera gives them, or
+            with the columns that `replay` writes.
+        options: of a file that another program has written, see `TrackOptions`.
+
+    Returns:
+        Distances of the tracked point from the declared path: `rms` and `largest`, with the `stated` error; from
+        the path as drawn: `raw_rms` and `raw_largest` [l]. `line` says it in words.
+
+    Raises:
+        InputError: the track has no such columns, or values that are not finite.
+
+    Example:
+        >>> import softflagella as sf
+        >>> result = sf.plan(sf.circle(1.2), "paper-control", objective="flips")
+        >>> error = sf.check(result, sf.replay(result))
+        >>> error.rms < error.largest < error.stated
+        True
+    """
+    content = load_plan(plan) if isinstance(plan, str | Path) else plan
+    with naming(track):
+        table = read_track(track, **options)
+        return tracking_error(content.to_dict() if isinstance(content, Plan) else content, table)
+
+
 def tracking_error(plan: Mapping[str, Any], track: pd.DataFrame) -> TrackingError:
     """Compare a track with its plan.
 
@@ -114,12 +151,52 @@ def tracking_error(plan: Mapping[str, Any], track: pd.DataFrame) -> TrackingErro
     )
 
 
-def replan_from(plan: Plan, track: pd.DataFrame) -> Plan:
-    """Plan the rest of a plan from the last pose of a track, at rest there; of a trip, the way to its goal.
+@checks_keywords
+def replan(
+    plan: Plan | str | Path,
+    track: pd.DataFrame | str | Path,
+    *,
+    lookup: LookupTable | str | Path | None = None,
+    own_table: bool = False,
+    **options: Unpack[TrackOptions],
+) -> Plan:
+    """Plan the rest of a plan from where a robot is now: the last pose of its track, at rest.
+
+    The track tells which part of the path the robot has followed. Where it is away from its path, the rest begins
+    with a way back, which leaves out as little of the path as is worth its length. Of a trip to a goal the way to
+    the goal is planned again, through the places that are left.
+
+    Args:
+        plan: plan.json, its folder, or a goal.json, tour.json or cover.json beside it. In Python also a plan.
+        track: table of the robot so far: `time_s`, `x_cm`, `y_cm`, `heading_deg` of the head's centre, or in other
+            units, or the columns that `replay` writes; in its last row the robot is now, at rest.
+        lookup: the look-up table with which a saved plan was made, or its file; see `restore_plan`.
+        own_table: a saved plan was made with the robot's own table, which is simulated.
+        options: of a track that another program has written, see `TrackOptions`.
+
+    Returns:
+        A plan whose first dwell begins now; its `job` is a `Trip` for a trip to a goal.
 
     Raises:
-        InputError: the track cannot be used, it has reached the end, or no way leads on.
+        InputError: the file is no plan, the track cannot be used or has reached the end, or no way leads on.
+
+    Example:
+        >>> import pandas as pd
+        >>> import softflagella as sf
+        >>> result = sf.plan([[0, 0], [4, 0]], "paper-control")
+        >>> track = pd.DataFrame({"time_s": [600.0], "x_cm": [22.0], "y_cm": [1.0], "heading_deg": [10.0]})
+        >>> rest = sf.replan(result, track)
+        >>> round(rest.start[0], 6), len(rest.dwells) < len(result.dwells)
+        (2.0, True)
     """
+    if isinstance(plan, str | Path):
+        plan = restore_plan(plan, lookup=lookup, own_table=own_table)
+    with naming(track):
+        return _replanned(plan, read_track(track, **options))
+
+
+def _replanned(plan: Plan, track: pd.DataFrame) -> Plan:
+    """Plan the rest of a plan from the last pose of a track, at rest there; of a trip, the way to its goal."""
     robot = {"tail_length_m": plan.robot.length_scale, "time_scale_s": plan.robot.time_scale}
     times, poses = poses_of(track, robot, running=True)
     if plan.ends_at is None:
@@ -131,18 +208,16 @@ def replan_from(plan: Plan, track: pd.DataFrame) -> Plan:
         passed += int(np.hypot(*(q[passed:] - np.array(via)).T).argmin())
         left += [via] if passed > place else []
     x, y, heading = poses[-1].tolist()
-    request = PlanRequest(
-        objective=plan.request.objective,
-        minimum_dwell=plan.minimum_dwell,
-        camera=plan.request.camera,
-        space=FreeSpace() if kept is None else kept.free_space,
-        feedback=kept is not None and kept.margin < plan.stated_error,
-    )
-    return to_goal((x, y, math.remainder(heading, math.tau)), plan.ends_at, plan.tracked, request, left)
+    space = FreeSpace() if kept is None else kept.free_space
+    return to_goal(
+        (x, y, math.remainder(heading, math.tau)), plan.ends_at, plan.tracked, via=left,
+        objective=plan.request.objective, minimum_dwell=plan.minimum_dwell, camera=plan.request.camera,
+        keep_out=space.regions, walls=space.walls, feedback=kept is not None and kept.margin < plan.stated_error,
+    )  # fmt: skip
 
 
 def read_track(track: pd.DataFrame | str | Path, **options: Unpack[TrackOptions]) -> pd.DataFrame:
-    """Read the table of a track from its file, see `sim.io.pose_tracks`.
+    """Read the table of a track from its file, see `sim.io.pose_tracks`, and warn of poses that are lost.
 
     Raises:
         InputError: the file cannot be read, or has the tracks of several robots.
@@ -150,6 +225,8 @@ def read_track(track: pd.DataFrame | str | Path, **options: Unpack[TrackOptions]
     table = track if isinstance(track, pd.DataFrame) else read_tracks(track, **options)
     if options and len(runs := table["run"].unique()) > 1:
         raise InputError(f"there are {len(runs)} tracks, of {runs[0]}, {runs[1]} …; give that of one robot")
+    for line in table.attrs.get("lost", ()):
+        warnings.warn(line, InputWarning, stacklevel=4)
     return table
 
 

@@ -10,10 +10,10 @@ shorter dwells are tried, which need less clearance. Lengths in l, angles in rad
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from planner.goal.last_dwells import Ending
 from planner.goal.lattice import RouteLimits
 from planner.goal.route import COURSES, Lattices, NoWayError, route
 from planner.goal.swings import Delay
+from planner.options import AnyVehicle, GoalOptions, Length, asked, place_of, pose_of, seconds_of, swimmer_of
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import LONGEST, heading_in_degrees, in_lab, place_in_lab
@@ -29,12 +30,12 @@ from planner.planning.feasible import Declared
 from planner.planning.line_of_sight import Start
 from planner.planning.picture import BODY, REPLAYED
 from planner.planning.plan import Job, Plan
-from planner.planning.request import POSE, PlanRequest, Progress
+from planner.planning.request import POSE
 from planner.planning.solve import Setting, Task, solve
-from planner.vehicle.tracked_point import TrackedVehicle
-from planner.vehicle.zigzag import check_least
+from planner.vehicle.zigzag import Objective, check_least
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -116,44 +117,75 @@ class Trip(Job):
         }
 
 
+@checks_keywords
 def to_goal(
-    start: POSE,
-    goal: POSE,
-    tracked: TrackedVehicle,
-    request: PlanRequest,
-    via: Sequence[tuple[float, float]] = (),
-    progress: Progress | None = None,
+    start: Sequence[Length],
+    goal: Sequence[Length],
+    robot: AnyVehicle,
+    *,
+    via: Sequence[tuple[Length, Length]] = (),
+    arrive: float | str | None = None,
+    objective: Objective = "time",
+    progress: Callable[[float], object] | None = None,
+    **options: Unpack[GoalOptions],
 ) -> Plan[Trip]:
-    """Plan the switching times from one pose of the head's centre to another, see `planner.api.to_goal`."""
-    vehicle, robot, space = tracked.vehicle, tracked.robot, request.space
-    least_dwell = check_least(request.least_dwell(robot))
+    """Plan the motor's switching times from one pose to another.
+
+    Args:
+        start: x, y [l] and heading [rad] of the head's centre, at rest; or words: X, Y and degrees.
+        goal: the same at the end.
+        robot: robot.toml or the name of a preset, with its motor speed in both directions; or the vehicle.toml of
+            a measured vehicle. In Python also the robot or the vehicle.
+        via: X Y, of a place that the pivot passes on its way.
+        arrive: TIME, when the robot is at the goal, such as 12min: dwells are changed, or swings or waiting
+            circles added. In Python also in seconds.
+        objective: what decides the dwell: small error, short time, or few flips.
+        progress: called now and then with the share of what is done.
+        options: see `GoalOptions`.
+
+    Raises:
+        NoWayError: there is no way to the goal; it is an `InputError`.
+        InputError: a pose or a region is bad, or the robot cannot be simulated.
+
+    Example:
+        >>> import softflagella as sf
+        >>> trip = sf.to_goal((0, 0, 0), (4, 1, 0), "paper-control")
+        >>> trip.job.end_error[0] < 0.01
+        True
+    """
+    swims, unit = swimmer_of(robot), options.get("unit")
+    begin, end = pose_of(start, unit, swims, "--start"), pose_of(goal, unit, swims, "--goal")
+    passed = tuple(place_of(place, unit, swims, "--via") for place in via)
+    tracked, request = asked(robot, options, objective=objective, arrive_seconds=seconds_of(arrive, "--arrive"))
+    vehicle, space = tracked.vehicle, request.space
+    least_dwell = check_least(request.least_dwell(swims))
     lattices: dict[Drift, Lattices] = {}
 
     @cache
     def track(drift: Drift, margin: float) -> DubinsPaths:
         limits = RouteLimits(vehicle.pivot_radius, tracked.body, space, drift)
-        stops = _stops(start, goal, via, vehicle.pivot_distance, drift)
-        return route(stops, limits, margin, lattices.setdefault(drift, {}), robot)
+        stops = _stops(begin, end, passed, vehicle.pivot_distance, drift)
+        return route(stops, limits, margin, lattices.setdefault(drift, {}), swims)
 
     def source(setting: Setting) -> Declared:
         way = track(setting.drift, setting.margin or 0.0)
         if way.total > LONGEST:
-            raise InputError(f"the way is {in_lab(way.total, robot)} long; at most {LONGEST:g} l can be planned")
+            raise InputError(f"the way is {in_lab(way.total, swims)} long; at most {LONGEST:g} l can be planned")
         poses = way.chain(_SPACING)
         if len(poses) < 2:
             raise InputError("start and goal are the same; nothing to do")
         # The guaranteed bound is for paths that turn less than the robot can; these arcs turn as much as it can.
         return Declared(
-            Reference.of_pivot(poses, tracked.rod, drift=setting.drift, heading=start[2]), curvature=0.0
+            Reference.of_pivot(poses, tracked.rod, drift=setting.drift, heading=begin[2]), curvature=0.0
         )
 
     task = Task(
-        source=source, changes=(Delay(space),), start=lambda declared: Start(start, declared.reference.first_turn),
-        ending=Ending(goal, least_dwell, _SHORTER), zigzags=_ZIGZAGS, longer=False, blocked=NoWayError,
+        source=source, changes=(Delay(space),), start=lambda declared: Start(begin, declared.reference.first_turn),
+        ending=Ending(end, least_dwell, _SHORTER), zigzags=_ZIGZAGS, longer=False, blocked=NoWayError,
     )  # fmt: skip
     plan = solve(task, tracked, request, progress)
     length = track(plan.drift, 0.0 if plan.kept_clear is None else plan.kept_clear.margin).total
-    return plan.with_job(Trip(goal, plan.end, tuple(via), length))
+    return plan.with_job(Trip(end, plan.end, passed, length))
 
 
 def _stops(start: POSE, goal: POSE, via: Sequence[tuple[float, float]], back: float, drift: Drift) -> list[Floats]:

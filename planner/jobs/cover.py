@@ -10,25 +10,26 @@ wider than a lane. Lengths in l, times in μ0 l⁴/EI.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
 
 from planner.goal.dubins import DubinsPaths
 from planner.jobs.shortest_order import EXACT, MOST, Order, shortest_order
 from planner.jobs.travel import SLACK, Travel, plan_track, preferred_setting
+from planner.options import AnyRegion, AnyVehicle, JobOptions, Length, asked, length_of, region_of
 from planner.paths.distance import distance_to
 from planner.paths.obstacles import Circle, FreeSpace, Region
 from planner.paths.path import arc_length, points_at, runs_of
-from planner.paths.units import in_lab
+from planner.paths.units import in_lab, read_degrees
 from planner.planning.picture import DECLARED
 from planner.planning.plan import Job, Plan
-from planner.planning.request import PlanRequest, Progress
-from planner.vehicle.tracked_point import TrackedVehicle
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from sim.io.units import format_time
 
 if TYPE_CHECKING:
@@ -164,31 +165,56 @@ class _Cut(NamedTuple):
     left_out: float
 
 
+@checks_keywords
 def cover(
-    field: Field,
-    width: float,
-    tracked: TrackedVehicle,
-    request: PlanRequest,
-    angle: float | None = None,
-    progress: Progress | None = None,
+    region: AnyRegion,
+    width: Length,
+    robot: AnyVehicle,
+    *,
+    holes: Sequence[AnyRegion] = (),
+    angle: float | str | None = None,
+    **options: Unpack[JobOptions],
 ) -> Plan[Coverage]:
-    """Plan a track whose footprint about the tracked point covers a region, see `planner.api.cover`.
+    """Sweep a region, in lanes and turns, with a camera, magnet or sampler under the robot.
 
-    With feedback, the share that is certain is the one within the error with it.
+    Args:
+        region: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline. In Python also a `Circle`, or
+            corners (n, 2) [l].
+        width: LENGTH, of the round footprint about the tracked point, such as 4cm.
+        robot: robot.toml or the name of a preset, or the vehicle.toml of a measured vehicle. In Python also the
+            robot or the vehicle.
+        holes: REGION, a part that need not be swept, and may be crossed, as is what `keep_out` has.
+        angle: DEGREES, direction of the lanes (default: the quickest). In Python also a number in rad.
+        options: see `JobOptions`.
+
+    Raises:
+        InputError: the region is empty or needs too many lanes, or the width is too small for this robot.
+
+    Example:
+        >>> import softflagella as sf
+        >>> swept = sf.cover([[0, 0], [2, 0], [2, 2], [0, 2]], 0.5, "paper-control", objective="time")
+        >>> swept.job.share > 0.97, swept.duration > swept.job.bound
+        (True, True)
     """
-    robot, space, setting = tracked.robot, request.space, preferred_setting(tracked, request)
+    tracked, request = asked(robot, options)
+    swims, unit, space = tracked.robot, options.get("unit"), request.space
+    outline = region_of(region, unit, swims, agree=True)
+    field = Field(outline, (*(region_of(each, unit, swims) for each in holes), *space.regions))
+    across = length_of(width, unit, swims, "--width")
+    along = read_degrees(angle, "--angle") if isinstance(angle, str) else angle
+    setting = preferred_setting(tracked, request)
     straight = setting.straight
-    swath = width - 2 * straight.largest
-    if not (math.isfinite(width) and swath > 0.3 * width):
-        zigzags = in_lab(2 * straight.largest, robot)
+    swath = across - 2 * straight.largest
+    if not (math.isfinite(across) and swath > 0.3 * across):
+        zigzags = in_lab(2 * straight.largest, swims)
         raise InputError(
-            f"width {in_lab(width, robot)}: the robot's zigzag alone is {zigzags} wide; give a larger width, or "
+            f"width {in_lab(across, swims)}: the robot's zigzag alone is {zigzags} wide; give a larger width, or "
             "shorter dwells"
         )
     travel = Travel.of(setting, space, 0.0)
     apart = _CROSSED * travel.radius
-    angles = _angles(field) if angle is None else [angle]
-    angles = [each for each in angles if across(field, each) < MOST * swath]
+    angles = _angles(field) if along is None else [along]
+    angles = [each for each in angles if extent_across(field, each) < MOST * swath]
     if not angles:
         raise InputError(f"the region needs more than {MOST} lanes: widen them, or cover it in parts")
     cut = min(
@@ -202,21 +228,22 @@ def cover(
             f"the region needs {len(cut)} lanes; at most {MOST} can be ordered: widen them, or cover it in parts"
         )
     ends, order = _ordered(cut, travel)
+    progress = options.get("progress")
     plan = plan_track(lambda drift: _track(ends, travel.drifting(drift)), setting, request, progress)
 
     def sure(error: float) -> float:
-        return share_covered(field, plan.reference, width - 2 * error) if width > 2 * error else 0.0
+        return share_covered(field, plan.reference, across - 2 * error) if across > 2 * error else 0.0
 
     tracked_sure = sure(plan.feedback_error)
-    points, cell = field.raster(width / 20)
+    points, cell = field.raster(across / 20)
     job = Coverage(
         field=field,
-        width=width,
+        width=across,
         lanes=ends,
-        share=share_covered(field, plan.track, width),
+        share=share_covered(field, plan.track, across),
         sure=tracked_sure if request.feedback else sure(plan.stated_error),
         sure_tracked=tracked_sure,
-        bound=len(points) * cell / (width * straight.net_speed),
+        bound=len(points) * cell / (across * straight.net_speed),
         exact=len(cut) <= EXACT and space.empty,
         gap=order.gap,
     )
@@ -288,7 +315,7 @@ def _track(ends: Floats, travel: Travel) -> DubinsPaths:
     return DubinsPaths.joined(parts)
 
 
-def across(field: Field, angle: float) -> float:
+def extent_across(field: Field, angle: float) -> float:
     """Compute the extent of a region across a direction."""
     return float(np.ptp(field.outline.corners @ np.array([-np.sin(angle), np.cos(angle)])))
 

@@ -1,4 +1,4 @@
-"""fleet(members, apart): plans of several robots in one tank that keep apart by a distance at all times.
+"""fleet(plans, apart): plans of several robots in one tank that keep apart by a distance at all times.
 
 At first nobody gives way. Of two robots that come too near to each other one must give way to the other: it keeps
 its path, and begins later or makes waiting circles on its way (`planner.jobs.timetable`). Both choices are tried,
@@ -29,10 +29,12 @@ from planner.jobs.fleet_plan import FleetPlan
 from planner.jobs.separation import Places, Scheduled, TimedMotion, approach, distances, times_at, too_near
 from planner.jobs.timetable import Timetable, Timing, Turn, WaitingCircle, circle_reference, with_circles
 from planner.paths.obstacles import Footprint, FreeSpace
+from planner.paths.units import Swimmer, read_length
 from planner.planning.conditions import KeptClear
 from planner.planning.plan import Plan
 from sim.io.errors import InputError
-from sim.io.units import format_length
+from sim.io.keywords import checks_keywords
+from sim.io.units import format_length, number_and_unit
 
 MOST_ROBOTS = 12
 MOST_TIMINGS = 300
@@ -64,33 +66,84 @@ class Member:
         return FreeSpace() if self.plan.kept_clear is None else self.plan.kept_clear.free_space
 
 
+@checks_keywords
 def fleet(
-    members: Sequence[Member],
-    apart: float,
+    plans: Sequence[Plan],
+    apart: float | str,
     *,
+    names: Sequence[str] | None = None,
+    delays_s: Sequence[float] | None = None,
+    unit: str | None = None,
     feedback: bool = False,
     progress: Callable[[float], object] | None = None,
 ) -> FleetPlan:
-    """Time plans so that the bodies of the robots keep `apart` [m], see `planner.api.fleet`."""
-    _check(members, apart)
-    planner = _Fleet(members, apart, feedback)
+    """Time plans of several robots in one tank so that their bodies keep apart, open loop or with feedback.
+
+    Each robot keeps its path. Of two robots that would come too near to each other the later one of the list gives
+    way: it begins later, or makes waiting circles. If that leads nowhere, the other one does. Robots that rest at
+    their start or end count, too.
+
+    Args:
+        plans: of two or more robots, in one frame of the tank; where possible, the first ones have priority.
+        apart: least distance between bodies, as "10cm"; a number is in tail lengths, if all robots have the same.
+            It is kept although both robots are off by their errors in place.
+        names: of the robots; default: robot-1, robot-2 and so on.
+        unit: of `apart` in words without one.
+        delays_s: times before which they do not begin.
+        feedback: the poses will be measured (`Tracker`, with `begin` at the robot's start).
+        progress: called now and then with the share of what is done.
+
+    Raises:
+        InputError: the robots cannot keep apart by waiting; the message says which two, and why.
+
+    Example:
+        >>> import softflagella as sf
+        >>> right = sf.plan([(0, 0), (3, 0)], "paper-control", objective="time")
+        >>> up = sf.plan([(1.5, -2.5), (1.5, 2.5)], "paper-control", objective="time")
+        >>> both = sf.fleet([right, up], apart="5cm")
+        >>> both.sure_m >= 0.05, both.begin_s[0] == 0 or both.begin_s[1] == 0
+        (True, True)
+    """
+    plans = list(plans)
+    names = [f"robot-{k + 1}" for k in range(len(plans))] if names is None else list(names)
+    delays = [0.0] * len(plans) if delays_s is None else list(delays_s)
+    if not len(plans) == len(names) == len(delays):
+        raise InputError(
+            f"{len(plans)} plans, {len(names)} names and {len(delays)} delays; give one of each a robot"
+        )
+    if len(set(names)) < len(names):
+        raise InputError("two robots have the same name; give each a name of its own")
+    if not plans:
+        raise InputError("no robots; a fleet has two or more")
+    words = apart if isinstance(apart, str) else f"{apart}l"
+    distance = distance_apart(words, unit, [plan.robot for plan in plans])
+    if not 2 <= len(plans) <= MOST_ROBOTS:
+        raise InputError(f"{len(plans)} robots; a fleet has 2 to {MOST_ROBOTS}")
+    for name, delay in zip(names, delays, strict=True):
+        if not 0 <= delay < _LONGEST:
+            raise InputError(f"{name}: start delay {delay:g} s; give seconds, 0 or more")
+    planner = _Fleet(list(map(Member, names, plans, delays)), distance, feedback)
     planner.check_rest()
     search = Priorities(planner.alone, planner.timed, planner.meet, MOST_TIMINGS, progress)
     resolved = search.resolve()
     if resolved is None:
         raise NoTimingError(planner.refusal(search))
-    return FleetPlan(tuple(each.name for each in members), *resolved, apart, feedback)
+    return FleetPlan(tuple(names), *resolved, distance, feedback)
 
 
-def _check(members: Sequence[Member], apart: float) -> None:
-    """Check what the user gave."""
-    if not 2 <= len(members) <= MOST_ROBOTS:
-        raise InputError(f"{len(members)} robots; a fleet has 2 to {MOST_ROBOTS}")
-    if not (math.isfinite(apart) and apart >= 0):
-        raise InputError(f"distance {apart:g} m; give a distance of 0 or more, such as 10cm")
-    for member in members:
-        if not 0 <= member.earliest < _LONGEST:
-            raise InputError(f"{member.name}: start delay {member.earliest:g} s; give seconds, 0 or more")
+def distance_apart(words: str | float, unit: str | None, robots: Sequence[Swimmer]) -> float:
+    """Read a distance such as 10cm in m.
+
+    Raises:
+        InputError: the words are no length above 0 or have no unit, or the robots have different tail lengths.
+    """
+    text, first = str(words), robots[0]
+    relative = (number_and_unit(text)[1] or unit) == "l"
+    if relative and any(robot.length_scale != first.length_scale for robot in robots):
+        raise InputError(
+            f"distance apart {words}: the robots have different tail lengths; say its unit, as in 10cm"
+        )
+    return read_length(text, unit, first, "distance apart", above_zero=True) * first.length_scale
 
 
 class _Fleet:

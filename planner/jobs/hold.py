@@ -15,20 +15,22 @@ so that flips correct it in both directions. It repeats until told otherwise. Le
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 from planner.jobs.plan import make_plan
+from planner.options import AnyVehicle, JobOptions, asked, place_of, seconds_of
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D, circle
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.plan import Job, Plan
-from planner.planning.request import POSE, PlanRequest, Progress
+from planner.planning.request import POSE
 from planner.vehicle.rollout import roll_out
-from planner.vehicle.tracked_point import TrackedVehicle
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from sim.io.units import format_time
 
 if TYPE_CHECKING:
@@ -120,32 +122,52 @@ class Orbit(Job):
         }
 
 
+@checks_keywords
 def hold(
-    place: tuple[float, float],
-    tracked: TrackedVehicle,
-    request: PlanRequest,
-    seconds: float | None = None,
-    progress: Progress | None = None,
+    place: Sequence[float] | str,
+    robot: AnyVehicle,
+    *,
+    seconds: float | str | None = None,
+    **options: Unpack[JobOptions],
 ) -> Plan[Orbit]:
-    """Plan an orbit of the tracked point about a place, for so many seconds, see `planner.api.hold`."""
-    x, y = place
-    if seconds is not None and not (math.isfinite(seconds) and seconds > 0):
-        raise InputError(f"hold for {seconds:g} s; give a time above 0")
-    vehicle, robot, space = tracked.vehicle, tracked.robot, request.space
+    """Stay about a place, on the smallest orbit that the robot can keep with a camera; it repeats.
+
+    Args:
+        place: X,Y. In Python also x, y [l].
+        robot: robot.toml or the name of a preset, or the vehicle.toml of a measured vehicle. In Python also the
+            robot or the vehicle.
+        seconds: TIME, for so long, such as 30min (default: until told otherwise).
+        options: see `JobOptions`.
+
+    Raises:
+        InputError: the place is no pair of finite numbers, the time is not above 0, or the body has no room.
+
+    Example:
+        >>> import softflagella as sf
+        >>> held = sf.hold((2, 1), "paper-control", seconds=1800)
+        >>> round(held.job.smallest, 2), round(held.job.radius, 2)
+        (0.94, 0.97)
+    """
+    duration = seconds_of(seconds, "--for")
+    if duration is not None and not (math.isfinite(duration) and duration > 0):
+        raise InputError(f"hold for {duration:g} s; give a time above 0")
+    tracked, request = asked(robot, options)
+    x, y = place_of(place, options.get("unit"), tracked.robot)
+    vehicle, swims, space = tracked.vehicle, tracked.robot, request.space
     current = math.hypot(*vehicle.current.tolist()) / vehicle.speed
     radius = math.hypot(vehicle.pivot_radius * (1 + current) / CURVED, tracked.rod)
     orbit = Path2D.of(circle(radius).points + np.array([x, y]), closed=True)
-    plan = make_plan(orbit, tracked, replace(request, loop=True, space=FreeSpace()), progress)
+    plan = make_plan(orbit, tracked, replace(request, loop=True, space=FreeSpace()), options.get("progress"))
     if not space.empty and (clearance := plan.clearance(space)) < plan.margin_needed:
         raise InputError(
-            f"there is no room to hold {place_in_lab(x, y, robot)}: the body comes within "
-            f"{in_lab(max(clearance, 0.0), robot)} of an obstacle and needs {in_lab(plan.margin_needed, robot)}; "
+            f"there is no room to hold {place_in_lab(x, y, swims)}: the body comes within "
+            f"{in_lab(max(clearance, 0.0), swims)} of an obstacle and needs {in_lab(plan.margin_needed, swims)}; "
             "move the place"
         )
-    body = Footprint.of(robot, 0.0)
+    body = Footprint.of(swims, 0.0)
     centres = body.centres(roll_out(vehicle, plan.switches).poses) - [x, y]
     reach = float((centres**2).sum(-1).max() ** 0.5) + body.radius
-    laps = None if seconds is None else math.ceil(seconds / (plan.duration * robot.time_scale))
+    laps = None if duration is None else math.ceil(duration / (plan.duration * swims.time_scale))
     twists = [(direction, *twist) for direction, twist in zip((1, -1), vehicle.twist.tolist(), strict=True)]
     smallest, still, (forward, left, rate) = min(
         (math.hypot(forward, left + rate * tracked.offset) / abs(rate), -direction, (forward, left, rate))

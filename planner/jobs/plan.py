@@ -1,4 +1,4 @@
-"""From a path to a frozen plan, without simulating.
+"""plan(path, robot): from a path to a frozen plan, without simulating.
 
 The look-up table gives the vehicle: both directions, and the memory of the last dwell
 (`planner.vehicle.from_table`). The path that the robot can follow and that is nearest to the drawn one is declared
@@ -8,24 +8,98 @@ The look-up table gives the vehicle: both directions, and the memory of the last
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
+from pathlib import Path
+from typing import Unpack
 
-from planner.paths.path import Path2D
+from numpy.typing import ArrayLike
+
+from planner.options import AnyVehicle, Length, PathOptions, asked, length_of, seconds_of
+from planner.paths.path import Path2D, smoothed
+from planner.paths.path_files import Drawing, read_path
 from planner.paths.tractrix import Drift
-from planner.paths.units import check_size
+from planner.paths.units import check_size, describe, in_lab, in_tails
 from planner.planning.declare import declare
 from planner.planning.feasible import Declared, Feasibility
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest, Progress
 from planner.planning.solve import Change, Task, solve
 from planner.vehicle.tracked_point import TrackedVehicle
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
+from sim.io.keywords import checks_keywords
+
+
+@checks_keywords
+def plan(
+    path: Path2D | Drawing | ArrayLike | str | Path,
+    robot: AnyVehicle,
+    *,
+    scale: float = 1.0,
+    shape: str | None = None,
+    closed: bool = False,
+    smooth: Length | None = None,
+    arrive: float | str | None = None,
+    loop: bool = False,
+    tell: Callable[[str], object] | None = None,
+    **options: Unpack[PathOptions],
+) -> Plan[None]:
+    """Plan the motor's switching times for a path.
+
+    Args:
+        path: CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE, polygon:CORNERS:SIDE (square:24cm,
+            polygon:6:2l). In Python also what `read_path` reads, a Path2D, or points (n, 2), in tail lengths l or
+            in `unit`.
+        robot: robot.toml or the name of a preset, with its motor speed in both directions; or the vehicle.toml of
+            a measured vehicle. In Python also the robot or the vehicle.
+        scale: multiply the path's coordinates.
+        shape: which path of an SVG with several.
+        closed: join the path's end to its start.
+        smooth: LENGTH, smooth the path over this length, such as 1cm.
+        arrive: TIME, when the robot is at the end, such as 12min: dwells are changed, or swings or waiting circles
+            added. In Python also in seconds; `Plan.arrival` has it.
+        loop: a closed path is followed lap after lap, until told otherwise; the time of a lap is only nearly
+            that of `arrive`. In Python `Plan.lap` says how well a lap closes.
+        tell: is told which path is planned, a line at a time.
+        options: see `PathOptions`.
+
+    Raises:
+        InputError: the path is bad or too tight, the dwell too short, the tolerance too small, there is no way
+            around an obstacle, no plan is as fast as `arrive`, or the robot cannot be simulated.
+
+    Example:
+        >>> import softflagella as sf
+        >>> result = sf.plan(sf.circle(2.0), "paper-control")
+        >>> len(result.dwells) > 100, result.predicted_rms < 0.03
+        (True, True)
+    """
+    tracked, request = asked(robot, options, arrive_seconds=seconds_of(arrive, "--arrive"), loop=loop)
+    swims, unit, say = tracked.robot, options.get("unit"), tell or (lambda line: None)
+    if not 0 < scale < float("inf"):
+        raise InputError(f"--scale {scale}; give a number above 0")
+    if isinstance(path, str | Path):
+        source, path = path, read_path(path, closed=closed or None, shape=shape)
+    else:
+        source = ""
+    with naming(source or None):
+        if isinstance(path, Drawing):
+            drawn = path.in_tails(swims, unit)
+        else:
+            drawn = path if isinstance(path, Path2D) else Path2D.of(path)
+            drawn = drawn if unit is None else drawn.scaled(in_tails(unit, swims))
+    drawn = drawn.scaled(scale)
+    if smooth is not None:
+        length = length_of(smooth, unit, swims, "--smooth")
+        drawn, moved = smoothed(drawn, length)
+        say(f"smoothed over {in_lab(length, swims)}, which moves the path by up to {in_lab(moved, swims)}")
+    say(f"path: {describe(drawn, swims)}")
+    return make_plan(drawn, tracked, request, options.get("progress"))
 
 
 def make_plan(
     drawn: Path2D, tracked: TrackedVehicle, request: PlanRequest, progress: Progress | None = None
 ) -> Plan[None]:
-    """Plan for a path [l] that the tracked point follows, see `planner.api.plan`."""
+    """Plan for a path [l] that the tracked point follows, see `plan`."""
     if request.loop and not drawn.closed:
         raise InputError("a path that repeats is closed; join its end to its start (--closed), or plan it once")
     check_size(drawn, tracked.robot, tracked.vehicle.turn_radius)

@@ -16,7 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
 
@@ -24,15 +25,15 @@ from planner.goal.dubins import DubinsPaths
 from planner.goal.route import best_options
 from planner.jobs.shortest_order import EXACT, shortest_order
 from planner.jobs.travel import SLACK, Travel, plan_track, preferred_setting
+from planner.options import AnyVehicle, JobOptions, asked, places_of
 from planner.paths.distance import distance_to
 from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.picture import REPLAYED, label_points
 from planner.planning.plan import Job, Plan
-from planner.planning.request import PlanRequest, Progress
-from planner.vehicle.tracked_point import TrackedVehicle
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from sim.io.units import format_time
 
 if TYPE_CHECKING:
@@ -108,21 +109,43 @@ class Visits(Job):
         }
 
 
+@checks_keywords
 def tour(
-    places: Sequence[Sequence[float]],
-    tracked: TrackedVehicle,
-    request: PlanRequest,
+    places: str | Path | Sequence[Sequence[float] | str],
+    robot: AnyVehicle,
     *,
-    any_start: bool = False,
     back: bool = False,
-    progress: Progress | None = None,
+    any_start: bool = False,
+    **options: Unpack[JobOptions],
 ) -> Plan[Visits]:
-    """Plan a tour in which the tracked point passes places, see `planner.api.tour`."""
-    task, setting = _Tour(_checked(places), any_start, back), preferred_setting(tracked, request)
+    """Visit places in the order that takes the robot the least time, with free headings.
+
+    Args:
+        places: X,Y of each, or one CSV or SVG with a point for each. The tour begins at the first one. Up to 12
+            more are ordered exactly; of more it is stated how much longer than the quickest order the tour may
+            be. In Python, `job.gap` states it, and a place may be x, y [l].
+        robot: robot.toml or the name of a preset, or the vehicle.toml of a measured vehicle. In Python also the
+            robot or the vehicle.
+        back: end where the tour began.
+        any_start: begin at any of the places.
+        options: see `JobOptions`.
+
+    Raises:
+        InputError: a place is no pair of finite numbers, is there twice, or cannot be visited.
+
+    Example:
+        >>> import softflagella as sf
+        >>> tour = sf.tour([(0, 0), (4, 0), (2, 1)], "paper-control", objective="time")
+        >>> tour.job.order, tour.job.exact, len(tour.dwells) > 10
+        ((0, 2, 1), True, True)
+    """
+    tracked, request = asked(robot, options)
+    visited = _checked(places_of(places, options.get("unit"), tracked.robot))
+    task, setting = _Tour(visited, any_start, back), preferred_setting(tracked, request)
     margin = 1.5 * setting.straight.largest
     for _ in range(_MARGINS):
         found = task.ordered(Travel.of(setting, request.space, margin))
-        plan = plan_track(partial(task.track, found), setting, request, progress)
+        plan = plan_track(partial(task.track, found), setting, request, options.get("progress"))
         if plan.kept_clear is None or not plan.kept_clear.detours or plan.kept_clear.margin <= margin:
             break
         margin = plan.kept_clear.margin

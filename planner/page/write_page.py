@@ -3,79 +3,103 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planner.files.headers import header_template, schedule_template
+from planner.options import CornerOptions, Length, length_of, request_of, table_of
 from planner.page.first_state import NamedPath, first_options, first_plan, robots_of, shapes_of, slider_ends
 from planner.page.page import page_text
 from planner.page.table_data import packed_bytes, packed_data, table_data
-from planner.paths.path import circle
-from planner.planning.request import PlanRequest
+from planner.paths.path import Path2D, circle, shape_of
+from planner.paths.path_files import read_path
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.from_table import both_directions
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Mode
+from sim.io.errors import naming
 from sim.io.files import write_text
+from sim.io.keywords import checks_keywords
 from sim.io.provenance import __version__, code_version
 from sim.model.robot import Robot
+from sim.robot_rows import OneRobot, one_robot
 from surrogate.interface import LookupTable
 from surrogate.table import NeuralTable
 
 TITLE = "Plan a path for a soft robot"
 
 
+@checks_keywords
 def write_page(
     path: str | Path,
-    robot: Robot,
-    lookup: LookupTable,
-    request: PlanRequest,
+    robot: OneRobot = "paper-control",
     *,
-    knowledge: CalibrationKnowledge | None = None,
-    paths: Sequence[NamedPath] = (),
-    smooth: float | None = None,
-    title: str = TITLE,
+    paths: Mapping[str, Path2D | ArrayLike] | Sequence[str] = (),
+    smooth: Length | None = None,
+    title: str | None = None,
+    **options: Unpack[CornerOptions],
 ) -> Path:
-    """Write one HTML file that plans without a server; the same input gives the same bytes.
+    """Write one HTML file in which a path is drawn and planned, without a server or a network.
 
     Args:
         path: the file.
-        robot: the robot that the page begins with.
-        lookup: the table that knows it. A trained table is written into the page, and the robot can be changed
-            there; of any other table, and of a robot that a calibration has changed, the vehicle is written, and
-            the robot's fields are locked.
-        request: the options of the first plan.
-        knowledge: what a calibration found besides the robot.
-        paths: they are offered besides the shapes, and the first one is planned.
-        smooth: length over which a drawn stroke is smoothed [l].
+        robot: robot.toml or the name of a preset, that the page begins with. Robots with effects or a calibration
+            cannot be changed in the page. In Python also the robot.
+        paths: a path that the page offers: CSV, SVG, or a shape such as circle:20cm; the first one is planned when
+            the page opens. In Python also points (n, 2) or a Path2D by name, in tail lengths l.
+        smooth: LENGTH, smooth drawn strokes over this length, such as 1cm.
         title: of the page.
+        options: of the first plan, see `CornerOptions`.
 
     Raises:
-        InputError: the table does not know the robot, or the file cannot be written.
+        InputError: the table does not know the robot, an option cannot be, or the file cannot be written.
+
+    Example:
+        >>> import tempfile
+        >>> import softflagella as sf
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     page = sf.write_page(f"{folder}/page.html", paths={"my circle": sf.circle(2.0)})
+        ...     0.5e6 < page.stat().st_size < 1.6e6
+        True
     """
-    tracked = tracked_vehicle(robot, lookup, request.point, knowledge)
-    known = knowledge or CalibrationKnowledge()
-    why = _locked(robot, lookup, known)
-    shapes = shapes_of(tracked.vehicle.turn_radius * robot.length_scale, paths)
-    first = paths[0].path if paths else circle(shapes[0]["size"] / 100)
-    plan = first_plan(first.scaled(1 / robot.length_scale), tracked, request)
+    swims, unit = one_robot(robot), options.get("unit")
+    named = []
+    if isinstance(paths, Mapping):
+        for name, each in paths.items():
+            drawn = each if isinstance(each, Path2D) else Path2D.of(each)
+            named.append(NamedPath(name, drawn.scaled(swims.length_scale)))
+    else:
+        for name in paths:
+            with naming(name):
+                drawn = read_path(name).in_tails(swims, unit)
+            short = Path(name).stem if shape_of(name) is None else name
+            named.append(NamedPath(short, drawn.scaled(swims.length_scale)))
+    table, known = table_of(robot, swims, options)
+    over = None if smooth is None else length_of(smooth, unit, swims, "--smooth")
+    request = request_of(options, swims)
+    tracked = tracked_vehicle(swims, table, request.point, known)
+    why = _locked(swims, table, known)
+    shapes = shapes_of(tracked.vehicle.turn_radius * swims.length_scale, named)
+    first = named[0].path if named else circle(shapes[0]["size"] / 100)
+    plan = first_plan(first.scaled(1 / swims.length_scale), tracked, request)
     data = {
-        "robots": robots_of(robot)[: 1 if why else None],
-        "limits": slider_ends(robot, lookup.domain),
+        "robots": robots_of(swims)[: 1 if why else None],
+        "limits": slider_ends(swims, table.domain),
         "shapes": shapes,
         "first": {
-            "robot": robot.name,
+            "robot": swims.name,
             "shape": shapes[0]["name"],
-            "options": first_options(request, robot, smooth),
+            "options": first_options(request, swims, over),
             "plan": plan and packed_bytes(json.dumps(plan, separators=(",", ":"), allow_nan=False).encode()),
         },
-        "locked": {"name": robot.name, "why": why} if why else None,
+        "locked": {"name": swims.name, "why": why} if why else None,
         "planner": {
-            "table": _planner_data(lookup, robot, tracked, why),
+            "table": _planner_data(table, swims, tracked, why),
             "files": {
                 "codeVersion": code_version(),
                 "headers": packed_bytes(f"{schedule_template()}\f{header_template()}".encode()),
@@ -84,10 +108,10 @@ def write_page(
     }
     version = f"softflagella {__version__}"
     footer = (
-        f"{version}, code {code_version()}. Robot {robot.name}. Look-up table {lookup.identity}. The page "
+        f"{version}, code {code_version()}. Robot {swims.name}. Look-up table {table.identity}. The page "
         "computes in your browser and sends nothing."
     )
-    write_text(path, page_text(title, footer, data, version))
+    write_text(path, page_text(title or TITLE, footer, data, version))
     return Path(path)
 
 

@@ -15,15 +15,17 @@ import numpy as np
 from planner.paths.distance import distance_to
 from planner.planning.plan import Plan
 from planner.planning.request import POSE, Camera
-from planner.tracking.tracker import Command
+from planner.tracking.tracker import Command, Tracker
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.io.keywords import checks_keywords
 from sim.io.units import column_units, format_length
 from sim.mechanics import planar
 from sim.model.robot import Robot
 from sim.motion.replay import run_at_rest
 from sim.motion.run import Run
+from sim.robot_rows import OneRobot, one_robot
 from sim.solve.march import YAW, X, Y
 
 if TYPE_CHECKING:
@@ -160,7 +162,55 @@ class Swimmer:
         return self._vehicle.motion(self._direction, self._before, time)
 
 
+@checks_keywords
 def swim(
+    pilot: Plan | Tracker,
+    truth: OneRobot | None = None,
+    camera: Camera | None = None,
+    *,
+    current_cm_s: tuple[float, float] = (0.0, 0.0),
+    longest: float = 3.0,
+) -> Swim:
+    """Simulate a robot under a tracker's orders, seen by a camera: a closed loop.
+
+    Args:
+        pilot: a tracker that has not begun, or a plan, which gets a tracker that knows the camera's noise.
+        truth: the robot that swims; default: the one that the plan was made for. A measured vehicle moves as
+            planned.
+        camera: what sees it; default: that of the plan.
+        current_cm_s: of the fluid, in x and y [cm/s], which the tracker does not know.
+        longest: times the planned duration after which the swim ends in any case.
+
+    Returns:
+        Times, poses, distances from the declared path, the tracker's bounds on them, and dwells as ordered.
+
+    Raises:
+        InputError: the robot cannot be simulated.
+
+    Example:
+        >>> import softflagella as sf
+        >>> result = sf.plan(sf.circle(1.2), "paper-control", objective="flips")
+        >>> track = sf.swim(result, camera=sf.Camera(delay_s=0.5))
+        >>> track.finished, track.rms() < 0.1
+        (True, True)
+    """
+    plan = pilot.plan if isinstance(pilot, Tracker) else pilot
+    camera = camera or plan.request.camera
+    tracker = pilot if isinstance(pilot, Tracker) else Tracker(plan, noise=camera.noise)
+    unit = plan.robot.time_scale / (100 * plan.robot.length_scale)
+    robot = plan.robot if truth is None else one_robot(truth)
+    return swim_under(
+        tracker,
+        plan,
+        robot if isinstance(robot, Robot) else plan.tracked.vehicle,
+        camera,
+        start=tracker.start,
+        current=(unit * current_cm_s[0], unit * current_cm_s[1]),
+        longest=longest,
+    )
+
+
+def swim_under(
     pilot: Pilot,
     plan: Plan,
     truth: Robot | Vehicle,

@@ -13,8 +13,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from calibration.swimmer.synthetic_table import make_table
-from planner.api import plan
 from planner.files.plan_files import write_plan
+from planner.jobs.plan import plan
 from sim.arrays import Floats
 from sim.inputs import save_robot
 from sim.io.errors import run_command

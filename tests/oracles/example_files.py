@@ -18,8 +18,8 @@ from calibration.statistics.gls import Noise
 from calibration.verdict.next_runs import Explanation
 from dataset.data_set import sweep_key
 from dataset.schema import rows_version
-from planner.api import plan
 from planner.files.plan_files import write_plan
+from planner.jobs.plan import plan
 from planner.paths.path import circle
 from planner.vehicle.calibration_table import CalibrationKnowledge, knowledge_toml
 from sim.io.provenance import fingerprint

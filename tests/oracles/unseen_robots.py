@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.api import plan
+from planner.jobs.plan import plan
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.errors import WOBBLE, plan_errors, predicted_error
 from planner.planning.plan import Plan

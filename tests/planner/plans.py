@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from planner.api import plan
 from planner.goal.trip import Trip
-from planner.jobs.plan import make_plan
+from planner.jobs.plan import make_plan, plan
 from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.path import Path2D, shape_of
 from planner.planning.plan import Plan

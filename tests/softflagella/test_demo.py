@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from planner.api import plan
 from planner.files.plan_files import write_plan
 from planner.files.saved_plan import load_plan
 from planner.files.tracks import tracking_error
+from planner.jobs.plan import plan
 from planner.paths.path import circle, polygon
 from sim.model.presets import PRESETS
 from sim.model.response import DWELLS

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.api import plan
 from planner.files.tracks import tracking_error
+from planner.jobs.plan import plan
 from planner.paths.path import polygon
 from sim.io.errors import InputError
 from sim.model.groups import Groups

@@ -26,9 +26,9 @@ from calibration.verdict.verdict import Verdict
 from calibration.words.quantities import detectable, direction_in_words, plain, size, with_error
 from calibration.words.render import next_steps
 from planner.__main__ import main as planner
-from planner.api import plan
 from planner.files.saved_plan import load_plan
 from planner.files.tracks import tracking_error
+from planner.jobs.plan import plan
 from planner.paths.path import circle
 from planner.vehicle.calibration_table import read_knowledge
 from sim.inputs import load_robot, save_robot

@@ -14,7 +14,7 @@ from calibration.report.corrected_robot import corrected_robot, corrected_toml
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
-from planner.api import plan
+from planner.jobs.plan import plan
 from planner.paths.path import circle
 from planner.vehicle.calibration_table import read_knowledge
 from planner.vehicle.from_table import table_vehicle

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from planner.__main__ import main
-from planner.api import plan
 from planner.files.arduino import write_arduino
 from planner.files.headers import milliseconds
 from planner.jobs.fleet_plan import FleetPlan
+from planner.jobs.plan import plan
 from planner.planning.plan import Plan
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
@@ -167,7 +167,7 @@ def test_a_folder_with_other_files_is_refused(
         main([*words, "--arduino", str(tmp_path)])
     assert not (tmp_path / "plan").exists()
     goal = ["goal", "--goal", "5l", "0", "0", *words[2:], "--arduino", str(tmp_path / "src" / "thesis.tex")]
-    monkeypatch.setattr("planner.api.to_goal", None)  # it is refused before
+    monkeypatch.setattr("planner.goal.trip.to_goal", None)  # it is refused before
     with pytest.raises(InputError, match=r"thesis.tex is a file; give a folder"):
         main(goal)
     main([*words, "--arduino", str(tmp_path / "library")])

@@ -15,11 +15,10 @@ import pytest
 from matplotlib.figure import Figure
 
 from planner.__main__ import main
-from planner.api import check
 from planner.files.headers import milliseconds
 from planner.files.plan_files import write_plan
 from planner.files.plan_svg import SvgAxes
-from planner.files.tracks import tracking_error
+from planner.files.tracks import check, tracking_error
 from planner.vehicle.rollout import Switches, roll_out
 from sim.io.errors import InputError
 from sim.io.pose_tracks import read_tracks

@@ -16,17 +16,18 @@ import pytest
 
 import softflagella as sf
 from planner.__main__ import main
-from planner.api import plan
-from planner.files.fleet_files import distance_apart, read_fleet
-from planner.files.own_table import table_for
+from planner.files.fleet_files import read_fleet
 from planner.files.plan_files import write_plan
 from planner.files.saved_plan import is_plan, load_goal, load_plan, restore_plan
 from planner.goal.trip import FORMAT as GOAL_FORMAT
+from planner.jobs.fleet import distance_apart
+from planner.jobs.plan import plan
 from planner.paths.path import circle
 from planner.planning.plan import Plan
 from planner.planning.request import Camera
 from planner.tracking.tracker import Tracker
 from planner.vehicle.calibration_table import CalibrationKnowledge
+from planner.vehicle.from_table import table_for
 from sim.inputs import save_robot
 from sim.io.errors import InputError, run_command
 from sim.model.presets import PRESETS

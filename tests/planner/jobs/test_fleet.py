@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.jobs.fleet import Member, NoTimingError, Priorities, fleet
+from planner.jobs.fleet import NoTimingError, Priorities, fleet
 from planner.jobs.fleet_plan import FleetPlan
 from planner.jobs.plan import make_plan
 from planner.jobs.separation import Places, Scheduled, TimedMotion, distances, instants, too_near
@@ -17,7 +17,7 @@ from planner.paths.obstacles import Circle, Footprint, FreeSpace
 from planner.paths.path import Path2D
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
-from planner.tracking.swim import swim
+from planner.tracking.swim import swim_under
 from planner.tracking.tracker import Tracker
 from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import tracked_vehicle
@@ -46,8 +46,7 @@ def crossing(**options: Any) -> list[Plan]:
 
 
 def keep_apart(plans: list[Plan], **options: Any) -> FleetPlan:
-    members = [Member(name, each) for name, each in zip("abcdef", plans, strict=False)]
-    return fleet(members, options.pop("apart", APART), **options)
+    return fleet(plans, options.pop("apart", APART) / TAIL, names="abcdef"[: len(plans)], **options)
 
 
 @shared
@@ -201,7 +200,7 @@ def test_robots_under_trackers_keep_apart() -> None:
         for each in result.scheduled:
             made = each.motion.plan
             robot = replace(made.tracked.vehicle.drawn(rng, 0.7), current=np.array([2e-5, -2e-5]))
-            tracks.append(swim(Tracker(made, noise=(0.005, 0.005)), made, robot, replace(FINE, seed=rng)))
+            tracks.append(swim_under(Tracker(made, noise=(0.005, 0.005)), made, robot, replace(FINE, seed=rng)))
         scale = CONTROL.time_scale
         times = np.arange(0.0, result.duration_s, 1.0)
         poses = [

@@ -20,7 +20,7 @@ from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.guidance import TrackerGuidance
 from planner.tracking.pipe import answers
-from planner.tracking.swim import swim
+from planner.tracking.swim import swim_under
 from planner.tracking.tracker import POSE, Command, Tracker
 from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import tracked_vehicle
@@ -48,7 +48,7 @@ def laps() -> Plan:
 
 @shared
 def held() -> Plan[Orbit]:
-    return hold(PLACE, tracked(), FEW, 1800.0)
+    return hold(PLACE, tracked(), dwell=FEW.dwell, seconds=1800.0)
 
 
 @dataclass
@@ -142,7 +142,7 @@ def test_a_tracked_robot_goes_around_until_it_is_told(current: float) -> None:
     car = lap.tracked.vehicle
     car = replace(car, twist=car.twist * np.array([1.02, 1.0, 1.02]), current=np.array([current, 0.0]))
     tracker = UntilTold(Tracker(lap), 2.4 * lap.duration)
-    result = swim(tracker, lap, car, FINE, longest=8)
+    result = swim_under(tracker, lap, car, FINE, longest=8)
     assert result.finished
     assert 2.8 < result.times[-1] / lap.duration < 3.2
     assert result.distance.max() < 0.15
@@ -155,7 +155,7 @@ def test_a_robot_that_was_moved_comes_back_in_any_lap() -> None:
     lap = laps()
     start = (0.5, -2.0, 2.0)
     tracker = UntilTold(Tracker(lap, start=start), 1.5 * lap.duration)
-    result = swim(tracker, lap, lap.tracked.vehicle, FINE, start=start, longest=8)
+    result = swim_under(tracker, lap, lap.tracked.vehicle, FINE, start=start, longest=8)
     assert result.finished
     assert result.distance[result.times > lap.duration].max() < 2 * lap.predicted_max
 
@@ -249,7 +249,7 @@ def test_a_tracked_robot_stays(current: float, wrong: float) -> None:
     plan, place = held(), held().job
     car = tracked().vehicle
     car = replace(car, twist=car.twist * np.array([wrong, 1.0, 1.0]), current=np.array([current, 0.0]))
-    result = swim(UntilTold(Tracker(plan), 2.5 * plan.duration), plan, car, FINE, longest=8)
+    result = swim_under(UntilTold(Tracker(plan), 2.5 * plan.duration), plan, car, FINE, longest=8)
     settled = result.times > plan.duration
     away = np.hypot(*(result.poses[settled, :2] - PLACE).T)
     assert result.finished
@@ -261,7 +261,7 @@ def test_a_tracked_robot_stays(current: float, wrong: float) -> None:
 def test_there_must_be_room(x: float) -> None:
     space = FreeSpace((Circle(x, 1.0, 0.2),))
     if x > 5:
-        assert hold(PLACE, tracked(), replace(FEW, space=space)).job.laps is None
+        assert hold(PLACE, tracked(), dwell=FEW.dwell, keep_out=space.regions).job.laps is None
         return
     with pytest.raises(InputError, match="no room to hold"):
-        hold(PLACE, tracked(), replace(FEW, space=space))
+        hold(PLACE, tracked(), dwell=FEW.dwell, keep_out=space.regions)

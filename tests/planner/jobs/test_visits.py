@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise, permutations
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,6 @@ from planner.jobs.travel import Travel
 from planner.paths.distance import distance_to
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.planning.feasible import TIGHTEST
-from planner.planning.request import PlanRequest
 from planner.planning.solve import Setting
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import dwells_for
@@ -28,7 +28,7 @@ from tests.planner.plans import CONTROL, tracked
 pytestmark = pytest.mark.slow
 
 PLACES = [(0.0, 0.0), (4.0, 0.0), (2.0, 1.0), (3.0, 3.0), (-1.0, 2.0)]
-QUICK = PlanRequest(objective="time")
+QUICK: dict[str, Any] = {"objective": "time"}
 OPTIONS = 3
 
 
@@ -102,7 +102,7 @@ def fixed_order(order: tuple[int, ...], times: np.ndarray) -> float:
 @pytest.mark.parametrize("any_start", [False, True])
 def test_no_other_order_of_the_places_takes_less_time(size: float, back: bool, any_start: bool) -> None:
     places = size * np.array([(0, 0), (4, 0), (2, 1), (3, 3), (-1, 2)])
-    best = tour(places.tolist(), tracked(), QUICK, back=back, any_start=any_start)
+    best = tour(places.tolist(), tracked(), **QUICK, back=back, any_start=any_start)
     assert best.job.exact
     assert 0.7 * best.job.estimate < best.duration < 1.1 * best.job.estimate  # longer dwells may be faster
     assert best.job.order[0] == (best.job.order[-1] if back else best.job.order[0] if any_start else 0)
@@ -114,7 +114,7 @@ def test_no_other_order_of_the_places_takes_less_time(size: float, back: bool, a
 
 
 def test_every_place_is_on_the_declared_path() -> None:
-    result = tour(PLACES, tracked(), PlanRequest(dwell=0.8))
+    result = tour(PLACES, tracked(), dwell=0.8)
     assert distance_to(result.reference, np.array(PLACES)).max() < 0.005
     assert result.job.distance.max() <= result.predicted_max + 0.005
     assert (np.diff(result.job.reached) > 0).all()
@@ -122,27 +122,27 @@ def test_every_place_is_on_the_declared_path() -> None:
 
 def test_the_error_of_the_tour_itself_decides_its_dwell() -> None:
     """A longer one than the objective begins with: its flips, which are fewer, add up to less."""
-    fixed, best = (tour(PLACES, tracked(), PlanRequest(dwell=dwell)) for dwell in (0.81, None))
+    fixed, best = (tour(PLACES, tracked(), dwell=dwell) for dwell in (0.81, None))
     assert best.minimum_dwell > 1.5 * fixed.minimum_dwell
     assert best.stated_error < 0.8 * fixed.stated_error
 
 
 @pytest.mark.parametrize("size", [1.0, 0.4])
 def test_a_quick_tour_begins_on_its_first_place(size: float) -> None:
-    result = tour([(size * x, size * y) for x, y in PLACES], tracked(), QUICK)
+    result = tour([(size * x, size * y) for x, y in PLACES], tracked(), **QUICK)
     assert result.job.distance[0] < 0.03
     assert result.straight.largest > 0.08  # where a dwell of the zigzag begins
 
 
 def test_the_point_that_is_asked_for_passes() -> None:
     by_pivot = tracked_vehicle(CONTROL, None, "pivot", None)
-    result = tour(PLACES[:3], by_pivot, QUICK)
+    result = tour(PLACES[:3], by_pivot, **QUICK)
     assert distance_to(result.declared.reference.q, np.array(PLACES[:3])).max() < 0.005
 
 
 def test_among_obstacles_it_keeps_clear() -> None:
     space = FreeSpace((Circle(1.0, 0.6, 0.3),))
-    result = tour(PLACES[:3], tracked(), PlanRequest(objective="flips", space=space))
+    result = tour(PLACES[:3], tracked(), objective="flips", keep_out=space.regions)
     kept = result.kept_clear
     assert kept is not None
     assert kept.margin >= result.stated_error
@@ -152,7 +152,7 @@ def test_among_obstacles_it_keeps_clear() -> None:
 
 
 def test_the_simulator_visits_all_places() -> None:
-    result = tour(PLACES[:3], tracked(), QUICK)
+    result = tour(PLACES[:3], tracked(), **QUICK)
     track = replay(result.schedule())
     points = track[["x_over_l", "y_over_l"]].to_numpy(float)
     assert distance_to(points, np.array(PLACES[:3])).max() < result.stated_error + 0.05
@@ -196,7 +196,7 @@ def test_lanes_cover_the_region_and_leave_holes_out(angle: float) -> None:
 
 def test_it_covers_the_region_by_turns_that_the_robot_can_make() -> None:
     """Neither another order of the lanes nor another direction is quicker; the bound is that of its area."""
-    swept = cover(FIELD, 0.5, tracked(), QUICK)
+    swept = cover(FIELD.outline, 0.5, tracked(), holes=FIELD.holes, **QUICK)
     assert swept.job.share > 0.995
     assert swept.job.share == share_covered(FIELD, swept.track, 0.5)
     assert 0.5 < swept.job.sure <= swept.job.share
@@ -205,14 +205,14 @@ def test_it_covers_the_region_by_turns_that_the_robot_can_make() -> None:
     assert len(swept.job.lanes) == 5
     assert swept.job.bound == pytest.approx(4.5 / (0.5 * swept.straight.net_speed), rel=0.01)
     assert swept.duration > swept.job.bound
-    across = cover(FIELD, 0.5, tracked(), QUICK, angle=np.pi / 2)
+    across = cover(FIELD.outline, 0.5, tracked(), holes=FIELD.holes, **QUICK, angle=np.pi / 2)
     assert swept.duration < across.duration
     assert np.ptp(swept.job.lanes[:, :, 1], axis=1).max() < 1e-9
 
 
 @pytest.mark.parametrize(("share", "proposed"), [(0.8, "80.0 % if a camera"), (0.0, "give more than")])
 def test_what_is_not_certain_without_a_camera_proposes_one(share: float, proposed: str) -> None:
-    swept = cover(SMALL, 0.5, tracked(), QUICK)
+    swept = cover(SMALL.outline, 0.5, tracked(), holes=SMALL.holes, **QUICK)
     assert swept.job.sure <= swept.job.sure_tracked <= swept.job.share
     said = replace(swept.job, sure=0.0, sure_tracked=share).lines(swept)[1]
     assert "0.0 % wherever the robot is within the stated error" in said
@@ -223,7 +223,7 @@ def test_what_is_not_certain_without_a_camera_proposes_one(share: float, propose
 
 def test_lanes_are_in_the_quickest_order() -> None:
     """Neighbouring lanes one after another would need wider loops than this robot's turns."""
-    swept = cover(Field(Polygon.of([[0, 0], [4, 0], [4, 3], [0, 3]])), 0.4, tracked(), QUICK)
+    swept = cover([[0, 0], [4, 0], [4, 3], [0, 3]], 0.4, tracked(), **QUICK)
     steps = np.abs(np.diff(swept.job.lanes[:, 0, 1]))
     assert np.median(steps) > 0.6
 
@@ -231,7 +231,7 @@ def test_lanes_are_in_the_quickest_order() -> None:
 @pytest.mark.rest
 def test_keep_outs_are_not_touched() -> None:
     rock = Circle(1.5, 0.8, 0.2)
-    swept = cover(replace(FIELD, holes=(rock,)), 0.5, tracked(), PlanRequest(space=FreeSpace((rock,))))
+    swept = cover(FIELD.outline, 0.5, tracked(), keep_out=[rock])
     kept = swept.kept_clear
     assert kept is not None
     assert kept.clearance > 0
@@ -241,7 +241,7 @@ def test_keep_outs_are_not_touched() -> None:
 
 @pytest.mark.rest
 def test_the_simulator_covers_the_same() -> None:
-    swept = cover(FIELD, 0.5, tracked(), QUICK)
+    swept = cover(FIELD.outline, 0.5, tracked(), holes=FIELD.holes, **QUICK)
     track = replay(swept.schedule())[["x_over_l", "y_over_l"]].to_numpy(float)
     assert share_covered(FIELD, track, 0.5) == pytest.approx(swept.job.share, abs=0.02)
     assert share_covered(FIELD, track, 0.5) >= swept.job.sure
@@ -249,8 +249,8 @@ def test_the_simulator_covers_the_same() -> None:
 
 def test_refusals() -> None:
     with pytest.raises(InputError, match="zigzag alone"):
-        cover(FIELD, 0.04, tracked(), PlanRequest())
+        cover(FIELD.outline, 0.04, tracked(), holes=FIELD.holes)
     with pytest.raises(InputError, match="more than 80 lanes"):
-        cover(Field(Polygon.of([[0, 0], [60, 0], [60, 60], [0, 60]])), 0.5, tracked(), PlanRequest())
+        cover([[0, 0], [60, 0], [60, 60], [0, 60]], 0.5, tracked())
     with pytest.raises(InputError, match="no lane of the region is clear"):
-        cover(FIELD, 0.5, tracked(), PlanRequest(space=FreeSpace((), FIELD.outline)))
+        cover(FIELD.outline, 0.5, tracked(), holes=FIELD.holes, walls=FIELD.outline)

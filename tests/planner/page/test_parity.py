@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from planner.api import plan
-from planner.jobs.plan import make_plan
+from planner.jobs.plan import make_plan, plan
 from planner.page.first_state import first_plan
 from planner.page.table_data import packed_data, table_data
 from planner.paths.path import Path2D, circle, polygon

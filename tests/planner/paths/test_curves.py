@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.api import plan
+from planner.jobs.plan import plan
 from planner.paths.distance import distance_to, nearest, two_sided
 from planner.paths.nearest_path import nearest_path
 from planner.paths.path import Path2D, circle, polygon, resample, smoothed

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from planner.api import plan
+from planner.jobs.plan import plan
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon, smoothed
 from planner.paths.tractrix import STILL, Drift, reference

@@ -11,11 +11,11 @@ from typing import Any, get_type_hints
 import numpy as np
 import pytest
 
-from planner.api import plan
 from planner.files.headers import schedule_header
 from planner.goal.trip import Trip
 from planner.jobs.cover import Coverage
 from planner.jobs.hold import Orbit
+from planner.jobs.plan import plan
 from planner.jobs.tour import Visits
 from planner.options import PathOptions
 from planner.paths.distance import distance_to

@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import cumulative_simpson, solve_ivp
 
 import softflagella as sf
-from planner.api import plan
+from planner.jobs.plan import plan
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import Plan

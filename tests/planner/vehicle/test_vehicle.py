@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.api import plan
+from planner.jobs.plan import plan
 from planner.paths.path import circle
 from planner.vehicle.calibration_table import (
     COEFFICIENTS,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import planner.files.own_table
+import planner.vehicle.from_table
 import softflagella as sf
 import surrogate.tabulate
 from tests.planner.plans import BIASED, CONTROL, own_table
@@ -60,7 +60,7 @@ def test_a_robot_that_the_shipped_table_does_not_know_gets_its_own_once(
 ) -> None:
     """In memory; the table is simulated elsewhere."""
     own = own_table()
-    monkeypatch.setattr(planner.files.own_table, "_TABLES", {})
+    monkeypatch.setattr(planner.vehicle.from_table, "_TABLES", {})
     monkeypatch.setattr(surrogate.tabulate, "tabulate", lambda robot: own)
     with pytest.raises(sf.InputError, match="left_right_bias"):
         sf.plan(sf.circle(2.0), BIASED, lookup=sf.load_table())
@@ -71,7 +71,7 @@ def test_a_robot_that_the_shipped_table_does_not_know_gets_its_own_once(
 
 @pytest.mark.rest
 def test_every_planning_function_takes_the_robot_s_own_table(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planner.files.own_table, "_TABLES", {})
+    monkeypatch.setattr(planner.vehicle.from_table, "_TABLES", {})
     robot = "paper-control"
     square = [[0, 0], [2, 0], [2, 2], [0, 2]]
     plans = [

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import softflagella as sf
-from planner.tracking.swim import swim
+from planner.tracking.swim import swim_under
 from tests.planner.vehicles import FINE
 
 ROBOT = sf.load_robot("paper-control")
@@ -17,7 +17,7 @@ ROBOT = sf.load_robot("paper-control")
 @pytest.mark.slow
 def test_a_simulated_robot_swims_like_the_vehicle_of_its_plan() -> None:
     plan = sf.plan(sf.circle(1.0), ROBOT, objective="flips")
-    simulated, moved = sf.swim(plan, camera=FINE), swim(sf.Tracker(plan), plan, plan.tracked.vehicle, FINE)
+    simulated, moved = sf.swim(plan, camera=FINE), swim_under(sf.Tracker(plan), plan, plan.tracked.vehicle, FINE)
     assert simulated.finished
     assert simulated.rms() == pytest.approx(moved.rms(), rel=0.2)
     assert len(simulated.dwells) == pytest.approx(len(moved.dwells), abs=1)

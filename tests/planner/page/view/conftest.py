@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from planner.page.write_page import write_page
-from planner.planning.request import PlanRequest
 from tests.planner.page.cases import CONTROL, shipped
 from tests.planner.page.view.browser import chromium, opened_page, planned
 from tests.shared import FOLDER, shared
@@ -20,7 +19,7 @@ FIRST = "v=1&objective=flips"  # of the shared page
 
 @shared
 def _written() -> Path:
-    return write_page(FOLDER / "page.html", CONTROL, shipped(), PlanRequest())
+    return write_page(FOLDER / "page.html", CONTROL, lookup=shipped())
 
 
 @pytest.fixture(scope="package")

@@ -12,12 +12,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from planner.api import plan
 from planner.files.tracks import tracking_error
+from planner.jobs.plan import plan
 from planner.page.write_page import write_page
 from planner.paths.path import circle
 from planner.planning.plan import Plan
-from planner.planning.request import PlanRequest
 from planner.vehicle.rollout import roll_out
 from sim.inputs import load_robot
 from sim.io.errors import run_command
@@ -346,7 +345,7 @@ def test_runs_are_compared_and_the_command_is_copied(page: Any, tmp_path: Path) 
 def test_a_locked_robot_is_planned_for_as_by_the_command(browser: Any, tmp_path: Path, why: str) -> None:
     one_error = replace(shipped(), curve_errors=None)
     robot, table = (CONTROL, one_error) if "one error" in why else (BIASED, own_table())
-    path = write_page(tmp_path / "page.html", robot, table, PlanRequest())
+    path = write_page(tmp_path / "page.html", robot, lookup=table)
     table_of_runs().to_csv(tmp_path / "table.csv", index=False)
     with opened_page(browser, f"{path.as_uri()}#v=1&objective=flips&path=circle%3A22") as page:
         planned(page)
