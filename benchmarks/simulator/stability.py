@@ -23,7 +23,7 @@ from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.motion.batches import one_thread
 from sim.motion.stability import growths, growths_on_mesh
-from sim.motion.steady import Perturbed, orbits
+from sim.motion.steady import orbits
 from sim.solve.assembly import bodies, row
 from sim.solve.refinement import MESHES, PHASES, SOLVED, refined_orbit
 from tests.oracles.stepped_growth import stepped_growth
@@ -99,7 +99,7 @@ def domain() -> None:
     wide, rows = robots(4096), []
     for tails in np.unique(wide["N"][wide["N"] > 1]):
         groups = Groups.from_columns({name: values[wide["N"] == tails] for name, values in wide.items()})
-        motion = orbits(groups, perturbed=Perturbed.ALL)
+        motion = orbits(groups, stability=True)
         yaws = np.abs(motion.omega_yr / motion.omega_t)
         rows.append(np.column_stack([yaws, motion.growth])[motion.converged])
     yaws, grows = np.concatenate(rows).T

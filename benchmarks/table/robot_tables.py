@@ -32,8 +32,7 @@ from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.response import DWELLS
 from sim.model.robot import Robot
-from sim.motion.resolution import Resolution
-from sim.motion.run import Run
+from sim.motion.run import Resolution, Run
 from sim.motion.settling import steady_state
 from sim.motion.stepped_response import steady_twist
 from sim.motion.warm import compile_once

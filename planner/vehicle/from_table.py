@@ -35,7 +35,7 @@ from sim.model.robot import Robot
 from surrogate.answers import refusing_robots
 from surrogate.interface import ErrorModes, LookupTable
 
-_TIME_STEPS = 2.5e-4  # of the yaw rate, one standard deviation: error of time steps (`sim.motion.resolution`)
+_TIME_STEPS = 2.5e-4  # of the yaw rate, one standard deviation: error of time steps (`sim.motion.run`)
 _ODD = 0.2  # share of a table's error that has opposite signs in the two directions
 STEADY = ("v_z", "v_x", "omega_yr_bar")
 OWN_TABLE = "softflagella surrogate robot"  # makes the table of one robot

@@ -18,7 +18,7 @@ from sim.arrays import Floats, Integers
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.model.groups import Groups
-from sim.motion.resolution import Resolution
+from sim.motion.run import Resolution
 from sim.motion.sensitivity import Sensitivities, sensitivities
 from sim.motion.settling import settle
 from sim.motion.steady import steady

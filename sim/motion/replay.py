@@ -19,8 +19,7 @@ from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.groups import Groups
 from sim.model.schedule import Schedule
-from sim.motion.resolution import COARSER, MOST_REPLAY_WORK, Resolution
-from sim.motion.run import Run
+from sim.motion.run import COARSER, MOST_REPLAY_WORK, Resolution, Run
 from sim.solve.assembly import bodies
 from sim.solve.march import YAW, X, Y
 

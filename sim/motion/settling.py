@@ -25,8 +25,7 @@ from sim.mechanics.balance import motor_gain
 from sim.mechanics.tail_contact import tail_gap
 from sim.model.body import Body
 from sim.model.groups import Groups
-from sim.motion.resolution import Resolution, steps_in
-from sim.motion.run import BROKE_DOWN, Run
+from sim.motion.run import BROKE_DOWN, Resolution, Run, steps_in
 from sim.motion.shapes import state_on_orbit
 from sim.motion.steady_motion import STEPPING, Steady
 from sim.solve.assembly import bodies

@@ -11,15 +11,13 @@ meshes and steps. Units: l, μ0 l⁴/EI.
 
 from __future__ import annotations
 
-from enum import Enum
-
 import numpy as np
 
 from sim.arrays import Floats, Integers, Words
 from sim.effects import check_size
 from sim.effects.tail_contact import EFFECT as CONTACT
 from sim.model.groups import Groups
-from sim.motion.resolution import Resolution
+from sim.motion.run import Resolution
 from sim.motion.settling import settle
 from sim.motion.stability import QUICK, growths
 from sim.motion.steady_motion import DIRECT, Steady, joined
@@ -27,21 +25,13 @@ from sim.solve import assembly
 from sim.solve.assembly import numbers
 from sim.solve.grouping import by_kind, slices
 from sim.solve.orbit import smallest_gaps
-from sim.solve.refinement import PHASES, REASONS, SOLVED, refined_orbits, stacked
+from sim.solve.refinement import PHASES, REASONS, SOLVED, difference, refined_orbits, stacked
 
 GROWS = -0.02  # growth in a motor revolution from which small perturbations may take the tails to another motion
 GROWS_IN_CONTACT = -0.12  # the same where tails touch: the mesh's error is larger
 SAME = 0.02  # relative difference up to which a stepped motion counts as the direct one
 _NEAR = 1.1  # gap from which tails cannot touch, given the error of the gap
 _OTHER_MOTION = "straight tails reach another motion than the one in which they move alike"
-
-
-class Perturbed(Enum):
-    """Which robots get the growth of small perturbations."""
-
-    NONE = "none"
-    TOUCHING = "those with contact whose tails touch"
-    ALL = "all"
 
 
 @np.errstate(all="ignore")  # robots that overflow are flagged
@@ -66,14 +56,14 @@ def steady(groups: Groups, *, stability: bool = True) -> Steady:
         (0.049, True)
     """
     check_groups(groups)
-    motion = orbits(groups, perturbed=Perturbed.ALL if stability else Perturbed.TOUCHING)
+    motion = orbits(groups, stability=stability)
     quick = np.abs(motion.omega_yr) > QUICK * np.abs(motion.omega_t)
     contact = groups.effects.get(CONTACT.name, np.zeros(len(groups))) != 0
     grows = motion.growth > np.where(contact, GROWS_IN_CONTACT, GROWS)
     doubtful = np.flatnonzero(~motion.failed & (quick | grows))
     if len(doubtful):
         reached = settle(groups.select(doubtful), resolution=Resolution.for_settling)
-        changed = doubtful[_difference(motion.at(doubtful), reached) > SAME]
+        changed = doubtful[difference(motion.means[doubtful], reached.means) > SAME]
         motion = _with_stepped(motion, groups, changed, np.full(len(groups), _OTHER_MOTION))
     lost = np.flatnonzero(motion.failed & (motion.method == DIRECT))
     return _with_stepped(motion, groups, lost, motion.note)
@@ -93,19 +83,19 @@ def _with_stepped(motion: Steady, groups: Groups, rows: Integers, notes: Words) 
     return motion.with_rows(rows, stepped(groups.select(rows), notes[rows].tolist()))
 
 
-def orbits(groups: Groups, *, phases: int = PHASES, perturbed: Perturbed = Perturbed.NONE) -> Steady:
+def orbits(groups: Groups, *, phases: int = PHASES, stability: bool = False) -> Steady:
     """Solve directly; `failed` where there is no orbit.
 
     Args:
         groups: B robots of one N.
         phases: number of phases to begin with.
-        perturbed: robots that get a growth.
+        stability: as for `steady`.
     """
     rows = numbers(groups)
-    return joined([_at_once(rows[part], groups.N, phases, perturbed) for part in slices(len(rows))])
+    return joined([_at_once(rows[part], groups.N, phases, stability) for part in slices(len(rows))])
 
 
-def _at_once(rows: Floats, tails: int, phases: int, perturbed: Perturbed) -> Steady:
+def _at_once(rows: Floats, tails: int, phases: int, stability: bool) -> Steady:
     """Solve directly for as many robots as there is room for, from their numbers (B, K)."""
     orbits = refined_orbits(rows, tails, phases)
     solved = np.array([orbit.status == SOLVED for orbit in orbits], bool)
@@ -113,9 +103,8 @@ def _at_once(rows: Floats, tails: int, phases: int, perturbed: Perturbed) -> Ste
     for robots in by_kind(np.flatnonzero(solved).tolist(), lambda i: orbits[i].x[2].shape):
         shapes, _ = stacked([orbits[i] for i in robots], 2)
         gap[robots] = smallest_gaps(rows[robots], shapes, tails)
-    if perturbed is not Perturbed.NONE:
-        wanted = solved if perturbed is Perturbed.ALL else (rows[:, assembly.CONTACT] != 0) & (gap < _NEAR)
-        growth[wanted] = growths(rows[wanted], tails, [orbits[i] for i in np.flatnonzero(wanted)])
+    wanted = solved if stability else (rows[:, assembly.CONTACT] != 0) & (gap < _NEAR)
+    growth[wanted] = growths(rows[wanted], tails, [orbits[i] for i in np.flatnonzero(wanted)])
     notes = [REASONS[orbit.status] or _growth_note(g) for orbit, g in zip(orbits, growth, strict=True)]
     omega_t, omega_h, omega_yr, v_x, v_z = np.array([orbit.means for orbit in orbits]).reshape(-1, 5).T
     return Steady(
@@ -149,14 +138,6 @@ def stepped(groups: Groups, notes: list[str]) -> Steady:
     if len(lasting):
         finer = settle(groups.select(lasting), resolution=lambda speed: Resolution.fitting(speed).finer(2))
         fine = coarse.with_rows(lasting, finer)
-    fields = {**vars(fine), "error": _difference(coarse, fine) / 3}  # of second order
+    fields = {**vars(fine), "error": difference(coarse.means, fine.means) / 3}  # of second order
     fields["note"] = np.array([f"{a}; {b}" if b else a for a, b in zip(notes, fine.note.tolist(), strict=True)])
     return Steady(**fields)
-
-
-def _difference(motion: Steady, other: Steady) -> Floats:
-    """Compute the largest relative difference of the means; velocities relative to the speed."""
-    speed = np.hypot(other.v_x, other.v_z)
-    rates = [np.abs(getattr(motion, k) / getattr(other, k) - 1) for k in ("omega_t", "omega_h", "omega_yr")]
-    velocities = [np.abs(getattr(motion, k) - getattr(other, k)) / speed for k in ("v_x", "v_z")]
-    return np.asarray(np.max(rates + velocities, 0))

@@ -50,6 +50,11 @@ class Steady:
         return len(self.omega_t)
 
     @property
+    def means(self) -> Floats:
+        """ω_t, ω_h, ω_yr, v_x and v_z, (B, 5)."""
+        return np.stack([self.omega_t, self.omega_h, self.omega_yr, self.v_x, self.v_z], -1)
+
+    @property
     def turn_radius(self) -> Floats:
         """R_yr/l of the head's centre."""
         return np.asarray(np.hypot(self.v_x, self.v_z) / np.abs(self.omega_yr))

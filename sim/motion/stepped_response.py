@@ -14,8 +14,7 @@ import numpy as np
 from sim.arrays import Floats
 from sim.mechanics import planar
 from sim.model.body import Body
-from sim.motion.resolution import Resolution
-from sim.motion.run import Run
+from sim.motion.run import Resolution, Run
 from sim.motion.settling import steady_state
 from sim.solve.march import PHASE, SURGE, SWAY, YAW
 

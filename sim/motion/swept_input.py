@@ -26,8 +26,8 @@ from sim.model.groups import Groups
 from sim.model.robot import Robot
 from sim.model.sweepable import SLOPE_INPUTS
 from sim.motion.lab_units import RPM
-from sim.motion.resolution import Resolution
 from sim.motion.revolution import MOST_STEPS, STEPS, Revolutions
+from sim.motion.run import Resolution
 from sim.motion.settling import settle_one
 from sim.solve.assembly import bodies
 from sim.solve.march import PHASE, State, advance

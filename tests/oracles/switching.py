@@ -35,8 +35,7 @@ from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.body import Body
 from sim.model.groups import DWELL, Groups
-from sim.motion.resolution import Resolution
-from sim.motion.run import Run
+from sim.motion.run import Resolution, Run
 from sim.motion.settling import steady_state
 from sim.motion.steady import check_groups, steady
 from sim.motion.steady_motion import Steady, twists

@@ -10,8 +10,8 @@ from sim.mechanics import planar
 from sim.model.response import BEFORE, DWELLS, at_equal_dwells
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay, replay_error
-from sim.motion.resolution import Resolution
 from sim.motion.response import longer_memory, responses
+from sim.motion.run import Resolution
 from sim.motion.steady import steady
 from sim.motion.steady_motion import twists
 from tests.oracles.switching import switch_response

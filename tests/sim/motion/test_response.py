@@ -12,8 +12,8 @@ from sim.model.response import BEFORE, DWELLS, FORGOTTEN, Responses, memory_afte
 from sim.model.schedule import Schedule
 from sim.motion import response
 from sim.motion.replay import replay
-from sim.motion.resolution import Resolution
 from sim.motion.response import responses
+from sim.motion.run import Resolution
 from sim.motion.steady import steady
 from sim.motion.stepped_response import stepped_response
 from sim.solve.assembly import bodies

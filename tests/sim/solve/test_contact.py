@@ -13,7 +13,7 @@ from scipy.spatial.distance import cdist
 from sim.linear.spectral import with_phases
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
-from sim.motion.resolution import Resolution
+from sim.motion.run import Resolution
 from sim.motion.sensitivity import sensitivities
 from sim.motion.settling import settle
 from sim.motion.steady import orbits

@@ -10,7 +10,7 @@ import pytest
 from sim.effects import catalogue
 from sim.linear.spectral import with_phases
 from sim.model.groups import Groups
-from sim.motion.resolution import Resolution
+from sim.motion.run import Resolution
 from sim.motion.sensitivity import sensitivities
 from sim.motion.settling import settle
 from sim.motion.steady import orbits
