@@ -15,7 +15,7 @@ from dataset.figures import plain_logarithms
 from planner.files.tracks import TrackingError, draw_overlay
 from planner.planning.picture import draw_tracks
 from sim.arrays import Floats
-from sim.io.page_figures import BLUE, GREEN, INK, ORANGE, RED, SOFT, VIOLET
+from sim.io.pages import BLUE, GREEN, INK, ORANGE, RED, SOFT, VIOLET
 from sim.model.response import DWELLS
 from sim.model.robot import Robot
 from sim.motion.lab_units import RPM, lab_columns

@@ -45,7 +45,7 @@ from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge, kno
 from sim.arrays import Flags, Floats
 from sim.effects import catalogue, effect_named, is_effect
 from sim.io.errors import InputError
-from sim.io.seals import sealed
+from sim.io.reading import sealed
 from sim.io.units import from_si, to_si
 from sim.model.correction import learnt_range
 from sim.model.laws import Load, make_law

@@ -23,7 +23,7 @@ from calibration.swimmer.camera_tracks import Track
 from calibration.verdict.verdict import Verdict
 from calibration.words.quantities import feature_in_words, final_model, output_label, output_scale
 from sim.arrays import Flags, Floats
-from sim.io.page_figures import BLUE, GREEN, INK, ORANGE, PALE, RED, VIOLET
+from sim.io.pages import BLUE, GREEN, INK, ORANGE, PALE, RED, VIOLET
 from sim.model.robot import Robot
 from sim.motion.robot_views import arrow, curved_arrow, draw_robot, scene
 

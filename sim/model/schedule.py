@@ -19,8 +19,7 @@ import numpy as np
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
-from sim.io.reading import ContentError, read_json
-from sim.io.seals import digest_of
+from sim.io.reading import ContentError, digest_of, read_json
 
 if TYPE_CHECKING:
     import pandas as pd

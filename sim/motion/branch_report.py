@@ -13,8 +13,7 @@ from pandas import DataFrame
 
 from sim.arrays import Floats
 from sim.io.files import make_folder, whole_file, write_csv
-from sim.io.page_figures import BLUE, GREEN, INK, ORANGE, RED, SOFT, VIOLET
-from sim.io.pages import Page
+from sim.io.pages import BLUE, GREEN, INK, ORANGE, RED, SOFT, VIOLET, Page
 from sim.io.provenance import code_version
 from sim.motion.branches import Branch, Branches, Motion
 from sim.motion.stability import DOUBLING, FOLD, HOPF

@@ -24,7 +24,7 @@ from planner.planning.request import PlanRequest
 from sim.inputs import load_robot
 from sim.io.errors import InputError
 from sim.io.provenance import code_version
-from sim.io.seals import sealed
+from sim.io.reading import sealed
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml

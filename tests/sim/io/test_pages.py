@@ -11,8 +11,7 @@ from matplotlib import pyplot
 from matplotlib.figure import Figure
 
 from sim.io.notebook import as_html
-from sim.io.page_figures import BLUE, INK, PALETTE, figure_markup
-from sim.io.pages import Page
+from sim.io.pages import BLUE, INK, PALETTE, Page, figure_markup
 from tests.page_text import PageText
 
 

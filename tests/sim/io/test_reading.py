@@ -10,8 +10,7 @@ import pytest
 from dataset.design import load_design
 from sim.inputs import load_robot
 from sim.io.errors import InputError
-from sim.io.reading import ContentError, read_bytes, read_json
-from sim.io.seals import check_seal, sealed
+from sim.io.reading import ContentError, check_seal, read_bytes, read_json, sealed
 from sim.io.tables import read_table
 from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
