@@ -10,24 +10,18 @@ C_t stays the drag across the axis, which changes yaw rate and radius. So ε cha
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from sim.arrays import Floats
+from sim.model.body import Body
 from sim.model.effect import Effect
-
-if TYPE_CHECKING:
-    from sim.model.body import Body
-    from sim.model.groups import Groups
+from sim.model.groups import Groups
 
 
-@dataclass(frozen=True)
-class AnisotropicHeadDrag(Effect):
-    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
-        return body.with_resistance({(1, 1): size * 6 * math.pi * groups.C_t / groups.l_over_R})
+def _adds(size: Floats, groups: Groups, body: Body) -> Body:
+    return body.with_resistance({(1, 1): size * 6 * math.pi * groups.C_t / groups.l_over_R})
 
 
-EFFECT = AnisotropicHeadDrag(
+EFFECT = Effect(
     name="anisotropic_head_drag",
     title="anisotropic head drag",
     equation="F_x = −6π μ0 R C_t v_x, F_z = −6π μ0 R C_t (1 + ε) v_z",
@@ -36,4 +30,5 @@ EFFECT = AnisotropicHeadDrag(
     typical=-0.2,
     plausible=(-0.5, 0.5),
     dissipative=True,
+    adds=_adds,
 )

@@ -10,25 +10,18 @@ that robot. Left out: the moment against yaw about the head's centre.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 from sim.arrays import Floats
 from sim.model.effect import Effect
+from sim.model.groups import Groups
 from sim.model.presets import CONTROL
 
-if TYPE_CHECKING:
-    from sim.model.groups import Groups
+
+def _number(size: Floats, groups: Groups) -> Floats:
+    scale = (groups.l_over_r0 / CONTROL.l_over_r0) ** 4 / (groups.l_over_R / CONTROL.l_over_R) ** 2
+    return 0.1 * size * scale
 
 
-@dataclass(frozen=True)
-class ContactLine(Effect):
-    def number(self, size: Floats, groups: Groups) -> Floats:
-        scale = (groups.l_over_r0 / CONTROL.l_over_r0) ** 4 / (groups.l_over_R / CONTROL.l_over_R) ** 2
-        return 0.1 * size * scale
-
-
-EFFECT = ContactLine(
+EFFECT = Effect(
     name="contact_line",
     title="friction of the contact line",
     equation="F = −ε F_0 s v/√(v² + v_s²)",
@@ -39,4 +32,5 @@ EFFECT = ContactLine(
     dissipative=True,
     similar=False,  # its creep speed is a speed of its own, see `contact_line_speed`
     reach="nonlocal",
+    number=_number,
 )

@@ -10,27 +10,20 @@ example. It shows only where there is such friction (`contact_line`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from sim.arrays import Floats
 from sim.model.effect import Effect
+from sim.model.groups import Groups
 from sim.model.presets import CONTROL
 
-if TYPE_CHECKING:
-    from sim.model.groups import Groups
+
+def _number(size: Floats, groups: Groups) -> Floats:
+    scale = (groups.l_over_r0 / CONTROL.l_over_r0) ** 4 / (groups.l_over_R / CONTROL.l_over_R)
+    return (np.exp(size) - 1) * scale
 
 
-@dataclass(frozen=True)
-class ContactLineSpeed(Effect):
-    def number(self, size: Floats, groups: Groups) -> Floats:
-        scale = (groups.l_over_r0 / CONTROL.l_over_r0) ** 4 / (groups.l_over_R / CONTROL.l_over_R)
-        return (np.exp(size) - 1) * scale
-
-
-EFFECT = ContactLineSpeed(
+EFFECT = Effect(
     name="contact_line_speed",
     title="speed of the contact line's creep",
     equation="v_s = v_0 (1 + (e^ε − 1) s)",
@@ -43,4 +36,5 @@ EFFECT = ContactLineSpeed(
     reach="nonlocal",
     beside="contact_line",
     grid=(0.0, 4.0, 6.0),
+    number=_number,
 )

@@ -10,24 +10,18 @@ the tails' own spin, but it does not depend on the length of the tails. Left out
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from sim.arrays import Floats
+from sim.model.body import Body
 from sim.model.effect import Effect
-
-if TYPE_CHECKING:
-    from sim.model.body import Body
-    from sim.model.groups import Groups
+from sim.model.groups import Groups
 
 
-@dataclass(frozen=True)
-class DiscDrag(Effect):
-    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
-        return body.with_resistance({(3, 4): size * 8 * math.pi / groups.l_over_R**3})
+def _adds(size: Floats, groups: Groups, body: Body) -> Body:
+    return body.with_resistance({(3, 4): size * 8 * math.pi / groups.l_over_R**3})
 
 
-EFFECT = DiscDrag(
+EFFECT = Effect(
     name="disc_drag",
     title="drag on the disc",
     equation="M_z = −ε 8π μ0 R³ ω_t",
@@ -37,4 +31,5 @@ EFFECT = DiscDrag(
     typical=0.4,
     plausible=(0.0, 4.0),
     dissipative=True,
+    adds=_adds,
 )

@@ -10,24 +10,18 @@ This lowers ω_yr by 5 % (N = 4, l = 15 cm) to 35 % (N = 2, l = 5 cm). Left out:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from sim.arrays import Floats
+from sim.model.body import Body
 from sim.model.effect import Effect
-
-if TYPE_CHECKING:
-    from sim.model.body import Body
-    from sim.model.groups import Groups
+from sim.model.groups import Groups
 
 
-@dataclass(frozen=True)
-class EndOverEndDrag(Effect):
-    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
-        return body.with_resistance({(2, 2): size * 8 * math.pi / groups.l_over_R**3})
+def _adds(size: Floats, groups: Groups, body: Body) -> Body:
+    return body.with_resistance({(2, 2): size * 8 * math.pi / groups.l_over_R**3})
 
 
-EFFECT = EndOverEndDrag(
+EFFECT = Effect(
     name="end_over_end_drag",
     title="head's end-over-end drag",
     equation="M_y = −ε 8π μ0 R³ ω_yr",
@@ -37,4 +31,5 @@ EFFECT = EndOverEndDrag(
     typical=5.0,
     plausible=(0.0, 12.0),
     dissipative=True,
+    adds=_adds,
 )

@@ -9,26 +9,20 @@ which stays at the centre.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from sim.arrays import Floats
+from sim.model.body import Body
 from sim.model.effect import Effect
-
-if TYPE_CHECKING:
-    from sim.model.body import Body
-    from sim.model.groups import Groups
+from sim.model.groups import Groups
 
 
-@dataclass(frozen=True)
-class HeadDragCentre(Effect):
-    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
-        L, drag = groups.L_over_R / groups.l_over_R, 6 * math.pi * groups.C_t / groups.l_over_R
-        coupled = drag * size * L  # the lever about J changes from L/2 to L/2 + ε L
-        return body.with_resistance({(0, 2): coupled, (2, 0): coupled, (2, 2): coupled * L * (1 + size)})
+def _adds(size: Floats, groups: Groups, body: Body) -> Body:
+    L, drag = groups.L_over_R / groups.l_over_R, 6 * math.pi * groups.C_t / groups.l_over_R
+    coupled = drag * size * L  # the lever about J changes from L/2 to L/2 + ε L
+    return body.with_resistance({(0, 2): coupled, (2, 0): coupled, (2, 2): coupled * L * (1 + size)})
 
 
-EFFECT = HeadDragCentre(
+EFFECT = Effect(
     name="head_drag_centre",
     title="drag off the head's centre",
     equation="F = −6π μ0 R C_t v at ε L ahead of the head's centre",
@@ -38,4 +32,5 @@ EFFECT = HeadDragCentre(
     typical=0.05,
     plausible=(-0.3, 0.3),
     dissipative=True,
+    adds=_adds,
 )

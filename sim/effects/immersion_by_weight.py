@@ -11,34 +11,28 @@ is taken in proportion to the wetted arc, too: an estimate. Left out: the tilt o
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sim.arrays import Floats
 from sim.model.body import Body, head_resistance
 from sim.model.effect import Effect
+from sim.model.groups import Groups
 from sim.model.presets import CONTROL
-
-if TYPE_CHECKING:
-    from sim.model.groups import Groups
 
 _LEVEL = math.asin(0.7)
 
 
-@dataclass(frozen=True)
-class ImmersionByWeight(Effect):
-    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
-        thicker = groups.l_over_R / groups.l_over_r0 * (CONTROL.l_over_r0 / CONTROL.l_over_R)
-        change = size * thicker**2 * (groups.N * groups.l_over_R / (2 * CONTROL.l_over_R))
-        wetted, side = change / (math.pi / 2 + _LEVEL), np.cos(_LEVEL + change) / math.cos(_LEVEL) - 1
-        R, L = 1 / groups.l_over_R, groups.L_over_R / groups.l_over_R
-        entries = head_resistance(groups.C_t * wetted, groups.C_r * wetted, groups.C_yr * side, R, L)
-        return body.plus(resistance=np.array(entries))
+def _adds(size: Floats, groups: Groups, body: Body) -> Body:
+    thicker = groups.l_over_R / groups.l_over_r0 * (CONTROL.l_over_r0 / CONTROL.l_over_R)
+    change = size * thicker**2 * (groups.N * groups.l_over_R / (2 * CONTROL.l_over_R))
+    wetted, side = change / (math.pi / 2 + _LEVEL), np.cos(_LEVEL + change) / math.cos(_LEVEL) - 1
+    R, L = 1 / groups.l_over_R, groups.L_over_R / groups.l_over_R
+    entries = head_resistance(groups.C_t * wetted, groups.C_r * wetted, groups.C_yr * side, R, L)
+    return body.plus(resistance=np.array(entries))
 
 
-EFFECT = ImmersionByWeight(
+EFFECT = Effect(
     name="immersion_by_weight",
     title="immersion that depends on the tails' weight",
     equation="β = asin 0.7 + ε s, C_yr ∝ cos β, C_t and C_r ∝ π/2 + β",
@@ -48,4 +42,5 @@ EFFECT = ImmersionByWeight(
     typical=0.03,
     plausible=(-0.1, 0.1),
     dissipative=True,
+    adds=_adds,
 )

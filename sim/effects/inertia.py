@@ -10,28 +10,21 @@ which are no change of drag.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 from sim.arrays import Floats
 from sim.linear.complex_step import magnitude
 from sim.model.effect import Effect, Factors
+from sim.model.groups import Groups
 from sim.model.presets import CONTROL
-
-if TYPE_CHECKING:
-    from sim.model.groups import Groups
 
 _CONTROL_SPEED = CONTROL.omega_bar / CONTROL.l_over_r0**4
 
 
-@dataclass(frozen=True)
-class Inertia(Effect):
-    def scales(self, size: Floats, groups: Groups) -> Factors:
-        speed = magnitude(groups.omega_bar) / groups.l_over_r0**4 / _CONTROL_SPEED
-        return Factors(drag=1 + size * speed)
+def _scales(size: Floats, groups: Groups) -> Factors:
+    speed = magnitude(groups.omega_bar) / groups.l_over_r0**4 / _CONTROL_SPEED
+    return Factors(drag=1 + size * speed)
 
 
-EFFECT = Inertia(
+EFFECT = Effect(
     name="inertia",
     title="drag growing with speed (inertia)",
     equation="ζ∥, ζ⊥, R_head × (1 + ε |ω|/ω_control)",
@@ -41,4 +34,5 @@ EFFECT = Inertia(
     plausible=(0.0, 0.3),
     dissipative=True,
     similar=False,  # the control example's speed is a speed of its own
+    scales=_scales,
 )

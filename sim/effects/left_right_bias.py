@@ -9,26 +9,19 @@ centre about J; the force itself is left out. Fit this effect before less common
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 from sim.arrays import Floats
 from sim.linear.complex_step import sign
+from sim.model.body import Body
 from sim.model.effect import Effect
-
-if TYPE_CHECKING:
-    from sim.model.body import Body
-    from sim.model.groups import Groups
+from sim.model.groups import Groups
 
 
-@dataclass(frozen=True)
-class LeftRightBias(Effect):
-    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
-        R, L = 1 / groups.l_over_R, groups.L_over_R / groups.l_over_R
-        return body.with_resistance({(2, 4): -size * sign(groups.omega_bar) * R * L**2 / 2})
+def _adds(size: Floats, groups: Groups, body: Body) -> Body:
+    R, L = 1 / groups.l_over_R, groups.L_over_R / groups.l_over_R
+    return body.with_resistance({(2, 4): -size * sign(groups.omega_bar) * R * L**2 / 2})
 
 
-EFFECT = LeftRightBias(
+EFFECT = Effect(
     name="left_right_bias",
     title="left-right bias",
     equation="M_y = ε μ0 R L² |ω_t|/2",
@@ -38,4 +31,5 @@ EFFECT = LeftRightBias(
     typical=0.05,
     plausible=(-0.5, 0.5),
     symmetry="odd",
+    adds=_adds,
 )

@@ -9,24 +9,17 @@ effects that change the head's spin drag. Left out: slip, which is proportional 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 from sim.arrays import Floats
+from sim.model.body import Body
 from sim.model.effect import Effect
-
-if TYPE_CHECKING:
-    from sim.model.body import Body
-    from sim.model.groups import Groups
+from sim.model.groups import Groups
 
 
-@dataclass(frozen=True)
-class MotorDroop(Effect):
-    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
-        return body.plus(droop=size)
+def _adds(size: Floats, groups: Groups, body: Body) -> Body:
+    return body.plus(droop=size)
 
 
-EFFECT = MotorDroop(
+EFFECT = Effect(
     name="motor_droop",
     title="droop of the motor under load",
     equation="ω_t − ω_h = ω − ε T/(μ0 l³)",
@@ -37,4 +30,5 @@ EFFECT = MotorDroop(
     plausible=(0.0, 5.0),
     dissipative=True,
     similar=False,  # the motor's loss of speed per torque is its own
+    adds=_adds,
 )

@@ -9,24 +9,17 @@ scale of the control robot (2.207 s). For one material and fluid, time scales μ
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 from sim.arrays import Floats
 from sim.model.effect import Effect
+from sim.model.groups import Groups
 from sim.model.presets import CONTROL
 
-if TYPE_CHECKING:
-    from sim.model.groups import Groups
+
+def _number(size: Floats, groups: Groups) -> Floats:
+    return size * (CONTROL.l_over_r0 / groups.l_over_r0) ** 4
 
 
-@dataclass(frozen=True)
-class RateDependentModulus(Effect):
-    def number(self, size: Floats, groups: Groups) -> Floats:
-        return size * (CONTROL.l_over_r0 / groups.l_over_r0) ** 4
-
-
-EFFECT = RateDependentModulus(
+EFFECT = Effect(
     name="rate_dependent_modulus",
     title="modulus that depends on the rate of bending",
     equation="M = EI (κ + ε t κ̇)",
@@ -38,4 +31,5 @@ EFFECT = RateDependentModulus(
     dissipative=True,
     similar=False,  # the rubber's time is its own
     reach="nonlocal",
+    number=_number,
 )

@@ -10,25 +10,18 @@ a rigid clamp.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 from sim.arrays import Floats
 from sim.model.effect import Effect
+from sim.model.groups import Groups
 from sim.model.presets import CONTROL
 
-if TYPE_CHECKING:
-    from sim.model.groups import Groups
+
+def _number(size: Floats, groups: Groups) -> Floats:
+    thicker = groups.l_over_R / groups.l_over_r0 * (CONTROL.l_over_r0 / CONTROL.l_over_R)
+    return size * thicker**4 * (CONTROL.l_over_R / groups.l_over_R)
 
 
-@dataclass(frozen=True)
-class RootCompliance(Effect):
-    def number(self, size: Floats, groups: Groups) -> Floats:
-        thicker = groups.l_over_R / groups.l_over_r0 * (CONTROL.l_over_r0 / CONTROL.l_over_R)
-        return size * thicker**4 * (CONTROL.l_over_R / groups.l_over_R)
-
-
-EFFECT = RootCompliance(
+EFFECT = Effect(
     name="root_compliance",
     title="clamps of the tails that give",
     equation="α = ε s (l/EI) M at the root",
@@ -38,4 +31,5 @@ EFFECT = RootCompliance(
     typical=0.1,
     plausible=(0.0, 0.4),
     reach="nonlocal",
+    number=_number,
 )

@@ -9,23 +9,16 @@ forces make.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 from sim.arrays import Floats
 from sim.model.effect import Effect
-
-if TYPE_CHECKING:
-    from sim.model.groups import Groups
+from sim.model.groups import Groups
 
 
-@dataclass(frozen=True)
-class StratifiedViscosity(Effect):
-    def number(self, size: Floats, groups: Groups) -> Floats:
-        return size * groups.l_over_R
+def _number(size: Floats, groups: Groups) -> Floats:
+    return size * groups.l_over_R
 
 
-EFFECT = StratifiedViscosity(
+EFFECT = Effect(
     name="stratified_viscosity",
     title="viscosity that differs with depth at the tails",
     equation="ζ∥, ζ⊥ × e^(ε y/R)",
@@ -35,4 +28,5 @@ EFFECT = StratifiedViscosity(
     typical=0.1,
     plausible=(-0.3, 0.3),
     reach="nonlocal",
+    number=_number,
 )

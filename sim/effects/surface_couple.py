@@ -10,25 +10,18 @@ itself.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 from sim.arrays import Floats
+from sim.model.body import Body
 from sim.model.effect import Effect
-
-if TYPE_CHECKING:
-    from sim.model.body import Body
-    from sim.model.groups import Groups
+from sim.model.groups import Groups
 
 
-@dataclass(frozen=True)
-class SurfaceCouple(Effect):
-    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
-        offset = groups.a_over_R / groups.l_over_R
-        return body.with_resistance({(2, 4): -size * groups.N * offset**2})
+def _adds(size: Floats, groups: Groups, body: Body) -> Body:
+    offset = groups.a_over_R / groups.l_over_R
+    return body.with_resistance({(2, 4): -size * groups.N * offset**2})
 
 
-EFFECT = SurfaceCouple(
+EFFECT = Effect(
     name="surface_couple",
     title="yaw couple of the tails under the surface",
     equation="M_y = ε μ0 N a² l ω_t",
@@ -37,4 +30,5 @@ EFFECT = SurfaceCouple(
     bounds=(-3.0, 3.0),
     typical=0.1,
     plausible=(-1.5, 1.5),
+    adds=_adds,
 )

@@ -11,30 +11,23 @@ fluid between the tails, which slows their approach.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.arrays import Floats
 from sim.model.effect import Effect
-
-if TYPE_CHECKING:
-    from sim.model.groups import Groups
+from sim.model.groups import Groups
 
 _FIRM = 500.0  # EI/l³, force per length at an overlap of 2 % and ε = 1: five softness lengths, so 5 F
 _BASE = 1000.0
 _KEPT = 0.98  # gap that contact keeps
 
 
-@dataclass(frozen=True)
-class TailContact(Effect):
-    def number(self, size: Floats, groups: Groups) -> Floats:
-        return _FIRM * (_BASE**size - 1) / (_BASE - 1)
+def _number(size: Floats, groups: Groups) -> Floats:
+    return _FIRM * (_BASE**size - 1) / (_BASE - 1)
 
 
-EFFECT = TailContact(
+EFFECT = Effect(
     name="tail_contact",
     title="contact between tails",
     equation="f = F(ε) ln(1 + exp((2 r0 − d)/0.008 r0))",
@@ -44,6 +37,7 @@ EFFECT = TailContact(
     typical=1.0,
     plausible=(0.6, 1.2),
     reach="nonlocal",
+    number=_number,
 )
 
 

@@ -11,29 +11,22 @@ axis, which the surface balances.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from sim.arrays import Floats
+from sim.model.body import Body
 from sim.model.effect import Effect
+from sim.model.groups import Groups
 from sim.model.presets import CONTROL
 
-if TYPE_CHECKING:
-    from sim.model.body import Body
-    from sim.model.groups import Groups
+
+def _adds(size: Floats, groups: Groups, body: Body) -> Body:
+    heavier = (groups.l_over_r0 / CONTROL.l_over_r0) ** 2 * groups.l_over_R / CONTROL.l_over_R
+    none = 0.0 * size
+    return body.plus(tail_load=np.stack([none, -8 * size * heavier, none]))
 
 
-@dataclass(frozen=True)
-class TailSag(Effect):
-    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
-        heavier = (groups.l_over_r0 / CONTROL.l_over_r0) ** 2 * groups.l_over_R / CONTROL.l_over_R
-        none = 0.0 * size
-        return body.plus(tail_load=np.stack([none, -8 * size * heavier, none]))
-
-
-EFFECT = TailSag(
+EFFECT = Effect(
     name="tail_sag",
     title="sag of the tails",
     equation="b = −8 ε (EI/l³) s e_y",
@@ -42,4 +35,5 @@ EFFECT = TailSag(
     bounds=(-0.4, 0.4),
     typical=0.1,
     plausible=(-0.05, 0.2),
+    adds=_adds,
 )

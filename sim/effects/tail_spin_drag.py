@@ -10,23 +10,17 @@ about the axis grows by a third.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from sim.arrays import Floats
 from sim.model.effect import Effect
-
-if TYPE_CHECKING:
-    from sim.model.groups import Groups
+from sim.model.groups import Groups
 
 
-@dataclass(frozen=True)
-class TailSpinDrag(Effect):
-    def number(self, size: Floats, groups: Groups) -> Floats:
-        return size * 4 * math.pi / groups.l_over_r0**2
+def _number(size: Floats, groups: Groups) -> Floats:
+    return size * 4 * math.pi / groups.l_over_r0**2
 
 
-EFFECT = TailSpinDrag(
+EFFECT = Effect(
     name="tail_spin_drag",
     title="drag on the tails' own spin",
     equation="torque per length = −ε 4π μ0 r0² (Ω·t) t",
@@ -38,4 +32,5 @@ EFFECT = TailSpinDrag(
     dissipative=True,
     reach="nonlocal",
     is_drag=True,
+    number=_number,
 )

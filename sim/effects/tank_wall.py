@@ -9,28 +9,21 @@ tanks: in one tank, a larger C_t does the same.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from sim.arrays import Floats
 from sim.model.body import Body, head_resistance
 from sim.model.effect import Driver, Effect
-
-if TYPE_CHECKING:
-    from sim.model.groups import Groups
+from sim.model.groups import Groups
 
 
-@dataclass(frozen=True)
-class TankWall(Effect):
-    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
-        factor = 1 / (1 - 2.104 * size + 2.089 * size**3 - 0.948 * size**5)
-        more = head_resistance(groups.C_t * (factor - 1), 0.0, 0.0, body.head_radius, body.head_length)
-        return body.plus(resistance=np.array(more))
+def _adds(size: Floats, groups: Groups, body: Body) -> Body:
+    factor = 1 / (1 - 2.104 * size + 2.089 * size**3 - 0.948 * size**5)
+    more = head_resistance(groups.C_t * (factor - 1), 0.0, 0.0, body.head_radius, body.head_length)
+    return body.plus(resistance=np.array(more))
 
 
-EFFECT = TankWall(
+EFFECT = Effect(
     name="tank_wall",
     title="wall of the tank",
     equation="F = −6π μ0 R C_t v/(1 − 2.104 ε + 2.089 ε³ − 0.948 ε⁵)",
@@ -50,4 +43,5 @@ EFFECT = TankWall(
             (0.3, 1.5),
         ),
     ),
+    adds=_adds,
 )

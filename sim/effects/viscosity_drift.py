@@ -9,25 +9,18 @@ the same viscosity, only the unit of time changes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from sim.arrays import Floats
 from sim.model.effect import Driver, Effect, Factors
-
-if TYPE_CHECKING:
-    from sim.model.groups import Groups
+from sim.model.groups import Groups
 
 
-@dataclass(frozen=True)
-class ViscosityDrift(Effect):
-    def scales(self, size: Floats, groups: Groups) -> Factors:
-        return Factors(viscosity=np.exp(-size))
+def _scales(size: Floats, groups: Groups) -> Factors:
+    return Factors(viscosity=np.exp(-size))
 
 
-EFFECT = ViscosityDrift(
+EFFECT = Effect(
     name="viscosity_drift",
     title="drift of the viscosity",
     equation="μ = μ0 exp(−ε), ε = β (T − T0)",
@@ -55,4 +48,5 @@ EFFECT = ViscosityDrift(
             (0.03, 0.15),
         ),
     ),
+    scales=_scales,
 )

@@ -10,7 +10,7 @@ So adding an effect is adding its file. An effect
    whether it keeps dynamic similarity, the sizes that are plausible by its source (outside, a claim is "in form
    like" the effect), what drives it from run to run, and the effect that it needs beside it to be seen, if any.
    An effect with a second number (exponent, time) has it as another effect beside it, with a `grid`;
-3. acts in one of three ways, all analytic in ε and the groups (`sim.linear.complex_step`):
+3. acts in one of three ways, by a function that is analytic in ε and the groups (`sim.linear.complex_step`):
    - `adds` returns the body with terms added, which must not depend on what is there already;
    - `scales` returns factors on drag, which multiply;
    - a non-local effect (`reach`) has a number of its own in `Body.nonlocal_terms`, from `number`, and its formula
@@ -21,14 +21,13 @@ Terms are added first, then the factors multiply. So the order of the effects do
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
 
 from sim.arrays import Floats
-
-if TYPE_CHECKING:
-    from sim.model.body import Body
-    from sim.model.groups import Groups
+from sim.model.body import Body
+from sim.model.groups import Groups
 
 
 class Factors(NamedTuple):
@@ -52,9 +51,21 @@ class Driver:
     plausible: tuple[float, float]  # sizes that its source allows
 
 
+def _no_term(size: Floats, groups: Groups, body: Body) -> Body:
+    return body
+
+
+def _no_factor(size: Floats, groups: Groups) -> Factors:
+    return Factors()
+
+
+def _size(size: Floats, groups: Groups) -> Floats:
+    return size
+
+
 @dataclass(frozen=True)
 class Effect:
-    """Declaration of an effect; subclasses override one of the three ways to act. Sizes ε are dimensionless.
+    """Declaration of an effect, with one of the three ways to act. Sizes ε are dimensionless.
 
     Example:
         >>> from softflagella import effects
@@ -79,20 +90,13 @@ class Effect:
     plausible: tuple[float, float] | None = None  # sizes that its source allows; None: all within the bounds
     beside: str = ""  # the effect without which this one shows nothing
     grid: tuple[float, ...] = ()  # sizes at which a calibration looks for `beside`, whose second number this is
+    adds: Callable[[Floats, Groups, Body], Body] = field(default=_no_term, compare=False, repr=False)  # its terms
+    scales: Callable[[Floats, Groups], Factors] = field(
+        default=_no_factor, compare=False, repr=False
+    )  # its factors
+    number: Callable[[Floats, Groups], Floats] = field(default=_size, compare=False, repr=False)  # if nonlocal
 
     @property
     def term(self) -> str:
         """Name of the effect whose term it is; a non-local effect has this name in `Body.nonlocal_terms`."""
         return self.name
-
-    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
-        """Add this effect's terms to the body."""
-        return body
-
-    def scales(self, size: Floats, groups: Groups) -> Factors:
-        """Return what this effect multiplies."""
-        return Factors()
-
-    def number(self, size: Floats, groups: Groups) -> Floats:
-        """Return the number of a non-local effect in `Body.nonlocal_terms`, in the simulator's units."""
-        return size

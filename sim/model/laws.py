@@ -33,8 +33,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -43,10 +44,8 @@ from sim.io.errors import InputError
 from sim.linear.complex_step import magnitude, sign
 from sim.model.body import Body, head_resistance
 from sim.model.effect import Effect, Factors
+from sim.model.groups import Groups
 from sim.model.presets import CONTROL
-
-if TYPE_CHECKING:
-    from sim.model.groups import Groups
 
 WRENCHES = {"Fx": ("F_x", 1), "Fz": ("F_z", 1), "My": ("M_y", 2), "Mz": ("M_z", 2)}  # symbol, power of length
 MOTIONS = {"vx": ("v_x", 0), "vz": ("v_z", 0), "wyr": ("ω_yr", 1), "wh": ("ω_h", 1), "wt": ("ω_t", 1)}
@@ -104,6 +103,10 @@ class Powers:
         tails = self.tails * np.log(np.asarray(groups.N) / _CONTROL_TAILS)
         return np.asarray(self.speed * np.log(speed) + self.length * np.log(length) + tails)
 
+    def factor(self, groups: Groups, power: Any = 1.0) -> Floats:
+        """Compute m of B robots to a power, (B,)."""
+        return np.asarray(np.exp(power * self.logarithm(groups)))
+
 
 class Load(NamedTuple):
     """A component of the wrench on head and disc about J that is driven by a component of the velocity."""
@@ -138,69 +141,44 @@ class Law(Effect):
     place: str
     powers: Powers
     lever: float = 0.0
-
-    def factor(self, groups: Groups, power: Any = 1.0) -> Floats:
-        """Compute m of B robots to a power, (B,)."""
-        return np.asarray(np.exp(power * self.powers.logarithm(groups)))
-
-
-@dataclass(frozen=True, kw_only=True)
-class ForceLaw(Law):
-    """ε μ0 R^d m times a velocity component, as a component of the wrench on head and disc about J."""
-
-    load: Load
-
-    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
-        strength = size * self.factor(groups)
-        if self.load.rectified:
-            strength = strength * sign(groups.omega_bar)
-        d = WRENCHES[self.load.wrench][1] + MOTIONS[self.load.motion][1]
-        row, column = list(WRENCHES).index(self.load.wrench), list(MOTIONS).index(self.load.motion)
-        force = -strength / groups.l_over_R**d
-        if not self.load.lever_unit:
-            return body.with_resistance({(row, column): force})
-        ahead = self.lever * (body.head_length if self.load.lever_unit == "L" else 1.0)
-        couple = list(WRENCHES).index("My")
-        return body.with_resistance({(row, column): force, (couple, column): ahead * force})
-
-
-@dataclass(frozen=True, kw_only=True)
-class FactorLaw(Law):
-    """A coefficient of the head, or the drag or the stiffness of the tails, times m^ε."""
-
-    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
-        if self.place not in COEFFICIENTS:
-            return body
-        more = self.factor(groups, size) - 1
-        C_t, C_r, C_yr = (more * getattr(groups, C) * (at == self.place) for at, C in COEFFICIENTS.items())
-        return body.plus(resistance=np.array(head_resistance(C_t, C_r, C_yr, body.head_radius, body.head_length)))
-
-    def scales(self, size: Floats, groups: Groups) -> Factors:
-        """Return what a law of the tails multiplies; stiffer tails move as in a fluid of viscosity μ0 m^(−ε)."""
-        if self.place in COEFFICIENTS:
-            return Factors()
-        factor = self.factor(groups, size)
-        return Factors(tail_drag=factor) if self.place == "tail_drag" else Factors(viscosity=1 / factor)
-
-
-@dataclass(frozen=True, kw_only=True)
-class ScaledEffect(Law):
-    """An effect on the tails whose size is multiplied by m."""
-
-    effect: Effect
+    effect: Effect | None = None  # on the tails, whose size it multiplies
 
     @property
     def term(self) -> str:
-        return self.effect.term
+        return self.effect.term if self.effect else self.name
 
-    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
-        return self.effect.adds(size * self.factor(groups), groups, body)
 
-    def scales(self, size: Floats, groups: Groups) -> Factors:
-        return self.effect.scales(size * self.factor(groups), groups)
+def _add_force(load: Load, powers: Powers, lever: float, size: Floats, groups: Groups, body: Body) -> Body:
+    """Add ε μ0 R^d m times a velocity component, as a component of the wrench on head and disc about J."""
+    strength = size * powers.factor(groups)
+    if load.rectified:
+        strength = strength * sign(groups.omega_bar)
+    d = WRENCHES[load.wrench][1] + MOTIONS[load.motion][1]
+    row, column = list(WRENCHES).index(load.wrench), list(MOTIONS).index(load.motion)
+    force = -strength / groups.l_over_R**d
+    if not load.lever_unit:
+        return body.with_resistance({(row, column): force})
+    ahead = lever * (body.head_length if load.lever_unit == "L" else 1.0)
+    couple = list(WRENCHES).index("My")
+    return body.with_resistance({(row, column): force, (couple, column): ahead * force})
 
-    def number(self, size: Floats, groups: Groups) -> Floats:
-        return self.effect.number(size * self.factor(groups), groups)
+
+def _scale_coefficient(place: str, powers: Powers, size: Floats, groups: Groups, body: Body) -> Body:
+    """Multiply a coefficient of the head by m^ε."""
+    more = powers.factor(groups, size) - 1
+    C_t, C_r, C_yr = (more * getattr(groups, C) * (at == place) for at, C in COEFFICIENTS.items())
+    return body.plus(resistance=np.array(head_resistance(C_t, C_r, C_yr, body.head_radius, body.head_length)))
+
+
+def _scale_tails(place: str, powers: Powers, size: Floats, groups: Groups) -> Factors:
+    """Multiply drag or stiffness of the tails by m^ε; stiffer ones move as in a fluid of viscosity μ0 m^(−ε)."""
+    factor = powers.factor(groups, size)
+    return Factors(tail_drag=factor) if place == "tail_drag" else Factors(viscosity=1 / factor)
+
+
+def _scale_effect(way: str, effect: Effect, powers: Powers, size: Floats, groups: Groups, *body: Body) -> Any:
+    """Let an effect act with m times its size."""
+    return getattr(effect, way)(size * powers.factor(groups), groups, *body)
 
 
 LOCAL_DRAG = {
@@ -244,7 +222,7 @@ def make_law(place: str | Effect, powers: Powers = Powers(), *, lever: float = 0
         d = d_force + d_motion
         scale = f"μ0 R^{d}" if d > 1 else "μ0 R"
         where = (" sgn ω" if load.rectified else "") + (f" at z = {lever:g} {unit}" if unit else "")
-        return ForceLaw(
+        return Law(
             **stated,
             title=f"{symbol} on the {'tails' if unit == 'l' else 'head'} from {driver}",
             equation=f"{symbol} = ε {scale}{powers.words} {driver}{where}",
@@ -253,10 +231,14 @@ def make_law(place: str | Effect, powers: Powers = Powers(), *, lever: float = 0
             typical=0.5,
             symmetry="odd" if load.odd else "even",
             similar=similar,
-            load=load,
+            adds=partial(_add_force, load, powers, lever),
         )
     if place in _SYMBOLS:
-        return FactorLaw(
+        if place in COEFFICIENTS:
+            stated["adds"] = partial(_scale_coefficient, place, powers)
+        else:
+            stated["scales"] = partial(_scale_tails, place, powers)
+        return Law(
             **stated,
             title=f"{COEFFICIENTS.get(place) or TAILS[place]} as a power law",
             equation=f"{_SYMBOLS[place]} × [{formula}]^ε",
@@ -266,7 +248,8 @@ def make_law(place: str | Effect, powers: Powers = Powers(), *, lever: float = 0
         )
     if effect is None:
         raise InputError(f"no place {place!r} of a law; such are {', '.join([*_SYMBOLS, *LOADS][:8])}")
-    return ScaledEffect(
+    stated |= {way: partial(_scale_effect, way, effect, powers) for way in ("adds", "scales", "number")}
+    return Law(
         **stated,
         title=f"{effect.title}, as a power law",
         equation=f"{effect.equation}, ε times {formula}" if formula else effect.equation,

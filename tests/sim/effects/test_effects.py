@@ -25,20 +25,12 @@ OUTPUTS = ("omega_t", "omega_yr", "v_x", "v_z")
 FOLDER = Path(sim.effects.__file__).parent
 
 NEW_EFFECT = """
-from dataclasses import dataclass
-
 from sim.model.effect import Effect, Factors
 
-
-@dataclass(frozen=True)
-class Stickiness(Effect):
-    def scales(self, size, groups):
-        return Factors(drag=1 + size)
-
-
-EFFECT = Stickiness(
+EFFECT = Effect(
     name="{reach}_one", title="stickiness", equation="drag × (1 + ε)", source="none", unit="1", null=0.0,
     bounds=(0.0, 1.0), typical=0.1, symmetry="even", dissipative=True, reach={reach!r},
+    scales=lambda size, groups: Factors(drag=1 + size),
 )
 """
 

@@ -87,7 +87,7 @@ def test_no_run_tells_stiffer_tails_from_a_thinner_fluid() -> None:
     """Drag of head and tails that grows with speed is less stiffness at the same speed."""
     law = make_law("tail_stiffness", Powers(speed=-0.42))
     softer = with_law(law.name, 1.0, N=3, omega_bar=20.0)
-    drag = 1 / float(law.factor(softer)[0])
+    drag = 1 / float(law.powers.factor(softer)[0])
     slow = float(np.exp(Powers(speed=1.0).logarithm(softer)[0]))  # ω/ω_control
     denser = with_law("inertia", (drag - 1) / slow, N=3, omega_bar=20.0)
     for output in OUTPUTS:
