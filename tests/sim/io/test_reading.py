@@ -1,4 +1,4 @@
-"""Files are read in any usual encoding, or refused in one line; edited and cut ones are noticed."""
+"""Files are read in any usual encoding, or refused in one line; edited and cut ones, and robots that cannot be."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from pathlib import Path
 import pytest
 
 from dataset.design import load_design
+from sim.__main__ import main
 from sim.inputs import load_robot
-from sim.io.errors import InputError
+from sim.io.errors import InputError, run_command
 from sim.io.reading import ContentError, check_seal, read_bytes, read_json, sealed
 from sim.io.tables import read_table
 from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
+from tests.sim.robots import CONTROL_VALUES
 
 BROKEN = {
     "lists in lists": ("x = " + "[" * 100_000, "is not TOML: .*(recursion|nested)"),
@@ -95,3 +97,40 @@ def test_an_edited_text_is_read_and_says_so_once(
     for _ in range(2):
         load_robot(tmp_path / "robot.toml")
     assert capsys.readouterr().err.count("was edited or damaged") == warnings
+
+
+def table(**changes: object) -> str:
+    values = {**CONTROL_VALUES, **changes}
+    return ",".join(values) + "\n" + ",".join(str(v) for v in values.values()) + "\n"
+
+
+BAD_TABLES = {
+    "negative length": (table(l_over_R=-3), "l_over_R = -3"),
+    "disc without radius": (table(a_over_R=0), "a_over_R = 0 in row 1; it must be above 0"),
+    "no tails": (table(N=0), "N = 0"),
+    "half a tail": (table(N=2.5), "N = 2.5"),
+    "nan": (table(C_t="nan"), "C_t = nan"),
+    "text": (table(C_t="three"), "C_t"),
+    "integer beyond floats": (table(C_t="1" * 400), "C_t = inf in row 1"),
+    "stout tail": (table(l_over_r0=1.2), "l/r0 = 1.2"),
+    "motor at rest": (table(omega_bar=0), "omega_bar = 0"),
+    "unknown column": (table(colour=3), "unknown column 'colour'"),
+    "effect out of bounds": (table(end_over_end_drag=-1), "end_over_end_drag = -1"),
+    "missing column": ("C_t,C_r\n1,2\n", "missing column"),
+    "no rows": (",".join(CONTROL_VALUES) + "\n", "no rows"),
+    "empty": ("", "is empty"),
+}
+
+
+@pytest.mark.parametrize("case", list(BAD_TABLES))
+def test_steady_refuses(case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text, expected = BAD_TABLES[case]
+    points, out = tmp_path / "points.csv", tmp_path / "out.csv"
+    points.write_text(text)
+    assert run_command(main, ["steady", str(points), "--out", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert expected in error
+    assert "points.csv" in error
+    assert error.startswith("error: ")
+    assert len(error.splitlines()) == 1
+    assert [p.name for p in tmp_path.iterdir()] == ["points.csv"]

@@ -73,10 +73,7 @@ def test_points_along_an_input_are_orbits(effect: str) -> None:
     first = beginning(family)
     last = list(follow(family, first, 100))[-1]
     assert last.s == pytest.approx(1.0, abs=1e-6)
-    start = family.start(1.0)
-    assert start is not None
-    direct = first_point(family, start, 1.0)
-    assert direct is not None
+    direct = beginning(family, 1.0)
     assert difference(family.means(last.y), family.means(direct.y)) < 1e-5
 
 

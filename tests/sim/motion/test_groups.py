@@ -110,17 +110,6 @@ def test_many_robots_are_solved_in_parts(monkeypatch: pytest.MonkeyPatch) -> Non
     assert agree(wanted, found())
 
 
-def test_derivatives_agree_with_differences_of_solutions() -> None:
-    rows, step = numbers(robots(3, 3)), 1e-3
-    found = slopes_of(rows, 3)
-    for k, number in enumerate(ALONG):
-        change = np.where(np.arange(rows.shape[1]) == number, step, 0.0) * rows
-        ends = [refined_orbits(rows + way * change, 3, PHASES_FOR_SLOPES) for way in (-1, 1)]
-        for i, (below, above) in enumerate(zip(*ends, strict=True)):
-            slopes, difference = found[i][0], (above.means - below.means) / (2 * step)
-            assert slopes[k] == pytest.approx(difference, rel=1e-4, abs=1e-5 * np.abs(slopes[k]).max())
-
-
 def test_a_robot_that_cannot_be_solved_leaves_the_others_of_its_group_alone() -> None:
     rows = numbers(robots(3, 10))
     wanted = orbits_of(rows, 3)
