@@ -23,12 +23,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from camera.view import DICTIONARIES, Markers, View, opencv
+from camera.view import Markers, View, opencv
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
@@ -49,6 +50,9 @@ _CHANGED = 0.13  # of a band's usual area, by which another area shows that it i
 _NOISE = 20.0  # pixels, three standard deviations of a band's area in a compressed film
 _OTHER = 0.3  # of a band's usual area, by which it may differ where the robot was not seen for _MEMORY pictures
 _MEMORY = 20  # pictures over which distance and areas are averaged
+_CORNER = 0.25  # standard error of a tag's corner [pixels]
+_MOVED = 0.25  # pixels, standard error of what moves a whole tag: lens, rolling shutter, compression
+_SIDE = 2.0  # standard error of the side of a tag from its outline [pixels]
 _REACH = {"head": (-0.7, 0.7, 0.75), "tail": (-3.0, -0.6, 1.5)}  # where dots are: along the axis, to the side
 
 
@@ -107,11 +111,13 @@ class Detector:
         self._cv = opencv()
         self._mask: Any = None
         self._memory = [_Memory() for _ in self._robots]
-        dictionaries = {each.dictionary for each in robots if each.tag is not None}
-        if view.tag is not None:
-            dictionaries.add(DICTIONARIES[0])
-        self._readers = {name: self._reader(name) for name in dictionaries}
-        self._seen_tags: dict[str, dict[int, Floats]] = {}  # in the whole of the picture at hand
+        aruco = self._cv.aruco
+        self._finder = self._reader(aruco.CORNER_REFINE_NONE)
+        self._refiners = (  # the first counts from a pixel's corner
+            (self._reader(aruco.CORNER_REFINE_APRILTAG), 0.5, _CORNER),
+            (self._reader(aruco.CORNER_REFINE_CONTOUR), 0.0, 2 * _CORNER),
+        )
+        self._seen_tags: dict[int, Floats] | None = None  # in the whole of the picture at hand
 
     def poses(self, frame: Any) -> list[Pose | Lost]:
         """Return the pose of each robot, or why it is not seen, in the order of the robots.
@@ -127,15 +133,15 @@ class Detector:
         if self.view.region is not None and self._mask is None:
             self._mask = np.zeros(frame.shape[:2], np.uint8)
             self._cv.fillPoly(self._mask, [np.round(self.view.region).astype(np.int32)], 255)
-        self._seen_tags.clear()
+        self._seen_tags = None
         if self.view.homography is None:
             assert self.view.tag is not None
-            corners = self._tags(DICTIONARIES[0], frame).get(self.view.tag[0])
+            number = self.view.tag[0]
+            corners = self._tags(frame).get(number)
             if corners is None:
-                return [
-                    Lost(each.name, f"no tag {self.view.tag[0]} that gives the scale") for each in self._robots
-                ]
-            self.view = self.view.with_tag(corners)
+                return [Lost(each.name, f"no tag {number} that gives the scale") for each in self._robots]
+            corners, error = self._refined(frame, number, corners)
+            self.view = self.view.with_tag(corners, _SIDE if error > _CORNER else _CORNER * math.sqrt(2))
         found = []
         for markers, memory in zip(self._robots, self._memory, strict=True):
             look = self._by_bands if markers.tag is None else self._by_tag
@@ -158,47 +164,67 @@ class Detector:
 
     # Tags
 
-    def _reader(self, dictionary: str) -> Any:
+    def _reader(self, refinement: int) -> Any:
         aruco = self._cv.aruco
         options = aruco.DetectorParameters()
-        options.cornerRefinementMethod = aruco.CORNER_REFINE_SUBPIX
-        known = aruco.getPredefinedDictionary(getattr(aruco, f"DICT_{dictionary.upper()}"))
+        options.cornerRefinementMethod = refinement
+        options.detectInvertedMarker = True  # white on black
+        known = aruco.getPredefinedDictionary(getattr(aruco, f"DICT_{self.view.dictionary.upper()}"))
         return aruco.ArucoDetector(known, options)
 
-    def _tags(self, dictionary: str, frame: Any, around: Floats | None = None) -> dict[int, Floats]:
-        """Read the tags of a picture, or of its part around corners (4, 2) [pixels]; number -> corners."""
+    def _tags(self, frame: Any, around: Floats | None = None) -> dict[int, Floats]:
+        """Find the tags of a picture, or of its part around corners (4, 2) [pixels]; number -> corners."""
+        if around is not None:
+            return self._read(self._finder, frame, around)
+        if self._seen_tags is None:
+            self._seen_tags = self._read(self._finder, frame)
+        return self._seen_tags
+
+    def _refined(self, frame: Any, number: int, corners: Floats) -> tuple[Floats, float]:
+        """Return the corners (4, 2) of a tag from lines along its sides, and their standard error [pixels].
+
+        Where the sides are too short or blurred for lines through the steepest grey, or white on black, those
+        through the outline serve, with which a tag is up to 3 pixels smaller or larger than it is.
+        """
+        for reader, shift, error in self._refiners:
+            with suppress(self._cv.error):  # of an outline with too few pixels on one side
+                refined = self._read(reader, frame, corners).get(number)
+                if refined is not None:
+                    return refined - shift, error
+        return corners, 4 * _CORNER
+
+    def _read(self, reader: Any, frame: Any, around: Floats | None = None) -> dict[int, Floats]:
         low = np.zeros(2, int)
         if around is not None:
             side = np.ptp(around, axis=0).max()
             low = np.maximum((around.min(axis=0) - side).astype(int), 0)
             right, down = (around.max(axis=0) + side).astype(int)
             frame = frame[low[1] : down, low[0] : right]
-        elif dictionary in self._seen_tags:
-            return self._seen_tags[dictionary]
-        grey = self._cv.cvtColor(frame, self._cv.COLOR_BGR2GRAY)
-        corners, numbers, _ = self._readers[dictionary].detectMarkers(grey)
+        corners, numbers, _ = reader.detectMarkers(self._cv.cvtColor(frame, self._cv.COLOR_BGR2GRAY))
         known = [] if numbers is None else np.asarray(numbers).reshape(-1).tolist()
-        tags = {n: low + np.asarray(c, dtype=float)[0] for n, c in zip(known, corners, strict=False)}
-        if around is None:
-            self._seen_tags[dictionary] = tags
-        return tags
+        return {n: low + np.asarray(c, dtype=float)[0] for n, c in zip(known, corners, strict=False)}
 
     def _by_tag(self, markers: Markers, memory: _Memory, frame: Any) -> Pose | Lost:
-        """Fit a square to the corners: first the front left one, then clockwise, as seen from above."""
-        corners = self._tags(markers.dictionary, frame, memory.places.get("tag")).get(int(markers.tag or 0))
+        """Fit a square to the corners: first the upper left one, then clockwise, as the camera sees them."""
+        number = int(markers.tag or 0)
+        corners = self._tags(frame, memory.places.get("tag")).get(number)
         if corners is None or not self._inside(corners.mean(axis=0)):
-            return Lost(markers.name, f"no tag {markers.tag}")
+            return Lost(markers.name, f"no tag {number}")
+        corners, error = self._refined(frame, number, corners)
         memory.places = {"tag": corners}
         places = self.view.to_tank(corners)
         centre = places.mean(axis=0)
-        square = np.array([1 + 1j, 1 - 1j, -1 - 1j, -1 + 1j])  # forward + i left
+        square = np.array([1 + 1j, 1 - 1j, -1 - 1j, -1 + 1j]) * np.exp(1j * markers.turned)  # forward + i left
+        square = square.conj() if self.view.up else square
         arms = (places - centre) @ [1, 1j]
         turn = (square.conj() @ arms) / 8
-        misfit = float(np.abs(arms - turn * square).std())
+        misfit = float(np.sum(np.abs(arms - turn * square) ** 2))  # with four degrees of freedom
+        pixel = self.view.metres(corners.mean(axis=0))
+        sigma = math.sqrt(((error * pixel) ** 2 + misfit / 4) / 2)  # of a corner
         heading, half = float(np.angle(turn)), abs(turn)
-        sigma = max(misfit / 2, 0.1 * self.view.metres(corners.mean(axis=0)))
         memory.apart = 2 * half
-        return self._pose(markers, centre, heading, sigma, sigma / half, memory, frame, corners)
+        place, turned = math.hypot(sigma / 2, _MOVED * pixel), sigma / math.sqrt(8) / half
+        return self._pose(markers, centre, heading, place, turned, memory, frame, corners)
 
     # Bands
 

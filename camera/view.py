@@ -34,20 +34,19 @@ from sim.io.units import split, to_si
 HUES = {"red": 0, "orange": 30, "yellow": 60, "green": 120, "cyan": 180, "blue": 240, "magenta": 300}  # degrees
 DOTS = ("head", "tail")  # markers that come and go as the robot spins
 _CLICK = 1.0  # pixels, standard deviation of a point that a person reads off a picture
-_CORNER = 0.3  # pixels, of the corner of a tag
 _STRETCH = 1.15  # greatest ratio of the sides of a tag from which the scale alone is taken
-DICTIONARIES = ("4x4_50", "5x5_100", "6x6_250", "7x7_1000", "apriltag_36h11")
 _KEYS = {
-    "": ("looks", "scale", "lens", "tank", "robots"),
+    "": ("looks", "dictionary", "scale", "lens", "tank", "robots"),
     "scale": ("points_px", "tag_id"),
     "lens": ("focal_px", "centre_px", "distortion"),
     "tank": ("region_px",),
-    "robots": ("name", "front", "rear", *DOTS, "tag", "dictionary"),
+    "robots": ("name", "front", "rear", *DOTS, "tag", "turned_deg"),
 }
 _LENGTHS = {"scale": ("points", "length", "tag"), "robots": ("ahead", "apart")}  # their keys have a unit
 EXAMPLE = """\
 # Pixels count from the picture's upper left corner, x to the right and y down.
 looks = "down"                       # the camera; "up" through the bottom of the tank
+# dictionary = "4x4_50"              # of ArUco tags, as OpenCV names it; "aruco_original", "apriltag_36h11", …
 
 [scale]                              # two points of a ruler at the robot's height, and their distance
 points_px = [[100, 650], [900, 650]]
@@ -92,9 +91,11 @@ class Markers(NamedTuple):
     dots: Mapping[str, float] = {}  # "head" or "tail" -> hue [deg]
     colours: Mapping[str, str] = {}  # marker -> the colour as it was given
     tag: int | None = None
-    dictionary: str = DICTIONARIES[0]
     ahead: float = 0.0  # of the markers' middle from the head's centre [m]
     apart: float = math.nan  # distance of front and rear [m]; NaN: learnt from the film
+    turned: float = (
+        0.0  # of the tag's upper edge from the robot's front, counter-clockwise as the camera sees it [rad]
+    )
 
 
 class Lens(NamedTuple):
@@ -119,6 +120,7 @@ class View:
     lens: Lens | None = None
     region: Floats | None = None  # (n, 2) pixels, a polygon
     tag: tuple[int, float] | None = None  # number and side [m] of the tag that gives the scale
+    dictionary: str = "4x4_50"  # of the tags, as OpenCV names it
     up: bool = False  # the camera looks up
 
     def to_tank(self, pixels: Floats) -> Floats:
@@ -151,8 +153,12 @@ class View:
         across, down = corners[1:] - corners[0]
         return math.sqrt(abs(float(across[0] * down[1] - across[1] * down[0])))
 
-    def with_tag(self, corners: Floats) -> View:
+    def with_tag(self, corners: Floats, error: float) -> View:
         """Return the view with the scale of its tag, whose corners (4, 2) are seen in a picture.
+
+        Args:
+            corners: of the tag [pixels].
+            error: standard error of its side [pixels].
 
         Raises:
             InputError: the tag is seen too slantwise for a scale.
@@ -167,10 +173,8 @@ class View:
                 "let the camera look straight down, or give four points, points_px and points_cm"
             )
         size = float(sides.mean())
-        error = _CORNER * math.sqrt(2) / size
-        return replace(
-            self, homography=_scaled(plane.mean(axis=0), self.tag[1] / size, self.up), scale_error=error
-        )
+        homography = _scaled(plane.mean(axis=0), self.tag[1] / size, self.up)
+        return replace(self, homography=homography, scale_error=error / size)
 
 
 class Setup(NamedTuple):
@@ -217,13 +221,22 @@ def _setup(content: dict[str, Any]) -> Setup:
         )
     lens = _lens(given["lens"]) if given["lens"] else None
     region = _points(given["tank"], "region_px", 3) if "region_px" in given["tank"] else None
-    view = _with_scale(View(lens=lens, region=region, up=looks == "up"), given["scale"])
+    dictionary = str(content.get("dictionary", View.dictionary)).lower()
+    if dictionary not in (known := _dictionaries()):
+        raise InputError(f"dictionary = {dictionary!r}; give one of OpenCV's: {', '.join(known)}")
+    view = View(lens=lens, region=region, up=looks == "up", dictionary=dictionary)
+    view = _with_scale(view, given["scale"])
     marked = tuple(_markers(robot, number + 1) for number, robot in enumerate(robots))
     if len({each.name for each in marked}) < len(marked):
         raise InputError("two robots have one name; give each [[robots]] a name of its own")
     if len({each.tag if each.tag is not None else (each.front, each.rear) for each in marked}) < len(marked):
         raise InputError("two robots have the same markers; give each its own colours or tag")
     return Setup(view, marked)
+
+
+def _dictionaries() -> list[str]:
+    names = [name[5:].lower() for name in dir(opencv().aruco) if name.startswith("DICT_")]
+    return sorted(set(names))
 
 
 def _check_keys(table: str, entries: Mapping[str, Any]) -> None:
@@ -318,10 +331,10 @@ def _markers(table: Mapping[str, Any], number: int) -> Markers:
         for one, other in combinations(sorted(hues), 2):
             if abs(math.remainder(hues[one] - hues[other], 360)) < 40:
                 raise InputError(f"{one} and {other} have nearly the same colour; give them others")
-        dictionary = str(table.get("dictionary", DICTIONARIES[0])).lower()
-        if dictionary not in DICTIONARIES:
-            raise InputError(f"dictionary {dictionary!r}; give one of {', '.join(DICTIONARIES)}")
         ahead, apart = (_length(table, name, "robots") for name in ("ahead", "apart"))
+        turned = table.get("turned_deg", 0)
+        if not _is_number(turned) or (turned and tag is None):
+            raise InputError(f"turned_deg = {turned!r}; give the degrees by which the tag's upper edge is turned")
         return Markers(
             str(table.get("name", number)),
             hues.pop("front", math.nan),
@@ -329,9 +342,9 @@ def _markers(table: Mapping[str, Any], number: int) -> Markers:
             hues,
             {key: str(colour) for key, colour in colours.items()},
             None if tag is None else _whole(tag, "tag"),
-            dictionary,
             0.0 if math.isnan(ahead) else ahead,
             apart,
+            math.radians(turned),
         )
 
 

@@ -78,6 +78,6 @@ def test_a_tag_that_is_seen_slantwise_gives_no_scale(tmp_path: Path) -> None:
     (tmp_path / "view.toml").write_text("[scale]\ntag_cm = 5\ntag_id = 7\n[[robots]]\ntag = 3\n")
     view = read_setup(tmp_path / "view.toml").view
     square = np.array([[100, 100], [200, 100], [200, 200], [100, 200.0]])
-    assert view.with_tag(square).metres(np.array([150, 150])) == pytest.approx(0.05 / 100)
+    assert view.with_tag(square, 0.4).metres(np.array([150, 150])) == pytest.approx(0.05 / 100)
     with pytest.raises(InputError, match="tag 7 is seen slantwise, 80 to 100 pixels a side"):
-        view.with_tag(square * [0.8, 1])
+        view.with_tag(square * [0.8, 1], 0.4)
