@@ -32,8 +32,8 @@ from planner.planning.errors import (
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.calibration_table import CalibrationKnowledge
-from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
+from planner.vehicle.vehicle import Switches, roll_out
 from sim.arrays import Floats
 from sim.io.errors import InputError, naming
 from sim.io.units import format_length

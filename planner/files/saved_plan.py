@@ -23,16 +23,16 @@ from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Reference
 from planner.planning.conditions import Arrival, KeptClear, Lap
+from planner.planning.declare import Declared
 from planner.planning.errors import PlanErrors, predicted_error
-from planner.planning.feasible import Declared
 from planner.planning.line_of_sight import Guidance
 from planner.planning.plan import GUARANTEE, KINDS, Plan
 from planner.planning.request import DOCUMENTED, Camera, PlanRequest
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.from_table import table_for
 from planner.vehicle.measured import MeasuredVehicle
-from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
+from planner.vehicle.vehicle import Switches, roll_out
 from planner.vehicle.zigzag import Objective, Zigzag
 from sim.io.errors import InputError, naming
 from sim.io.keywords import checks_keywords

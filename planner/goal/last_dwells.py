@@ -22,14 +22,13 @@ import numpy as np
 
 from planner.paths.distance import distance_to
 from planner.planning.conditions import OVERLAP, Lap
+from planner.planning.declare import Declared
 from planner.planning.errors import drift_of_a_lap, plan_errors
-from planner.planning.feasible import Declared
 from planner.planning.line_of_sight import follow
 from planner.planning.plan import J, Plan
 from planner.planning.request import POSE, Progress
 from planner.planning.solve import Setting
-from planner.vehicle.rollout import Switches, flips_after, roll_out
-from planner.vehicle.vehicle import Vehicle
+from planner.vehicle.vehicle import Switches, Vehicle, flips_after, roll_out
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.mechanics import planar

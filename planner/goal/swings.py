@@ -21,7 +21,7 @@ from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D, points_at
 from planner.paths.tractrix import Drift, Reference
 from planner.planning.conditions import Swing
-from planner.planning.feasible import Declared
+from planner.planning.declare import Declared
 from planner.planning.solve import Setting
 from sim.arrays import Floats
 from sim.io.errors import InputError

@@ -19,14 +19,13 @@ import numpy as np
 
 from planner.goal.dubins import DubinsPaths
 from planner.goal.last_dwells import Ending
-from planner.goal.lattice import RouteLimits
-from planner.goal.route import COURSES, Lattices, NoWayError, route
+from planner.goal.route import COURSES, Lattices, NoWayError, RouteLimits, route
 from planner.goal.swings import Delay
 from planner.options import AnyVehicle, GoalOptions, Length, asked, place_of, pose_of, seconds_of, swimmer_of
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import LONGEST, heading_in_degrees, in_lab, place_in_lab
-from planner.planning.feasible import Declared
+from planner.planning.declare import Declared
 from planner.planning.line_of_sight import Start
 from planner.planning.picture import BODY, REPLAYED
 from planner.planning.plan import Job, Plan

@@ -2,7 +2,7 @@
 
 A stretch of the path is blocked where the robot's body would come nearer than the margin to what it must keep
 clear of. A way around leaves the path before the stretch and joins it again behind. Among the places where it may
-leave and join, and among all ways of the lattice between them (`planner.goal.lattice`), it makes
+leave and join, and among all ways of the lattice between them (`planner.goal.route`), it makes
 
     length of the way + length of the path that is not followed
 
@@ -22,8 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.goal.dubins import shortest_paths
-from planner.goal.lattice import Lattice, RouteLimits
-from planner.goal.route import AROUND, LEVELS, shortened
+from planner.goal.route import AROUND, LEVELS, Lattice, RouteLimits, shortened
 from planner.paths.distance import nearest
 from planner.paths.nearest_path import nearest_poses, tracked_points
 from planner.paths.obstacles import Footprint, FreeSpace
@@ -32,7 +31,7 @@ from planner.paths.tractrix import Drift, Reference
 from planner.paths.tractrix import reference as follow_path
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.conditions import BlockedError, Detour
-from planner.planning.feasible import AS_DRAWN, TIGHTEST, Declared
+from planner.planning.declare import AS_DRAWN, TIGHTEST, Declared
 from planner.planning.solve import Setting
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.arrays import Flags, Floats

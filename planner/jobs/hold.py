@@ -28,7 +28,7 @@ from planner.paths.path import Path2D, circle
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.plan import Job, Plan
 from planner.planning.request import POSE
-from planner.vehicle.rollout import roll_out
+from planner.vehicle.vehicle import roll_out
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.io.units import format_time

@@ -20,8 +20,7 @@ from planner.paths.path import Path2D, smoothed
 from planner.paths.path_files import Drawing, read_path
 from planner.paths.tractrix import Drift
 from planner.paths.units import check_size, describe, in_lab, in_tails
-from planner.planning.declare import declare
-from planner.planning.feasible import Declared, Feasibility
+from planner.planning.declare import Declared, Feasibility, declare
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest, Progress
 from planner.planning.solve import Change, Task, solve

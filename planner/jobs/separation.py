@@ -39,8 +39,8 @@ from planner.paths.path import Path2D, arc_length, axis_at, points_at
 from planner.paths.tractrix import reference
 from planner.planning.errors import LEVEL, WOBBLE, deviations_open_loop, error_growth
 from planner.planning.plan import Plan
-from planner.vehicle.rollout import roll_out
 from planner.vehicle.tracked_point import TrackedVehicle
+from planner.vehicle.vehicle import roll_out
 from planner.vehicle.zigzag import zigzag
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError

@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.goal.dubins import TURNS, DubinsPaths, words
-from planner.goal.lattice import RouteLimits
+from planner.goal.route import RouteLimits
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D, axis_at
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import check_size
-from planner.planning.feasible import AS_DRAWN, Declared
+from planner.planning.declare import AS_DRAWN, Declared
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest, Progress
 from planner.planning.solve import Change, Setting, Task, solve

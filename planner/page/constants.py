@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.page.first_state import CAMEL
+from planner.page.first_state import camel
 from planner.planning.request import PlanRequest
 from planner.vehicle.calibration_table import UNMEASURED
 from sim.io import units
@@ -25,12 +25,11 @@ _NAMES = {  # of each module; a leading underscore is left out
     "planner.paths.nearest_path": "SPACING MOST_POSES COARSEST WEIGHTS ITERATIONS ALONG POINTS_A_POSE ROUNDS "
     "LEAST EVEN SHORT SHORTEST_STEP",
     "planner.paths.path": "CIRCLE_POINTS LARGEST MOST_SMOOTHED EVEN",
-    "planner.paths.svg_names": "NAMES",
+    "planner.paths.svg_attributes": "NAMES",
     "planner.paths.tractrix": "LAPS MOST_SLIP",
-    "planner.planning.declare": "WARN FAR SCALES MOST_WORK SMOOTHINGS FIRST",
+    "planner.planning.declare": "WARN FAR SCALES MOST_WORK SMOOTHINGS FIRST CORNER AS_DRAWN ROOMS TIGHTEST "
+    "LOST ROUNDED SMALL NOISY FEWEST_POSES FILLET_ROOM SPACING MOST_POINTS MINIMAX ROUNDING POINTS_A_POSE",
     "planner.planning.errors": "LEVEL WOBBLE DRAWS BLOCKS WITHIN KEPT ZIGZAG PLACE COURSE STRETCH",
-    "planner.planning.feasible": "CORNER AS_DRAWN ROOMS TIGHTEST LOST ROUNDED SMALL NOISY FEWEST_POSES "
-    "FILLET_ROOM SPACING MOST_POINTS MINIMAX ROUNDING POINTS_A_POSE",
     "planner.planning.line_of_sight": "EXACT LARGEST_STEP TURNS MOST_BIAS HALVINGS MOST_LOOKS MOST_SWITCHES "
     "PATIENCE EVERY TIGHTEST PAIRS_AHEAD",
     "planner.planning.plan": "WIDE OWN_TABLE_FROM",
@@ -69,7 +68,7 @@ def constants() -> dict[str, dict[str, Any]]:
         found.setdefault(module.rpartition(".")[2], {}).update(_of(module, names.split()))
     request = PlanRequest()
     options = [name for name in vars(request) if name not in _NOT_ASKED]
-    found["request"] = {"DEFAULTS": {_camel(name): getattr(request, name) for name in options}}
+    found["request"] = {"DEFAULTS": {camel(name): getattr(request, name) for name in options}}
     found["paths_units"] = _of("planner.paths.units", ["LONGEST", "SMALLEST"])
     found["errors"]["CAMERA"] = request.camera.to_dict()
     found["units"]["SIGNS"] = {chr(sign): str(word) for sign, word in units._SIGNS.items()}
@@ -77,8 +76,8 @@ def constants() -> dict[str, dict[str, Any]]:
         "UNMEASURED": dict(zip(UNMEASURED.names, np.sqrt(np.diag(UNMEASURED.covariance)).tolist(), strict=True))
     }
     found["robot_toml"] |= {
-        "ENTRIES": [entry._replace(field=CAMEL[entry.field]) for entry in ENTRIES],
-        "MEASURED": [CAMEL[field] for field in uncertainty.DEFAULTS],
+        "ENTRIES": [entry._replace(field=camel(entry.field)) for entry in ENTRIES],
+        "MEASURED": [camel(field) for field in uncertainty.DEFAULTS],
         "LARGEST_SIGMA": uncertainty._LARGEST,
     }
     return found
@@ -94,11 +93,6 @@ def constants_module() -> str:
 def _of(module: str, names: list[str]) -> dict[str, Any]:
     parts = vars(import_module(module))
     return {name: parts[name] if name in parts else parts[f"_{name}"] for name in names}
-
-
-def _camel(name: str) -> str:
-    first, *rest = name.split("_")
-    return first + "".join(word.title() for word in rest)
 
 
 def _plain(value: Any) -> Any:

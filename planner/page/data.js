@@ -1,5 +1,5 @@
 /* Texts of files, and the numbers of a look-up table or of a vehicle, as Python has written them into the page
- * (table_data.py has the format).
+ * (write_page.py has the format).
  *
  * A tensor becomes {shape, values}, with all values in one Float64Array, the last axis fastest. */
 import { InputError } from "./words.js";

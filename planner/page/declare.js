@@ -12,8 +12,8 @@ import { inLab, placeInLab } from "./units.js";
 import { pivotRadius, turnRadius } from "./vehicle.js";
 import { DECLARING, REMEDY, InputError, fixed, general, quoted } from "./words.js";
 
-const { AS_DRAWN, ROOMS, TIGHTEST, LOST, ROUNDED, SMALL, NOISY, FEWEST_POSES, FILLET_ROOM } = CONSTANTS.feasible;
-const { SPACING, MOST_POINTS, MINIMAX, ROUNDING, POINTS_A_POSE } = CONSTANTS.feasible;
+const { AS_DRAWN, ROOMS, TIGHTEST, LOST, ROUNDED, SMALL, NOISY, FEWEST_POSES, FILLET_ROOM } = CONSTANTS.declare;
+const { SPACING, MOST_POINTS, MINIMAX, ROUNDING, POINTS_A_POSE } = CONSTANTS.declare;
 const { LONGEST } = CONSTANTS.paths_units, { WARN, FAR } = CONSTANTS.declare;
 const { SCALES, MOST_WORK, SMOOTHINGS, FIRST } = CONSTANTS.declare;
 const CORNERS = ["nearest", "minimax", "fillet", "error"];

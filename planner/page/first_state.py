@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,20 +16,8 @@ from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 
-CAMEL = {
-    "tails": "tails",
-    "tail_length": "tailLength",
-    "tail_radius": "tailRadius",
-    "youngs_modulus": "youngsModulus",
-    "head_radius": "headRadius",
-    "head_length": "headLength",
-    "viscosity": "viscosity",
-    "motor_speed": "motorSpeed",
-    "C_t": "C_t",
-    "C_r": "C_r",
-    "C_yr": "C_yr",
-    "disc_offset": "discOffset",
-}
+FIELDS = ("tails", "tail_length", "tail_radius", "youngs_modulus", "head_radius", "head_length", "viscosity",
+          "motor_speed", "C_t", "C_r", "C_yr", "disc_offset")  # fmt: skip
 _ROUND = 2  # digits of the ends of sliders
 _TURNS = 2.5  # turn radii: the first size of a shape
 _MOST_DWELLS = 2000  # of a plan that is written into the page
@@ -44,11 +31,16 @@ class NamedPath(NamedTuple):
     path: Path2D  # in m
 
 
+def camel(name: str) -> str:
+    """Return a name as JavaScript writes it: tailLength for tail_length; coefficients keep theirs, such as C_t."""
+    first, *rest = name.split("_")
+    return name if first == "C" else first + "".join(word.title() for word in rest)
+
+
 def robot_fields(robot: Robot) -> dict[str, Any]:
     """Return a robot's fields as the page has them."""
-    assert set(CAMEL) <= {field.name for field in fields(Robot)}
-    return {"name": robot.name, **{name: getattr(robot, field) for field, name in CAMEL.items()},
-            "effects": dict(robot.effects)}  # fmt: skip
+    values = {camel(field): getattr(robot, field) for field in FIELDS}
+    return {"name": robot.name, **values, "effects": dict(robot.effects)}
 
 
 def robots_of(robot: Robot) -> list[dict[str, Any]]:

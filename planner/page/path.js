@@ -10,7 +10,7 @@ import { InputError, general, repr } from "./words.js";
 
 const { CIRCLE_POINTS, LARGEST, MOST_SMOOTHED, EVEN } = CONSTANTS.path;
 const { LONGEST, SMALLEST } = CONSTANTS.paths_units;
-const { CORNER } = CONSTANTS.feasible;
+const { CORNER } = CONSTANTS.declare;
 const FINE = 2 * (Math.PI / 180); // largest turn between two points of an arc
 const FEWEST = 8; // points of an arc
 const POINTS = 400, WAVES = 2, HEIGHT = 0.12; // of a wave: half of its height, over its length

@@ -6,7 +6,7 @@ import { CONSTANTS } from "./constants.js";
 import { TAU, mod } from "./math.js";
 import { InputError, quoted } from "./words.js";
 
-const { NAMES } = CONSTANTS.svg_names;
+const { NAMES } = CONSTANTS.svg_attributes;
 const N = "[-+]?(?:\\d+\\.?\\d*|\\.\\d+)(?:[eE][-+]?\\d+)?";
 const [COMMAND, FLOAT, FLAG, END] = ["[MmZzLlHhVvCcSsQqTtAa]", N, "[01]", "$"].map((word) => {
   return new RegExp(`[ ,\\t\\n\\f\\r]*(${word})`, "y");

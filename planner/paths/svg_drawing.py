@@ -26,6 +26,7 @@ from svgelements import Path as SvgPath
 
 from planner.paths.path import Path2D, steps_of
 from planner.paths.svg_attributes import (
+    NAMES,
     NUMBER,
     Lengths,
     View,
@@ -37,7 +38,6 @@ from planner.paths.svg_attributes import (
     read_style_sheet,
     transform_of,
 )
-from planner.paths.svg_names import NAMES
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.reading import read_bytes

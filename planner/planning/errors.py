@@ -38,11 +38,10 @@ import numpy as np
 from planner.draws import normals
 from planner.paths.distance import distance_to, nearest
 from planner.paths.path import Path2D
-from planner.planning.feasible import Declared
+from planner.planning.declare import Declared
 from planner.planning.request import Camera
-from planner.vehicle.rollout import Rollout, Switches, roll_out
 from planner.vehicle.tracked_point import TrackedVehicle
-from planner.vehicle.vehicle import Mode, Vehicle, interpolated
+from planner.vehicle.vehicle import Mode, Rollout, Switches, Vehicle, interpolated, roll_out
 from sim.arrays import Floats, Integers
 from sim.mechanics import planar
 

@@ -39,8 +39,7 @@ import numpy as np
 
 from planner.paths.tractrix import Reference
 from planner.planning.request import FOLLOWING, Progress, tell
-from planner.vehicle.rollout import Switches
-from planner.vehicle.vehicle import BEFORE_KNOTS, SHORTEST, STEP, Vehicle
+from planner.vehicle.vehicle import BEFORE_KNOTS, SHORTEST, STEP, Switches, Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.arrays import Floats
 from sim.io.errors import InputError

@@ -16,13 +16,13 @@ from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
 from planner.paths.units import heading_in_degrees, in_lab, place_in_lab, time_in_lab
 from planner.planning.conditions import Arrival, KeptClear, Lap
+from planner.planning.declare import Declared
 from planner.planning.errors import PlanErrors, feedback_error, plan_errors
-from planner.planning.feasible import Declared
 from planner.planning.line_of_sight import Guidance
 from planner.planning.request import POSE, PlanRequest
 from planner.vehicle.measured import MeasuredVehicle
-from planner.vehicle.rollout import Switches, roll_out, smooth_track
 from planner.vehicle.tracked_point import TrackedVehicle
+from planner.vehicle.vehicle import Switches, roll_out, smooth_track
 from planner.vehicle.zigzag import Zigzag
 from sim.arrays import Floats
 from sim.io.errors import InputError

@@ -26,14 +26,14 @@ from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab, time_in_lab
 from planner.planning.conditions import BlockedError, KeptClear
+from planner.planning.declare import Declared
 from planner.planning.errors import plan_errors
-from planner.planning.feasible import Declared
 from planner.planning.line_of_sight import Guidance, Start, follow, guaranteed, look_ahead
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest, Progress
 from planner.vehicle.from_table import OWN_TABLE
-from planner.vehicle.rollout import Switches
 from planner.vehicle.tracked_point import TrackedVehicle
+from planner.vehicle.vehicle import Switches
 from planner.vehicle.zigzag import Zigzag, check_least, dwells_for, longer_dwells, nearly_fastest, zigzag
 from sim.io.errors import InputError
 

@@ -23,14 +23,13 @@ import numpy as np
 from scipy.ndimage import minimum_filter1d
 
 from planner.goal.dubins import words
-from planner.goal.lattice import RouteLimits
-from planner.goal.route import Lattices, NoWayError, route
+from planner.goal.route import Lattices, NoWayError, RouteLimits, route
 from planner.paths.distance import two_sided
 from planner.paths.path import Path2D, arc_length, axis_at, resample
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.conditions import KeptClear
-from planner.planning.feasible import Declared
+from planner.planning.declare import Declared
 from planner.planning.line_of_sight import Start
 from planner.planning.plan import Job, Plan
 from planner.planning.request import POSE

@@ -20,8 +20,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from planner.paths.path import axis_at
-from planner.vehicle.rollout import Switches, roll_out
-from planner.vehicle.vehicle import SHORTEST, Vehicle
+from planner.vehicle.vehicle import SHORTEST, Switches, Vehicle, roll_out
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.mechanics import planar

@@ -13,8 +13,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from planner.goal.dubins import TURNS, words
-from planner.vehicle.rollout import Switches, flips_after
-from planner.vehicle.vehicle import Vehicle
+from planner.vehicle.vehicle import Switches, Vehicle, flips_after
 from planner.vehicle.zigzag import QUICK
 from sim.arrays import Floats
 

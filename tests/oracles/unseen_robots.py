@@ -12,7 +12,7 @@ from planner.paths.path import Path2D, circle, polygon
 from planner.planning.errors import WOBBLE, plan_errors, predicted_error
 from planner.planning.plan import Plan
 from planner.vehicle.from_table import table_vehicle
-from planner.vehicle.rollout import roll_out
+from planner.vehicle.vehicle import roll_out
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from surrogate.table import NeuralTable

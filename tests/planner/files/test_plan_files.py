@@ -19,7 +19,7 @@ from planner.files.headers import milliseconds
 from planner.files.plan_files import write_plan
 from planner.files.plan_svg import SvgAxes
 from planner.files.tracks import check, tracking_error
-from planner.vehicle.rollout import Switches, roll_out
+from planner.vehicle.vehicle import Switches, roll_out
 from sim.io.errors import InputError
 from sim.io.pose_tracks import read_tracks
 from sim.model.schedule import load_schedule

@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 
 from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, three_arcs, words
-from planner.goal.lattice import RouteLimits
-from planner.goal.route import COURSES, NoWayError, route
+from planner.goal.route import COURSES, NoWayError, RouteLimits, route
 from planner.goal.swings import NoRoomError, swung
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import STILL, Drift, reference
 from planner.planning.plan import Plan
 from planner.vehicle.calibration_table import CalibrationKnowledge
-from planner.vehicle.rollout import Switches, roll_out
+from planner.vehicle.vehicle import Switches, roll_out
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.mechanics import planar

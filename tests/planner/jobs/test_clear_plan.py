@@ -16,7 +16,7 @@ from planner.jobs.timetable import WaitingCircle, circle_reference, with_circles
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.path import Path2D, circle, runs_of
 from planner.planning.arrive import EXACT
-from planner.planning.feasible import TIGHTEST
+from planner.planning.declare import TIGHTEST
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.swim import swim_under

@@ -19,8 +19,8 @@ from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.tracking.swim import swim_under
 from planner.tracking.tracker import Tracker
-from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import tracked_vehicle
+from planner.vehicle.vehicle import Switches, roll_out
 from sim.io.errors import InputError
 from sim.motion.replay import replay
 from tests.planner.plans import CONTROL, LINE, planned

@@ -22,9 +22,8 @@ from planner.tracking.guidance import TrackerGuidance
 from planner.tracking.pipe import answers
 from planner.tracking.swim import swim_under
 from planner.tracking.tracker import POSE, Command, Tracker
-from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import tracked_vehicle
-from planner.vehicle.vehicle import Vehicle
+from planner.vehicle.vehicle import Switches, Vehicle, roll_out
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.mechanics import planar

@@ -17,7 +17,7 @@ from planner.jobs.tour import tour
 from planner.jobs.travel import Travel
 from planner.paths.distance import distance_to
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
-from planner.planning.feasible import TIGHTEST
+from planner.planning.declare import TIGHTEST
 from planner.planning.solve import Setting
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import dwells_for

@@ -22,7 +22,7 @@ import pytest
 
 from planner.page.constants import constants_module
 from planner.page.first_state import robot_fields
-from planner.page.table_data import table_data
+from planner.page.write_page import table_data
 from planner.paths.tractrix import Reference
 from planner.planning.plan import Plan
 from planner.vehicle.tracked_point import TrackedVehicle
@@ -55,7 +55,7 @@ def node() -> str:
 def _table_file() -> Path:
     """Write the shipped look-up table as the page has it."""
     path = SESSION / "table.json"
-    path.write_text(table_data(load()))
+    path.write_text(json.dumps(table_data(load())))
     return path
 
 

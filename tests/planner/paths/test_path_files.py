@@ -20,7 +20,7 @@ from planner.paths.units import (
     place_in_lab,
     read_time,
 )
-from planner.planning.feasible import CORNER, kinks
+from planner.planning.declare import CORNER, kinks
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from tests.planner.paths import svg_cases

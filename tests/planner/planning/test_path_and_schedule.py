@@ -14,11 +14,10 @@ from planner.jobs.plan import plan
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon, smoothed
 from planner.paths.tractrix import STILL, Drift, reference
-from planner.planning.declare import MOST_WORK, declare, remedy
-from planner.planning.feasible import Feasibility, changed, cost, feasible
+from planner.planning.declare import MOST_WORK, Feasibility, changed, cost, declare, feasible, remedy
 from planner.planning.line_of_sight import follow, guaranteed, hysteresis, look_ahead
 from planner.planning.request import DECLARING, REMEDY, Corner, Share
-from planner.vehicle.rollout import roll_out
+from planner.vehicle.vehicle import roll_out
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
@@ -205,13 +204,14 @@ TIGHT = {"circle": circle(0.2), "star": star(0.7, 0.25), "spike": SPIKE}
 )
 def test_the_search_is_bounded_and_says_that_it_goes_on(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     work: list[float] = []
+    told: list[Share] = []
 
     def counted(raw: Path2D, feasibility: Feasibility, way: float, *rest: Any) -> Any:
-        work.append(cost(raw, feasibility, way))
+        if told and told[-1].stage == REMEDY:
+            work.append(cost(raw, feasibility, way))
         return changed(raw, feasibility, way, *rest)
 
     monkeypatch.setattr("planner.planning.declare.changed", counted)
-    told: list[Share] = []
     with pytest.raises(InputError) as caught:
         declare(TIGHT[name], five_tails(), lambda share: told.append(cast(Share, share)))
     assert "\n" not in str(caught.value)

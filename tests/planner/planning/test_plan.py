@@ -26,7 +26,7 @@ from planner.planning.plan import KINDS
 from planner.planning.request import PlanRequest
 from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
 from planner.vehicle.from_table import table_vehicle
-from planner.vehicle.rollout import roll_out
+from planner.vehicle.vehicle import roll_out
 from planner.vehicle.zigzag import dwells_for, longer_dwells, longest_dwell
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS

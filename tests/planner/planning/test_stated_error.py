@@ -26,8 +26,7 @@ from planner.planning.line_of_sight import follow, look_ahead
 from planner.planning.request import Camera
 from planner.tracking.swim import swim_under
 from planner.tracking.tracker import Tracker
-from planner.vehicle.rollout import Rollout, Switches, roll_out
-from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle
+from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Rollout, Switches, Vehicle, roll_out
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.motion.replay import replay

@@ -14,7 +14,7 @@ from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Reference, reference
 from planner.planning.plan import Plan
 from planner.tracking.rest import Remainder, reached, rest_of
-from planner.vehicle.rollout import roll_out
+from planner.vehicle.vehicle import roll_out
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
 from sim.motion.replay import replay

@@ -16,8 +16,7 @@ from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import Plan
 from planner.vehicle.measured import MeasuredVehicle
-from planner.vehicle.rollout import Switches, roll_out
-from planner.vehicle.vehicle import Vehicle
+from planner.vehicle.vehicle import Switches, Vehicle, roll_out
 from sim.io.errors import InputError
 from sim.mechanics import planar
 

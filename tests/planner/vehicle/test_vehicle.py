@@ -19,8 +19,7 @@ from planner.vehicle.calibration_table import (
     read_knowledge,
 )
 from planner.vehicle.from_table import table_vehicle
-from planner.vehicle.rollout import Switches, roll_out
-from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, interpolated, lag_table
+from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Switches, interpolated, lag_table, roll_out
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.inputs import load_robot
 from sim.io.errors import InputError

@@ -17,7 +17,7 @@ from planner.jobs.plan import plan
 from planner.page.write_page import write_page
 from planner.paths.path import circle
 from planner.planning.plan import Plan
-from planner.vehicle.rollout import roll_out
+from planner.vehicle.vehicle import roll_out
 from sim.inputs import load_robot
 from sim.io.errors import run_command
 from sim.model.presets import PRESETS
