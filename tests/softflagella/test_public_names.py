@@ -1,15 +1,22 @@
-"""The public face: every name is there, documented, with an example that runs."""
+"""The public face: names with examples that run, words of the command `softflagella`, and what they load."""
 
 from __future__ import annotations
 
 import doctest
+import subprocess
+import sys
 from importlib import import_module
 from inspect import isfunction
+from pathlib import Path
 
 import pytest
 
 import softflagella as sf
+from sim.io.errors import run_command
 from sim.io.keywords import keywords_of
+from softflagella.__main__ import WORDS, command, main, program_of
+from softflagella.shadowing import PACKAGES
+from tests.processes import LIMIT
 
 LONG = {"FleetPlan", "Orbit", "Swim", "TrackingError", "Trip", "hold", "load_goal", "tabulate"}
 NAMES = [name for name in sf.__all__ if not name.startswith("_")]
@@ -47,3 +54,101 @@ def test_every_name_has_an_example_that_runs(name: str) -> None:
     assert examples[0].examples, f"{name} has no example"
     results = [doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE).run(test) for test in examples]
     assert sum(result.failed for result in results) == 0
+
+
+def test_one_command_has_those_of_all_packages(capsys: pytest.CaptureFixture[str]) -> None:
+    for package in PACKAGES:
+        with pytest.raises(SystemExit) as ended:
+            main([package, "--help"])
+        assert ended.value.code == 0
+        said = capsys.readouterr().out
+        assert f"usage: softflagella {package}" in said
+        assert all(name in said for name in program_of(package).commands)
+
+
+def test_words_are_commands_of_packages_and_stand_first(capsys: pytest.CaptureFixture[str]) -> None:
+    assert {"steady", "plan", "sweep", "train", "calibrate", "replay", "query"} <= set(WORDS)
+    main([])
+    lines = capsys.readouterr().out.splitlines()
+    places = [next(i for i, line in enumerate(lines) if line.startswith(f"  {word} ")) for word in WORDS]
+    assert places == sorted(places)
+    assert max(places) < lines.index("further commands, by package (softflagella PACKAGE COMMAND …):")
+    for word, (package, name) in WORDS.items():
+        packaged = program_of(package).commands[name]
+        assert command(word) is packaged
+        with pytest.raises(SystemExit) as ended:
+            main([word, "--help"])
+        assert ended.value.code == 0
+        assert f"usage: softflagella {word} " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["export"], "no command 'export'; it is softflagella surrogate export"),
+        (["report"], "no command 'report'; it is softflagella dataset report"),
+        (["calibrat"], "no command 'calibrat'; is it calibrate?"),
+        (["qqq"], "no command 'qqq'; there are robot, steady"),
+        (["plan", "square:3l"], "required: --robot/--vehicle, --out; softflagella plan --help"),
+        (["planner", "fly"], "invalid choice: 'fly'"),
+        (["sim"], "required: COMMAND; softflagella sim --help"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_wrong_words_end_in_one_line(words: list[str], expected: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        raise SystemExit(run_command(main, words))
+    assert ended.value.code == 2
+    captured = capsys.readouterr()
+    (line,) = captured.err.splitlines()
+    assert line.startswith("error: ")
+    assert expected in line
+    assert captured.out == ""
+
+
+def test_effects_are_listed_with_a_sentence_each_and_the_version(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["--version"])
+    assert capsys.readouterr().out == f"softflagella {sf.__version__}\n"
+    main(["effects"])
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(sf.effects())
+    assert all(len(line.split()) > 3 and line.endswith(".") for line in lines)
+
+
+SLOW = ("torch", "scipy.stats", "scipy.integrate", "matplotlib", "joblib")
+CODE = f"""
+import sys
+def check(*slow):
+    assert not set(slow) & set(sys.modules), set(slow) & set(sys.modules)
+import softflagella as sf
+check("numpy", "torch", "numba", "pandas", "matplotlib", "scipy", "pyarrow", "sim")
+from sim.io.errors import run_command
+from softflagella.__main__ import main
+folder = sys.argv[1]
+main(["query", "paper-control"])
+main(["steady", "paper-control"])
+main(["plan", "circle:1l", "--robot", "paper-control", "--objective", "flips", "--out", folder])
+check(*{SLOW!r}, "pandas", "pyarrow")
+main(["replay", folder + "/plan.json", "--out", folder + "/track.csv"])
+check(*{SLOW!r})
+assert run_command(main, ["train", folder, "--out", folder + "/m"]) == 2
+import numpy as np
+robot = sf.load_robot("paper-control")
+columns = {{name: np.array([value]) for name, value in robot.group_values().items()}}
+table = sf.load_table()
+table.query(columns | {{"dwell_bar": np.array([1.0])}}, intervals=True)
+table.response(columns)
+table.derivatives(columns, ["C_t", "disc_drag"])
+sf.Tracker(sf.restore_plan(folder + "/plan.json")).update(0.0)
+check("torch", "scipy.stats", "scipy.integrate", "joblib")
+"""
+
+
+def test_commands_and_answers_from_python_load_what_they_need(tmp_path: Path) -> None:
+    """A replay writes a table; training looks at its files before it loads torch."""
+    done = subprocess.run(
+        [sys.executable, "-c", CODE, str(tmp_path)],
+        capture_output=True, text=True, timeout=LIMIT, cwd=Path(__file__).parents[2],
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "track.csv").exists()

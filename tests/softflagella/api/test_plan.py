@@ -1,17 +1,23 @@
-"""Robots and paths in any form, for plans and goals; the robot's own table; checks of tracks."""
+"""The public functions of plans, swims and calibrations: robots and paths in any form, tracks, decisions."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import planner.vehicle.from_table
 import softflagella as sf
 import surrogate.tabulate
+from planner.tracking.swim import swim_under
+from sim.io.errors import InputError
+from tests.calibration.toy_tables import DRAG, START, ambiguous, on_the_toy, toy_table
 from tests.planner.plans import BIASED, CONTROL, own_table
+from tests.planner.vehicles import FINE
 
 KNOWN = sf.CalibrationKnowledge(names=("C_yr",), covariance=np.array([[0.01]]))
 
@@ -99,3 +105,74 @@ def test_a_track_is_checked_against_a_plan_in_any_form(tmp_path: Path) -> None:
     assert sf.check(result, camera).rms == pytest.approx(error.rms, rel=1e-9)
     with pytest.raises(sf.InputError, match="it needs time_s, x_cm"):
         sf.check(result, camera.drop(columns="x_cm"))
+
+
+@pytest.mark.slow
+def test_a_simulated_robot_swims_like_the_vehicle_of_its_plan() -> None:
+    plan = sf.plan(sf.circle(1.0), CONTROL, objective="flips")
+    simulated, moved = sf.swim(plan, camera=FINE), swim_under(sf.Tracker(plan), plan, plan.tracked.vehicle, FINE)
+    assert simulated.finished
+    assert simulated.rms() == pytest.approx(moved.rms(), rel=0.2)
+    assert len(simulated.dwells) == pytest.approx(len(moved.dwells), abs=1)
+    assert simulated.to_frame()["x_over_l"].to_numpy() == pytest.approx(simulated.poses[:, 0])
+
+
+@pytest.mark.slow
+def test_another_robot_with_an_askew_marker_in_a_current() -> None:
+    """A tail that is a tenth shorter has other units of time and length; those of the plan are told."""
+    plan = sf.plan(sf.circle(1.0), CONTROL, objective="flips")
+    other = replace(CONTROL, tail_length=0.95 * CONTROL.tail_length)
+    tracker = sf.Tracker(plan)
+    camera = replace(FINE, marker=(0.0, 0.0, 0.3))
+    result = sf.swim(tracker, other, camera, current_cm_s=(0.004, 0.0))
+    assert result.finished
+    assert result.rms() < 2 * plan.predicted_rms + 0.02
+    assert tracker.learned["marker, angle"] == pytest.approx(0.3, abs=0.05)
+    assert sf.check(plan, result.to_frame()).rms == pytest.approx(result.rms(), rel=0.05)
+
+
+@pytest.mark.parametrize("wrong", [{"noise": (0.0, 0.01)}, {"every_s": 0.0}, {"delay_s": -1.0}, {"lost": 1.5},
+                                   {"noise": (np.nan, 0.01)}])  # fmt: skip
+def test_a_camera_that_cannot_be_is_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(sf.InputError, match=f"{next(iter(wrong))} is"):
+        sf.Camera(**wrong)  # type: ignore[arg-type]
+
+
+def circle_track(run: int, samples: int) -> pd.DataFrame:
+    time = np.linspace(0, 120, samples)
+    angle = 0.05 * time
+    columns: dict[str, Any] = {"run": run, "time_s": time, "x_cm": 9 * np.cos(angle), "y_cm": 9 * np.sin(angle)}
+    return pd.DataFrame({**columns, "heading_deg": np.degrees(angle) + 20})
+
+
+def test_tracks_that_are_left_out_are_warned_of() -> None:
+    samples = pd.concat([circle_track(1, 200), circle_track(2, 5)])
+    runs = pd.DataFrame({"run": [1, 2], "N": 2, "l_cm": 11.0, "omega_rpm": 43.0})
+    with pytest.warns(UserWarning, match="excluded: run 2: 5 samples") as warned:
+        table = sf.tracks(samples, runs)
+    assert warned[0].filename == __file__
+    assert table["R_yr_cm"].round(6).tolist()[0] == 9.0
+    assert np.isnan(table["R_yr_cm"].iloc[1])
+    assert len(table.attrs["excluded"]) == 1
+    assert table.attrs["units"]["v_cm_s"] == "cm/s"
+
+
+@pytest.mark.slow
+def test_new_runs_decide_a_verdict_that_is_at_hand() -> None:
+    table = toy_table(1, lengths_cm=(8.0,), **{DRAG: 4.0})
+    more = toy_table(2, lengths_cm=(5.0, 11.0), **{DRAG: 4.0}).assign(session="new").sample(8, random_state=1)
+    with on_the_toy():
+        decision = sf.decide(pd.concat([table, more], ignore_index=True), ambiguous(), START)
+    assert decision.new_runs == 8
+    assert decision.decided == "head's end-over-end drag"
+    assert decision.sentence.startswith("Decided: head's end-over-end drag.")
+    assert not sf.Decision(decision.standings[:1] * 2, 8).decided
+
+
+def test_lengths_of_paths_have_the_unit_that_is_given() -> None:
+    with pytest.raises(InputError, match=r"missing\.csv"):
+        sf.calibrate("missing.csv", "paper-control", paths=("square:24",), unit="cm")
+    with pytest.raises(InputError, match="unit"):
+        sf.calibrate("missing.csv", "paper-control", paths=("square:24",))
+    with pytest.raises(InputError, match="max_seconds"):
+        sf.calibrate("missing.csv", "paper-control", max_seconds=0.0)
