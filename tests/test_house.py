@@ -1,13 +1,15 @@
-"""Imports run one way between packages and between rooms, and importing a package loads only what it uses."""
+"""Imports run one way and load only what is used; targets of tests, the list of benchmarks, pinned packages."""
 
 from __future__ import annotations
 
 import ast
 import json
+import re
 import subprocess
 import sys
 from functools import cache
 from graphlib import TopologicalSorter
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -110,3 +112,42 @@ def test_importing_loads_only_what_is_used() -> None:
         assert not set(modules) & (LIBRARIES | SOLVERS | others), name
     assert "surrogate.motions" in after_a_plan
     assert not set(after_a_plan) & (SIMULATOR | TRAINING | {"joblib", "pandas", "torch"})
+
+
+def test_each_test_belongs_to_one_target() -> None:
+    selections = re.findall(
+        r'^test\S*:.*\n\t\$\(RUN\) \$\(PYTEST\) -m "?([^"\n]+)"?$', (ROOT / "Makefile").read_text(), re.MULTILINE
+    )
+    assert len(selections) == 3
+    for rest, rates in product((False, True), repeat=2):
+        marks = {"rest": rest, "rates": rates}
+        assert sum(eval(selection, marks) for selection in selections) == 1
+
+
+def benchmarks(*words: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "benchmarks", *words]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=300)
+
+
+def test_the_list_names_each_benchmark() -> None:
+    listed = [line[2:].split()[0] for line in benchmarks().stdout.splitlines()[1:] if line[:2] in ("* ", "  ")]
+    files = (ROOT / "benchmarks").glob("*/*.py")
+    assert sorted(listed) == sorted(file.stem for file in files if "\ndef main(" in file.read_text())
+
+
+def test_an_unknown_name_is_refused() -> None:
+    done = benchmarks("accurracy")
+    assert (done.returncode, done.stderr) == (
+        2,
+        "error: no benchmark 'accurracy'; `python -m benchmarks` lists all\n",
+    )
+
+
+def test_each_package_has_a_version_and_hashes() -> None:
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    blocks = re.split(r"\n(?=\S)", "\n".join(line for line in lines if line[:1] != "#").strip())
+    assert len(blocks) > 100
+    for block in blocks:
+        assert re.match(r"[\w.\[\]-]+==[0-9][\w.+!]*( ; [^\\]+)? \\\n {4}--hash=sha256:[0-9a-f]{64}\b", block), (
+            block
+        )
