@@ -25,11 +25,12 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from camera.view import Markers, View, opencv
+from camera.view import BANDS, DOTS, Markers, View, opencv
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
@@ -47,7 +48,7 @@ _SHIFT = 0.0065  # of the bands' distance, of what shifts both: light from one s
 _WHOLE = 0.3  # of the bands' distance, half the length of a band that must be in the picture, and in the region
 _END = 0.18  # of the bands' distance, by which a band's centre moves for a whole band that is hidden at one end
 _CHANGED = 0.13  # of a band's usual area, by which another area shows that it is hidden or has a thing beside it
-_NOISE = 20.0  # pixels, three standard deviations of a band's area in a compressed film
+_NOISE = 25.0  # pixels, three to four standard deviations of a band's area in a compressed film
 _OTHER = 0.3  # of a band's usual area, by which it may differ where the robot was not seen for _MEMORY pictures
 _MEMORY = 20  # pictures over which distance and areas are averaged
 _CORNER = 0.25  # standard error of a tag's corner [pixels]
@@ -77,14 +78,20 @@ class Lost(NamedTuple):
 
 
 @dataclass
-class _Memory:
-    """What is known of a robot from the pictures before."""
+class _Robot:
+    """A robot's markers, and what is known of it from the pictures before."""
 
+    markers: Markers
     places: dict[str, Floats] = field(default_factory=dict)  # of the markers [pixels]; none: to be looked for
     apart: float = math.nan  # distance of front and rear, or side of the tag [m]
     areas: dict[str, float] = field(default_factory=dict)  # of the bands [m²]
     seen: int = 0  # pictures
     missed: int = 0  # pictures in a row
+
+    @property
+    def known(self) -> float:
+        """The distance of its bands [m]; NaN: it is not known."""
+        return self.apart if self.seen else self.markers.apart
 
 
 class _Blob(NamedTuple):
@@ -107,17 +114,14 @@ class Detector:
         Raises:
             InputError: OpenCV is not installed.
         """
-        self.view, self._robots, self._head_length = view, tuple(robots), head_length
-        self._cv = opencv()
+        self.view, self._robots, self._head_length = view, [_Robot(each) for each in robots], head_length
+        self._cv = cv = opencv()
         self._mask: Any = None
-        self._memory = [_Memory() for _ in self._robots]
-        aruco = self._cv.aruco
-        self._finder = self._reader(aruco.CORNER_REFINE_NONE)
+        self._finder = self._reader(cv.aruco.CORNER_REFINE_NONE)
         self._refiners = (  # the first counts from a pixel's corner
-            (self._reader(aruco.CORNER_REFINE_APRILTAG), 0.5, _CORNER),
-            (self._reader(aruco.CORNER_REFINE_CONTOUR), 0.0, 2 * _CORNER),
+            (self._reader(cv.aruco.CORNER_REFINE_APRILTAG), 0.5, _CORNER),
+            (self._reader(cv.aruco.CORNER_REFINE_CONTOUR), 0.0, 2 * _CORNER),
         )
-        self._seen_tags: dict[int, Floats] | None = None  # in the whole of the picture at hand
 
     def poses(self, frame: Any) -> list[Pose | Lost]:
         """Return the pose of each robot, or why it is not seen, in the order of the robots.
@@ -133,34 +137,32 @@ class Detector:
         if self.view.region is not None and self._mask is None:
             self._mask = np.zeros(frame.shape[:2], np.uint8)
             self._cv.fillPoly(self._mask, [np.round(self.view.region).astype(np.int32)], 255)
-        self._seen_tags = None
         if self.view.homography is None:
             assert self.view.tag is not None
             number = self.view.tag[0]
-            corners = self._tags(frame).get(number)
-            if corners is None:
-                return [Lost(each.name, f"no tag {number} that gives the scale") for each in self._robots]
-            corners, error = self._refined(frame, number, corners)
+            tag = self._tag(number, frame)
+            if tag is None:
+                return [Lost(each.markers.name, f"no tag {number} that gives the scale") for each in self._robots]
+            corners, error = tag
             self.view = self.view.with_tag(corners, _SIDE if error > _CORNER else _CORNER * math.sqrt(2))
-        found = []
-        for markers, memory in zip(self._robots, self._memory, strict=True):
-            look = self._by_bands if markers.tag is None else self._by_tag
-            known = bool(memory.places)
-            pose = look(markers, memory, frame)
-            if known and isinstance(pose, Lost):  # where it was expected
-                memory.places.clear()
-                pose = look(markers, memory, frame)
-            if isinstance(pose, Lost):
-                memory.places.clear()
-                memory.missed += 1
-                if memory.missed > memory.seen:  # what was seen may have been something else
-                    memory.seen = 0
-                if memory.missed > max(memory.seen, _MEMORY):
-                    memory.areas.clear()
-            else:
-                memory.seen, memory.missed = memory.seen + 1, 0
-            found.append(pose)
-        return found
+        return [self._look(robot, frame) for robot in self._robots]
+
+    def _look(self, robot: _Robot, frame: Any) -> Pose | Lost:
+        """Look for a robot where it is expected, then everywhere, and remember."""
+        look = self._by_bands if robot.markers.tag is None else self._by_tag
+        pose = look(robot, frame)
+        if isinstance(pose, str) and robot.places:
+            robot.places = {}
+            pose = look(robot, frame)
+        if isinstance(pose, Pose):
+            robot.seen, robot.missed = robot.seen + 1, 0
+            return pose
+        robot.places, robot.missed = {}, robot.missed + 1
+        if robot.missed > robot.seen:  # what was seen may have been something else
+            robot.seen = 0
+            if robot.missed > _MEMORY:
+                robot.areas = {}
+        return Lost(robot.markers.name, pose)
 
     # Tags
 
@@ -172,28 +174,24 @@ class Detector:
         known = aruco.getPredefinedDictionary(getattr(aruco, f"DICT_{self.view.dictionary.upper()}"))
         return aruco.ArucoDetector(known, options)
 
-    def _tags(self, frame: Any, around: Floats | None = None) -> dict[int, Floats]:
-        """Find the tags of a picture, or of its part around corners (4, 2) [pixels]; number -> corners."""
-        if around is not None:
-            return self._read(self._finder, frame, around)
-        if self._seen_tags is None:
-            self._seen_tags = self._read(self._finder, frame)
-        return self._seen_tags
-
-    def _refined(self, frame: Any, number: int, corners: Floats) -> tuple[Floats, float]:
+    def _tag(self, number: int, frame: Any, around: Floats | None = None) -> tuple[Floats, float] | None:
         """Return the corners (4, 2) of a tag from lines along its sides, and their standard error [pixels].
 
         Where the sides are too short or blurred for lines through the steepest grey, or white on black, those
         through the outline serve, with which a tag is up to 3 pixels smaller or larger than it is.
         """
+        corners = self._read(self._finder, number, frame, around)
+        if corners is None:
+            return None
         for reader, shift, error in self._refiners:
             with suppress(self._cv.error):  # of an outline with too few pixels on one side
-                refined = self._read(reader, frame, corners).get(number)
+                refined = self._read(reader, number, frame, corners)
                 if refined is not None:
                     return refined - shift, error
         return corners, 4 * _CORNER
 
-    def _read(self, reader: Any, frame: Any, around: Floats | None = None) -> dict[int, Floats]:
+    def _read(self, reader: Any, number: int, frame: Any, around: Floats | None) -> Floats | None:
+        """Return the corners (4, 2) of a tag in a picture, or in its part around the corners that it had."""
         low = np.zeros(2, int)
         if around is not None:
             side = np.ptp(around, axis=0).max()
@@ -201,203 +199,183 @@ class Detector:
             right, down = (around.max(axis=0) + side).astype(int)
             frame = frame[low[1] : down, low[0] : right]
         corners, numbers, _ = reader.detectMarkers(self._cv.cvtColor(frame, self._cv.COLOR_BGR2GRAY))
-        known = [] if numbers is None else np.asarray(numbers).reshape(-1).tolist()
-        return {n: low + np.asarray(c, dtype=float)[0] for n, c in zip(known, corners, strict=False)}
+        found = np.flatnonzero(np.asarray(numbers) == number)  # None, where there is no tag
+        return low + np.asarray(corners[found[-1]], dtype=float)[0] if len(found) else None
 
-    def _by_tag(self, markers: Markers, memory: _Memory, frame: Any) -> Pose | Lost:
+    def _by_tag(self, robot: _Robot, frame: Any) -> Pose | str:
         """Fit a square to the corners: first the upper left one, then clockwise, as the camera sees them."""
-        number = int(markers.tag or 0)
-        corners = self._tags(frame, memory.places.get("tag")).get(number)
-        if corners is None or not self._inside(corners.mean(axis=0)):
-            return Lost(markers.name, f"no tag {number}")
-        corners, error = self._refined(frame, number, corners)
-        memory.places = {"tag": corners}
+        number = int(robot.markers.tag or 0)
+        tag = self._tag(number, frame, robot.places.get("tag"))
+        if tag is None or not self._inside(tag[0].mean(axis=0)):
+            return f"no tag {number}"
+        corners, error = tag
+        robot.places = {"tag": corners}
         places = self.view.to_tank(corners)
         centre = places.mean(axis=0)
-        square = np.array([1 + 1j, 1 - 1j, -1 - 1j, -1 + 1j]) * np.exp(1j * markers.turned)  # forward + i left
+        square = np.array([1 + 1j, 1 - 1j, -1 - 1j, -1 + 1j]) * np.exp(
+            1j * robot.markers.turned
+        )  # forward + i left
         square = square.conj() if self.view.up else square
         arms = (places - centre) @ [1, 1j]
         turn = (square.conj() @ arms) / 8
         misfit = float(np.sum(np.abs(arms - turn * square) ** 2))  # with four degrees of freedom
         pixel = self.view.metres(corners.mean(axis=0))
         sigma = math.sqrt(((error * pixel) ** 2 + misfit / 4) / 2)  # of a corner
-        heading, half = float(np.angle(turn)), abs(turn)
-        memory.apart = 2 * half
-        place, turned = math.hypot(sigma / 2, _MOVED * pixel), sigma / math.sqrt(8) / half
-        return self._pose(markers, centre, heading, place, turned, memory, frame, corners)
+        place, turned = math.hypot(sigma / 2, _MOVED * pixel), sigma / math.sqrt(8) / abs(turn)
+        robot.apart = 2 * abs(turn)
+        return self._pose(robot, frame, centre, float(np.angle(turn)), place, turned, corners)
 
     # Bands
 
-    def _by_bands(self, markers: Markers, memory: _Memory, frame: Any) -> Pose | Lost:
-        hues = {"front": markers.front, "rear": markers.rear}
-        searched = not memory.places
-        places = self._search(markers, memory, frame, hues) if searched else memory.places
+    def _by_bands(self, robot: _Robot, frame: Any) -> Pose | str:
+        first = 0.5 if robot.places else 0.4
+        places = robot.places or self._search(robot, frame)
         if isinstance(places, str):
-            return Lost(markers.name, places)
-        distance = float(np.linalg.norm(places["front"] - places["rear"]))
-        first = distance * (0.4 if searched else 0.5)
-        blobs = {}
-        for name, hue in hues.items():
+            return places
+        distance, blobs = float(np.linalg.norm(places["front"] - places["rear"])), list[_Blob]()
+        for name in BANDS:
             centre = places[name]
-            for reach in (first, 0.45 * distance, 0.45 * distance):
-                blob = self._blob(frame, hue, centre, reach, distance)
+            for reach in (first, 0.45, 0.45):
+                blob = self._blob(frame, robot.markers.hues[name], centre, reach * distance, distance)
                 if blob is None:
-                    return Lost(markers.name, f"no {markers.colours[name]}")
-                blobs[name], centre = blob, blob.centre
-        return self._pair(markers, memory, frame, blobs)
+                    return f"no {robot.markers.colours[name]}"
+                centre = blob.centre
+            assert blob is not None
+            blobs.append(blob)
+        return self._pair(robot, frame, blobs)
 
-    def _pair(self, markers: Markers, memory: _Memory, frame: Any, blobs: Mapping[str, _Blob]) -> Pose | Lost:
+    def _pair(self, robot: _Robot, frame: Any, blobs: Sequence[_Blob]) -> Pose | str:
         """Check a pair of bands against what is known of them, and return its pose."""
-        marks = np.stack([blob.centre for blob in blobs.values()])
-        places = self.view.to_tank(marks)
+        marks = np.stack([blob.centre for blob in blobs])
+        places, known = self.view.to_tank(marks), robot.known
         arm, distance = places[0] - places[1], float(np.linalg.norm(marks[0] - marks[1]))
         apart = float(np.hypot(*arm))
-        known = memory.apart if memory.seen else markers.apart
         if not distance > 0 or abs(apart / known - 1) > _ALIKE:
-            return Lost(markers.name, wrong_distance(markers))
+            return wrong_distance(robot.markers)
         side = _WHOLE * (marks[0] - marks[1])[::-1] * [1, -1]  # from a band's centre to its end
         ends = np.concatenate([marks + side, marks - side])
         if (ends < 0).any() or (ends > np.array(frame.shape[1::-1]) - 1).any():
-            return Lost(markers.name, "at the edge of the picture")
-        if not all(self._inside(end) for end in ends):
-            return Lost(markers.name, "outside the region of the tank")
-        metres, forget, anew = apart / distance, min(memory.seen + 1, _MEMORY), memory.missed > _MEMORY
+            return "at the edge of the picture"
+        if not all(map(self._inside, ends)):
+            return "outside the region of the tank"
+        metres, forget, anew = apart / distance, min(robot.seen + 1, _MEMORY), robot.missed > _MEMORY
         bias = math.hypot(_BIAS * distance, _PIXEL)
         variance, areas = 0.0, {}  # of the difference of the centres, in squares of pixels
-        for name, blob in blobs.items():
+        for name, blob in zip(BANDS, blobs, strict=True):
             pixel = self.view.metres(blob.centre) ** 2
             area = blob.area * pixel
-            usual = memory.areas.get(name, area)
+            usual = robot.areas.get(name, area)
             least = 1 - (_OTHER if anew else min(max(_CHANGED, _NOISE * pixel / usual), _OTHER))
             if area < least * usual:
-                return Lost(markers.name, f"{markers.colours[name]} partly hidden")
+                return f"{robot.markers.colours[name]} partly hidden"
             if area * least > usual:
-                return Lost(markers.name, f"more that is {markers.colours[name]} beside it")
+                return f"more that is {robot.markers.colours[name]} beside it"
             areas[name] = area if anew else usual + (area - usual) / forget  # the light may have changed
             variance += blob.error**2 + bias**2 + (_END * distance * (1 - area / usual)) ** 2
-        memory.apart = known + (apart - known) / forget if memory.seen else apart
-        memory.places, memory.areas = {name: blob.centre for name, blob in blobs.items()}, areas
+        robot.apart = known + (apart - known) / forget if robot.seen else apart
+        robot.places, robot.areas = dict(zip(BANDS, marks, strict=True)), areas
         error = metres * math.sqrt(variance)
-        sigma = math.hypot(error / 2, (apart - memory.apart) / 2, _SHIFT * apart)
-        heading = math.atan2(arm[1], arm[0])
-        return self._pose(markers, places.mean(axis=0), heading, sigma, error / apart, memory, frame, marks)
+        sigma = math.hypot(error / 2, (apart - robot.apart) / 2, _SHIFT * apart)
+        return self._pose(
+            robot, frame, places.mean(axis=0), math.atan2(arm[1], arm[0]), sigma, error / apart, marks
+        )
 
     def _pose(
-        self, markers: Markers, centre: Floats, heading: float, sigma: float, sigma_heading: float,
-        memory: _Memory, frame: Any, marks: Floats,
+        self, robot: _Robot, frame: Any, centre: Floats, heading: float, sigma: float, sigma_heading: float,
+        marks: Floats,
     ) -> Pose:  # fmt: skip
         """Move the pose to the head's centre, and look for the dots."""
-        axis = np.array([math.cos(heading), math.sin(heading)])
+        markers, axis = robot.markers, np.array([math.cos(heading), math.sin(heading)])
         x, y = (centre - markers.ahead * axis).tolist()
+        dots = {name: self._dot(robot, frame, centre, axis, name) for name in DOTS if name in markers.hues}
         sigma = math.hypot(sigma, markers.ahead * sigma_heading)
-        dots = {name: self._dot(frame, hue, centre, axis, name, memory) for name, hue in markers.dots.items()}
-        shown = tuple((float(u), float(v)) for u, v in marks)
-        return Pose(markers.name, x, y, heading, sigma, sigma_heading, dots, shown)
+        return Pose(markers.name, x, y, heading, sigma, sigma_heading, dots, tuple(map(tuple, marks.tolist())))
 
-    def _dot(
-        self, frame: Any, hue: float, centre: Floats, axis: Floats, name: str, memory: _Memory
-    ) -> tuple[float, float]:
+    def _dot(self, robot: _Robot, frame: Any, centre: Floats, axis: Floats, name: str) -> tuple[float, float]:
         """Return how far a dot is left of the axis [m] and its seen area [m²]; (nan, 0) where it is not seen."""
-        back, ahead, side = (memory.apart * reach for reach in _REACH[name])
+        back, ahead, side = (robot.apart * reach for reach in _REACH[name])
         left = np.array([-axis[1], axis[0]])
         corners = np.array([centre + a * axis + b * left for a in (back, ahead) for b in (-side, side)])
         outline = self.view.to_picture(corners)
         middle, reach = outline.mean(axis=0), float(np.ptp(outline, axis=0).max()) / 2
         metres = self.view.metres(middle)
-        blob = self._blob(frame, hue, middle, reach, memory.apart / metres)
-        if blob is None:
-            return math.nan, 0.0
-        offset = self.view.to_tank(blob.centre)[0] - centre
-        along, across = float(offset @ axis), float(offset @ left)
-        if not (back <= along <= ahead and abs(across) <= side):
-            return math.nan, 0.0
-        return across, blob.area * metres**2
+        blob = self._blob(frame, robot.markers.hues[name], middle, reach, robot.apart / metres)
+        if blob is not None:
+            along, across = (self.view.to_tank(blob.centre)[0] - centre) @ np.column_stack([axis, left])
+            if back <= along <= ahead and abs(across) <= side:
+                return float(across), blob.area * metres**2
+        return math.nan, 0.0
 
     # Colours
 
     def _inside(self, pixel: Floats) -> bool:
-        if self.view.region is None:
-            return True
-        return bool(self._cv.pointPolygonTest(self.view.region.astype(np.float32), pixel.tolist(), False) >= 0)
+        region = self.view.region
+        return region is None or self._cv.pointPolygonTest(region.astype(np.float32), pixel.tolist(), False) >= 0
 
-    def _weights(self, picture: Any, hue: float) -> Any:
-        """Return p of a hue where it counts as that hue, 0 elsewhere."""
-        c, s, root = math.cos(math.radians(hue)), math.sin(math.radians(hue)), math.sqrt(3) / 2
-        alpha, beta = np.array([-0.5, -0.5, 1.0]), np.array([-root, root, 0.0])  # of blue, green, red
-        mixed = self._cv.transform(
-            picture.astype(np.float32), np.array([c * alpha + s * beta, c * beta - s * alpha], np.float32)
-        )
-        p, q = mixed[..., 0], mixed[..., 1]
-        return np.where(np.abs(q) < _CONE * p, p, np.float32(0))
-
-    def _weights_in(self, picture: Any, hue: float, box: tuple[slice, slice], size: tuple[int, int]) -> Any:
-        """Return the weights of a part of the picture, made smaller, without what is no robot's."""
+    def _weights(self, picture: Any, hue: float, box: tuple[slice, slice], size: tuple[int, int]) -> Any:
+        """Return p of a hue where it counts as that hue, 0 elsewhere, in a part of the picture made smaller."""
 
         def part(whole: Any) -> Any:
             return self._cv.resize(whole[box], size, interpolation=self._cv.INTER_AREA)
 
-        weights = self._weights(part(picture), hue)
+        c, s, root = math.cos(math.radians(hue)), math.sin(math.radians(hue)), math.sqrt(3) / 2
+        alpha, beta = np.array([-0.5, -0.5, 1.0]), np.array([-root, root, 0.0])  # of blue, green, red
+        axes = np.array([c * alpha + s * beta, c * beta - s * alpha], np.float32)
+        p, q = self._cv.split(self._cv.transform(part(picture).astype(np.float32), axes))
+        weights = np.where(np.abs(q) < _CONE * p, p, np.float32(0))
         if self._mask is not None:
             weights[part(self._mask) < 128] = 0
         return weights
 
     def _blob(self, frame: Any, hue: float, centre: Floats, reach: float, distance: float) -> _Blob | None:
         """Return the weighted mean of the pixels of a hue around a place; None if there are none to speak of."""
-        height, width = frame.shape[:2]
         fold = max(int(distance / _FINE), 1)  # pixels that become one, each way
-        left, top = (max(int(value - reach), 0) for value in centre)
-        across, down = ((min(int(c + reach) + 2, n) - low) // fold for c, n, low in
-                        ((centre[0], width, left), (centre[1], height, top)))  # fmt: skip
+        low = np.maximum((centre - reach).astype(int), 0)
+        across, down = (np.minimum((centre + reach).astype(int) + 2, frame.shape[1::-1]) - low) // fold
         if across < 3 or down < 3:
             return None
-        box = (slice(top, top + down * fold), slice(left, left + across * fold))
-        weights = self._weights_in(frame, hue, box, (across, down))
+        box = (slice(low[1], low[1] + down * fold), slice(low[0], low[0] + across * fold))
+        weights = self._weights(frame, hue, box, (int(across), int(down)))
         steps = np.diff(frame[box][:: 2 * fold, ::fold, 1].astype(np.float32), axis=1)
         noise = max(1.05 * float(np.median(np.abs(steps))), 0.5)
         peak = float(np.partition(weights.ravel(), -6)[-6])
         if peak < max(_FAINT, 5 * noise / fold):
             return None
         weights = np.maximum(weights - _EDGE * peak, 0)
-        counted, total = weights > 0, float(weights.sum())
-        area = float(np.minimum(weights / (_EDGE * peak), 1).sum()) * fold**2  # a pixel at its edge counts in part
-        place, spread = [], 0.0
-        for axis, count in enumerate((across, down)):
-            at = np.arange(count)
-            place.append(float(weights.sum(axis=axis) @ at) / total)
-            spread += float(counted.sum(axis=axis) @ (at - place[-1]) ** 2) / 2
+        total, at = float(weights.sum()), np.indices(weights.shape)[::-1]
+        place = (weights * at).sum(axis=(1, 2)) / total
+        spread = float(((at - place[:, None, None]) ** 2 * (weights > 0)).sum()) / 2
         error = 1.2 * noise * math.sqrt(spread) / total  # p has √(3/2) times the noise of a colour; × fold / fold
-        low = np.array([left, top])
-        return _Blob(low + (np.array(place) + 0.5) * fold - 0.5, area, error)
+        area = float(np.minimum(weights / (_EDGE * peak), 1).sum()) * fold**2  # a pixel at its edge counts in part
+        return _Blob(low + (place + 0.5) * fold - 0.5, area, error)
 
-    def _search(
-        self, markers: Markers, memory: _Memory, frame: Any, hues: Mapping[str, float]
-    ) -> dict[str, Floats] | str:
+    def _search(self, robot: _Robot, frame: Any) -> dict[str, Floats] | str:
         """Look for the pair in the whole picture, made smaller; return its places, or why it is not there."""
         height, width = frame.shape[:2]
-        factor = max(width / _WIDTH, 1.0)
-        size = (round(width / factor), round(height / factor))
-        found: dict[str, list[tuple[float, Floats]]] = {}
-        for name, hue in hues.items():
-            weights = self._cv.blur(self._weights_in(frame, hue, (slice(None), slice(None)), size), (3, 3))
-            weights[weights < max(_FAINT / 2, _RIVAL * float(weights.max()))] = 0
-            found[name] = [(p, (place + 0.5) * factor - 0.5) for p, place in self._patches(weights)]
-            if not found[name]:
-                return f"no {markers.colours[name]}"
-        known = memory.apart if memory.seen else markers.apart
-        best, chosen = 0.0, None
-        for strength, front in found["front"]:
-            for other, rear in found["rear"]:
-                apart = float(np.hypot(*np.diff(self.view.to_tank(np.stack([front, rear])), axis=0)[0]))
-                if known > 0:
-                    fit = math.exp(-(((apart / known - 1) / _ALIKE) ** 2))
-                else:
-                    fit = 1 / apart if apart < 1.1 * self._head_length or math.isnan(self._head_length) else 0.0
-                if np.linalg.norm(front - rear) > 3 and fit * min(strength, other) > best:
-                    best, chosen = fit * min(strength, other), {"front": front, "rear": rear}
-        return chosen or wrong_distance(markers)
+        factor, whole = max(width / _WIDTH, 1.0), (slice(None), slice(None))
+        found = []
+        for name in BANDS:
+            weights = self._weights(
+                frame, robot.markers.hues[name], whole, (round(width / factor), round(height / factor))
+            )
+            found.append([(p, (place + 0.5) * factor - 0.5) for p, place in self._patches(weights)])
+            if not found[-1]:
+                return f"no {robot.markers.colours[name]}"
+        known, best, chosen = robot.known, 0.0, None
+        for (strength, front), (other, rear) in product(*found):
+            apart = float(np.hypot(*np.diff(self.view.to_tank(np.stack([front, rear])), axis=0)[0]))
+            if known > 0:
+                fit = math.exp(-(((apart / known - 1) / _ALIKE) ** 2))
+            else:
+                fit = 0.0 if apart > 1.1 * self._head_length else 1 / apart
+            if np.linalg.norm(front - rear) > 3 and fit * min(strength, other) > best:
+                best, chosen = fit * min(strength, other), {"front": front, "rear": rear}
+        return chosen or wrong_distance(robot.markers)
 
     def _patches(self, weights: Any) -> list[tuple[float, Floats]]:
         """Return the strongest connected patches: their largest weights, and their centres (2,)."""
+        weights = self._cv.blur(weights, (3, 3))
+        weights[weights < max(_FAINT / 2, _RIVAL * float(weights.max()))] = 0
         count, labels, _, centres = self._cv.connectedComponentsWithStats(
             self._cv.dilate((weights > 0).astype(np.uint8), np.ones((3, 3), np.uint8))
         )

@@ -37,10 +37,9 @@ class LensFit(NamedTuple):
 
     def lines(self) -> str:
         """Write the table [lens] of a view.toml."""
-        focal, centre, distortion = (
-            ", ".join(f"{value:.{digits}f}" for value in part)
-            for part, digits in zip(self.lens, (2, 2, 5), strict=True)
-        )
+        matrix = self.lens.matrix
+        parts = matrix.diagonal()[:2], matrix[:2, 2], self.lens.distortion
+        focal, centre, distortion = (", ".join(f"{value:.5f}" for value in part) for part in parts)
         return (
             f"[lens]  # {self.pictures} pictures of a chessboard, reprojection error {self.error:.2g} pixels\n"
             f"focal_px = [{focal}]\ncentre_px = [{centre}]\ndistortion = [{distortion}]\n"
@@ -97,9 +96,8 @@ def calibrate_lens(pictures: Sequence[str | Path], *, squares: str = "10x7") -> 
         )
         if abs(distortion.ravel()[4]) > _SEEN * sigmas.ravel()[8]:
             break
-    focal = np.array([matrix[0, 0], matrix[1, 1]])
-    lens = Lens(focal, np.array([matrix[0, 2], matrix[1, 2]]), distortion.ravel()[:5])
-    unsure = float(np.max(sigmas.ravel()[:2] / focal))
+    lens = Lens(matrix, distortion.ravel()[:5])
+    unsure = float(np.max(sigmas.ravel()[:2] / matrix.diagonal()[:2]))
     if unsure > _UNSURE:
         notes.append(
             f"the focal length is uncertain by {100 * unsure:.0f} %: tilt the board more, each time otherwise"

@@ -20,7 +20,7 @@ from camera.circle import LEAST_TURN, fit_track
 from camera.detector import Detector, Lost, Pose, wrong_distance
 from camera.film import Film
 from camera.spin import Spin, aliasing, fit_spin
-from camera.view import Markers, Setup, View, opencv
+from camera.view import DOTS, Markers, Setup, View, opencv
 from sim.io.errors import InputError, naming
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def track_film(
             raise InputError(f"no frame between {start:g} and {end:g} s; the film has {film.count} frames")
         tables = _tables(Path(path).stem, setup, rows, why, len(times) - doubled)
         notes = _notes(np.array(times), doubled, why)
-        if any(each.dots for each in setup.robots) and len(times) > 1:
+        if any(set(DOTS) & set(each.hues) for each in setup.robots) and len(times) > 1:
             notes += filter(None, [aliasing(np.array(times), motor_speed)])
         for name, table in tables.items():
             if _spin_sense(table, motor_speed) * turn_sense(table) > 0:

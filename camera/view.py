@@ -32,15 +32,18 @@ from sim.io.reading import read_toml
 from sim.io.units import split, to_si
 
 HUES = {"red": 0, "orange": 30, "yellow": 60, "green": 120, "cyan": 180, "blue": 240, "magenta": 300}  # degrees
+BANDS = ("front", "rear")
 DOTS = ("head", "tail")  # markers that come and go as the robot spins
 _CLICK = 1.0  # pixels, standard deviation of a point that a person reads off a picture
+_APART = 40  # degrees between the hues of two markers
+_NARROW = 1e-3  # of the length of a set of points, its width at which they lie on a line
 _STRETCH = 1.15  # greatest ratio of the sides of a tag from which the scale alone is taken
 _KEYS = {
     "": ("looks", "dictionary", "scale", "lens", "tank", "robots"),
     "scale": ("points_px", "tag_id"),
     "lens": ("focal_px", "centre_px", "distortion"),
     "tank": ("region_px",),
-    "robots": ("name", "front", "rear", *DOTS, "tag", "turned_deg"),
+    "robots": ("name", *BANDS, *DOTS, "tag", "turned_deg"),
 }
 _LENGTHS = {"scale": ("points", "length", "tag"), "robots": ("ahead", "apart")}  # their keys have a unit
 EXAMPLE = """\
@@ -83,32 +86,22 @@ def opencv() -> Any:
 
 
 class Markers(NamedTuple):
-    """How a robot is marked: by two colours, front and rear, or by a tag; and the dots on head and tail."""
+    """How a robot is marked: by bands of two colours or by a tag, and by dots on head and tail."""
 
     name: str
-    front: float = math.nan  # hue [deg]
-    rear: float = math.nan
-    dots: Mapping[str, float] = {}  # "head" or "tail" -> hue [deg]
-    colours: Mapping[str, str] = {}  # marker -> the colour as it was given
+    hues: Mapping[str, float] = {}  # of the bands and dots, by BANDS and DOTS [deg]
+    colours: Mapping[str, str] = {}  # as they were given
     tag: int | None = None
     ahead: float = 0.0  # of the markers' middle from the head's centre [m]
     apart: float = math.nan  # distance of front and rear [m]; NaN: learnt from the film
-    turned: float = (
-        0.0  # of the tag's upper edge from the robot's front, counter-clockwise as the camera sees it [rad]
-    )
+    turned: float = 0.0  # of a tag's upper edge from the front, counter-clockwise as the camera sees it [rad]
 
 
 class Lens(NamedTuple):
-    """A pinhole camera with the distortion (k1, k2, p1, p2, k3) of OpenCV."""
+    """A pinhole camera with OpenCV's distortion."""
 
-    focal: Floats  # (2,) pixels
-    centre: Floats  # (2,) pixels
-    distortion: Floats  # (5,)
-
-    @property
-    def matrix(self) -> Floats:
-        """The matrix (3, 3) of the pinhole camera."""
-        return np.array([[self.focal[0], 0, self.centre[0]], [0, self.focal[1], self.centre[1]], [0, 0, 1.0]])
+    matrix: Floats  # (3, 3), with focal lengths and centre [pixels]
+    distortion: Floats  # (5,) k1, k2, p1, p2, k3
 
 
 @dataclass(frozen=True)
@@ -126,26 +119,20 @@ class View:
     def to_tank(self, pixels: Floats) -> Floats:
         """Map pixels (n, 2) to places in the tank (n, 2) [m]."""
         assert self.homography is not None
-        plane: Any = np.asarray(pixels, dtype=float).reshape(-1, 2)
+        plane: Any = np.asarray(pixels, dtype=float).reshape(-1, 1, 2)
         if self.lens is not None:
-            matrix = self.lens.matrix
-            plane = np.asarray(
-                opencv().undistortPoints(plane[:, None], matrix, self.lens.distortion, P=matrix)[:, 0],
-                dtype=np.float64,
-            )
-        return _projected(self.homography, plane)
+            plane = opencv().undistortPoints(plane, *self.lens, P=self.lens.matrix)
+        return _mapped(self.homography, plane)
 
     def to_picture(self, places: Floats) -> Floats:
         """Map places (n, 2) in the tank [m] to pixels (n, 2)."""
         assert self.homography is not None
-        inverse: Any = np.linalg.inv(self.homography)
-        pixels = _projected(inverse, np.asarray(places, dtype=float))
+        pixels = _mapped(np.linalg.inv(self.homography), np.asarray(places, dtype=float))
         if self.lens is None:
             return pixels
-        rays = np.column_stack([(pixels - self.lens.centre) / self.lens.focal, np.ones(len(pixels))])
+        rays = np.column_stack([pixels, np.ones(len(pixels))]) @ np.linalg.inv(self.lens.matrix).T
         zero = np.zeros(3)
-        seen = opencv().projectPoints(rays, zero, zero, self.lens.matrix, self.lens.distortion)[0]
-        return np.asarray(seen[:, 0], dtype=float)
+        return np.asarray(opencv().projectPoints(rays, zero, zero, *self.lens)[0][:, 0], dtype=float)
 
     def metres(self, pixel: Floats) -> float:
         """Return the length that one pixel has at a place in the picture [m]."""
@@ -194,9 +181,9 @@ def read_setup(path: str | Path) -> Setup:
         return _setup(read_toml(path))
 
 
-def _projected(homography: Any, points: Any) -> Floats:
-    mapped = np.column_stack([points, np.ones(len(points))]) @ homography.T
-    return mapped[:, :2] / mapped[:, 2:]
+def _mapped(homography: Any, points: Any) -> Floats:
+    mapped = np.column_stack([points.reshape(-1, 2), np.ones(len(points))]) @ homography.T
+    return np.asarray(mapped[:, :2] / mapped[:, 2:], dtype=np.float64)
 
 
 def _scaled(origin: Floats, scale: float, up: bool) -> Floats:
@@ -206,12 +193,13 @@ def _scaled(origin: Floats, scale: float, up: bool) -> Floats:
 
 
 def _setup(content: dict[str, Any]) -> Setup:
-    given = {"": content, **{name: content.get(name, {}) for name in ("scale", "lens", "tank")}}
-    robots = content.get("robots", [])
-    for table, entries in given.items():
+    _check_keys("", content)
+    scale, lens, tank = (content.get(table, {}) for table in ("scale", "lens", "tank"))
+    for table, entries in (("scale", scale), ("lens", lens), ("tank", tank)):
         if not isinstance(entries, dict):
             raise InputError(f"{table} is no table; write [{table}] and its entries below")
         _check_keys(table, entries)
+    robots = content.get("robots")
     if not isinstance(robots, list) or not robots or not all(isinstance(robot, dict) for robot in robots):
         raise InputError('no robot; write [[robots]] with front = "red" and rear = "green", or tag = 0')
     looks = content.get("looks", "down")
@@ -219,24 +207,23 @@ def _setup(content: dict[str, Any]) -> Setup:
         raise InputError(
             f'looks = {looks!r}; give "down" (the camera above the tank) or "up" (through its bottom)'
         )
-    lens = _lens(given["lens"]) if given["lens"] else None
-    region = _points(given["tank"], "region_px", 3) if "region_px" in given["tank"] else None
+    region = _points(tank, "region_px", 3) if "region_px" in tank else None
     dictionary = str(content.get("dictionary", View.dictionary)).lower()
     if dictionary not in (known := _dictionaries()):
         raise InputError(f"dictionary = {dictionary!r}; give one of OpenCV's: {', '.join(known)}")
-    view = View(lens=lens, region=region, up=looks == "up", dictionary=dictionary)
-    view = _with_scale(view, given["scale"])
-    marked = tuple(_markers(robot, number + 1) for number, robot in enumerate(robots))
+    view = View(lens=_lens(lens) if lens else None, region=region, dictionary=dictionary, up=looks == "up")
+    view = _with_scale(view, scale)
+    marked = tuple(_markers(robot, number) for number, robot in enumerate(robots, 1))
     if len({each.name for each in marked}) < len(marked):
         raise InputError("two robots have one name; give each [[robots]] a name of its own")
-    if len({each.tag if each.tag is not None else (each.front, each.rear) for each in marked}) < len(marked):
+    marks = {each.tag if each.tag is not None else tuple(map(each.hues.get, BANDS)) for each in marked}
+    if len(marks) < len(marked):
         raise InputError("two robots have the same markers; give each its own colours or tag")
     return Setup(view, marked)
 
 
 def _dictionaries() -> list[str]:
-    names = [name[5:].lower() for name in dir(opencv().aruco) if name.startswith("DICT_")]
-    return sorted(set(names))
+    return sorted({name[5:].lower() for name in dir(opencv().aruco) if name.startswith("DICT_")})
 
 
 def _check_keys(table: str, entries: Mapping[str, Any]) -> None:
@@ -257,7 +244,7 @@ def _with_scale(view: View, table: Mapping[str, Any]) -> View:
     if not math.isnan(tag):
         if not tag > 0:
             raise InputError("[scale] the tag's side is not above 0; give its length, tag_cm = 4")
-        return replace(view, tag=(_whole(table.get("tag_id", 0), "[scale] tag_id"), tag))
+        return replace(view, tag=(_tag_number(table.get("tag_id", 0), "[scale] tag_id"), tag))
     if "points_px" not in table:
         raise InputError(
             "no scale; give [scale] points_px = [[100, 650], [900, 650]] and length_cm = 30, two points of a "
@@ -281,71 +268,56 @@ def _with_scale(view: View, table: Mapping[str, Any]) -> View:
 
 
 def _from_places(view: View, plane: Floats, places: Floats) -> View:
-    """Fit a homography to points (n, 2) and their places (n, 2) by the direct linear transformation."""
+    """Fit a homography to points (n, 2) and their places (n, 2) [m]."""
     if len(places) != len(plane):
         raise InputError(f"[scale] {len(plane)} points_px and {len(places)} places; give a place for each point")
-    shift, size = plane.mean(axis=0), float(plane.std()) or 1.0
-    unit, far = (plane - shift) / size, float(np.abs(places).max()) or 1.0
-    rows = []
-    for (u, v), (x, y) in zip(unit, places / far, strict=True):
-        rows += [[u, v, 1, 0, 0, 0, -x * u, -x * v, -x], [0, 0, 0, u, v, 1, -y * u, -y * v, -y]]
-    *_, values, solution = np.linalg.svd(np.array(rows))
-    homography = np.diag([far, far, 1.0]) @ solution[-1].reshape(3, 3)
-    homography = homography @ np.array([[1, 0, -shift[0]], [0, 1, -shift[1]], [0, 0, size]]) / size
-    if values[7] < 1e-6 * values[0] or not abs(homography[2, 2]) > 0:
+    spreads = [np.linalg.svd(points - points.mean(axis=0), compute_uv=False) for points in (plane, places)]
+    homography = None
+    if all(narrow > _NARROW * wide for wide, narrow in spreads):
+        homography, _ = opencv().findHomography(plane, places)
+    if homography is None:
         raise InputError("[scale] the points lie on a line; give the corners of a rectangle")
-    homography = homography / (homography[2] @ [*shift, 1.0])
-    mirrored = np.linalg.det(homography) > 0
-    if mirrored != view.up:
+    homography = homography / (homography[2] @ [*plane.mean(axis=0), 1.0])
+    if (np.linalg.det(homography) > 0) != view.up:
         other = "down" if view.up else "up"
         raise InputError(
             "[scale] points_px and their places are mirror images of each other: give places with y "
             f'counter-clockwise from x, seen from above, or looks = "{other}"'
         )
-    return replace(view, homography=homography, scale_error=_CLICK * math.sqrt(2 / len(plane)) / (2 * size))
+    error = _CLICK * math.sqrt(2 / len(plane)) / (2 * float(plane.std()))
+    return replace(view, homography=homography, scale_error=error)
 
 
 def _lens(table: Mapping[str, Any]) -> Lens:
-    parts = []
-    for name, count in (("focal_px", 2), ("centre_px", 2), ("distortion", 5)):
-        numbers = table.get(name)
-        if not isinstance(numbers, list) or len(numbers) != count or not all(map(_is_number, numbers)):
+    focal, centre, distortion = (_numbers(table.get(name)) for name in _KEYS["lens"])
+    for name, numbers, count in zip(_KEYS["lens"], (focal, centre, distortion), (2, 2, 5), strict=True):
+        if numbers.shape != (count,):
             raise InputError(f"[lens] {name}: give {count} numbers, as OpenCV calibrates them")
-        parts.append(np.array(numbers, dtype=float))
-    if not (parts[0] > 0).all():
+    if not (focal > 0).all():
         raise InputError("[lens] focal_px: give numbers above 0")
-    return Lens(*parts)
+    return Lens(np.array([[focal[0], 0, centre[0]], [0, focal[1], centre[1]], [0, 0, 1.0]]), distortion)
 
 
 def _markers(table: Mapping[str, Any], number: int) -> Markers:
     with naming(f"[[robots]] {number}"):
         _check_keys("robots", table)
         tag = table.get("tag")
-        needed = () if tag is not None else ("front", "rear")
-        colours = {key: table[key] for key in ("front", "rear", *DOTS) if key in table}
-        if missing := [key for key in needed if key not in colours]:
+        colours = {key: table[key] for key in (*BANDS, *DOTS) if key in table}
+        if tag is None and (missing := [key for key in BANDS if key not in colours]):
             raise InputError(
                 f'no {missing[0]}; give two bands of other colours, front = "red" and rear = "green", or a tag'
             )
         hues = {key: _hue(colour, key) for key, colour in colours.items()}
         for one, other in combinations(sorted(hues), 2):
-            if abs(math.remainder(hues[one] - hues[other], 360)) < 40:
+            if abs(math.remainder(hues[one] - hues[other], 360)) < _APART:
                 raise InputError(f"{one} and {other} have nearly the same colour; give them others")
         ahead, apart = (_length(table, name, "robots") for name in ("ahead", "apart"))
         turned = table.get("turned_deg", 0)
-        if not _is_number(turned) or (turned and tag is None):
+        if _numbers(turned).shape != () or (turned and tag is None):
             raise InputError(f"turned_deg = {turned!r}; give the degrees by which the tag's upper edge is turned")
-        return Markers(
-            str(table.get("name", number)),
-            hues.pop("front", math.nan),
-            hues.pop("rear", math.nan),
-            hues,
-            {key: str(colour) for key, colour in colours.items()},
-            None if tag is None else _whole(tag, "tag"),
-            0.0 if math.isnan(ahead) else ahead,
-            apart,
-            math.radians(turned),
-        )
+        tag = None if tag is None else _tag_number(tag, "tag")
+        name, ahead = str(table.get("name", number)), 0.0 if math.isnan(ahead) else ahead
+        return Markers(name, hues, colours, tag, ahead, apart, math.radians(turned))
 
 
 def _hue(colour: object, key: str) -> float:
@@ -366,9 +338,9 @@ def _length(table: Mapping[str, Any], quantity: str, where: str) -> float:
     key, suffix = _key_of(table, quantity)
     if not key:
         return math.nan
-    if not _is_number(table[key]):
+    if _numbers(table[key]).shape != ():
         raise InputError(f"[{where}] {key} = {table[key]!r}; give a number, {quantity}_cm or in another unit")
-    return float(to_si(float(table[key]), suffix))
+    return float(to_si(table[key], suffix))
 
 
 def _key_of(table: Mapping[str, Any], quantity: str) -> tuple[str, str]:
@@ -382,18 +354,22 @@ def _key_of(table: Mapping[str, Any], quantity: str) -> tuple[str, str]:
 
 
 def _points(table: Mapping[str, Any], key: str, fewest: int) -> Floats:
-    rows = table[key]
-    good = isinstance(rows, list) and len(rows) >= fewest
-    if not good or not all(isinstance(p, list) and len(p) == 2 and all(map(_is_number, p)) for p in rows):
+    points = _numbers(table[key])
+    if points.ndim != 2 or points.shape[1] != 2 or len(points) < fewest:
         raise InputError(f"{key}: give {fewest} points or more, [[100, 650], [900, 650], …]")
-    return np.array(rows, dtype=float)
+    return points
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e9
+def _numbers(value: object) -> Floats:
+    """Return an array of finite numbers; an empty one if the value is none."""
+    try:
+        numbers = np.array(value)
+    except ValueError:  # rows of different lengths
+        return np.empty(0)
+    return numbers.astype(float) if numbers.dtype.kind in "if" and (np.abs(numbers) < 1e9).all() else np.empty(0)
 
 
-def _whole(value: object, key: str) -> int:
+def _tag_number(value: object, key: str) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 1000:
         raise InputError(f"{key} = {value!r}; give the number of a tag, 0 to 999")
     return value

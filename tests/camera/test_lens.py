@@ -44,8 +44,8 @@ def test_the_lens_is_that_which_was_drawn_and_poses_through_it_are_right(
     setup = read_setup(tmp_path / "view.toml")
     lens = setup.view.lens
     assert lens is not None
-    assert lens.focal == pytest.approx(np.full(2, TANK.focal), rel=0.005)
-    assert lens.centre == pytest.approx([(TANK.width - 1) / 2, (TANK.height - 1) / 2], abs=1.5)
+    assert lens.matrix.diagonal()[:2] == pytest.approx(np.full(2, TANK.focal), rel=0.005)
+    assert lens.matrix[:2, 2] == pytest.approx([(TANK.width - 1) / 2, (TANK.height - 1) / 2], abs=1.5)
     pixels = np.stack(np.meshgrid(np.arange(10, 480, 20.0), np.arange(10, 360, 20.0)), -1).reshape(-1, 2)
     undistorted = replace(setup.view, homography=np.eye(3)).to_tank(pixels)
     drawn = TANK.rays(pixels) * TANK.focal + (np.array([TANK.width, TANK.height]) - 1) / 2
