@@ -91,9 +91,7 @@ class Effect:
     beside: str = ""  # the effect without which this one shows nothing
     grid: tuple[float, ...] = ()  # sizes at which a calibration looks for `beside`, whose second number this is
     adds: Callable[[Floats, Groups, Body], Body] = field(default=_no_term, compare=False, repr=False)  # its terms
-    scales: Callable[[Floats, Groups], Factors] = field(
-        default=_no_factor, compare=False, repr=False
-    )  # its factors
+    scales: Callable[[Floats, Groups], Factors] = field(default=_no_factor, compare=False, repr=False)  # factors
     number: Callable[[Floats, Groups], Floats] = field(default=_size, compare=False, repr=False)  # if nonlocal
 
     @property
