@@ -22,7 +22,7 @@ from sim.linear import chains as separate
 from sim.linear import coupled
 from sim.linear.coupled import Coupled, Coupling, new_coupled
 from sim.linear.gmres import extend, new_krylov, solution, start
-from sim.linear.lane_arrays import add_chosen, choose_all, combine, largest_entry
+from sim.linear.lane_arrays import add_chosen, choose_all, combine, copy, divide, largest_entry
 from sim.mechanics.balance import tail_spin
 from sim.mechanics.geometry import turned_edges
 from sim.model.body import Body
@@ -106,7 +106,8 @@ def correct(
         linearise(body, rates, x, u, work.scratch, work.equations)
     if not anew or somewhere(going * reaches_further(body)):
         fill_residual(body, rates, x, u, going, work.scratch, work.equations.r, work.equations.t)
-    negate(work.equations, dx, du)
+    divide(dx, work.equations.r, -1.0)
+    divide(du, work.equations.t, -1.0)
     solve_linear(body, rates, x, u, work, anew, RELATIVE_TOLERANCE, going, dx, du)
 
 
@@ -128,32 +129,11 @@ def move(body: Body, x: Floats, share: Any, dx: Floats, going: Any) -> None:
     add_chosen(x, share, dx, going - further)
 
 
-@compiled
-def negate(equations: Equations, dx: Floats, du: Floats) -> None:
-    """Negate the residual: the right-hand sides of Newton's equations."""
-    n, columns, _ = dx.shape
-    for k in range(n):
-        for m in range(columns):
-            for c in range(3):
-                dx[k, m, c] = -equations.r[k, m, c]
-    for p in range(len(du)):
-        for a in range(4):
-            du[p, a] = -equations.t[p, a]
-
-
 @inlined
 def solve_linear(
-    body: Body,
-    rates: Rates,
-    x: Floats,
-    u: Floats,
-    work: Workspace,
-    anew: bool,
-    tolerance: float,
-    going: Any,
-    dx: Floats,
-    du: Floats,
-) -> None:
+    body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, anew: bool, tolerance: float, going: Any,
+    dx: Floats, du: Floats,
+) -> None:  # fmt: skip
     """Solve with the derivative of the residual at x, u, which `linearise` left in `work`.
 
     Args:
@@ -216,7 +196,8 @@ def _solve_nonlocal(
     krylov, image = new_krylov(dx, size, _MOST_PRODUCTS), empty(dx, (size,))
     above, below = new_unknowns(x, u), new_unknowns(x, u)
     moved = new_unknowns(x, u)
-    _join(image, dx, du, scale)
+    copy(image[: dx.size], dx)
+    divide(image[dx.size :], du, scale)
     norm = start(krylov, image)
     wanted = going = going * less(0.0, norm)
     count = 0
@@ -231,7 +212,8 @@ def _solve_nonlocal(
         combine(moved.x, half, above.x, -half, below.x)
         combine(moved.u, half, above.u, -half, below.u)
         solve_local(rates, work, moved.x, moved.u)
-        _join(image, moved.x, moved.u, scale)
+        copy(image[: dx.size], moved.x)
+        divide(image[dx.size :], moved.u, scale)
         left = extend(krylov, count, image, going)
         going = going * (1 - less(left, tolerance * norm))
         count += 1
@@ -240,16 +222,6 @@ def _solve_nonlocal(
     choose_all(flat, wanted, image[: dx.size], flat)
     for i in range(len(velocities)):
         velocities[i] = choose(wanted, image[dx.size + i] * scale, velocities[i])
-
-
-@compiled
-def _join(out: Floats, dx: Floats, du: Floats, scale: Any) -> None:
-    """Set a vector to the entries of dx and of du/scale."""
-    flat, velocities = dx.reshape(dx.size), du.reshape(du.size)
-    for i in range(len(flat)):
-        out[i] = flat[i]
-    for i in range(len(velocities)):
-        out[len(flat) + i] = velocities[i] / scale
 
 
 @compiled

@@ -28,7 +28,7 @@ import numpy as np
 from sim.arrays import Floats, Integers
 from sim.jit import compiled, formula, inlined
 from sim.lanes import choose, lane, lanes, larger, less, smaller, somewhere, width, with_lane, zeros
-from sim.linear.lane_arrays import add_chosen, choose_all, copy, largest_entry, put_lane, take_lane
+from sim.linear.lane_arrays import add_chosen, choose_all, combine, copy, largest_entry, put_lane, take_lane
 from sim.linear.spectral import differentiation
 from sim.model.body import Body
 from sim.solve.assembly import are_local
@@ -259,31 +259,25 @@ def _try_step(
         solved = _solve_stage(body, rates, new.x, new.u, stage == 0, solved, step, work)
         if not somewhere(solved):
             break
-        _rate_of_change(step.slope[stage], new.x, step.start, tau)
+        combine(step.slope[stage], 1 / tau, new.x, -1 / tau, step.start)
         end = now + (tau if stage == 0 else dt)
         advance_lag(body, new.u, twist, end, 1 / tau, step.lag_start, step.lag_by_phase, new.lag)
-        _rate_of_change(step.lag_slope[stage], new.lag, step.lag_start, tau)
+        combine(step.lag_slope[stage], 1 / tau, new.lag, -1 / tau, step.lag_start)
     return solved
 
 
 @compiled
 def _begin_stage(at: _State, new: _State, step: _Step, stage: int, dt: Any, tau: Any) -> None:
     """Fill the starts of a stage, and guess its shape."""
-    n, columns, _ = at.x.shape
-    for k in range(n):
-        for m in range(columns):
-            for c in range(3):
-                start = at.x[k, m, c]
-                if stage == 1:
-                    start += (1 - GAMMA) * dt * step.slope[0, k, m, c]
-                step.start[k, m, c] = start
-                slope = at.slope[k, m, c] if stage == 0 else step.slope[0, k, m, c]
-                new.x[k, m, c] = start + tau * slope
-    for p in range(at.lag.shape[0]):
-        for c in range(3):
-            step.lag_start[p, c] = at.lag[p, c]
-            if stage == 1:
-                step.lag_start[p, c] += (1 - GAMMA) * dt * step.lag_slope[0, p, c]
+    if stage == 0:
+        copy(step.start, at.x)
+        copy(step.lag_start, at.lag)
+        combine(new.x, 1.0, at.x, tau, at.slope)
+    else:
+        share = (1 - GAMMA) * dt
+        combine(step.start, 1.0, at.x, share, step.slope[0])
+        combine(step.lag_start, 1.0, at.lag, share, step.lag_slope[0])
+        combine(new.x, 1.0, step.start, tau, step.slope[0])
 
 
 @inlined
@@ -307,14 +301,6 @@ def _solve_stage(
         if not somewhere(going):
             break
     return solved
-
-
-@compiled
-def _rate_of_change(out: Floats, end: Floats, start: Floats, tau: Any) -> None:
-    """Set out = (end − start)/tau."""
-    flat, last, first = out.reshape(out.size), end.reshape(end.size), start.reshape(start.size)
-    for i in range(len(flat)):
-        flat[i] = (last[i] - first[i]) / tau
 
 
 @compiled
