@@ -21,7 +21,7 @@ from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED, Responses
 from sim.motion.run import REVERSED
 from sim.motion.steady import check_groups, steady
 from sim.motion.steady_motion import Steady, net_speeds, twists
-from sim.motion.stepped_response import stepped_response
+from sim.motion.stepped_response import Curves, stepped_response
 from sim.solve.assembly import bodies, numbers
 from sim.solve.grouping import slices
 from sim.solve.refinement import OnMesh, coarse_orbits, orbits_on_mesh
@@ -37,15 +37,6 @@ _MEMORY_UNTIL = float(BEFORE[-1])  # from here on the difference is constant
 _SOME_BEFORE = BEFORE[::2].copy()  # dwells before that are simulated
 _TIMES = np.unique([*np.minimum(DWELLS, SETTLED), *np.minimum(DWELLS, _SAME)])
 _UNTIL_SETTLED, _UNTIL_SAME = (np.searchsorted(_TIMES, np.minimum(DWELLS, end)) for end in (SETTLED, _SAME))
-
-
-class Curves(NamedTuple):
-    """Response of one robot, as in `Responses`."""
-
-    lag: Floats
-    memory: Floats
-    rest: Floats
-    spread: Floats
 
 
 class _Wanted(NamedTuple):
@@ -97,10 +88,9 @@ def responses(
         if curves is None:
             robot = groups.select(np.array([i]))
             body, reverse = bodies(robot)[0], bodies(robot.reversed())[0]
-            values = stepped_response(
+            curves = stepped_response(
                 body, groups.N, DWELLS, BEFORE, reverse=reverse, history=history, settled=SETTLED
             )
-            curves = Curves(*values)
         by_robot.append(curves)
     lag, memory, rest, spread = (np.array(column) for column in zip(*by_robot, strict=True))
     sense = np.sign(rows[:, 0])

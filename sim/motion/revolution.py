@@ -128,18 +128,14 @@ class Revolutions:
 
     def correction(self, y: Floats, row: Floats, defect: float) -> Floats:
         """See `sim.motion.continuation.Equations`."""
-        turn = self.at(y)
-        if turn is None:
-            return np.full(len(y), np.nan)
-        image = self._image(y)
+        image = self._fixed_image(y)
         if image is None:
             return np.full(len(y), np.nan)
         return self._solved(y, image, row, np.append(y[:-1] - image, -defect), _RESIDUAL)
 
     def tangent(self, y: Floats, row: Floats) -> Floats:
         """See `sim.motion.continuation.Equations`."""
-        turn = self.at(y)
-        image = None if turn is None else self._image(y)
+        image = self._fixed_image(y)
         if image is None:
             return np.full(len(y), np.nan)
         return self._solved(y, image, row, np.append(np.zeros(len(y) - 1), 1.0), _RESIDUAL_OF_TANGENT)
@@ -155,8 +151,7 @@ class Revolutions:
 
     def leading(self, y: Floats) -> Leading:
         """Find the perturbation that decays least, by Arnoldi's method (`sim.motion.stability.Leading`)."""
-        turn = self.at(y)
-        image = None if turn is None else self._image(y)
+        turn, image = self.at(y), self._fixed_image(y)
         if turn is None or image is None:
             return Leading(np.nan, np.nan, 1)
         size = len(y) - 1
@@ -187,6 +182,10 @@ class Revolutions:
             return None
         turn = self.turn(self.state(y), float(y[-1]), self._time)
         return None if turn is None else turn.state.x.ravel() / self._scale
+
+    def _fixed_image(self, y: Floats) -> Floats | None:
+        """Compute Φ(y) with the velocities and the time of a turn from there; None where there is none."""
+        return None if self.at(y) is None else self._image(y)
 
     def _product(self, y: Floats, image: Floats, vector: Floats) -> Floats:
         """Multiply the derivative of Φ in (x, s) with a vector, by a difference."""

@@ -8,6 +8,7 @@ Curves are means over two phases of the disc, half a tail spacing apart, and the
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,15 @@ _WINDOW = 0.5  # shortest averaging time of the steady circle
 _APPROACH = 0.9  # of the angle that is left; the steps to its end must not become tiny
 
 
+class Curves(NamedTuple):
+    """Response of one robot, as in `sim.model.response.Responses`, over D dwells and K dwells before."""
+
+    lag: Floats  # (D, 3)
+    memory: Floats  # (K, D, 3)
+    rest: Floats  # (D, 3)
+    spread: Floats  # (D, 3)
+
+
 def stepped_response(
     body: Body,
     tails: int,
@@ -33,8 +43,8 @@ def stepped_response(
     resolution: Resolution | None = None,
     history: bool = True,
     settled: float = np.inf,
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Step lag (D, 3), memory (K, D, 3), lag from rest (D, 3) and spread (D, 3) of `sim.model.response.Responses`.
+) -> Curves:
+    """Step the curves of one robot.
 
     Args:
         body: with the motor's speed after the flip.
@@ -50,11 +60,8 @@ def stepped_response(
     """
     chosen = resolution or Resolution.fitting(body.omega)
     reverse = body._replace(omega=-body.omega) if reverse is None else reverse
-    count = len(dwells)
-    lag, memory, rest, spread = (
-        np.full(size, np.nan) for size in ((count, 3), (len(before), count, 3), (count, 3), (count, 3))
-    )
-    lost = lag, memory, rest, spread
+    unknown = np.full((len(dwells), 3), np.nan)
+    lost = Curves(unknown, np.full((len(before), *unknown.shape), np.nan), unknown, unknown)
     state = steady_state(reverse, tails, chosen)
     if state is None:
         return lost
@@ -78,6 +85,7 @@ def stepped_response(
     circle = planar.inverse(planar.arc(twist, times))
     each = planar.compose(np.array(changes), circle)
     lag, spread = each.mean(0), each.std(0)
+    rest, memory = lost.rest, lost.memory
     if history:
         from_rest = Run(body, tails, chosen)
         rest = planar.compose(_poses(from_rest, times, sense), circle)
@@ -85,7 +93,7 @@ def stepped_response(
         if from_rest.failed:
             return lost
         rest, memory = rest[place], memory[:, place]
-    return lag[place], memory, rest, spread[place]
+    return Curves(lag[place], memory, rest, spread[place])
 
 
 def _after_short_dwells(run: Run, before: Floats, dwells: Floats, sense: float) -> Floats:
