@@ -123,33 +123,24 @@ def _beyond(end: float) -> Callable[[Point], float]:
 
 
 def locate(equations: Equations, start: Point, end: Point, value: Callable[[Point], float]) -> Point | None:
-    """Find where `value` is zero between two neighbours on the curve, by regula falsi (Illinois); None if lost."""
-    left, right = 0.0, float(start.tangent @ (end.y - start.y))
-    whole = right
-    at_left, at_right = value(start), value(end)
-    if not at_left * at_right <= 0:
+    """Find where `value` is zero between two neighbours on the curve, by Brent's method; None if lost."""
+    from scipy.optimize import brentq  # slow to import
+
+    whole = float(start.tangent @ (end.y - start.y))
+    points = {0.0: start, whole: end}  # by their distances along the tangent
+
+    def value_at(distance: float) -> float:
+        if distance not in points:
+            found = step(equations, start, distance)
+            if found is None:
+                raise ValueError("the curve is lost")
+            points[distance] = found[0]
+        return value(points[distance])
+
+    try:
+        return points[brentq(value_at, 0.0, whole, xtol=_CLOSE_TO_ROOT * whole, maxiter=40, disp=False)]
+    except ValueError:  # or one sign at both ends, or no number
         return None
-    point = end
-    for _ in range(40):
-        if at_right == at_left:
-            return point
-        middle = right - at_right * (right - left) / (at_right - at_left)
-        found = step(equations, start, middle)
-        if found is None:
-            return None
-        point = found[0]
-        at_middle = value(point)
-        if not np.isfinite(at_middle):
-            return None
-        if at_middle * at_right < 0:
-            left, at_left = right, at_right
-        else:
-            at_left /= 2
-        close = abs(middle - right) < _CLOSE_TO_ROOT * whole
-        right, at_right = middle, at_middle
-        if close or abs(at_middle) < 1e-12:
-            return point
-    return point
 
 
 def _corrected(
