@@ -319,17 +319,19 @@ def schedule_header(result: Plan, identity: str) -> str:
     """Write schedule.h as text."""
     entries, checkpoints = milliseconds(result.seconds), _checkpoints(result)
     lines = [", ".join(map(str, entries[i : i + 12])) for i in range(0, len(entries), 12)]
-    (x, y, heading), cm = result.start, 100 * result.robot.length_scale
+    (x, y, heading), robot, once = result.start, result.robot, result.lap is None
+    cm = 100 * robot.length_scale
+    rpm = robot.motor_speed * 30 / np.pi if isinstance(robot, Robot) else None  # a measured vehicle has none
     parts = {
         "IDENTITY": identity,
         "NAME": safe_name(result),
-        "AFTER": _after(result),
+        "AFTER": "Stop after the last entry." if once else "After the last entry go on with the first.",
         "MODEL": result.tracked.model,
         "STATED": _stated(result),
         "FIRST_DIRECTION": str(result.first_direction),
-        "COUNT": f"{len(entries)}{_repeats(result)}",
+        "COUNT": f"{len(entries)}" + ("" if once else "\n#define SCHEDULE_REPEATS 1"),
         "TOTAL": str(sum(entries)),
-        "MOTOR": _motor(result),
+        "MOTOR": "" if rpm is None else f"#define SCHEDULE_MOTOR_RPM {rpm:.3f}\n",
         "X_CM": f"{cm * x:.4f}",
         "Y_CM": f"{cm * y:.4f}",
         "DEGREES": f"{np.degrees(heading):.3f}",
@@ -379,22 +381,6 @@ static const schedule_checkpoint SCHEDULE_TABLE(schedule_checkpoints)[SCHEDULE_C
 }};
 {c_part("schedule.h")}#endif
 """
-
-
-def _motor(result: Plan) -> str:
-    """Define the motor's speed; a measured vehicle has none."""
-    robot = result.robot
-    return f"#define SCHEDULE_MOTOR_RPM {robot.motor_speed * 30 / np.pi:.3f}\n" if isinstance(robot, Robot) else ""
-
-
-def _after(result: Plan) -> str:
-    """Say what follows the last entry."""
-    return "Stop after the last entry." if result.lap is None else "After the last entry go on with the first."
-
-
-def _repeats(result: Plan) -> str:
-    """Define a macro for a schedule that repeats."""
-    return "" if result.lap is None else "\n#define SCHEDULE_REPEATS 1"
 
 
 def _stated(result: Plan) -> str:

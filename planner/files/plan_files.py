@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planner.files.headers import schedule_header, tracker_header
-from planner.files.plan_svg import plan_svg
+from planner.files.pictures import plan_svg
 from planner.planning.plan import KINDS, Plan
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_numbers, write_text

@@ -196,7 +196,36 @@ class _Fleet:
         return None
 
     def _turns_of(self, k: int, step: float) -> list[Turn]:
-        return _turns(self.members[k], self.motions[k], step)
+        """List the waiting circles that a robot may make on its path."""
+        member = self.members[k]
+        plan = member.plan
+        reference, robot, a = plan.declared.reference, plan.robot, plan.tracked.vehicle.pivot_distance
+        arc = reference.arc
+        count = max(1, min(_PLACES, math.floor(float(arc[-1]) / _SPACING)))
+        rows = np.searchsorted(arc, np.linspace(0.0, arc[-1], count + 1))
+        places = np.unique(rows.clip(max=len(arc) - 1)).tolist()
+        try:
+            circling = with_circles(plan, [WaitingCircle(places[len(places) // 2], 1)])
+        except InputError:
+            return []
+        duration = (circling.duration - plan.duration) * robot.time_scale
+        steps = max(1, round(duration / step))
+        begins = times_at(plan, arc[places]) * robot.time_scale
+        turns = []
+        for place, begin in zip(places, begins.tolist(), strict=True):
+            for side in (1, -1):
+                around = circle_reference(plan, WaitingCircle(place, side))
+                at = np.linspace(0.0, around.arc[-1], steps, endpoint=False)
+                x, y, heading = (np.interp(at, around.arc, column) for column in (*around.q.T, around.heading))
+                poses = np.stack([x + a * np.cos(heading), y + a * np.sin(heading), heading], 1)
+                if not member.free_space.empty:
+                    room = Footprint.of(robot, 0.0).clearance(poses, member.free_space).min()
+                    if room < max(plan.stated_error, plan.predicted_max):
+                        continue
+                turns.append(
+                    Turn(WaitingCircle(place, side), begin, poses * [robot.length_scale, robot.length_scale, 1.0])
+                )
+        return turns
 
     def _circling(self, member: Member, circles: Sequence[WaitingCircle]) -> Plan:
         """Plan again with waiting circles, clear of obstacles.
@@ -271,37 +300,6 @@ class _Fleet:
             for when, word in ((0.0, "starts"), (1.0, "ends"))
             if too_near(along, self._resting(resting, when), self.apart).any()
         ]
-
-
-def _turns(member: Member, motion: TimedMotion, step: float) -> list[Turn]:
-    """List the waiting circles that a robot may make on its path."""
-    plan = member.plan
-    reference, robot, a = plan.declared.reference, plan.robot, plan.tracked.vehicle.pivot_distance
-    arc = reference.arc
-    count = max(1, min(_PLACES, math.floor(float(arc[-1]) / _SPACING)))
-    places = np.unique(np.searchsorted(arc, np.linspace(0.0, arc[-1], count + 1)).clip(max=len(arc) - 1)).tolist()
-    try:
-        circling = with_circles(plan, [WaitingCircle(places[len(places) // 2], 1)])
-    except InputError:
-        return []
-    duration = (circling.duration - plan.duration) * robot.time_scale
-    steps = max(1, round(duration / step))
-    begins = times_at(plan, arc[places]) * robot.time_scale
-    turns = []
-    for place, begin in zip(places, begins.tolist(), strict=True):
-        for side in (1, -1):
-            around = circle_reference(plan, WaitingCircle(place, side))
-            at = np.linspace(0.0, around.arc[-1], steps, endpoint=False)
-            x, y, heading = (np.interp(at, around.arc, column) for column in (*around.q.T, around.heading))
-            poses = np.stack([x + a * np.cos(heading), y + a * np.sin(heading), heading], 1)
-            if not member.free_space.empty:
-                room = Footprint.of(robot, 0.0).clearance(poses, member.free_space).min()
-                if room < max(plan.stated_error, plan.predicted_max):
-                    continue
-            turns.append(
-                Turn(WaitingCircle(place, side), begin, poses * [robot.length_scale, robot.length_scale, 1.0])
-            )
-    return turns
 
 
 Pairs = frozenset[tuple[int, int]]  # of robots: the first goes before the second

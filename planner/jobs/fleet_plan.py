@@ -18,7 +18,8 @@ from planner.planning.picture import draw_regions, label_points
 from planner.planning.plan import Plan
 from sim.arrays import Floats
 from sim.io.notebook import Shown, given_axes
-from sim.io.units import column_units, format_length, format_time
+from sim.io.units import format_length, format_time
+from sim.robot_rows import with_units
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -210,9 +211,7 @@ class FleetPlan(Shown):
         for (first, second), (predicted, sure) in table.items():
             pair = f"{self.names[first]}_{self.names[second]}"
             columns |= {f"{pair}_cm": 100 * predicted, f"{pair}_sure_cm": 100 * sure}
-        frame = pd.DataFrame(columns)
-        frame.attrs["units"] = column_units(frame)
-        return frame
+        return with_units(pd.DataFrame(columns))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of fleet.json."""

@@ -27,9 +27,10 @@ from planner.vehicle.zigzag import Zigzag
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.notebook import Shown, given_axes
-from sim.io.units import column_units, format_time
+from sim.io.units import format_time
 from sim.model.robot import Robot
 from sim.model.schedule import FORMAT, Schedule, plan_id
+from sim.robot_rows import with_units
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -359,9 +360,7 @@ class Plan(Shown, Generic[J]):
         """
         import pandas as pd  # a plan is made without it
 
-        frame = pd.DataFrame(self.columns())
-        frame.attrs["units"] = column_units(frame)
-        return frame
+        return with_units(pd.DataFrame(self.columns()))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of plan.json, which `softflagella.load_plan` reads.

@@ -29,6 +29,7 @@ from planner.paths.tractrix import Drift, Reference
 from planner.planning.conditions import OVERLAP
 from planner.planning.line_of_sight import LineOfSight, look_ahead
 from planner.planning.plan import Plan
+from planner.planning.request import POSE
 from sim.arrays import Floats, Integers
 
 SHORTEST_ROD = 1e-9  # l
@@ -36,7 +37,6 @@ AWAY = 1.0  # rad
 STRAIGHT = 1e-6  # l; shorter arcs do not decide to which side the robot turns first
 _NEAR = 0.5  # of the pivot's turn radius: the distance within which the guidance steers back to its reference
 _ERRORS = 4.0  # or of the largest predicted error
-POSE = tuple[float, float, float]
 LEFT_OUT = 0.1  # of a length of the path: what it costs to leave it out
 STRIDE = 0.5  # between two targets, in radii
 ROOM = 0.95  # the share of its largest curvature that the robot uses on the way

@@ -24,11 +24,11 @@ import numpy as np
 from planner.paths.tractrix import Drift
 from planner.planning.line_of_sight import arc_terms
 from planner.planning.plan import Plan
+from planner.planning.request import POSE
 from planner.tracking.guidance import TrackerGuidance
 from planner.vehicle.vehicle import interpolated
 from sim.arrays import Floats
 
-POSE = tuple[float, float, float]
 NAMES = ("x", "y", "heading", "yaw rate, left", "yaw rate, right", "surge", "sway", "lag angle",
          "current x", "current y", "marker, forward", "marker, left", "marker, angle")  # fmt: skip
 STATES = len(NAMES)

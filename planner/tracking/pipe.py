@@ -33,7 +33,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from planner.paths.units import Swimmer
-from planner.tracking.kalman_filter import POSE
+from planner.planning.request import POSE
 from planner.tracking.tracker import Tracker
 from sim.io.errors import InputError
 from sim.io.units import from_si, split, to_si

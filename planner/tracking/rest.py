@@ -124,39 +124,24 @@ def _way(plan: Plan, pose: POSE, place: int, drift: Drift) -> tuple[Reference | 
     a, (x, y, heading) = plan.tracked.vehicle.pivot_distance, pose
     course = heading + float(drift.slip_at(heading))
     start = x - a * math.cos(heading), y - a * math.sin(heading), course
-    poses, join = _shortest(plan, start, place, drift)
-    if plan.kept_clear is not None:
-        limits, margin = _limits(plan, drift), plan.kept_clear.margin
-        if len(poses) and float(limits.clearance(poses).min()) < margin:
-            poses, join = _around(plan, start, place, limits, margin)
+    current = float(np.hypot(*plan.tracked.vehicle.current)) / plan.straight.speed
+    radius = plan.tracked.vehicle.pivot_radius * (1 + current) / ROOM
+    reference = plan.declared.reference
+    targets = reference.part(place, -1).courses(drift)
+    left_out = reference.arc[place:-1] - reference.arc[place]
+    track, target = shortest_way(start, targets, left_out, stride(plan), radius, _WORTH)
+    poses, join = track.sampled(_SPACING), place + target
+    if (kept := plan.kept_clear) is not None:
+        limits = RouteLimits(radius, plan.tracked.body, kept.free_space, drift)
+        if len(poses) and float(limits.clearance(poses).min()) < kept.margin:
+            poses, join = _around(plan, start, place, limits, kept.margin)
     if len(poses) < 2:
         return None, join
     return Reference.of_pivot(poses, plan.tracked.rod, drift, heading), join
 
 
-def _shortest(plan: Plan, start: POSE, place: int, drift: Drift) -> tuple[Floats, int]:
-    """Find the shortest way from a pose of the pivot; return its poses (m, 3), and the point where it ends."""
-    reference = plan.declared.reference
-    targets = reference.part(place, -1).courses(drift)
-    left_out = reference.arc[place:-1] - reference.arc[place]
-    radius = _radius(plan)
-    track, target = shortest_way(start, targets, left_out, stride(plan), radius, _WORTH)
-    return track.sampled(_SPACING), place + target
-
-
-def _radius(plan: Plan) -> float:
-    """Return the radius of arcs on the way."""
-    current = float(np.hypot(*plan.tracked.vehicle.current)) / plan.straight.speed
-    return plan.tracked.vehicle.pivot_radius * (1 + current) / ROOM
-
-
-def _limits(plan: Plan, drift: Drift) -> RouteLimits:
-    assert plan.kept_clear is not None
-    return RouteLimits(_radius(plan), plan.tracked.body, plan.kept_clear.free_space, drift)
-
-
 def _around(plan: Plan, start: POSE, place: int, limits: RouteLimits, margin: float) -> tuple[Floats, int]:
-    """Find a way among obstacles to one of the next places of the path; see `_shortest`.
+    """Find a way among obstacles to one of the next places of the path: poses (m, 3), and the point where it ends.
 
     Raises:
         NoWayError: there is none.

@@ -20,12 +20,12 @@ from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
-from sim.io.units import column_units, format_length
+from sim.io.units import format_length
 from sim.mechanics import planar
 from sim.model.robot import Robot
 from sim.motion.replay import run_at_rest
 from sim.motion.run import Run
-from sim.robot_rows import OneRobot, one_robot
+from sim.robot_rows import OneRobot, one_robot, with_units
 from sim.solve.march import YAW, X, Y
 
 if TYPE_CHECKING:
@@ -91,9 +91,7 @@ class Swim:
             "heading_rad": heading, "direction": self.direction.astype(int), "error_over_l": self.errors,
             "plan_id": self.plan.identity,
         }  # fmt: skip
-        frame = pd.DataFrame(columns)
-        frame.attrs["units"] = column_units(frame)
-        return frame
+        return with_units(pd.DataFrame(columns))
 
     def __repr__(self) -> str:
         length = self.plan.robot.length_scale

@@ -42,8 +42,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from planner.paths.units import heading_in_degrees, in_lab
 from planner.planning.errors import KEPT, bound
 from planner.planning.plan import Plan
+from planner.planning.request import POSE
 from planner.tracking.guidance import TrackerGuidance
-from planner.tracking.kalman_filter import NAMES, POSE, Dwell, Estimate, difference
+from planner.tracking.kalman_filter import NAMES, Dwell, Estimate, difference
 from sim.io.errors import InputError
 from sim.io.notebook import Shown
 from sim.io.units import format_time

@@ -15,9 +15,9 @@ import pytest
 from planner.files.headers import milliseconds, rounded, schedule_header, table_bytes, tracker_header
 from planner.jobs.plan import plan
 from planner.planning.plan import Plan
-from planner.planning.request import Camera
+from planner.planning.request import POSE, Camera
 from planner.tracking.swim import swim_under
-from planner.tracking.tracker import POSE, SLACK, Command, Tracker
+from planner.tracking.tracker import SLACK, Command, Tracker
 from planner.vehicle.vehicle import Vehicle
 from sim.model.presets import PRESETS
 from tests.planner.compiled import MEMORIES, SOURCES, WARNINGS, CompiledTracker, compile_c

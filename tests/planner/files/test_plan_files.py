@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 
 from planner.__main__ import main
 from planner.files.headers import milliseconds
+from planner.files.pictures import SvgAxes
 from planner.files.plan_files import write_plan
-from planner.files.plan_svg import SvgAxes
 from planner.files.tracks import check, tracking_error
 from planner.vehicle.vehicle import Switches, roll_out
 from sim.io.errors import InputError

@@ -17,11 +17,11 @@ from planner.jobs.plan import make_plan
 from planner.paths.obstacles import Circle, Footprint, FreeSpace
 from planner.paths.path import Path2D, circle
 from planner.planning.plan import Plan
-from planner.planning.request import PlanRequest
+from planner.planning.request import POSE, PlanRequest
 from planner.tracking.guidance import TrackerGuidance
 from planner.tracking.pipe import answers
 from planner.tracking.swim import swim_under
-from planner.tracking.tracker import POSE, Command, Tracker
+from planner.tracking.tracker import Command, Tracker
 from planner.vehicle.tracked_point import tracked_vehicle
 from planner.vehicle.vehicle import Switches, Vehicle, roll_out
 from sim.arrays import Floats
