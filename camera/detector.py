@@ -212,9 +212,8 @@ class Detector:
         robot.places = {"tag": corners}
         places = self.view.to_tank(corners)
         centre = places.mean(axis=0)
-        square = np.array([1 + 1j, 1 - 1j, -1 - 1j, -1 + 1j]) * np.exp(
-            1j * robot.markers.turned
-        )  # forward + i left
+        square = np.array([1 + 1j, 1 - 1j, -1 - 1j, -1 + 1j])  # forward + i left
+        square = square * np.exp(1j * robot.markers.turned)
         square = square.conj() if self.view.up else square
         arms = (places - centre) @ [1, 1j]
         turn = (square.conj() @ arms) / 8

@@ -193,14 +193,10 @@ def _scaled(origin: Floats, scale: float, up: bool) -> Floats:
 
 
 def _setup(content: dict[str, Any]) -> Setup:
-    _check_keys("", content)
-    scale, lens, tank = (content.get(table, {}) for table in ("scale", "lens", "tank"))
-    for table, entries in (("scale", scale), ("lens", lens), ("tank", tank)):
-        if not isinstance(entries, dict):
-            raise InputError(f"{table} is no table; write [{table}] and its entries below")
-        _check_keys(table, entries)
+    content = _read("", content)
+    scale, lens, tank = (_read(table, content.get(table, {})) for table in ("scale", "lens", "tank"))
     robots = content.get("robots")
-    if not isinstance(robots, list) or not robots or not all(isinstance(robot, dict) for robot in robots):
+    if not isinstance(robots, list) or not robots:
         raise InputError('no robot; write [[robots]] with front = "red" and rear = "green", or tag = 0')
     looks = content.get("looks", "down")
     if looks not in ("down", "up"):
@@ -226,45 +222,50 @@ def _dictionaries() -> list[str]:
     return sorted({name[5:].lower() for name in dir(opencv().aruco) if name.startswith("DICT_")})
 
 
-def _check_keys(table: str, entries: Mapping[str, Any]) -> None:
-    lengths = _LENGTHS.get(table, ())
-    for key in entries:
-        quantity, unit = split(key)
-        if key in _KEYS[table] or (quantity in lengths and unit and unit.kind == "length"):
-            continue
-        place = f"[{table}] {key}" if table else key
-        if quantity in lengths:
+def _read(table: str, entries: Any) -> dict[str, Any]:
+    """Check the keys of a table, and return its entries; lengths in metres, by their names without a unit."""
+    if not isinstance(entries, dict):
+        raise InputError(f"{table} is no table; write [{table}] and its entries below")
+    read, lengths = {}, _LENGTHS.get(table, ())
+    for key, value in entries.items():
+        (quantity, unit), place = split(key), f"[{table}] {key}" if table else key
+        if key in _KEYS[table]:
+            read[key] = value
+        elif quantity not in lengths:
+            near = difflib.get_close_matches(quantity, (*_KEYS[table], *lengths), n=1)
+            raise InputError(f"unknown entry {place}{f'; is it {near[0]}?' if near else ''}")
+        elif unit is None or unit.kind != "length":
             raise InputError(f"{place} has no unit of length; give {quantity}_cm, or another unit")
-        near = difflib.get_close_matches(quantity, (*_KEYS[table], *lengths), n=1)
-        raise InputError(f"unknown entry {place}{f'; is it {near[0]}?' if near else ''}")
+        elif quantity in read:
+            raise InputError(f"{place}: another entry gives {quantity}, too; drop all but one")
+        elif quantity != "points" and _numbers(value).shape != ():
+            raise InputError(f"{place} = {value!r}; give a number, {quantity}_cm or in another unit")
+        else:
+            read[quantity] = to_si(_numbers(value), unit.suffix)
+    return read
 
 
-def _with_scale(view: View, table: Mapping[str, Any]) -> View:
-    tag, length = (_length(table, name, "scale") for name in ("tag", "length"))
-    if not math.isnan(tag):
-        if not tag > 0:
+def _with_scale(view: View, scale: Mapping[str, Any]) -> View:
+    if scale.keys() - {"tag_id"} not in ({"tag"}, {"points_px", "length"}, {"points_px", "points"}):
+        raise InputError(
+            "no scale, or two; give [scale] points_px = [[100, 650], [900, 650]] and length_cm = 30, two points "
+            "of a ruler, or points_px and points_cm, four or more and their places, or tag_cm, a tag's side"
+        )
+    if "tag" in scale:
+        if not scale["tag"] > 0:
             raise InputError("[scale] the tag's side is not above 0; give its length, tag_cm = 4")
-        return replace(view, tag=(_tag_number(table.get("tag_id", 0), "[scale] tag_id"), tag))
-    if "points_px" not in table:
-        raise InputError(
-            "no scale; give [scale] points_px = [[100, 650], [900, 650]] and length_cm = 30, two points of a "
-            "ruler, or tag_cm, the side of an ArUco tag"
-        )
-    pixels = _points(table, "points_px", 2)
+        return replace(view, tag=(_tag_number(scale.get("tag_id", 0), "[scale] tag_id"), float(scale["tag"])))
+    pixels = _points(scale, "points_px", 2)
     plane = replace(view, homography=np.eye(3)).to_tank(pixels)
-    key, suffix = _key_of(table, "points")
-    if key:
-        return _from_places(view, plane, to_si(_points(table, key, 4), suffix))
-    if len(pixels) != 2 or math.isnan(length):
-        raise InputError(
-            "[scale] gives no scale; give two points and length_cm, or four points or more and points_cm, a place "
-            "for each"
-        )
+    if "points" in scale:
+        return _from_places(view, plane, _points(scale, "points", 4))
+    if len(pixels) != 2:
+        raise InputError(f"[scale] a length and {len(pixels)} points_px; give two, or points_cm, a place for each")
     distance = float(np.linalg.norm(plane[1] - plane[0]))
-    if not (length > 0 and distance > 0):
+    if not (scale["length"] > 0 and distance > 0):
         raise InputError("[scale] the two points or their distance are the same; give two ends of a ruler")
-    error = _CLICK * math.sqrt(2) / distance
-    return replace(view, homography=_scaled(plane[0], length / distance, view.up), scale_error=error)
+    homography = _scaled(plane[0], float(scale["length"]) / distance, view.up)
+    return replace(view, homography=homography, scale_error=_CLICK * math.sqrt(2) / distance)
 
 
 def _from_places(view: View, plane: Floats, places: Floats) -> View:
@@ -298,9 +299,9 @@ def _lens(table: Mapping[str, Any]) -> Lens:
     return Lens(np.array([[focal[0], 0, centre[0]], [0, focal[1], centre[1]], [0, 0, 1.0]]), distortion)
 
 
-def _markers(table: Mapping[str, Any], number: int) -> Markers:
+def _markers(table: Any, number: int) -> Markers:
     with naming(f"[[robots]] {number}"):
-        _check_keys("robots", table)
+        table = _read("robots", table)
         tag = table.get("tag")
         colours = {key: table[key] for key in (*BANDS, *DOTS) if key in table}
         if tag is None and (missing := [key for key in BANDS if key not in colours]):
@@ -311,46 +312,25 @@ def _markers(table: Mapping[str, Any], number: int) -> Markers:
         for one, other in combinations(sorted(hues), 2):
             if abs(math.remainder(hues[one] - hues[other], 360)) < _APART:
                 raise InputError(f"{one} and {other} have nearly the same colour; give them others")
-        ahead, apart = (_length(table, name, "robots") for name in ("ahead", "apart"))
         turned = table.get("turned_deg", 0)
         if _numbers(turned).shape != () or (turned and tag is None):
             raise InputError(f"turned_deg = {turned!r}; give the degrees by which the tag's upper edge is turned")
         tag = None if tag is None else _tag_number(tag, "tag")
-        name, ahead = str(table.get("name", number)), 0.0 if math.isnan(ahead) else ahead
-        return Markers(name, hues, colours, tag, ahead, apart, math.radians(turned))
+        name, ahead, apart = str(table.get("name", number)), table.get("ahead", 0.0), table.get("apart", math.nan)
+        return Markers(name, hues, colours, tag, float(ahead), float(apart), math.radians(turned))
 
 
 def _hue(colour: object, key: str) -> float:
     """Return the hue of a colour [deg], red 0, green 120, blue 240."""
-    if colour in HUES:
-        return float(HUES[str(colour)])
-    if not isinstance(colour, str) or not re.fullmatch(r"#[0-9a-fA-F]{6}", colour):
+    if not isinstance(colour, str) or not (colour in HUES or re.fullmatch("#[0-9a-fA-F]{6}", colour)):
         raise InputError(f'{key} = {colour!r}; give {", ".join(HUES)}, or a colour of the picture, "#c03020"')
+    if colour in HUES:
+        return float(HUES[colour])
     red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     along, across = red - (green + blue) / 2, math.sqrt(3) / 2 * (green - blue)
     if math.hypot(along, across) < 30:
         raise InputError(f'{key} = "{colour}" is nearly grey; give the marker a strong colour')
     return math.degrees(math.atan2(across, along)) % 360
-
-
-def _length(table: Mapping[str, Any], quantity: str, where: str) -> float:
-    """Return a length in metres, in whatever unit its key has; NaN if it is not there."""
-    key, suffix = _key_of(table, quantity)
-    if not key:
-        return math.nan
-    if _numbers(table[key]).shape != ():
-        raise InputError(f"[{where}] {key} = {table[key]!r}; give a number, {quantity}_cm or in another unit")
-    return float(to_si(table[key], suffix))
-
-
-def _key_of(table: Mapping[str, Any], quantity: str) -> tuple[str, str]:
-    """Return the key of a quantity and the suffix of its unit; two empty words if it is not there."""
-    keys = {
-        key: unit.suffix for key in table for name, unit in [split(key)] if name == quantity and unit is not None
-    }
-    if len(keys) > 1:
-        raise InputError(f"{' and '.join(keys)} are the same quantity; drop all but one")
-    return next(iter(keys.items()), ("", ""))
 
 
 def _points(table: Mapping[str, Any], key: str, fewest: int) -> Floats:
