@@ -39,33 +39,35 @@ def measure_films(
         raise InputError(f"{runs} has no column 'film' that names the film of each run")
     if len(setup.robots) > 1:
         raise InputError(f"{view} has {len(setup.robots)} robots; films of runs show one")
-    parts = {name: numbers_of(table[name]) for name in ("start_s", "end_s") if name in table}
+    given = {name: numbers_of(table[name]) for name in ("start_s", "end_s") if name in table}
+    parts = pd.DataFrame(given, table.index, columns=["start_s", "end_s"]).fillna(
+        {"start_s": 0.0, "end_s": math.inf}
+    )
     with naming(runs):
-        noted, converted = convert_measured(table.drop(columns=["film", *parts]), str(runs))
-    omega = numbers_of(noted["omega_rpm"])
+        noted, converted = convert_measured(table.drop(columns=["film", *given]), str(runs))
+    omega = numbers_of(noted["omega_rpm"]) * math.pi / 30
     for index, film in enumerate(table["film"]):
         if not isinstance(film, str):
             raise InputError(f"{runs}: {row_name(table, index)} has no film")
         Film(Path(runs).parent / film)  # refused before the first is tracked, which takes a while
     tracks, scale_error = [], 0.0
-    for index, film in enumerate(table["film"]):
-        start, end = (
-            float(parts[name].iloc[index]) if name in parts else math.nan for name in ("start_s", "end_s")
-        )
+    for number, (film, speed, (start, end)) in enumerate(
+        zip(table["film"], omega, parts.to_numpy(), strict=True), 1
+    ):
         tracked = track_film(
             Path(runs).parent / film,
             setup,
             head_length=robot.head_length,
-            motor_speed=abs(omega.iloc[index]) * math.pi / 30,
-            start=0.0 if math.isnan(start) else start,
-            end=math.inf if math.isnan(end) else end,
+            motor_speed=abs(speed),
+            start=start,
+            end=end,
         )
         track, notes = next(iter(tracked.tables.values())), tracked.notes
-        if turn_sense(track) * omega.iloc[index] < 0:
+        if turn_sense(track) * speed < 0:
             notes = [*notes, f"the robot turns to the other side than omega_rpm makes it: {MIRRORED}"]
         for note in notes:
             tell(f"{film}: {note}")
-        tracks.append(track.assign(run=index + 1))
+        tracks.append(track.assign(run=number))
         scale_error = max(scale_error, tracked.view.scale_error)  # of a tag, whose scale each film has anew
     if "camera_scale_sigma_percent" not in noted:
         noted["camera_scale_sigma_percent"] = 100 * scale_error

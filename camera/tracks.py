@@ -31,6 +31,7 @@ _SHOWN = 10  # poses in the picture of a track
 _GAP = 1.5  # usual times between two frames, at which frames are missing
 _LEAST = 0.3  # of the head's length, of which the bands are apart
 _CERTAIN = 5.0  # standard errors by which a robot that moves tail first has moved
+_ENOUGH = 2000  # frames for the sense of a spin
 _EXCHANGE = "exchange the colours of front and rear in view.toml (turn a tag by 180 degrees)"
 
 
@@ -67,6 +68,8 @@ def track_film(
     Raises:
         InputError: the film cannot be read, or a robot is not seen in it; the message says what to change.
     """
+    import pandas as pd
+
     with naming(path):
         film = Film(path)
         detector = Detector(_with_distances(film, setup, head_length), setup.view, head_length=head_length)
@@ -88,16 +91,39 @@ def track_film(
                     rows[each.robot].append(_row(each, frame.number, frame.time_s - start))
         if picture is None:
             raise InputError(f"no frame between {start:g} and {end:g} s; the film has {film.count} frames")
-        tables = _tables(Path(path).stem, setup, rows, why, len(times) - doubled)
-        notes = _notes(np.array(times), doubled, why)
+        notes, steps = list[str](), np.diff(times)
+        if gaps := int((steps > _GAP * np.median(steps)).sum()) if len(steps) else 0:
+            notes.append(f"{gaps} gaps in the time stamps: the camera dropped frames")
+        if doubled:
+            notes.append(f"{doubled} of {len(times)} frames are copies of the frame before, and left out")
+        for robot, reasons in why.items():
+            for reason, count in reasons.most_common():
+                notes.append(f"robot {robot}: {count} of {len(times)} frames without a pose: {reason}")
         if any(set(DOTS) & set(each.hues) for each in setup.robots) and len(times) > 1:
             notes += filter(None, [aliasing(np.array(times), motor_speed)])
-        for name, table in tables.items():
-            if _spin_sense(table, motor_speed) * turn_sense(table) > 0:
+        tables = {}
+        for markers in setup.robots:
+            name, run = markers.name, Path(path).stem
+            if not rows[name]:
+                raise InputError(_nothing(markers, why[name].most_common(1)[0][0], len(times) - doubled))
+            table = tables[name] = pd.DataFrame(rows[name])
+            table.insert(0, "run", run if len(setup.robots) == 1 else f"{run}-{name}")
+            turn = turn_sense(table)
+            if turn and turn == _spin_sense(table[:_ENOUGH], motor_speed):
                 notes.append(f"robot {name}: its head spins as if front and rear were exchanged; {_EXCHANGE}")
             elif _swims_backwards(table):
                 notes.append(f"robot {name}: it moves tail first; if it did not, {_EXCHANGE}")
         return FilmTracks(tables, notes, detector.view, picture)
+
+
+def _nothing(markers: Markers, reason: str, count: int) -> str:
+    """Say that a robot is in no frame, why, and what to change."""
+    remedy = 'give its markers as they look in the picture, front = "#c03020", or light the tank'
+    if markers.tag is not None:
+        remedy = "check its number, its dictionary and its white border, and that the film is not mirrored"
+    elif reason == wrong_distance(markers):
+        remedy = "correct [scale] in view.toml, or apart, the distance of the bands, if it is given"
+    return f"no robot {markers.name} in {count} frames ({reason}): {remedy}"
 
 
 def _with_distances(film: Film, setup: Setup, head_length: float) -> list[Markers]:
@@ -140,42 +166,6 @@ def _row(pose: Pose, index: int, time: float) -> dict[str, float]:
     for name, (left, area) in pose.dots.items():
         row |= {f"{name}_left_cm": 100 * left, f"{name}_area_mm2": 1e6 * area}
     return row
-
-
-def _tables(
-    film: str, setup: Setup, rows: dict[str, list[dict[str, float]]], why: dict[str, Counter[str]], count: int
-) -> dict[str, pd.DataFrame]:
-    import pandas as pd
-
-    tables = {}
-    for each in setup.robots:
-        if not rows[each.name]:
-            remedy = (
-                'give its markers as they look in the picture, front = "#c03020", or light the tank'
-                if each.tag is None
-                else "check its number, its dictionary and its white border, and that the film is not mirrored"
-            )
-            reason = why[each.name].most_common(1)[0][0]
-            if each.tag is None and reason == wrong_distance(each):
-                remedy = "correct [scale] in view.toml, or apart, the distance of the bands, if it is given"
-            raise InputError(f"no robot {each.name} in {count} frames ({reason}): {remedy}")
-        table = pd.DataFrame(rows[each.name])
-        table.insert(0, "run", film if len(setup.robots) == 1 else f"{film}-{each.name}")
-        tables[each.name] = table
-    return tables
-
-
-def _notes(times: Any, doubled: int, why: dict[str, Counter[str]]) -> list[str]:
-    notes = []
-    steps = np.diff(times)
-    if len(steps) and (missing := int((steps > _GAP * np.median(steps)).sum())):
-        notes.append(f"{missing} gaps in the time stamps: the camera dropped frames")
-    if doubled:
-        notes.append(f"{doubled} of {len(times)} frames are copies of the frame before, and left out")
-    for robot, reasons in why.items():
-        for reason, count in reasons.most_common():
-            notes.append(f"robot {robot}: {count} of {len(times)} frames without a pose: {reason}")
-    return notes
 
 
 def turn_sense(table: pd.DataFrame) -> int:
