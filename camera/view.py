@@ -279,6 +279,8 @@ def _from_places(view: View, plane: Floats, places: Floats) -> View:
     if homography is None:
         raise InputError("[scale] the points lie on a line; give the corners of a rectangle")
     homography = homography / (homography[2] @ [*plane.mean(axis=0), 1.0])
+    if not (plane @ homography[2, :2] + homography[2, 2] > 0).all():
+        raise InputError("[scale] points_px and their places go around in different orders; give a place for each")
     if (np.linalg.det(homography) > 0) != view.up:
         other = "down" if view.up else "up"
         raise InputError(
@@ -316,6 +318,8 @@ def _markers(table: Any, number: int) -> Markers:
         if _numbers(turned).shape != () or (turned and tag is None):
             raise InputError(f"turned_deg = {turned!r}; give the degrees by which the tag's upper edge is turned")
         tag = None if tag is None else _tag_number(tag, "tag")
+        if table.get("apart", 1.0) <= 0:
+            raise InputError("the bands' distance, apart, is not above 0; leave it out, and it is learnt")
         name, ahead, apart = str(table.get("name", number)), table.get("ahead", 0.0), table.get("apart", math.nan)
         return Markers(name, hues, colours, tag, float(ahead), float(apart), math.radians(turned))
 

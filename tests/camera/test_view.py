@@ -28,6 +28,8 @@ REFUSED = {  # what of EXAMPLE is written otherwise, and the message
     "the same point": ("[100, 650], ", "[900, 650], ", "[scale] the two points or their distance are the same"),
     "no scale": ("points_px = [[100, 650], [900, 650]]\n", "", "no scale, or two; give [scale] points_px"),
     "mirrored": (RULER, "points_cm = [[0, 30], [30, 30], [30, 0], [0, 0]]", "mirror images of each other"),
+    "another order": (RULER, "points_cm = [[0, 0], [30, 30], [30, 0], [0, 30]]", "go around in different orders"),
+    "no distance": ("# ahead_mm = 0", "apart_mm = 0", "[[robots]] 1: the bands' distance, apart, is not above 0"),
     "on a line": ("[900, 100], [100, 100]]", "[500, 650], [300, 650]]", "the points lie on a line"),
     "other robot": ("# ahead_mm = 0", "ahead = 0", "[[robots]] 1: [robots] ahead has no unit of length"),
     "no colour": ('"green"', '"grass"', "[[robots]] 1: rear = 'grass'; give red, orange"),
@@ -43,7 +45,7 @@ REFUSED = {  # what of EXAMPLE is written otherwise, and the message
 def test_an_entry_that_cannot_be_used_is_named(case: str, tmp_path: Path) -> None:
     old, new, message = REFUSED[case]
     text = EXAMPLE
-    if case in ("mirrored", "on a line"):
+    if case in ("mirrored", "on a line", "another order"):
         text = text.replace("[[100, 650], [900, 650]]", SQUARE)
     if case == "on a line":
         text = text.replace(RULER, "points_cm = [[0, 0], [30, 0], [15, 0], [8, 0]]")
