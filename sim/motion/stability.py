@@ -36,7 +36,7 @@ from sim.linear.spectral import differentiation, with_phases
 from sim.model.body import Body
 from sim.solve.assembly import CONTACT, are_local, batch, row
 from sim.solve.floquet import arnoldi
-from sim.solve.grouping import NAMES, by_kind, from_groups, in_groups, wanted_lanes
+from sim.solve.grouping import by_kind, from_groups, in_groups, robots_in_lanes
 from sim.solve.orbit import mean_motion, solve_orbits_in_place
 from sim.solve.refinement import ROUGH, Orbit, stacked
 
@@ -114,12 +114,9 @@ def _projected(rows: Floats, tails: int, x: Floats, u: Floats, shifts: Floats, m
     first = first_perturbation(tails, *x.shape[1:3]).ravel()
     count = min(most, first.size - 1)
     by_phase = _damped_differentiation(x.shape[2], float(np.sign(rows[0, 0])))
-    shapes, wanted = in_groups(_without_highest(x)), wanted_lanes(np.ones(len(rows), bool))
+    shapes = in_groups(_without_highest(x))
     projected = np.zeros((len(shapes), count + 1, count, shapes.shape[-1]))
-    arnoldi(
-        in_groups(rows), NAMES, shapes, in_groups(u), in_groups(shifts), by_phase, first / np.linalg.norm(first),
-        wanted, projected,
-    )  # fmt: skip
+    arnoldi(robots_in_lanes(rows), shapes, in_groups(u), in_groups(shifts), by_phase, first, projected)
     return from_groups(projected, len(rows))
 
 
@@ -205,7 +202,7 @@ def first_perturbation(tails: int, n: int, columns: int) -> Floats:
         columns: M, phases of the orbit.
 
     Returns:
-        The displacement of the nodes of one tail at all phases, (n, M, 3). Only its direction counts.
+        The displacement of the nodes of one tail at all phases, (n, M, 3), of length 1.
     """
     numbers = np.random.default_rng(0)
     phase = 2 * np.pi * np.arange(columns) / columns
@@ -214,7 +211,7 @@ def first_perturbation(tails: int, n: int, columns: int) -> Floats:
     for harmonic in range(tails // 2 + 1):
         for wave in (np.cos(harmonic * phase), np.sin(harmonic * phase)):
             vector += bend[:, None, None] * wave[:, None] * numbers.normal(size=3)
-    return vector
+    return np.asarray(vector / np.linalg.norm(vector))
 
 
 class Leading(NamedTuple):

@@ -32,7 +32,7 @@ from sim.linear.blocks import block, put, vector
 from sim.linear.lane_arrays import choose_all, combine, divide, largest_entry, scalar_product, subtract_multiple
 from sim.linear.vectors import applied
 from sim.model.body import Body
-from sim.solve.grouping import body_in_lanes, reaches_further
+from sim.solve.grouping import InLanes, group_of, reaches_further
 from sim.solve.linearise import linearise
 from sim.solve.newton import Workspace, new_unknowns, new_workspace, solve_linear
 from sim.solve.rates import Rates, in_transient
@@ -45,28 +45,22 @@ _STEP = 1e-6  # finite-difference step of the largest entry, in l
 
 @compiled
 def arnoldi(
-    numbers: Floats, names: Any, x: Floats, u: Floats, shifts: Floats, by_phase: Floats, first: Floats,
-    wanted: Floats, projected: Floats,
-) -> None:  # fmt: skip
+    robots: InLanes, x: Floats, u: Floats, shifts: Floats, by_phase: Floats, first: Floats, projected: Floats
+) -> None:
     """Fill `projected` (G, K + 1, K, W) for orbits x (G, n, M, 3, W), u (G, P, 4, W) with shifts (G, W).
 
     Args:
-        numbers: of the robots, (G, K', W).
-        names: of the non-local effects.
         by_phase: d/dφ, (M, M).
         first: a unit vector, (3 n M,).
-        wanted: 1 in the lanes that are wanted, (G, W).
     """
-    given, shapes, velocities, shift = lanes(numbers), lanes(x), lanes(u), lanes(shifts)
-    going, out = lanes(wanted), lanes(projected)
+    shapes, velocities, shift, out = lanes(x), lanes(u), lanes(shifts), lanes(projected)
     count = out.shape[2]
     basis = zeros(shapes, (count + 1, first.size))
     image, du = zeros(shapes, shapes[0].shape), zeros(shapes, velocities[0].shape)
     vector_of_image = image.reshape(image.size)
     work = new_workspace(in_transient(shift[0], by_phase, shapes[0]), shapes[0], velocities[0])
-    for g in range(len(given)):
-        body, at_x, at_u, where = body_in_lanes(given[g], names), shapes[g], velocities[g], going[g]
-        matrix = out[g]
+    for g in range(len(shapes)):
+        (body, where), at_x, at_u, matrix = group_of(robots, g), shapes[g], velocities[g], out[g]
         rates = in_transient(shift[g], by_phase, at_x)
         linearise(body, rates, at_x, at_u, work.scratch, work.equations)
         for k in range(first.size):

@@ -7,13 +7,13 @@ nothing is asked of them. In compiled loops the numbers of a group are one `Body
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from sim.arrays import Flags, Floats
 from sim.jit import compiled
-from sim.lanes import lane, less, named_like, width, zeros
+from sim.lanes import lane, lanes, less, named_like, width, zeros
 from sim.linear.lane_arrays import take_lane
 from sim.model.body import Body
 from sim.solve.assembly import Nonlocal
@@ -40,21 +40,34 @@ def in_groups(array: Floats) -> Floats:
     """Lay out an array (B, …) of B ≥ 1 robots as (G, …, W)."""
     groups, count = -(-len(array) // width()), len(array)
     places = np.minimum(np.arange(groups * width()), count - 1)
-    lanes = array[places].reshape(groups, width(), *array.shape[1:])
-    return np.ascontiguousarray(np.moveaxis(lanes, 1, -1))
+    return np.ascontiguousarray(np.moveaxis(array[places].reshape(groups, width(), *array.shape[1:]), 1, -1))
 
 
 def from_groups(array: Floats, count: int) -> Floats:
     """Lay out an array (G, …, W) as (B, …), for B robots."""
-    lanes = np.moveaxis(array, -1, 1)
-    return np.ascontiguousarray(lanes.reshape(lanes.shape[0] * lanes.shape[1], *lanes.shape[2:])[:count])
+    robots = np.moveaxis(array, -1, 1)
+    return np.ascontiguousarray(robots.reshape(-1, *robots.shape[2:])[:count])
 
 
-def wanted_lanes(wanted: Flags) -> Floats:
-    """Tell in which lanes there is a robot that is wanted, from flags (B,), as (G, W) of 1 and 0."""
-    groups = in_groups(wanted.astype(float))
-    groups.reshape(-1)[len(wanted) :] = 0.0
-    return groups
+class InLanes(NamedTuple):
+    """Robots in groups, for compiled loops."""
+
+    numbers: Floats  # in the order of `sim.solve.assembly.numbers`, (G, K, W)
+    wanted: Floats  # 1 in the lanes of robots that are wanted, else 0, (G, W)
+    names: Any  # numbers of the non-local effects of any robot; only their names matter
+
+
+def robots_in_lanes(rows: Floats, wanted: Flags | None = None) -> InLanes:
+    """Lay out robots with numbers (B, K) in groups; flags (B,) tell which are wanted, all by default."""
+    flags = in_groups(np.ones(len(rows)) if wanted is None else wanted.astype(float))
+    flags.reshape(-1)[len(rows) :] = 0.0
+    return InLanes(in_groups(rows), flags, NAMES)
+
+
+@compiled
+def group_of(robots: InLanes, g: int) -> tuple[Body, Any]:
+    """Return the robots of group g as one, and 1 in the lanes of those that are wanted."""
+    return body_in_lanes(lanes(robots.numbers)[g], robots.names), lanes(robots.wanted)[g]
 
 
 @compiled

@@ -18,7 +18,7 @@ Source: Alexander (1977) for SDIRK2; Hairer and Wanner, *Solving ODEs II*, V.1 f
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from sim.mechanics.balance import tail_spin
 from sim.mechanics.geometry import straight
 from sim.model.body import Body
 from sim.solve.assembly import row
-from sim.solve.grouping import NAMES, body_in_lanes, in_groups, wanted_lanes
+from sim.solve.grouping import InLanes, group_of, in_groups, robots_in_lanes
 from sim.solve.newton import new_workspace, newton
 from sim.solve.rates import in_stage
 
@@ -50,11 +50,10 @@ class State(NamedTuple):
 
 @compiled
 def _march(
-    numbers: Floats, names: Any, given: State, dt: float, count: int, tolerance: float, wanted: Floats,
-    poses: Floats, shapes: Floats,
-) -> bool:  # fmt: skip
-    """Step the robots of a group until one of those that are `wanted`, (1, W), fails; arrays end with (W,)."""
-    body, going = body_in_lanes(lanes(numbers), names), lanes(wanted)[0]
+    robots: InLanes, given: State, dt: float, count: int, tolerance: float, poses: Floats, shapes: Floats
+) -> bool:
+    """Step the robots of one group until one of those that are wanted fails; arrays end with (W,)."""
+    body, going = group_of(robots, 0)
     state = State(lanes(given.x), lanes(given.x_dot), lanes(given.pose), lanes(given.u))
     all_poses, all_shapes = lanes(poses), lanes(shapes)
     star, now, before = _new_like(state), _new_like(state), _new_like(state)
@@ -152,10 +151,8 @@ def advance(body: Body, state: State, dt: float, count: int, tolerance: float, *
     if not 0 < dt < np.inf:
         return steps
     kept = (*state, *steps[1:])
-    numbers, *in_lanes = (in_groups(part[None])[0] for part in (row(body)[0], *kept))
-    *state_in_lanes, all_poses, all_shapes = in_lanes
-    wanted = wanted_lanes(np.ones(1, bool))
-    solved = _march(numbers, NAMES, State(*state_in_lanes), dt, count, tolerance, wanted, all_poses, all_shapes)
+    in_lanes = [in_groups(part[None])[0] for part in kept]
+    solved = _march(robots_in_lanes(row(body)), State(*in_lanes[:4]), dt, count, tolerance, *in_lanes[4:])
     for part, found in zip(kept, in_lanes, strict=True):
         part[:] = found[..., 0]
     return steps._replace(solved=bool(solved))

@@ -33,7 +33,7 @@ from sim.mechanics.balance import tail_spin
 from sim.mechanics.geometry import measure, straight
 from sim.model.body import Body
 from sim.solve.assembly import batch
-from sim.solve.grouping import NAMES, body_in_lanes, from_groups, in_groups, wanted_lanes
+from sim.solve.grouping import InLanes, from_groups, group_of, in_groups, robots_in_lanes
 from sim.solve.linearise import linearise
 from sim.solve.newton import new_workspace, newton, solve_linear
 from sim.solve.rates import on_orbit
@@ -63,9 +63,9 @@ def solve_orbits_in_place(
     Returns:
         Size of each robot's last correction, (B,), see `sim.solve.newton.newton`; NaN of those that are not going.
     """
-    wanted = wanted_lanes(np.ones(len(rows), bool) if going is None else going)
-    shapes, velocities, sizes = in_groups(x), in_groups(u), np.empty_like(wanted)
-    _solve_groups(in_groups(rows), NAMES, shapes, velocities, tolerance, wanted, sizes)
+    robots, shapes, velocities = robots_in_lanes(rows, going), in_groups(x), in_groups(u)
+    sizes = np.empty_like(robots.wanted)
+    _solve_groups(robots, shapes, velocities, tolerance, sizes)
     x[:], u[:] = from_groups(shapes, len(x)), from_groups(velocities, len(u))
     return from_groups(sizes, len(x))
 
@@ -76,9 +76,9 @@ def residuals_on_orbits(rows: Floats, x: Floats, u: Floats) -> tuple[Floats, Flo
     Returns:
         r (B, n, M, 3) on the nodes, t (B, P, 4) on the robots, and the largest elastic force in an edge, (B,).
     """
-    shapes, velocities, wanted = in_groups(x), in_groups(u), wanted_lanes(np.ones(len(x), bool))
-    r, t, force = np.empty_like(shapes), np.empty_like(velocities), np.empty_like(wanted)
-    _fill_residuals(in_groups(rows), NAMES, shapes, velocities, wanted, r, t, force)
+    robots, shapes, velocities = robots_in_lanes(rows), in_groups(x), in_groups(u)
+    r, t, force = np.empty_like(shapes), np.empty_like(velocities), np.empty_like(robots.wanted)
+    _fill_residuals(robots, shapes, velocities, r, t, force)
     return from_groups(r, len(x)), from_groups(t, len(x)), from_groups(force, len(x))
 
 
@@ -92,8 +92,8 @@ def solve_at_orbits(rows: Floats, x: Floats, u: Floats, r: Floats, t: Floats) ->
     Returns:
         The solutions, of the same shapes.
     """
-    dx, du, wanted = in_groups(r), in_groups(t), wanted_lanes(np.ones(len(x), bool))
-    _solve_linear_in_groups(in_groups(rows), NAMES, in_groups(x), in_groups(u), wanted, dx, du)
+    dx, du = in_groups(r), in_groups(t)
+    _solve_linear_in_groups(robots_in_lanes(rows), in_groups(x), in_groups(u), dx, du)
     return from_groups(dx, len(x)), from_groups(du, len(x))
 
 
@@ -130,55 +130,38 @@ def smallest_gaps(rows: Floats, x: Floats, tails: int) -> Floats:
 
 
 @compiled
-def _solve_groups(
-    numbers: Floats, names: Any, x: Floats, u: Floats, tolerance: float, wanted: Floats, sizes: Floats
-) -> None:
-    """Improve x (G, n, M, 3, W) and u (G, P, 4, W) in place.
-
-    Args:
-        numbers: of the robots, (G, K, W).
-        names: of the non-local effects.
-        wanted: 1 in the lanes that are wanted, (G, W).
-        sizes: of the last corrections, (G, W), filled.
-    """
-    given, shapes, velocities = lanes(numbers), lanes(x), lanes(u)
-    going, size = lanes(wanted), lanes(sizes)
+def _solve_groups(robots: InLanes, x: Floats, u: Floats, tolerance: float, sizes: Floats) -> None:
+    """Improve x (G, n, M, 3, W) and u (G, P, 4, W) in place; `sizes` (G, W) of the last corrections are filled."""
+    shapes, velocities, size = lanes(x), lanes(u), lanes(sizes)
     rates = on_orbit(shapes[0])
     work = new_workspace(rates, shapes[0], velocities[0])
-    for g in range(len(given)):
-        body = body_in_lanes(given[g], names)
-        size[g] = newton(body, rates, shapes[g], velocities[g], work, tolerance, going[g])[1]
+    for g in range(len(size)):
+        body, going = group_of(robots, g)
+        size[g] = newton(body, rates, shapes[g], velocities[g], work, tolerance, going)[1]
 
 
 @compiled
-def _fill_residuals(
-    numbers: Floats, names: Any, x: Floats, u: Floats, wanted: Floats, r: Floats, t: Floats, force: Floats,
-) -> None:  # fmt: skip
-    """Fill r (G, n, M, 3, W), t (G, P, 4, W) and force (G, W) at x and u; arguments as in `_solve_groups`."""
-    given, shapes, velocities = lanes(numbers), lanes(x), lanes(u)
-    where, largest = lanes(wanted), lanes(force)
-    on_nodes, on_robots = lanes(r), lanes(t)
+def _fill_residuals(robots: InLanes, x: Floats, u: Floats, r: Floats, t: Floats, force: Floats) -> None:
+    """Fill r (G, n, M, 3, W), t (G, P, 4, W) and force (G, W) at x and u, see `residuals_on_orbits`."""
+    shapes, velocities, on_nodes, on_robots, largest = lanes(x), lanes(u), lanes(r), lanes(t), lanes(force)
     rates, scratch = on_orbit(shapes[0]), new_scratch(shapes[0], velocities[0])
-    for g in range(len(given)):
-        body = body_in_lanes(given[g], names)
-        fill_residual(body, rates, shapes[g], velocities[g], where[g], scratch, on_nodes[g], on_robots[g])
+    for g in range(len(largest)):
+        body, where = group_of(robots, g)
+        fill_residual(body, rates, shapes[g], velocities[g], where, scratch, on_nodes[g], on_robots[g])
         measure(scratch.geometry, shapes[g], body.offset, body.axial_stiffness)
         largest[g] = largest_entry(scratch.geometry.force)
 
 
 @compiled
-def _solve_linear_in_groups(
-    numbers: Floats, names: Any, x: Floats, u: Floats, wanted: Floats, dx: Floats, du: Floats
-) -> None:
-    """Solve in place for the right-hand sides dx (G, K, n, M, 3, W), du (G, K, P, 4, W); see `_solve_groups`."""
-    given, shapes, velocities = lanes(numbers), lanes(x), lanes(u)
-    going, changes, changes_of_robot = lanes(wanted), lanes(dx), lanes(du)
+def _solve_linear_in_groups(robots: InLanes, x: Floats, u: Floats, dx: Floats, du: Floats) -> None:
+    """Solve in place for the right-hand sides dx (G, K, n, M, 3, W), du (G, K, P, 4, W) at x and u."""
+    shapes, velocities, changes, changes_of_robot = lanes(x), lanes(u), lanes(dx), lanes(du)
     rates = on_orbit(shapes[0])
     work = new_workspace(rates, shapes[0], velocities[0])
-    for g in range(len(given)):
-        body, at_x, at_u = body_in_lanes(given[g], names), shapes[g], velocities[g]
+    for g in range(len(shapes)):
+        (body, going), at_x, at_u = group_of(robots, g), shapes[g], velocities[g]
         linearise(body, rates, at_x, at_u, work.scratch, work.equations)
         for i in range(changes.shape[1]):
             solve_linear(
-                body, rates, at_x, at_u, work, i == 0, _TOLERANCE, going[g], changes[g, i], changes_of_robot[g, i]
+                body, rates, at_x, at_u, work, i == 0, _TOLERANCE, going, changes[g, i], changes_of_robot[g, i]
             )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from sim.lanes import lanes, width
 from sim.linear.chains import Chains
 from sim.model.body import Body
 from sim.solve.assembly import row
-from sim.solve.grouping import NAMES, body_in_lanes, in_groups, wanted_lanes
+from sim.solve.grouping import InLanes, group_of, in_groups, robots_in_lanes
 from sim.solve.linearise import linearise
 from sim.solve.newton import factor_and_solve, new_workspace, newton
 from sim.solve.rates import Rates
@@ -36,25 +36,24 @@ def _stacked(*arrays: Floats) -> list[Floats]:
 def residual(body: Body, rates: Plain, x: Floats, u: Floats, noise: float = 0.0) -> tuple[Floats, Floats]:
     """Compute r (n, M, 3) and t (P, 4); `noise` fills the scratch arrays before."""
     r, t = _stacked(x, u)
-    wanted = wanted_lanes(np.ones(1, bool))
-    numbers, *parts = _stacked(row(body)[0], [rates.rate, rates.phase], rates.start, x, u)
-    _fill(numbers, NAMES, rates.differentiation, *parts, wanted, noise, r, t)
+    parts = _stacked([rates.rate, rates.phase], rates.start, x, u)
+    _fill(robots_in_lanes(row(body)), rates.differentiation, *parts, noise, r, t)
     return r[..., 0], t[..., 0]
 
 
 @compiled
 def _fill(
-    numbers: Floats, names: Any, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats,
-    wanted: Floats, noise: float, r: Floats, t: Floats,
+    robots: InLanes, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats, noise: float, r: Floats,
+    t: Floats,
 ) -> None:  # fmt: skip
-    v, at_x, at_u, given = lanes(pair), lanes(x), lanes(u), lanes(wanted)
+    v, at_x, at_u = lanes(pair), lanes(x), lanes(u)
     rates = Rates(v[0], v[1], by_phase, lanes(start))
     scratch = new_scratch(at_x, at_u)
     for values in (scratch.around.flow, scratch.around.drag, scratch.x_dot, scratch.by_spin):
         values[:] = noise
     scratch.around.moment[:], scratch.around.wrench[:] = noise, noise
-    body = body_in_lanes(lanes(numbers), names)
-    fill_residual(body, rates, at_x, at_u, given[0], scratch, lanes(r), lanes(t))
+    body, wanted = group_of(robots, 0)
+    fill_residual(body, rates, at_x, at_u, wanted, scratch, lanes(r), lanes(t))
 
 
 class Linear(NamedTuple):
@@ -74,20 +73,20 @@ def linear(body: Body, rates: Plain, x: Floats, u: Floats, dx: Floats, du: Float
     blocks = [np.zeros((n, columns, 3, 3))] * 5
     shapes = [*blocks, np.zeros((n, columns, 4, 3)), np.zeros((2, columns, 4, 3)), np.zeros((instants, 4, 4))]
     chains, equations = Chains(*_stacked(*shapes, np.zeros((4, 4)))), _stacked(blocks[0], x, u)
-    numbers, *parts = _stacked(row(body)[0], [rates.rate, rates.phase], rates.start, x, u, dx, du)
-    _linear(numbers, NAMES, rates.differentiation, *parts, chains, *equations)
+    parts = _stacked([rates.rate, rates.phase], rates.start, x, u, dx, du)
+    _linear(robots_in_lanes(row(body)), rates.differentiation, *parts, chains, *equations)
     first = [np.ascontiguousarray(part[..., 0]) for part in (*chains, *equations, *parts[-2:])]
     return Linear(Chains(*first[:9]), *first[9:])
 
 
 @compiled
 def _linear(
-    numbers: Floats, names: Any, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats, dx: Floats,
-    du: Floats, chains: Chains, resistance: Floats, r: Floats, t: Floats,
+    robots: InLanes, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats, dx: Floats, du: Floats,
+    chains: Chains, resistance: Floats, r: Floats, t: Floats,
 ) -> None:  # fmt: skip
     v, at_x, at_u = lanes(pair), lanes(x), lanes(u)
     rates = Rates(v[0], v[1], by_phase, lanes(start))
-    body, work = body_in_lanes(lanes(numbers), names), new_workspace(rates, at_x, at_u)
+    body, work = group_of(robots, 0)[0], new_workspace(rates, at_x, at_u)
     linearise(body, rates, at_x, at_u, work.scratch, work.equations)
     found = work.equations.chains
     for out, block in (
@@ -103,22 +102,21 @@ def _linear(
 
 def corrections(body: Body, rates: Plain, x: Floats, u: Floats, tolerance: float) -> tuple[int, float]:
     """Improve x (n, M, 3) and u (P, 4) in place; return the number of corrections and the size of the last one."""
-    numbers, pair, start, at_x, at_u = _stacked(row(body)[0], [rates.rate, rates.phase], rates.start, x, u)
-    sizes = np.empty((1, width()))
-    wanted = wanted_lanes(np.ones(1, bool))
-    count = _newton(numbers, NAMES, rates.differentiation, pair, start, at_x, at_u, wanted, tolerance, sizes)
+    pair, start, at_x, at_u = _stacked([rates.rate, rates.phase], rates.start, x, u)
+    robots, sizes = robots_in_lanes(row(body)), np.empty((1, width()))
+    count = _newton(robots, rates.differentiation, pair, start, at_x, at_u, tolerance, sizes)
     x[:], u[:] = at_x[..., 0], at_u[..., 0]
     return int(count), float(sizes[0, 0])
 
 
 @compiled
 def _newton(
-    numbers: Floats, names: Any, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats,
-    wanted: Floats, tolerance: float, sizes: Floats,
+    robots: InLanes, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats, tolerance: float,
+    sizes: Floats,
 ) -> int:  # fmt: skip
     v, at_x, at_u = lanes(pair), lanes(x), lanes(u)
     rates = Rates(v[0], v[1], by_phase, lanes(start))
-    body, going = body_in_lanes(lanes(numbers), names), lanes(wanted)[0]
+    body, going = group_of(robots, 0)
     count, size = newton(body, rates, at_x, at_u, new_workspace(rates, at_x, at_u), tolerance, going)
     lanes(sizes)[0] = size
     return count
