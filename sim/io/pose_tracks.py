@@ -26,18 +26,6 @@ from sim.io.tracking_programs import PROGRAMS, Program, Seen
 from sim.io.units import number_and_unit, of_kind, to_si
 
 _LISTED = 8  # names in a message
-_SIGNS = {  # how a file begins -> what may have written it
-    "scorer,": "deeplabcut",
-    "track,frame_idx,": "sleap",
-    "LABEL,ID,TRACK_ID,": "trackmate",
-    "<": "trackmate",
-    "#multi:": "tracker",
-    "multi:": "tracker",
-    "seconds,x1,y1": "idtrackerai",
-    "\x93NUMPY": "idtrackerai",
-    "\x89HDF": "deeplabcut, sleap or idtrackerai",
-    "Format Version,": "motive",
-}
 
 
 def read_tracks(path: str | Path, **options: Unpack[TrackOptions]) -> pd.DataFrame:
@@ -53,9 +41,9 @@ def read_tracks(path: str | Path, **options: Unpack[TrackOptions]) -> pd.DataFra
     if source is None:
         if others := options.keys() - {"written_by"}:
             raise InputError(f"--{min(others)} is for tracks of another program; say which with --from")
-        start = read_bytes(path, first=80).decode("latin-1") if path.is_file() else ""
-        if sign := next(filter(start.removeprefix("ï»¿").startswith, _SIGNS), None):
-            raise InputError(f"{path} is no table of poses; say what wrote it: --from {_SIGNS[sign]}")
+        start = read_bytes(path, first=80).decode("latin-1").removeprefix("ï»¿") if path.is_file() else ""
+        if wrote := [name for name, program in PROGRAMS.items() if start.startswith(program.begins)]:
+            raise InputError(f"{path} is no table of poses; say what wrote it: --from {' or '.join(wrote)}")
         return read_table(path)
     if source not in PROGRAMS:
         raise InputError(f"no program {source!r}; there are {', '.join(PROGRAMS)}")

@@ -46,6 +46,7 @@ class Program(NamedTuple):
     title: str
     read: Callable[[Path], Seen]
     endings: tuple[str, ...]  # of its files; of one film the first is read
+    begins: tuple[str, ...]  # how they begin, in Latin-1
     y_down: bool = True  # as in pictures
     likely: float = 0.0  # least likelihood of a point that counts: the program's own default
 
@@ -259,10 +260,12 @@ def _motive(path: Path) -> Seen:
 
 
 PROGRAMS = {
-    "deeplabcut": Program("DeepLabCut", _deeplabcut, (".csv", *_HDF5), likely=0.6),
-    "sleap": Program("SLEAP", _sleap, (".csv", *_HDF5), likely=0.2),
-    "trackmate": Program("TrackMate", _trackmate, (".csv", ".xml")),
-    "tracker": Program("Tracker", _tracker, (".txt", ".csv"), y_down=False),
-    "idtrackerai": Program("idtracker.ai", _idtrackerai, (".csv", *_HDF5, ".npy")),
-    "motive": Program("Motive", _motive, (".csv",)),
+    "deeplabcut": Program("DeepLabCut", _deeplabcut, (".csv", *_HDF5), ("scorer,", "\x89HDF"), likely=0.6),
+    "sleap": Program("SLEAP", _sleap, (".csv", *_HDF5), ("track,frame_idx,", "\x89HDF"), likely=0.2),
+    "trackmate": Program("TrackMate", _trackmate, (".csv", ".xml"), ("LABEL,ID,TRACK_ID,", "<")),
+    "tracker": Program("Tracker", _tracker, (".txt", ".csv"), ("#multi:", "multi:"), y_down=False),
+    "idtrackerai": Program(
+        "idtracker.ai", _idtrackerai, (".csv", *_HDF5, ".npy"), ("seconds,x1,y1", "\x93NUMPY", "\x89HDF")
+    ),
+    "motive": Program("Motive", _motive, (".csv",), ("Format Version,",)),
 }
