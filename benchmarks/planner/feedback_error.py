@@ -27,7 +27,7 @@ from benchmarks.planner.stated_errors import random_path
 from planner.jobs.plan import plan
 from planner.paths.path import circle
 from planner.planning.request import Camera
-from planner.tracking.swim import Swim, swim_under
+from planner.tracking.swim import Swim, swim
 from planner.tracking.tracker import Tracker
 from sim.io.errors import InputError
 from sim.motion.warm import compile_once
@@ -72,9 +72,10 @@ def outcomes(seed: int, vehicle: bool) -> list[Outcome] | str:
     found = []
     for (name, camera), each in zip(CAMERAS.items(), planned, strict=False):
         for current in (0.0, CURRENT):
-            x, y = (current * each.straight.net_speed * way for way in (math.cos(angle), math.sin(angle)))
+            speed = current * each.straight.net_speed * 100 * each.robot.length_scale / each.robot.time_scale
+            x, y = speed * math.cos(angle), speed * math.sin(angle)
             tracker, seen = Tracker(each, noise=camera.noise), replace(camera, seed=seed)
-            result = swim_under(tracker, each, truth, seen, current=(x, y))
+            result = swim(tracker, truth, seen, current_cm_s=(x, y))
             found.append(_outcome(seed, name, current, each.feedback_error, result))
     return found
 

@@ -39,6 +39,12 @@ _SHARES = np.array([0.25, 0.5, 0.75, 1.0])  # of the time between two events: th
 class Pilot(Protocol):
     """A `Tracker`, or what is fed like one."""
 
+    @property
+    def plan(self) -> Plan: ...
+
+    @property
+    def start(self) -> POSE: ...
+
     def update(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Command: ...
 
 
@@ -162,21 +168,25 @@ class Swimmer:
 
 @checks_keywords
 def swim(
-    pilot: Plan | Tracker,
-    truth: OneRobot | None = None,
+    pilot: Plan | Pilot,
+    truth: OneRobot | Vehicle | None = None,
     camera: Camera | None = None,
     *,
+    start: POSE | None = None,
     current_cm_s: tuple[float, float] = (0.0, 0.0),
+    later: Robot | Vehicle | None = None,
     longest: float = 3.0,
 ) -> Swim:
     """Simulate a robot under a tracker's orders, seen by a camera: a closed loop.
 
     Args:
         pilot: a tracker that has not begun, or a plan, which gets a tracker that knows the camera's noise.
-        truth: the robot that swims; default: the one that the plan was made for. A measured vehicle moves as
-            planned.
+        truth: what swims: a robot that is simulated, or a vehicle; default: the one that the plan was made for. A
+            measured vehicle moves as planned.
         camera: what sees it; default: that of the plan.
-        current_cm_s: of the fluid, in x and y [cm/s], which the tracker does not know.
+        start: pose of the head's centre at rest [l, rad]; default: where the tracker believes it.
+        current_cm_s: of the fluid, in x and y [cm/s], which the tracker does not know; a vehicle has its own, too.
+        later: what swims from half of the planned time on.
         longest: times the planned duration after which the swim ends in any case.
 
     Returns:
@@ -192,53 +202,18 @@ def swim(
         >>> track.finished, track.rms() < 0.1
         (True, True)
     """
-    plan = pilot.plan if isinstance(pilot, Tracker) else pilot
+    plan = pilot if isinstance(pilot, Plan) else pilot.plan
     camera = camera or plan.request.camera
-    tracker = pilot if isinstance(pilot, Tracker) else Tracker(plan, noise=camera.noise)
-    unit = plan.robot.time_scale / (100 * plan.robot.length_scale)
-    robot = plan.robot if truth is None else one_robot(truth)
-    return swim_under(
-        tracker,
-        plan,
-        robot if isinstance(robot, Robot) else plan.tracked.vehicle,
-        camera,
-        start=tracker.start,
-        current=(unit * current_cm_s[0], unit * current_cm_s[1]),
-        longest=longest,
-    )
-
-
-def swim_under(
-    pilot: Pilot,
-    plan: Plan,
-    truth: Robot | Vehicle,
-    camera: Camera,
-    *,
-    start: POSE | None = None,
-    current: tuple[float, float] = (0.0, 0.0),
-    later: Robot | Vehicle | None = None,
-    longest: float = 3.0,
-) -> Swim:
-    """Let a robot swim until the pilot says that the path ends.
-
-    Args:
-        pilot: gives the orders.
-        plan: gives the path and the units.
-        truth: what swims: a robot that is simulated, or a vehicle.
-        camera: what sees it.
-        start: pose of the head's centre at rest; default: the plan's.
-        current: of the fluid, in x and y [l per time unit]; a vehicle has its own besides.
-        later: what it is from half of the planned time on.
-        longest: times the planned duration after which the swim ends in any case.
-
-    Raises:
-        InputError: the robot cannot be simulated.
-    """
+    pilot = Tracker(plan, noise=camera.noise) if isinstance(pilot, Plan) else pilot
+    if not isinstance(truth, Vehicle):
+        robot = plan.robot if truth is None else one_robot(truth)
+        truth = robot if isinstance(robot, Robot) else plan.tracked.vehicle
     scale, rng = plan.robot.time_scale, np.random.default_rng(camera.seed)
     every, delay = camera.every_s / scale, camera.delay_s / scale
-    begin, limit = np.array(plan.start if start is None else start), longest * plan.duration
+    begin, limit = np.array(pilot.start if start is None else start), longest * plan.duration
+    x, y = (scale * each / (100 * plan.robot.length_scale) for each in current_cm_s)
     command = pilot.update(0.0)
-    swimmer = Swimmer(truth, plan, command.direction, begin, current)
+    swimmer = Swimmer(truth, plan, command.direction, begin, (x, y))
     now, look, change = 0.0, every, plan.duration / 2 if later else np.inf
     waiting: list[tuple[float, POSE, float]] = []
     rows = [(np.zeros(1), begin[None], command)]

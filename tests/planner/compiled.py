@@ -56,7 +56,7 @@ class CompiledTracker:
         self._library.begin.argtypes = [ctypes.c_double, ctypes.c_double, ctypes.c_void_p]
         self._library.feed.argtypes = [ctypes.c_double, ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
         self._library.finish.argtypes = [ctypes.c_void_p]
-        self._scale = plan.robot.time_scale
+        self.plan, self.start, self._scale = plan, plan.start, plan.robot.time_scale
         self.memory: int = self._library.memory()
         self.restart()
 

@@ -16,7 +16,7 @@ from planner.files.headers import milliseconds, rounded, schedule_header, table_
 from planner.jobs.plan import plan
 from planner.planning.plan import Plan
 from planner.planning.request import POSE, Camera
-from planner.tracking.swim import swim_under
+from planner.tracking.swim import swim
 from planner.tracking.tracker import SLACK, Command, Tracker
 from planner.vehicle.vehicle import Vehicle
 from sim.model.presets import PRESETS
@@ -142,6 +142,7 @@ class Both:
         self.one, self.other, self.calls, self.over = one, other, 0, False
         other.restart(start)
         self.last, self.told, self.flipped_at = one.command, other.update(0.0), 0.0
+        self.plan, self.start = one.plan, one.start
 
     def update(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Command:
         seen = now if seen_at is None else seen_at
@@ -186,7 +187,7 @@ def slower() -> Vehicle:
 )
 def test_the_same_orders_as_in_python(compiled: CompiledTracker, camera: Camera) -> None:
     both = Both(Tracker(bent()), compiled)
-    swim_under(both, bent(), slower(), camera)
+    swim(both, slower(), camera)
     assert both.calls > 40
     assert both.one.command.finished
 
@@ -197,7 +198,7 @@ def test_the_same_way_back_as_in_python(compiled: CompiledTracker, told: bool) -
     x, y, heading = bent().start
     start = x - 0.6 * math.sin(heading), y + 0.6 * math.cos(heading), heading + 1.0
     both = Both(Tracker(bent(), start=start if told else None), compiled, start if told else None)
-    result = swim_under(both, bent(), bent().tracked.vehicle, replace(PROMPT, every_s=0.7), start=start)
+    result = swim(both, bent().tracked.vehicle, replace(PROMPT, every_s=0.7), start=start)
     assert both.calls > 40
     assert both.one._law._way is not None or both.one.command.finished
     assert result.distance[-50:].max() < 0.1
@@ -225,10 +226,10 @@ def test_in_c_the_robot_stays_on_its_path_as_well(tmp_path: Path, compiled: Comp
     """In double and in single precision; and their memory is what the documentation says."""
     single = CompiledTracker(bent(), tmp_path, single=True)
     camera = replace(PROMPT, delay_s=1.0, lost=0.2)
-    python = swim_under(Tracker(bent()), bent(), slower(), camera).distance
+    python = swim(Tracker(bent()), slower(), camera).distance
     compiled.restart()
     for tracker in (compiled, single):
-        result = swim_under(tracker, bent(), slower(), camera)
+        result = swim(tracker, slower(), camera)
         assert root_mean_square(result.distance) == pytest.approx(root_mean_square(python), rel=0.03)
         assert min(result.dwells[:-1]) >= bent().minimum_dwell * (1 - 1e-6)
     assert single.memory <= 1350

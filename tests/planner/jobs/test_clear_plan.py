@@ -19,7 +19,7 @@ from planner.planning.arrive import EXACT
 from planner.planning.declare import TIGHTEST
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
-from planner.tracking.swim import swim_under
+from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from sim.io.errors import InputError
 from sim.motion.replay import replay
@@ -114,7 +114,7 @@ def test_a_tracked_robot_with_wrong_coefficients_stays_clear() -> None:
     result = make_plan(Path2D.of(LINE), tracked(), PlanRequest(space=ROCK))
     assert result.kept_clear is not None
     twist = tracked().vehicle.twist * np.array([1.02, 1.0, 1.02])
-    distances = swim_under(Tracker(result), result, replace(tracked().vehicle, twist=twist), FINE).distance
+    distances = swim(Tracker(result), replace(tracked().vehicle, twist=twist), FINE).distance
     assert distances.max() < result.kept_clear.margin
 
 
@@ -211,9 +211,7 @@ def test_the_simulator_follows_swings() -> None:
 
 def test_a_tracked_robot_swims_the_circles_and_arrives() -> None:
     car = tracked().vehicle
-    result = swim_under(
-        Tracker(waiting()), waiting(), replace(car, twist=car.twist * np.array([1.02, 1.0, 1.02])), FINE
-    )
+    result = swim(Tracker(waiting()), replace(car, twist=car.twist * np.array([1.02, 1.0, 1.02])), FINE)
     assert result.finished
     assert result.distance.max() < 0.2
     assert result.times[-1] == pytest.approx(waiting().duration, rel=0.03)  # a robot that is 2 % faster

@@ -17,7 +17,7 @@ from planner.paths.obstacles import Circle, Footprint, FreeSpace
 from planner.paths.path import Path2D
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
-from planner.tracking.swim import swim_under
+from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.tracked_point import tracked_vehicle
 from planner.vehicle.vehicle import Switches, roll_out
@@ -200,7 +200,7 @@ def test_robots_under_trackers_keep_apart() -> None:
         for each in result.scheduled:
             made = each.motion.plan
             robot = replace(made.tracked.vehicle.drawn(rng, 0.7), current=np.array([2e-5, -2e-5]))
-            tracks.append(swim_under(Tracker(made, noise=(0.005, 0.005)), made, robot, replace(FINE, seed=rng)))
+            tracks.append(swim(Tracker(made, noise=(0.005, 0.005)), robot, replace(FINE, seed=rng)))
         scale = CONTROL.time_scale
         times = np.arange(0.0, result.duration_s, 1.0)
         poses = [

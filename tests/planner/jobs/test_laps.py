@@ -20,7 +20,7 @@ from planner.planning.plan import Plan
 from planner.planning.request import POSE, PlanRequest
 from planner.tracking.guidance import TrackerGuidance
 from planner.tracking.pipe import answers
-from planner.tracking.swim import swim_under
+from planner.tracking.swim import swim
 from planner.tracking.tracker import Command, Tracker
 from planner.vehicle.tracked_point import tracked_vehicle
 from planner.vehicle.vehicle import Switches, Vehicle, roll_out
@@ -57,6 +57,9 @@ class UntilTold:
     tracker: Tracker
     at: float
     told: bool = field(default=False)
+
+    def __post_init__(self) -> None:
+        self.plan, self.start = self.tracker.plan, self.tracker.start
 
     def update(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Command:
         command = self.tracker.update(now, pose, seen_at)
@@ -141,7 +144,7 @@ def test_a_tracked_robot_goes_around_until_it_is_told(current: float) -> None:
     car = lap.tracked.vehicle
     car = replace(car, twist=car.twist * np.array([1.02, 1.0, 1.02]), current=np.array([current, 0.0]))
     tracker = UntilTold(Tracker(lap), 2.4 * lap.duration)
-    result = swim_under(tracker, lap, car, FINE, longest=8)
+    result = swim(tracker, car, FINE, longest=8)
     assert result.finished
     assert 2.8 < result.times[-1] / lap.duration < 3.2
     assert result.distance.max() < 0.15
@@ -154,7 +157,7 @@ def test_a_robot_that_was_moved_comes_back_in_any_lap() -> None:
     lap = laps()
     start = (0.5, -2.0, 2.0)
     tracker = UntilTold(Tracker(lap, start=start), 1.5 * lap.duration)
-    result = swim_under(tracker, lap, lap.tracked.vehicle, FINE, start=start, longest=8)
+    result = swim(tracker, lap.tracked.vehicle, FINE, start=start, longest=8)
     assert result.finished
     assert result.distance[result.times > lap.duration].max() < 2 * lap.predicted_max
 
@@ -248,7 +251,7 @@ def test_a_tracked_robot_stays(current: float, wrong: float) -> None:
     plan, place = held(), held().job
     car = tracked().vehicle
     car = replace(car, twist=car.twist * np.array([wrong, 1.0, 1.0]), current=np.array([current, 0.0]))
-    result = swim_under(UntilTold(Tracker(plan), 2.5 * plan.duration), plan, car, FINE, longest=8)
+    result = swim(UntilTold(Tracker(plan), 2.5 * plan.duration), car, FINE, longest=8)
     settled = result.times > plan.duration
     away = np.hypot(*(result.poses[settled, :2] - PLACE).T)
     assert result.finished

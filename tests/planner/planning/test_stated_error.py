@@ -24,7 +24,7 @@ from planner.planning.errors import (
 )
 from planner.planning.line_of_sight import follow, look_ahead
 from planner.planning.request import Camera
-from planner.tracking.swim import swim_under
+from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Rollout, Switches, Vehicle, roll_out
 from sim.io.errors import InputError
@@ -174,7 +174,7 @@ def test_it_holds_for_unseen_robots_and_paths() -> None:
 def test_the_tracker_keeps_it_in_95_percent_of_the_time(camera: Camera) -> None:
     result = plan_of("circle:1.6l", "paper-triangle", camera=camera)
     tracker = Tracker(result, noise=camera.noise)
-    assert swim_under(tracker, result, result.tracked.vehicle, camera).within(result.feedback_error) > 0.95
+    assert swim(tracker, result.tracked.vehicle, camera).within(result.feedback_error) > 0.95
 
 
 def test_a_worse_camera_means_a_larger_error() -> None:

@@ -16,7 +16,7 @@ from planner.paths.tractrix import Drift
 from planner.planning.plan import Plan
 from planner.planning.request import POSE, Camera
 from planner.tracking.guidance import TrackerGuidance, Way, shortest_way
-from planner.tracking.swim import Swim, swim_under
+from planner.tracking.swim import Swim, swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.zigzag import Objective
 from sim.model.presets import PRESETS
@@ -38,8 +38,8 @@ def eight() -> Plan:
 def test_a_learned_current_is_used() -> None:
     """Soon the error is that of a plan that knows the current."""
     truth, known = replace(eight().tracked.vehicle, current=np.array(CURRENT)), in_current()
-    learning = swim_under(Tracker(eight()), eight(), truth, PROMPT).distance
-    knowing = swim_under(Tracker(known), known, truth, PROMPT).distance
+    learning = swim(Tracker(eight()), truth, PROMPT).distance
+    knowing = swim(Tracker(known), truth, PROMPT).distance
     half = len(learning) // 2
     assert root_mean_square(knowing) < 0.015
     assert root_mean_square(learning[half:]) < 1.2 * root_mean_square(knowing)
@@ -72,7 +72,7 @@ def within(plan: Plan, tracker: Tracker | CompiledTracker, camera: Camera, rng: 
     angle = rng.uniform(0, 2 * math.pi)
     car = plan.tracked.vehicle.drawn(rng)
     car = replace(car, current=current * np.array([math.cos(angle), math.sin(angle)]))
-    result = swim_under(tracker, plan, car, camera)
+    result = swim(tracker, car, camera)
     return result.distance <= result.errors
 
 
@@ -99,7 +99,7 @@ def test_the_same_where_the_swings_are_large(robot: str, objective: Objective, t
 
 def swim_from(start: Any, camera: Camera, *, told: bool = False) -> Swim:
     tracker = Tracker(eight(), start=start if told else None)
-    return swim_under(tracker, eight(), eight().tracked.vehicle, camera, start=start, longest=10)
+    return swim(tracker, eight().tracked.vehicle, camera, start=start, longest=10)
 
 
 def time_back(result: Swim) -> float:

@@ -18,7 +18,7 @@ from planner.planning.request import POSE, Camera
 from planner.tracking import tracker
 from planner.tracking.guidance import TrackerGuidance
 from planner.tracking.kalman_filter import MOST, STATES, Dwell, Estimate
-from planner.tracking.swim import swim_under
+from planner.tracking.swim import swim
 from planner.tracking.tracker import CONFIRMED, EARLY, LATE, Clock, Tracker
 from planner.vehicle.vehicle import Vehicle
 from sim.mechanics import planar
@@ -54,7 +54,7 @@ ROBOTS: dict[str, dict[str, float]] = {
 )
 def test_robots_that_differ_stay_on_the_path(name: str, seeds: int) -> None:
     cameras = [replace(PROMPT, seed=seed) for seed in range(seeds)]
-    swims = [swim_under(Tracker(planned()), planned(), changed(**ROBOTS[name]), camera) for camera in cameras]
+    swims = [swim(Tracker(planned()), changed(**ROBOTS[name]), camera) for camera in cameras]
     assert np.mean([each.rms() for each in swims]) < 0.026
     for each in swims:
         assert min(each.dwells[:-1]) >= planned().minimum_dwell * (1 - 1e-9)
@@ -73,9 +73,7 @@ def test_robots_that_differ_stay_on_the_path(name: str, seeds: int) -> None:
 def test_bad_cameras_do_little_harm(camera: Camera) -> None:
     """Without any camera the same robot is lost: what feedback is worth."""
     truth = changed(**ROBOTS["3 % asymmetry"])
-    seen, blind = (
-        swim_under(Tracker(planned()), planned(), truth, each) for each in (camera, replace(PROMPT, lost=1.0))
-    )
+    seen, blind = (swim(Tracker(planned()), truth, each) for each in (camera, replace(PROMPT, lost=1.0)))
     assert seen.rms() < 0.03
     assert blind.rms() > 0.09
 
@@ -83,14 +81,14 @@ def test_bad_cameras_do_little_harm(camera: Camera) -> None:
 def test_it_learns_the_robot() -> None:
     """On a circle of many small swings the difference of the turns shows at once; their mean hardly does."""
     tracker = Tracker(planned())
-    swim_under(tracker, planned(), changed(left=1.04, right=0.99, speed=0.97), PROMPT)
+    swim(tracker, changed(left=1.04, right=0.99, speed=0.97), PROMPT)
     assert tracker.learned["yaw rate, left"] - tracker.learned["yaw rate, right"] == pytest.approx(0.05, abs=0.02)
     assert tracker.learned["surge"] == pytest.approx(-0.03, abs=0.02)
 
 
 def test_an_effect_that_starts_halfway_is_learned() -> None:
     tracker = Tracker(planned())
-    result = swim_under(tracker, planned(), changed(), PROMPT, later=changed(left=1.06, right=0.94))
+    result = swim(tracker, changed(), PROMPT, later=changed(left=1.06, right=0.94))
     assert result.rms() < 0.05
     assert tracker.learned["yaw rate, left"] - tracker.learned["yaw rate, right"] > 0.03
 
@@ -105,7 +103,7 @@ def test_an_effect_that_starts_halfway_is_learned() -> None:
 )
 def test_a_marker_off_centre_or_askew_is_found(marker: POSE) -> None:
     tracker = Tracker(planned())
-    result = swim_under(tracker, planned(), changed(), replace(PROMPT, marker=marker))
+    result = swim(tracker, changed(), replace(PROMPT, marker=marker))
     assert result.rms() < 0.025
     assert not result.alarms
     found = [tracker.learned[f"marker, {name}"] for name in ("forward", "left", "angle")]
@@ -116,20 +114,20 @@ def test_a_marker_off_centre_or_askew_is_found(marker: POSE) -> None:
 def test_alarms_are_rare_for_a_robot_of_the_model_and_come_for_another() -> None:
     for seed in range(4):
         camera = replace(PROMPT, seed=seed)
-        assert not swim_under(Tracker(planned()), planned(), changed(left=1.02), camera).alarms
+        assert not swim(Tracker(planned()), changed(left=1.02), camera).alarms
     jerky = replace(changed(), lag=changed().lag + np.array([0.03, 0.0, 0.0]), twist=1.3 * changed().twist)
-    assert swim_under(Tracker(planned()), planned(), jerky, PROMPT).alarms
+    assert swim(Tracker(planned()), jerky, PROMPT).alarms
 
 
 def test_wrong_poses_are_no_alarm() -> None:
     """A camera that is wrong now and then says nothing of the robot."""
-    assert not swim_under(Tracker(planned()), planned(), changed(), replace(PROMPT, wrong=0.1)).alarms
+    assert not swim(Tracker(planned()), changed(), replace(PROMPT, wrong=0.1)).alarms
 
 
 def test_a_pose_at_the_time_of_a_flip_announces_the_next_flip() -> None:
     """A call at that time counts as the flip, so the motor turns as ordered; dwells of four units end at poses."""
     line = plan_of(((0.0, 0.0), (3.0, 0.0)), objective="flips")
-    distance = swim_under(Tracker(line), line, line.tracked.vehicle, PROMPT).distance
+    distance = swim(Tracker(line), line.tracked.vehicle, PROMPT).distance
     assert distance.max() < line.predicted_max + 0.04
     tracker = Tracker(line)
     first = tracker.command

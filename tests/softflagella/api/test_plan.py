@@ -13,7 +13,6 @@ import pytest
 import planner.vehicle.from_table
 import softflagella as sf
 import surrogate.tabulate
-from planner.tracking.swim import swim_under
 from sim.io.errors import InputError
 from tests.calibration.toy_tables import DRAG, START, ambiguous, on_the_toy, toy_table
 from tests.planner.plans import BIASED, CONTROL, own_table
@@ -110,7 +109,7 @@ def test_a_track_is_checked_against_a_plan_in_any_form(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_simulated_robot_swims_like_the_vehicle_of_its_plan() -> None:
     plan = sf.plan(sf.circle(1.0), CONTROL, objective="flips")
-    simulated, moved = sf.swim(plan, camera=FINE), swim_under(sf.Tracker(plan), plan, plan.tracked.vehicle, FINE)
+    simulated, moved = sf.swim(plan, camera=FINE), sf.swim(sf.Tracker(plan), plan.tracked.vehicle, FINE)
     assert simulated.finished
     assert simulated.rms() == pytest.approx(moved.rms(), rel=0.2)
     assert len(simulated.dwells) == pytest.approx(len(moved.dwells), abs=1)
