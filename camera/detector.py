@@ -180,7 +180,7 @@ class Detector:
         Where the sides are too short or blurred for lines through the steepest grey, or white on black, those
         through the outline serve, with which a tag is up to 3 pixels smaller or larger than it is.
         """
-        corners = self._read(self._finder, number, frame, around)
+        corners = self._read(self._finder, number, frame) if around is None else around
         if corners is None:
             return None
         for reader, shift, error in self._refiners:
@@ -188,9 +188,11 @@ class Detector:
                 refined = self._read(reader, number, frame, corners)
                 if refined is not None:
                     return refined - shift, error
-        return corners, 4 * _CORNER
+        if around is not None:
+            corners = self._read(self._finder, number, frame, around)
+        return None if corners is None else (corners, 4 * _CORNER)
 
-    def _read(self, reader: Any, number: int, frame: Any, around: Floats | None) -> Floats | None:
+    def _read(self, reader: Any, number: int, frame: Any, around: Floats | None = None) -> Floats | None:
         """Return the corners (4, 2) of a tag in a picture, or in its part around the corners that it had."""
         low = np.zeros(2, int)
         if around is not None:
