@@ -30,7 +30,7 @@ def _steady(
         shapes: of one robot, its shape and the forces on it in a turn of the disc: .npz, or .pvd for ParaView.
     """
     from sim.motion.batches import steady_columns
-    from sim.motion.lab_units import describe_motion
+    from sim.motion.steady_motion import describe_motion
     from sim.robot_rows import command_rows, write_motion
 
     rows = command_rows(robots, robot, out)

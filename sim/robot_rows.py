@@ -27,8 +27,7 @@ from sim.inputs import check_columns, group_columns, load_robot, names_robot, ru
 from sim.io.errors import InputError, naming
 from sim.io.units import column_units
 from sim.model.robot import Robot
-from sim.motion.lab_units import lab_motion
-from sim.motion.steady_motion import QUALITY_COLUMNS, STEADY_COLUMNS
+from sim.motion.steady_motion import QUALITY_COLUMNS, STEADY_COLUMNS, lab_motion
 
 NAME = "robot"  # the column of the robots' names
 UNITS = {  # of dimensionless columns whose name does not say it

@@ -18,9 +18,8 @@ from sim.arrays import Floats
 from sim.io.pages import BLUE, GREEN, INK, ORANGE, RED, SOFT, VIOLET
 from sim.model.response import DWELLS
 from sim.model.robot import Robot
-from sim.motion.lab_units import RPM, lab_columns
 from sim.motion.robot_views import draw_from_above, draw_from_behind, scene
-from sim.motion.steady_motion import Steady
+from sim.motion.steady_motion import RPM, Steady, lab_columns
 
 _WIDTH = 4.4  # inches: two of them stand beside each other
 _NARROW = 3.0  # three
@@ -152,7 +151,7 @@ def in_lab_units(rows: pd.DataFrame, motion: pd.DataFrame | dict[str, Floats], r
         motion: theirs, simulated or predicted.
 
     Returns:
-        N, l_cm, omega_rpm, and the columns of `sim.motion.lab_units`.
+        N, l_cm, omega_rpm, and the columns of `sim.motion.steady_motion`.
     """
     length = rows["l_over_R"].to_numpy(float) * robot.head_radius
     scale = 4 * robot.viscosity / (math.pi * robot.youngs_modulus)

@@ -29,8 +29,7 @@ from sim.io.units import format_length, format_time
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.model.presets import INDEPENDENT
 from sim.model.robot import Robot
-from sim.motion.lab_units import RPM, lab_motion
-from sim.motion.steady_motion import Steady
+from sim.motion.steady_motion import RPM, Steady, lab_motion
 from softflagella.demo_figures import (
     draw_circles,
     draw_net_speed,

@@ -70,7 +70,7 @@ def _query(
         out: CSV; needed for a table of points.
     """
     from sim.model.groups import DWELL
-    from sim.motion.lab_units import describe_motion
+    from sim.motion.steady_motion import describe_motion
     from sim.robot_rows import command_rows, write_motion
     from surrogate.answers import answer_rows
     from surrogate.table_file import load_table

@@ -12,9 +12,7 @@ For a resonance the place of its term is true, for a load on the tails along the
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -26,12 +24,10 @@ from calibration.laws.places import places
 from calibration.swimmer.swimmer import SwimmerModel
 from sim.arrays import Floats
 from sim.effects import catalogue
+from sim.model.body import Body
 from sim.model.effect import Effect
+from sim.model.groups import Groups
 from sim.model.laws import Powers
-
-if TYPE_CHECKING:
-    from sim.model.body import Body
-    from sim.model.groups import Groups
 
 DESIGN: dict[str, Any] = {"lengths_cm": (5.0, 7.5, 10.0), "motor_rpm": (80.0, 100.0, 125.0, 150.0)}
 KINDS = ("two places", "resonance", "threshold", "drift", "tail load")
@@ -56,7 +52,7 @@ def foreign(setting: Setting, seed: int) -> Truth:
             sizes[place.law(law).name] = way * score / setting.score(signal)
         return Truth(kind, score, [place.name for place in chosen], lambda: setting.table(sizes, seed))
     if kind == "tail load":
-        load = TailLoad.of(powers[0])
+        load = tail_load(powers[0])
         with patch.dict(catalogue(), {load.name: load}):
             model = SwimmerModel(ROBOT, setting.model.runs)
             slope = model.derivatives({**setting.base.parameters, load.name: 0.0}, [load.name])[1][..., 0]
@@ -95,22 +91,15 @@ def _with_sizes(setting: Setting, name: str, sizes: Floats, seed: int) -> pd.Dat
     return table
 
 
-@dataclass(frozen=True)
-class TailLoad(Effect):
-    """b = ε (EI/l³) m e_z, a force per length on the tails along the axis."""
+def tail_load(powers: Powers) -> Effect:
+    """Make an effect b = ε (EI/l³) m e_z, a force per length on the tails along the axis, with a power law m."""
 
-    powers: Powers = field(default_factory=Powers)
-
-    @classmethod
-    def of(cls, powers: Powers) -> TailLoad:
-        """Make it with a power law m."""
-        values: Mapping[str, Any] = {"null": 0.0, "bounds": (-100.0, 100.0), "typical": 0.1}
-        return cls(
-            name="tail_load_along_the_axis", title="load on the tails along the axis",
-            equation="b = ε (EI/l³) m e_z", source="none: a truth for a benchmark", unit="EI/l³",
-            symmetry="even", dissipative=False, powers=powers, **values,
-        )  # fmt: skip
-
-    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
-        load = size * np.exp(self.powers.logarithm(groups))
+    def add_load(size: Floats, groups: Groups, body: Body) -> Body:
+        load = size * powers.factor(groups)
         return body.plus(tail_load=np.stack([0.0 * load, 0.0 * load, load]))
+
+    return Effect(
+        name="tail_load_along_the_axis", title="load on the tails along the axis",
+        equation="b = ε (EI/l³) m e_z", source="none: a truth for a benchmark", unit="EI/l³",
+        bounds=(-100.0, 100.0), typical=0.1, adds=add_load,
+    )  # fmt: skip

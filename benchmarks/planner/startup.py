@@ -39,7 +39,7 @@ _STEADY = (
     """
 from sim.inputs import group_columns, load_robot
 from sim.motion.batches import steady_columns
-from sim.motion.lab_units import describe_motion
+from sim.motion.steady_motion import describe_motion
 """,
     "describe_motion(load_robot('paper-control'), steady_columns(group_columns([load_robot('paper-control')])))",
 )

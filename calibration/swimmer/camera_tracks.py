@@ -33,7 +33,7 @@ from sim.io.tables import read_table, row_name
 from sim.io.track_options import TrackOptions
 from sim.model.robot import Robot
 from sim.motion.batches import steady_columns
-from sim.motion.lab_units import lab_motion
+from sim.motion.steady_motion import lab_motion
 
 COLUMNS = ("run", "time_s", "x_cm", "y_cm", "heading_deg")
 _DOTS = ("head_left_cm", "head_area_mm2", "tail_left_cm", "tail_area_mm2")  # of films, see `camera.tracks`

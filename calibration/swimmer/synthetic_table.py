@@ -21,7 +21,7 @@ from sim.io.errors import InputError
 from sim.io.keywords import checks_keywords
 from sim.model.robot import Robot
 from sim.motion.batches import stepped_columns
-from sim.motion.lab_units import RPM, lab_columns
+from sim.motion.steady_motion import RPM, lab_columns
 
 
 @checks_keywords

@@ -25,10 +25,10 @@ from sim.model.body import Body
 from sim.model.groups import Groups
 from sim.model.robot import Robot
 from sim.model.sweepable import SLOPE_INPUTS
-from sim.motion.lab_units import RPM
 from sim.motion.revolution import MOST_STEPS, STEPS, Revolutions
 from sim.motion.run import Resolution
 from sim.motion.settling import settle_one
+from sim.motion.steady_motion import RPM
 from sim.solve.assembly import bodies
 from sim.solve.march import PHASE, State, advance
 from sim.solve.refinement import difference

@@ -19,8 +19,8 @@ from planner.jobs.plan import plan
 from planner.paths.path import circle, polygon
 from sim.model.presets import PRESETS
 from sim.model.response import DWELLS
-from sim.motion.lab_units import lab_motion
 from sim.motion.steady import steady
+from sim.motion.steady_motion import lab_motion
 from softflagella.__main__ import command
 from softflagella.demo import _beside, steer
 from softflagella.demo_figures import draw_circles, draw_path, draw_schedule, in_lab_units

@@ -16,7 +16,7 @@ from sim.io.errors import run_command
 from sim.io.units import to_si
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
-from sim.motion.lab_units import describe_motion
+from sim.motion.steady_motion import describe_motion
 from surrogate.__main__ import main
 from surrogate.answers import answer_with_error, refusing_robots
 from surrogate.interface import OutsideError

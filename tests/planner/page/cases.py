@@ -16,7 +16,7 @@ from planner.planning.request import PlanRequest
 from planner.vehicle.tracked_point import Point, TrackedVehicle
 from planner.vehicle.vehicle import Mode, Vehicle
 from sim.model.presets import PRESETS
-from sim.motion.lab_units import lab_columns
+from sim.motion.steady_motion import lab_columns
 from surrogate.domain import ROBOT as GROUPS
 from surrogate.table import NeuralTable
 from surrogate.table_file import load

@@ -18,11 +18,10 @@ from sim.io.errors import run_command
 from sim.model.presets import INDEPENDENT, PRESETS
 from sim.model.robot import Robot
 from sim.motion.batches import steady_columns, stepped_columns
-from sim.motion.lab_units import LAB_COLUMNS, describe_motion, lab_columns, lab_motion
 from sim.motion.settling import settle
 from sim.motion.stability import QUICK
 from sim.motion.steady import orbits, steady
-from sim.motion.steady_motion import DIRECT, STEPPING
+from sim.motion.steady_motion import DIRECT, LAB_COLUMNS, STEPPING, describe_motion, lab_columns, lab_motion
 from sim.solve.refinement import LOST, REASONS, Orbit
 from tests.reference.cases import INDEPENDENT_HEAD_SHARE, MEASURED_HEAD_SHARE, STEADY_INPUTS, STEADY_POINTS
 from tests.sim.robots import control, sweep_points

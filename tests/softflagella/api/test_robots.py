@@ -13,7 +13,7 @@ import softflagella as sf
 import surrogate.__main__
 from dataset.schema import INPUTS, OUTPUTS
 from sim.io.tables import read_table
-from sim.motion.lab_units import LAB_COLUMNS
+from sim.motion.steady_motion import LAB_COLUMNS
 from sim.robot_rows import UNITS, robot_rows, with_units
 from tests.planner.plans import CONTROL, own_table
 
