@@ -321,6 +321,8 @@ def _markers(table: Any, number: int) -> Markers:
         if table.get("apart", 1.0) <= 0:
             raise InputError("the bands' distance, apart, is not above 0; leave it out, and it is learnt")
         name, ahead, apart = str(table.get("name", number)), table.get("ahead", 0.0), table.get("apart", math.nan)
+        if not re.fullmatch(r"[\w .-]+", name):
+            raise InputError(f"name = {name!r}; give letters, digits and - . _, as for a file")
         return Markers(name, hues, colours, tag, float(ahead), float(apart), math.radians(turned))
 
 

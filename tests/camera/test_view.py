@@ -33,6 +33,7 @@ REFUSED = {  # what of EXAMPLE is written otherwise, and the message
     "on a line": ("[900, 100], [100, 100]]", "[500, 650], [300, 650]]", "the points lie on a line"),
     "other robot": ("# ahead_mm = 0", "ahead = 0", "[[robots]] 1: [robots] ahead has no unit of length"),
     "no colour": ('"green"', '"grass"', "[[robots]] 1: rear = 'grass'; give red, orange"),
+    "no file's name": ("# ahead_mm = 0", 'name = "a/b"', "[[robots]] 1: name = 'a/b'; give letters, digits"),
     "no word": ('"green"', '["green"]', "[[robots]] 1: rear = ['green']; give red, orange"),
     "grey": ('"green"', '"#808890"', '[[robots]] 1: rear = "#808890" is nearly grey'),
     "alike": ('"green"', '"orange"', "[[robots]] 1: front and rear have nearly the same colour"),
