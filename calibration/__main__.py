@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from sim.io.commands import Call, Program
 from sim.io.errors import InputError
@@ -79,9 +80,11 @@ def _filmed(films: str, view: str, robot: str, out: str) -> str:
     from sim.inputs import load_robot
     from sim.io.files import make_folder, write_csv
 
+    if Path(out).is_file():  # before films are tracked, which takes a while
+        raise InputError(f"{out} is a file; give a folder")
     measured = measure_films(films, view, load_robot(robot), tell=_to_stderr)
-    for line in measured.excluded:
-        _to_stderr(f"excluded: {line}")
+    for line in (*measured.converted, *(f"excluded: {line}" for line in measured.excluded)):
+        _to_stderr(line)
     make_folder(out)
     table = f"{out}/table.csv"
     write_csv(measured.table, table, digits=6)

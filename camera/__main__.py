@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sim.io.commands import Program
+from sim.io.errors import InputError
 
 program = Program("camera", "track robots in films")
 main = program.main
@@ -72,6 +73,9 @@ def _tracks(
     from sim.io.files import whole_file, write_csv
 
     setup, known = read_setup(view), load_robot(robot)
+    for path in (out, check or "check.png"):  # before a film is tracked, which takes a while
+        if Path(path).is_dir():
+            raise InputError(f"{path} is a folder; give the name of a file")
 
     def tell(done: int, count: int) -> None:
         if sys.stderr.isatty():

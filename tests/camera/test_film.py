@@ -120,6 +120,20 @@ def test_the_command_writes_a_track_that_planner_and_calibration_read_and_a_pict
     assert (tmp_path / "check.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.parametrize("option", ["--out", "--check", "--films"])
+def test_a_place_that_cannot_be_written_is_refused_before_a_film_is_tracked(
+    option: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("camera.tracks.track_film", None)
+    (tmp_path / "file").write_text("")
+    view = ["--robot", "paper-control", "--view", str(film().parent / "view.toml")]
+    words = ["tracks", str(film()), *view, "--out", str(tmp_path / "t.csv"), option, str(tmp_path)]
+    if option == "--films":
+        words = ["calibrate", "--films", str(tmp_path / "file"), *view, "--out", str(tmp_path / "file")]
+    assert run_command(main, words) == 2
+    assert re.search("is a (file; give a folder|folder; give the name of a file)", capsys.readouterr().err)
+
+
 def test_frames_that_the_camera_dropped_are_gaps_in_the_time_stamps(tmp_path: Path) -> None:
     """A GIF has a duration for each frame."""
     from PIL import Image
