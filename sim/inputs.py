@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.effects import catalogue, check_effects, check_size, effect_named, is_effect
+from sim.effects import catalogue, check_effects, effect_named, is_effect
 from sim.io.errors import InputError, naming
 from sim.io.files import write_text
 from sim.io.keywords import checks_keywords
@@ -80,9 +80,7 @@ def check_columns(columns: Mapping[str, Any]) -> dict[str, Floats]:
         allowed = ", ".join(sorted({*groups, *catalogue()}))
         raise InputError(f"unknown column {unknown[0]!r}; allowed are {allowed}: rename or drop it")
     values = checked_values(columns)
-    for name in [name for name in values if name not in groups]:
-        for size in (values[name].min(), values[name].max()):
-            check_size(name, float(size))
+    check_effects({name: sizes for name, sizes in values.items() if name not in groups})
     return values
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from calibration.words.render import rendered
-from sim.effects import catalogue, check_size, effect_named
+from sim.effects import catalogue, check_effects, effect_named
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_text
 from sim.io.reading import ContentError, read_json
@@ -60,7 +60,7 @@ def adopt_law(source: str | Path, name: str, folder: str | Path, *, place: str =
         words, runs = _plain(record["words"]), _runs_in_words(record["runs"])
         if not isinstance(law, Law) or not math.isfinite(size + error) or not size or not words:
             raise ValueError
-        check_size(law.name, size)
+        check_effects({law.name: size})
     except (KeyError, TypeError, ValueError, OverflowError):
         raise InputError(f"{source}: the law cannot be read; calibrate the table again") from None
     described = (

@@ -8,12 +8,15 @@ import pkgutil
 from collections.abc import Mapping
 from functools import cache
 
+import numpy as np
+
+from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.model.effect import Effect
 from sim.model.groups import check_finite
 from sim.model.laws import Law, read_law
 
-__all__ = ["Effect", "catalogue", "check_effects", "check_size", "effect_named", "is_effect"]
+__all__ = ["Effect", "catalogue", "check_effects", "effect_named", "is_effect"]
 
 
 @cache
@@ -62,15 +65,11 @@ def effect_named(name: str) -> Effect:
     return effect
 
 
-def check_effects(effects: Mapping[str, float]) -> None:
-    """Reject unknown effects, and sizes that are not numbers or outside their bounds."""
+def check_effects(effects: Mapping[str, Floats | float]) -> None:
+    """Reject unknown effects, and sizes, (B,) or one, that are not numbers or outside their bounds."""
     for name, size in effects.items():
-        check_size(name, size)
-
-
-def check_size(name: str, size: float) -> None:
-    """Reject an unknown effect, or a size that is not a number or outside its bounds."""
-    low, high = effect_named(name).bounds
-    check_finite(name, size)
-    if not low <= size <= high:
-        raise InputError(f"{name} = {size:g}; its size must lie from {low:g} to {high:g}")
+        low, high = effect_named(name).bounds
+        for end in (size.min(), size.max()) if isinstance(size, np.ndarray) else (size,):
+            check_finite(name, end)
+            if not low <= end <= high:
+                raise InputError(f"{name} = {end:g}; its size must lie from {low:g} to {high:g}")

@@ -55,7 +55,8 @@ class Groups:
         """Make robots from columns of numbers, checked; all rows must have one N.
 
         Args:
-            columns: GROUP_COLUMNS, optionally a_over_R, each (B,). Every other column is the size of an effect.
+            columns: GROUP_COLUMNS, optionally a_over_R, each (B,) or one number. Every other column is the size of
+                an effect.
 
         Raises:
             InputError: a missing column, a number that is not finite or out of its range.
@@ -90,7 +91,7 @@ def checked_values(columns: Mapping[str, Any]) -> dict[str, Floats]:
     values: dict[str, Floats] = {}
     for name, raw in columns.items():
         try:
-            values[name] = np.asarray(raw, dtype=float)
+            values[name] = np.atleast_1d(np.asarray(raw, dtype=float))
         except (TypeError, ValueError, OverflowError):
             raise InputError(f"column {name!r} has a value that is no number; give numbers") from None
     if not len(values["N"]):

@@ -12,8 +12,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from sim.io.errors import InputError
 from sim.io.notebook import Shown
 from sim.io.units import format_length, from_si
@@ -141,7 +139,7 @@ class Robot(Shown):
 
     def groups(self) -> Groups:
         """Return this robot as a batch of one."""
-        return Groups.from_columns({name: np.array([value]) for name, value in self.group_values().items()})
+        return Groups.from_columns(self.group_values())
 
     @property
     def outline(self) -> tuple[float, float, float]:

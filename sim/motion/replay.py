@@ -91,8 +91,7 @@ def run_at_rest(schedule: Schedule, resolution: Resolution | None = None) -> Run
     Raises:
         InputError: the robot cannot be simulated, or the schedule asks for too many time steps.
     """
-    values = check_columns({name: np.array([value]) for name, value in schedule.robot.items()})
-    groups = Groups.from_columns(values)
+    groups = Groups.from_columns(check_columns(schedule.robot))
     body, reverse = bodies(groups)[0], bodies(groups.reversed())[0]
     if body.omega * schedule.first_direction < 0:
         body, reverse = reverse, body

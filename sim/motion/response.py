@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.effects import effect_named
+from sim.effects import check_effects, effect_named
 from sim.mechanics import planar
 from sim.mechanics.geometry import straight
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED, Responses
 from sim.motion.run import REVERSED
-from sim.motion.steady import check_groups, steady
+from sim.motion.steady import steady
 from sim.motion.steady_motion import Steady, net_speeds, twists
 from sim.motion.stepped_response import Curves, stepped_response
 from sim.solve.assembly import bodies, numbers
@@ -69,7 +69,7 @@ def responses(
         meshes: edges of a tail on the two meshes; errors go as 1/n², extrapolated.
         extrapolated_memory: extrapolate the memory, too; it takes half as long again.
     """
-    check_groups(groups)
+    check_effects(groups.effects)
     motion = steady(groups, stability=False) if motion is None else motion
     even = all(effect_named(name).symmetry == "even" for name in groups.effects)
     wanted = _Wanted(groups.N, even, tolerance)

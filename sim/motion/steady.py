@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats, Integers, Words
-from sim.effects import check_size
+from sim.effects import check_effects
 from sim.effects.tail_contact import EFFECT as CONTACT
 from sim.model.groups import Groups
 from sim.motion.run import Resolution
@@ -55,7 +55,7 @@ def steady(groups: Groups, *, stability: bool = True) -> Steady:
         >>> round(float(motion.omega_yr[0]), 3), motion.method[0] == "direct"
         (0.049, True)
     """
-    check_groups(groups)
+    check_effects(groups.effects)
     motion = orbits(groups, stability=stability)
     quick = np.abs(motion.omega_yr) > QUICK * np.abs(motion.omega_t)
     contact = groups.effects.get(CONTACT.name, np.zeros(len(groups))) != 0
@@ -67,13 +67,6 @@ def steady(groups: Groups, *, stability: bool = True) -> Steady:
         motion = _with_stepped(motion, groups, changed, np.full(len(groups), _OTHER_MOTION))
     lost = np.flatnonzero(motion.failed & (motion.method == DIRECT))
     return _with_stepped(motion, groups, lost, motion.note)
-
-
-def check_groups(groups: Groups) -> None:
-    """Refuse unknown effects and sizes outside their bounds."""
-    for name, sizes in groups.effects.items():
-        for end in (sizes.min(), sizes.max()):
-            check_size(name, float(end))
 
 
 def _with_stepped(motion: Steady, groups: Groups, rows: Integers, notes: Words) -> Steady:

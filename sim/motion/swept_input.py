@@ -82,8 +82,7 @@ class SweptInput:
 
     def groups_at(self, s: float) -> Groups:
         """Return the robot at s, as a batch of one."""
-        columns = self._columns(self.value(s))
-        return Groups.from_columns({name: np.array([value]) for name, value in columns.items()})
+        return Groups.from_columns(self._columns(self.value(s)))
 
     def body_at(self, s: float) -> Body:
         """Return the robot's numbers at s."""

@@ -30,14 +30,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.arrays import Flags, Floats
-from sim.effects import effect_named
+from sim.effects import check_effects, effect_named
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.body import Body
 from sim.model.groups import DWELL, Groups
 from sim.motion.run import Resolution, Run
 from sim.motion.settling import steady_state
-from sim.motion.steady import check_groups, steady
+from sim.motion.steady import steady
 from sim.motion.steady_motion import Steady, twists
 from sim.motion.stepped_response import steady_twist
 from sim.solve.assembly import bodies
@@ -70,7 +70,7 @@ def switch_response(
         motion: the robots' steady motion, if it is at hand; the net speed is made of its arcs and the lags.
         resolution: mesh and step; by default what each robot needs.
     """
-    check_groups(groups)
+    check_effects(groups.effects)
     dwell = np.asarray(dwell, dtype=float)
     for row in np.flatnonzero(~(np.isfinite(dwell) & (dwell > 0)))[:1]:
         raise InputError(f"{DWELL} = {dwell[row]} in row {row + 1}; it must be a finite number above 0")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sim.arrays import Floats
-from sim.effects import catalogue, check_size, effect_named, is_effect
+from sim.effects import catalogue, check_effects, effect_named, is_effect
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.model.groups import Groups
@@ -169,7 +169,7 @@ NO_LAWS = [
 def test_what_is_no_name_of_a_law_is_refused(name: str) -> None:
     assert not is_effect(f"law_{name}")
     with pytest.raises(InputError, match="unknown effect"):
-        check_size(f"law_{name}", 0.1)
+        check_effects({f"law_{name}": 0.1})
     with pytest.raises(InputError, match="unknown column"):
         with_law(f"law_{name}", 0.1)
 
