@@ -19,11 +19,10 @@ Poses in l and rad, times in seconds from the beginning.
 from __future__ import annotations
 
 import math
-import queue
 import signal
-import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -93,46 +92,32 @@ class Motor:
 
 
 class Pictures:
-    """What a camera sees, as it comes from a thread, and the time.
+    """What a camera sees, looked at in a thread, and the time.
 
     Args:
         sights: yields it, given a function that tells the time; it ends with a `with` block.
     """
 
     def __init__(self, sights: Sights):
-        self._began, self._sights = time.monotonic(), sights
-        self._inbox = queue.Queue[Sight | BaseException | None]()
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._look, daemon=True)
-        self._thread.start()
+        self._began, self._reader = time.monotonic(), ThreadPoolExecutor(1)
+        self._sights = sights(self.now)
+        self._next = self._reader.submit(next, self._sights, None)
 
     def __enter__(self) -> Pictures:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._over.set()
-        self._thread.join(WATCHDOG)
+        self._reader.shutdown(wait=False, cancel_futures=True)
 
     def now(self) -> float:
         """Return the time since the beginning [s]."""
         return time.monotonic() - self._began
 
     def get(self, timeout: float) -> Sight | None:
-        """Wait for the next sight; None: the film is over; queue.Empty after the time-out."""
-        sight = self._inbox.get(timeout=timeout)
-        if isinstance(sight, BaseException):
-            raise sight
+        """Wait for the next sight; None: the film is over; TimeoutError after the time-out."""
+        sight = self._next.result(timeout)
+        self._next = self._reader.submit(next, self._sights, None)
         return sight
-
-    def _look(self) -> None:
-        try:
-            for sight in self._sights(self.now):
-                if self._over.is_set():
-                    return
-                self._inbox.put(sight)
-            self._inbox.put(None)
-        except BaseException as error:
-            self._inbox.put(error)
 
 
 @dataclass
@@ -189,7 +174,7 @@ def steer(
     while not ride.finished:
         try:
             sight = pictures.get(max(min(ordered_at + REPEAT, flip_at) - pictures.now(), 0.0))
-        except queue.Empty:
+        except TimeoutError:
             sight = nothing
         if sight is None:
             break

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import queue
 import signal
 import subprocess
 import sys
@@ -58,7 +57,7 @@ class Tank(Pictures, Motor):
             delivery = self.sights[0].time + DELAY if self.sights else np.inf
             if min(self.next, delivery) > end:
                 self._swim_until(end)
-                raise queue.Empty
+                raise TimeoutError
             self._swim_until(min(self.next, delivery))
             if delivery <= self.next:
                 return self.sights.pop(0)
