@@ -307,7 +307,7 @@ def planner_fleet(made: Path, out: Path) -> str:
     for each in content["robots"]:
         assert names(out / "fleet" / each["name"]) >= FILES
         assert load_plan(out / "fleet" / each["name"] / "plan.json")["id"] == each["plan_id"]
-    return "robot-2: starts "
+    return "left: starts at once"
 
 
 def planner_check(made: Path, out: Path) -> str:

@@ -125,23 +125,6 @@ def test_any_shape_by_name(
     planned(tmp_path, f"{shape}:{size}", "--unit", unit, capsys=capsys)
 
 
-PATHS = ["M 0 0 h 300 v 300", "M 0 0 C 100 0 200 100 300 300", "M 0 0 A 300 300 0 0 1 300 300", "M 0 0 L 0 0",
-         "M nan 0 L 1 1"]  # fmt: skip
-ENDS = ["", " z", " L 1e999 0", " L nan nan", " M 5 5 l 3 3", " Q", " 7", " A 0 0 0 0 0 1 1", " h 1e300"]
-SIZES = ["", 'width="30mm" viewBox="0 0 300 300"', 'width="0mm"', 'viewBox="0 0 0 0"', 'width="x"']
-TURNS = st.one_of(number.map(lambda v: f"scale({v!r})"), st.sampled_from(["", "rotate(x)", "matrix(1)"]))
-
-
-@few
-@given(body=st.sampled_from(PATHS), end=st.sampled_from(ENDS), transform=TURNS, size=st.sampled_from(SIZES))
-def test_any_drawing(
-    body: str, end: str, transform: str, size: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    text = f'<svg xmlns="http://www.w3.org/2000/svg" {size}><path d="{body}{end}" transform="{transform}"/></svg>'
-    (tmp_path / "path.svg").write_text(text)
-    planned(tmp_path, tmp_path / "path.svg", "--scale", "0.01", capsys=capsys)
-
-
 @few
 @given(table=changed(pd.DataFrame([{**CONTROL, "dwell_bar": 1.0, "omega_bar": w} for w in (8.0, 10.0, 12.0)])))
 def test_any_question_to_the_look_up_table(

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from random import Random
 from typing import Any
 
 MOST = 2**19  # bytes of a mutated file; larger ones are cut
 _NUMBER = re.compile(rb"[+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")
-_WORD = re.compile(rb"[A-Za-z_]\w*")
+_WORD, _LINE = re.compile(rb"[A-Za-z_]\w*"), re.compile(rb"[^\n]+\n?")
 NUMBERS = (
     b"0", b"-0", b"-1", b"1", b"2", b"0.5", b"nan", b"-nan", b"NaN", b"inf", b"-inf", b"Infinity", b"1e999",
     b"-1e999", b"1e308", b"-1e308", b"1e200", b"1e-320", b"1e9", b"1e5", b"65536", b"2147483648",
@@ -33,119 +33,47 @@ _PAIRS = (
 )  # fmt: skip
 _ENCODINGS = ("utf-16", "utf-16-le", "utf-8-sig", "utf-32", "latin-1", "utf-7", "cp500")
 
-Change = Callable[[bytes, Sequence[bytes], Random], bytes]
-
 
 def mutated(data: bytes, tokens: Sequence[bytes], random: Random) -> bytes:
     """Mutate a file one to five times, with the words and signs that matter to its format."""
     for _ in range(random.choice((1, 1, 1, 2, 3, 5))):
-        data = random.choice(_CHANGES)(data, tokens, random)[:MOST]
+        start, end = _part(data, random)
+        data = (data[:start] + _in_place_of(data[start:end], data, tokens, random) + data[end:])[:MOST]
+        if random.random() < 0.1:
+            data = data.decode("utf-8", errors="replace").encode(random.choice(_ENCODINGS), errors="replace")
     return data
 
 
-def _slice(data: bytes, random: Random) -> tuple[int, int]:
-    """Choose a slice, short ones more often than long ones."""
+def _part(data: bytes, random: Random) -> tuple[int, int]:
+    """Choose a number, a word, a line, or any slice: short ones more often than long ones, or all to the end."""
+    places = [place.span() for place in random.choice((_NUMBER, _NUMBER, _WORD, _LINE)).finditer(data)]
+    if places and random.random() < 0.6:
+        return random.choice(places)
     start = random.randrange(len(data) + 1)
-    length = int(len(data) ** random.random())
+    length = random.choice((0, int(len(data) ** random.random()), len(data)))
     return start, min(start + length, len(data))
 
 
-def _flip(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
-    changed = bytearray(data)
-    places = random.choices(range(len(data)), k=random.choice((1, 1, 2, 8))) if data else []
-    for place in places:
-        changed[place] = random.randrange(256)
-    return bytes(changed)
-
-
-def _delete(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
-    start, end = _slice(data, random)
-    return data[:start] + data[end:]
-
-
-def _duplicate(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
-    start, end = _slice(data, random)
-    times = random.choice((1, 1, 2, 100, 20_000))
-    times = min(times, MOST // max(end - start, 1))
-    return data[:end] + data[start:end] * times + data[end:]
-
-
-def _move(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
-    start, end = _slice(data, random)
-    rest = data[:start] + data[end:]
-    place = random.randrange(len(rest) + 1)
-    return rest[:place] + data[start:end] + rest[place:]
-
-
-def _insert(data: bytes, tokens: Sequence[bytes], random: Random) -> bytes:
-    place = random.randrange(len(data) + 1)
-    token = random.choice((*tokens, *_COMMON, *NUMBERS))
-    return data[:place] + token + data[place:]
-
-
-def _number(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
-    """Replace a number by a strange one."""
-    places = list(_NUMBER.finditer(data))
-    if not places:
-        return data
-    place = random.choice(places)
-    return data[: place.start()] + random.choice(NUMBERS) + data[place.end() :]
-
-
-def _word(data: bytes, tokens: Sequence[bytes], random: Random) -> bytes:
-    """Replace a word by another word of the file, or by a token."""
-    places = list(_WORD.finditer(data))
-    if not places:
-        return data
-    place = random.choice(places)
-    other = random.choice((random.choice(places)[0], *random.sample(tokens, min(3, len(tokens))), b""))
-    return data[: place.start()] + other + data[place.end() :]
-
-
-def _lines(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
-    """Delete, repeat or swap lines."""
-    lines = data.split(b"\n")
-    first, second = random.randrange(len(lines)), random.randrange(len(lines))
-    kind = random.choice(("delete", "repeat", "swap", "one"))
-    if kind == "delete":
-        del lines[first]
-    elif kind == "repeat":
-        lines.insert(second, lines[first])
-    elif kind == "swap":
-        lines[first], lines[second] = lines[second], lines[first]
-    else:
-        lines = lines[: first + 1]
-    return b"\n".join(lines)
-
-
-def _truncate(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
-    return data[: random.randrange(len(data) + 1)]
-
-
-def _nest(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
-    """Open brackets many times, and close them or not."""
-    start, end = _slice(data, random)
+def _in_place_of(part: bytes, data: bytes, tokens: Sequence[bytes], random: Random) -> bytes:
+    """Write nothing, a strange number, a token, another part, noise, or the part repeated or in brackets."""
+    kinds = (*3 * ("number", "token"), *2 * ("nothing", "other"), "noise", "repeated", "nested")
+    kind = random.choice(kinds)
+    if kind == "nothing":
+        return b""
+    if kind == "number":
+        return random.choice(NUMBERS)
+    if kind == "token":
+        return random.choice((*tokens, *_COMMON))
+    if kind == "other":
+        return data[slice(*_part(data, random))]
+    if kind == "noise":
+        return random.randbytes(random.choice((1, 1, 4, 100, 10_000)))
+    if kind == "repeated":
+        return part * min(random.choice((2, 2, 100, 20_000)), MOST // max(len(part), 1))
     left, right = random.choice(_PAIRS)
-    times = random.choice((1, 3, 60, 1000, 100_000))
-    times = min(times, MOST // len(left))
-    return data[:start] + left * times + data[start:end] + right * random.choice((times, times, 0)) + data[end:]
+    times = min(random.choice((1, 3, 60, 1000, 100_000)), MOST // len(left))
+    return left * times + part + right * random.choice((times, times, 0))
 
-
-def _noise(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
-    place = random.randrange(len(data) + 1)
-    return data[:place] + random.randbytes(random.choice((1, 4, 100, 10_000))) + data[place:]
-
-
-def _encode(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
-    """Write a text in another encoding."""
-    text = data.decode("utf-8", errors="replace")
-    return text.encode(random.choice(_ENCODINGS), errors="replace")
-
-
-_CHANGES: tuple[Change, ...] = (
-    _flip, _delete, _duplicate, _move, _insert, _insert, _number, _number, _number, _word, _word, _lines,
-    _truncate, _nest, _noise, _encode,
-)  # fmt: skip
 
 VALUES: tuple[Any, ...] = (
     None, True, False, 0, -1, 1, 2, 0.5, -0.0, 1e-320, 1e308, -1e308, 1e9, 2**31, 2**63, 10**400, float("nan"),

@@ -34,7 +34,6 @@ from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.schedule import FORMAT, load_schedule, plan_id
 from surrogate.table_file import load
-from tests.planner.compiled import CompiledTracker
 from tests.planner.plans import BIASED, CONTROL, CORNER, WALLS, around, hindered_trip, own_table, planned, trip
 from tests.shared import shared
 
@@ -92,16 +91,6 @@ def test_a_restored_plan_gives_the_same_orders(name: str) -> None:
     assert (found.names, found.current, found.current_error) == (known.names, known.current, known.current_error)
     assert found.covariance == pytest.approx(known.covariance)
     assert (same.kept_clear and same.kept_clear.to_dict()) == (result.kept_clear and result.kept_clear.to_dict())
-
-
-def test_the_microcontroller_gets_the_same_tracker(tmp_path: Path) -> None:
-    """Written again, tracker.h gives the orders of the plan in memory."""
-    compiled = CompiledTracker(restore_plan(saved("square")), tmp_path)
-    now = 0.0
-    for direction, flip_at in orders(PLANS["square"](), 30):
-        command = compiled.update(now)
-        assert (command.direction, command.flip_at) == (direction, pytest.approx(flip_at, abs=1e-3))
-        now = command.flip_at
 
 
 def test_the_files_of_jobs_and_their_folder_lead_to_the_plan(tmp_path: Path) -> None:
