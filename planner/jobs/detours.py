@@ -15,8 +15,7 @@ path that is followed as drawn. Lengths in l.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from functools import cache, partial
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -49,18 +48,13 @@ _APART = 1.0  # between two ways around
 _DIFFERENCE = 1e-4  # l, for derivatives of distances
 
 
+@dataclass(frozen=True)
 class Around:
-    """Replaces what obstacles block of a declared path by ways around, once a setting has a margin.
+    """Replaces what obstacles block of a declared path by ways around, once a setting has a margin."""
 
-    Args:
-        tracked: the vehicle and its tracked point.
-        space: walls and regions.
-        drawn: the path as drawn.
-    """
-
-    def __init__(self, tracked: TrackedVehicle, space: FreeSpace, drawn: Path2D):
-        self._detours = cache(partial(Detours, tracked, space))  # by drift: they have lattices
-        self._drawn = drawn
+    space: FreeSpace  # walls and regions
+    drawn: Path2D  # the path as drawn
+    detours: dict[Drift, Detours] = field(default_factory=dict)  # they have lattices
 
     def __call__(self, declared: Declared, setting: Setting) -> Declared:
         """Keep clear.
@@ -70,7 +64,8 @@ class Around:
         """
         if setting.margin is None:
             return declared
-        ways = self._detours(setting.drift)
+        drift = setting.drift
+        ways = self.detours.setdefault(drift, Detours(setting.tracked, self.space, drift))
         try:
             reference, detours = ways.around(declared.reference, setting.margin)
         except BlockedError as blocked:
@@ -79,7 +74,7 @@ class Around:
             except BlockedError:
                 blocked.hopeless = True
             raise
-        return replace(declared.moved(reference, self._drawn), detours=detours) if detours else declared
+        return replace(declared.moved(reference, self.drawn), detours=detours) if detours else declared
 
 
 class Stretch(NamedTuple):

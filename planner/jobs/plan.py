@@ -117,7 +117,7 @@ def make_plan(
     if not request.space.empty:
         from planner.jobs.detours import Around  # loads SciPy's graphs
 
-        changes.append(Around(tracked, request.space, drawn))
+        changes.append(Around(request.space, drawn))
     task = Task(
         source=lambda setting: nearest(setting.drift), changes=tuple(changes), drawn=drawn, quickest=not changes
     )

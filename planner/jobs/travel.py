@@ -129,5 +129,5 @@ def plan_track(
     if not space.empty:
         from planner.jobs.detours import Around  # loads SciPy's graphs
 
-        changes = (Around(tracked, space, drawn),)
+        changes = (Around(space, drawn),)
     return solve(Task(source=source, changes=changes, drawn=drawn), tracked, request, progress)

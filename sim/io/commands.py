@@ -89,6 +89,7 @@ def _function(place: str) -> tuple[ast.FunctionDef, Path]:
     return function, file
 
 
+@cache
 def read_function(place: str) -> dict[str, Parameter]:
     """Read a function's parameters from the source, those of **options: Unpack[Options] among them."""
     function, file = _function(place)
@@ -225,10 +226,10 @@ class Command(NamedTuple):
 
     def parameters(self) -> tuple[dict[str, Parameter], dict[str, Parameter]]:
         """Return the parameters of the public function, and its own, without the first, which is that function."""
-        theirs, own = read_function(self.of) if self.of else {}, read_function(self.place)
-        if self.of:
-            del own[next(iter(own))]
-        return theirs, own
+        own = read_function(self.place)
+        if not self.of:
+            return {}, own
+        return read_function(self.of), dict([*own.items()][1:])
 
     def parser(self, prog: str) -> ArgumentParser:
         """Return a parser of this command alone."""
