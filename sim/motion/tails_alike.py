@@ -134,25 +134,16 @@ def orbit_from_turn(turn: Turn, instants: int) -> tuple[Floats, Floats] | None:
     """
     from scipy.interpolate import CubicSpline  # slow to import
 
-    way = float(np.sign(turn.phases[-1]))
-    if not (np.diff(turn.phases) * way > 0).all():
+    if not (np.diff(turn.phases) * turn.phases[-1] > 0).all():
         return None
-    phases = np.concatenate([turn.phases[-5:] - way * _TURN, turn.phases, turn.phases[:5] + way * _TURN])
-    shapes = np.concatenate([turn.shapes[-5:], turn.shapes, turn.shapes[:5]])
-    order = np.argsort(phases)
-    keep = np.append(True, np.diff(phases[order]) > 1e-6)
-    spline = CubicSpline(phases[order][keep], shapes[order][keep])
-    tails = turn.shapes.shape[2]
+    phases, order = np.unique(turn.phases % _TURN, return_index=True)
+    ends, shapes = np.append(phases, phases[0] + _TURN), turn.shapes[[*order, order[0]]]
+    spline, tails = CubicSpline(ends, shapes, bc_type="periodic"), shapes.shape[2]
     count = tails * instants
-
-    def of_tail(tail: int, at: Floats) -> Floats:
-        within = way * ((way * at) % _TURN)
-        return np.asarray(spline(within)[:, :, tail])
-
     nodes = FIRST_PHASE + _TURN * np.arange(count) / count
-    x = of_tail(0, nodes)
+    x = spline(nodes)[:, :, 0]
     for tail in range(1, tails):
-        if np.abs(of_tail(tail, nodes - _TURN * tail / tails) - x).max() > _ALIKE:
+        if np.abs(spline(nodes - _TURN * tail / tails)[:, :, tail] - x).max() > _ALIKE:
             return None
     u = np.tile(turn.state.u, (instants, 1))
     return np.ascontiguousarray(x.transpose(1, 0, 2)), u
