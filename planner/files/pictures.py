@@ -1,7 +1,7 @@
 """Pictures of plans: plan.svg, with the path and the stated error, and by matplotlib jobs, fleets, the trade-off.
 
 To import matplotlib takes longer than to plan a path. So plan.svg is drawn on axes of equal scale that write
-themselves as SVG. They take those calls of matplotlib's axes that `planner.planning.picture` makes.
+themselves as SVG. They take those calls of matplotlib's axes that `Plan.plot` makes.
 
 The trade-off is what the dwell decides: a longer one loses less speed at the flips and flips less often, but the
 heading swings further. One plan is made for each of several dwells.

@@ -28,7 +28,7 @@ import numpy as np
 from planner.jobs.fleet_plan import FleetPlan
 from planner.jobs.separation import Places, Scheduled, TimedMotion, approach, distances, times_at, too_near
 from planner.jobs.timetable import Timetable, Timing, Turn, WaitingCircle, circle_reference, with_circles
-from planner.paths.obstacles import Footprint, FreeSpace
+from planner.paths.obstacles import Footprint
 from planner.paths.units import Swimmer, read_length
 from planner.planning.conditions import KeptClear
 from planner.planning.plan import Plan
@@ -50,20 +50,6 @@ M = TypeVar("M")  # a motion
 
 class NoTimingError(InputError):
     """Robots cannot keep apart by waiting."""
-
-
-@dataclass(frozen=True)
-class Member:
-    """A robot of a fleet."""
-
-    name: str
-    plan: Plan
-    earliest: float = 0.0  # time before which it does not begin
-
-    @property
-    def free_space(self) -> FreeSpace:
-        """What waiting circles must keep clear of."""
-        return FreeSpace() if self.plan.kept_clear is None else self.plan.kept_clear.free_space
 
 
 @checks_keywords
@@ -122,7 +108,7 @@ def fleet(
     for name, delay in zip(names, delays, strict=True):
         if not 0 <= delay < _LONGEST:
             raise InputError(f"{name}: start delay {delay:g} s; give seconds, 0 or more")
-    planner = _Fleet(list(map(Member, names, plans, delays)), distance, feedback)
+    planner = _Fleet(names, plans, delays, distance, feedback)
     planner.check_rest()
     search = Priorities(planner.alone, planner.timed, planner.meet, MOST_TIMINGS, progress)
     resolved = search.resolve()
@@ -149,10 +135,12 @@ def distance_apart(words: str | float, unit: str | None, robots: Sequence[Swimme
 class _Fleet:
     """The robots, and what is known of them."""
 
-    def __init__(self, members: Sequence[Member], apart: float, feedback: bool):
-        self.members, self.apart, self.feedback = members, apart, feedback
-        self.motions = [TimedMotion(member.plan, feedback) for member in members]
-        self.alone = tuple(map(Scheduled, self.motions, (member.earliest for member in members)))
+    def __init__(
+        self, names: Sequence[str], plans: Sequence[Plan], earliest: Sequence[float], apart: float, feedback: bool
+    ):
+        self.names, self.apart, self.feedback = names, apart, feedback
+        self.motions = [TimedMotion(plan, feedback) for plan in plans]
+        self.alone = tuple(map(Scheduled, self.motions, earliest))
         self.timed, self.meet, self._turns = cache(self._timed), cache(self._meet), cache(self._turns_of)
 
     def _meet(self, first: Scheduled, second: Scheduled) -> float:
@@ -169,20 +157,20 @@ class _Fleet:
 
     def _timed(self, k: int, others: tuple[Scheduled, ...]) -> Scheduled | None:
         """Find when a robot begins and where it circles. The margin grows until the exact distances suffice."""
-        member, base = self.members[k], self.motions[k]
+        base, earliest = self.motions[k], self.alone[k].begin
         margin, step = 0.0, self._step(k, others)
         for _ in range(_TRIES):
-            table = Timetable(base, others, self.apart + margin, step, member.earliest)
+            table = Timetable(base, others, self.apart + margin, step, earliest)
             timing = table.find() or table.find(self._turns(k, step))
             if timing is None:
                 return None
             motion = base
             if timing.circles:
                 try:
-                    motion = TimedMotion(self._circling(member, timing.circles), self.feedback)
+                    motion = TimedMotion(self._circling(base.plan, timing.circles), self.feedback)
                 except InputError:  # no room for a circle
                     return None
-                again = Timetable(motion, others, self.apart, step, member.earliest).find()
+                again = Timetable(motion, others, self.apart, step, earliest).find()
                 if again is None:
                     ends = [each.error(np.array([each.duration]))[0] for each in (base, motion)]
                     margin += max(float(ends[1] - ends[0]) - margin, _MORE * base.body.reach)
@@ -197,8 +185,8 @@ class _Fleet:
 
     def _turns_of(self, k: int, step: float) -> list[Turn]:
         """List the waiting circles that a robot may make on its path."""
-        member = self.members[k]
-        plan = member.plan
+        plan = self.motions[k].plan
+        kept = plan.kept_clear
         reference, robot, a = plan.declared.reference, plan.robot, plan.tracked.vehicle.pivot_distance
         arc = reference.arc
         count = max(1, min(_PLACES, math.floor(float(arc[-1]) / _SPACING)))
@@ -218,8 +206,8 @@ class _Fleet:
                 at = np.linspace(0.0, around.arc[-1], steps, endpoint=False)
                 x, y, heading = (np.interp(at, around.arc, column) for column in (*around.q.T, around.heading))
                 poses = np.stack([x + a * np.cos(heading), y + a * np.sin(heading), heading], 1)
-                if not member.free_space.empty:
-                    room = Footprint.of(robot, 0.0).clearance(poses, member.free_space).min()
+                if kept is not None:
+                    room = Footprint.of(robot, 0.0).clearance(poses, kept.free_space).min()
                     if room < max(plan.stated_error, plan.predicted_max):
                         continue
                 turns.append(
@@ -227,13 +215,13 @@ class _Fleet:
                 )
         return turns
 
-    def _circling(self, member: Member, circles: Sequence[WaitingCircle]) -> Plan:
+    def _circling(self, plan: Plan, circles: Sequence[WaitingCircle]) -> Plan:
         """Plan again with waiting circles, clear of obstacles.
 
         Raises:
             InputError: there is no room.
         """
-        plan = with_circles(member.plan, circles)
+        plan = with_circles(plan, circles)
         kept = plan.kept_clear
         if kept is None:
             return plan
@@ -251,8 +239,8 @@ class _Fleet:
         Raises:
             NoTimingError: the message names the two robots.
         """
-        for first, second in combinations(range(len(self.members)), 2):
-            one, two = self.members[first].name, self.members[second].name
+        for first, second in combinations(range(len(self.names)), 2):
+            one, two = self.names[first], self.names[second]
             for when, word, remedy in ((0.0, "start", "put them"), (1.0, "end", "end one of them")):
                 pair = [self._resting(k, when) for k in (first, second)]
                 errors = float(pair[0].error[0] + pair[1].error[0])
@@ -286,7 +274,7 @@ class _Fleet:
         reasons = dict.fromkeys(reason for pair in pairs for reason in self._in_the_way(*pair))
         why = " and ".join(reasons) or "they meet where neither of them has room to wait"
         return (
-            f"{' and '.join(self.members[k].name for k in robots)} cannot keep {format_length(self.apart)} apart, "
+            f"{' and '.join(self.names[k] for k in robots)} cannot keep {format_length(self.apart)} apart, "
             f"{tried}: {why}; move their paths apart, or ask for less"
         )
 
@@ -294,7 +282,7 @@ class _Fleet:
         """Say whether a robot starts or ends on the way of another one."""
         motion = self.motions[moving]
         along = motion.places(np.arange(0.0, motion.duration, self._step(moving, ())))
-        names = self.members[resting].name, self.members[moving].name
+        names = self.names[resting], self.names[moving]
         return [
             f"{names[0]} {word} on the way of {names[1]}"
             for when, word in ((0.0, "starts"), (1.0, "ends"))

@@ -42,13 +42,6 @@ def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float, length
     axes.set_ylabel("y [cm]")
 
 
-def draw_prediction(axes: Axes, track: Floats, length_scale: float) -> None:
-    """Draw the predicted track, given in l, and its start as a dot, on axes in cm."""
-    points = 100 * length_scale * track
-    axes.plot(*points.T, color=PREDICTED, lw=0.8, label="predicted")
-    axes.plot(*points[0], "o", color=DECLARED, ms=5)
-
-
 def draw_regions(axes: Axes, free_space: FreeSpace, length_scale: float) -> None:
     """Draw obstacles, given in l, as areas, and walls as lines, on axes in cm; `length_scale` is l in m."""
     cm = 100 * length_scale

@@ -304,12 +304,14 @@ class Plan(Shown, Generic[J]):
         Args:
             ax: default: axes of a new figure.
         """
-        from planner.planning.picture import draw_prediction, draw_regions, draw_tracks
+        from planner.planning.picture import DECLARED, PREDICTED, draw_regions, draw_tracks
 
         ax = given_axes(ax)
         length = self.robot.length_scale
         draw_tracks(ax, self.drawn.polyline(), self.reference, self.stated_error, length)
-        draw_prediction(ax, self.smooth_track, length)
+        points = 100 * length * self.smooth_track
+        ax.plot(*points.T, color=PREDICTED, lw=0.8, label="predicted")
+        ax.plot(*points[0], "o", color=DECLARED, ms=5)
         if self.kept_clear is not None:
             draw_regions(ax, self.kept_clear.free_space, length)
         if self.job is not None:
