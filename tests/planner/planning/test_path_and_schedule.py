@@ -144,13 +144,6 @@ def advised(words: str) -> float:
     return float(words.rsplit(" ", 1)[1].removesuffix("l"))
 
 
-@pytest.mark.parametrize("radius", [pytest.param(0.4, marks=pytest.mark.rest), 0.57])
-def test_a_tight_circle_is_refused_with_a_scale_that_works(radius: float) -> None:
-    words = refusal(circle(radius))
-    assert "too tight" in words
-    assert plan(circle(radius * advised(words)), CONTROL).predicted_rms < 0.1
-
-
 @pytest.mark.parametrize("noise", [0.02, pytest.param(0.2, marks=pytest.mark.rest)])
 def test_the_smoothing_that_a_noisy_path_is_told_works(noise: float) -> None:
     rng = np.random.default_rng(0)

@@ -91,22 +91,6 @@ def test_every_planning_function_takes_the_robot_s_own_table(monkeypatch: pytest
 
 
 @pytest.mark.slow
-def test_a_track_is_checked_against_a_plan_in_any_form(tmp_path: Path) -> None:
-    result = sf.plan(sf.circle(1.0), CONTROL, objective="flips")
-    track = sf.replay(result)
-    error = sf.check(result, track)
-    assert error.largest < error.stated == result.stated_error
-    sf.write_plan(result, tmp_path)
-    track.to_csv(tmp_path / "track.csv", index=False)
-    for plan_given in (result.to_dict(), tmp_path / "plan.json", str(tmp_path / "plan.json")):
-        assert sf.check(plan_given, tmp_path / "track.csv").rms == pytest.approx(error.rms, rel=1e-9)
-    camera = track[["time_s", "x_cm", "y_cm", "heading_deg"]]
-    assert sf.check(result, camera).rms == pytest.approx(error.rms, rel=1e-9)
-    with pytest.raises(sf.InputError, match="it needs time_s, x_cm"):
-        sf.check(result, camera.drop(columns="x_cm"))
-
-
-@pytest.mark.slow
 def test_a_simulated_robot_swims_like_the_vehicle_of_its_plan() -> None:
     plan = sf.plan(sf.circle(1.0), CONTROL, objective="flips")
     simulated, moved = sf.swim(plan, camera=FINE), sf.swim(sf.Tracker(plan), plan.tracked.vehicle, FINE)
