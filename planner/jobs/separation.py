@@ -33,11 +33,10 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely import distance, linestrings
 
-from planner.draws import normals
 from planner.paths.obstacles import Footprint
 from planner.paths.path import Path2D, arc_length, axis_at, points_at
 from planner.paths.tractrix import reference
-from planner.planning.errors import LEVEL, WOBBLE, deviations_open_loop, error_growth
+from planner.planning.errors import LEVEL, WOBBLE, deviations_open_loop, error_growth, normals
 from planner.planning.plan import Plan
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import roll_out

@@ -18,7 +18,6 @@ from sim.model import uncertainty
 from sim.model.robot_toml import ENTRIES
 
 _NAMES = {  # of each module; a leading underscore is left out
-    "planner.draws": "WEYL FIRST SECOND MIDDLE TAIL",
     "planner.files.headers": "LARGEST MOST_MS CHECKPOINTS",
     "planner.paths.distance": "TIE",
     "planner.paths.path_files": "KINDS",
@@ -29,7 +28,8 @@ _NAMES = {  # of each module; a leading underscore is left out
     "planner.paths.tractrix": "LAPS MOST_SLIP",
     "planner.planning.declare": "WARN FAR SCALES MOST_WORK SMOOTHINGS FIRST CORNER AS_DRAWN ROOMS TIGHTEST "
     "LOST ROUNDED SMALL NOISY FEWEST_POSES FILLET_ROOM SPACING MOST_POINTS MINIMAX ROUNDING POINTS_A_POSE",
-    "planner.planning.errors": "LEVEL WOBBLE DRAWS BLOCKS WITHIN KEPT ZIGZAG PLACE COURSE STRETCH",
+    "planner.planning.errors": "LEVEL WOBBLE DRAWS BLOCKS WITHIN KEPT ZIGZAG PLACE COURSE STRETCH WEYL FIRST "
+    "SECOND MIDDLE TAIL",
     "planner.planning.line_of_sight": "EXACT LARGEST_STEP TURNS MOST_BIAS HALVINGS MOST_LOOKS MOST_SWITCHES "
     "PATIENCE EVERY TIGHTEST PAIRS_AHEAD",
     "planner.planning.plan": "WIDE OWN_TABLE_FROM",

@@ -10,7 +10,7 @@ import { distanceTo, nearest } from "./reference.js";
 import { BEFORE_KNOTS, COUNT, SHORTEST, STEP, lagAt, lagNoise, lagPlace, pivotRadius, rollOut } from "./vehicle.js";
 import { zigzagSpeed } from "./vehicle.js";
 
-const { WEYL, FIRST, SECOND, MIDDLE, TAIL } = CONSTANTS.draws;
+const { WEYL, FIRST, SECOND, MIDDLE, TAIL } = CONSTANTS.errors;
 const { LEVEL, WOBBLE, DRAWS, BLOCKS } = CONSTANTS.errors;
 const { TIGHTEST, PAIRS_AHEAD } = CONSTANTS.line_of_sight;
 const { WITHIN, KEPT, ZIGZAG, PLACE, COURSE, STRETCH, CAMERA } = CONSTANTS.errors;
