@@ -10,7 +10,7 @@ import json
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -86,15 +86,10 @@ class Schedule:
             raise InputError("the schedule has no tail length that another robot could use; plan it again")
         time, length = self.time_scale / robot.time_scale, self.tail_length / robot.tail_length
         x, y, heading = self.start
-        return Schedule(
-            robot.group_values(),
-            self.first_direction,
-            self.dwells * time,
-            (x * length, y * length, heading),
-            robot.time_scale,
-            robot.tail_length,
-            self.plan_id,
-        )
+        return replace(
+            self, robot=robot.group_values(), dwells=self.dwells * time, start=(x * length, y * length, heading),
+            time_scale=robot.time_scale, tail_length=robot.tail_length,
+        )  # fmt: skip
 
     def in_own_units(self, track: pd.DataFrame) -> pd.DataFrame:
         """Return the track of a robot that has carried it out with times and lengths in this schedule's units."""

@@ -137,8 +137,11 @@ def stretches(
             progress(1)
 
 
+@np.errstate(over="ignore")  # seconds of an absurd time scale
 def track_of(schedule: Schedule, simulated: Iterable[Stretch]) -> pd.DataFrame:
     """Tabulate the track of a schedule, see `replay`, with about 12 samples in each dwell and one at its end."""
+    import pandas as pd  # slow to import, and batches of steady motions need no track
+
     rows = [np.array([[0.0, 0.0, 0.0, 0.0, schedule.first_direction, 0]])]
     for index, parts in groupby(simulated, lambda stretch: stretch.dwell):
         dwell = list(parts)
@@ -148,13 +151,7 @@ def track_of(schedule: Schedule, simulated: Iterable[Stretch]) -> pd.DataFrame:
         kept = (step % max(1, len(times) // _SAMPLES) == 0) | (step == len(times))
         said = np.broadcast_to([dwell[0].direction, index], (len(times), 2))
         rows.append(np.column_stack([times, poses[:, [X, Y, YAW]], said])[kept])
-    return _track(schedule, np.concatenate(rows))
-
-
-@np.errstate(over="ignore")  # seconds of an absurd time scale
-def _track(schedule: Schedule, table: Floats) -> pd.DataFrame:
-    import pandas as pd  # slow to import, and batches of steady motions need no track
-
+    table = np.concatenate(rows)
     pose = planar.compose(np.array(schedule.start), table[:, 1:4])
     lab = {}
     if schedule.tail_length is not None:

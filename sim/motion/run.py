@@ -9,6 +9,7 @@ other one.
 from __future__ import annotations
 
 import math
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -121,8 +122,7 @@ class Run:
 
     def copy(self) -> Run:
         """Return an independent copy of this run."""
-        duplicate = object.__new__(Run)
-        duplicate.__dict__ |= vars(self)
+        duplicate = copy(self)
         duplicate.state = copied(self.state)
         return duplicate
 
