@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from planner.goal.trip import Trip
 from planner.jobs.plan import make_plan, plan
@@ -57,6 +58,13 @@ def planned(
     """Plan for a path, in a current [m/s]; see `path_of`."""
     knowledge = None if current is None else CalibrationKnowledge(current=current)
     return plan(path_of(path), PRESETS[robot], knowledge=knowledge, **options)
+
+
+def predicted_track(result: Plan[Any], noise: float = 0.0) -> pd.DataFrame:
+    """Make a track of the poses that a plan predicts at the flips."""
+    poses = result.poses + noise * np.random.default_rng(0).normal(size=result.poses.shape)
+    rows = np.column_stack([np.concatenate([[0.0], np.cumsum(result.dwells)]), poses])
+    return pd.DataFrame(rows, columns=["time_bar", "x_over_l", "y_over_l", "heading_rad"])
 
 
 @shared

@@ -28,6 +28,7 @@ from softflagella.demo_page import Results, documentation, header_excerpt, write
 from surrogate.table_file import load
 from tests.calibration.toy_tables import DRAG, ambiguous, none, toy_swimmer, toy_table
 from tests.page_text import PageText
+from tests.planner.plans import predicted_track
 
 ROBOT = PRESETS["paper-control"]
 SECTIONS = [
@@ -63,10 +64,8 @@ def write_demo(out: Path) -> None:
     for name in ("circle", "square", "triangle"):
         write_plan(planned, out / "demo" / name)
         record = load_plan(out / "demo" / name / "plan.json")
-        times = np.concatenate([[0.0], np.cumsum(record["dwell_s"])])
-        x, y, heading = np.array(record["predicted_poses"]).T
-        track = pd.DataFrame({"time_bar": times / ROBOT.time_scale, "time_s": times, "x_over_l": x, "y_over_l": y,
-                              "heading_rad": heading})  # fmt: skip
+        track = predicted_track(planned)
+        track["time_s"] = ROBOT.time_scale * track["time_bar"]
         track.to_csv(out / "demo" / name / "track.csv", index=False)
         plans[name] = (record, tracking_error(record, track))
     loops = {

@@ -24,7 +24,7 @@ from sim.io.errors import InputError
 from sim.io.pose_tracks import read_tracks
 from sim.model.schedule import load_schedule
 from tests.planner.compiled import compile_c
-from tests.planner.plans import CONTROL, planned
+from tests.planner.plans import CONTROL, planned, predicted_track
 from tests.sim.io.tracked_files import deeplabcut, two_robots
 
 
@@ -167,16 +167,8 @@ def test_a_long_dwell_is_drawn_as_a_curve() -> None:
 @cache
 def tracks() -> tuple[dict[str, Any], pd.DataFrame]:
     """Return a plan, and the track that it predicts at the flips, 1 mm off."""
-    result = planned()
-    x, y, heading = result.poses.T
-    time = np.concatenate([[0.0], np.cumsum(result.dwells)])
-    columns = {
-        "time_bar": time,
-        "x_over_l": x + 0.001 / CONTROL.tail_length,
-        "y_over_l": y,
-        "heading_rad": heading,
-    }
-    return result.to_dict(), pd.DataFrame(columns)
+    track = predicted_track(planned())
+    return planned().to_dict(), track.assign(x_over_l=track["x_over_l"] + 0.001 / CONTROL.tail_length)
 
 
 def test_a_track_of_a_camera_has_the_error_of_the_same_track_in_tail_lengths() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ from planner.planning.request import PlanRequest
 from planner.vehicle.tracked_point import Point, TrackedVehicle
 from planner.vehicle.vehicle import Mode, Vehicle
 from sim.model.presets import PRESETS
-from sim.motion.steady_motion import lab_columns
+from sim.motion.steady_motion import LAB_COLUMNS
+from softflagella import query
 from surrogate.domain import ROBOT as GROUPS
 from surrogate.table import NeuralTable
 from surrogate.table_file import load
@@ -96,26 +98,14 @@ def followed(path: str, car: str, offset: float = 0.0, **options: Any) -> Plan:
 
 def look_up(runs: pd.DataFrame) -> dict[str, np.ndarray]:
     """Ask the look-up table for the motion of each run, in the columns of a measured table."""
-    robots = [
-        replace(MEASURED, tails=int(n), tail_length=length / 100, motor_speed=abs(speed) * np.pi / 30)
-        for n, length, speed in zip(runs["N"], runs["l_cm"], runs["omega_rpm"], strict=True)
-    ]
-    groups = columns_of([robot.group_values() for robot in robots])
-    groups["omega_bar"] = groups["omega_bar"] * np.sign(runs["omega_rpm"].to_numpy())
-    length, time = runs["l_cm"].to_numpy(), np.array([robot.time_scale for robot in robots])
-    return lab_columns(shipped().query(groups), length, time)
+    motion = query(runs[["N", "l_cm", "omega_rpm"]], robot=MEASURED, lookup=shipped())
+    return {name: motion[name].to_numpy() for name in LAB_COLUMNS}
 
 
 def table_of_runs() -> pd.DataFrame:
     """Make runs of two numbers of tails, two lengths and two speeds, in both directions and three sessions."""
-    rows = [
-        (tails, length, sense * speed, f"day {k % 3}")
-        for tails in (3, 4)
-        for length in (7.0, 9.5)
-        for speed in (100.0, 150.0)
-        for sense in (1, -1)
-        for k in range(3)
-    ]
+    conditions = product((3, 4), (7.0, 9.5), (100.0, 150.0), (1, -1), range(3))
+    rows = [(tails, length, sense * speed, f"day {k}") for tails, length, speed, sense, k in conditions]
     runs = pd.DataFrame(rows, columns=["N", "l_cm", "omega_rpm", "session"])
     rng = np.random.default_rng(7)
     answers = look_up(runs)

@@ -43,7 +43,7 @@ from tests.planner.page.page_core import (
     refusal_of,
     to_page,
 )
-from tests.planner.plans import planned
+from tests.planner.plans import planned, predicted_track
 from tests.sim.model.test_robot_toml import LAB, REFUSALS
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
@@ -101,15 +101,6 @@ def test_a_plan_of_the_page_is_restored() -> None:
                [theirs["predicted_max_over_l"], theirs["predicted_rms_over_l"]])  # fmt: skip
 
 
-def track_of(result: Plan, noise: float = 0.0) -> pd.DataFrame:
-    """Make a track of the head's centre near a plan's poses."""
-    rng = np.random.default_rng(0)
-    poses = result.poses + noise * rng.normal(size=result.poses.shape)
-    time = np.concatenate([[0.0], np.cumsum(result.dwells)])
-    columns = {"time_bar": time, "x_over_l": poses[:, 0], "y_over_l": poses[:, 1], "heading_rad": poses[:, 2]}
-    return pd.DataFrame(columns)
-
-
 def compared(content: dict[str, Any], frame: pd.DataFrame, how: str = "none") -> Any:
     plans = frame.get("plan_id", pd.Series(dtype=str)).unique().tolist()
     numbers = frame.drop(columns="plan_id", errors="ignore")
@@ -121,7 +112,7 @@ def compared(content: dict[str, Any], frame: pd.DataFrame, how: str = "none") ->
 @pytest.mark.parametrize("name", ["circle", "bend"])
 def test_errors_of_a_track(name: str, noise: float) -> None:
     result = plan_of(name)
-    content, frame = result.to_dict(), track_of(result, noise)
+    content, frame = result.to_dict(), predicted_track(result, noise)
     cm = 100 * result.robot.length_scale
     lab = {
         "time [min]": frame["time_bar"] * result.robot.time_scale / 60, "x_mm": frame["x_over_l"] * 10 * cm,
@@ -149,13 +140,13 @@ BAD: dict[str, Callable[[pd.DataFrame], pd.DataFrame]] = {
 @pytest.mark.parametrize("change", BAD)
 def test_bad_tracks_are_refused(change: str) -> None:
     result = plan_of("circle")
-    frame, content = BAD[change](track_of(result)), result.to_dict()
+    frame, content = BAD[change](predicted_track(result)), result.to_dict()
     assert str(compared(content, frame)) == refusal_of(tracking_error, content, frame)
 
 
 def test_a_track_can_be_laid_on_the_plan_and_tells_of_another_plan() -> None:
     result = plan_of("circle")
-    content, frame = result.to_dict(), track_of(result).assign(plan_id="p1")
+    content, frame = result.to_dict(), predicted_track(result).assign(plan_id="p1")
     turned = frame.assign(time_bar=frame["time_bar"] + 3, x_over_l=-frame["y_over_l"], y_over_l=frame["x_over_l"],
                           heading_rad=frame["heading_rad"] + np.pi / 2, plan_id=content["id"])  # fmt: skip
     measured, laid = compared(content, frame), compared(content, turned, "rigid")
