@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +18,9 @@ import calibration.verdict.calibrate
 import sim.motion.run
 from dataset.simulate import simulate
 from sim.effects import catalogue
-from sim.inputs import load_robot
 from sim.io.errors import InputError, run_command
 from sim.model.groups import DWELL, GROUP_COLUMNS
 from sim.model.presets import PRESETS
-from sim.model.robot_toml import robot_toml
 from sim.model.schedule import FORMAT, load_schedule
 from sim.motion.batches import steady_columns
 from sim.motion.replay import replay
@@ -246,10 +243,3 @@ def test_any_plan_is_replayed_or_refused(content: object, tmp_path: Path, monkey
     with suppress(InputError):
         track = replay(load_schedule(tmp_path / "plan.json"))
         assert np.isfinite(track[["x_over_l", "y_over_l", "heading_rad"]].to_numpy()).all()
-
-
-@pytest.mark.parametrize("name", ['a "quoted" name', "back\\slash", "two\nlines", "Übung", ""], ids=repr)
-def test_robots_keep_their_names(name: str, tmp_path: Path) -> None:
-    robot = replace(PRESETS["paper-control"], name=name)
-    (tmp_path / "robot.toml").write_text(robot_toml(robot))
-    assert load_robot(tmp_path / "robot.toml") == robot

@@ -18,7 +18,6 @@ from calibration.statistics.gls import Noise
 from calibration.verdict.next_runs import Explanation
 from dataset.data_set import sweep_key
 from dataset.schema import rows_version
-from planner.files.plan_files import write_plan
 from planner.jobs.plan import plan
 from planner.paths.path import circle
 from planner.vehicle.calibration_table import CalibrationKnowledge, knowledge_toml
@@ -34,7 +33,6 @@ from surrogate.table import FORMAT
 from surrogate.table_file import SHIPPED, load
 from tests.calibration.track import track
 from tests.dataset.sweeps import design, invented, write_rows
-from tests.planner.plans import hindered_trip
 from tests.shared import shared
 
 ROBOT = PRESETS["paper-control"]
@@ -155,13 +153,6 @@ def plan_file() -> bytes:
     """Make a plan.json without its id, so that a mutation is read, not refused as one."""
     content = plan(circle(1.0), ROBOT).to_dict()
     return json.dumps({name: value for name, value in content.items() if name != "id"}).encode()
-
-
-@shared
-def goal_file() -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
-        write_plan(hindered_trip(), folder)
-        return Path(folder, "goal.json").read_bytes()
 
 
 def replayed() -> bytes:

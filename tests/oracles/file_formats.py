@@ -53,7 +53,6 @@ from tests.oracles.example_files import (
     Files,
     corrected,
     file,
-    goal_file,
     json_of,
     model_content,
     of_data_set,
@@ -74,6 +73,7 @@ from tests.oracles.example_files import (
     verdict,
 )
 from tests.oracles.mutations import changed_content, mutated
+from tests.planner.plans import goal_file
 from tests.sim.io import tracked_files
 
 

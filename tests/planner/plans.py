@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from planner.files.plan_files import write_plan
 from planner.goal.trip import Trip
 from planner.jobs.plan import make_plan, plan
 from planner.paths.obstacles import Circle, FreeSpace
@@ -86,6 +89,14 @@ def hindered_trip() -> Plan[Trip]:
     regions = [Circle(1.5, -1.1, 0.3), [[4.0, 1.5], [5.0, 1.5], [5.0, 2.5]]]
     task = {"keep_out": regions, "walls": WALLS, "via": [(1.5, 0.3)]}
     return to_goal((0, 0, 0), (3, 0, 0), CONTROL, objective="flips", **task)
+
+
+@shared
+def goal_file() -> bytes:
+    """Return goal.json of the trip that is hindered, as it is written."""
+    with TemporaryDirectory() as folder:
+        write_plan(hindered_trip(), folder)
+        return Path(folder, "goal.json").read_bytes()
 
 
 @shared

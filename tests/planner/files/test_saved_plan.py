@@ -5,9 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -34,7 +32,18 @@ from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.schedule import FORMAT, load_schedule, plan_id
 from surrogate.table_file import load
-from tests.planner.plans import BIASED, CONTROL, CORNER, WALLS, around, hindered_trip, own_table, planned, trip
+from tests.planner.plans import (
+    BIASED,
+    CONTROL,
+    CORNER,
+    WALLS,
+    around,
+    goal_file,
+    hindered_trip,
+    own_table,
+    planned,
+    trip,
+)
 from tests.shared import shared
 
 pytestmark = pytest.mark.slow
@@ -98,6 +107,9 @@ def test_the_files_of_jobs_and_their_folder_lead_to_the_plan(tmp_path: Path) -> 
     places = [tmp_path / "trip", tmp_path / "trip" / "plan.json", tmp_path / "trip" / "goal.json"]
     first, *others = [restore_plan(place) for place in places]
     assert all(is_plan(place) for place in places)
+    goal, content = load_goal(places[2]), load_plan(places[1])
+    assert goal["plan_id"] == content["id"]
+    assert content["predicted_poses"][-1] == pytest.approx(goal["predicted_end"])
     assert all(other.to_dict() == first.to_dict() for other in others)
     write_plan(planned(), tmp_path / "circle")
     (tmp_path / "circle" / "goal.json").write_text((tmp_path / "trip" / "goal.json").read_text())
@@ -227,25 +239,20 @@ def test_a_robot_that_it_does_not_know_is_planned_for_at_once(
 READERS = [load_plan, load_schedule]  # of the planner and of the simulator
 
 
-@cache
-def record() -> dict[str, Any]:
-    return json.loads(json.dumps(planned().to_dict()))  # type: ignore[no-any-return]
-
-
 def written(folder: Path, **changes: Any) -> Path:
     path = folder / "plan.json"
-    path.write_text(json.dumps({**record(), **changes}))
+    path.write_text(json.dumps({**saved("square"), **changes}))
     return path
 
 
 def test_a_changed_number_is_noticed(tmp_path: Path) -> None:
-    dwells = record()["dwell_bar"]
+    dwells = saved("square")["dwell_bar"]
     changed = {"dwell_bar": [dwells[0] * 1.01, *dwells[1:]]}
     damaged = r"was edited or damaged after it was written: .*; plan again, or delete"
     for reader in READERS:
         with pytest.raises(InputError, match=damaged):
             reader(written(tmp_path, **changed))
-    edited = {name: value for name, value in {**record(), **changed}.items() if name != "id"}
+    edited = {name: value for name, value in {**saved("square"), **changed}.items() if name != "id"}
     (tmp_path / "edited.json").write_text(json.dumps(edited))
     assert load_plan(tmp_path / "edited.json") == {**edited, "id": plan_id(edited)}
     assert load_plan(written(tmp_path, **changed, id="0123456789ab"))["id"] == "0123456789ab"
@@ -265,7 +272,7 @@ def test_a_changed_number_is_noticed(tmp_path: Path) -> None:
 def test_both_readers_refuse_the_same_files(
     reader: Callable[[Path], object], tmp_path: Path, old: str, new: str, expected: str
 ) -> None:
-    text = json.dumps(record())
+    text = json.dumps(saved("square"))
     assert old in text
     (tmp_path / "plan.json").write_text(text.replace(old, new, 1))
     with pytest.raises(InputError, match=expected) as caught:
@@ -289,21 +296,9 @@ def test_other_files_are_refused(
         reader(tmp_path / name)
 
 
-@shared
-def goal_file() -> str:
-    """Return goal.json of a trip, as it is written."""
-    with TemporaryDirectory() as folder:
-        write_plan(hindered_trip(), Path(folder))
-        content = load_goal(Path(folder, "goal.json"))
-        made = load_plan(Path(folder, "plan.json"))
-        assert content["plan_id"] == made["id"]
-        assert made["predicted_poses"][-1] == pytest.approx(content["predicted_end"])
-        return Path(folder, "goal.json").read_text()
-
-
 def test_a_goal_reads_back(tmp_path: Path) -> None:
     content = json.loads(goal_file())
-    (tmp_path / "goal.json").write_text(goal_file())
+    (tmp_path / "goal.json").write_bytes(goal_file())
     assert load_goal(tmp_path / "goal.json") == content
     assert content["goal"] == [3, 0, 0]
     assert [next(iter(region)) for region in content["keep_out"]] == ["circle", "polygon"]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from sim.inputs import load_robot, save_robot
@@ -139,21 +139,21 @@ SIZES = st.floats(1e-4, 1.0)
 OTHERS = st.tuples(st.floats(1e3, 1e10), st.floats(1e-4, 1e3), st.floats(1e-3, 1e3))
 
 
-@given(st.tuples(SIZES, SIZES, SIZES, st.none() | SIZES), OTHERS, st.floats(0.0, 0.4))
-@settings(max_examples=50, deadline=None)
+@given(st.text(max_size=9), st.tuples(SIZES, SIZES, SIZES, st.none() | SIZES), OTHERS, st.floats(0.0, 0.4))
+@settings(max_examples=80, deadline=None)
+@example('a "quoted" name\\ in two\nlines', (0.1, 0.016, 0.06, None), (1.2e6, 1.5, 4.5), 0.0)
 def test_what_is_written_is_read_back_to_the_last_bit(
-    lengths: tuple[float, float, float, float | None], others: tuple[float, float, float], sigma: float
+    name: str, lengths: tuple[float, float, float, float | None], others: tuple[float, float, float], sigma: float
 ) -> None:
     length, radius, head, offset = lengths
     stiffness, viscosity, speed = others
     robot = replace(
         CONTROL, tail_length=length, tail_radius=length / 20, head_radius=radius, head_length=head,
         disc_offset=offset, youngs_modulus=stiffness, viscosity=viscosity, motor_speed=speed,
-        sigmas={"head_length": Sigma(sigma * head, False)},
+        sigmas={"head_length": Sigma(sigma * head, False)}, name=name,
     )  # fmt: skip
     tables = tomllib.loads(robot_toml(robot))
-    name = tables.pop("name")
-    assert Robot(name=name, **read_robot(tables)) == robot
+    assert Robot(name=tables.pop("name"), **read_robot(tables)) == robot
 
 
 def test_numbers_of_the_presets() -> None:
