@@ -249,6 +249,7 @@ def test_a_film_has_a_picture_for_each_of_its_times(tmp_path: Path) -> None:
     with Image.open(tmp_path / "swim.gif") as image:
         assert count == 13
         assert image.size[0] == 200
+        assert 60 <= image.size[1] <= 300
         first = np.asarray(image.convert("RGB")).astype(int)
         image.seek(image.n_frames - 1)
         assert np.abs(np.asarray(image.convert("RGB")).astype(int) - first).max() > 100
