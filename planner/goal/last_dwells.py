@@ -16,9 +16,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from planner.paths.distance import distance_to
 from planner.planning.conditions import OVERLAP, Lap
@@ -118,15 +120,19 @@ def _least_squares(
         least: the shortest ones.
         options: of SciPy's `least_squares`.
     """
-    from scipy.optimize import least_squares  # here, for it takes longer to load than most plans to make
+
+    @lru_cache(maxsize=1)  # the solver asks for both, one after the other
+    def at(dwells: bytes) -> tuple[Floats, Floats]:
+        """Compute residuals (R,) and derivatives (R, K) together."""
+        last = np.frombuffer(dwells)
+        values = residuals(np.concatenate([last[None], last + _STEP * np.eye(len(last))]))
+        return values[0], (values[1:] - values[0]).T / _STEP
 
     def values(dwells: Floats) -> Floats:
-        return residuals(dwells[None])[0]
+        return at(dwells.tobytes())[0]
 
     def slopes(dwells: Floats) -> Floats:
-        """Compute derivatives (R, K), all dwells at once."""
-        at = residuals(np.concatenate([dwells[None], dwells + _STEP * np.eye(len(dwells))]))
-        return np.asarray((at[1:] - at[0]).T / _STEP)
+        return at(dwells.tobytes())[1]
 
     return np.asarray(least_squares(values, first, slopes, bounds=(least, np.inf), **options).x)
 

@@ -15,6 +15,7 @@ from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
 from planner.goal.dubins import DubinsPaths, three_arcs
 from planner.paths.obstacles import FreeSpace
@@ -140,7 +141,6 @@ class _Track:
 
     def swung(self, rest: float, circles: int, radius: float) -> Iterator[_Candidate]:
         """Yield swings that gain `rest` besides their circles, from the end of the track to its beginning."""
-        from scipy.optimize import brentq  # here, for it takes longer to load than most plans to make
 
         def beyond(joins: float, leaves: float, word: int) -> float:
             return float(self._gained(leaves, np.array([joins]), radius)[0, word]) - rest

@@ -15,6 +15,8 @@ from typing import Unpack
 
 from numpy.typing import ArrayLike
 
+from planner.goal.last_dwells import looped
+from planner.goal.swings import Delay
 from planner.options import AnyVehicle, Length, PathOptions, asked, length_of, seconds_of
 from planner.paths.path import Path2D, smoothed
 from planner.paths.path_files import Drawing, read_path
@@ -111,8 +113,6 @@ def make_plan(
 
     changes: list[Change] = []
     if request.arrive_seconds is not None:
-        from planner.goal.swings import Delay
-
         changes.append(Delay(request.space, drawn))
     if not request.space.empty:
         from planner.jobs.detours import Around  # loads SciPy's graphs
@@ -124,6 +124,4 @@ def make_plan(
     once = solve(task, tracked, request, progress)
     if not request.loop:
         return once
-    from planner.goal.last_dwells import looped
-
     return looped(once, progress)

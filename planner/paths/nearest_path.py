@@ -30,6 +30,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg.lapack import dpbsv
 
 from planner.paths.path import Path2D, axis_at, resample
 from planner.paths.tractrix import STILL, Drift
@@ -249,8 +250,6 @@ def whole_lap(poses: Floats, turn: float) -> Floats:
 
 def damped_step(band: Floats, right: Floats, damping: float) -> Floats | None:
     """Solve the damped normal equations (3 m,) in lower band form; None where they are not positive definite."""
-    from scipy.linalg.lapack import dpbsv  # slow to import, and only tight places need it
-
     damped = band.copy(order="F")
     damped[0] += damping
     _, step, info = dpbsv(damped, right, lower=1, overwrite_ab=1)
