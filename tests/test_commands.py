@@ -45,6 +45,12 @@ from tests.processes import LIMIT
 from tests.shared import FOLDER, shared
 
 FILES = {"plan.json", "plan.csv", "plan.svg", "schedule.h", "tracker.h"}
+SAID = {  # by commands that write nothing
+    "sim check": "this simulator, its fit     0.403",
+    "sim effects": "end_over_end_drag      Drag moment on the head when it turns end over end.",
+    "sim compile": "loops compiled in",
+    "surrogate compile": "loops compiled in",
+}
 COMMANDS = [(package, name) for package in PACKAGES for name in program_of(package).commands]
 
 
@@ -128,26 +134,6 @@ def planner_page(made: Path, out: Path) -> str:
     done("planner", "page", "--robot", made / "robot.toml", "--path", "circle:2l", "--out", out / "page.html")
     assert "circle:2l" in (out / "page.html").read_text()
     return "opens in a browser"
-
-
-def sim_check(made: Path, out: Path) -> str:
-    done("sim", "check")
-    return "this simulator, its fit     0.403"
-
-
-def sim_effects(made: Path, out: Path) -> str:
-    done("sim", "effects")
-    return "end_over_end_drag      Drag moment on the head when it turns end over end."
-
-
-def sim_compile(made: Path, out: Path) -> str:
-    done("sim", "compile")
-    return "loops compiled in"
-
-
-def surrogate_compile(made: Path, out: Path) -> str:
-    done("surrogate", "compile")
-    return "loops compiled in"
 
 
 def dataset_build(made: Path, out: Path) -> str:
@@ -415,7 +401,10 @@ def test_every_command_does_its_work(
 ) -> None:
     made()
     capsys.readouterr()
-    said = globals()[f"{package}_{name}"](made(), tmp_path)
+    if said := SAID.get(f"{package} {name}"):
+        done(package, name)
+    else:
+        said = globals()[f"{package}_{name}"](made(), tmp_path)
     output = capsys.readouterr()
     assert said in output.out
     assert "Traceback" not in output.err
