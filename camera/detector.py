@@ -11,9 +11,10 @@ and a pixel has the weight p of a hue h if |q| < p tan 30° and p is above the n
 the marker's own p. Blur and mixing with grey shrink p and leave the hue. So the weighted mean of the pixels is
 the band's centre to a fraction of a pixel.
 
-A robot that was seen lately is looked for around its last pose, at full resolution; any other in the whole
-picture, smaller. Of several candidates the pair counts whose distance is that of the bands, which is given or
-learnt from the pictures before.
+What has the colour of a marker and rests, a thing in the tank or its rim, is known from pictures of the whole film
+and counts as grey. A robot that was seen lately is looked for around its last pose, at full resolution; any other
+in the whole picture, smaller. Of several candidates the pair counts whose distance is that of the bands, which is
+given or learnt from the pictures before.
 
 The standard error of a centre is that of a weighted mean with the picture's own noise, and `_BIAS` and `_SHIFT`
 for what noise does not explain: shading, glare, compression. What the distance of the bands is wrong by is added.
@@ -35,7 +36,9 @@ from sim.arrays import Floats
 from sim.io.errors import InputError
 
 _CONE = math.tan(math.radians(30))  # of hues that count as one colour
+_WIDE = 1.0  # the same of what rests, which noise moves across the edge of the cone
 _FAINT = 14.0  # p of the faintest marker, of 255
+_ABOVE = 2.0  # times the p that rests at a place: least p of a marker in front of it
 _EDGE = 0.3  # of a marker's p
 _RIVAL = 0.45  # of the strongest p in a picture, of what may be a marker, too
 _WIDTH = 480  # pixels of the picture in which a lost robot is looked for
@@ -103,19 +106,27 @@ class _Blob(NamedTuple):
 class Detector:
     """Find the marked robots in one picture after another."""
 
-    def __init__(self, robots: Sequence[Markers], view: View, *, head_length: float = math.nan) -> None:
+    def __init__(
+        self,
+        robots: Sequence[Markers],
+        view: View,
+        *,
+        still: Mapping[float, Any] = {},
+        head_length: float = math.nan,
+    ) -> None:
         """Prepare for pictures of one camera.
 
         Args:
             robots: their markers.
             view: of the camera; where a tag gives its scale, `view` is complete once the tag was seen.
+            still: `resting`; {} where no pictures show it.
             head_length: of the robots, which the bands cannot be further apart than [m].
 
         Raises:
             InputError: OpenCV is not installed.
         """
-        self.view, self._robots, self._head_length = view, [_Robot(each) for each in robots], head_length
-        self._cv = cv = opencv()
+        self.view, self._robots, self._longest = view, [_Robot(each) for each in robots], 1.1 * head_length
+        self._cv, self._still = (cv := opencv()), still
         self._mask: Any = None
         self._finder = self._reader(cv.aruco.CORNER_REFINE_NONE)
         self._refiners = (  # the first counts from a pixel's corner
@@ -319,11 +330,10 @@ class Detector:
         def part(whole: Any) -> Any:
             return self._cv.resize(whole[box], size, interpolation=self._cv.INTER_AREA)
 
-        c, s, root = math.cos(math.radians(hue)), math.sin(math.radians(hue)), math.sqrt(3) / 2
-        alpha, beta = np.array([-0.5, -0.5, 1.0]), np.array([-root, root, 0.0])  # of blue, green, red
-        axes = np.array([c * alpha + s * beta, c * beta - s * alpha], np.float32)
-        p, q = self._cv.split(self._cv.transform(part(picture).astype(np.float32), axes))
+        p, q = _chroma(part(picture), hue)
         weights = np.where(np.abs(q) < _CONE * p, p, np.float32(0))
+        if hue in self._still:
+            weights[weights < _ABOVE * part(self._still[hue])] = 0
         if self._mask is not None:
             weights[part(self._mask) < 128] = 0
         return weights
@@ -350,28 +360,44 @@ class Detector:
         area = float(np.minimum(weights / (_EDGE * peak), 1).sum()) * fold**2  # a pixel at its edge counts in part
         return _Blob(low + (place + 0.5) * fold - 0.5, area, error)
 
+    def distances(self, robot: int, frame: Any) -> list[float]:
+        """Return how far apart the bands of a robot may be in a picture, for each pair of candidates [m]."""
+        pairs = self._pairs(self._robots[robot], frame)
+        return [] if isinstance(pairs, str) else [pair[3] for pair in pairs if not pair[3] > self._longest]
+
     def _search(self, robot: _Robot, frame: Any) -> dict[str, Floats] | str:
-        """Look for the pair in the whole picture, made smaller; return its places, or why it is not there."""
+        """Look for the pair in the whole picture; return its places, or why it is not there."""
+        pairs, known = self._pairs(robot, frame), robot.known
+        if isinstance(pairs, str):
+            return pairs
+
+        def fit(pair: tuple[float, Floats, Floats, float]) -> float:
+            strength, _, _, apart = pair
+            if known > 0:
+                return strength * math.exp(-(((apart / known - 1) / _ALIKE) ** 2))
+            return 0.0 if apart > self._longest else strength / apart
+
+        best = max(pairs, key=fit, default=None)
+        return dict(zip(BANDS, best[1:3], strict=True)) if best and fit(best) else wrong_distance(robot.markers)
+
+    def _pairs(self, robot: _Robot, frame: Any) -> list[tuple[float, Floats, Floats, float]] | str:
+        """Return pairs of candidates in the whole picture: strength, places [pixels], distance [m]."""
         height, width = frame.shape[:2]
         factor, whole = max(width / _WIDTH, 1.0), (slice(None), slice(None))
-        found = []
+        candidates = []
         for name in BANDS:
             weights = self._weights(
                 frame, robot.markers.hues[name], whole, (round(width / factor), round(height / factor))
             )
-            found.append([(p, (place + 0.5) * factor - 0.5) for p, place in self._patches(weights)])
-            if not found[-1]:
+            candidates.append([(p, (place + 0.5) * factor - 0.5) for p, place in self._patches(weights)])
+            if not candidates[-1]:
                 return f"no {robot.markers.colours[name]}"
-        known, best, chosen = robot.known, 0.0, None
-        for (strength, front), (other, rear) in product(*found):
+        pairs = []
+        for (strength, front), (other, rear) in product(*candidates):
             apart = float(np.hypot(*np.diff(self.view.to_tank(np.stack([front, rear])), axis=0)[0]))
-            if known > 0:
-                fit = math.exp(-(((apart / known - 1) / _ALIKE) ** 2))
-            else:
-                fit = 0.0 if apart > 1.1 * self._head_length else 1 / apart
-            if np.linalg.norm(front - rear) > 3 and fit * min(strength, other) > best:
-                best, chosen = fit * min(strength, other), {"front": front, "rear": rear}
-        return chosen or wrong_distance(robot.markers)
+            if np.linalg.norm(front - rear) > 3:
+                pairs.append((min(strength, other), front, rear, apart))
+        return pairs
 
     def _patches(self, weights: Any) -> list[tuple[float, Floats]]:
         """Return the strongest connected patches: their largest weights, and their centres (2,)."""
@@ -385,6 +411,31 @@ class Detector:
         strengths[0] = 0
         order = np.argsort(-strengths)[:_CANDIDATES]
         return [(float(strengths[label]), centres[label]) for label in order if strengths[label] > 0]
+
+
+def chroma_of(picture: Any, hue: float) -> Any:
+    """Return p of a hue in a picture, uint8 (H, W), also of hues near it, which noise may move."""
+    p, q = _chroma(picture, hue)
+    return opencv().blur(np.where(np.abs(q) < _WIDE * p, p, np.float32(0)), (3, 3)).clip(0, 255).astype(np.uint8)
+
+
+def resting(colours: Mapping[float, Any]) -> dict[float, Any]:
+    """Return for each hue the p, uint8 (H, W), that two thirds of the pictures have at a place: what rests there.
+
+    Args:
+        colours: hue -> `chroma_of` pictures, (K, H, W), over which a camera rests; 0 where a robot is.
+    """
+    third = {hue: len(maps) // 3 for hue, maps in colours.items() if len(maps)}
+    rests = {hue: np.partition(colours[hue], index, axis=0)[index] for hue, index in third.items()}
+    return {hue: opencv().dilate(weights, np.ones((5, 5))) for hue, weights in rests.items()}
+
+
+def _chroma(picture: Any, hue: float) -> Any:
+    """Return p and q of a hue, each (H, W)."""
+    c, s, root = math.cos(math.radians(hue)), math.sin(math.radians(hue)), math.sqrt(3) / 2
+    alpha, beta = np.array([-0.5, -0.5, 1.0]), np.array([-root, root, 0.0])  # of blue, green, red
+    axes = np.array([c * alpha + s * beta, c * beta - s * alpha], np.float32)
+    return opencv().split(opencv().transform(picture.astype(np.float32), axes))
 
 
 def wrong_distance(markers: Markers) -> str:

@@ -53,10 +53,12 @@ class Film:
         self.count = max(int(self._capture.get(cv.CAP_PROP_FRAME_COUNT)), 1)
         self._capture = cv.VideoCapture(self.path, cv.CAP_FFMPEG, [cv.CAP_PROP_N_THREADS, 2])
 
-    def samples(self, number: int) -> Iterator[Any]:
-        """Yield pictures at equal distances over the film."""
+    def samples(self, number: int, start: float = 0.0, end: float = math.inf) -> Iterator[Any]:
+        """Yield pictures at about equal distances from `start` to `end` [s]."""
         seeking = self._cv.VideoCapture(self.path, self._cv.CAP_FFMPEG)
-        for index in np.linspace(0, self.count - 1, number).astype(int):
+        rate = float(seeking.get(self._cv.CAP_PROP_FPS))
+        first, last = np.clip([start * rate, end * rate if rate else math.inf], 0, self.count - 1)
+        for index in np.linspace(first, last, number).astype(int):
             seeking.set(self._cv.CAP_PROP_POS_FRAMES, int(index))
             good, picture = seeking.read()
             if good:

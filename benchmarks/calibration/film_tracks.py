@@ -54,14 +54,15 @@ def _pose(time: float) -> tuple[float, float, float]:
 def _draw(path: Path, seconds: float, *, tag: bool) -> None:
     cv2: Any = opencv()
     sprite, rng, (width, height) = _sprite(tag), np.random.default_rng(0), SIZE
+    middle = np.array(HEAD) / 2 - (0.5 if tag else 0)  # the bands' on a pixel, the tag's between pixels
     u, v = np.meshgrid(np.arange(width), np.arange(height))
     floor = (150 + 12 * np.sin(u / 37) * np.cos(v / 29))[..., None] * np.array([1.0, 1.0, 0.97])
     noisy = [np.clip(floor + rng.normal(scale=3, size=floor.shape), 0, 255).astype(np.uint8) for _ in range(12)]
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), RATE, SIZE)
     for index in range(round(seconds * RATE)):
         x, y, angle = _pose(index / RATE)
-        turn = cv2.getRotationMatrix2D((HEAD[0] / 2, HEAD[1] / 2), math.degrees(angle), 1)
-        turn[:, 2] += [x - HEAD[0] / 2, y - HEAD[1] / 2]
+        turn = cv2.getRotationMatrix2D(middle, math.degrees(angle), 1)
+        turn[:, 2] += np.array([x, y]) - middle
         frame = noisy[index % len(noisy)].copy()
         cv2.warpAffine(sprite, turn, SIZE, frame, cv2.INTER_LINEAR, cv2.BORDER_TRANSPARENT)
         writer.write(cv2.GaussianBlur(frame, (0, 0), 0.8))

@@ -308,6 +308,24 @@ def test_a_robot_whose_front_and_rear_are_exchanged_is_named_and_its_runs_are_re
             measure_tracks(tracked.tables["1"], RUNS)
 
 
+@pytest.mark.parametrize(("rate", "seen"), [(0.8, 0.6), (0.0, 1.0)])
+def test_things_of_the_markers_colours_that_lie_in_the_tank_are_no_markers(
+    rate: float, seen: float, tmp_path: Path
+) -> None:
+    """The rim is red; on the circle of a robot that moves lie things as far apart as its bands."""
+    tank, swum = small(), circling(rate=rate)
+    tank._floor[tank._y > 0.225] = (20, 20, 240)
+    for paint, x, y in (((20, 20, 240), 0.16, 0.12), ((40, 220, 40), 0.16, 0.165), ((20, 20, 240), 0.21, 0.14)):
+        if rate:
+            tank._floor[np.hypot(tank._x - x, tank._y - y) < 0.01] = paint
+    table = track_film(tank.film(tmp_path / "a.mp4", swum, 8.0, RATE), setup_of(tank, tmp_path)).tables["1"]
+    assert len(table) >= seen * 8 * RATE
+    truth = np.array([swum(t) for t in table["time_s"]])
+    off = table[["x_cm", "y_cm"]].to_numpy() / 100 - truth[:, :2]
+    assert np.abs(off).max() < 0.002
+    assert np.abs(np.angle(np.exp(1j * (np.radians(table["heading_deg"]) - truth[:, 2])))).max() < 0.06
+
+
 def test_a_place_that_drifts_leaves_the_circle(tmp_path: Path) -> None:
     """A camera that sags moves the picture, as a current moves the robot; a turn shows it."""
 
