@@ -260,10 +260,12 @@ def test_a_track_is_shown_over_its_plan_with_its_error(page: Any, tmp_path: Path
     size = page.viewport_size
     page.set_viewport_size({"width": 390, "height": 844})
     page.wait_for_function("document.querySelector('#strip').lastChild.getBoundingClientRect().right < 390")
-    ends = page.locator("#measured svg text").evaluate_all(
-        "all => all.map((each) => each.getBoundingClientRect().right)"
+    page.wait_for_function(  # it is drawn anew, as wide as the window is now
+        """() => {
+            const words = [...document.querySelectorAll('#measured svg text')];
+            return words.length && words.every((each) => each.getBoundingClientRect().right < 390);
+        }"""
     )
-    assert max(ends) < 390  # it is drawn anew, as wide as the window is now
     page.set_viewport_size(size)
 
 
