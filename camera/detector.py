@@ -36,7 +36,6 @@ from sim.arrays import Floats
 from sim.io.errors import InputError
 
 _CONE = math.tan(math.radians(30))  # of hues that count as one colour
-_WIDE = 1.0  # the same of what rests, which noise moves across the edge of the cone
 _FAINT = 14.0  # p of the faintest marker, of 255
 _ABOVE = 2.0  # times the p that rests at a place: least p of a marker in front of it
 _EDGE = 0.3  # of a marker's p
@@ -119,7 +118,7 @@ class Detector:
         Args:
             robots: their markers.
             view: of the camera; where a tag gives its scale, `view` is complete once the tag was seen.
-            still: `resting`; {} where no pictures show it.
+            still: see `camera.learning`; {} where no film shows it.
             head_length: of the robots, which the bands cannot be further apart than [m].
 
         Raises:
@@ -330,7 +329,7 @@ class Detector:
         def part(whole: Any) -> Any:
             return self._cv.resize(whole[box], size, interpolation=self._cv.INTER_AREA)
 
-        p, q = _chroma(part(picture), hue)
+        p, q = chroma(part(picture), hue)
         weights = np.where(np.abs(q) < _CONE * p, p, np.float32(0))
         if hue in self._still:
             weights[weights < _ABOVE * part(self._still[hue])] = 0
@@ -413,24 +412,7 @@ class Detector:
         return [(float(strengths[label]), centres[label]) for label in order if strengths[label] > 0]
 
 
-def chroma_of(picture: Any, hue: float) -> Any:
-    """Return p of a hue in a picture, uint8 (H, W), also of hues near it, which noise may move."""
-    p, q = _chroma(picture, hue)
-    return opencv().blur(np.where(np.abs(q) < _WIDE * p, p, np.float32(0)), (3, 3)).clip(0, 255).astype(np.uint8)
-
-
-def resting(colours: Mapping[float, Any]) -> dict[float, Any]:
-    """Return for each hue the p, uint8 (H, W), that two thirds of the pictures have at a place: what rests there.
-
-    Args:
-        colours: hue -> `chroma_of` pictures, (K, H, W), over which a camera rests; 0 where a robot is.
-    """
-    third = {hue: len(maps) // 3 for hue, maps in colours.items() if len(maps)}
-    rests = {hue: np.partition(colours[hue], index, axis=0)[index] for hue, index in third.items()}
-    return {hue: opencv().dilate(weights, np.ones((5, 5))) for hue, weights in rests.items()}
-
-
-def _chroma(picture: Any, hue: float) -> Any:
+def chroma(picture: Any, hue: float) -> Any:
     """Return p and q of a hue, each (H, W)."""
     c, s, root = math.cos(math.radians(hue)), math.sin(math.radians(hue)), math.sqrt(3) / 2
     alpha, beta = np.array([-0.5, -0.5, 1.0]), np.array([-root, root, 0.0])  # of blue, green, red

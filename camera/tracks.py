@@ -10,29 +10,25 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from camera.circle import LEAST_TURN, fit_track
-from camera.detector import Detector, Lost, Pose, chroma_of, resting, wrong_distance
+from camera.detector import Detector, Lost, Pose, wrong_distance
 from camera.film import Film
+from camera.learning import learn
 from camera.spin import Spin, aliasing, fit_spin
-from camera.view import BANDS, DOTS, Markers, Setup, View, opencv
-from sim.arrays import Floats
+from camera.view import DOTS, Markers, Setup, View, opencv
 from sim.io.errors import InputError, naming
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_SAMPLES = 12  # pictures from which is learnt what rests, and the distance of the bands
-_AGREED = 0.04  # relative difference of two distances of the bands in small pictures
-_BAND_REACH, _DOTS_REACH = 0.5, 3  # of the bands' distance, around a band's centre and a robot: there they are
 _SHOWN = 10  # poses in the picture of a track
 _GAP = 1.5  # usual times between two frames, at which frames are missing
-_LEAST = 0.3  # of the head's length, of which the bands are apart
 _CERTAIN = 5.0  # standard errors by which a robot that moves tail first has moved
 _ENOUGH = 2000  # frames for the sense of a spin
 _EXCHANGE = "exchange the colours of front and rear in view.toml (turn a tag by 180 degrees)"
@@ -75,7 +71,7 @@ def track_film(
 
     with naming(path):
         film = Film(path)
-        robots, still = _learn(film, setup, head_length, start, end)
+        robots, still = learn(film, setup, head_length, start, end)
         detector = Detector(robots, setup.view, still=still, head_length=head_length)
         rows: dict[str, list[dict[str, float]]] = {each.name: [] for each in setup.robots}
         why = {each.name: Counter[str]() for each in setup.robots}
@@ -128,90 +124,6 @@ def _nothing(markers: Markers, reason: str, count: int) -> str:
     elif reason == wrong_distance(markers):
         remedy = "correct [scale] in view.toml, or apart, the distance of the bands, if it is given"
     return f"no robot {markers.name} in {count} frames ({reason}): {remedy}"
-
-
-def _learn(
-    film: Film, setup: Setup, head_length: float, start: float, end: float
-) -> tuple[list[Markers], dict[float, Any]]:
-    """Learn from some pictures what rests, and how far the bands of each robot are apart; compare with its head.
-
-    A distance that view.toml gives is taken. What is around a robot does not rest; where a robot is seen only if
-    everything may be a marker, it does so itself.
-
-    Raises:
-        InputError: the bands are further apart than the head is long, or hardly apart.
-    """
-    banded = [each for each in setup.robots if each.tag is None]
-    pictures = list(film.samples(_SAMPLES, start, end)) if banded else []
-    hues = {hue for each in banded for hue in each.hues.values()}
-    colours = {hue: np.array([chroma_of(picture, hue) for picture in pictures]) for hue in hues}
-    for still in (resting(colours), {}):
-        guessed = [
-            each._replace(apart=_agreed(pictures, each, setup.view, still, head_length))
-            if math.isnan(each.apart)
-            else each
-            for each in banded
-        ]
-        seen = _seen(pictures, guessed, setup.view, still)
-        if all(seen.values()):
-            break
-    for each in banded:
-        for index, (marks, _) in seen[each.name].items():
-            distance = float(np.linalg.norm(marks[0] - marks[1]))
-            around = {**dict(zip(BANDS, marks, strict=True)), **dict.fromkeys(DOTS, marks.mean(axis=0))}
-            for name, hue in each.hues.items():
-                reach = distance * (_DOTS_REACH if name in DOTS else _BAND_REACH)
-                low, high = ((around[name] + side * reach).clip(0).astype(int) for side in (-1, 1))
-                colours[hue][index, low[1] : high[1], low[0] : high[0]] = 0
-    still = resting(colours)
-    seen = _seen(pictures, guessed, setup.view, still)
-    distances = {name: [apart for _, apart in poses.values()] for name, poses in seen.items()}
-    learnt = {name: float(np.median(aparts)) for name, aparts in distances.items() if aparts}
-    for apart in (learnt[each.name] for each in banded if math.isnan(each.apart) and each.name in learnt):
-        if apart > 1.05 * head_length or apart < _LEAST * head_length:
-            raise InputError(
-                f"the bands are {100 * apart:.3g} cm apart, and the head of the robot is "
-                f"{100 * head_length:.3g} cm long: correct [scale] in view.toml, or give the right robot, or "
-                "the bands' distance as apart_cm"
-            )
-    robots = [
-        each._replace(apart=learnt.get(each.name, math.nan)) if math.isnan(each.apart) else each
-        for each in setup.robots
-    ]
-    return robots, still
-
-
-def _agreed(
-    pictures: Sequence[Any], markers: Markers, view: View, still: Mapping[float, Any], head_length: float
-) -> float:
-    """Return the distance of two bands that most pictures allow [m]; NaN: no picture shows two bands.
-
-    Other things that have the colours, and one of them and a band, come nearer to each other as the robot moves.
-    """
-    allowed = []
-    for picture in pictures:
-        detector = Detector([markers], view, still=still, head_length=head_length)
-        detector.poses(picture)  # which finds the scale
-        allowed.append(np.array(detector.distances(0, picture) if detector.view.homography is not None else []))
-    votes = {
-        apart: sum(bool((np.abs(others / apart - 1) < _AGREED).any()) for others in allowed)
-        for apart in np.concatenate([*allowed, []]).tolist()
-    }
-    return max(votes, key=lambda apart: (votes[apart], -apart), default=math.nan)
-
-
-def _seen(
-    pictures: Sequence[Any], robots: Sequence[Markers], view: View, still: Mapping[float, Any]
-) -> dict[str, dict[int, tuple[Floats, float]]]:
-    """Find robots with bands in single pictures: name -> picture -> marks (2, 2) [pixels], their distance [m]."""
-    seen: dict[str, dict[int, tuple[Floats, float]]] = {each.name: {} for each in robots}
-    for index, picture in enumerate(pictures):
-        detector = Detector(robots, view, still=still)
-        for each in detector.poses(picture):
-            if isinstance(each, Pose):
-                marks = np.array(each.marks)
-                seen[each.robot][index] = marks, float(np.hypot(*np.diff(detector.view.to_tank(marks), axis=0)[0]))
-    return seen
 
 
 def _row(pose: Pose, index: int, time: float) -> dict[str, float]:

@@ -1,0 +1,127 @@
+"""What is learnt from some pictures of a film before it is tracked: what rests, and how far bands are apart.
+
+A camera rests, and a robot moves. So a place that has a marker's colour in two thirds of the pictures, at the rim
+of the tank or where a thing lies, is no marker. Front and rear of a robot have one distance in all pictures; a
+thing and a band have another in each.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from camera.detector import Detector, Pose, chroma
+from camera.film import Film
+from camera.view import BANDS, DOTS, Markers, Setup, View, opencv
+from sim.arrays import Floats
+from sim.io.errors import InputError
+
+_SAMPLES = 12  # pictures from which is learnt what rests, and the distance of the bands
+_AGREED = 0.04  # relative difference of two distances of the bands in small pictures
+_BAND_REACH, _DOTS_REACH = 0.5, 3  # of the bands' distance, around a band's centre and a robot: there they are
+_LEAST = 0.3  # of the head's length, of which the bands are apart
+_WIDE = 1.0  # tangent of the half-angle of hues that count as one, wider than a marker's: noise moves a hue
+
+
+def learn(
+    film: Film, setup: Setup, head_length: float, start: float, end: float
+) -> tuple[list[Markers], dict[float, Any]]:
+    """Learn from some pictures what rests, and how far the bands of each robot are apart; compare with its head.
+
+    A distance that view.toml gives is taken. What is around a robot does not rest; where a robot is seen only if
+    everything may be a marker, it does so itself.
+
+    Raises:
+        InputError: the bands are further apart than the head is long, or hardly apart.
+    """
+    banded = [each for each in setup.robots if each.tag is None]
+    pictures = list(film.samples(_SAMPLES, start, end)) if banded else []
+    hues = {hue for each in banded for hue in each.hues.values()}
+    colours = {hue: np.array([_map(picture, hue) for picture in pictures]) for hue in hues}
+    for still in (_resting(colours), {}):
+        guessed = [
+            each._replace(apart=_agreed(pictures, each, setup.view, still, head_length))
+            if math.isnan(each.apart)
+            else each
+            for each in banded
+        ]
+        seen = _seen(pictures, guessed, setup.view, still)
+        if all(seen.values()):
+            break
+    for each in banded:
+        for index, (marks, _) in seen[each.name].items():
+            distance = float(np.linalg.norm(marks[0] - marks[1]))
+            around = {**dict(zip(BANDS, marks, strict=True)), **dict.fromkeys(DOTS, marks.mean(axis=0))}
+            for name, hue in each.hues.items():
+                reach = distance * (_DOTS_REACH if name in DOTS else _BAND_REACH)
+                low, high = ((around[name] + side * reach).clip(0).astype(int) for side in (-1, 1))
+                colours[hue][index, low[1] : high[1], low[0] : high[0]] = 0
+    still = _resting(colours)
+    seen = _seen(pictures, guessed, setup.view, still)
+    distances = {name: [apart for _, apart in poses.values()] for name, poses in seen.items()}
+    learnt = {name: float(np.median(aparts)) for name, aparts in distances.items() if aparts}
+    for apart in (learnt[each.name] for each in banded if math.isnan(each.apart) and each.name in learnt):
+        if apart > 1.05 * head_length or apart < _LEAST * head_length:
+            raise InputError(
+                f"the bands are {100 * apart:.3g} cm apart, and the head of the robot is "
+                f"{100 * head_length:.3g} cm long: correct [scale] in view.toml, or give the right robot, or "
+                "the bands' distance as apart_cm"
+            )
+    robots = [
+        each._replace(apart=learnt.get(each.name, math.nan)) if math.isnan(each.apart) else each
+        for each in setup.robots
+    ]
+    return robots, still
+
+
+def _agreed(
+    pictures: Sequence[Any], markers: Markers, view: View, still: Mapping[float, Any], head_length: float
+) -> float:
+    """Return the distance of two bands that most pictures allow [m]; NaN: no picture shows two bands.
+
+    Other things that have the colours, and one of them and a band, come nearer to each other as the robot moves.
+    """
+    allowed = []
+    for picture in pictures:
+        detector = Detector([markers], view, still=still, head_length=head_length)
+        detector.poses(picture)  # which finds the scale
+        allowed.append(np.array(detector.distances(0, picture) if detector.view.homography is not None else []))
+    votes = {
+        apart: sum(bool((np.abs(others / apart - 1) < _AGREED).any()) for others in allowed)
+        for apart in np.concatenate([*allowed, []]).tolist()
+    }
+    return max(votes, key=lambda apart: (votes[apart], -apart), default=math.nan)
+
+
+def _seen(
+    pictures: Sequence[Any], robots: Sequence[Markers], view: View, still: Mapping[float, Any]
+) -> dict[str, dict[int, tuple[Floats, float]]]:
+    """Find robots with bands in single pictures: name -> picture -> marks (2, 2) [pixels], their distance [m]."""
+    seen: dict[str, dict[int, tuple[Floats, float]]] = {each.name: {} for each in robots}
+    for index, picture in enumerate(pictures):
+        detector = Detector(robots, view, still=still)
+        for each in detector.poses(picture):
+            if isinstance(each, Pose):
+                marks = np.array(each.marks)
+                seen[each.robot][index] = marks, float(np.hypot(*np.diff(detector.view.to_tank(marks), axis=0)[0]))
+    return seen
+
+
+def _map(picture: Any, hue: float) -> Any:
+    """Return p of a hue in a picture, uint8 (H, W), also of hues near it, which noise may move."""
+    p, q = chroma(picture, hue)
+    return opencv().blur(np.where(np.abs(q) < _WIDE * p, p, np.float32(0)), (3, 3)).clip(0, 255).astype(np.uint8)
+
+
+def _resting(colours: Mapping[float, Any]) -> dict[float, Any]:
+    """Return for each hue the p, uint8 (H, W), that two thirds of the pictures have at a place: what rests there.
+
+    Args:
+        colours: hue -> `_map` of pictures, (K, H, W), over which a camera rests; 0 where a robot is.
+    """
+    third = {hue: len(maps) // 3 for hue, maps in colours.items() if len(maps)}
+    rests = {hue: np.partition(colours[hue], index, axis=0)[index] for hue, index in third.items()}
+    return {hue: opencv().dilate(weights, np.ones((5, 5))) for hue, weights in rests.items()}
