@@ -155,6 +155,8 @@ def asked(robot: AnyVehicle, options: Mapping[str, Any], **own: Any) -> tuple[Tr
     swims = swimmer_of(robot)
     request = request_of(options, swims, **own)
     if isinstance(robot, TrackedVehicle):
+        if given := [name for name in ("lookup", "own_table", "knowledge", "point") if options.get(name)]:
+            raise InputError(f"{given[0]}: the vehicle of a plan has its own; give the robot instead")
         return robot, request
     if isinstance(robot, MeasuredVehicle) or isinstance(swims, MeasuredVehicle):
         if any(options.get(name) for name in ("lookup", "own_table", "knowledge")):

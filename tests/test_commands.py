@@ -19,6 +19,7 @@ from camera.view import read_setup
 from dataset.build import build
 from dataset.design import Axis, load_design
 from planner.files.saved_plan import load_goal, load_plan
+from planner.planning.request import Camera
 from sim.inputs import load_robot
 from sim.io.errors import InputError, run_command
 from sim.io.units import format_time
@@ -215,8 +216,10 @@ def surrogate_export(made: Path, out: Path) -> str:
 
 
 def planner_plan(made: Path, out: Path) -> str:
-    done("planner", "plan", "square:3l", "--robot", made / "robot.toml", "--out", out / "plan")
+    camera = ["--camera", "0.02l", 0.03, 1.5, 0.5, 0.1]
+    done("planner", "plan", "square:3l", "--robot", made / "robot.toml", *camera, "--out", out / "plan")
     assert names(out / "plan") == FILES
+    assert load_plan(out / "plan" / "plan.json")["camera"] == Camera((0.02, 0.03), 1.5, 0.5, 0.1).to_dict()
     return "of the declared path"
 
 

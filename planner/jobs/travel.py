@@ -15,6 +15,7 @@ import numpy as np
 
 from planner.goal.dubins import TURNS, DubinsPaths, words
 from planner.goal.route import RouteLimits
+from planner.jobs.detours import Around
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D, axis_at
 from planner.paths.tractrix import Drift, Reference
@@ -125,9 +126,5 @@ def plan_track(
 
     drawn = Path2D(source(preferred).reference.p, False)
     check_size(drawn, tracked.robot, tracked.vehicle.turn_radius)
-    changes: tuple[Change, ...] = ()
-    if not space.empty:
-        from planner.jobs.detours import Around  # loads SciPy's graphs
-
-        changes = (Around(space, drawn),)
+    changes: tuple[Change, ...] = () if space.empty else (Around(space, drawn),)
     return solve(Task(source=source, changes=changes, drawn=drawn), tracked, request, progress)

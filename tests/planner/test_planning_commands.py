@@ -99,6 +99,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("plan circle:1l --camera 0.02l 0.03 1.5 0.5 1.1 R", "camera: lost is 1.1"),
         ("plan circle:1l --camera 0.02 0.03 1.5 0.5 0.1 R", "0.02 has no unit"),
         ("plan circle:1l --camera 0.02l 0.03cm 1.5 0.5 0.1 R", "--camera 0.02l 0.03cm 1.5 0.5 0.1: RAD"),
+        ("plan circle:1l --camera 0.02l 0.03 1.5 0.5 10% R", "numbers without a unit"),
         ("plan circle:1l --arrive=1min R", "the fastest plan takes"),
         ("plan circle:1l --arrive=30 R", "with its unit"),
         ("plan circle:1l --arrive=-3min R", "above 0"),

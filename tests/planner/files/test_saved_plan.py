@@ -15,6 +15,7 @@ import pytest
 import softflagella as sf
 from planner.__main__ import main
 from planner.files.fleet_files import read_fleet
+from planner.files.headers import tracker_header
 from planner.files.plan_files import write_plan
 from planner.files.saved_plan import is_plan, load_goal, load_plan, restore_plan
 from planner.goal.trip import FORMAT as GOAL_FORMAT
@@ -90,6 +91,7 @@ def test_a_restored_plan_gives_the_same_orders(name: str) -> None:
     assert np.array(orders(same)) == pytest.approx(np.array(orders(result)), abs=1e-6)
     assert (same.warnings, same.request.camera) == (result.warnings, result.request.camera)
     assert (same.lap, same.feedback_error) == (result.lap, result.feedback_error)
+    assert tracker_header(same, "") == tracker_header(result, "")
     again = json.loads(json.dumps(same.to_dict()))
     assert again.keys() == content.keys()
     for key in ("reference", "predicted_poses", "dwell_s", "raw_path"):

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.files.headers import rounded
+from planner.files.headers import rounded, schedule_header
 from planner.goal import last_dwells
 from planner.goal.last_dwells import looped
 from planner.jobs.hold import Orbit, hold
@@ -90,6 +90,10 @@ def test_laps_close(path: Path2D) -> None:
     assert plan.lap.to_dict() == {
         "closes_over_l": closes, "closes_rad": turned, "drift_over_l": drift, "drift_rad": drift_turn,
     }  # fmt: skip
+    assert "repeat it: a lap ends where it began" in repr(plan)
+    header = schedule_header(plan, plan.identity)
+    assert "After the last entry go on with the first." in header
+    assert "\n#define SCHEDULE_REPEATS 1\n" in header
     many = Switches(plan.first_direction, np.tile(plan.dwells, 6), plan.poses[:1])
     after = roll_out(tracked().vehicle, many).flips[count::count]
     turn = 0.0 if path is EIGHT else 2 * np.pi

@@ -105,7 +105,7 @@ def test_several_paths_are_named_and_one_can_be_chosen(tmp_path: Path) -> None:
         drawn(tmp_path, body, shape="circle1")
 
 
-@pytest.mark.parametrize("text", svg_cases.BROKEN)
+@pytest.mark.parametrize("text", [*svg_cases.BROKEN, "\xff\xfe\x00"])
 def test_what_is_no_drawing_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "a.svg").write_bytes(text.encode("latin-1"))
     with pytest.raises(InputError, match="not SVG"):
@@ -175,7 +175,10 @@ def test_drawings_that_show_the_same_are_read_alike(text: str, reference: str, t
     assert path.points == pytest.approx(wanted.points, rel=1e-8, abs=1e-8 * np.abs(wanted.points).max())
 
 
-@pytest.mark.parametrize(("text", "words"), svg_cases.REFUSED, ids=range(len(svg_cases.REFUSED)))
+DEEP = (svg_cases.svg("<g>" * 20_000 + "</g>" * 20_000), "more than 100 levels")
+
+
+@pytest.mark.parametrize(("text", "words"), [*svg_cases.REFUSED, DEEP], ids=range(len(svg_cases.REFUSED) + 1))
 def test_what_is_not_read_is_refused_by_name(text: str, words: str, tmp_path: Path) -> None:
     (tmp_path / "a.svg").write_text(text)
     with pytest.raises(InputError) as refusal:

@@ -166,9 +166,12 @@ AGAINST = CalibrationKnowledge(current=(-0.05 * LAB, 0.0))
          {"robot": CONTROL.with_motor(500.0)}),
         (circle(2.0), r"outside the look-up table: disc offset 1.6 mm \(a_over_R = 0.1\)",
          {"robot": replace(CONTROL, disc_offset=0.0016)}),
+        (circle(2.0), "lookup: the vehicle of a plan has its own", {"robot": tracked()}),
+        (circle(2.0), "point: the vehicle of a plan has its own",
+         {"robot": tracked(), "lookup": None, "point": "pivot"}),
         (circle(2.0), "tail_sag .*surrogate robot", {"robot": replace(CONTROL, effects={"tail_sag": 0.1})}),
     ],
-    ids=range(23),
+    ids=range(25),
 )  # fmt: skip
 def test_refusals(path: Any, expected: str, options: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=expected) as caught:
