@@ -32,7 +32,7 @@ def learn(
     """Learn from some pictures what rests, and how far the bands of each robot are apart; compare with its head.
 
     A distance that view.toml gives is taken. What is around a robot does not rest; where a robot is seen only if
-    everything may be a marker, it does so itself.
+    everything may be a marker, or where nothing is left once it moves, it does so itself.
 
     Raises:
         InputError: the bands are further apart than the head is long, or hardly apart.
@@ -51,14 +51,11 @@ def learn(
         seen = _seen(pictures, guessed, setup.view, still)
         if all(seen.values()):
             break
-    for each in banded:
-        for index, (marks, _) in seen[each.name].items():
-            distance = float(np.linalg.norm(marks[0] - marks[1]))
-            around = {**dict(zip(BANDS, marks, strict=True)), **dict.fromkeys(DOTS, marks.mean(axis=0))}
-            for name, hue in each.hues.items():
-                reach = distance * (_DOTS_REACH if name in DOTS else _BAND_REACH)
-                low, high = ((around[name] + side * reach).clip(0).astype(int) for side in (-1, 1))
-                colours[hue][index, low[1] : high[1], low[0] : high[0]] = 0
+    _erase(colours, banded, seen)
+    known = [index for index in range(len(pictures)) if all(index in each for each in seen.values())]
+    if 0 < len(known) < len(pictures):  # what is gone there was a robot that rested
+        left = _resting({hue: maps[known] for hue, maps in colours.items()})
+        _erase(colours, banded, _seen(pictures, guessed, setup.view, left))
     still = _resting(colours)
     seen = _seen(pictures, guessed, setup.view, still)
     distances = {name: [apart for _, apart in poses.values()] for name, poses in seen.items()}
@@ -108,6 +105,20 @@ def _seen(
                 marks = np.array(each.marks)
                 seen[each.robot][index] = marks, float(np.hypot(*np.diff(detector.view.to_tank(marks), axis=0)[0]))
     return seen
+
+
+def _erase(
+    colours: Mapping[float, Any], robots: Sequence[Markers], seen: Mapping[str, Mapping[int, tuple[Floats, float]]]
+) -> None:
+    """Set the p of hues (`_resting`) to 0 around robots that are seen (`_seen`)."""
+    for each in robots:
+        for index, (marks, _) in seen[each.name].items():
+            distance = float(np.linalg.norm(marks[0] - marks[1]))
+            around = {**dict(zip(BANDS, marks, strict=True)), **dict.fromkeys(DOTS, marks.mean(axis=0))}
+            for name, hue in each.hues.items():
+                reach = distance * (_DOTS_REACH if name in DOTS else _BAND_REACH)
+                low, high = ((around[name] + side * reach).clip(0).astype(int) for side in (-1, 1))
+                colours[hue][index, low[1] : high[1], low[0] : high[0]] = 0
 
 
 def _map(picture: Any, hue: float) -> Any:

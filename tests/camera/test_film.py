@@ -308,15 +308,19 @@ def test_a_robot_whose_front_and_rear_are_exchanged_is_named_and_its_runs_are_re
             measure_tracks(tracked.tables["1"], RUNS)
 
 
-@pytest.mark.parametrize(("rate", "seen"), [(0.8, 0.6), (0.0, 1.0)])
+@pytest.mark.parametrize(("rate", "rest", "seen"), [(0.8, 0.0, 0.6), (0.0, 0.0, 1.0), (0.8, 6.0, 0.98)])
 def test_things_of_the_markers_colours_that_lie_in_the_tank_are_no_markers(
-    rate: float, seen: float, tmp_path: Path
+    rate: float, rest: float, seen: float, tmp_path: Path
 ) -> None:
-    """The rim is red; on the circle of a robot that moves lie things as far apart as its bands."""
-    tank, swum = small(), circling(rate=rate)
+    """The rim is red; on the circle of a robot that moves at once lie things as far apart as its bands."""
+    tank = small()
+
+    def swum(time: float) -> tuple[float, float, float, float, float]:
+        return circling(rate=rate)(max(time - rest, 0.0))
+
     tank._floor[tank._y > 0.225] = (20, 20, 240)
     for paint, x, y in (((20, 20, 240), 0.16, 0.12), ((40, 220, 40), 0.16, 0.165), ((20, 20, 240), 0.21, 0.14)):
-        if rate:
+        if rate and not rest:
             tank._floor[np.hypot(tank._x - x, tank._y - y) < 0.01] = paint
     table = track_film(tank.film(tmp_path / "a.mp4", swum, 8.0, RATE), setup_of(tank, tmp_path)).tables["1"]
     assert len(table) >= seen * 8 * RATE
