@@ -20,9 +20,10 @@ from __future__ import annotations
 
 import math
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -99,15 +100,15 @@ class Pictures:
     """
 
     def __init__(self, sights: Sights):
-        self._began, self._reader = time.monotonic(), ThreadPoolExecutor(1)
+        self._began = time.monotonic()
         self._sights = sights(self.now)
-        self._next = self._reader.submit(next, self._sights, None)
+        self._look()
 
     def __enter__(self) -> Pictures:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._reader.shutdown(wait=False, cancel_futures=True)
+        self._thread.join(WATCHDOG)
 
     def now(self) -> float:
         """Return the time since the beginning [s]."""
@@ -116,8 +117,21 @@ class Pictures:
     def get(self, timeout: float) -> Sight | None:
         """Wait for the next sight; None: the film is over; TimeoutError after the time-out."""
         sight = self._next.result(timeout)
-        self._next = self._reader.submit(next, self._sights, None)
+        self._look()
         return sight
+
+    def _look(self) -> None:
+        """Begin to look for the next sight; the program does not wait at its end for a camera that hangs."""
+        self._next = seen = Future[Sight | None]()
+
+        def look() -> None:
+            try:
+                seen.set_result(next(self._sights, None))
+            except BaseException as error:
+                seen.set_exception(error)
+
+        self._thread = threading.Thread(target=look, daemon=True)
+        self._thread.start()
 
 
 @dataclass

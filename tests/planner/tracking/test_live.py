@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 import tty
-from collections.abc import Callable
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from planner.files.plan_files import write_plan
 from planner.paths.distance import distance_to
 from planner.planning.request import POSE
 from planner.tracking import live
-from planner.tracking.live import REPEAT, Motor, Pictures, Ride, Sight, steer
+from planner.tracking.live import REPEAT, Clock, Motor, Pictures, Ride, Sight, steer
 from planner.tracking.swim import Swimmer
 from planner.tracking.tracker import Tracker
 from sim.io.errors import InputError
@@ -170,12 +170,24 @@ def test_each_order_is_a_line_and_the_last_one_is_stop(monkeypatch: pytest.Monke
 
 
 def test_what_a_camera_raises_comes_out_of_the_loop() -> None:
-    def gone(now: Callable[[], float]) -> None:
+    def gone(now: Clock) -> Iterator[Sight]:
+        yield Sight(now(), None, "a damaged picture")
         raise InputError("no picture comes any more")
 
-    tank = Tank()
+    ride, pictures = Ride(), Pictures(gone)
     with pytest.raises(InputError, match="no picture comes any more"):
-        steer(Ride(), Pictures(gone), tank, begin, UNIT, lost=LOST, row=print, tell=print)  # type: ignore[arg-type]
+        steer(ride, pictures, Tank(), begin, UNIT, lost=LOST, row=print, tell=print)
+    assert ride.pictures == 1
+
+
+def test_the_program_ends_where_a_camera_hangs() -> None:
+    code = (
+        "import threading\nfrom planner.tracking.live import Pictures\n"
+        "with Pictures(lambda now: iter(threading.Event().wait, 0)) as pictures:\n    pictures.get(0.01)\n"
+    )
+    words = [sys.executable, "-c", code]
+    ended = subprocess.run(words, capture_output=True, text=True, timeout=LIMIT, cwd=Path(__file__).parents[3])
+    assert ended.stderr.splitlines()[-1] == "TimeoutError"
 
 
 def test_cameras_that_fail_and_robots_that_are_not_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
