@@ -40,7 +40,7 @@ def measure_films(
     if len(setup.robots) > 1:
         raise InputError(f"{view} has {len(setup.robots)} robots; films of runs show one")
     given = {name: numbers_of(table[name]) for name in ("start_s", "end_s") if name in table}
-    parts = pd.DataFrame(given, table.index, columns=["start_s", "end_s"]).fillna(
+    parts = pd.DataFrame(given, table.index, ["start_s", "end_s"], float).fillna(
         {"start_s": 0.0, "end_s": math.inf}
     )
     with naming(runs):
