@@ -241,10 +241,11 @@ def _live(
         print(line, file=sys.stderr, flush=True)
 
     sights, ride = watch(source, view, plan.robot.name, length, latency), Ride()
-    with ending_on_signals(), Motor(port) as motor:
+    with ending_on_signals():
+        motor = Motor(port)
         print("time_s,x_cm,y_cm,heading_deg,direction,error_cm", flush=True)
         try:
-            with Pictures(sights) as pictures:
+            with Pictures(sights) as pictures, motor:  # which stops first
                 steer(ride, pictures, motor, begin, plan.robot.time_scale, lost=lost, row=row, tell=tell)
         finally:
             if ride.pictures:
