@@ -287,7 +287,7 @@ def _from_places(view: View, plane: Floats, places: Floats) -> View:
             "[scale] points_px and their places are mirror images of each other: give places with y "
             f'counter-clockwise from x, seen from above, or looks = "{other}"'
         )
-    error = _CLICK * math.sqrt(2 / len(plane)) / (2 * float(plane.std()))
+    error = _CLICK / float(np.linalg.norm(plane - plane.mean(axis=0)))
     return replace(view, homography=homography, scale_error=error)
 
 

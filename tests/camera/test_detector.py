@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -175,7 +176,7 @@ def test_a_tag_is_followed_in_a_part_of_the_picture_and_found_again_after_a_jump
     setup, grey = read_setup(file), cv2.cvtColor
     monkeypatch.setattr(cv2, "cvtColor", lambda part, code: read.append(part.size) or grey(part, code))
     detector, searches = Detector(setup.robots, setup.view), []
-    for u, v in ((100, 100), (110, 95), (125, 90), (500, 300), (495, 310)):
+    for u, v in ((100, 100), (110, 95), (125, 90), (500, 300), (495, 310), (4, 7), (2, 3)):
         picture = np.full((480, 640, 3), 160, np.uint8)
         picture[v : v + 84, u : u + 84] = tag[..., None]
         read.clear()
@@ -183,7 +184,28 @@ def test_a_tag_is_followed_in_a_part_of_the_picture_and_found_again_after_a_jump
         searches.append(read.count(picture.size))
         assert isinstance(pose, Pose)
         assert 1000 * np.array([pose.x, pose.y]) == pytest.approx([u + 41.5, 479 - (v + 41.5)], abs=0.2)
-    assert searches == [1, 0, 0, 1, 0]
+    assert searches == [1, 0, 0, 1, 0, 1, 0]
+    region = np.array([[200, 0], [640, 0], [640, 480], [200, 480]])
+    assert Detector(setup.robots, replace(setup.view, region=region)).poses(picture) == [Lost("1", "no tag 3")]
+
+
+@pytest.mark.parametrize(("side", "blur"), [(14, 0.3), (20, 1.0), (32, 1.5)])
+def test_stated_errors_of_small_and_blurred_tags_hold(side: float, blur: float, tmp_path: Path) -> None:
+    file = tmp_path / "view.toml"
+    file.write_text("[scale]\npoints_px = [[0, 159], [100, 159]]\nlength_cm = 10\n[[robots]]\ntag = 3\n")
+    setup, ratios = read_setup(file), []
+    for index in range(16):
+        angle, place = 0.4 * index, (100.3 + 0.3 * index, 80.7 - 0.2 * index)
+        picture = draw_tag(np.full((160, 200), 130.0), 3, side, place, angle, cv2.aruco.DICT_4X4_50)
+        noise = np.random.default_rng(index).normal(scale=3, size=(160, 200, 3))
+        noisy = np.clip(cv2.GaussianBlur(picture, (0, 0), blur)[..., None] + noise, 0, 255).astype(np.uint8)
+        (pose,) = Detector(setup.robots, setup.view).poses(noisy)
+        assert isinstance(pose, Pose)
+        truth = (place[0] / 1000, (159 - place[1]) / 1000, math.pi / 2 - angle)
+        ratios.append(off(pose, truth) / [pose.sigma_x, pose.sigma_x, pose.sigma_heading])
+    rms = np.sqrt((np.array(ratios) ** 2).mean(axis=0))
+    assert (rms < [0.7, 0.7, 1.7]).all()
+    assert rms[2] > 0.5
 
 
 def draw_tag(picture: np.ndarray, number: int, side: float, centre: Sequence[float], angle: float, dictionary: int,
@@ -224,14 +246,19 @@ tag_id = 7
 tag = 3
 ahead_mm = 10
 turned_deg = {turned}
+tail = "yellow"
 ''')
     setup = read_setup(file)
     noisy = picture[..., None] + np.random.default_rng(0).normal(scale=3, size=(480, 640, 3))
-    detector = Detector(setup.robots, setup.view)
-    (pose,) = detector.poses(np.clip(np.round(noisy), 0, 255).astype(np.uint8))
-    assert isinstance(pose, Pose)
+    seen = np.clip(np.round(noisy), 0, 255).astype(np.uint8)
     up = 1 if looks == "up" else -1  # y of the tank along v of the picture
     axis = np.exp(1j * (angle - math.pi / 2 + math.radians(turned)))  # in the picture, u + i v
+    dot = complex(260.2, 210.7) + axis * (-40 + 10j * up)
+    cv2.circle(seen, (round(dot.real), round(dot.imag)), 4, (40, 205, 215), -1)
+    detector = Detector(setup.robots, setup.view)
+    (pose,) = detector.poses(seen)
+    assert isinstance(pose, Pose)
+    assert pose.dots["tail"] == pytest.approx((0.005, 1.2e-5), abs=1e-3)
     ahead = complex(axis.real, up * axis.imag)
     place = 0.0005 * complex(260.2 - 520.3, up * (210.7 - 370.6)) - 0.01 * ahead
     assert abs(complex(pose.x, pose.y) - place) < 0.0005
