@@ -175,6 +175,18 @@ def test_a_square_and_its_tolerance_have_units(
     assert plan["stated_error_over_l"] <= 0.005 / CONTROL.tail_length
 
 
+@pytest.mark.parametrize(("option", "said"), [("--loop", "repeat it: a lap ends"), ("--arrive=20min", "as asked")])
+def test_a_circle_is_a_lap_or_ends_at_a_time(
+    option: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["plan", "circle:1l", option, "--robot", "paper-control", "--out", str(tmp_path)]
+    assert run_command(main, words) == 0
+    assert said in capsys.readouterr().out
+    plan = json.loads((tmp_path / "plan.json").read_text())
+    assert ("lap" in plan) == (option == "--loop")
+    assert option == "--loop" or sum(plan["dwell_s"]) == pytest.approx(1200, abs=1)
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A folder with a plan."""
