@@ -102,9 +102,22 @@ def _fitted(omega: float, time: Floats, values: Floats) -> tuple[Floats, Floats]
 
 
 def _sums(grid: Floats, series: list[tuple[Floats, Floats]]) -> Floats:
-    """Return the sum of the squares of the residuals at each frequency; each series in units of its scatter."""
+    """Return the sum of the squares of the residuals at frequencies of equal distance; each series in its scatter.
+
+    The normal equations of `_fitted` need three sums at each frequency, of which one is turned into the next.
+    """
     total = np.zeros(len(grid))
     for time, values in series:
-        squares = np.array([float(r @ r) for r in (_fitted(omega, time, values)[1] for omega in grid)])
+        off, count = values - values.mean(), len(time)
+        turn, onward, sums = np.exp(1j * grid[0] * time), np.exp(1j * (grid[1] - grid[0]) * time), []
+        for _ in grid:
+            sums.append((turn.sum(), turn @ turn, turn @ off))
+            turn *= onward
+        once, twice, seen = np.array(sums).T
+        cosine, mixed, sine = (count + twice.real) / 2, twice.imag / 2, (count - twice.real) / 2
+        normal = np.array([[np.full(len(grid), count), once.real, once.imag], [once.real, cosine, mixed],
+                           [once.imag, mixed, sine]]).transpose(2, 0, 1)  # fmt: skip
+        right = np.stack([np.zeros(len(grid)), seen.real, seen.imag], 1)
+        squares = off @ off - np.sum(right * np.linalg.solve(normal, right[..., None])[..., 0], 1)
         total += squares / max(float(values.var()), 1e-300)
     return total

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 _SHOWN = 10  # poses in the picture of a track
 _GAP = 1.5  # usual times between two frames, at which frames are missing
 _CERTAIN = 5.0  # standard errors by which a robot that moves tail first has moved
-_ENOUGH = 2000  # frames for the sense of a spin
 _EXCHANGE = "exchange the colours of front and rear in view.toml (turn a tag by 180 degrees)"
 
 
@@ -109,7 +108,7 @@ def track_film(
             table = tables[name] = pd.DataFrame(rows[name])
             table.insert(0, "run", run if len(setup.robots) == 1 else f"{run}-{name}")
             turn = turn_sense(table)
-            if turn and turn == _spin_sense(table[:_ENOUGH], motor_speed):
+            if turn and turn == _spin_sense(table, motor_speed):
                 notes.append(f"robot {name}: its head spins as if front and rear were exchanged; {_EXCHANGE}")
             elif _swims_backwards(table):
                 notes.append(f"robot {name}: it moves tail first; if it did not, {_EXCHANGE}")
