@@ -52,10 +52,11 @@ def learn(
         if all(seen.values()):
             break
     _erase(colours, banded, seen)
-    known = [index for index in range(len(pictures)) if all(index in each for each in seen.values())]
-    if 0 < len(known) < len(pictures):  # what is gone there was a robot that rested
-        left = _resting({hue: maps[known] for hue, maps in colours.items()})
-        _erase(colours, banded, _seen(pictures, guessed, setup.view, left))
+    for each in guessed:
+        known = list(seen[each.name])
+        if 0 < len(known) < len(pictures):  # what is gone there was the robot, at rest
+            left = _resting({hue: colours[hue][known] for hue in each.hues.values()})
+            _erase(colours, [each], _seen(pictures, [each], setup.view, left))
     still = _resting(colours)
     seen = _seen(pictures, guessed, setup.view, still)
     distances = {name: [apart for _, apart in poses.values()] for name, poses in seen.items()}

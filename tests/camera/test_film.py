@@ -330,6 +330,20 @@ def test_things_of_the_markers_colours_that_lie_in_the_tank_are_no_markers(
     assert np.abs(np.angle(np.exp(1j * (np.radians(table["heading_deg"]) - truth[:, 2])))).max() < 0.06
 
 
+def test_robots_that_share_a_colour_and_rest_most_of_the_time_are_seen_all_the_time(tmp_path: Path) -> None:
+    tank = Tank(width=400, height=200, scale=0.001)
+    tank._floor[np.hypot(tank._x - 0.2, tank._y - 0.1) < 0.008] = (60, 170, 60)
+    paths = {"a": circling(0.4, 0.05, centre=(0.1, 0.1)), "b": circling(-0.4, 0.05, centre=(0.3, 0.1))}
+    swum = {"a": lambda t: paths["a"](min(t, 3.3)), "b": lambda t: paths["b"](max(t - 8.7, 0.0))}
+    paints = {"a": ("red", "green"), "b": ("blue", "green")}
+    robots = [f'[[robots]]\nname = "{a}"\nfront = "{b}"\nrear = "{c}"\n' for a, (b, c) in paints.items()]
+    (tmp_path / "view.toml").write_text(tank.view_toml(robots="".join(robots)))
+    made = tank.film(tmp_path / "a.mp4", [(swum[name], paints[name]) for name in paints], 12.0, RATE)
+    for name, table in track_film(made, read_setup(tmp_path / "view.toml")).tables.items():
+        assert len(table) > 0.95 * 12 * RATE
+        assert np.hypot(*errors_of(table, swum[name])[0].T).max() < 0.002
+
+
 def test_a_place_that_drifts_leaves_the_circle(tmp_path: Path) -> None:
     """A camera that sags moves the picture, as a current moves the robot; a turn shows it."""
 
