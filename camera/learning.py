@@ -1,8 +1,8 @@
 """What is learnt from some pictures of a film before it is tracked: what rests, and how far bands are apart.
 
-A camera rests, and a robot moves. So a place that has a marker's colour in two thirds of the pictures, at the rim
-of the tank or where a thing lies, is no marker. Front and rear of a robot have one distance in all pictures; a
-thing and a band have another in each.
+A camera rests, and a robot moves. So a place that has a marker's colour in two thirds of the pictures in which no
+robot is there, at the rim of the tank or where a thing lies, is no marker. Front and rear of a robot have one
+distance in all pictures; a thing and a band have another in each.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ _SAMPLES = 12  # pictures from which is learnt what rests, and the distance of t
 _AGREED = 0.04  # relative difference of two distances of the bands in small pictures
 _BAND_REACH, _DOTS_REACH = 0.5, 3  # of the bands' distance, around a band's centre and a robot: there they are
 _LEAST = 0.3  # of the head's length, of which the bands are apart
+_UNKNOWN = 255  # for p of a place at which a robot is
 _WIDE = 1.0  # tangent of the half-angle of hues that count as one, wider than a marker's: noise moves a hue
 
 
@@ -111,7 +112,7 @@ def _seen(
 def _erase(
     colours: Mapping[float, Any], robots: Sequence[Markers], seen: Mapping[str, Mapping[int, tuple[Floats, float]]]
 ) -> None:
-    """Set the p of hues (`_resting`) to 0 around robots that are seen (`_seen`)."""
+    """Set the p of hues (`_resting`) to `_UNKNOWN` around robots that are seen (`_seen`)."""
     for each in robots:
         for index, (marks, _) in seen[each.name].items():
             distance = float(np.linalg.norm(marks[0] - marks[1]))
@@ -119,21 +120,28 @@ def _erase(
             for name, hue in each.hues.items():
                 reach = distance * (_DOTS_REACH if name in DOTS else _BAND_REACH)
                 low, high = ((around[name] + side * reach).clip(0).astype(int) for side in (-1, 1))
-                colours[hue][index, low[1] : high[1], low[0] : high[0]] = 0
+                colours[hue][index, low[1] : high[1], low[0] : high[0]] = _UNKNOWN
 
 
 def _map(picture: Any, hue: float) -> Any:
     """Return p of a hue in a picture, uint8 (H, W), also of hues near it, which noise may move."""
     p, q = chroma(picture, hue)
-    return opencv().blur(np.where(np.abs(q) < _WIDE * p, p, np.float32(0)), (3, 3)).clip(0, 255).astype(np.uint8)
+    weights = opencv().blur(np.where(np.abs(q) < _WIDE * p, p, np.float32(0)), (3, 3))
+    return weights.clip(0, _UNKNOWN - 1).astype(np.uint8)
 
 
 def _resting(colours: Mapping[float, Any]) -> dict[float, Any]:
     """Return for each hue the p, uint8 (H, W), that two thirds of the pictures have at a place: what rests there.
 
     Args:
-        colours: hue -> `_map` of pictures, (K, H, W), over which a camera rests; 0 where a robot is.
+        colours: hue -> `_map` of pictures, (K, H, W), over which a camera rests; `_UNKNOWN` where a robot is, and
+            where one is in all, nothing rests.
     """
-    third = {hue: len(maps) // 3 for hue, maps in colours.items() if len(maps)}
-    rests = {hue: np.partition(colours[hue], index, axis=0)[index] for hue, index in third.items()}
-    return {hue: opencv().dilate(weights, np.ones((5, 5))) for hue, weights in rests.items()}
+    rests = {}
+    for hue, maps in colours.items():
+        if len(maps):
+            third = (maps < _UNKNOWN).sum(axis=0, dtype=np.uint8) // 3
+            weights = np.take_along_axis(np.sort(maps, axis=0), third[None].astype(np.intp), axis=0)[0]
+            weights[weights == _UNKNOWN] = 0
+            rests[hue] = opencv().dilate(weights, np.ones((5, 5)))
+    return rests

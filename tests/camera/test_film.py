@@ -322,6 +322,8 @@ def test_things_of_the_markers_colours_that_lie_in_the_tank_are_no_markers(
     for paint, x, y in (((20, 20, 240), 0.16, 0.12), ((40, 220, 40), 0.16, 0.165), ((20, 20, 240), 0.21, 0.14)):
         if rate and not rest:
             tank._floor[np.hypot(tank._x - x, tank._y - y) < 0.01] = paint
+    if rest:  # beside the front
+        tank._floor[np.hypot(tank._x - 0.255, tank._y - 0.155) < 0.006] = (20, 20, 240)
     table = track_film(tank.film(tmp_path / "a.mp4", swum, 8.0, RATE), setup_of(tank, tmp_path)).tables["1"]
     assert len(table) >= seen * 8 * RATE
     truth = np.array([swum(t) for t in table["time_s"]])
