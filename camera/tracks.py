@@ -107,6 +107,8 @@ def track_film(
                 raise InputError(_nothing(markers, why[name].most_common(1)[0][0], len(times) - doubled))
             table = tables[name] = pd.DataFrame(rows[name])
             table.insert(0, "run", run if len(setup.robots) == 1 else f"{run}-{name}")
+            if markers.tag is None and float(np.ptp(table[["x_cm", "y_cm"]], axis=0).max()) < 100 * head_length:
+                notes.append(f"robot {name}: it hardly moves, so a thing of its colours may be taken for it")
             turn = turn_sense(table)
             if turn and turn == _spin_sense(table, motor_speed):
                 notes.append(f"robot {name}: its head spins as if front and rear were exchanged; {_EXCHANGE}")
