@@ -42,13 +42,11 @@ def learn(
     pictures = list(film.samples(_SAMPLES, start, end)) if banded else []
     hues = {hue for each in banded for hue in each.hues.values()}
     colours = {hue: np.array([_map(picture, hue) for picture in pictures]) for hue in hues}
+    unknown = {each.name for each in banded if math.isnan(each.apart)}
     for still in (_resting(colours), {}):
-        guessed = [
-            each._replace(apart=_agreed(pictures, each, setup.view, still, head_length))
-            if math.isnan(each.apart)
-            else each
-            for each in banded
-        ]
+        agreed = {each.name: _agreed(pictures, each, setup.view, still, head_length) for each in banded
+                  if each.name in unknown}  # fmt: skip
+        guessed = [each._replace(apart=agreed.get(each.name, each.apart)) for each in banded]
         seen = _seen(pictures, guessed, setup.view, still)
         if all(seen.values()):
             break
@@ -60,20 +58,16 @@ def learn(
             _erase(colours, [each], _seen(pictures, [each], setup.view, left))
     still = _resting(colours)
     seen = _seen(pictures, guessed, setup.view, still)
-    distances = {name: [apart for _, apart in poses.values()] for name, poses in seen.items()}
-    learnt = {name: float(np.median(aparts)) for name, aparts in distances.items() if aparts}
-    for apart in (learnt[each.name] for each in banded if math.isnan(each.apart) and each.name in learnt):
+    learnt = {name: float(np.median([apart for _, apart in poses.values()])) for name, poses in seen.items()
+              if poses and name in unknown}  # fmt: skip
+    for apart in learnt.values():
         if apart > 1.05 * head_length or apart < _LEAST * head_length:
             raise InputError(
                 f"the bands are {100 * apart:.3g} cm apart, and the head of the robot is "
                 f"{100 * head_length:.3g} cm long: correct [scale] in view.toml, or give the right robot, or "
                 "the bands' distance as apart_cm"
             )
-    robots = [
-        each._replace(apart=learnt.get(each.name, math.nan)) if math.isnan(each.apart) else each
-        for each in setup.robots
-    ]
-    return robots, still
+    return [each._replace(apart=learnt.get(each.name, each.apart)) for each in setup.robots], still
 
 
 def _agreed(
@@ -86,7 +80,8 @@ def _agreed(
     allowed = []
     for picture in pictures:
         detector = Detector([markers], view, still=still, head_length=head_length)
-        detector.poses(picture)  # which finds the scale
+        if view.homography is None:
+            detector.poses(picture)  # which finds the tag of the scale
         allowed.append(np.array(detector.distances(0, picture) if detector.view.homography is not None else []))
     votes = {
         apart: sum(bool((np.abs(others / apart - 1) < _AGREED).any()) for others in allowed)
