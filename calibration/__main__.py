@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,12 +15,13 @@ main = program.main
 _LISTED = 8  # laws
 
 
-def _refuse_early(*tables: str) -> None:
-    """Refuse what is no table before anything that takes seconds to load."""
-    from sim.io.tables import read_table
+def _refuse_early(*files: str) -> None:
+    """Refuse a file that is missing before anything that takes seconds to load; a pipe is read once, later."""
+    from sim.io.reading import read_bytes
 
-    for table in tables:
-        read_table(table)
+    for file in files:
+        if not os.path.exists(file):
+            read_bytes(file)
 
 
 def _to_stderr(line: str) -> None:
@@ -187,12 +189,8 @@ def _tracks(tracks: Call, runs: str, *, check: str | None = None, out: str) -> N
         out: CSV.
     """
     from sim.io.files import write_csv
-    from sim.io.pose_tracks import read_tracks
-    from sim.io.track_options import TrackOptions
 
-    options = {name: value for name, value in tracks.given.items() if name in TrackOptions.__annotations__}
-    read_tracks(tracks.given["tracks"], **options)
-    _refuse_early(runs)
+    _refuse_early(tracks.given["tracks"], runs)
     table = tracks(runs=runs, check=check)
     for line in table.attrs["converted"]:
         _to_stderr(line)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,11 +10,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.__main__ import program
 from calibration.report.figures import draw_tracks
 from calibration.swimmer.camera_tracks import measure_tracks
 from camera.circle import fit_track
 from sim.inputs import load_robot
-from sim.io.errors import InputError
+from sim.io.errors import InputError, run_command
 from sim.motion.steady import steady
 from tests.calibration.track import RADIUS, RATE, SLIP, track
 
@@ -120,6 +122,18 @@ def test_tracks_are_compared_with_the_robot_as_given() -> None:
             measure_tracks(wrong, runs, robot=ROBOT)
     with pytest.raises(InputError, match="no column 'l_cm'; the comparison with a robot needs it"):
         measure_tracks(samples, runs.drop(columns="l_cm"), robot=ROBOT)
+
+
+def test_tracks_and_runs_come_from_pipes(tmp_path: Path) -> None:
+    """The tables of this test are smaller than what a pipe holds."""
+    pipes = []
+    for table in (track(0).iloc[::2].round(4), RUNS):
+        pipe, writing = os.pipe()
+        with open(writing, "w") as file:
+            table.to_csv(file, index=False)
+        pipes.append(f"/dev/fd/{pipe}")
+    assert run_command(program.main, ["tracks", *pipes, "--out", str(tmp_path / "table.csv")]) == 0
+    assert pd.read_csv(tmp_path / "table.csv")["R_yr_cm"].iloc[0] == pytest.approx(RADIUS, rel=0.01)
 
 
 def test_the_picture_has_a_panel_for_each_run_with_track_and_fit() -> None:
