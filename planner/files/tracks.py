@@ -22,7 +22,7 @@ from planner.files.saved_plan import load_plan, restore_plan
 from planner.goal.trip import to_goal
 from planner.paths.distance import distance_to, farthest
 from planner.paths.obstacles import FreeSpace
-from planner.paths.units import length_in_lab
+from planner.paths.units import length_in_lab, missed_words
 from planner.planning.plan import Plan
 from planner.tracking.rest import place_reached, rest_of
 from sim.arrays import Floats
@@ -61,19 +61,20 @@ class TrackingError:
     raw_rms: float  # over time, from the path as given
     raw_largest: float  # distance from the path as given
     missed: float  # largest distance of a point of the path as given from the track
+    declared_missed: float  # largest distance of a point of the declared path from the track
     stated: float  # error that the plan states
     track: Floats = field(repr=False)  # (S, 2) tracked point
     tail_length: float  # of the robot [m]
 
     @property
     def line(self) -> str:
-        """The errors in one sentence, in units of length and in l."""
+        """The errors in one sentence, in units of length and in l; first, what of the path was not swum."""
         verdict = "within" if self.largest <= self.stated else "ABOVE"
         rms, largest, stated, raw_rms, raw_largest, missed = (
             length_in_lab(value, self.tail_length)
             for value in (self.rms, self.largest, self.stated, self.raw_rms, self.raw_largest, self.missed)
         )
-        return (
+        return missed_words(self.declared_missed, self.stated, self.tail_length) + (
             f"tracking error {rms} rms, {largest} at most, {verdict} the stated error {stated}; from the path as "
             f"drawn {raw_rms} rms, {raw_largest} at most, every point of it within {missed}"
         )
@@ -95,7 +96,8 @@ def check(
 
     Returns:
         Distances of the tracked point from the declared path: `rms` and `largest`, with the `stated` error; from
-        the path as drawn: `raw_rms` and `raw_largest` [l]. `line` says it in words.
+        the path as drawn: `raw_rms` and `raw_largest`; of points of these paths from the track: `declared_missed`
+        and `missed` [l]. `line` says it in words.
 
     Raises:
         InputError: the track has no such columns, or values that are not finite.
@@ -145,6 +147,7 @@ def tracking_error(plan: Mapping[str, Any], track: pd.DataFrame) -> TrackingErro
         raw_rms=float(np.sqrt((weight * raw**2).sum())),
         raw_largest=float(raw.max()),
         missed=farthest(np.array(plan["raw_path"]), tracked),
+        declared_missed=farthest(np.array(plan["reference"]), tracked),
         stated=float(plan["stated_error_over_l"]),
         track=tracked,
         tail_length=float(plan["robot"]["tail_length_m"]),

@@ -45,6 +45,7 @@ _GOAL = 1e7  # time units that a squared distance [l² or rad²] from the goal c
 _FAR = 3e4  # the same for a distance [l] from the track, beyond the largest one of the schedule
 _CHANGED = 60  # dwells before the end of a lap that are changed
 _NEAR = 6  # flips, or 2 % of them, from where the lap should end: its end is sought among them
+_FEWEST = 6  # dwells of a lap, below which none could be changed
 _EXACT = 1e4  # weight of the pose at the end, over the change of a dwell as a share of it
 _CLOSED = 1e-4  # l and rad; a lap that closes less well is refused
 
@@ -153,6 +154,11 @@ def looped(plan: Plan[J], progress: Progress | None = None) -> Plan[J]:
     turn = reference.turn
     tried = [_closed(long, first, last, turn, plan) for first, last in _ends(long, len(plan.dwells), turn)]
     laps = [lap for lap in tried if lap is not None]
+    if not laps and len(plan.dwells) < _FEWEST:
+        raise InputError(
+            f"the robot flips too seldom to correct a lap ({len(plan.dwells)} dwells), as the path is nearly its "
+            "own circle; allow shorter dwells (--objective error), or draw the path wider"
+        )
     if not laps:
         raise InputError("no schedule of this path repeats; change the dwell a little (--minimum-dwell)")
     _, switches = min(laps, key=lambda lap: lap[0])

@@ -25,13 +25,13 @@ _NAMES = {  # of each module; a leading underscore is left out
     "LEAST EVEN SHORT SHORTEST_STEP",
     "planner.paths.path": "CIRCLE_POINTS LARGEST MOST_SMOOTHED EVEN",
     "planner.paths.svg_attributes": "NAMES",
-    "planner.paths.tractrix": "LAPS MOST_SLIP",
+    "planner.paths.tractrix": "BACK LAPS MOST_SLIP",
     "planner.planning.declare": "WARN FAR SCALES MOST_WORK SMOOTHINGS FIRST CORNER AS_DRAWN ROOMS TIGHTEST "
     "LOST ROUNDED SMALL NOISY FEWEST_POSES FILLET_ROOM SPACING MOST_POINTS MINIMAX ROUNDING POINTS_A_POSE",
     "planner.planning.errors": "LEVEL WOBBLE DRAWS BLOCKS WITHIN KEPT ZIGZAG PLACE COURSE STRETCH WEYL FIRST "
     "SECOND MIDDLE TAIL",
-    "planner.planning.line_of_sight": "EXACT LARGEST_STEP TURNS MOST_BIAS HALVINGS MOST_LOOKS MOST_SWITCHES "
-    "PATIENCE EVERY TIGHTEST PAIRS_AHEAD",
+    "planner.planning.line_of_sight": "EXACT LARGEST_STEP LARGEST_TURN TURNS MOST_BIAS HALVINGS MOST_LOOKS "
+    "MOST_SWITCHES PATIENCE EVERY QUICKEST TIGHTEST PAIRS_AHEAD",
     "planner.planning.plan": "WIDE OWN_TABLE_FROM",
     "planner.planning.solve": "WORTH SAVED LENGTHENED_FROM",
     "planner.tracking.guidance": "NEAR ERRORS",

@@ -15,7 +15,7 @@ import { DECLARING, REMEDY, InputError, fixed, general, quoted } from "./words.j
 const { AS_DRAWN, ROOMS, TIGHTEST, LOST, ROUNDED, SMALL, NOISY, FEWEST_POSES, FILLET_ROOM } = CONSTANTS.declare;
 const { SPACING, MOST_POINTS, MINIMAX, ROUNDING, POINTS_A_POSE } = CONSTANTS.declare;
 const { LONGEST } = CONSTANTS.paths_units, { WARN, FAR } = CONSTANTS.declare;
-const { SCALES, MOST_WORK, SMOOTHINGS, FIRST } = CONSTANTS.declare;
+const { SCALES, MOST_WORK, SMOOTHINGS, FIRST } = CONSTANTS.declare, { BACK } = CONSTANTS.tractrix;
 const CORNERS = ["nearest", "minimax", "fillet", "error"];
 
 /* Ways to change a path, in order of preference: ROUNDED, or shares of ROOMS. */
@@ -59,9 +59,17 @@ function changed(raw, feasibility, way, progress = null) {
   return acceptedReference(raw, reference(path, rod, spacingOf(path), drift), feasibility);
 }
 
+/* Whether the pivot moves backwards somewhere, as a rod longer than the radius of its circle makes it. */
+function goesBack({ q, heading }) {
+  return q.slice(1).some(([x, y], i) => {
+    const angle = (heading[i + 1] + heading[i]) / 2;
+    return (x - q[i][0]) * Math.cos(angle) + (y - q[i][1]) * Math.sin(angle) < -BACK;
+  });
+}
+
 /* Accept a reference that turns wide enough and keeps the shape of the drawn path. */
 function acceptedReference(raw, followed, { vehicle }) {
-  if (largestSize(followed.curvature) > TIGHTEST / pivotRadius(vehicle)) return null;
+  if (largestSize(followed.curvature) > TIGHTEST / pivotRadius(vehicle) || goesBack(followed)) return null;
   const [offDrawn, missed] = twoSided(followed.p, polyline(raw));
   const lost = Math.min(LOST * Math.max(...extent(raw)), turnRadius(vehicle));
   return Math.max(offDrawn, missed) > lost ? null : { reference: followed, offDrawn, missed };

@@ -3,12 +3,12 @@
  * Guidance is {dwell, ahead, swing}; a pose is [x, y, heading] of the head's centre; offset is from there forward to
  * the tracked point. Lengths in l, times in μ0 l⁴/EI, angles in rad. */
 import { CONSTANTS } from "./constants.js";
-import { clip, column, compose, inversePose } from "./math.js";
+import { clip, column, compose, inversePose, sum } from "./math.js";
 import { motionAfter, pivotDistance, pivotRadius, sideOf, speedOf, turnRadius, zigzag } from "./vehicle.js";
 import { FOLLOWING, InputError, general } from "./words.js";
 
-const { EXACT, LARGEST_STEP, TURNS, MOST_BIAS, HALVINGS, MOST_LOOKS } = CONSTANTS.line_of_sight;
-const { MOST_SWITCHES, PATIENCE, EVERY } = CONSTANTS.line_of_sight;
+const { EXACT, LARGEST_STEP, LARGEST_TURN, TURNS, MOST_BIAS, HALVINGS, MOST_LOOKS } = CONSTANTS.line_of_sight;
+const { MOST_SWITCHES, PATIENCE, EVERY, QUICKEST } = CONSTANTS.line_of_sight;
 
 /* Compute h at every step of the reference. */
 function hysteresis(reference, vehicle, swing) {
@@ -92,27 +92,43 @@ class LineOfSight {
 
   /* The same without this rule. */
   nextFlip(pose, sense, before) {
-    const rate = Math.abs(this.vehicle.twist[sideOf(sense)][2]);
-    const longest = TURNS / rate, most = LARGEST_STEP / rate;
+    const rate = Math.abs(this.vehicle.twist[sideOf(sense)][2]), most = LARGEST_STEP / rate;
     const look = (at) => this.excess(this.poseAfter(pose, sense, before, at), sense);
-    let time = this.dwell, value = look(time), low = 0, lowValue = null, slope = rate;
+    let { place } = this, longest = TURNS / rate, lowValue = null, slope = rate;
+    let { time, low, value } = this.swim(look, rate, this.dwell);
     for (let n = 0; n < MOST_LOOKS; n++) {
-      if (this.ended) return { time: this.endTime(look, time), ended: true };
+      if (this.ended) return { time: this.endTime(look, low, time), ended: true };
       if ((value >= 0 && lowValue === null) || Math.abs(value) < EXACT) return { time, ended: false };
       if (value >= 0) return { time: root(look, [low, lowValue], [time, value]), ended: false };
       low = time;
       lowValue = value;
       time += Math.min((-1.02 * value) / Math.max(slope, 0.1 * rate), most);
-      if (time > longest) break;
+      if (time > longest) {
+        if (this.place <= place) break;
+        ({ place } = this);
+        longest += TURNS / rate; // its circles lead along the path
+      }
       value = look(time);
       slope = (value - lowValue) / (time - low);
     }
     throw new InputError("the robot turns in circles and does not reach the path; check the path's scale");
   }
 
-  /* Find the time at which the path ends, by bisection. */
-  endTime(look, time) {
-    let low = 0, high = time;
+  /* Move the place with the robot until `end`, in turns of at most LARGEST_TURN: seen from across a circle another
+   * step may be nearer. Returns the time at which the path has ended, otherwise `end`; one before; and the excess. */
+  swim(look, rate, end) {
+    const count = Math.max(Math.ceil((end * rate) / LARGEST_TURN), 1);
+    let low = 0, time = 0, value = 0;
+    for (let n = 1; n <= count; n++) {
+      [low, time] = [time, n === count ? end : n * (end / count)];
+      value = look(time);
+      if (this.ended) break;
+    }
+    return { time, low, value };
+  }
+
+  /* Find the time at which the path ends, by bisection between a time before its end and one after it. */
+  endTime(look, low, high) {
     for (let n = 0; n < HALVINGS; n++) {
       const middle = (low + high) / 2;
       look(middle);
@@ -153,7 +169,10 @@ function follow(reference, vehicle, guidance, offset = 0, progress = null) {
       sense = -sense;
       before = time;
     }
-    if (ended) return { firstDirection, dwells: Float64Array.from(dwells), poses };
+    if (ended) {
+      checkDuration(dwells, reference, vehicle);
+      return { firstDirection, dwells: Float64Array.from(dwells), poses };
+    }
     stalled = law.place > furthest ? 0 : stalled + time;
     furthest = Math.max(furthest, law.place);
     if (stalled > patience) {
@@ -166,6 +185,22 @@ function follow(reference, vehicle, guidance, offset = 0, progress = null) {
       throw new InputError(`the path needs more than ${MOST_SWITCHES} switches; split it`);
     }
     if (dwells.length % EVERY === 0) progress?.(FOLLOWING, law.place / reference.q.length);
+  }
+}
+
+/* Throw where a schedule is too short for its path: its end was accepted too early. */
+function checkDuration(dwells, reference, vehicle) {
+  let lag = 0;
+  for (const table of vehicle.rest) {
+    for (let i = 0; i < table.length; i += 3) lag = Math.max(lag, Math.hypot(table[i], table[i + 1]));
+  }
+  const fastest = Math.max(...vehicle.twist.map(([forward]) => Math.abs(forward))) + Math.hypot(...vehicle.current);
+  const time = sum(dwells), length = reference.arc.at(-1);
+  if (fastest * time < QUICKEST * (length - dwells.length * lag)) {
+    throw new Error(
+      `a schedule of ${general(time, 3)} time units is too short for ${general(length, 3)} l: an error of the `
+      + "planner; please report robot and path",
+    );
   }
 }
 

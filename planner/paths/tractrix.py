@@ -28,6 +28,7 @@ from sim.io.errors import InputError
 
 _LAPS = 6
 _MOST_SLIP = 3.0  # sideways by forward motion
+_BACK = 1e-9  # l that a pivot may move back in a step, by rounding
 _STRAIGHT = 1e-6  # rad; smaller turns are rounding
 _TOO_FAST = (
     "the current, or the difference of left and right turns, is as fast as the robot's net motion; use a longer "
@@ -132,6 +133,12 @@ class Reference:
         """Turn of the heading per length of q at the middle of its steps, (m − 1,)."""
         step = np.maximum(np.diff(self.arc), 1e-9)
         return np.diff(self.heading) / step
+
+    @property
+    def goes_back(self) -> bool:
+        """Whether the pivot moves backwards somewhere, as a rod longer than the radius of its circle makes it."""
+        ahead = (np.diff(self.q, axis=0) * axis_at((self.heading[1:] + self.heading[:-1]) / 2)).sum(1)
+        return bool((ahead < -_BACK).any())
 
     @property
     def poses(self) -> Floats:

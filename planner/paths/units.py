@@ -55,6 +55,19 @@ def length_in_lab(value: float, length_scale: float) -> str:
     return f"{format_length(value * length_scale)} ({_tails(value)} l)"
 
 
+def missed_words(missed: float, stated: float, length: float) -> str:
+    """Begin a sentence with what a track missed of its declared path; empty where that is within `stated` [l].
+
+    Args:
+        missed: largest distance of a point of the path from the track [l].
+        stated: error that the plan states [l].
+        length: of a tail [m].
+    """
+    if missed <= stated:
+        return ""
+    return f"MISSED a part of the declared path: it is up to {length_in_lab(missed, length)} from the track; "
+
+
 def time_in_lab(value: float, robot: Swimmer) -> str:
     """Write a time given in units of μ0 l⁴/EI: 1.79 s (0.81 time units)."""
     return f"{format_time(value * robot.time_scale)} ({value:.2g} time units)"

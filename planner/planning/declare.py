@@ -145,9 +145,9 @@ def changed(raw: Path2D, feasibility: Feasibility, way: Way, progress: Progress 
 
 
 def _accepted(raw: Path2D, followed: Reference, feasibility: Feasibility) -> Declared | None:
-    """Accept a reference that turns wide enough and keeps the shape of the drawn path."""
+    """Accept a reference that turns wide enough, only goes ahead, and keeps the shape of the drawn path."""
     curvature = float(np.abs(followed.curvature).max())
-    if curvature > TIGHTEST / feasibility.vehicle.pivot_radius:
+    if curvature > TIGHTEST / feasibility.vehicle.pivot_radius or followed.goes_back:
         return None
     declared = Declared(followed, curvature, *two_sided(followed.p, raw.polyline()))
     lost = min(LOST * max(extent(raw)), feasibility.vehicle.turn_radius)

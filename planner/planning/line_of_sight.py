@@ -38,7 +38,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.paths.tractrix import Reference
-from planner.planning.request import FOLLOWING, Progress, tell
+from planner.planning.request import FOLLOWING, POSE, Progress, tell
 from planner.vehicle.vehicle import BEFORE_KNOTS, SHORTEST, STEP, Switches, Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.arrays import Floats
@@ -47,6 +47,7 @@ from sim.mechanics import planar
 
 EXACT = 1e-7  # rad, of the heading at a flip
 LARGEST_STEP = 0.4  # rad that the robot turns between two evaluations
+LARGEST_TURN = 1.5  # rad that it turns while its place on the path is sought from the last one
 TURNS = 4 * math.pi  # a dwell that turns further than this leads nowhere
 MOST_BIAS = 0.3  # rad
 HALVINGS = 30
@@ -57,6 +58,7 @@ _KNOTS: list[float] = BEFORE_KNOTS.tolist()
 MOST_SWITCHES = 2_000_000
 _PATIENCE = 30.0  # lengths of the robot's motion that may pass without progress along the path
 _EVERY = 2_000  # switches between two calls of `progress`
+_QUICKEST = 0.5  # of the time that the pivot needs for the reference at its largest speed: no schedule is shorter
 
 
 class Guidance(NamedTuple):
@@ -188,13 +190,36 @@ class LineOfSight:
     def ended(self) -> bool:
         return self.place >= self._last and self.share >= 1
 
+    def swim(
+        self, pose: POSE, sense: int, before: float | None, time: float, since: float = 0.0
+    ) -> tuple[float, float, float]:
+        """Move the place with the robot, in a dwell that began at `pose`, from the time `since` to `time`.
+
+        The nearest step is sought from the last one. Seen from across a circle another step may be nearer, so the
+        place moves in turns of at most LARGEST_TURN.
+
+        Returns:
+            The first time at which the path has ended, otherwise `time`; a time before, at which it had not; and
+            σ(φ − φ_d) − h.
+        """
+        rate = abs(self._twist[0 if sense > 0 else 1][2])
+        count = max(math.ceil((time - since) * rate / LARGEST_TURN), 1)
+        step, low, high = (time - since) / count, since, since
+        for n in range(count):
+            low, high = high, time if n == count - 1 else since + (n + 1) * step
+            value = self._excess(self.pose_after(pose, sense, before, high), sense)
+            if self.ended:
+                break
+        return high, low, value
+
     def next_dwell(
         self, pose: tuple[float, float, float], sense: int, before: float | None, elapsed: float = 0.0
     ) -> tuple[float, bool]:
         """Compute the length of the dwell that began at `pose`, and whether the path ends in it.
 
-        `elapsed` is the time since then: the motor cannot flip before it. The last dwell is trimmed. If it were
-        too short for the motor, it is the shortest one or none at all, whichever ends nearer to the path's end.
+        `elapsed` is the time since then, when the robot is at the place: the motor cannot flip before it. The last
+        dwell is trimmed. If it were too short for the motor, it is the shortest one or none at all, whichever ends
+        nearer to the path's end.
         """
         time, ended = self.next_flip(pose, sense, before, elapsed)
         if ended and time < self._dwell and before is not None:
@@ -206,13 +231,12 @@ class LineOfSight:
     ) -> tuple[float, bool]:
         """Compute the length of the dwell that began at `pose`, and whether the path ends in it."""
         rate = abs(self._twist[0 if sense > 0 else 1][2])
-        longest, largest = TURNS / rate, LARGEST_STEP / rate
-        time = max(self._dwell, elapsed)
-        value = self._excess(self.pose_after(pose, sense, before, time), sense)
-        low, low_value, slope = 0.0, None, rate
+        place, longest, largest = self.place, TURNS / rate, LARGEST_STEP / rate
+        time, low, value = self.swim(pose, sense, before, max(self._dwell, elapsed), elapsed)
+        low_value, slope = None, rate
         for _ in range(MOST_LOOKS):
             if self.ended:
-                return self._end(pose, sense, before, time), True
+                return self._end(pose, sense, before, low, time), True
             if value >= 0 and (low_value is None or value < EXACT):
                 return time, False
             if value >= 0:  # between two evaluations
@@ -222,7 +246,9 @@ class LineOfSight:
             low, low_value = time, value
             time += min(-1.02 * value / max(slope, 0.1 * rate), largest)
             if time > longest:
-                break
+                if self.place <= place:
+                    break
+                place, longest = self.place, longest + TURNS / rate  # its circles lead along the path
             value = self._excess(self.pose_after(pose, sense, before, time), sense)
             slope = (value - low_value) / (time - low)
         raise InputError("the robot turns in circles and does not reach the path; check the path's scale")
@@ -248,9 +274,8 @@ class LineOfSight:
                 b, fb, fa = time, value, fa / 2
         return time
 
-    def _end(self, pose: tuple[float, float, float], sense: int, before: float | None, time: float) -> float:
-        """Find the time at which the path ends, by bisection."""
-        low, high = 0.0, time
+    def _end(self, pose: POSE, sense: int, before: float | None, low: float, high: float) -> float:
+        """Find the time at which the path ends, by bisection between a time before its end and one after it."""
         for _ in range(HALVINGS):
             middle = (low + high) / 2
             self._excess(self.pose_after(pose, sense, before, middle), sense)
@@ -323,7 +348,9 @@ def follow(
             poses.append(pose)
             sense, before = -sense, time
         if ended:
-            return Switches(start.sense, np.array(dwells), np.array(poses))
+            switches = Switches(start.sense, np.array(dwells), np.array(poses))
+            _check_duration(switches, reference, vehicle)
+            return switches
         stalled = 0.0 if law.place > furthest else stalled + time
         furthest = max(furthest, law.place)
         if stalled > patience:
@@ -336,6 +363,17 @@ def follow(
             raise InputError(f"the path needs more than {MOST_SWITCHES} switches; split it")
         if len(dwells) % _EVERY == 0:
             tell(progress, FOLLOWING, law.place / len(reference.q))
+
+
+def _check_duration(switches: Switches, reference: Reference, vehicle: Vehicle) -> None:
+    """Raise RuntimeError where a schedule is too short for its path: its end was accepted too early."""
+    lags = len(switches.dwells) * float(np.hypot(vehicle.rest[..., 0], vehicle.rest[..., 1]).max())
+    fastest = float(np.abs(vehicle.twist[:, 0]).max() + np.hypot(*vehicle.current))
+    if fastest * switches.dwells.sum() < _QUICKEST * (float(reference.arc[-1]) - lags):
+        raise RuntimeError(
+            f"a schedule of {switches.dwells.sum():.3g} time units is too short for {reference.arc[-1]:.3g} l: an "
+            "error of the planner; please report robot and path"
+        )
 
 
 def start_at_rest(reference: Reference, vehicle: Vehicle, guidance: Guidance, offset: float) -> Start:

@@ -38,6 +38,7 @@ STRAIGHT = 1e-6  # l; shorter arcs do not decide to which side the robot turns f
 _NEAR = 0.5  # of the pivot's turn radius: the distance within which the guidance steers back to its reference
 _ERRORS = 4.0  # or of the largest predicted error
 LEFT_OUT = 0.1  # of a length of the path: what it costs to leave it out
+MOST_LEFT_OUT = 0.1  # of a lap of a closed path, whose end is near its beginning: what all ways may leave out
 STRIDE = 0.5  # between two targets, in radii
 ROOM = 0.95  # the share of its largest curvature that the robot uses on the way
 SEGMENTS = 3
@@ -60,6 +61,8 @@ class TrackerGuidance(LineOfSight):
         self._swing = plan.guidance.swing
         self._way_ahead = way_ahead(plan)
         self._limit, self._stride = limit(plan), stride(plan)
+        lap = float(plan.declared.reference.arc[-1])
+        self._may_leave_out = self._may_leave_out_of_lap = MOST_LEFT_OUT * lap if plan.drawn.closed else math.inf
         self._way: Way | None = None
         self._leg, self._along = SEGMENTS, 0.0  # of the way; the path follows its last segment
 
@@ -99,6 +102,7 @@ class TrackerGuidance(LineOfSight):
             self._reached -= self._arc[self._lap]
             self._lean += self._lap_turn
             self._turns += self._lap_turn
+            self._may_leave_out = self._may_leave_out_of_lap
         if self._stopping and self._way is None and self.place < self._lap:
             self._around, self._last = False, self._lap - 1
 
@@ -154,9 +158,12 @@ class TrackerGuidance(LineOfSight):
         x = np.array(self._x[rows]) + rod * (np.cos(heading) - np.cos(heading + lean))
         y = np.array(self._y[rows]) + rod * (np.sin(heading) - np.sin(heading + lean))
         left_out = np.array(self._arc[rows]) - self._arc[place]
+        allowed = left_out <= max(self._may_leave_out, 0.0)
+        left_out = left_out[allowed]
         start = self._pivot(pose)
-        targets, radius = np.stack([x, y, course], 1), self._radius()
+        targets, radius = np.stack([x, y, course], 1)[allowed], self._radius()
         track, target = shortest_way(start, targets, left_out, self._stride, radius)
+        self._may_leave_out -= float(left_out[target])
         at = min(place + target, self._last)
         self._way = Way.of(track, at)
         turns = round((self._way.course - course[target]) / (2 * math.pi))

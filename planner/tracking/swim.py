@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from planner.paths.distance import distance_to
+from planner.paths.distance import distance_to, farthest
+from planner.paths.units import missed_words
 from planner.planning.plan import Plan
 from planner.planning.request import POSE, Camera
 from planner.tracking.tracker import Command, Tracker
@@ -66,6 +67,7 @@ class Swim:
     direction: Floats  # (K,) of the motor
     distance: Floats  # (K,) of the tracked point from the declared path
     errors: Floats  # (K,) the bound on it that the tracker gave before
+    missed: float  # largest distance of a point of the declared path from the track
     dwells: Floats  # (M,) as ordered
     alarms: tuple[float, ...]  # when an alarm began
     fed: int  # poses that came in
@@ -104,7 +106,8 @@ class Swim:
         rms, largest = format_length(self.rms() * length), format_length(float(self.distance.max()) * length)
         feedback = self.plan.feedback_error
         return (
-            f"Swim of {self.plan.robot.name!r} under a tracker: {len(self.dwells)} dwells, {rms} rms and "
+            f"Swim of {self.plan.robot.name!r} under a tracker: {missed_words(self.missed, feedback, length)}"
+            f"{len(self.dwells)} dwells, {rms} rms and "
             f"{largest} at most from the declared path, {100 * self.within(feedback):.0f} % of the time within "
             f"{format_length(feedback * length)}; {'finished' if self.finished else 'not finished'}, "
             f"{len(self.alarms)} alarms"
@@ -257,6 +260,7 @@ def swim(
         np.repeat([float(each.direction) for _, _, each in rows], counts),
         distance_to(plan.reference, followed),
         np.repeat([each.error for _, _, each in rows], counts),
+        farthest(plan.reference, followed),
         np.array(dwells),
         tuple(alarms),
         fed,

@@ -121,6 +121,8 @@ CASES: dict[str, Callable[[], Case]] = {
     "in a current": lambda: Case(polygon(6, 4.0), ("in a current", 0.1), {**SHORT, "corner": "fillet"}),
     "minimax": lambda: Case(SQUARE, ("symmetric", 0.0),
                             {"objective": "flips", "tolerance": 0.1, "corner": "minimax"}),
+    "own circle": lambda: Case(circle(0.95), CONTROL, SHORT),
+    "smaller than the rod": lambda: Case(circle(0.94), lab_robot(np.random.default_rng(56005)), SHORT),
     "drawing.svg": lambda: opened_case("drawing.svg"),
     "table.csv": lambda: opened_case("table.csv"),
     "robot.toml": lambda: opened_case("robot.toml"),
@@ -141,7 +143,7 @@ CASES: dict[str, Callable[[], Case]] = {
     "star": lambda: Case(PATHS["star"], MEASURED, {"objective": "flips", "time_weight": 0.05}),
     "long dwells": lambda: Case(PATHS["eight"].scaled(2), TRIANGLE, {"minimum_seconds": 3.0}),
 }  # fmt: skip
-QUICK = 10  # cases of `make test`; the others run with the rates
+QUICK = 12  # cases of `make test`; the others run with the rates
 CASE_MARKS = [pytest.param(name, marks=[] if i < QUICK else pytest.mark.rates) for i, name in enumerate(CASES)]
 ERRORS = {"stated": "stated", "guaranteed": "guaranteed", "predicted_rms": "predictedRms",
           "predicted_max": "predictedMax", "drawn_rms": "drawnRms", "drawn_max": "drawnMax"}  # fmt: skip

@@ -22,6 +22,7 @@ from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning import solve
 from planner.planning.conditions import BlockedError
+from planner.planning.line_of_sight import LineOfSight
 from planner.planning.plan import KINDS
 from planner.planning.request import PlanRequest
 from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
@@ -32,6 +33,7 @@ from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from surrogate.table_file import load
+from tests.oracles.unseen_robots import lab_robot
 from tests.planner.plans import CONTROL, planned, tracked
 
 pytestmark = pytest.mark.slow
@@ -283,3 +285,36 @@ def test_the_longest_dwell_that_keeps_a_tolerance_is_found(monkeypatch: pytest.M
 
 def test_files_know_the_kinds_of_jobs() -> None:
     assert (Trip.kind, Visits.kind, Coverage.kind, Orbit.kind) == KINDS
+
+
+@pytest.mark.parametrize("objective", ["error", "time", "flips"])
+@pytest.mark.parametrize("path", ["circle:0.9l", "circle:0.95l", "circle:1.05l", "polygon:6:1l", "square:1.6l"])
+def test_a_lap_near_the_own_turn_circle_is_swum_whole(path: str, objective: str) -> None:
+    """It has few flips or none, and ends where it begins."""
+    result = planned(path, objective=objective)
+    length = np.hypot(*np.diff(result.reference, axis=0).T).sum()
+    assert 0.8 * length / result.tracked.vehicle.speed < result.duration < 1.2 * length / result.straight.net_speed
+    middle = result.drawn.points.mean(0)
+    angle = np.unwrap(np.arctan2(*(roll_out(result.tracked.vehicle, result.switches).track - middle).T[::-1]))
+    assert angle[-1] - angle[0] == pytest.approx(2 * math.pi, rel=0.1)
+
+
+def test_a_circle_smaller_than_the_rod_is_followed_ahead() -> None:
+    """The rod would drag its pivot backwards along it, so the nearest path is declared."""
+    rear = lab_robot(np.random.default_rng(56005))
+    vehicle = table_vehicle(rear, load())
+    assert vehicle.pivot_distance > 0.95 * vehicle.turn_radius
+    result = plan(circle(0.94 * vehicle.turn_radius), rear, objective="flips")
+    assert not result.declared.reference.goes_back
+    assert result.stated_error < 0.3
+
+
+def test_a_lap_with_too_few_flips_to_be_corrected_is_refused() -> None:
+    with pytest.raises(InputError, match="flips too seldom"):
+        plan(circle(tracked().vehicle.turn_radius), CONTROL, objective="flips", loop=True)
+
+
+def test_a_schedule_too_short_for_its_path_is_an_error_of_the_planner(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(LineOfSight, "ended", True)
+    with pytest.raises(RuntimeError, match="error of the planner"):
+        plan(circle(2.0), CONTROL, objective="flips")

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from planner.files.tracks import check
 from planner.goal.dubins import shortest_paths
 from planner.jobs.plan import plan
 from planner.paths.tractrix import Drift
 from planner.planning.plan import Plan
 from planner.planning.request import POSE, Camera
-from planner.tracking.guidance import TrackerGuidance, Way, shortest_way
+from planner.tracking.guidance import MOST_LEFT_OUT, TrackerGuidance, Way, shortest_way
 from planner.tracking.swim import Swim, swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.zigzag import Objective
@@ -173,3 +174,32 @@ def test_the_poses_of_another_robot_are_an_alarm_and_no_path() -> None:
     assert 200 < result.alarms[0] < 215
     straight = result.times < 230
     assert result.distance[straight].max() < ON_PATH
+
+
+@pytest.mark.parametrize("turns", [1.0, 1.05])
+def test_the_tracker_ends_a_lap_near_the_own_turn_circle_at_its_end(turns: float) -> None:
+    """A robot that turns a little more tightly than planned has its lap ended after a lap, too."""
+    result = planned("circle:0.95l", objective="flips")
+    vehicle = result.tracked.vehicle
+    swum = swim(result, replace(vehicle, twist=vehicle.twist * np.array([1.0, 1.0, turns])))
+    angle = np.unwrap(np.arctan2(*swum.poses[:, 1::-1].T))
+    assert swum.finished
+    assert angle[-1] - angle[0] == pytest.approx(2 * math.pi, rel=0.1)
+    assert swum.missed < 0.1
+
+
+def test_what_was_not_swum_is_said_first() -> None:
+    result = planned("circle:1.2l", objective="flips")
+    swum = swim(result, longest=0.5)
+    assert "under a tracker: MISSED a part of the declared path: it is up to" in repr(swum)
+    assert check(result, swum.to_frame()).line.startswith("MISSED a part of the declared path")
+    assert check(result, swim(result).to_frame()).line.startswith("tracking error")
+
+
+def test_ways_back_leave_out_a_tenth_of_a_lap_at_most() -> None:
+    """The end of a closed path is near its beginning, but not the way to take from there."""
+    result = planned("circle:1.2l", objective="flips")
+    guidance, arc, (x, y, heading) = TrackerGuidance(result), result.declared.reference.arc, result.start
+    for _ in range(4):
+        guidance.plan_way((x + 0.5, y, heading + math.pi))
+    assert arc[guidance.place] <= MOST_LEFT_OUT * arc[-1]
