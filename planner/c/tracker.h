@@ -6,16 +6,14 @@ static void tracker_plan_flip(tracker *t)
     tracker_where where = t->where;
     tracker_real present[3], elapsed = tracker_larger((tracker_real)(t->now - t->dwell.start), 0);
     double start = t->dwell.start, least;
-    int off;
     tracker_apply(t);
     for (int i = 0; i < 3; i++) present[i] = from.pose[i];
     if (elapsed > 0) tracker_moved(t, &from, elapsed, present);
-    off = tracker_is_off(t, present);
-    t->where = where;
-    if (off) {
+    if (tracker_is_off(t, present)) {
         tracker_plan_way(t, present);
         where = t->where;
     }
+    t->where = where;
     t->flip_at = start + tracker_next(t, &from, elapsed, &t->ends);
     t->where = where;
     least = t->ends ? start : start + TRACKER_SHORTEST;

@@ -95,7 +95,7 @@ class LineOfSight {
     const rate = Math.abs(this.vehicle.twist[sideOf(sense)][2]), most = LARGEST_STEP / rate;
     const look = (at) => this.excess(this.poseAfter(pose, sense, before, at), sense);
     let { place } = this, longest = TURNS / rate, lowValue = null, slope = rate;
-    let { time, low, value } = this.swim(look, rate, this.dwell);
+    let { time, low } = this.approach(look, rate, this.dwell), value = look(time);
     for (let n = 0; n < MOST_LOOKS; n++) {
       if (this.ended) return { time: this.endTime(look, low, time), ended: true };
       if ((value >= 0 && lowValue === null) || Math.abs(value) < EXACT) return { time, ended: false };
@@ -114,17 +114,18 @@ class LineOfSight {
     throw new InputError("the robot turns in circles and does not reach the path; check the path's scale");
   }
 
-  /* Move the place with the robot until `end`, in turns of at most LARGEST_TURN: seen from across a circle another
-   * step may be nearer. Returns the time at which the path has ended, otherwise `end`; one before; and the excess. */
-  swim(look, rate, end) {
-    const count = Math.max(Math.ceil((end * rate) / LARGEST_TURN), 1);
-    let low = 0, time = 0, value = 0;
-    for (let n = 1; n <= count; n++) {
-      [low, time] = [time, n === count ? end : n * (end / count)];
-      value = look(time);
-      if (this.ended) break;
+  /* Move the place with the robot nearly until `end`, in turns of at most LARGEST_TURN: seen from across a circle
+   * another step may be nearer. Returns when to look next, at `end` or where the path has ended, and a time before. */
+  approach(look, rate, end) {
+    const count = Math.ceil((end * rate) / LARGEST_TURN);
+    let low = 0;
+    for (let n = 1; n < count; n++) {
+      const time = n * (end / count);
+      look(time);
+      if (this.ended) return { time, low };
+      low = time;
     }
-    return { time, low, value };
+    return { time: end, low };
   }
 
   /* Find the time at which the path ends, by bisection between a time before its end and one after it. */

@@ -190,36 +190,32 @@ class LineOfSight:
     def ended(self) -> bool:
         return self.place >= self._last and self.share >= 1
 
-    def swim(
-        self, pose: POSE, sense: int, before: float | None, time: float, since: float = 0.0
-    ) -> tuple[float, float, float]:
-        """Move the place with the robot, in a dwell that began at `pose`, from the time `since` to `time`.
+    def approach(self, pose: POSE, sense: int, before: float | None, time: float) -> tuple[float, float]:
+        """Move the place with the robot from `pose`, where the dwell began, nearly until `time`.
 
         The nearest step is sought from the last one. Seen from across a circle another step may be nearer, so the
         place moves in turns of at most LARGEST_TURN.
 
         Returns:
-            The first time at which the path has ended, otherwise `time`; a time before, at which it had not; and
-            σ(φ − φ_d) − h.
+            When to look next, `time` or an earlier one at which the path has ended; and when it had not yet ended.
         """
         rate = abs(self._twist[0 if sense > 0 else 1][2])
-        count = max(math.ceil((time - since) * rate / LARGEST_TURN), 1)
-        step, low, high = (time - since) / count, since, since
-        for n in range(count):
-            low, high = high, time if n == count - 1 else since + (n + 1) * step
-            value = self._excess(self.pose_after(pose, sense, before, high), sense)
+        count, low = math.ceil(time * rate / LARGEST_TURN), 0.0
+        for n in range(1, count):
+            high = n * (time / count)
+            self._excess(self.pose_after(pose, sense, before, high), sense)
             if self.ended:
-                break
-        return high, low, value
+                return high, low
+            low = high
+        return time, low
 
     def next_dwell(
         self, pose: tuple[float, float, float], sense: int, before: float | None, elapsed: float = 0.0
     ) -> tuple[float, bool]:
         """Compute the length of the dwell that began at `pose`, and whether the path ends in it.
 
-        `elapsed` is the time since then, when the robot is at the place: the motor cannot flip before it. The last
-        dwell is trimmed. If it were too short for the motor, it is the shortest one or none at all, whichever ends
-        nearer to the path's end.
+        `elapsed` is the time since then: the motor cannot flip before it. The last dwell is trimmed. If it were
+        too short for the motor, it is the shortest one or none at all, whichever ends nearer to the path's end.
         """
         time, ended = self.next_flip(pose, sense, before, elapsed)
         if ended and time < self._dwell and before is not None:
@@ -232,7 +228,8 @@ class LineOfSight:
         """Compute the length of the dwell that began at `pose`, and whether the path ends in it."""
         rate = abs(self._twist[0 if sense > 0 else 1][2])
         place, longest, largest = self.place, TURNS / rate, LARGEST_STEP / rate
-        time, low, value = self.swim(pose, sense, before, max(self._dwell, elapsed), elapsed)
+        time, low = self.approach(pose, sense, before, max(self._dwell, elapsed))
+        value = self._excess(self.pose_after(pose, sense, before, time), sense)
         low_value, slope = None, rate
         for _ in range(MOST_LOOKS):
             if self.ended:

@@ -122,7 +122,6 @@ class Tracker(Shown):
         self._clock = Clock(begin)
         self._displacement = Displacement()
         self._dwell = Dwell(begin, plan.first_direction, None, 0.0)
-        self._placed = 0.0  # since the dwell began: the time at which the guidance knows its place on the path
         self._past: deque[Dwell] = deque(maxlen=KEPT)
         self._finished = False
         self._rejected = 0
@@ -240,13 +239,13 @@ class Tracker(Shown):
             self._finished = True
             return
         done = self._dwell._replace(length=self._flip_at - self._dwell.start)
-        self._swim(done.length)
+        self._approach(done.length)
         self._displacement.advance(self._estimate, done)
         self._estimate.advance(done)
         self._estimate.apply()
         self._law.integrate(self._estimate.pose, done.sense)
         self._past.append(done)
-        self._dwell, self._placed = Dwell(self._flip_at, -done.sense, done.length, 0.0), 0.0
+        self._dwell = Dwell(self._flip_at, -done.sense, done.length, 0.0)
         self._plan_flip()
         self._finished = self._ends and self._flip_at <= self._now + SLACK  # the path ends at the flip
 
@@ -255,15 +254,13 @@ class Tracker(Shown):
         self._estimate.apply()
         law, pose, dwell = self._law, self._estimate.pose, self._dwell
         elapsed = max(self._now - dwell.start, 0.0)
-        self._swim(elapsed)
-        self._placed = elapsed
-        present = law.pose_after(pose, dwell.sense, dwell.before, elapsed) if elapsed else pose
         where = law.where()
-        off = law.is_off(present)
-        law.go_to(where)
-        if off:
+        present = law.pose_after(pose, dwell.sense, dwell.before, elapsed) if elapsed else pose
+        self._approach(elapsed)
+        if law.is_off(present):
             law.plan_way(present)
             where = law.where()
+        law.go_to(where)
         try:
             length, self._ends = law.next_dwell(pose, dwell.sense, dwell.before, elapsed)
         except InputError:  # the robot turns in circles: swim on
@@ -272,10 +269,10 @@ class Tracker(Shown):
         start = self._dwell.start
         self._flip_at = max(start + length, self._now, start + (0.0 if self._ends else self.shortest))
 
-    def _swim(self, time: float) -> None:
-        """Move the guidance's place with the robot, until `time` after the last flip."""
+    def _approach(self, time: float) -> None:
+        """Move the guidance's place with the robot, nearly until `time` after the last flip."""
         dwell = self._dwell
-        self._law.swim(self._estimate.pose, dwell.sense, dwell.before, time, self._placed)
+        self._law.approach(self._estimate.pose, dwell.sense, dwell.before, time)
 
     def _error(self) -> float:
         """Bound the distance of the tracked point from the path until the next flip."""
@@ -285,7 +282,7 @@ class Tracker(Shown):
             prediction = self._estimate.pose_at(when, dwell, ())
             assert prediction is not None
             pose, D = prediction
-            self._swim(when - dwell.start)
+            self._approach(when - dwell.start)
             distance, direction = law.distance(pose)
             law.go_to(where)
             ends.append(distance)
