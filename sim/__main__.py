@@ -61,13 +61,17 @@ def _write_steady_shapes(robots: Sequence[Robot], path: str) -> None:
 
 
 def _counts(robots: dict[str, Any], motion: dict[str, Any]) -> str:
-    """Count the rows that converged, and those whose tails touch."""
+    """Count the rows that converged, those whose tails touch, and those with a large error."""
     from sim.effects.tail_contact import EFFECT as CONTACT
     from sim.effects.tail_contact import least_gap
+    from sim.motion.steady_motion import LARGE_ERROR
 
+    wrong = int((motion["error"] > LARGE_ERROR).sum())
+    beside = f"; do not rely on the {wrong} whose error is above {100 * LARGE_ERROR:.0f} %" if wrong else ""
     touching = int((motion["tail_gap"] < least_gap(robots.get(CONTACT.name, 0.0))).sum())
     direct, ended = int((motion["method"] == "direct").sum()), motion["converged"]
-    return f"{len(ended)} rows, {int(ended.sum())} converged ({direct} solved directly), tails touch in {touching}"
+    converged = f"{len(ended)} rows, {int(ended.sum())} converged ({direct} solved directly)"
+    return f"{converged}, tails touch in {touching}{beside}"
 
 
 @program.command("branches", further={name: f"LOW:HIGH, sweep {what}" for name, what in SWEEPABLE.items()})

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.effects import catalogue, check_effects, effect_named, is_effect
-from sim.io.errors import InputError, naming
+from sim.io.errors import InputError, InputWarning, naming
 from sim.io.files import write_text
 from sim.io.keywords import checks_keywords
 from sim.io.reading import read_toml
@@ -23,7 +24,7 @@ from sim.model.correction import read_correction, read_learnt_range
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, checked_values
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
-from sim.model.robot_toml import read_robot, robot_toml
+from sim.model.robot_toml import doubtful, read_robot, robot_toml
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -134,7 +135,7 @@ def names_robot(source: str | Path) -> bool:
 
 @checks_keywords
 def load_robot(source: str | Path) -> Robot:
-    """Load a robot from a preset's name or a robot.toml.
+    """Load a robot from a preset's name or a robot.toml; an `InputWarning` asks about doubtful units.
 
     Args:
         source: path of a file, or one of `sim.model.presets.PRESETS`.
@@ -167,7 +168,10 @@ def _read_robot(path: Path) -> Robot:
         raise InputError(f"effects = {effects!r}; write a table [effects] with lines name = size")
     values = read_robot(tables)
     check_effects(effects)
-    return Robot(name=str(name), effects=dict(effects), correction=correction, learnt_from=learnt_from, **values)
+    robot = Robot(name=str(name), effects=dict(effects), correction=correction, learnt_from=learnt_from, **values)
+    if doubts := ", ".join(doubtful(tables)):
+        warnings.warn(f"{path}: {doubts}", InputWarning, stacklevel=1)  # from one place, so once a command
+    return robot
 
 
 @checks_keywords

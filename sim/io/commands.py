@@ -255,7 +255,7 @@ class Command(NamedTuple):
         """Parse words and run the command."""
         call, own = self.read(prog, words)
         with warnings.catch_warnings():
-            warnings.simplefilter("always", InputWarning)
+            warnings.simplefilter("default", InputWarning)  # each line once
             warnings.showwarning = partial(_show_warning, warnings.showwarning)
             self.run(*([call] if self.of else []), **own)
 

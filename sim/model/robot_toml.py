@@ -11,12 +11,13 @@ from __future__ import annotations
 import difflib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from sim.io.errors import InputError
 from sim.io.units import UNITS, from_si, of_kind, split, to_si
 from sim.model.correction import correction_tables
+from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.uncertainty import DEFAULTS, Sigma, read_sigma, sigma_text
 
@@ -65,6 +66,8 @@ ENTRIES = (
 )
 _SIGMA = "_sigma"
 _LARGEST = 1e100  # of a number, whatever its unit
+_FAR = {"": 30.0, "cm": 30.0, "mm": 30.0, "MPa": 300.0, "Pa_s": 300.0, "rpm": 300.0}  # times the paper's, or less
+_NEAR = 10.0  # times, of a number in the unit that it may be in
 _HEADER = """\
 # Units are suffixes: length_cm, length_mm, speed_rpm, speed_rad_s, ... KEY_sigma states one standard deviation of
 # a number, in its unit or as "5 %"; only a calibration uses it.
@@ -112,6 +115,25 @@ def read_robot(tables: Mapping[str, Any]) -> dict[str, Any]:
         for entry, key, value in stated
     }
     return {**values, "sigmas": sigmas}
+
+
+def doubtful(tables: Mapping[str, Any]) -> Iterator[str]:
+    """Ask about each number, of tables that `read_robot` has read, that silicone in glycerine can hardly have."""
+    for table, content in tables.items():
+        for key, number in content.items():
+            entry, unit = _entry(table, key), split(key).unit
+            paper = getattr(PRESETS["paper-control"], entry.field) if entry and entry.field != "tails" else None
+            if not (entry and paper and number):
+                continue
+            own = unit.suffix if unit else ""
+            units = [own, *(suffix for suffix in of_kind(unit.kind) if suffix != "in")] if unit else [own]
+            times = {suffix: abs(to_si(number, suffix) if suffix else number) / paper for suffix in units}
+            ratio, far = times[own], _FAR[entry.unit]
+            if not 1 / far <= ratio <= far:
+                likely = min(units, key=lambda suffix: abs(math.log(times[suffix])))
+                asked = f"is its unit {likely}?" if 1 / _NEAR <= times[likely] <= _NEAR else "is it right?"
+                size = f"{ratio:,.0f}" if ratio > 1 else f"{ratio:.2g}"
+                yield f"{key} = {number:g} is {size} times that of the paper's robot; {asked}"
 
 
 def robot_toml(robot: Robot) -> str:

@@ -38,6 +38,7 @@ STEADY_COLUMNS = (*STEADY_OUTPUTS[:-1], "converged", STEADY_OUTPUTS[-1])
 STABILITY_COLUMNS = ("stable", "growth")
 QUALITY_COLUMNS = (*STABILITY_COLUMNS, "error", "method", "note")  # how good a row is, beside its numbers
 RPM = 2 * math.pi / 60  # rad/s
+LARGE_ERROR = 0.2  # estimated relative error above which a number is not an answer
 # Column in lab units: what it is, its unit, the column that it is made from, and that one's unit.
 _QUANTITIES = {
     "omega_h_rpm": ("spin of the head", "rpm", "omega_h_bar", "EI/(μ0 l⁴)"),
@@ -185,15 +186,17 @@ def describe_motion(robot: Robot, motion: Mapping[str, Any], *, error: str = "es
         "circle_s": lab["circle_s"] / robot.time_scale,
     }
     tails = "1 tail" if robot.tails == 1 else f"{robot.tails} tails"
+    wrong = float(motion["error"][0]) if "error" in motion else 0.0
+    digits, beside = (1, f" ± {100 * wrong:.0f} %") if wrong > LARGE_ERROR else (4, "")
     lines = [
         f"{robot.name}: {tails} of {100 * robot.tail_length:.4g} cm, motor at "
         f"{robot.motor_speed / RPM:.4g} rpm, fluid of {robot.viscosity:.4g} Pa s"
     ]
     for name, (what, unit, column, plain_unit) in _QUANTITIES.items():
-        line = f"  {what:18}{lab[name]:>10.4g} {unit}"
+        line = f"  {what:18}{lab[name]:>10.{digits}g} {unit}{beside}"
         if plain_unit:
             bare = float(motion[column][0]) if column else plain[name]
-            line = f"{line:40} ({bare:.4g} {plain_unit})"
+            line = f"{line:40} ({bare:.{digits}g} {plain_unit})"
         lines.append(line)
     if motion["tail_gap"][0] < least_gap(robot.effects.get(CONTACT.name, 0.0)):
         lines.append(
@@ -206,5 +209,5 @@ def describe_motion(robot: Robot, motion: Mapping[str, Any], *, error: str = "es
             f"perturbations change by a factor of {factor:.2g}"
         )
     if "error" in motion:
-        lines.append(f"  {error} {100 * float(motion['error'][0]):.2g} %")
+        lines.append(f"  {error} {100 * wrong:.2g} %{': do not rely on these numbers' if beside else ''}")
     return "\n".join(lines)

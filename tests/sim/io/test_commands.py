@@ -87,8 +87,8 @@ def leave_out(rooms: int) -> None:
 
 @program.command("sweep", of="tests.sim.io.test_commands:leave_out")
 def _sweep(leave_out: Call) -> None:
-    leave_out()
-    leave_out(rooms=3)
+    for rooms in (2, 3, 2):
+        leave_out(rooms=rooms)
 
 
 def test_a_command_says_what_is_left_out_and_has_the_sentence_of_its_function(capsys: Capsys) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,11 +14,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from sim.inputs import load_robot, save_robot
-from sim.io.errors import InputError
+from sim.io.errors import InputError, InputWarning
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
-from sim.model.robot_toml import ENTRIES, read_robot, robot_toml
+from sim.model.robot_toml import ENTRIES, doubtful, read_robot, robot_toml
 from sim.model.uncertainty import DEFAULTS, Sigma
 
 CONTROL, MEASURED = PRESETS["paper-control"], PRESETS["paper-measured"]
@@ -54,6 +55,43 @@ def test_a_robot_in_the_units_of_a_laboratory(tmp_path: Path) -> None:
     robot = read(LAB, tmp_path)
     assert {name: getattr(robot, name) for name in IN_SI} == pytest.approx(IN_SI, rel=1e-15)
     assert read("\ufeff" + LAB, tmp_path) == robot
+
+
+@pytest.mark.parametrize(
+    ("given", "doubted", "question"),
+    [
+        ("youngs_modulus_MPa = 1.2", "youngs_modulus_MPa = 1.2e6", "1.2e+06 is 1,000,000 times"),
+        ("length_cm = 9", "length_m = 9", "9 is 82 times that of the paper's robot; is its unit cm?"),
+        ("radius_mm = 3.2", "radius_cm = 320", "is its unit um?"),
+        ("length_in = 2.5", "length_m = 4.5", "4.5 is 75 times that of the paper's robot; is its unit cm?"),
+        ("radius_mm = 16", "radius_m = 16", "is its unit mm?"),
+        ("viscosity_cP = 1490", "viscosity_Pa_s = 1490", "; is its unit mPa_s?"),
+        ("viscosity_cP = 1490", "viscosity_cP = 1.49", " is 0.001 times that of the paper's"),
+        ("speed_rpm = 90", "speed_rpm = 1e5", "is it right?"),
+        ("C_t = 3.0", "C_t = 300", "300 is 100 times that of the paper's robot; is it right?"),
+    ],
+)  # fmt: skip
+def test_a_number_far_from_those_of_silicone_in_glycerine_is_asked_about(
+    given: str, doubted: str, question: str
+) -> None:
+    assert not [*doubtful(tomllib.loads(LAB))]
+    (asked,) = doubtful(tomllib.loads(LAB.replace(given, doubted)))
+    assert asked.startswith(doubted.split("=")[0])
+    assert question in asked
+
+
+def test_all_doubts_are_one_warning_and_usual_robots_have_none(tmp_path: Path) -> None:
+    read(LAB, tmp_path)
+    read(LAB.replace("C_yr = 2.0", "C_yr = 0"), tmp_path)
+    doubted = LAB.replace("length_cm = 9", "length_m = 9").replace("C_t = 3.0", "C_t = 300")
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("default")  # as commands do
+        assert read(doubted, tmp_path) == read(doubted, tmp_path)
+        load_robot(tmp_path / "robot.toml")  # from another place
+    (warning,) = told
+    assert warning.category is InputWarning
+    for part in ("robot.toml: length_m = 9 is", ", C_t = 300 is"):
+        assert part in str(warning.message)
 
 
 def test_a_file_in_si_units_is_read_as_before(tmp_path: Path) -> None:

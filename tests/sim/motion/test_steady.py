@@ -12,7 +12,7 @@ import pytest
 
 import sim.motion.settling
 import sim.motion.steady
-from sim.__main__ import main
+from sim.__main__ import _counts, main
 from sim.inputs import save_robot
 from sim.io.errors import run_command
 from sim.model.presets import INDEPENDENT, PRESETS
@@ -181,6 +181,16 @@ def test_the_lines_say_what_the_columns_hold() -> None:
     assert f"{lab['v_cm_s'][0]:.4g} cm/s" in lines[6]
     assert f"({motion['R_yr_over_l'][0]:.4g} l)" in lines[4]
     assert lines[-1].endswith(f"{100 * motion['error'][0]:.2g} %")
+
+
+def test_numbers_with_a_large_error_are_not_written_like_others() -> None:
+    motion = {**motion_of(), "error": np.array([0.35])}
+    lines = describe_motion(ROBOT, motion).splitlines()
+    assert lines[3] == "  yaw rate                0.02 rad/s ± 35 % (0.05 EI/(μ0 l⁴))"
+    assert all("± 35 %" in line for line in lines[1:8])
+    assert lines[-1].endswith("35 %: do not rely on these numbers")
+    assert _counts({}, motion).endswith("; do not rely on the 1 whose error is above 20 %")
+    assert "rely" not in _counts({}, motion_of())
 
 
 def test_the_command_prints_the_motion_of_a_robot(
