@@ -24,7 +24,7 @@ from planner.goal.swings import Delay
 from planner.options import AnyVehicle, GoalOptions, Length, asked, place_of, pose_of, seconds_of, swimmer_of
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.tractrix import Drift, Reference
-from planner.paths.units import LONGEST, heading_in_degrees, in_lab, place_in_lab
+from planner.paths.units import LONGEST, ask_about_days, heading_in_degrees, in_lab, place_in_lab
 from planner.planning.declare import Declared
 from planner.planning.line_of_sight import Start
 from planner.planning.picture import BODY, REPLAYED
@@ -157,6 +157,7 @@ def to_goal(
     passed = tuple(place_of(place, unit, swims, "--via") for place in via)
     tracked, request = asked(robot, options, objective=objective, arrive_seconds=seconds_of(arrive, "--arrive"))
     vehicle, space = tracked.vehicle, request.space
+    ask_about_days(sum(map(math.dist, [begin[:2], *passed], [*passed, end[:2]])), swims, vehicle.speed)
     least_dwell = check_least(request.least_dwell(swims))
     lattices: dict[Drift, Lattices] = {}
 

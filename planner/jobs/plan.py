@@ -103,7 +103,7 @@ def make_plan(
     """Plan for a path [l] that the tracked point follows, see `plan`."""
     if request.loop and not drawn.closed:
         raise InputError("a path that repeats is closed; join its end to its start (--closed), or plan it once")
-    check_size(drawn, tracked.robot, tracked.vehicle.turn_radius)
+    check_size(drawn, tracked.robot, tracked.vehicle.turn_radius, tracked.vehicle.speed)
 
     @cache
     def nearest(drift: Drift) -> Declared:

@@ -125,6 +125,6 @@ def plan_track(
         return Declared(reference, float(np.abs(reference.curvature).max()))
 
     drawn = Path2D(source(preferred).reference.p, False)
-    check_size(drawn, tracked.robot, tracked.vehicle.turn_radius)
+    check_size(drawn, tracked.robot, tracked.vehicle.turn_radius, tracked.vehicle.speed)
     changes: tuple[Change, ...] = () if space.empty else (Around(space, drawn),)
     return solve(Task(source=source, changes=changes, drawn=drawn), tracked, request, progress)

@@ -62,13 +62,14 @@ function convertUnit(value, given, wanted) {
   return given === wanted ? value : fromSi(toSi(value, given), wanted);
 }
 
-/* Write a duration as people say it: 0.35 s, 48.2 s, 12.5 min, 3 h 20 min. */
+/* Write a duration as people say it: 0.35 s, 48.2 s, 12.5 min, 3 h 20 min, 7.5 days. */
 function formatTime(seconds) {
   const size = Math.abs(seconds), minutes = Math.round(seconds / 60);
   if (!Number.isFinite(seconds) || size < 90) return `${general(seconds, 3)} s`;
   if (size < 5400) return `${general(seconds / 60, 3)} min`;
+  if (size >= 172800) return `${general(seconds / 86400, 3)} days`;
   const hours = `${Math.floor(minutes / 60)} h`;
-  return minutes % 60 && minutes < 6000 ? `${hours} ${minutes % 60} min` : hours;
+  return minutes % 60 ? `${hours} ${minutes % 60} min` : hours;
 }
 
 /* Write a length in metres as people say it: 3.2 mm, 12.4 cm, 3.1 m. */

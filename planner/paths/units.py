@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
-from sim.io.errors import InputError
+from sim.io.errors import InputError, InputWarning
 from sim.io.units import LENGTHS, format_length, format_time, number_and_unit, of_kind, to_si
 
 if TYPE_CHECKING:  # the command needs them before it loads NumPy
     from planner.paths.path import Path2D
 
 LONGEST = 12_000.0  # l
+_DAY = 86_400.0  # s
 SMALLEST = 0.25  # of the radius of the robot's circle, largest extent of a path
 NO_UNIT = (
     "its lengths have no unit; write it behind them, 24cm or 3l (tail lengths), name columns x_cm and y_cm, or "
@@ -182,8 +184,8 @@ def extent(path: Path2D) -> tuple[float, float]:
     return width, height
 
 
-def check_size(path: Path2D, robot: Swimmer, turn_radius: float) -> None:
-    """Refuse a path that no schedule can be meant for.
+def check_size(path: Path2D, robot: Swimmer, turn_radius: float, speed: float) -> None:
+    """Refuse a path that no schedule can be meant for, and ask about one that takes days.
 
     Raises:
         InputError: the path is far too long or too small.
@@ -195,3 +197,12 @@ def check_size(path: Path2D, robot: Swimmer, turn_radius: float) -> None:
             f"the path is {describe(path, robot)}: too small, the robot's circle has a radius of "
             f"{in_lab(turn_radius, robot)}; scale it"
         )
+    ask_about_days(path.length, robot, speed)
+
+
+def ask_about_days(length: float, robot: Swimmer, speed: float) -> None:
+    """Ask whether the units are right of a way that takes more than a day."""
+    seconds = length / speed * robot.time_scale
+    if seconds > _DAY:
+        asked = f"takes this robot {format_time(seconds)} or more; are its units right?"
+        warnings.warn(f"a way of {in_lab(length, robot)} {asked}", InputWarning, stacklevel=4)

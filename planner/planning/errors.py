@@ -43,7 +43,7 @@ import numpy as np
 from planner.paths.distance import distance_to, nearest
 from planner.paths.path import Path2D
 from planner.planning.declare import Declared
-from planner.planning.request import Camera
+from planner.planning.request import ERRORS, Camera, Progress, tell
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Mode, Rollout, Switches, Vehicle, interpolated, roll_out
 from sim.arrays import Floats, Integers
@@ -125,6 +125,7 @@ def plan_errors(
     *,
     guaranteed: float | None,
     seed: int,
+    progress: Progress | None = None,
 ) -> PlanErrors:
     """Compute the errors of a schedule.
 
@@ -135,11 +136,12 @@ def plan_errors(
         switches: the schedule.
         guaranteed: bound on the error without uncertainty, if there is one.
         seed: of the random robots.
+        progress: called now and then with the share that is done.
     """
     path = declared.reference.p
     rollout = roll_out(tracked.vehicle, switches, tracked.offset)
     predicted = predicted_error(path, rollout.track, closed=drawn.closed)
-    growth = error_growth(tracked.vehicle, switches, rollout)
+    growth = error_growth(tracked.vehicle, switches, rollout, progress)
     return PlanErrors(
         track=rollout.track,
         distance=predicted.distance,
@@ -171,7 +173,9 @@ class ErrorGrowth(NamedTuple):
     turned: Floats  # (E, P), of the heading
 
 
-def error_growth(vehicle: Vehicle, switches: Switches, rollout: Rollout) -> ErrorGrowth:
+def error_growth(
+    vehicle: Vehicle, switches: Switches, rollout: Rollout, progress: Progress | None = None
+) -> ErrorGrowth:
     """Propagate the modes of a vehicle, and those of its disc's phase, to some _BLOCKS flips of its rollout."""
     dwells, count = switches.dwells, len(switches.dwells)
     flips = np.unique(np.linspace(0, count, min(count, _BLOCKS) + 1).astype(int))
@@ -185,6 +189,7 @@ def error_growth(vehicle: Vehicle, switches: Switches, rollout: Rollout) -> Erro
     lags = [*_mode_lags(vehicle, side, dwells), *of_phase]
     deviation, turned = np.zeros((len(flips), len(modes), 2)), np.zeros((len(flips), len(modes)))
     for p, mode in enumerate(modes):
+        tell(progress, ERRORS, p / len(modes))
         arc = planar.arc((vehicle.twist + mode.twist)[side], dwells) if mode.twist.any() else circle
         change = planar.compose(lag + lags[p], arc) - moves_predicted
         heading = np.concatenate([[0.0], np.cumsum(change[:, 2])])

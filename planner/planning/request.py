@@ -23,6 +23,7 @@ Corner = Literal["nearest", "minimax", "fillet", "error"]
 DECLARING = "finding the nearest path that can be followed"
 REMEDY = "too tight: looking for a change that helps"
 FOLLOWING = "following the path"
+ERRORS = "computing the error of the path"
 Progress = Callable[[float], object]  # called with a Share
 POSE = tuple[float, float, float]
 _ANYWHERE = (5.0, 5.0, 2.0)  # standard deviations of wrong poses
@@ -132,6 +133,6 @@ class Share(float):
 def tell(progress: Progress | None, stage: str, done: float) -> None:
     """Tell how far a stage is."""
     if progress is not None:
-        share = Share(done if stage == FOLLOWING else 0.0)
+        share = Share(done if stage == FOLLOWING else float(stage == ERRORS))
         share.stage, share.done = stage, done
         progress(share)

@@ -145,7 +145,8 @@ def follow_declared(
         switches = ending(switches, declared, setting)
         guidance = guidance._replace(dwell=min(guidance.dwell, float(switches.dwells.min())))
     bound = None if start else guaranteed(vehicle, tracked.rod, straight.swing, guidance.ahead)
-    errors = plan_errors(tracked, drawn, declared, switches, guaranteed=bound, seed=request.seed)
+    errors = plan_errors(tracked, drawn, declared, switches, guaranteed=bound, seed=request.seed,
+                         progress=progress)  # fmt: skip
     return Plan(tracked, request, drawn, declared, straight, guidance, switches, errors)
 
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle, lag_table, resampled
+from planner.vehicle.zigzag import LONGEST
 from sim.arrays import Floats
 from sim.effects import effect_named, is_effect
 from sim.effects.tail_contact import EFFECT as CONTACT
@@ -40,6 +41,8 @@ _ODD = 0.2  # share of a table's error that has opposite signs in the two direct
 STEADY = ("v_z", "v_x", "omega_yr_bar")
 OWN_TABLE = "softflagella surrogate robot"  # makes the table of one robot
 _STEP = 0.02  # of a coefficient, for derivatives
+_STIFF = 0.1  # ω̄ below which tails hardly bend
+_LEAST_WAY = 1e-5  # forward in the longest dwell [l]: 100,000 flips for the robot's length
 ENDING = ".table.json"
 _TABLES: dict[tuple[tuple[str, float], ...], LookupTable] = {}  # of robots without a file, by their groups
 
@@ -77,6 +80,10 @@ def table_for(
     kept = None if source is None or source in PRESETS else Path(source).with_suffix(ENDING)
     table = _kept_table(robot, kept, knowledge)
     if table is None:
+        if robot.omega_bar < _STIFF:
+            from sim.motion.steady import steady
+
+            _check_bent(robot, float(steady(robot.groups(), stability=False).v_z[0]))
         print(f"{reason}simulating this robot's own look-up table, for some seconds", file=sys.stderr)
         table = _simulated_table(robot, kept)
     return table
@@ -114,6 +121,16 @@ def _simulated_table(robot: Robot, kept: Path | None) -> LookupTable:
     return table
 
 
+def _check_bent(robot: Robot, speed: float) -> None:
+    """Refuse a robot whose tails bend so little that its speed v_z forward leads nowhere."""
+    if robot.omega_bar < _STIFF and speed * LONGEST < _LEAST_WAY:
+        cm_s = 100 * speed * robot.length_scale / robot.time_scale
+        raise InputError(
+            f"robot {robot.name!r} hardly moves forward, {cm_s:.2g} cm/s: its tails hardly bend (omega_bar = "
+            f"{robot.omega_bar:.3g}); check Young's modulus, viscosity and motor speed"
+        )
+
+
 def _key(robot: Robot) -> tuple[tuple[str, float], ...]:
     return tuple(sorted(robot.group_values().items()))
 
@@ -140,6 +157,7 @@ def table_vehicle(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowl
     speed = twist[:, 0].mean()
     if speed <= 0:
         raise InputError(f"robot {robot.name!r} does not move forward (v_z = {speed:.3g}); turn its motor slower")
+    _check_bent(robot, float(speed))
     if (twist[:, 2] * [1.0, -1.0] <= 0).any():
         raise InputError(f"robot {robot.name!r} turns to the same side in both directions of its motor; it cannot "
                          "follow a path")  # fmt: skip

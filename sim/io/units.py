@@ -167,14 +167,16 @@ def convert(value: Any, given: str, wanted: str) -> Any:
 
 
 def format_time(seconds: float) -> str:
-    """Write a duration as people say it: 0.35 s, 48.2 s, 12.5 min, 3 h 20 min."""
+    """Write a duration as people say it: 0.35 s, 48.2 s, 12.5 min, 3 h 20 min, 7.5 days."""
     if not math.isfinite(seconds) or abs(seconds) < 90:
         return f"{seconds:.3g} s"
     if abs(seconds) < 5400:
         return f"{seconds / 60:.3g} min"
+    if abs(seconds) >= 172_800:
+        return f"{seconds / 86_400:.3g} days"
     minutes = round(seconds / 60)
     hours = f"{minutes // 60} h"
-    return f"{hours} {minutes % 60} min" if minutes % 60 and minutes < 6000 else hours
+    return f"{hours} {minutes % 60} min" if minutes % 60 else hours
 
 
 def format_length(metres: float) -> str:

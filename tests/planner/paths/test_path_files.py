@@ -287,9 +287,9 @@ def test_headings_are_above_minus_180_and_up_to_180_degrees(degrees: float, word
 
 
 def test_long_paths_pass_if_they_are_not_absurd() -> None:
-    check_size(Path2D.of([[0, 0], [10_000, 0]]), CONTROL, 0.9)
+    check_size(Path2D.of([[0, 0], [10_000, 0]]), CONTROL, 0.9, 1e3)
     with pytest.raises(InputError, match="at most 12000 l can be planned"):
-        check_size(Path2D.of([[0, 0], [13_000, 0]]), CONTROL, 0.9)
+        check_size(Path2D.of([[0, 0], [13_000, 0]]), CONTROL, 0.9, 1e3)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from planner.files.headers import schedule_header
-from planner.goal.trip import Trip
+from planner.goal.trip import Trip, to_goal
 from planner.jobs.cover import Coverage
 from planner.jobs.hold import Orbit
 from planner.jobs.plan import plan
@@ -20,16 +20,17 @@ from planner.jobs.tour import Visits
 from planner.options import PathOptions
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
+from planner.paths.units import in_lab
 from planner.planning import solve
 from planner.planning.conditions import BlockedError
 from planner.planning.line_of_sight import LineOfSight
 from planner.planning.plan import KINDS
-from planner.planning.request import PlanRequest
+from planner.planning.request import ERRORS, PlanRequest
 from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
 from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.vehicle import roll_out
 from planner.vehicle.zigzag import dwells_for, longer_dwells, longest_dwell
-from sim.io.errors import InputError
+from sim.io.errors import InputError, InputWarning
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from surrogate.table_file import load
@@ -68,11 +69,34 @@ def test_planning_never_calls_the_simulator_and_says_how_far_it_is(monkeypatch: 
     for module, name in ((sim.motion.steady, "steady"), (sim.motion.steady, "refined_orbits"),
                          (sim.motion.run, "advance")):  # fmt: skip
         monkeypatch.setattr(module, name, refuse)
-    shares: list[float] = []
+    shares: list[Any] = []
     again = plan(polygon(4, 3.0), CONTROL, progress=shares.append)
     assert np.array_equal(again.dwells, planned("square:3l").dwells)
     assert shares
     assert shares == sorted(shares)
+    assert len({share.done for share in shares if share.stage == ERRORS}) > 5
+
+
+def test_what_takes_days_is_asked_about_before_it_is_planned(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("planner.jobs.plan.solve", lambda *_: 1 / 0)
+    monkeypatch.setattr("planner.goal.trip.solve", lambda *_: 1 / 0)
+    asked = r"400 m \(3636 l\) takes this robot 2\.0\d days or more; are its units right"
+    with pytest.warns(InputWarning, match=asked), pytest.raises(ZeroDivisionError):
+        plan([[0.0, 0.0], [40_000.0, 0.0]], CONTROL, unit="cm")
+    with pytest.warns(InputWarning, match=asked), pytest.raises(ZeroDivisionError):
+        to_goal((0.0, 0.0, 0.0), ("400m", "0m", "0"), CONTROL)
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e6])
+def test_a_robot_whose_tails_hardly_bend_is_refused_before_its_table_is_simulated(
+    factor: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("surrogate.tabulate.tabulate", lambda robot: 1 / 0)
+    stiff = replace(CONTROL, youngs_modulus=factor * CONTROL.youngs_modulus)
+    with pytest.raises(InputError, match=r"hardly moves forward, .* cm/s: its tails hardly bend .*; check"):
+        plan(polygon(4, 3.0), stiff)
+    with pytest.raises(ZeroDivisionError):
+        plan(polygon(4, 3.0), replace(CONTROL, youngs_modulus=50 * CONTROL.youngs_modulus))
 
 
 @pytest.mark.parametrize("point", ["head_tip", "pivot"])

@@ -234,8 +234,8 @@ def test_every_unit_is_found_as_it_is_written(suffix: str) -> None:
 
 
 def test_times_and_lengths_as_people_say_them() -> None:
-    assert [format_time(s) for s in (0.354, 48.2, 750.0, 12_000.0, 7200.0, 134_000.0)] == [
-        "0.354 s", "48.2 s", "12.5 min", "3 h 20 min", "2 h", "37 h 13 min",
+    assert [format_time(s) for s in (0.354, 48.2, 750.0, 12_000.0, 7200.0, 134_000.0, 890_000.0)] == [
+        "0.354 s", "48.2 s", "12.5 min", "3 h 20 min", "2 h", "37 h 13 min", "10.3 days",
     ]  # fmt: skip
     assert [format_length(m) for m in (0.0032, 0.124, 1.5, 104.0, 0.0)] == [
         "3.2 mm", "12.4 cm", "150 cm", "104 m", "0 cm",
