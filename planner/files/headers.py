@@ -387,9 +387,8 @@ def _stated(result: Plan) -> str:
     """Say how far from the path the robot may get."""
     exact = "" if result.tracked.calibrated else ", if its coefficients are exact"
     lines = [f"Of 100 such robots 95 stay within {in_lab(result.stated_error, result.robot)} of the path{exact}."]
-    unmeasured = result.unmeasured_error
-    if unmeasured is not None:
-        lines.append(f"With the coefficients of another robot it is {in_lab(unmeasured, result.robot)}.")
+    if words := result.unmeasured_words:
+        lines.append(f"{words[0].upper()}{words[1:]}.")
     return "\n".join(f" * {line}" for line in lines)
 
 

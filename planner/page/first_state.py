@@ -10,6 +10,7 @@ import numpy as np
 
 from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D
+from planner.paths.units import extent
 from planner.planning.request import PlanRequest
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.io.errors import InputError
@@ -137,6 +138,7 @@ def first_plan(path: Path2D, tracked: TrackedVehicle, request: PlanRequest) -> d
         "offset": tracked.offset,
         "stated": plan.stated_error,
         "unmeasured": plan.unmeasured_error,
+        "size": max(extent(path)),
         "feedback": plan.feedback_error,
         "guaranteed": plan.errors.guaranteed,
         "predictedRms": plan.predicted_rms,

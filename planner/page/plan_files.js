@@ -4,7 +4,7 @@
 import { CONSTANTS } from "./constants.js";
 import { lookAhead } from "./errors.js";
 import { differences, largestSize, linspace, runningSum, sum } from "./math.js";
-import { polyline } from "./path.js";
+import { extent, polyline } from "./path.js";
 import { groupValues } from "./robot.js";
 import { planId } from "./seals.js";
 import { inLab, timeInLab } from "./units.js";
@@ -184,10 +184,14 @@ function filled(template, parts) {
 }
 
 /* Say how far from the path the robot may get. */
-function statedWithin({ tracked: { robot, calibrated }, errors, unmeasured }) {
+function statedWithin({ tracked: { robot, calibrated }, drawn, errors, unmeasured }) {
   const exact = calibrated ? "" : ", if its coefficients are exact";
   const lines = [`Of 100 such robots 95 stay within ${inLab(errors.stated, robot)} of the path${exact}.`];
-  if (unmeasured !== null) lines.push(`With the coefficients of another robot it is ${inLab(unmeasured, robot)}.`);
+  if (unmeasured > Math.max(...extent(drawn))) {
+    lines.push(`Not known before calibration (other robots differ by ${inLab(unmeasured, robot)}).`);
+  } else if (unmeasured !== null) {
+    lines.push(`With the coefficients of another robot: stated error ${inLab(unmeasured, robot)}.`);
+  }
   return lines.map((line) => ` * ${line}`).join("\n");
 }
 

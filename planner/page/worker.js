@@ -6,7 +6,7 @@ import { inflated, readData } from "./data.js";
 import { trackedVehicle, vehicleOfParts } from "./from_table.js";
 import { geomspace } from "./math.js";
 import { openFile } from "./open_file.js";
-import { pageShape, pathLength, pathOf, polyline, scaled, smoothed } from "./path.js";
+import { extent, pageShape, pathLength, pathOf, polyline, scaled, smoothed } from "./path.js";
 import { followedPath, makePlan, planRequest } from "./plan.js";
 import { planDuration, planFiles, planRecord, planSeconds, planWarnings } from "./plan_files.js";
 import { makeRobot, robotToml } from "./robot.js";
@@ -119,6 +119,7 @@ function pictured(plan) {
     stated: inCm(errors.stated),
     calibrated: tracked.calibrated,
     unmeasured: inCm(unmeasured),
+    size: inCm(Math.max(...extent(drawn))),
     feedback: inCm(errors.feedback),
     guaranteed: inCm(errors.guaranteed),
     predictedRms: inCm(errors.predictedRms),

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
-from planner.paths.units import heading_in_degrees, in_lab, place_in_lab, time_in_lab
+from planner.paths.units import extent, heading_in_degrees, in_lab, place_in_lab, time_in_lab
 from planner.planning.conditions import Arrival, KeptClear, Lap
 from planner.planning.declare import Declared
 from planner.planning.errors import PlanErrors, feedback_error, plan_errors
@@ -246,6 +246,16 @@ class Plan(Shown, Generic[J]):
         return plan_errors(guessed, self.drawn, self.declared, self.switches, guaranteed=None, seed=0).stated
 
     @property
+    def unmeasured_words(self) -> str:
+        """What is known of the error before calibration, in words; empty where there is nothing to say."""
+        error = self.unmeasured_error
+        if error is None:
+            return ""
+        if error > max(extent(self.drawn)):
+            return f"not known before calibration (other robots differ by {in_lab(error, self.robot)})"
+        return f"with the coefficients of another robot: stated error {in_lab(error, self.robot)}"
+
+    @property
     def error_line(self) -> str:
         """The errors in one sentence; on two lines where the coefficients are not calibrated."""
         rms, largest, stated, feedback = (
@@ -254,12 +264,12 @@ class Plan(Shown, Generic[J]):
         )
         predicted = f"predicted error {rms} rms, {largest} at most;"
         errors = f"stated error {stated}, with feedback {feedback}"
+        if self.feedback_error >= self.stated_error:
+            errors = f"stated error {stated} open loop, which this camera would not lessen"
         if self.tracked.calibrated:
             return f"{predicted} {errors}"
-        if self.unmeasured_error is not None:
-            unmeasured = in_lab(self.unmeasured_error, self.robot)
-            errors += f"; with the coefficients of another robot: stated error {unmeasured}"
-        return f"if the coefficients are exact: {predicted}\n{errors}"
+        unmeasured = self.unmeasured_words and f"; {self.unmeasured_words}"
+        return f"if the coefficients are exact: {predicted}\n{errors}{unmeasured}"
 
     def schedule(self, robot: Robot | None = None, *, laps: int = 1) -> Schedule:
         """Return the schedule for `sim.motion.replay`.

@@ -5,10 +5,11 @@ import { transformed } from "./editor.js";
 import { FIELDS, labValues, OPTIONS } from "./state.js";
 
 /* The sentence that a screen reader is told when a plan is finished. */
-function summary({ seconds, dwells, calibrated, stated, offDrawn, missed, unmeasured }) {
+function summary({ seconds, dwells, calibrated, stated, offDrawn, missed, unmeasured, size }) {
   const exact = calibrated ? "" : "if the coefficients are exact, ", away = Math.max(offDrawn, missed);
   const off = away > stated ? `, which leaves the drawn one by up to ${length(away)}` : "";
-  const guessed = unmeasured === null ? "" : ` With coefficients of another robot: ${length(unmeasured)}.`;
+  const lost = unmeasured > size ? "not known, they differ by " : "";
+  const guessed = unmeasured === null ? "" : ` With coefficients of another robot: ${lost}${length(unmeasured)}.`;
   return `${duration(seconds)}, ${dwells.length} dwells: ${exact}95 of 100 such robots stay within ${length(stated)} of `
     + `the path to follow${off}.${guessed}`;
 }
@@ -17,7 +18,7 @@ function summary({ seconds, dwells, calibrated, stated, offDrawn, missed, unmeas
 function showResults(plan, tails) {
   const size = (value) => length(value, plan.tailLength, tails);
   const time = (value) => duration(value) + (tails ? ` (${digits(value / plan.timeScale)} time units)` : "");
-  const [x, y, heading] = plan.start;
+  const [x, y, heading] = plan.start, lost = plan.unmeasured > plan.size ? "not known, they differ by " : "";
   const pairs = [
     ["Start pose", `x ${digits(x)} cm, y ${digits(y)} cm, heading ${degrees(heading)} degrees, at rest`],
     ["Time", `${time(plan.seconds)}, ${plan.dwells.length} dwells`],
@@ -25,8 +26,8 @@ function showResults(plan, tails) {
     ["Shortest dwell", time(plan.minimumDwell)],
     ["Predicted error", `${size(plan.predictedRms)} rms, ${size(plan.predictedMax)} at most`],
     [`Stated error${plan.calibrated ? "" : " if the coefficients are exact"}`, size(plan.stated)],
-    ...(plan.unmeasured === null ? [] : [["With coefficients of another robot", size(plan.unmeasured)]]),
-    ["With a tracker and a camera", size(plan.feedback)],
+    ...(plan.unmeasured === null ? [] : [["With coefficients of another robot", lost + size(plan.unmeasured)]]),
+    ["With a tracker and a camera", plan.feedback < plan.stated ? size(plan.feedback) : "more than without"],
     ["Path to follow from the drawn one", `${size(plan.offDrawn)} at most`],
     ["Drawn points from the path to follow", `${size(plan.missed)} at most`],
   ];

@@ -70,7 +70,7 @@ def test_a_robot_with_an_effect_is_locked_and_small(tmp_path: Path) -> None:
     page = sf.write_page(tmp_path / "page.html", BIASED, lookup=own_table())
     data = data_of(page)
     assert "left_right_bias" in data["locked"]["why"]
-    assert page.stat().st_size < 0.5e6
+    assert page.stat().st_size < 0.52e6
 
 
 def test_of_a_table_without_errors_of_the_response_the_vehicle_is_written(tmp_path: Path) -> None:
@@ -81,7 +81,7 @@ def test_of_a_table_without_errors_of_the_response_the_vehicle_is_written(tmp_pa
     assert [entry["name"] for entry in data["robots"]] == ["paper-control"]
     errors = lookup.error_modes(both_directions(robot.group_values())).twist
     assert len(data["planner"]["table"]["vehicle"]["errors"]) == len(errors)
-    assert page.stat().st_size < 0.5e6
+    assert page.stat().st_size < 0.52e6
 
 
 def test_bad_input_ends_in_one_line_and_leaves_no_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

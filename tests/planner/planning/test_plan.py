@@ -238,6 +238,24 @@ def test_errors_that_are_not_calibrated_say_so() -> None:
     assert "exact" not in schedule_header(found, "p1")
 
 
+def test_an_error_larger_than_the_path_is_no_error_of_the_path() -> None:
+    square = planned("square:2.2l")
+    assert square.unmeasured_error is not None
+    assert square.unmeasured_error > 2.2
+    differ = f"not known before calibration (other robots differ by {in_lab(square.unmeasured_error, CONTROL)})"
+    assert square.error_line.endswith(f"; {differ}")
+    assert f" * N{differ[1:]}.\n" in schedule_header(square, "p1")
+
+
+def test_the_smaller_error_is_stated_with_its_condition() -> None:
+    result, stated = planned(), in_lab(planned().stated_error, CONTROL)
+    assert f"stated error {stated}, with feedback {in_lab(result.feedback_error, CONTROL)}" in result.error_line
+    short = planned("square:2.2l")
+    assert short.feedback_error > short.stated_error
+    assert "open loop, which this camera would not lessen" in short.error_line
+    assert "with feedback" not in short.error_line
+
+
 def test_robots_with_the_coefficients_of_another_stay_within_the_error_of_unmeasured_ones() -> None:
     """The first-order statement, against 40 vehicles of robots whose coefficients are drawn as those of others."""
     result = planned("circle:2l", objective="flips")

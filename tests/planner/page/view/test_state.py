@@ -129,6 +129,11 @@ def test_a_plan_is_summed_up_and_tells_where_it_leaves_the_drawn_path() -> None:
     assert answer("view/panels.js", "summary", plan) == f"{words}."
     off = answer("view/panels.js", "summary", plan | {"missed": 3.0})
     assert off == f"{words}, which leaves the drawn one by up to 3.00 cm."
+    guessed = plan | {"unmeasured": 64.6, "size": 24.0}
+    assert answer("view/panels.js", "summary", guessed).endswith(
+        "another robot: not known, they differ by 64.6 cm."
+    )
+    assert answer("view/panels.js", "summary", guessed | {"size": 240.0}).endswith("another robot: 64.6 cm.")
 
 
 def test_no_tail_is_drawn_behind_another() -> None:
