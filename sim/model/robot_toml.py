@@ -127,12 +127,12 @@ def doubtful(tables: Mapping[str, Any]) -> Iterator[str]:
                 continue
             own = unit.suffix if unit else ""
             units = [own, *(suffix for suffix in of_kind(unit.kind) if suffix != "in")] if unit else [own]
-            times = {suffix: abs(to_si(number, suffix) if suffix else number) / paper for suffix in units}
+            times = {each: max(abs(to_si(number, each) if each else number) / paper, 1e-300) for each in units}
             ratio, far = times[own], _FAR[entry.unit]
             if not 1 / far <= ratio <= far:
                 likely = min(units, key=lambda suffix: abs(math.log(times[suffix])))
                 asked = f"is its unit {likely}?" if 1 / _NEAR <= times[likely] <= _NEAR else "is it right?"
-                size = f"{ratio:,.0f}" if ratio > 1 else f"{ratio:.2g}"
+                size = f"{ratio:,.0f}" if 1 < ratio < 1e9 else f"{ratio:.2g}"
                 yield f"{key} = {number:g} is {size} times that of the paper's robot; {asked}"
 
 

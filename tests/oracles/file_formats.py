@@ -34,7 +34,7 @@ from planner.tracking.tracker import Tracker
 from planner.vehicle.calibration_table import read_knowledge
 from planner.vehicle.from_table import default_table
 from sim.inputs import check_columns, load_robot
-from sim.io.errors import InputError, naming
+from sim.io.errors import InputError, InputWarning, naming
 from sim.io.pose_tracks import read_tracks
 from sim.io.tables import read_table
 from sim.io.track_options import Source
@@ -109,6 +109,7 @@ def judged(form: FileFormat, path: Path) -> bool:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
+            warnings.simplefilter("ignore", InputWarning)
             form.read(path)
     except InputError as refusal:
         message = str(refusal)

@@ -68,6 +68,7 @@ def test_a_robot_in_the_units_of_a_laboratory(tmp_path: Path) -> None:
         ("viscosity_cP = 1490", "viscosity_Pa_s = 1490", "; is its unit mPa_s?"),
         ("viscosity_cP = 1490", "viscosity_cP = 1.49", " is 0.001 times that of the paper's"),
         ("speed_rpm = 90", "speed_rpm = 1e5", "is it right?"),
+        ("viscosity_cP = 1490", "viscosity_Pa_s = 1e-321", "is it right?"),  # and 0 in mPa_s
         ("C_t = 3.0", "C_t = 300", "300 is 100 times that of the paper's robot; is it right?"),
     ],
 )  # fmt: skip
