@@ -127,7 +127,8 @@ class CurveErrors:
         curves = np.concatenate([lag[:, None] + memory, lag[:, None]], 1)
         rms = np.sqrt((curves**2).mean((1, 2)))
         half = np.arange(len(rms)) % 2 == 0
-        widths = Intervals.learned(features[half], _named(rms[half]), features[~half], _named(rms[~half]))
+        widths = Intervals.learned(features[half], _named(rms[half]))
+        widths = widths.calibrated(features[~half], _named(rms[~half]))
         local = np.maximum(_sizes(widths, features), rms / _OUTLIER)
         scaled = (curves / local[:, None, None]).reshape(len(rms), -1) / np.sqrt(len(rms))
         _, values, vectors = np.linalg.svd(scaled, full_matrices=False)

@@ -5,12 +5,11 @@
 
 s is fitted to the logarithm of errors by least squares. Its features are the inputs of the tails and their
 squares, the robot's distance from the middle of the training data, the spread of the ensemble, and N. q makes the
-intervals cover 90 % however well s fits. There is one q for robots with one tail, and one for each octant of the
-others: low or high drag number, deflection and forward motion. Robots on which the tails' spin exerts a couple in
-yaw have a q of their own in each part. So the intervals cover 90 % in each of these parts, with and without
-couples. s makes them cover about 90 % in smaller parts as well. s and q are fitted to different robots. Sources:
-Lei et al., J. Am. Stat. Assoc. 113, 1094 (2018), section 5.2; Vovk, Gammerman and Shafer, Algorithmic Learning in
-a Random World (2005), section 4.5, for the parts.
+intervals cover 90 % however well s fits. Each group of robots has a q of its own. Groups differ in the number of
+tails, in whether the tails' spin exerts a couple in yaw, in the third of the motor speeds, and in whether a robot
+is nearer to the middle of the training data than half of the others. A group of few robots takes the q of a wider
+one. s and q are fitted to different robots. Sources: Lei et al., J. Am. Stat. Assoc. 113, 1094 (2018), section
+5.2; Vovk, Gammerman and Shafer, Algorithmic Learning in a Random World (2005), section 4.5, for the groups.
 """
 
 from __future__ import annotations
@@ -23,18 +22,21 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Flags, Floats, Integers
+from sim.arrays import Floats, Integers
 from sim.jit import compiled_fast
+from surrogate.domain import MOST_TAILS
 from surrogate.errors import ITSELF, ONE, OUTPUTS, SCALES, SPEED, SURGE
+from surrogate.tails import COUPLE, NUMBER, ROBOT_NUMBERS
 
 COVERAGE = 0.90
 _TINY = 1e-9  # of the scale of an output
 _RIDGE = 1e-3
-HALVED = (0, 3, 5)  # features whose halves make the octants: drag number, deflection, forward motion
-_ONE_TAIL = -1  # the width feature that is 1 for one tail
-PARTS = 2 ** len(HALVED) + 1
-GROUPS = 2  # robots without and with a couple
-_FEWEST = 40  # robots in a part or group, for a q of its own
+NOVELTY = 7  # among the features
+THIRDS = 2 * MOST_TAILS * 3  # couple or not × number of tails × third of the motor speeds
+GROUPS = 2 * THIRDS  # the nearer half of each, and the other
+_PER_NUMBER = 2 * 3  # groups of a number of tails
+_WIDER = (1, 2, _PER_NUMBER)  # so many groups together, where each has few robots
+_FEWEST = 60  # robots of a group, for a q of its own
 _CLIPPED = 5.0  # standard deviations of a feature
 _YAW_RATE, _V_X, _V_Z = 2, 3, 4  # among the outputs
 _FIRMEST, _SOFTEST = 0.002, 0.998  # s is held between these quantiles of itself
@@ -48,43 +50,44 @@ class Intervals:
     scale: Floats  # (F,)
     weights: Mapping[str, Floats]  # output -> (P,)
     bounds: Mapping[str, tuple[float, float]]  # output -> smallest and largest ln s
-    middle: Floats  # (3,), the halves meet here
-    factor: Mapping[str, Floats]  # output -> q of each part, (PARTS,) for all robots or (GROUPS PARTS,)
+    speeds: Floats  # (2,): the thirds of |ω̄| meet here
+    middle: Floats  # (THIRDS,): the halves of the novelty meet here
+    factor: Mapping[str, Floats]  # output -> q of each group, (GROUPS,), or of all robots, (1,)
 
-    def ends(self, features: Floats, couples: Flags, outputs: Floats) -> dict[str, Floats]:
+    def ends(self, features: Floats, robots: Floats, outputs: Floats) -> dict[str, Floats]:
         """Return `<name>_low` and `<name>_high`, (M,) each, of the outputs that have intervals.
 
         Args:
-            features, couples: see `half_widths`.
+            features, robots: see `half_widths`.
             outputs: OUTPUTS, (12, M).
         """
-        low, high, _ = self._ask(*self._of_outputs, features, couples, outputs)
+        low, high, _ = self._ask(*self._of_outputs, features, robots, outputs)
         lows, highs = self._names
         return {**dict(zip(lows, low, strict=True)), **dict(zip(highs, high, strict=True))}
 
-    def half_widths(self, names: Sequence[str], features: Floats, couples: Flags | bool = False) -> Floats:
+    def half_widths(self, names: Sequence[str], features: Floats, robots: Floats | None = None) -> Floats:
         """Return half-widths of the intervals of some outputs, (O, M), over what errors are relative to.
 
         Args:
             names: of the outputs.
             features: (M, F), see `surrogate.table`.
-            couples: (M,), which robots have a couple in yaw from the spin of their tails.
+            robots: (M, 39), see `surrogate.tails.pack_robots`; not needed where all robots have one q.
         """
         none = np.zeros(len(self.factor), dtype=np.int64)
-        _, half, _ = self._ask(none + ONE, none, features, couples, np.zeros((1, len(features))))
+        _, half, _ = self._ask(none + ONE, none, features, robots, np.zeros((1, len(features))))
         return half[[list(self.factor).index(name) for name in names]]
 
-    def part(self, features: Floats) -> Integers:
-        """Return which part each robot belongs to, (M,): 0 to 7 for octants, 8 for one tail."""
+    def groups(self, features: Floats, robots: Floats) -> Integers:
+        """Return which group each robot belongs to, (M,)."""
         none = np.zeros(len(self.factor), dtype=np.int64)
-        return self._ask(none, none, features, False, np.zeros((1, len(features))))[2]
+        return self._ask(none, none, features, robots, np.zeros((1, len(features))))[2]
 
     def _ask(
-        self, kinds: Integers, places: Integers, features: Floats, couples: Flags | bool, outputs: Floats
+        self, kinds: Integers, places: Integers, features: Floats, robots: Floats | None, outputs: Floats
     ) -> tuple[Floats, Floats, Integers]:
-        """Return ends (O, M) and parts (M,), see `intervals_of`."""
-        own = np.ascontiguousarray(features), np.zeros(len(features), dtype=bool) | couples
-        arguments: Any = (*self._stacked, kinds, places, *own, outputs)
+        """Return ends (O, M) and groups (M,), see `intervals_of`."""
+        own = np.zeros((len(features), ROBOT_NUMBERS)) if robots is None else robots
+        arguments: Any = (*self._stacked, kinds, places, np.ascontiguousarray(features), own, outputs)
         return intervals_of(*arguments)
 
     @cached_property
@@ -95,8 +98,8 @@ class Intervals:
             count, 1 + size + size * (size + 1) // 2
         )
         bounds = np.array([self.bounds[name] for name in self.factor]).reshape(count, 2).T.copy()
-        factors = np.array([np.resize(part, GROUPS * PARTS) for part in self.factor.values()])
-        return self.shift, self.scale, weights, bounds, self.middle, factors.reshape(count, GROUPS * PARTS)
+        factors = np.array([np.resize(part, GROUPS) for part in self.factor.values()]).reshape(count, GROUPS)
+        return self.shift, self.scale, weights, bounds, self.speeds, self.middle, factors
 
     @cached_property
     def _of_outputs(self) -> tuple[Integers, Integers]:
@@ -109,14 +112,8 @@ class Intervals:
         return [f"{name}_low" for name in self.factor], [f"{name}_high" for name in self.factor]
 
     @staticmethod
-    def learned(
-        features: Floats,
-        errors: Mapping[str, Floats],
-        more_features: Floats,
-        more_errors: Mapping[str, Floats],
-        more_couples: Flags | bool = False,
-    ) -> Intervals:
-        """Learn from relative errors by output, (M,), of robots for s and of more robots, (M',), for q."""
+    def learned(features: Floats, errors: Mapping[str, Floats]) -> Intervals:
+        """Learn s from relative errors by output, (M,), of robots; `calibrated` learns q from others."""
         features = np.ascontiguousarray(features)
         shift, scale = features.mean(0), np.maximum(features.std(0, ddof=1), 1e-6)
         design: Floats = designs_of(features, shift, scale)
@@ -132,33 +129,37 @@ class Intervals:
             weights[name] = np.asarray(np.linalg.solve(matrix, rows.T @ logs), dtype=float)
             low, high = np.quantile(rows @ weights[name], [_FIRMEST, _SOFTEST])
             bounds[name] = (float(low), float(high))
-        several = features[features[:, _ONE_TAIL] < 0.5]
-        middle = np.quantile((several if len(several) else features)[:, list(HALVED)], 0.5, axis=0, method="lower")
-        plain = Intervals(shift, scale, weights, bounds, middle, {})
-        return plain.calibrated(more_features, more_errors, more_couples)
+        return Intervals(shift, scale, weights, bounds, np.zeros(2), np.zeros(THIRDS), {})
 
     def calibrated(
-        self, features: Floats, errors: Mapping[str, Floats], couples: Flags | bool = False
+        self, features: Floats, errors: Mapping[str, Floats], robots: Floats | None = None
     ) -> Intervals:
         """Return the intervals with q for these robots.
 
         Args:
             features: (M, F) of robots that s was not learned from.
             errors: relative errors by output, (M,); NaN where unknown.
-            couples: (M,), see `half_widths`; with too few robots of either group both have the same q.
+            robots: (M, 39), see `half_widths`; None for one q of all.
         """
-        part, factor = self.part(features), {}
-        couples = np.broadcast_to(couples, part.shape)
-        groups = [~couples, couples]
-        if min(map(np.count_nonzero, groups)) < _FEWEST:
-            groups = [~couples | couples]
-        local = replace(self, factor=dict.fromkeys(errors, np.ones(PARTS))).half_widths(list(errors), features)
-        for (name, error), size in zip(errors.items(), local, strict=True):
+        found = replace(self, factor=dict.fromkeys(errors, np.ones(1)))
+        cells = [np.zeros((1, len(features)), dtype=bool)]
+        if robots is not None:
+            found = replace(found, speeds=np.quantile(robots[:, 0], [1 / 3, 2 / 3]))
+            group, novelty = found.groups(features, robots), features[:, NOVELTY]
+            thirds = [novelty[group // 2 == k] for k in range(THIRDS)]
+            middle = np.array([np.median(third if len(third) else novelty) for third in thirds])
+            found = replace(found, middle=middle)
+            group = found.groups(features, robots)
+            number, every = group // _PER_NUMBER % MOST_TAILS, np.arange(GROUPS)[:, None]
+            cells = [every // wider == group // wider for wider in _WIDER]
+            cells.append(every // _PER_NUMBER % MOST_TAILS == number)
+        sizes, factor = found.half_widths(list(errors), features), {}
+        for (name, error), size in zip(errors.items(), sizes, strict=True):
             known, scores = np.isfinite(error), np.abs(error) / size
-            cells = [[group & (part == k) & known, group & known, known] for group in groups for k in range(PARTS)]
-            pools = [next((c for c in cell if c.sum() >= _FEWEST), known) for cell in cells]
-            factor[name] = np.array([_conformal_quantile(scores[pool]) for pool in pools])
-        return replace(self, factor=factor)
+            pools = [[own & known for own in cell] for cell in zip(*cells, strict=True)]
+            chosen = [next((pool for pool in cell if pool.sum() >= _FEWEST), known) for cell in pools]
+            factor[name] = np.array([_conformal_quantile(scores[pool]) for pool in chosen])
+        return replace(found, factor=factor)
 
 
 def _conformal_quantile(scores: Floats) -> float:
@@ -196,34 +197,34 @@ def designs_of(features: Floats, shift: Floats, scale: Floats) -> Floats:
 
 @compiled_fast
 def intervals_of(
-    shift: Floats, scale: Floats, weights: Floats, bounds: Floats, middle: Floats, factors: Floats,
-    kinds: Integers, places: Integers, features: Floats, couples: Flags, outputs: Floats,
+    shift: Floats, scale: Floats, weights: Floats, bounds: Floats, speeds: Floats, middle: Floats, factors: Floats,
+    kinds: Integers, places: Integers, features: Floats, robots: Floats, outputs: Floats,
 ) -> tuple[Floats, Floats, Integers]:  # fmt: skip
-    """Return the ends of intervals, (O, M) each, and the part of each robot, (M,).
+    """Return the ends of intervals, (O, M) each, and the group of each robot, (M,).
 
     Args:
-        shift, scale, weights, bounds, middle, factors: as in `surrogate.intervals`, stacked over O outputs.
+        shift, scale, weights, bounds, speeds, middle, factors: as in `Intervals`, stacked over O outputs.
         kinds: what errors are relative to, (O,).
         places: of these among the outputs, (O,).
         features: (M, F).
-        couples: (M,).
+        robots: (M, 39).
         outputs: their intervals have no width where they are not finite.
     """
     count, size = features.shape
     low, high = np.empty((len(places), count)), np.empty((len(places), count))
-    parts, design, x = np.empty(count, dtype=np.int64), np.empty(weights.shape[1]), np.empty(size)
+    groups, design, x = np.empty(count, dtype=np.int64), np.empty(weights.shape[1]), np.empty(size)
     for row in range(count):
-        own, part = features[row], 0
-        for i, feature in enumerate(HALVED):
-            part += int(own[feature] > middle[i]) << i
-        part = PARTS - 1 if own[size - 1] > 0.5 else part
-        parts[row] = part
+        own, speed = features[row], robots[row, 0]
+        number = min(max(int(robots[row, NUMBER]), 1), MOST_TAILS) + MOST_TAILS * int(robots[row, COUPLE] != 0)
+        third = 3 * (number - 1) + int(speed > speeds[0]) + int(speed > speeds[1])
+        group = 2 * third + int(own[NOVELTY] > middle[third])
+        groups[row] = group
         _put_design(own, shift, scale, x, design)
         for o in range(len(places)):
             value, total = outputs[places[o], row], 0.0
             for p in range(len(design)):
                 total += weights[o, p] * design[p]
-            half = factors[o, part + PARTS * int(couples[row])]
+            half = factors[o, group]
             half *= np.exp(min(max(total, bounds[0, o]), bounds[1, o]))
             if kinds[o] == ITSELF:
                 half *= abs(value)
@@ -233,4 +234,4 @@ def intervals_of(
                 half *= abs(outputs[_V_Z if kinds[o] == SURGE else _YAW_RATE, row])
             half = half if abs(value) < np.inf else 0.0
             low[o, row], high[o, row] = value - half, value + half
-    return low, high, parts
+    return low, high, groups

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.arrays import Flags, Floats, Integers
+from sim.arrays import Floats, Integers
 from sim.jit import compiled_fast
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.balance import inputs_at, network_inputs_at, solve
 from surrogate.domain import FAST_YAW, INSIDE, MAX_YAW_SHARE, NO_MOTION, NOVEL, SupportNumbers, put_novelty
 from surrogate.network import BLOCK, Ensemble, Layers, evaluate
-from surrogate.tails import COUPLE, HEAD_LENGTH, INPUTS, SENSE, SINGLE_INPUTS, TAILS
+from surrogate.tails import HEAD_LENGTH, INPUTS, SENSE, SINGLE_INPUTS, TAILS
 
 CLASSES = (1, 2, 3)  # networks for N = 1, N = 2, and three or more tails
 INPUT_COUNTS = (len(SINGLE_INPUTS), len(INPUTS), len(INPUTS))  # of these networks
@@ -50,11 +50,6 @@ class Motions:
     def steady(self) -> dict[str, Floats]:
         """STEADY_OUTPUTS, (M,) each."""
         return dict(zip(STEADY_OUTPUTS, self.outputs, strict=False))
-
-    @property
-    def couples(self) -> Flags:
-        """Which robots have a couple in yaw from the spin of their tails, (M,)."""
-        return np.asarray(self.robots[:, COUPLE] != 0)
 
 
 def network_index(count: Floats) -> Integers:

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-FORMAT = 7  # of model files
+FORMAT = 8  # of model files
 OUTSIDE, CERTIFIED = "outside", "certified_error"  # columns of an answer
 _MIN_DWELL = DWELLS[0] * (1 - 1e-9)
 _DIFFERENCE = 1e-4  # of an input, relative, for derivatives
@@ -293,7 +293,7 @@ class NeuralTable(Shown):
         """Return the ends of the intervals of a result, in its order."""
         if self.intervals is None:
             raise InputError("this look-up table has no intervals; train it again")
-        ends = self.intervals.ends(self.width_features(motions), motions.couples, motions.outputs)
+        ends = self.intervals.ends(self.width_features(motions), motions.robots, motions.outputs)
         return {f"{name}_{end}": ends[f"{name}_{end}"] for end in ("low", "high") for name in result
                 if f"{name}_{end}" in ends}  # fmt: skip
 

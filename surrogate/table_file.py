@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from shlex import quote
 from typing import Any
@@ -25,8 +26,7 @@ from surrogate import tensor_file
 from surrogate.domain import ROBOT, Support, monomial_count
 from surrogate.error_modes import CURVE_ERRORS, CurveErrors
 from surrogate.interface import LookupTable
-from surrogate.intervals import GROUPS, HALVED, Intervals
-from surrogate.intervals import PARTS as INTERVAL_PARTS
+from surrogate.intervals import GROUPS, THIRDS, Intervals
 from surrogate.motions import FEATURES, INPUT_COUNTS, WrenchTable
 from surrogate.network import Ensemble, state_shapes
 from surrogate.response import FLIP_INPUTS, PARTS, SHAPES, Basis, ResponseTable
@@ -192,9 +192,9 @@ def _intervals_form(part: Mapping[str, Any], needed: tuple[str, ...] = ()) -> di
     names = {*part["factor"], *needed}
     terms = 1 + FEATURES + FEATURES * (FEATURES + 1) // 2
     return {
-        "shift": (FEATURES,), "scale": (FEATURES,), "middle": (len(HALVED),),
+        "shift": (FEATURES,), "scale": (FEATURES,), "speeds": (2,), "middle": (THIRDS,),
         "weights": dict.fromkeys(names, (terms,)), "bounds": dict.fromkeys(names, _is_ordered),
-        "factor": dict.fromkeys(names, _is_factor),
+        "factor": dict.fromkeys(names, partial(_is_factor, 1 if needed else GROUPS)),
     }  # fmt: skip
 
 
@@ -210,9 +210,9 @@ def _is_range(part: Any) -> bool:
     return bool(part[0] >= 0 and _is_ordered(part))
 
 
-def _is_factor(part: Any) -> bool:
-    """Whether a part is q of an interval; infinite where there were no rows."""
-    return part.shape in {(INTERVAL_PARTS,), (GROUPS * INTERVAL_PARTS,)} and not np.isnan(part).any()
+def _is_factor(groups: int, part: Any) -> bool:
+    """Whether a part is q of an interval in each group; infinite where there were no rows."""
+    return part.shape == (groups,) and not np.isnan(part).any()
 
 
 def _are_numbers(part: Any) -> bool:

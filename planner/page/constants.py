@@ -49,10 +49,10 @@ _NAMES = {  # of each module; a leading underscore is left out
     "sim.model.robot_toml": "LARGEST SIGMA HEADER NOTES NO_EFFECTS SI",
     "surrogate.error_modes": "NORMAL_90 LAGS",
     "surrogate.errors": "RELATIVE",
-    "surrogate.intervals": "HALVED",
+    "surrogate.intervals": "NOVELTY",
     "surrogate.table": "OF_TAILS",
     "surrogate.response": "PARTS SMALL_SURGE OF_HEAD",
-    "surrogate.domain": "DEGREE DEGREE_OF_MANY MANY",
+    "surrogate.domain": "DEGREE DEGREE_OF_MANY MANY MOST_TAILS",
     "surrogate.balance": "STEPS CORRECTION ACCEPTED DIFFERENCE MIN_SHARE FIRST_SPIN MAX_TURN",
     "surrogate.tails": "SOFT SMALL_DEFLECTION SMALL_SURGE MIN_SURGE TINY THRUST THRUST_SOFT THRUST_POWER "
     "TORQUE_SOFT TORQUE_POWER",

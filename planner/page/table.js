@@ -12,8 +12,8 @@ import { BEFORE, CURVE } from "./vehicle.js";
 import { InputError } from "./words.js";
 
 const { OF_TAILS } = CONSTANTS.table, { PARTS, SMALL_SURGE, OF_HEAD } = CONSTANTS.response;
-const { NORMAL_90, LAGS } = CONSTANTS.error_modes, { HALVED } = CONSTANTS.intervals, { RELATIVE } = CONSTANTS.errors;
-const { DEGREE, DEGREE_OF_MANY, MANY } = CONSTANTS.domain; // of monomials; of so many inputs and more
+const { NORMAL_90, LAGS } = CONSTANTS.error_modes, { NOVELTY } = CONSTANTS.intervals, { RELATIVE } = CONSTANTS.errors;
+const { DEGREE, DEGREE_OF_MANY, MANY, MOST_TAILS } = CONSTANTS.domain; // of monomials; of so many inputs and more
 const STEADY = ["v_z", "v_x", "omega_yr_bar"];
 const END = 1.02; // of half an input's range
 const BRANCHES = 0.6; // |ω_yr/ω_t| from which a robot may have several motions
@@ -100,13 +100,14 @@ function within([low, high], size) {
 function tableErrorModes({ curveErrors, intervals, ...table }, robot) {
   const found = motionOf(table, robot), { head, tails, motion } = found, speeds = curveSpeeds(head, motion);
   const answer = steadyOutputs(table, head, tails, motion), features = widthFeatures(table, found);
+  const group = groupOf(intervals, robot, features);
   const steady = STEADY.map((name, i) => {
     const size = RELATIVE.includes(name) ? Math.abs(answer[name]) : Math.hypot(answer.v_x, answer.v_z);
-    const half = halfWidth(intervals, name, features, size) / NORMAL_90;
+    const half = halfWidth(intervals, name, features, group, size) / NORMAL_90;
     const sigma = Math.hypot(half, curveErrors.simulator * size);
     return { twist: STEADY.map((_, k) => (k === i ? sigma : 0)), lag: null, memory: null };
   });
-  const local = LAGS.map((name, axis) => (halfWidth(curveErrors.widths, name, features, 1) / NORMAL_90) * speeds[axis]);
+  const local = LAGS.map((name, axis) => (halfWidth(curveErrors.widths, name, features, 0, 1) / NORMAL_90) * speeds[axis]);
   const { shape, values } = curveErrors.curves, whole = (BEFORE.length + 1) * CURVE, first = BEFORE.length * CURVE;
   const curves = Array.from({ length: shape[0] }, (_, k) => {
     const curve = values.slice(k * whole, (k + 1) * whole).map((value, at) => value * local[at % 3]);
@@ -130,17 +131,22 @@ function widthFeatures(table, { head, tails, motion, inputs, own }) {
   return [...inputs, ...more].map((value) => (Number.isNaN(value) ? 0 : value));
 }
 
+/* The group of a robot among those that have intervals of their own: by N, motor speed and novelty. The page's robots
+ * have no couple in yaw, so they are in the first half. */
+function groupOf({ speeds, middle }, robot, features) {
+  const speed = Math.abs(robot.omega_bar), faster = speeds.values.filter((limit) => speed > limit).length;
+  const third = 3 * (Math.min(robot.N, MOST_TAILS) - 1) + faster;
+  return 2 * third + (features[NOVELTY] > middle.values[third] ? 1 : 0);
+}
+
 /* Half of the width of the interval of an output.
  *
- * The page's robots have no couple in yaw, so their factors are the first ones of `factor`. intervals: as a model
- * file has them. size: what errors are relative to. */
-function halfWidth({ shift, scale, weights, bounds, middle, factor }, name, features, size) {
-  const single = features[features.length - 1] > 0.5;
-  const octant = HALVED.reduce((place, f, k) => place + (features[f] > middle.values[k] ? 2 ** k : 0), 0);
+ * intervals: as a model file has them. group: 0 where all robots have one factor. size: what errors are relative to. */
+function halfWidth({ shift, scale, weights, bounds, factor }, name, features, group, size) {
   const x = features.map((value, i) => clip((value - shift.values[i]) / scale.values[i], -5, 5)), terms = [1, ...x];
   x.forEach((value, i) => terms.push(...x.slice(i).map((other) => value * other)));
   const local = Math.exp(clip(dot(terms, weights[name].values), bounds[name][0], bounds[name][1]));
-  return factor[name].values[single ? 2 ** HALVED.length : octant] * local * size;
+  return factor[name].values[group] * local * size;
 }
 
 /* How far some inputs are from the joint support of the training data, a smooth measure: q over its limit, or how far

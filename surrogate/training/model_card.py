@@ -1,7 +1,7 @@
 """The model card: one page of Markdown beside a look-up table.
 
-It has the domain, the errors on held-out robots of several kinds, the coverage of the intervals of the yaw rate,
-and the limits of validity.
+It has the domain, the errors on held-out robots of several kinds, the coverage of the intervals in each group of
+robots, and the limits of validity.
 """
 
 from __future__ import annotations
@@ -11,25 +11,19 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from sim.arrays import Flags, Floats
-from surrogate.domain import ROBOT
-from surrogate.errors import relative_errors
-from surrogate.intervals import COVERAGE
+from surrogate.domain import MOST_TAILS, ROBOT
+from surrogate.errors import coverage, relative_errors
+from surrogate.intervals import COVERAGE, THIRDS
 from surrogate.table import NeuralTable
 from surrogate.tails import robots_of
 from surrogate.training.simulated import SimulatedRobots
 from surrogate.training.train import with_radius, without_effects
 
 _FEWEST = 20  # robots, for a line of a table
-_YAW_RATE = "omega_yr_bar"
 _TITLES = {
-    "omega_h_bar": "spin of the head", _YAW_RATE: "yaw rate",
+    "omega_h_bar": "spin of the head", "omega_yr_bar": "yaw rate",
     "R_yr_over_l": "turn radius", "v_z": "surge, of the speed", "theta_deg": "slip angle [degrees]",
 }  # fmt: skip
-_YAW_RATE_HEAD = ("median", "95 %", "worst", "coverage")
-_YAW_RATE_WORDS = (
-    f"Coverage is the share of intervals for {100 * COVERAGE:.0f} % that hold the simulator's value. The lines "
-    "for one N are for robots without effects, touching or not."
-)
 _NO_TRUST = """
 - One tail: errors are several times larger, mostly where a strong couple yaws the robot (surface couple,
   left-right bias). Its response to a flip is not learned.
@@ -53,14 +47,23 @@ def _about_errors(inside: int, outside: int) -> str:
     )
 
 
-def model_card(lookup: NeuralTable, held_out: SimulatedRobots) -> str:
-    """Write the card of a table, from robots that it did not learn."""
-    answer = lookup.query(held_out.robots, intervals=True, flag=True)
-    truth = with_radius(held_out.motion)
+def coverage_by_group(lookup: NeuralTable, rows: SimulatedRobots) -> list[tuple[int, dict[str, float]]]:
+    """Return the number of robots and the coverage by output of each group of `surrogate.intervals`, (THIRDS,)."""
+    answer, truth = lookup.query(rows.robots, intervals=True, flag=True), with_radius(rows.motion)
+    motions, found = lookup.solve(rows.robots), []
+    assert lookup.intervals is not None
+    group = lookup.intervals.groups(lookup.width_features(motions), motions.robots) // 2
+    for own in ((group == third) & ~answer["outside"] for third in range(THIRDS)):
+        inside = [{name: values[own] for name, values in part.items()} for part in (answer, truth)]
+        found.append((int(own.sum()), coverage(*inside)))
+    return found
+
+
+def model_card(lookup: NeuralTable, held_out: SimulatedRobots, fresh: SimulatedRobots | None = None) -> str:
+    """Write the card of a table, from robots that it did not learn, and fresh ones if given for the intervals."""
+    answer, truth = lookup.query(held_out.robots, flag=True), with_radius(held_out.motion)
     known = ~answer["outside"]
     errors = {name: np.abs(error) for name, error in relative_errors(answer, truth).items()}
-    low, high = (answer[f"{_YAW_RATE}_{end}"] for end in ("low", "high"))
-    inside = (low <= truth[_YAW_RATE]) & (truth[_YAW_RATE] <= high)
     names = [name for name in ROBOT if name in lookup.ranges]
     ranges = ["{} {:.4g} to {:.4g}".format(name, *lookup.ranges[name]) for name in names]
     kinds = {words: kind & known for words, kind in _kinds(held_out).items()}
@@ -69,11 +72,6 @@ def model_card(lookup: NeuralTable, held_out: SimulatedRobots) -> str:
     counts = {f"N = {count:.0f}": shown & (tails == count) for count in np.unique(tails)}
     by_output = [
         (words, *(" / ".join(_quantiles(errors[name], name, kind)) for name in _TITLES))
-        for words, kind in kinds.items()
-        if np.count_nonzero(kind) >= _FEWEST
-    ]
-    yaw_rate = [
-        (words, *_quantiles(errors[_YAW_RATE], _YAW_RATE, kind, 1.0), f"{100 * inside[kind].mean():.0f} %")
         for words, kind in {**kinds, **counts}.items()
         if np.count_nonzero(kind) >= _FEWEST
     ]
@@ -86,10 +84,26 @@ def model_card(lookup: NeuralTable, held_out: SimulatedRobots) -> str:
         "## Errors",
         _about_errors(int(known.sum()), int((~known).sum())),
         *([_lines(("robots", *_TITLES.values()), by_output)] if by_output else []),
-        *(["## Yaw rate", _YAW_RATE_WORDS, _lines(("robots", *_YAW_RATE_HEAD), yaw_rate)] if yaw_rate else []),
+        *_about_groups(lookup, held_out if fresh is None else fresh),
         "## Where not to trust it",
         _NO_TRUST.strip(),
     ]) + "\n"  # fmt: skip
+
+
+def _about_groups(lookup: NeuralTable, rows: SimulatedRobots) -> list[str]:
+    """Write the section of the intervals; none where all groups are small."""
+    found = coverage_by_group(lookup, rows)
+    ends = [(min(shares.values()), max(shares.values())) if n >= _FEWEST else () for n, shares in found]
+    cells = [" to ".join(f"{100 * share:.0f}" for share in shares) for shares in ends]
+    names = [f"N = {1 + k % MOST_TAILS}{', with a couple in yaw' * (k // MOST_TAILS)}" for k in range(THIRDS // 3)]
+    thirds = zip(*(cells[third::3] for third in range(3)), strict=True)
+    lines = [(name, *shares) for name, shares in zip(names, thirds, strict=True) if any(shares)]
+    if not lines or lookup.intervals is None:
+        return []
+    slow, fast = lookup.intervals.speeds
+    words = f"Least and largest share of all outputs that intervals for {100 * COVERAGE:.0f} % hold, in per cent."
+    head = ("robots", f"omega_bar below {slow:.3g}", f"to {fast:.3g}", "above")
+    return ["## Intervals", words, _lines(head, lines)]
 
 
 def _kinds(held_out: SimulatedRobots) -> dict[str, Flags]:
@@ -114,10 +128,10 @@ def _what(lookup: NeuralTable) -> str:
     return f"{words} Code {made.get('code_version', 'unknown')}, {libraries}."
 
 
-def _quantiles(errors: Floats, name: str, kind: Flags, *more: float) -> list[str]:
-    """Write the median, the 95 % quantile and more of them of the errors of one output over some robots."""
+def _quantiles(errors: Floats, name: str, kind: Flags) -> list[str]:
+    """Write the median and the 95 % quantile of the errors of one output over some robots."""
     size = errors[kind & np.isfinite(errors)] * (1 if name == "theta_deg" else 100)
-    return [f"{value:.2g}" for value in np.quantile(size, [0.5, 0.95, *more])]
+    return [f"{value:.2g}" for value in np.quantile(size, [0.5, 0.95])]
 
 
 def _lines(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

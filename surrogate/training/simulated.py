@@ -1,15 +1,15 @@
 """Simulated robots as the look-up table learns them: from a data set's folder, or drawn and simulated here.
 
 The tails' wrench follows from a robot's own motion, whatever its head is. So robots with heads far wider than
-those of real robots make the best rows: `drawn` gives them. Columns have the names of the data set. Curves of
-the response to a flip are those of `sim.model.response`; rows without them have NaN.
+those of real robots make the best rows: `draw_robots` gives them. Columns have the names of the data set. Curves
+of the response to a flip are those of `sim.model.response`; rows without them have NaN.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -18,6 +18,7 @@ import pandas as pd
 from scipy.stats import qmc
 
 from dataset.data_set import read, read_manifest, usable
+from dataset.design import SWEEP_TOML, load_design
 from sim.arrays import Flags, Floats, Integers
 from sim.effects import effect_named, is_effect
 from sim.model.groups import Groups
@@ -25,7 +26,7 @@ from sim.model.response import BEFORE, DWELLS, LAG_PARTS
 from sim.motion.batches import in_batches
 from sim.motion.response import TOLERANCE, responses
 from sim.motion.steady import orbits
-from surrogate.domain import DOMAIN, MOST_TAILS, ROBOT, WIDE
+from surrogate.domain import COEFFICIENTS, DOMAIN, MOST_TAILS, ROBOT, WIDE
 
 MOTION = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap", "error")
 _TAILS = (1, 1, 2, 2, 3, 4, 5, 7)  # N of eighths of the wide robots; half of the last two have one tail more
@@ -132,6 +133,25 @@ def draw_robots(count: int, seed: int, *, wide: bool, effects: bool | None = Non
     robots["surface_couple"] = np.where(sense < 0.5, -size, size)
     robots["motor_droop"] = np.where(droop < 0.7, 0.0, 0.05 * 160 ** ((droop - 0.7) / 0.3))
     return robots
+
+
+def draw_as_users(count: int, seed: int) -> dict[str, Floats]:
+    """Draw robots as users do: a third each of the default sweep, and of DOMAIN with even C's and even ln C.
+
+    A quarter of them have effects on head and motor, half of them a couple in yaw.
+    """
+    robots = draw_robots(count, seed, wide=False, effects=True)
+    kind, with_effects, even, couple = np.random.default_rng((seed, 5)).uniform(size=(4, count))
+    for name in COEFFICIENTS:
+        low, high = DOMAIN[name]
+        share = np.log(robots[name] / low) / np.log(high / low)
+        robots[name] = np.where(kind < 2 / 3, low + (high - low) * share, robots[name])
+    swept: dict[str, Any] = {"a_over_R": 1.0, **replace(load_design(SWEEP_TOML), rows=count, seed=seed).points()}
+    robots |= {name: np.where(kind < 1 / 3, values, robots[name]) for name, values in swept.items()}
+    for name in set(filter(is_effect, robots)) - {"surface_couple"}:
+        robots[name] = np.where(with_effects < 1 / 4, robots[name], 0.0)
+    size = robots["surface_couple"]  # of the couples that are there, half are even
+    return robots | {"surface_couple": np.where((size == 0) | (even < 0.5), size, 3 * couple - 1.5)}
 
 
 def simulate_robots(

@@ -222,20 +222,26 @@ def _with_intervals(lookup: NeuralTable, width_rows: SimulatedRobots, held_out: 
     The intervals are those of all rows. The errors are those of robots without effects and with two tails and
     more, as far as there are any.
     """
-    (first_features, first, _, _), (features, errors, couples, inside) = (
-        _errors(lookup, rows) for rows in (width_rows, held_out)
-    )
-    intervals = Intervals.learned(first_features, first, features, errors, couples)
+    features, errors, _, _ = _errors(lookup, width_rows)
+    lookup = recalibrated(replace(lookup, intervals=Intervals.learned(features, errors)), held_out)
+    _, errors, _, inside = _errors(lookup, held_out)
     apart = held_out.motion["tail_gap"][inside] >= 1
     stated = np.ones(len(apart), dtype=bool)
     for kind in (without_effects(held_out.robots)[inside], held_out.robots["N"][inside] > 1):
         stated = stated & kind if (stated & kind).any() else stated
     report = summary({name: error[stated] for name, error in errors.items()}, apart[stated])
-    return replace(lookup, intervals=intervals, errors={**lookup.errors, **report})
+    return replace(lookup, errors={**lookup.errors, **report})
 
 
-def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[Floats, dict[str, Floats], Flags, Flags]:
-    """Return features, relative errors and couples of rows inside the domain, and which those are."""
+def recalibrated(lookup: NeuralTable, rows: SimulatedRobots) -> NeuralTable:
+    """Calibrate intervals to hold their share of robots like these in each group; it did not learn them."""
+    features, errors, robots, _ = _errors(lookup, rows)
+    intervals = lookup.intervals and lookup.intervals.calibrated(features, errors, robots)
+    return replace(lookup, intervals=intervals)
+
+
+def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[Floats, dict[str, Floats], Floats, Flags]:
+    """Return features, relative errors and packed robots of rows inside the domain, and which those are."""
     motions = lookup.solve(rows.robots)
     inside = motions.outside == INSIDE
     if inside.sum() < _MIN_INSIDE:  # a table of few rows has a domain that holds hardly any others: all count
@@ -245,7 +251,7 @@ def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[Floats, dict[st
     return (
         lookup.width_features(motions)[inside],
         {name: error[inside] for name, error in errors.items()},
-        motions.couples[inside],
+        motions.robots[inside],
         inside,
     )
 

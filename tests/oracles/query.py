@@ -18,7 +18,6 @@ from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate import tails
 from surrogate.domain import Support, products_of
 from surrogate.errors import RESPONSE_OUTPUTS, error_scale
-from surrogate.intervals import PARTS
 from surrogate.network import Ensemble
 from surrogate.table import NeuralTable
 
@@ -190,7 +189,7 @@ def _part(table: NeuralTable, k: int, r: Robots, within: Any, dwells: Any) -> di
     weight = tails.motion_sensitivity(r.own, u.T) @ tails.wrench_slopes(r.own, u.T)
     spread = np.linalg.norm((weight @ apart)[..., 0], axis=-1).mean(0)
     extra = [np.log(novelty + 1e-12), np.log(spread + 1e-9), np.log(number), np.full(len(number), k == 0)]
-    widths = _half_widths(table, np.nan_to_num(np.array([*x, *extra])), r.R[2, 4] != 0, result)
+    widths = _half_widths(table, np.nan_to_num(np.array([*x, *extra])), r, result)
     return {**result, **{f"{name}_half": half for name, half in widths.items()}, "outside": outside}
 
 
@@ -211,16 +210,16 @@ def _response(table: NeuralTable, twist: Any, x: Any, r: Robots, T: Any) -> dict
     return dict(zip(RESPONSE_OUTPUTS, (speed, *z[::-1]), strict=True))
 
 
-def _half_widths(table: NeuralTable, features: Any, couples: Any, result: dict[str, Any]) -> dict[str, Any]:
+def _half_widths(table: NeuralTable, features: Any, r: Robots, result: dict[str, Any]) -> dict[str, Any]:
     """Return half of the widths of the intervals by output, (M,) each, from features (11, M)."""
     w, widths = table.intervals, {}
     assert w is not None
-    octant = [1, 2, 4] @ (features[[0, 3, 5]] > w.middle[:, None])
-    part = np.where(features[-1] > 0.5, PARTS - 1, octant) + PARTS * couples
+    third = 24 * (r.R[2, 4] != 0) + 3 * (r.own.number.astype(int) - 1) + np.searchsorted(w.speeds, r.own.speed)
+    group = 2 * third + (features[7] > w.middle[third])
     z, pairs = np.clip((features.T - w.shift) / w.scale, -5, 5), np.triu_indices(len(features))
     design = np.column_stack([np.ones(len(z)), z, z[:, pairs[0]] * z[:, pairs[1]]])
     for name in [name for name in result if name in w.factor]:
         local = np.exp(np.clip(design @ w.weights[name], *w.bounds[name]))
-        half = np.resize(w.factor[name], 2 * PARTS)[part] * local * error_scale(name, result)
+        half = np.resize(w.factor[name], 96)[group] * local * error_scale(name, result)
         widths[name] = np.where(np.isfinite(result[name]), half, 0.0)
     return widths

@@ -15,9 +15,10 @@ from sim.model.response import BEFORE, DWELLS
 from surrogate.domain import Support
 from surrogate.error_modes import STEADY, CurveErrors, error_modes
 from surrogate.errors import error_scale, shortcomings, summary
-from surrogate.intervals import PARTS, Intervals
+from surrogate.intervals import NOVELTY, Intervals
 from surrogate.response import Basis
 from surrogate.table_file import load
+from surrogate.tails import COUPLE, NUMBER, ROBOT_NUMBERS
 from tests.surrogate.small import table
 
 ERRORS = {name: {"rms": 0.002} for name in (*STEADY, "lag_z", "lag_x", "lag_psi_rad")}
@@ -45,51 +46,60 @@ def test_each_input_must_be_in_its_range(size: int) -> None:
     assert beyond == pytest.approx((1.1 - support.shift[2]) / support.scale[2])
 
 
-def sampled(count: int, random: np.random.Generator, size: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
-    """Draw features with values from 0 to 1, a fifth of them with one tail, and errors of that size."""
-    features = random.uniform(size=(count, 8))
-    features[:, -1] = features[:, -1] < 0.2
-    return features, size(features) * random.standard_normal(count)
+def sampled(
+    count: int, random: np.random.Generator, size: Callable[[Floats, Floats], Floats]
+) -> tuple[Floats, Floats, Floats]:
+    """Draw features with values from 0 to 1, and packed robots, with errors of that size."""
+    features, robots = random.uniform(size=(count, 11)), np.zeros((count, ROBOT_NUMBERS))
+    robots[:, 0] = random.uniform(size=count)
+    robots[:, NUMBER], robots[:, COUPLE] = random.integers(1, 9, count), random.uniform(size=count) < 0.5
+    return features, size(features, robots) * random.standard_normal(count), robots
 
 
-def covered(size: Callable[[Floats], Floats]) -> tuple[Intervals, Floats, Flags]:
-    """Learn intervals from such errors; return fresh features, and which of their errors are inside."""
+def covered(size: Callable[[Floats, Floats], Floats], count: int = 40_000) -> tuple[Floats, Floats, Flags]:
+    """Learn intervals from such errors; return fresh features and robots, and which of their errors are inside."""
     random = np.random.default_rng(2)
-    (x, error), (more, other), (test, last) = (sampled(n, random, size) for n in (3000, 3000, 20000))
-    found = Intervals.learned(x, {"v": error}, more, {"v": other})
-    return found, test, np.abs(last) <= found.half_widths(["v"], test)[0]
+    (x, error, _), (more, other, known), (test, last, robots) = (
+        sampled(n, random, size) for n in (3000, count, 40_000)
+    )
+    found = Intervals.learned(x, {"v": error}).calibrated(more, {"v": other}, known)
+    return test, robots, np.abs(last) <= found.half_widths(["v"], test, robots)[0]
 
 
 def test_intervals_cover_as_they_say() -> None:
     """Errors whose size depends on an input: 90 % are covered, on the loud side and on the quiet side."""
-    _, test, inside = covered(lambda x: np.exp(3 * x[:, 0]))
+    test, _, inside = covered(lambda x, robots: np.exp(3 * x[:, 0]))
     assert inside.mean() == pytest.approx(0.9, abs=0.02)
     for side in (test[:, 0] < 0.3, test[:, 0] > 0.7):
         assert 0.86 < inside[side].mean() < 0.94
 
 
-def test_intervals_cover_in_each_part() -> None:
-    """Errors that are large in one octant and for one tail only, which the local width cannot follow."""
-    found, test, inside = covered(lambda x: 1 + 8 * (x[:, [0, 3, 5]] > 0.5).all(1) + 20 * (x[:, -1] > 0.5))
-    part = found.part(test)
-    assert sorted(set(part.tolist())) == list(range(9))
-    for k in range(9):
-        assert 0.85 < inside[part == k].mean() < 0.95
+GROUPED = {
+    "tails": lambda x, robots: 1 + 20 * (robots[:, NUMBER] == 2),
+    "couple": lambda x, robots: 1 + 4 * robots[:, COUPLE],
+    "speed": lambda x, robots: 1 + 8 * (robots[:, 0] > 2 / 3),
+    "novelty": lambda x, robots: 1 + 8 * (np.abs(x[:, NOVELTY] - 0.4) < 0.1),
+}
 
 
-@pytest.mark.parametrize(("with_couples", "groups"), [(0.5, 2), (0.01, 1)])
-def test_intervals_cover_with_and_without_couples(with_couples: float, groups: int) -> None:
-    """Errors that are five times as large with couples; with too few of these robots nothing is told apart."""
-    random = np.random.default_rng(3)
-    (x, error), (more, other), (test, last) = (
-        sampled(n, random, lambda x: 1 + x[:, 0]) for n in (3000, 3000, 20000)
-    )
-    couples, tested = (random.uniform(size=size) < with_couples for size in (3000, 20000))
-    found = Intervals.learned(x, {"v": error}, more, {"v": other * (1 + 4 * couples)}, couples)
-    inside = np.abs(last * (1 + 4 * tested)) <= found.half_widths(["v"], test, tested)[0]
-    assert len(found.factor["v"]) == groups * PARTS
-    assert inside[~tested].mean() == pytest.approx(0.9, abs=0.02)
-    assert (0.88 < inside[tested].mean() < 0.92) == (groups == 2)
+@pytest.mark.parametrize("kind", GROUPED)
+def test_intervals_cover_in_each_group(kind: str) -> None:
+    """Errors that are large in some groups, which the local width does not know or cannot follow."""
+    test, robots, inside = covered(GROUPED[kind])
+    third = np.searchsorted([1 / 3, 2 / 3], robots[:, 0])
+    group = np.column_stack([robots[:, NUMBER], robots[:, COUPLE], third, test[:, NOVELTY] > 0.5])
+    shares = [inside[(group == own).all(1)].mean() for own in np.unique(group, axis=0)]
+    assert len(shares) == 96
+    assert min(shares) > 0.8
+    assert max(shares) < 0.98
+    assert np.std(shares) < 0.025
+
+
+def test_a_group_of_few_robots_has_the_intervals_of_all_robots_with_as_many_tails() -> None:
+    """Groups of 17 robots; with as many tails there are 200."""
+    _, robots, inside = covered(lambda x, robots: 1 + 20 * (robots[:, NUMBER] == 2), 1600)
+    for tails in range(1, 9):
+        assert 0.85 < inside[robots[:, NUMBER] == tails].mean() < 0.95
 
 
 def test_figures_of_errors_and_a_table_of_few_rows_that_says_that_it_is_poor() -> None:

@@ -21,7 +21,7 @@ from sim.solve.refinement import orbit_on_mesh
 from surrogate.domain import INSIDE, ROBOT
 from surrogate.errors import certified_error
 from surrogate.interface import OutsideError
-from surrogate.intervals import PARTS
+from surrogate.intervals import GROUPS
 from surrogate.table import NeuralTable
 from surrogate.table_file import load
 from surrogate.tails import (
@@ -138,10 +138,9 @@ def test_widths_of_intervals_with_a_spread_of_the_members() -> None:
 
 @pytest.mark.parametrize("effect", ["", "surface_couple", "left_right_bias"])
 def test_robots_with_couples_in_yaw_have_factors_of_their_own(effect: str) -> None:
-    """Files of earlier versions have one group for all robots."""
     drawn = {name: values for name, values in robots(8).items() if name in ROBOT}
     drawn |= {effect: np.full(8, 0.05)} if effect else {}
-    factors = np.ones(PARTS), np.repeat([1.0, 3.0], PARTS)
+    factors = np.ones(1), np.repeat([1.0, 3.0], GROUPS // 2)
     one, two = (with_factor(load(), factor) for factor in factors)
     before, after = (lookup.query(drawn, flag=True, intervals=True) for lookup in (one, two))
     known = ~after["outside"]

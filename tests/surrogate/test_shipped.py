@@ -19,7 +19,7 @@ from surrogate.domain import BOUNDS, DOMAIN, MOST_TAILS, WIDE
 from surrogate.errors import coverage, relative_errors
 from surrogate.inverse import inverse
 from surrogate.table_file import SHIPPED, load
-from surrogate.training.simulated import draw_robots
+from surrogate.training.simulated import draw_as_users, draw_robots
 from surrogate.training.train import with_radius
 from tests.processes import LIMIT
 from tests.reference.cases import STEADY_INPUTS, STEADY_POINTS
@@ -84,6 +84,22 @@ def test_fresh_robots_are_near_the_simulator_and_inside_their_intervals() -> Non
         assert np.median(np.abs(errors[name][good])) < limit, name
     covered = coverage({n: v[good] for n, v in answer.items()}, {n: v[good] for n, v in truth.items()})
     assert 0.82 < np.mean([*covered.values()]) < 0.98
+
+
+@pytest.mark.parametrize("count", [6144, pytest.param(32768, marks=pytest.mark.rates)])
+def test_intervals_hold_for_each_number_of_tails_and_third_of_the_speeds(count: int) -> None:
+    """Robots drawn as users draw them; with one width for all N radii with two tails were inside in 54 %."""
+    drawn = draw_as_users(count, 91)
+    kept = (drawn["N"] >= 2) & (drawn["N"] <= 5) & (drawn["surface_couple"] == 0)
+    robots = {name: values[kept] for name, values in drawn.items()}
+    answer, truth, good = answered(robots)
+    third = np.searchsorted(np.quantile(robots["omega_bar"], [1 / 3, 2 / 3]), robots["omega_bar"])
+    for tails in (2, 3, 4, 5):
+        groups = [good & (robots["N"] == tails)]
+        groups += [groups[0] & (third == k) for k in range(3)]
+        for group, slack in zip(groups, (0.05, 0.09, 0.09, 0.09), strict=True):
+            covered = coverage({n: v[group] for n, v in answer.items()}, {n: v[group] for n, v in truth.items()})
+            assert np.abs(np.array([*covered.values()]) - 0.9).max() < slack, (tails, covered)
 
 
 @counts
