@@ -131,17 +131,14 @@ function widthFeatures(table, { head, tails, motion, inputs, own }) {
   return [...inputs, ...more].map((value) => (Number.isNaN(value) ? 0 : value));
 }
 
-/* The group of a robot among those that have intervals of their own: by N, motor speed and novelty. The page's robots
- * have no couple in yaw, so they are in the first half. */
-function groupOf({ speeds, middle }, robot, features) {
-  const speed = Math.abs(robot.omega_bar), faster = speeds.values.filter((limit) => speed > limit).length;
-  const third = 3 * (Math.min(robot.N, MOST_TAILS) - 1) + faster;
-  return 2 * third + (features[NOVELTY] > middle.values[third] ? 1 : 0);
+/* The group whose intervals a robot has; the page's robots have no couple in yaw. */
+function groupOf({ speeds, middle }, { N, omega_bar }, features) {
+  const faster = speeds.values.filter((speed) => Math.abs(omega_bar) > speed).length;
+  const third = 3 * (Math.min(N, MOST_TAILS) - 1) + faster;
+  return 2 * third + Number(features[NOVELTY] > middle.values[third]);
 }
 
-/* Half of the width of the interval of an output.
- *
- * intervals: as a model file has them. group: 0 where all robots have one factor. size: what errors are relative to. */
+/* Half of the width of the interval of an output; size: what errors are relative to. */
 function halfWidth({ shift, scale, weights, bounds, factor }, name, features, group, size) {
   const x = features.map((value, i) => clip((value - shift.values[i]) / scale.values[i], -5, 5)), terms = [1, ...x];
   x.forEach((value, i) => terms.push(...x.slice(i).map((other) => value * other)));
