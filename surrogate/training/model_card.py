@@ -84,14 +84,14 @@ def model_card(lookup: NeuralTable, held_out: SimulatedRobots, fresh: SimulatedR
         "## Errors",
         _about_errors(int(known.sum()), int((~known).sum())),
         *([_lines(("robots", *_TITLES.values()), by_output)] if by_output else []),
-        *_about_groups(lookup, held_out if fresh is None else fresh),
+        *_about_groups(lookup, fresh or held_out, "fresh robots" if fresh else "robots that calibrated them"),
         "## Where not to trust it",
         _NO_TRUST.strip(),
     ]) + "\n"  # fmt: skip
 
 
-def _about_groups(lookup: NeuralTable, rows: SimulatedRobots) -> list[str]:
-    """Write the section of the intervals; none where all groups are small."""
+def _about_groups(lookup: NeuralTable, rows: SimulatedRobots, which: str) -> list[str]:
+    """Write the section of the intervals, from robots that are described in words; none where groups are small."""
     found = coverage_by_group(lookup, rows)
     ends = [(min(shares.values()), max(shares.values())) if n >= _FEWEST else () for n, shares in found]
     cells = [" to ".join(f"{100 * share:.0f}" for share in shares) for shares in ends]
@@ -101,7 +101,10 @@ def _about_groups(lookup: NeuralTable, rows: SimulatedRobots) -> list[str]:
     if not lines or lookup.intervals is None:
         return []
     slow, fast = lookup.intervals.speeds
-    words = f"Least and largest share of all outputs that intervals for {100 * COVERAGE:.0f} % hold, in per cent."
+    words = (
+        f"Share of {len(rows)} {which} that intervals for {100 * COVERAGE:.0f} % hold, in per cent: the least and "
+        "the largest of all outputs."
+    )
     head = ("robots", f"omega_bar below {slow:.3g}", f"to {fast:.3g}", "above")
     return ["## Intervals", words, _lines(head, lines)]
 
