@@ -4,13 +4,14 @@ A pose needs two points on the axis of the robot, equally far ahead of and behin
 
     (x, y) = (front + rear) / 2,   heading = atan2(y_front - y_rear, x_front - x_rear)
 
-Only a rigid body of Motive has a heading of its own. The y axis of pictures points down and is reversed. Where a
-program is not sure of a point (`Program.likely`), the pose is lost.
+A rigid body of Motive and a TUM trajectory have a heading of their own. The y axis of pictures points down and
+is reversed. Where a program is not sure of a point (`Program.likely`), the pose is lost.
 """
 
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from pathlib import Path
 from typing import Unpack
@@ -18,14 +19,14 @@ from typing import Unpack
 import numpy as np
 import pandas as pd
 
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 from sim.io.reading import read_bytes
 from sim.io.tables import read_table
 from sim.io.track_options import TrackOptions
 from sim.io.tracking_programs import PROGRAMS, Program, Seen
 from sim.io.units import number_and_unit, of_kind, to_si
 
-_LISTED = 8  # names in a message
+_LISTED, _HEAD = 8, 400  # names in a message; bytes that tell which program wrote a file
 
 
 def read_tracks(path: str | Path, **options: Unpack[TrackOptions]) -> pd.DataFrame:
@@ -41,16 +42,19 @@ def read_tracks(path: str | Path, **options: Unpack[TrackOptions]) -> pd.DataFra
     if source is None:
         if others := options.keys() - {"written_by"}:
             raise InputError(f"--{min(others)} is for tracks of another program; say which with --from")
-        start = read_bytes(path, first=80).decode("latin-1").removeprefix("ï»¿") if path.is_file() else ""
-        if wrote := [name for name, program in PROGRAMS.items() if start.startswith(program.begins)]:
+        start = read_bytes(path, first=_HEAD).decode("latin-1").removeprefix("ï»¿") if path.is_file() else ""
+        wrote = [name for name, program in PROGRAMS.items() if re.match(program.begins, start)]
+        if not wrote:
+            return read_table(path)
+        if wrote != ["tum"]:  # which needs no options
             raise InputError(f"{path} is no table of poses; say what wrote it: --from {' or '.join(wrote)}")
-        return read_table(path)
+        source = "tum"
     if source not in PROGRAMS:
         raise InputError(f"no program {source!r}; there are {', '.join(PROGRAMS)}")
     program, runs = PROGRAMS[source], []
     for file in _films(path, program) if path.is_dir() else [path]:
         try:
-            with warnings.catch_warnings():
+            with warnings.catch_warnings(), naming(file):
                 warnings.simplefilter("ignore")  # pandas' of columns of mixed types
                 seen = program.read(file)
         except InputError:
@@ -80,13 +84,22 @@ def _poses(seen: Seen, path: Path, program: Program, options: TrackOptions) -> p
     """Make poses of the points of a file."""
     points, own_metres, own_seconds = seen
     fps, scale = options.get("fps"), options.get("scale")
-    for name, given, own in (("fps", fps, own_seconds), ("scale", scale, own_metres)):
-        if given is not None and own is not None:
-            raise InputError(f"{path} has its own units; leave out --{name}")
-    if own_seconds is None and not (fps and 0 < fps < math.inf):
-        raise InputError(f"{path} counts frames; give the frames per second of its film, such as --fps 30")
-    seconds = own_seconds or 1 / (fps or 1.0)
-    metres = own_metres or _length(path, scale)
+    seconds = own_seconds if own_seconds is not None else 1 / fps if fps else math.nan
+    metres = own_metres or _length(scale or "")
+    faults = [
+        f"has its own units; leave out --{name}"
+        for name, given, own in (("fps", fps, own_seconds), ("scale", scale, own_metres))
+        if given is not None and own is not None
+    ]
+    if own_seconds is not None and not 0 < own_seconds < math.inf:
+        faults.append(f"has frames {own_seconds:g} s apart; correct its frame rate, above 0 and finite")
+    elif not 0 < seconds < math.inf:
+        faults.append("counts frames; give the frames per second of its film, such as --fps 30")
+    if metres is None:
+        scaled = f"cannot have --scale {scale}" if scale else "has no unit of length"
+        faults.append(f"{scaled}; give the length of a pixel, or of the file's unit, such as --scale 0.2mm")
+    if metres is None or faults:
+        raise InputError(f"{path} {', and it '.join(faults)}")
     points.loc[points["sure"] < program.likely, ["x", "y"]] = math.nan
     if "heading" in points and not {"front", "rear"} & set(options):
         poses = points[points["robot"] != ""]
@@ -122,13 +135,10 @@ def _poses(seen: Seen, path: Path, program: Program, options: TrackOptions) -> p
     return table
 
 
-def _length(path: Path, words: str | None) -> float:
-    """Read the length of a pixel, in metres."""
-    value, unit = number_and_unit(words or "", of_kind("length"))
-    if unit is None or not 0 < value < math.inf:
-        given = f"--scale {words}" if words else f"{path} has no unit of length"
-        raise InputError(f"{given}; give the length of a pixel, or of the file's unit, such as --scale 0.2mm")
-    return float(to_si(value, unit))
+def _length(words: str) -> float | None:
+    """Read the length of a pixel, in metres; None: the words are none."""
+    value, unit = number_and_unit(words, of_kind("length"))
+    return float(to_si(value, unit)) if unit is not None and 0 < value < math.inf else None
 
 
 def _rows(points: pd.DataFrame, path: Path, name: str) -> pd.DataFrame:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, TypedDict
 
-Source = Literal["deeplabcut", "sleap", "trackmate", "tracker", "idtrackerai", "motive"]
+Source = Literal["deeplabcut", "sleap", "trackmate", "tracker", "idtrackerai", "motive", "tum"]
 
 
 class TrackOptions(TypedDict, total=False):

@@ -1,7 +1,7 @@
-"""Points that other programs have tracked: DeepLabCut, SLEAP, TrackMate, Tracker, idtracker.ai, Motive.
+"""Points that other programs have tracked: DeepLabCut, SLEAP, TrackMate, Tracker, idtracker.ai, Motive, TUM files.
 
-Each reader returns the points of one file, in the file's own units. Nothing in a file is run: of a pickle only
-numbers, texts, containers and arrays are read. Projects (.slp, .trk) are not read; export their tracks.
+Each reader returns the points of one file, in the file's own units. No pickle is loaded, and of HDF5 only numbers
+and texts within the file are read. Projects (.slp, .trk) are not read; export their tracks.
 `sim.io.pose_tracks` makes poses of the points.
 """
 
@@ -9,27 +9,26 @@ from __future__ import annotations
 
 import csv
 import io
-import pickle
-from collections.abc import Callable, Iterable, Mapping
+import math
+import pickletools
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from sim.io.errors import InputError
-from sim.io.reading import decode, read_bytes
+from sim.io.reading import MOST_BYTES, decode, read_bytes
 from sim.io.units import find_unit, split, to_si
 
 _HDF5 = (".h5", ".hdf5")
 _SPELLINGS = {"micron": "um", "microns": "um", "millimeters": "mm", "centimeters": "cm"}
 _SPOT = ["TRACK_ID", "FRAME", "POSITION_T", "POSITION_X", "POSITION_Y"]  # of TrackMate
-_ARRAYS = {  # what a pickle of arrays calls
-    ("numpy", "ndarray"), ("numpy", "dtype"), ("_codecs", "encode"),
-    *((f"numpy.{core}.multiarray", name) for core in ("core", "_core") for name in ("_reconstruct", "scalar")),
-}  # fmt: skip
+_MOST_NAMES = 2**16  # bytes of names
+_NUMBERS = r"(?:[-+.\de]+[ \t]+){7}[-+.\de]+"  # time, place and quaternion, in a line of text
 
 
 class Seen(NamedTuple):
@@ -46,7 +45,7 @@ class Program(NamedTuple):
     title: str
     read: Callable[[Path], Seen]
     endings: tuple[str, ...]  # of its files; of one film the first is read
-    begins: tuple[str, ...]  # how they begin, in Latin-1
+    begins: str  # how they begin, in Latin-1: a pattern
     y_down: bool = True  # as in pictures
     likely: float = 0.0  # least likelihood of a point that counts: the program's own default
 
@@ -87,17 +86,38 @@ def _hdf5(path: Path) -> Any:
     return h5py.File(io.BytesIO(read_bytes(path)), "r")
 
 
-class _Plain(pickle.Unpickler):
-    """A reader of pickles that calls nothing but what makes arrays."""
+def _stored(file: Any, name: str, most: int = MOST_BYTES) -> NDArray[Any]:
+    """Read a dataset of an HDF5 file.
 
-    def find_class(self, module: str, name: str) -> Any:
-        if (module, name) not in _ARRAYS:
-            raise pickle.UnpicklingError(f"it holds a {module}.{name}; export it as CSV")
-        return super().find_class(module.replace("numpy.core", "numpy._core"), name)
+    Raises:
+        InputError: it does not lie within the file, holds objects, or is too large.
+    """
+    from h5py import check_string_dtype
+
+    data = file[name]
+    faults = {
+        "lies in other files": data.is_virtual or data.external,
+        "holds objects": data.dtype.hasobject and check_string_dtype(data.dtype) is None,
+        f"has more than {most} bytes": data.nbytes > most,
+    }
+    for fault in (words for words, found in faults.items() if found):
+        raise InputError(f"{name!r} {fault}, which is not read; export the tracks as CSV")
+    return np.asarray(data[:])
 
 
-def _unpickled(data: bytes) -> Any:
-    return _Plain(io.BytesIO(data)).load()
+def _pickled_texts(data: bytes) -> list[str]:
+    """List the texts of a pickle in their order, without loading it."""
+    texts: list[str] = []
+    memo: dict[int, str | None] = {}
+    last = None  # the text that has just been read
+    for code, value, _ in pickletools.genops(data):
+        if code.name.endswith(("PUT", "MEMOIZE")):
+            memo[len(memo) if value is None else value] = last
+            continue
+        last = memo[value] if code.name.endswith("GET") else value if code.name.endswith("UNICODE") else None
+        if last is not None:
+            texts.append(last)
+    return texts
 
 
 def _unit(words: str, kind: str) -> float | None:
@@ -111,9 +131,11 @@ def _deeplabcut(path: Path) -> Seen:
     """Read the table of a film: scorer, perhaps individuals, bodyparts and coords stand above its columns."""
     if _is_hdf5(path):
         with _hdf5(path) as file:
-            table = file[next(iter(file))]["table"]
-            rows, names = table[:], _unpickled(bytes(table.attrs["values_block_0_kind"]))
+            table = file[next(iter(file))]
+            rows = _stored(table, "table")
+            texts = _pickled_texts(bytes(table["table"].attrs["values_block_0_kind"]))
         frames, values = rows["index"], rows["values_block_0"]
+        names = np.reshape(texts, (values.shape[1], -1)).tolist()
     else:
         text = _text(path)
         heads = 3 + text.split("\n", 2)[1].startswith("individuals")
@@ -134,23 +156,27 @@ def _sleap(path: Path) -> Seen:
     """Read an "analysis" export."""
     if _is_hdf5(path):
         with _hdf5(path) as file:
-            tracks, scores = file["tracks"][:], file["point_scores"][:]  # (robots, 2, nodes, frames), without 2
-            nodes = [name.decode() for name in file["node_names"]]
-            robots = [name.decode() for name in file["track_names"]] or [""]
+            tracks = _stored(file, "tracks")  # (robots, 2, nodes, frames)
+            scores = _stored(file, "point_scores") if "point_scores" in file else np.ones_like(tracks[:, 0])
+            nodes, robots = (
+                [name.decode() for name in _stored(file, f"{kind}_names", _MOST_NAMES).tolist()]
+                for kind in ("node", "track")
+            )
         frames = np.arange(tracks.shape[-1])
         return Seen(
             pd.concat(
                 _points(robot, node, frames, tracks[i, 0, k], tracks[i, 1, k], scores[i, k])
-                for i, robot in enumerate(robots)
+                for i, robot in enumerate(robots or [""])
                 for k, node in enumerate(nodes)
             )
         )
     table = _csv(path)
     nodes = [name.removesuffix(".x") for name in map(str, table) if name.endswith(".x")]
     seen = [
-        _points("", node, table["frame_idx"], table[f"{node}.x"], table[f"{node}.y"], table[f"{node}.score"])
+        _points("", node, table["frame_idx"], table[f"{node}.x"], table[f"{node}.y"],
+                sure=table.get(f"{node}.score", 1.0))
         for node in nodes
-    ]
+    ]  # fmt: skip
     robot_of = table["track"].fillna("").astype(str).to_numpy()
     return Seen(pd.concat(rows.assign(robot=robot_of) for rows in seen))
 
@@ -176,6 +202,8 @@ def _trackmate_xml(path: Path) -> tuple[pd.DataFrame, str, str]:
     rows: list[tuple[Any, ...]]
     if root.tag == "Tracks":
         interval = float(root.get("frameInterval", "1"))
+        if not 0 < interval < math.inf:
+            raise InputError(f"frameInterval is {interval:g}; correct it, above 0 and finite")
         rows = [
             (k, spot.get("t"), interval * float(spot.get("t", "nan")), spot.get("x"), spot.get("y"))
             for k, particle in enumerate(root.iter("particle"))
@@ -218,23 +246,18 @@ def _numbers(words: pd.Series) -> pd.Series:
 
 def _idtrackerai(path: Path) -> Seen:
     """Read trajectories; an individual is a point."""
-    about: Mapping[str, Any] = {}
-    if path.suffix.lower() == ".csv":
-        table = _csv(path).astype(float).to_numpy()
-        time, places = table[:, 0], table[:, 1:].reshape(len(table), -1, 2)
+    if path.suffix.lower() == ".npy":
+        raise InputError("it is a pickle, which is not read; export CSV or HDF5 from idtracker.ai")
+    if _is_hdf5(path):
+        with _hdf5(path) as file:
+            places, names = _stored(file, "trajectories"), file.attrs.get("identities_labels")
+            seconds = 1 / float(file.attrs["frames_per_second"])
+        time = np.arange(len(places))
     else:
-        if _is_hdf5(path):
-            with _hdf5(path) as file:
-                places, about = file["trajectories"][:], dict(file.attrs)
-        else:
-            data = io.BytesIO(read_bytes(path))
-            np.lib.format.read_magic(data)
-            np.lib.format.read_array_header_1_0(data)
-            about = _unpickled(data.read()).item()
-            places = about["trajectories"]
-        time = np.arange(len(places)) / float(about["frames_per_second"])
-    names: Iterable[object] = about.get("identities_labels", range(1, places.shape[1] + 1))
-    return Seen(pd.concat(_points("", name, time, *places[:, k].T) for k, name in enumerate(names)), None, 1.0)
+        table = _csv(path).astype(float).to_numpy()
+        time, places, names, seconds = table[:, 0], table[:, 1:].reshape(len(table), -1, 2), None, 1.0
+    names = range(1, places.shape[1] + 1) if names is None else names
+    return Seen(pd.concat(_points("", name, time, *places[:, k].T) for k, name in enumerate(names)), None, seconds)
 
 
 def _motive(path: Path) -> Seen:
@@ -259,13 +282,24 @@ def _motive(path: Path) -> Seen:
     return Seen(pd.concat(seen), _unit(about["Length Units"], "length"), 1.0)
 
 
+def _tum(path: Path) -> Seen:
+    """Read time, place and quaternion, in s and m, as SLAM writes them."""
+    table = _csv(path, sep=r"\s+", comment="#", header=None).to_numpy(dtype=float)
+    time, x, y, _, a, b, c, w = table.T
+    heading = np.arctan2(2 * (w * c + a * b), 1 - 2 * (b * b + c * c))  # of the body's x axis
+    return Seen(_points("robot", "robot", time - time.min(), x, y, heading=heading), 1.0, 1.0)
+
+
 PROGRAMS = {
-    "deeplabcut": Program("DeepLabCut", _deeplabcut, (".csv", *_HDF5), ("scorer,", "\x89HDF"), likely=0.6),
-    "sleap": Program("SLEAP", _sleap, (".csv", *_HDF5), ("track,frame_idx,", "\x89HDF"), likely=0.2),
-    "trackmate": Program("TrackMate", _trackmate, (".csv", ".xml"), ("LABEL,ID,TRACK_ID,", "<")),
-    "tracker": Program("Tracker", _tracker, (".txt", ".csv"), ("#multi:", "multi:"), y_down=False),
+    "deeplabcut": Program("DeepLabCut", _deeplabcut, (".csv", *_HDF5), "scorer,|\x89HDF", likely=0.6),
+    "sleap": Program("SLEAP", _sleap, (".csv", *_HDF5), "track,frame_idx,|\x89HDF", likely=0.2),
+    "trackmate": Program("TrackMate", _trackmate, (".csv", ".xml"), "LABEL,ID,TRACK_ID,|<"),
+    "tracker": Program("Tracker", _tracker, (".txt", ".csv"), "#?multi:", y_down=False),
     "idtrackerai": Program(
-        "idtracker.ai", _idtrackerai, (".csv", *_HDF5, ".npy"), ("seconds,x1,y1", "\x93NUMPY", "\x89HDF")
+        "idtracker.ai", _idtrackerai, (".csv", *_HDF5, ".npy"), "seconds,x1,y1|\x93NUMPY|\x89HDF"
     ),
-    "motive": Program("Motive", _motive, (".csv",), ("Format Version,",)),
+    "motive": Program("Motive", _motive, (".csv",), "Format Version,"),
+    "tum": Program(
+        "TUM", _tum, (".txt", ".tum"), rf"(?:(?:#.*\n)*#.* tx .*\n)?{_NUMBERS}[ \t]*\r?\n", y_down=False
+    ),
 }

@@ -287,7 +287,9 @@ FORMATS: dict[str, FileFormat] = {
         "a.xml", "trackmate", tracked_files.trackmate_xml, scale="1mm", fps=25.0, front="0", rear="1"
     ),
     "Tracker": _tracked("a.txt", "tracker", tracked_files.tracker, scale="1cm"),
-    "idtracker.ai": _tracked("a.npy", "idtrackerai", tracked_files.idtrackerai, scale="1mm", front="1", rear="2"),
+    "idtracker.ai": _tracked(
+        "a.csv", "idtrackerai", tracked_files.idtrackerai_csv, scale="1mm", front="1", rear="2"
+    ),
     "Motive": _tracked("a.csv", "motive", tracked_files.motive),
     "verdict": FileFormat(file("verdict.json", lambda: json.dumps(verdict()).encode()), _read_verdict, JSON),
 }  # fmt: skip

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import io
-import pickle
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +24,15 @@ WRITTEN: dict[str, tuple[str, bytes | Callable[[Path], None], dict[str, Any]]] =
     "run3DLC_resnet50_swim.h5": ("deeplabcut", files.deeplabcut_h5, FILMED),
     "run3.analysis.csv": ("sleap", files.sleap(), FILMED),
     "run3.analysis.h5": ("sleap", files.sleap_h5, FILMED),
+    "older.analysis.h5": ("sleap", partial(files.sleap_h5, scores=False), FILMED),
     "spots.csv": ("trackmate", files.trackmate(), {"scale": "0.5mm", **TRACKS}),
     "run3.xml": ("trackmate", files.trackmate_xml(), {**FILMED, **TRACKS}),
     "run3_Tracks.xml": ("trackmate", files.trackmate_tracks(), {"scale": "0.5mm", **TRACKS}),
     "run3.txt": ("tracker", files.tracker(), {"scale": "1cm"}),
-    "trajectories.npy": ("idtrackerai", files.idtrackerai(), {"scale": "0.5mm", **ANIMALS}),
     "trajectories.csv": ("idtrackerai", files.idtrackerai_csv(), {"scale": "0.5mm", **ANIMALS}),
     "trajectories.h5": ("idtrackerai", files.idtrackerai_h5, {"scale": "0.5mm", **ANIMALS}),
     "take.csv": ("motive", files.motive(), {}),
+    "trajectory.tum": ("tum", files.tum(), {}),
     "markers.csv": ("motive", files.motive(), {"front": "front", "rear": "rear"}),
 }
 
@@ -59,9 +59,9 @@ def test_every_file_has_the_same_poses(name: str, tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(seen.reset_index(drop=True), expected, rtol=1e-6, atol=1e-6)
     assert table.attrs["lost"] == [f"{path}: 1 of 40 poses are lost"]
     moved = read_tracks(path, written_by=source, **options, origin=(2.0, -1.0))
-    unit = {"tracker": 1.0, "motive": 100.0}.get(source, 0.05)
+    unit = {"tracker": 1.0, "motive": 100.0, "tum": 100.0}.get(source, 0.05)
     assert moved["x_cm"].to_numpy() == pytest.approx(table["x_cm"].to_numpy() - 2 * unit)
-    turned = -1.0 if source == "tracker" else 1.0
+    turned = -1.0 if source in ("tracker", "tum") else 1.0
     assert moved["y_cm"].to_numpy() == pytest.approx(table["y_cm"].to_numpy() - unit * turned)
 
 
@@ -98,6 +98,9 @@ def test_of_a_point_that_is_seen_twice_at_a_time_the_first_counts(tmp_path: Path
     ("run3DLC_resnet50_swim.csv", {**FILMED, "origin": (np.nan, 0.0)}, "--origin nan 0; give two finite numbers"),
     ("spots.csv", FILMED, "has its own units; leave out --fps"),
     ("take.csv", {"scale": "0.5mm"}, "has its own units; leave out --scale"),
+    ("spots.csv", {"fps": 25.0, **TRACKS}, "leave out --fps, and it has no unit of length; .* --scale 0.2mm"),
+    ("run3.xml", TRACKS, "counts frames; .* --fps 30, and it has no unit of length; .* --scale 0.2mm"),
+    ("run3.xml", {**FILMED, "fps": 1e-320}, "counts frames; give the frames per second"),
 ])  # fmt: skip
 def test_what_is_missing_or_too_much_is_said(
     name: str, options: dict[str, Any], words: str, tmp_path: Path
@@ -106,7 +109,7 @@ def test_what_is_missing_or_too_much_is_said(
         read_tracks(written(name, tmp_path), written_by=WRITTEN[name][0], **options)
 
 
-@pytest.mark.parametrize("name", WRITTEN)
+@pytest.mark.parametrize("name", [name for name in WRITTEN if name != "trajectory.tum"])
 def test_a_file_of_another_program_is_recognized(name: str, tmp_path: Path) -> None:
     path = written(name, tmp_path)
     if name == "markers.csv":
@@ -131,19 +134,29 @@ def test_without_a_program_a_table_is_read_as_it_is(tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(table.reset_index(drop=True), poses())
 
 
-def test_nothing_in_a_pickle_runs(tmp_path: Path) -> None:
-    class Trap:
-        def __reduce__(self) -> Any:
-            return Path.touch, (tmp_path / "ran",)
+@pytest.mark.parametrize("first", [0, 2])
+def test_a_trajectory_with_its_own_units_needs_no_options(first: int, tmp_path: Path) -> None:
+    path = tmp_path / "trajectory.txt"
+    path.write_bytes(b"\n".join(files.tum().splitlines()[first:]) + b"\n")
+    table = read_tracks(path).drop(columns="run")
+    assert table.to_numpy() == pytest.approx(poses().to_numpy(), abs=1e-5)
+    path.write_text("# time_s x_cm y_cm heading_deg a b c d\n" + "0 1 2 3 4 5 6 7\n")
+    assert read_tracks(path)["heading_deg"].tolist() == [3]
 
-    data = io.BytesIO()
-    np.save(data, {"trajectories": Trap(), "frames_per_second": 25}, allow_pickle=True)  # type: ignore[arg-type]
-    (tmp_path / "trajectories.npy").write_bytes(data.getvalue())
-    with pytest.raises(InputError, match=r"it holds a pathlib.* export it as CSV"):
-        read_tracks(tmp_path / "trajectories.npy", written_by="idtrackerai", scale="0.5mm")
-    assert not (tmp_path / "ran").exists()
-    pickle.loads(pickle.dumps(Trap()))
-    assert (tmp_path / "ran").exists()
+
+@pytest.mark.parametrize("interval", ["0", "-0.04", "inf", "nan"])
+def test_intervals_that_cannot_be_are_refused(interval: str, tmp_path: Path) -> None:
+    path = tmp_path / "tracks.xml"
+    path.write_bytes(files.trackmate_tracks().replace(b'"0.04"', f'"{interval}"'.encode()))
+    with pytest.raises(InputError, match=r"frameInterval is .*; correct it, above 0 and finite"):
+        read_tracks(path, written_by="trackmate", scale="0.5mm", **TRACKS)
+
+
+def test_a_pickle_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "trajectories.npy"
+    np.save(path, {"trajectories": np.zeros((4, 2, 2)), "frames_per_second": 25}, allow_pickle=True)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"npy: it is a pickle.* export CSV or HDF5 from idtracker.ai"):
+        read_tracks(path, written_by="idtrackerai", scale="0.5mm")
 
 
 def test_the_lost_frame_is_left_out() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import itertools
 import pickle
 from pathlib import Path
@@ -85,13 +84,14 @@ def sleap() -> bytes:
     return "\n".join([head, *("," + line for line in lines), ""]).encode()
 
 
-def sleap_h5(path: Path) -> None:
+def sleap_h5(path: Path, *, scores: bool = True) -> None:
     import h5py
 
     with h5py.File(path, "w") as file:
         tracks = np.stack([_seen(name) for name in DOTS], 1)[None]  # (tracks, 2, nodes, frames)
-        file["tracks"], file["point_scores"] = tracks, np.full(tracks[:, 0].shape, 0.8)
-        file["node_names"], file["track_names"] = np.array(list(DOTS), dtype="S"), np.zeros(0)
+        file["tracks"], file["node_names"], file["track_names"] = tracks, list(DOTS), np.zeros(0)
+        if scores:
+            file["point_scores"] = np.full(tracks[:, 0].shape, 0.8)
 
 
 def trackmate() -> bytes:
@@ -145,15 +145,6 @@ def tracker() -> bytes:
     return "\n".join([*lines, ""]).encode()
 
 
-def idtrackerai() -> bytes:
-    data = io.BytesIO()
-    trajectories = np.stack([_seen(name).T for name in DOTS], 1)
-    np.save(
-        data, {"trajectories": trajectories, "frames_per_second": 25, "video_path": "run.avi"}, allow_pickle=True
-    )  # type: ignore[arg-type]
-    return data.getvalue()
-
-
 def idtrackerai_csv() -> bytes:
     return ("seconds,x1,y1,x2,y2\n" + _rows(TIME, *_seen("front"), *_seen("rear"))).encode()
 
@@ -179,3 +170,14 @@ def motive() -> bytes:
              "Frame,Time (Seconds),X,Y,Z,W" + 3 * ",X,Y,Z"]  # fmt: skip
     dots = [c for name in DOTS for c in (_seen(name)[0] * PIXEL_CM / 100, zero, _seen(name)[1] * PIXEL_CM / 100)]
     return ("\n".join(heads) + "\n" + _rows(FRAMES, TIME, *body, *dots)).encode()
+
+
+def tum() -> bytes:
+    """A trajectory in m and s since 1970, with y upwards."""
+    x, y = CENTRE * [[PIXEL_CM / 100], [-PIXEL_CM / 100]]
+    x[LOST] = np.nan
+    rows = [
+        f"{1.7e9 + t:.4f} {a:.9f} {b:.9f} 0 0 0 {np.sin(h / 2):.9f} {np.cos(h / 2):.9f}"
+        for t, a, b, h in zip(TIME, x, y, HEADING, strict=True)
+    ]
+    return "\n".join(["# ground truth", "# timestamp tx ty tz qx qy qz qw", *rows, ""]).encode()
