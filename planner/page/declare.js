@@ -38,7 +38,7 @@ function feasible(raw, feasibility, progress = null) {
 /* Take the path as it was drawn, if the robot can follow it. */
 function asDrawn(raw, feasibility) {
   const drawn = reference(raw, feasibility.rod, spacingOf(raw), feasibility.drift);
-  const sharpest = largestSize(drawn.curvature) * pivotRadius(feasibility.vehicle);
+  const sharpest = largest(sharpness(drawn)) * pivotRadius(feasibility.vehicle);
   if (sharpest <= AS_DRAWN && !feasibility.timeWeight) return acceptedReference(raw, drawn, feasibility);
   if (feasibility.corner !== "error") return null;
   refuseCorner(raw, feasibility.robot);
@@ -59,17 +59,19 @@ function changed(raw, feasibility, way, progress = null) {
   return acceptedReference(raw, reference(path, rod, spacingOf(path), drift), feasibility);
 }
 
-/* Whether the pivot moves backwards somewhere, as a rod longer than the radius of its circle makes it. */
-function goesBack({ q, heading }) {
-  return q.slice(1).some(([x, y], i) => {
-    const angle = (heading[i + 1] + heading[i]) / 2;
-    return (x - q[i][0]) * Math.cos(angle) + (y - q[i][1]) * Math.sin(angle) < -BACK;
+/* Size of the curvature, infinite where the pivot goes back, as a rod longer than its circle does. */
+function sharpness({ q, heading, curvature }) {
+  return curvature.map((turn, i) => {
+    const angle = (heading[i + 1] + heading[i]) / 2, [x, y] = q[i], [nextX, nextY] = q[i + 1];
+    const ahead = (nextX - x) * Math.cos(angle) + (nextY - y) * Math.sin(angle);
+    return ahead < -BACK ? Infinity : Math.abs(turn);
   });
 }
 
 /* Accept a reference that turns wide enough and keeps the shape of the drawn path. */
 function acceptedReference(raw, followed, { vehicle }) {
-  if (largestSize(followed.curvature) > TIGHTEST / pivotRadius(vehicle) || goesBack(followed)) return null;
+  const [x, y] = followed.p[0], still = followed.p.every((point) => point[0] === x && point[1] === y);
+  if (still || largest(sharpness(followed)) > TIGHTEST / pivotRadius(vehicle)) return null;
   const [offDrawn, missed] = twoSided(followed.p, polyline(raw));
   const lost = Math.min(LOST * Math.max(...extent(raw)), turnRadius(vehicle));
   return Math.max(offDrawn, missed) > lost ? null : { reference: followed, offDrawn, missed };
@@ -167,7 +169,7 @@ function declare(raw, feasibility, progress = null) {
 /* Say where a path is too tight, and what to change. */
 function tooTight(raw, feasibility, progress) {
   const { robot, vehicle, rod, drift } = feasibility, drawn = reference(raw, rod, spacingOf(raw), drift);
-  const curvature = drawn.curvature.map(Math.abs), worst = placeOfLargest(curvature);
+  const curvature = sharpness(drawn), worst = placeOfLargest(curvature);
   const within = inLab(pivotRadius(vehicle) / TIGHTEST, robot), circle = inLab(turnRadius(vehicle), robot);
   return `path too tight at ${placeInLab(...drawn.p[worst], robot)}: the pivot would turn with radius `
     + `${inLab(1 / curvature[worst], robot)}, the robot can with ${within}; its circle has radius ${circle}, and `

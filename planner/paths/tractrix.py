@@ -135,10 +135,10 @@ class Reference:
         return np.diff(self.heading) / step
 
     @property
-    def goes_back(self) -> bool:
-        """Whether the pivot moves backwards somewhere, as a rod longer than the radius of its circle makes it."""
+    def sharpness(self) -> Floats:
+        """Size of the curvature, (m − 1,), infinite where the pivot goes back."""
         ahead = (np.diff(self.q, axis=0) * axis_at((self.heading[1:] + self.heading[:-1]) / 2)).sum(1)
-        return bool((ahead < -_BACK).any())
+        return np.where(ahead < -_BACK, np.inf, np.abs(self.curvature))
 
     @property
     def poses(self) -> Floats:

@@ -120,7 +120,7 @@ def as_drawn(raw: Path2D, feasibility: Feasibility) -> Declared | None:
         InputError: corners are not allowed, and the path has one.
     """
     drawn = reference(raw, feasibility.rod, spacing(raw), feasibility.drift)
-    sharpest = float(np.abs(drawn.curvature).max()) * feasibility.vehicle.pivot_radius
+    sharpest = float(drawn.sharpness.max()) * feasibility.vehicle.pivot_radius
     if sharpest <= AS_DRAWN and not feasibility.time_weight:
         return _accepted(raw, drawn, feasibility)
     if feasibility.corner != "error":
@@ -146,8 +146,8 @@ def changed(raw: Path2D, feasibility: Feasibility, way: Way, progress: Progress 
 
 def _accepted(raw: Path2D, followed: Reference, feasibility: Feasibility) -> Declared | None:
     """Accept a reference that turns wide enough, only goes ahead, and keeps the shape of the drawn path."""
-    curvature = float(np.abs(followed.curvature).max())
-    if curvature > TIGHTEST / feasibility.vehicle.pivot_radius or followed.goes_back:
+    curvature = float(followed.sharpness.max())
+    if curvature > TIGHTEST / feasibility.vehicle.pivot_radius or not np.ptp(followed.p, axis=0).any():
         return None
     declared = Declared(followed, curvature, *two_sided(followed.p, raw.polyline()))
     lost = min(LOST * max(extent(raw)), feasibility.vehicle.turn_radius)
@@ -300,7 +300,7 @@ def _too_tight(raw: Path2D, feasibility: Feasibility, progress: Progress | None)
     """Say where a path is too tight, and what to change."""
     robot, vehicle = feasibility.robot, feasibility.vehicle
     drawn = reference(raw, feasibility.rod, spacing(raw), feasibility.drift)
-    curvature = np.abs(drawn.curvature)
+    curvature = drawn.sharpness
     worst = place_of_largest(curvature)
     x, y = drawn.p[worst]
     return (

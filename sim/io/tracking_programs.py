@@ -108,7 +108,7 @@ def _stored(file: Any, name: str, most: int = MOST_BYTES) -> NDArray[Any]:
 def _pickled_texts(data: bytes) -> list[str]:
     """List the texts of a pickle in their order, without loading it."""
     texts: list[str] = []
-    memo: dict[int, str | None] = {}
+    memo: dict[Any, str | None] = {}
     last = None  # the text that has just been read
     for code, value, _ in pickletools.genops(data):
         if code.name.endswith(("PUT", "MEMOIZE")):
@@ -140,7 +140,8 @@ def _deeplabcut(path: Path) -> Seen:
         text = _text(path)
         heads = 3 + text.split("\n", 2)[1].startswith("individuals")
         written = pd.read_csv(io.StringIO(text), header=list(range(heads)), index_col=0)
-        frames, values, names = written.index, written.to_numpy(dtype=float), written.columns
+        frames, values = written.index.to_numpy(), written.to_numpy(dtype=float)
+        names = [list(name) for name in written.columns]
     columns = {tuple(name): values[:, k] for k, name in enumerate(names)}
     parts = dict.fromkeys(name[:-1] for name in columns)
     return Seen(

@@ -97,8 +97,8 @@ def test_the_poses_of_a_replay_are_found_with_errors_that_hold_and_its_plan_is_c
     said = []
     for name in ("true.csv", "tracks.csv"):
         run("check", folder / "plan.json", tmp_path / name)
-        said.append(capsys.readouterr().out.split())
-    simulated, seen = (float(words[2]) for words in said)  # tracking error 2.27 cm (0.206 l) rms
+        said.append(capsys.readouterr().out.partition("tracking error ")[2].split())
+    simulated, seen = (float(words[0]) for words in said)  # 2.27 cm (0.206 l) rms
     assert seen == pytest.approx(simulated, abs=0.02)
     assert "within" in said[1]
 
