@@ -50,15 +50,20 @@ class Film:
         if not self._capture.isOpened() or not self._capture.grab():
             raise InputError(f"{path} is no film that can be read; convert it: ffmpeg -i FILM film.mp4")
         self._number = 0  # of the next frame
-        self.count = max(int(self._capture.get(cv.CAP_PROP_FRAME_COUNT)), 1)
+        self.count = int(self._capture.get(cv.CAP_PROP_FRAME_COUNT))
+        if self.count <= 0:  # the film does not state them
+            self.count = 1
+            while self._capture.grab():
+                self.count += 1
         self._capture = cv.VideoCapture(self.path, cv.CAP_FFMPEG, [cv.CAP_PROP_N_THREADS, 2])
 
     def samples(self, number: int, start: float = 0.0, end: float = math.inf) -> Iterator[Any]:
         """Yield pictures at about equal distances from `start` to `end` [s]."""
         seeking = self._cv.VideoCapture(self.path, self._cv.CAP_FFMPEG)
         rate = float(seeking.get(self._cv.CAP_PROP_FPS))
+        rate = rate if 0 < rate < math.inf else 0.0
         first, last = np.clip([start * rate, end * rate if rate else math.inf], 0, self.count - 1)
-        for index in np.linspace(first, last, number).astype(int):
+        for index in np.unique(np.linspace(first, last, number).astype(int)):
             seeking.set(self._cv.CAP_PROP_POS_FRAMES, int(index))
             good, picture = seeking.read()
             if good:

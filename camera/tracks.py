@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _SHOWN = 10  # poses in the picture of a track
+_UNCOUNTED = 0.01  # of the frames of a film, by which the number that it states may differ from what is read
 _GAP = 1.5  # usual times between two frames, at which frames are missing
 _CERTAIN = 5.0  # standard errors by which a robot that moves tail first has moved
 _EXCHANGE = "exchange the colours of front and rear in view.toml (turn a tag by 180 degrees)"
@@ -76,7 +77,7 @@ def track_film(
         why = {each.name: Counter[str]() for each in setup.robots}
         times, doubled, picture = [], 0, None
         for frame in film.frames(start, end):
-            if progress is not None and frame.number % 100 == 0:
+            if progress is not None and frame.number % 10 == 0:
                 progress(frame.number, film.count)
             times.append(frame.time_s)
             if frame.doubled:
@@ -91,6 +92,14 @@ def track_film(
         if picture is None:
             raise InputError(f"no frame between {start:g} and {end:g} s; the film has {film.count} frames")
         notes, steps = list[str](), np.diff(times)
+        if start <= 0 and end == math.inf and film.count - len(times) > max(_UNCOUNTED * film.count, 2):
+            unread = f"the film states {film.count} frames, {len(times)} can be read"
+            if Path(path).suffix.lower() == ".avi":
+                raise InputError(
+                    f"{unread}: an AVI has no time stamps, so times after a gap are too early; track the part "
+                    "before it (--end), or film again"
+                )
+            notes.append(f"{unread}: it is damaged or cut")
         if gaps := int((steps > _GAP * np.median(steps)).sum()) if len(steps) else 0:
             notes.append(f"{gaps} gaps in the time stamps: the camera dropped frames")
         if doubled:

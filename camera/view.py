@@ -34,6 +34,7 @@ from sim.io.units import split, to_si
 HUES = {"red": 0, "orange": 30, "yellow": 60, "green": 120, "cyan": 180, "blue": 240, "magenta": 300}  # degrees
 BANDS = ("front", "rear")
 DOTS = ("head", "tail")  # markers that come and go as the robot spins
+_POSSIBLE = (1e-5, 1e3)  # m, between which a length in a tank is
 _CLICK = 1.0  # pixels, standard deviation of a point that a person reads off a picture
 _APART = 40  # degrees between the hues of two markers
 _NARROW = 1e-3  # of the length of a set of points, its width at which they lie on a line
@@ -252,8 +253,8 @@ def _with_scale(view: View, scale: Mapping[str, Any]) -> View:
             "of a ruler, or points_px and points_cm, four or more and their places, or tag_cm, a tag's side"
         )
     if "tag" in scale:
-        if not scale["tag"] > 0:
-            raise InputError("[scale] the tag's side is not above 0; give its length, tag_cm = 4")
+        if not _POSSIBLE[0] < scale["tag"] < _POSSIBLE[1]:
+            raise InputError(f"[scale] the tag's side is {scale['tag']:g} m; give its length, tag_cm = 4")
         return replace(view, tag=(_tag_number(scale.get("tag_id", 0), "[scale] tag_id"), float(scale["tag"])))
     pixels = _points(scale, "points_px", 2)
     plane = replace(view, homography=np.eye(3)).to_tank(pixels)
@@ -262,7 +263,11 @@ def _with_scale(view: View, scale: Mapping[str, Any]) -> View:
     if len(pixels) != 2:
         raise InputError(f"[scale] a length and {len(pixels)} points_px; give two, or points_cm, a place for each")
     distance = float(np.linalg.norm(plane[1] - plane[0]))
-    if not (scale["length"] > 0 and distance > 0):
+    if not _POSSIBLE[0] < scale["length"] < _POSSIBLE[1]:
+        raise InputError(
+            f"[scale] the length is {scale['length']:g} m; give that between the points, length_cm = 30"
+        )
+    if not distance > 0:
         raise InputError("[scale] the two points or their distance are the same; give two ends of a ruler")
     homography = _scaled(plane[0], float(scale["length"]) / distance, view.up)
     return replace(view, homography=homography, scale_error=_CLICK * math.sqrt(2) / distance)

@@ -231,11 +231,11 @@ def _live(
 
     length = plan.robot.length_scale
 
-    def row(sight: Sight, direction: int, error: float) -> None:
+    def row(sight: Sight, direction: int, error: float, alarm: bool) -> None:
         if sight.pose is not None:
             x, y, heading = sight.pose
             place = f"{100 * length * x:.4f},{100 * length * y:.4f},{math.degrees(heading):.3f}"
-            print(f"{sight.time:.4f},{place},{direction},{100 * length * error:.4f}", flush=True)
+            print(f"{sight.time:.4f},{place},{direction},{100 * length * error:.4f},{alarm:d}", flush=True)
 
     def tell(line: str) -> None:
         print(line, file=sys.stderr, flush=True)
@@ -243,7 +243,7 @@ def _live(
     sights, ride = watch(source, view, plan.robot.name, length, latency), Ride()
     with ending_on_signals():
         motor = Motor(port)
-        print("time_s,x_cm,y_cm,heading_deg,direction,error_cm", flush=True)
+        print("time_s,x_cm,y_cm,heading_deg,direction,error_cm,alarm", flush=True)
         try:
             with Pictures(sights) as pictures, motor:  # which stops first
                 steer(ride, pictures, motor, begin, plan.robot.time_scale, lost=lost, row=row, tell=tell)

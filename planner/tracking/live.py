@@ -28,12 +28,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from planner.planning.request import POSE
 from planner.tracking.tracker import Tracker
 from sim.io.errors import InputError
 
 REPEAT = 0.2  # s between two orders, at most
 WATCHDOG = 1.0  # s without a byte after which the board stops the motor
+FROZEN = 40  # pictures without any change, after which they count as none
 RESET = 2.0  # s in which a board that resets as its port is opened gets ready
 _ORDERS = {1: b"F\n", -1: b"B\n", 0: b"S\n"}
 
@@ -142,14 +145,18 @@ class Ride:
     delays: list[float] = field(default_factory=list)  # from a picture with the robot to the order after it [s]
     late: list[float] = field(default_factory=list)  # from an announced flip to its order [s]
     rests: int = 0  # of the motor before the end
+    alarms: int = 0
+    missing: str = "no picture"  # why the robot was not seen the last time
     finished: bool = False
 
     def line(self) -> str:
         """Say it in a sentence."""
-        delays, late = sorted(self.delays) or [0.0], max(self.late, default=0.0)
+        if not self.delays:
+            return f"the robot was never seen in {self.pictures} pictures ({self.missing}); the motor rested"
+        delays, late = sorted(self.delays), max(self.late, default=0.0)
         return (
             f"the path has {'ended' if self.finished else 'not ended'}; the robot seen in {len(self.delays)} of "
-            f"{self.pictures} pictures, lost {self.rests} times; from picture to order "
+            f"{self.pictures} pictures, lost {self.rests} times, {self.alarms} alarms; from picture to order "
             f"{1e3 * delays[len(delays) // 2]:.0f} ms, {1e3 * delays[-1]:.0f} ms at most; {len(self.late)} flips, "
             f"{1e3 * late:.0f} ms late at most"
         )
@@ -163,7 +170,7 @@ def steer(
     unit: float,
     *,
     lost: float,
-    row: Callable[[Sight, int, float], object],
+    row: Callable[[Sight, int, float, bool], object],
     tell: Callable[[str], object],
 ) -> None:
     """Steer until the path or the film ends.
@@ -175,14 +182,14 @@ def steer(
         begin: makes a tracker that begins at rest at a pose and a time [μ0 l⁴/EI].
         unit: of the tracker's time [s].
         lost: time without a pose after which the motor rests [s].
-        row: is given each sight, the direction ordered then, and the tracker's bound on the error [l].
+        row: is given each sight, the direction ordered then, the tracker's bound on the error [l], and its alarm.
         tell: is given what the user should know at once.
 
     Raises:
         InputError: the board or the camera has gone.
     """
     tracker: Tracker | None = None
-    direction, flip_at, error, missing = 0, math.inf, math.nan, "no picture"
+    direction, flip_at, error, alarm, waiting = 0, math.inf, math.nan, False, True
     seen_at = ordered_at = pictures.now()
     nothing = Sight(0.0, None)
     while not ride.finished:
@@ -194,12 +201,12 @@ def steer(
             break
         now = pictures.now()
         seen_at = seen_at if sight.pose is None else sight.time
-        missing = sight.why or missing
+        ride.missing = sight.why or ride.missing
         held_up = now - ordered_at >= WATCHDOG
         if tracker is not None and (held_up or now - seen_at > lost):
-            why = "the program was held up" if held_up else f"no robot for {lost:g} s ({missing})"
+            why = "the program was held up" if held_up else f"no robot for {lost:g} s ({ride.missing})"
             tell(f"{why}; the motor rests until the robot is seen")
-            tracker, direction, flip_at, error = None, 0, math.inf, math.nan
+            tracker, direction, flip_at, error, alarm = None, 0, math.inf, math.nan, False
             ride.rests += 1
         elif tracker is not None or sight.pose is not None:
             due, before = flip_at, direction
@@ -209,14 +216,21 @@ def steer(
                 tracker = begin(sight.pose, now / unit)
                 command = tracker.command
             direction, flip_at, error = command.direction, command.flip_at * unit, command.error
+            if command.alarm and not alarm:
+                tell(f"alarm at {now:.1f} s: the robot does not swim as planned, or does not move; see to it")
+                ride.alarms += 1
+            alarm, waiting = command.alarm, False
             ride.finished = command.finished
             ride.late += [max(now - due, 0.0)] * (direction == -before != 0)
+        elif waiting and now - seen_at > lost:
+            tell(f"no robot for {lost:g} s from the start ({ride.missing}); the motor rests until it is seen")
+            waiting = False
         motor.turn(direction)
         ordered_at = now
         if sight is not nothing:
             ride.pictures += 1
             ride.delays += [pictures.now() - sight.time] * (sight.pose is not None)
-            row(sight, direction, error)
+            row(sight, direction, error, alarm)
     motor.turn(0)
 
 
@@ -242,20 +256,27 @@ def watch(source: str, view: str, robot: str, length: float, latency: float) -> 
         names = ", ".join(each.name for each in marked)
         raise InputError(f"{view}: several robots, {names}; call the one that swims {robot!r}, as the plan does")
     detector = Detector(marked, setup.view)
-    live = source.isdigit() or source.startswith("/dev/")
-    device: Any = cv.VideoCapture(int(source) if source.isdigit() else source)
+    live = source.isdecimal() or source.startswith("/dev/")
+    try:
+        device: Any = cv.VideoCapture(int(source) if live and source.isdecimal() else source)
+    except (cv.error, OverflowError, SystemError) as refusal:
+        raise InputError(f"--camera {source}: no such camera") from refusal
     if not device.isOpened():
         raise InputError(f"--camera {source}: no such {'camera, or another program has it' if live else 'film'}")
     device.set(cv.CAP_PROP_BUFFERSIZE, 1)  # the latest picture, not one that has waited
 
     def sights(now: Clock) -> Iterator[Sight]:
-        began = now()
+        began, before, same = now(), None, 0
         while device.grab():
             if not live:
                 time.sleep(max(began + device.get(cv.CAP_PROP_POS_MSEC) / 1e3 - now(), 0.0))
             taken = now() - latency
             good, picture = device.retrieve()
+            same = same + 1 if good and before is not None and np.array_equal(picture, before) else 0
+            before = picture if good else before
             (seen,) = detector.poses(picture) if good else (Lost(robot, "a damaged picture"),)
+            if same >= FROZEN:
+                seen = Lost(robot, f"the last {same} pictures are the same one: is the camera frozen?")
             if isinstance(seen, Lost):
                 yield Sight(taken, None, seen.why)
             else:

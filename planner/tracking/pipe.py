@@ -34,7 +34,7 @@ from dataclasses import dataclass
 
 from planner.paths.units import Swimmer
 from planner.planning.request import POSE
-from planner.tracking.tracker import Tracker
+from planner.tracking.tracker import Tracker, is_near
 from sim.io.errors import InputError
 from sim.io.units import from_si, split, to_si
 
@@ -74,11 +74,11 @@ def answers(
             continue
         first = False
         now, pose, seen = columns.read(words[1:] if words[:1] == [BEGIN] else words)
-        if begin is not None and (tracker is None or words[:1] == [BEGIN]) and pose and _finite(now, *pose):
+        if begin and (tracker is None or words[:1] == [BEGIN]) and pose and is_near(pose) and math.isfinite(now):
             tracker = begin(pose, now)
             command = tracker.command
         elif tracker is None:
-            last = now if _finite(now) else last
+            last = now if math.isfinite(now) else last
             yield f"0 {last * time_scale + WAIT:.9f} nan 0"
             continue
         elif words[:1] == [BEGIN]:  # without a pose it counts as nothing
@@ -91,10 +91,6 @@ def answers(
         yield f"{command.direction} {flip_at:.9f} {error:.4f} {int(command.alarm)}"
         if command.finished:
             return
-
-
-def _finite(*numbers: float) -> bool:
-    return all(map(math.isfinite, numbers))
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ then with its own. Signatures are read from the source, not imported: help needs
 from __future__ import annotations
 
 import ast
+import os
 import re
 import sys
 import warnings
@@ -188,6 +189,9 @@ def _sentence(about: str) -> str:
     return f"{about[0].upper()}{about[1:]}."
 
 
+_OUTPUTS = ("out", "check", "shapes")  # parameters that name files to write
+
+
 class Call(NamedTuple):
     """A public function, imported when called, with what was written for it."""
 
@@ -254,10 +258,30 @@ class Command(NamedTuple):
     def main(self, prog: str, words: list[str]) -> None:
         """Parse words and run the command."""
         call, own = self.read(prog, words)
+        _check_outputs({**call.given, **own})
         with warnings.catch_warnings():
             warnings.simplefilter("default", InputWarning)  # each line once
             warnings.showwarning = partial(_show_warning, warnings.showwarning)
             self.run(*([call] if self.of else []), **own)
+
+
+def _check_outputs(given: Mapping[str, Any]) -> None:
+    """Refuse an output that is an input, or another output.
+
+    Raises:
+        InputError: they are the same file.
+    """
+    outputs = [(name, value) for name, value in given.items() if name in _OUTPUTS and isinstance(value, str)]
+    others = [(name, each) for name, value in given.items() if name not in _OUTPUTS
+              for each in ([value] if isinstance(value, str) else value if isinstance(value, list | tuple) else ())
+              if isinstance(each, str)]  # fmt: skip
+    for k, (name, value) in enumerate(outputs):
+        for other, word in others + outputs[:k]:
+            known = os.path.isfile(value) and os.path.isfile(word) and os.path.samefile(value, word)
+            if known or (other in _OUTPUTS and os.path.realpath(value) == os.path.realpath(word)):
+                raise InputError(
+                    f"--{name} {value} is the same file as {other.replace('_', '-')} {word}; give another name"
+                )
 
 
 def _show_warning(otherwise: Callable[..., None], message: Warning | str, *place: Any) -> None:

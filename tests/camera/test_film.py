@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pandas as pd
 import pytest
@@ -18,6 +19,7 @@ from camera.film import Film
 from camera.spin import Spin, fit_spin
 from camera.tracks import FilmTracks, track_film, turn_sense
 from camera.view import Setup, read_setup
+from planner.tracking.live import FROZEN, watch
 from sim.arrays import Floats
 from sim.inputs import load_robot
 from sim.io.errors import InputError, run_command
@@ -397,3 +399,33 @@ def test_mirrored_and_slow_films_are_named_when_runs_are_measured(
     ]
     assert measured.excluded[0] == f"run a: no spin of the head: {slow[0]}"
     assert measured.table["R_yr_cm"][0] == pytest.approx(100 * RADIUS, rel=0.02)
+
+
+def test_a_film_with_a_hole_is_refused_since_later_frames_come_too_early(tmp_path: Path) -> None:
+    """An AVI has no time stamps; the part before the hole is tracked where it is asked for."""
+    tank, path = small(), tmp_path / "film.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10, (320, 240))
+    for k in range(60):
+        writer.write(tank.frame(SWUM, k / 10))
+    writer.release()
+    whole = bytearray(path.read_bytes())
+    assert len(track_film(path, setup_of(tank, tmp_path)).tables["1"]) == 60
+    half = len(whole) // 2
+    whole[half : half + len(whole) // 6] = bytes(len(whole) // 6)
+    path.write_bytes(whole)
+    with pytest.raises(InputError, match=r"states 60 frames, \d\d can be read: an AVI has no time stamps"):
+        track_film(path, setup_of(tank, tmp_path))
+    assert len(track_film(path, setup_of(tank, tmp_path), end=2.0).tables["1"]) == 21
+
+
+def test_a_frozen_camera_shows_no_robot(tmp_path: Path) -> None:
+    tank, path = small(), tmp_path / "film.avi"
+    setup_of(tank, tmp_path)
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 50, (320, 240))
+    picture = tank.frame(SWUM, 0.0)
+    for _ in range(FROZEN + 5):
+        writer.write(picture)
+    writer.release()
+    sights = [*watch(str(path), str(tmp_path / "view.toml"), "1", TAIL, 0.0)(lambda: 1e9)]
+    assert [sight.pose is not None for sight in sights] == FROZEN * [True] + 5 * [False]
+    assert sights[-1].why.endswith("is the camera frozen?")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -135,6 +136,24 @@ def test_the_motor_stops_where_the_film_ends() -> None:
     ride, _ = steered(tank)
     assert not ride.finished
     assert tank.time < 21
+
+
+def test_an_alarm_is_told_once_and_stands_in_the_track() -> None:
+    """The robot hangs on something: it is seen, always in the same place."""
+    tank, told, rows = Tank(over=80.0), list[str](), list[tuple[object, ...]]()
+    tank._swim_until = lambda end: setattr(tank, "time", max(end, tank.time))  # type: ignore[method-assign]
+    ride = Ride()
+    steer(ride, tank, tank, begin, UNIT, lost=LOST, row=lambda *row: rows.append(row), tell=told.append)
+    assert [line.split(" at ")[0] for line in told] == ["alarm"]
+    assert ride.alarms == 1
+    assert not rows[0][3]
+    assert rows[-1][3]
+
+
+def test_a_robot_that_was_never_seen_is_said_to_be() -> None:
+    ride, told = steered(Tank(blind=(0.0, 99.0), over=20.0))
+    assert told == ["no robot for 3 s from the start (dark); the motor rests until it is seen"]
+    assert re.fullmatch(r"the robot was never seen in \d+ pictures \(dark\); the motor rested", ride.line())
 
 
 def pseudo_terminal() -> tuple[int, str]:
@@ -288,7 +307,7 @@ def test_a_film_moves_the_motor(tank_files: Path) -> None:
     out, err = (process := tracking(tank_files, port)).communicate(timeout=LIMIT)
     assert process.returncode == 0, err
     header, *lines = out.splitlines()
-    assert header == "time_s,x_cm,y_cm,heading_deg,direction,error_cm"
+    assert header == "time_s,x_cm,y_cm,heading_deg,direction,error_cm,alarm"
     rows = np.array([[float(word) for word in line.split(",")] for line in lines])
     assert len(rows) > 20
     expected = np.array([swum(time - rows[0, 0]) for time in rows[:, 0]]) * [100, 100, 180 / np.pi]

@@ -65,6 +65,12 @@ def test_the_first_pose_or_a_line_decides_where_the_robot_begins() -> None:
     assert told[4][:2] == [f"{command.direction}", f"{command.flip_at * SCALE:.9f}"]
 
 
+def test_a_pose_that_is_too_far_away_counts_as_none() -> None:
+    lines = ["0", "1 1e200 0 0", "2 0 -1e200 0", "begin 2 1e200 0 0"]
+    assert words_of(Tracker(planned()), lines) == words_of(Tracker(planned()), ["0", "1", "2", "2"])
+    assert words_of(None, ["0 1e200 0 0"])[0][0] == "0"
+
+
 def test_a_header_says_the_units_of_the_laboratory() -> None:
     """The same orders as in tail lengths; the error is in the unit of x, and columns may change places."""
     x, y, heading = planned().start

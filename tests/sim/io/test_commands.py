@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Literal
 
 import pytest
 
 from sim.io.commands import Call, Program
 from sim.io.errors import InputError, InputWarning
+from softflagella.__main__ import main as softflagella
 from softflagella.__main__ import program as top
 from softflagella.__main__ import program_of
 from softflagella.shadowing import PACKAGES
@@ -139,3 +141,16 @@ def test_every_option_of_every_command_says_what_it_is(package: str, name: str) 
     assert command.help[0].islower() or not command.help[1].islower()
     for action in command.parser(name)._actions:
         assert action.help, action.dest
+
+
+def test_an_output_that_is_an_input_or_another_output_is_refused(tmp_path: Path) -> None:
+    """A link to it, too; nothing is written."""
+    table, link = tmp_path / "table.csv", tmp_path / "link.csv"
+    table.write_text("x,y\n")
+    link.symlink_to(table)
+    for words in (["plan", str(table), "--robot", "paper-control", "--out", str(link)],
+                  ["camera", "tracks", "f.mp4", "--robot", "r", "--view", str(table), "--out", str(table)],
+                  ["replay", "p.json", "--out", "new.csv", "--shapes", "./new.csv"]):  # fmt: skip
+        with pytest.raises(InputError, match="is the same file as"):
+            softflagella(words)
+    assert table.read_text() == "x,y\n"
