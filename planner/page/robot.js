@@ -17,7 +17,7 @@ const POSITIVE = {
   head_length: "headLength", viscosity: "viscosity", motor_speed: "motorSpeed", C_t: "C_t", C_r: "C_r",
 };
 const LOCKED = ["effects", "correction", "learnt_from", "calibration"];
-const WORDS = /"(?:[^"\\\n]|\\.)*"|'[^'\n]*'|[^\s,[\]"'#]+/g; // of a value
+const WORDS = /"(?:[^"\\\n]|\\.)*"?|'[^'\n]*'?|[^\s,[\]"'#]+/g; // of a value
 const DECIMAL = /^[+-]?(?:0|[1-9](?:_?\d)*)(?:\.\d(?:_?\d)*)?(?:[eE][+-]?\d(?:_?\d)*)?$/;
 const DECIMAL_COMMA = /^[ \t]*[\w-]+[ \t]*=[ \t]*([+-]?\d{1,20}),(\d{1,20})[ \t]*(?:#.*)?$/m;
 
@@ -110,7 +110,7 @@ function readToml(text, where) {
 
 /* Whether an array goes on in the next line. */
 function unclosed(text) {
-  const bare = text.replace(/"(?:[^"\\]|\\.)*"|'[^']*'/g, "");
+  const bare = text.replace(/"(?:[^"\\]|\\.)*"?|'[^']*'?/g, "");
   return bare.split("[").length > bare.split("]").length;
 }
 
@@ -187,7 +187,8 @@ function numberOf(value, key, entry) {
 
 /* Read a standard deviation: {size, relative}, a number in the unit of its key, or a text like "10 %". */
 function readSigma(given, value, key, entry) {
-  const { unit } = splitName(key.slice(0, -SIGMA.length)), share = /^\s*(.+?)\s*%\s*$/.exec(given)?.[1];
+  const { unit } = splitName(key.slice(0, -SIGMA.length)), words = String(given).trim();
+  const share = words.length > 1 && words.endsWith("%") ? words.slice(0, -1).trim() : undefined;
   const number = typeof given === "number" ? given : Number(share ?? NaN);
   if (Number.isNaN(number)) {
     throw new InputError(`${entry} = ${shown(given)}; give a number in the unit of its key, or a text like "10 %"`);

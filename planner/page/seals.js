@@ -1,6 +1,6 @@
 /* Digests that files carry of their own content, so that damage and edits are noticed: SHA-256 (FIPS 180-4), which a
  * page that was opened from a folder has not from its browser. */
-import { InputError } from "./words.js";
+import { InputError, trimmedEnd } from "./words.js";
 
 const PRIMES = Array.from({ length: 310 }, (_, i) => i + 2).filter((n, _, all) => all.every((p) => p * p > n || n % p));
 const fraction = (value) => ((value - Math.floor(value)) * 2 ** 32) >>> 0; // the first 32 bits after the point
@@ -9,7 +9,7 @@ const START = PRIMES.slice(0, 8).map((prime) => fraction(Math.sqrt(prime)));
 const FIRST = "# The last line is a digest of the others: a reader notices whether the file is whole.";
 const LAST = /^# digest: ([0-9a-f]{11})[ \t\r]*$\n?/m;
 const ID = /^p[0-9a-f]{11}$/; // ids of older versions have another form
-const TOKEN = /"(?:[^"\\]|\\.)*"|[^\s,:[\]{}"]+|[,:[\]{}]/g; // of JSON
+const TOKEN = /"(?:[^"\\]|\\.)*"?|[^\s,:[\]{}"]+|[,:[\]{}]/g; // of JSON
 
 /* Eleven characters that name a text: the first of its digest. */
 function digestOf(text) {
@@ -75,7 +75,7 @@ function planId(text) {
 function isWhole(text) {
   const stated = LAST.exec(text), lines = text.replace(LAST, "").split("\n");
   if (!stated) return !text.startsWith(FIRST);
-  return stated[1] === digestOf(lines.map((line) => line.replace(/[ \t\r]+$/, "")).join("\n").replace(/\n+$/, ""));
+  return stated[1] === digestOf(trimmedEnd(lines.map((line) => trimmedEnd(line, " \t\r")).join("\n"), "\n"));
 }
 
 export { planId, checkPlanId, isWhole };

@@ -6,13 +6,13 @@ import { differences, largestSize, unwrap } from "./math.js";
 import { pathOf, stepsOf } from "./path.js";
 import { NAMES, NUMBER, Lengths, fitted, moved, numbersIn, product, shapeSegments } from "./svg_shapes.js";
 import { transformed, transformOf, unread } from "./svg_shapes.js";
-import { InputError, naming, quoted } from "./words.js";
+import { InputError, naming, quoted, trimmedEnd } from "./words.js";
 
-const COMMENT = /\/\*[^]*?\*\/|<!--|-->/g;
-const NO_RULE = /@(?:charset|namespace)[^;{}]*;|@font-face\s*\{[^{}]*\}/gi;
-const RULE = /([^{}]*)\{([^{}]*)\}/g;
+const COMMENT = /\/\*[^]*?(?:\*\/|$)|<!--|-->/g;
+const NO_RULE = /@(?:charset|namespace)[^;{}@]*;|@font-face\s*\{[^{}]*\}/gi;
+const RULE = /(?<![^{}])([^{}]*)\{([^{}]*)\}/g;
 const SELECTOR = /^(\*|[\p{L}\p{N}_-]*)((?:[.#][\p{L}\p{N}_-]+)*)$/u;
-const IMPORTANT = /\s*!\s*important$/i;
+const IMPORTANT = /!\s*important$/i;
 
 /* Read the rules that declare one of the `known` properties, the weakest first. */
 function readStyleSheet(text, known) {
@@ -23,7 +23,7 @@ function readStyleSheet(text, known) {
     if (!Object.keys(given).length) continue;
     for (const selector of selectors.split(",").map((word) => word.trim())) {
       const found = SELECTOR.exec(selector);
-      if (!found || IMPORTANT.test(body.trim().replace(/;+$/, ""))) {
+      if (!found || IMPORTANT.test(trimmedEnd(body.trim(), ";"))) {
         throw new InputError(
           `<style> sets ${Object.keys(given).join(", ")} of ${quoted(selector)}; read are kinds, classes and ids, without `
           + "!important; write attributes instead",
@@ -53,14 +53,14 @@ function declarations(text) {
   const found = {};
   for (const part of text.replace(COMMENT, "").split(";")) {
     const at = part.indexOf(":");
-    if (at >= 0) found[part.slice(0, at).trim().toLowerCase()] = part.slice(at + 1).trim().replace(IMPORTANT, "");
+    if (at >= 0) found[part.slice(0, at).trim().toLowerCase()] = part.slice(at + 1).trim().replace(IMPORTANT, "").trimEnd();
   }
   return found;
 }
 
 const MOST_NUMBERS = 50_000, DEEPEST = 100;
 const SVG = "{http://www.w3.org/2000/svg}", XLINK = "{http://www.w3.org/1999/xlink}href";
-const LINK = /^url\(\s*["']?(#[^"')]+)["']?\s*\)$/;
+const LINK = /^url\(\s*["']?(#[^"')\s]+)["']?\s*\)$/;
 const VISIBLE = { visible: true, hidden: false, collapse: false };
 const SIZE = ["width", "height"];
 const AROUND = { matrix: [1, 0, 0, 1, 0, 0], view: [null, null], visible: true, unread: "", clips: [] };
@@ -244,7 +244,7 @@ function partsOf(element) {
 
 /* Tell whether an element is hidden with all that it holds. */
 function hidden(own) {
-  const opacity = (own.opacity ?? "1").replace(/%+$/, "");
+  const opacity = trimmedEnd(own.opacity ?? "1", "%");
   const transparent = opacity.trim() !== "" && Number(opacity) <= 0;
   return transparent || own.display?.toLowerCase() === "none" || Boolean(own.requiredExtensions);
 }

@@ -7,7 +7,7 @@ import { TAU, mod } from "./math.js";
 import { InputError, quoted } from "./words.js";
 
 const { NAMES } = CONSTANTS.svg_attributes;
-const N = "[-+]?(?:\\d+\\.?\\d*|\\.\\d+)(?:[eE][-+]?\\d+)?";
+const N = "[-+]?(?:\\d+(?:\\.\\d*)?|\\.\\d+)(?:[eE][-+]?\\d+)?";
 const [COMMAND, FLOAT, FLAG, END] = ["[MmZzLlHhVvCcSsQqTtAa]", N, "[01]", "$"].map((word) => {
   return new RegExp(`[ ,\\t\\n\\f\\r]*(${word})`, "y");
 });
@@ -108,7 +108,7 @@ function pathSegments(data) {
 
 const NUMBER = new RegExp(N, "g");
 const LENGTH = new RegExp(`^(${N})\\s*([a-zA-Z]*|%)$`);
-const FUNCTION = /[\s,]*([a-zA-Z]+)\s*\(([^()]*)\)/g;
+const FUNCTION = /(?<![a-zA-Z])([a-zA-Z]+)\s*\(([^()]*)\)/g;
 const ASPECT = /^(?:none|x(Min|Mid|Max)Y(Min|Mid|Max))(?:\s+(?:meet|(slice)))?$/;
 const SHARES = { Min: 0, Mid: 0.5, Max: 1 };
 

@@ -2,8 +2,8 @@
  * missing values as people write them; paths in tables. */
 import { CONSTANTS } from "./constants.js";
 import { pathOf } from "./path.js";
-import { findUnit, splitName, timesOf, toSi } from "./units.js";
-import { InputError, naming, quoted, refusing, repr, whole } from "./words.js";
+import { findUnit, splitName, timesOf, toSi, unbracketed } from "./units.js";
+import { InputError, naming, quoted, refusing, repr, trimmedEnd, whole } from "./words.js";
 
 const { NUMBER, MISSING, COMMA, POINT, THOUSANDS, WHOLE_LINE, THREE, OTHER, FORMULA } = CONSTANTS.number_words;
 const { COMMENT, MARKED_NUMBER, BLANKS, SEPARATORS } = CONSTANTS.tables;
@@ -33,7 +33,7 @@ function checkMarks(columns, where, separator) {
     for (const text of texts) {
       const three = THREE[mark].exec(text);
       if (!three || OTHER[mark].test(text) || !(alone || WHOLE_LINE.test(text))) continue;
-      const [word] = three, small = word.replace(mark, ".").replace(/0+$/, "");
+      const [word] = three, small = trimmedEnd(word.replace(mark, "."), "0");
       throw new InputError(
         `${where} has the number ${quoted(word)}, which may be ${word.replace(mark, "")} or ${small}; write it without `
         + "separators of thousands, or with another number of decimals",
@@ -182,7 +182,7 @@ function areUnits(words) {
 
 /* Write the unit of a column behind its name. */
 function withUnit(name, unit) {
-  return unit ? `${name} [${unit.replace(/^[[\]()]+|[[\]()]+$/g, "")}]` : name;
+  return unit ? `${name} [${unbracketed(unit)}]` : name;
 }
 
 /* Take names from the last comment, if it has one for each column and no number. */

@@ -3,7 +3,7 @@
  * A value v in a unit is (v + zero) · times / over in SI units. Of a robot, tailLength [m] and timeScale [s] count. */
 import { CONSTANTS } from "./constants.js";
 import { smallest } from "./math.js";
-import { InputError, fixed, general, quoted, repr, whole } from "./words.js";
+import { InputError, fixed, general, quoted, repr, trimmedEnd, whole } from "./words.js";
 
 const { UNITS: KNOWN, TEXTS, SPELLINGS, SIGNS, MOST_PARTS } = CONSTANTS.units;
 const UNITS = new Map(Object.entries(KNOWN));
@@ -15,9 +15,14 @@ const DATE = /^(\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d)?)?)(?:(?<=:\d\d:\d\d)[.
 
 /* Find a unit by its suffix or another spelling ("deg/s", "°", "U/min"); null if it is no known unit. */
 function findUnit(text) {
-  const bare = text.trim().replace(/^[[\]()]+|[[\]()]+$/g, "").trim();
+  const bare = unbracketed(text.trim()).trim();
   const word = Array.from(bare, (sign) => SIGNS[sign] ?? sign).join("").replace(/_+/g, "_");
   return UNITS.get(Object.hasOwn(SPELLINGS, word) ? SPELLINGS[word] : word) ?? null;
+}
+
+/* A unit without the brackets around it. */
+function unbracketed(unit) {
+  return trimmedEnd(unit.replace(/^[[\]()]+/, ""), "[]()");
 }
 
 /* Split the name of a column or key into {quantity, unit}; unit null if it has none or an unknown one.
@@ -27,7 +32,7 @@ function splitName(name) {
   const text = name.trim(), head = text.slice(0, -1), bracket = head.replaceAll("(", "[").lastIndexOf("[");
   const inside = head.slice(bracket + 1);
   if (bracket >= 0 && /[\])]$/.test(text) && !/[\])]/.test(inside)) {
-    return { quantity: text.slice(0, bracket).replace(/[_ \t]+$/, "").trim(), unit: findUnit(inside) };
+    return { quantity: trimmedEnd(text.slice(0, bracket), "_ \t").trim(), unit: findUnit(inside) };
   }
   const parts = text.split("_");
   for (let first = Math.max(1, parts.length - MOST_PARTS); first < parts.length; first++) {
@@ -200,5 +205,5 @@ function checkBare(names, wanted, where, synonyms) {
   }
 }
 
-export { UNITS, findUnit, splitName, toSi, fromSi, formatLength, inLab, inTails, timeInLab };
+export { UNITS, findUnit, splitName, toSi, fromSi, formatLength, inLab, inTails, timeInLab, unbracketed };
 export { placeInLab, labColumns, timesOf, convertColumns };

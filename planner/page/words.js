@@ -82,6 +82,13 @@ function quoted(text) {
   return quote + text.replace(/[^\S ]|\p{C}/gu, hidden).replaceAll(quote, `\\${quote}`) + quote;
 }
 
+/* A text without some signs at its end; a pattern would try each of them as the first. */
+function trimmedEnd(text, signs) {
+  let end = text.length;
+  while (end && signs.includes(text[end - 1])) end -= 1;
+  return text.slice(0, end);
+}
+
 /* A pattern that matches whole texts. */
 function whole(pattern) {
   return new RegExp(`^(?:${pattern.source})$`, pattern.flags);
@@ -107,4 +114,4 @@ function editsBetween(word, other) {
 }
 
 export { InputError, refusing, naming, DECLARING, REMEDY, FOLLOWING, inPage, repr, general, fixed, quoted };
-export { closeMatch, whole };
+export { closeMatch, trimmedEnd, whole };

@@ -30,7 +30,7 @@ KINDS = {  # of files that are neither tables nor drawings: their endings, and h
     "XML": ("xml gml", r"<"),
     "G-code": ("gcode gco ngc cnc tap", r"(?:[%;(O][^\n]*\n|\s)*(?:N\d+\s*)?[GM]\d+(?:\.\d+)?(?:\s|[A-Z;(]|$)"),
     "WKT": ("wkt ewkt", r"(?:[^\n]*\n)?[^\n(]*?(?:POINT|LINESTRING|RING|POLYGON|COLLECTION)[\sZM]*\(+[\s\d.+-]"),
-    "DXF": ("dxf", r"(?:999\s*\n[^\n]*\n\s*)*0\s*\n\s*SECTION"),
+    "DXF": ("dxf", r"(?:999[^\S\n]*\n[^\n]*\n\s*)*0\s*\n\s*SECTION"),
     "a shapefile": ("shp shx dbf", r"\x00\x00\x27\x0a"),
     "a vector format": ("dwg plt hpgl eps ps ai step stp stl obj", r"%!PS|AC10\d\d"),
     "PDF": ("pdf", r"%PDF"),

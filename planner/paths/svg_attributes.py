@@ -22,21 +22,21 @@ from svgelements import Path as SvgPath
 
 from sim.io.errors import InputError
 
-_N = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_N = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 NUMBER = re.compile(_N)
 _LENGTH = re.compile(rf"({_N})\s*([a-zA-Z]*|%)")
-_FUNCTION = re.compile(r"[\s,]*([a-zA-Z]+)\s*\(([^()]*)\)")
+_FUNCTION = re.compile(r"(?<![a-zA-Z])([a-zA-Z]+)\s*\(([^()]*)\)")
 _NO_DATA = re.compile(r"[^MZLHVCSQTAE\d\s,.+-]|[MLHVCSQTA][\s,]*(?:[MZLHVCSQTA]|$)|^\s*[^M\s]", re.IGNORECASE)
 _POINT = re.compile(r"(?<=\d)\.(?!\d)")  # of "5.", which svgelements does not read
 _ASPECT = re.compile(r"(?:none|x(Min|Mid|Max)Y(Min|Mid|Max))(?:\s+(?:meet|(slice)))?")
 _SHARES = {None: 0.0, "Min": 0.0, "Mid": 0.5, "Max": 1.0}
 _BROKEN = (AttributeError, TypeError, ValueError, ArithmeticError, LookupError)  # data of a path, to svgelements
 View = tuple[float | None, float | None]  # width and height that percentages belong to
-_COMMENT = re.compile(r"/\*.*?\*/|<!--|-->", re.DOTALL)
-_NO_RULE = re.compile(r"@(?:charset|namespace)[^;{}]*;|@font-face\s*\{[^{}]*\}", re.IGNORECASE)
-_RULE = re.compile(r"([^{}]*)\{([^{}]*)\}")
+_COMMENT = re.compile(r"/\*.*?(?:\*/|\Z)|<!--|-->", re.DOTALL)
+_NO_RULE = re.compile(r"@(?:charset|namespace)[^;{}@]*;|@font-face\s*\{[^{}]*\}", re.IGNORECASE)
+_RULE = re.compile(r"(?<![^{}])([^{}]*)\{([^{}]*)\}")
 _SELECTOR = re.compile(r"(\*|[\w-]*)((?:[.#][\w-]+)*)")
-_IMPORTANT = re.compile(r"\s*!\s*important$", re.IGNORECASE)
+_IMPORTANT = re.compile(r"!\s*important$", re.IGNORECASE)
 NAMES: dict[str, Any] = {
   "shapes": ["path", "line", "polyline", "polygon", "rect", "circle", "ellipse"],
   "groups": ["svg", "g", "a", "switch", "use", "symbol"],
@@ -238,4 +238,5 @@ def declared(rules: list[Rule], kind: str, attributes: Mapping[str, str]) -> dic
 def declarations(text: str) -> dict[str, str]:
     """Read the declarations of a rule, or of the attribute style."""
     parts = (part.partition(":") for part in _COMMENT.sub("", text).split(";"))
-    return {name.strip().lower(): _IMPORTANT.sub("", value.strip()) for name, colon, value in parts if colon}
+    given = {name.strip().lower(): value.strip() for name, colon, value in parts if colon}
+    return {name: _IMPORTANT.sub("", value).rstrip() for name, value in given.items()}

@@ -50,7 +50,7 @@ _BROKEN = (ElementTree.ParseError, ValueError, ArithmeticError, LookupError)  # 
 _MOST_NUMBERS, _DEEPEST = 50_000, 100
 _SVG = "{http://www.w3.org/2000/svg}"
 _XLINK = "{http://www.w3.org/1999/xlink}href"
-_LINK = re.compile(r"url\(\s*[\"']?(#[^\"')]+)[\"']?\s*\)")
+_LINK = re.compile(r"url\(\s*[\"']?(#[^\"')\s]+)[\"']?\s*\)")
 _VISIBLE = {"visible": True, "hidden": False, "collapse": False}
 _SIZE = ("width", "height")
 

@@ -82,7 +82,7 @@ def read_time(words: str, name: str) -> float:
         InputError: the words are no time above 0; the message begins with `name`.
     """
     units = "|".join(of_kind("time"))
-    parts = re.findall(rf"\s*([0-9.]+)\s*({units})(?![a-z])", words)
+    parts = re.findall(rf"(?<![0-9.])([0-9.]+)\s*({units})(?![a-z])", words)
     try:
         seconds = sum(float(to_si(float(number), unit)) for number, unit in parts)
     except ValueError:

@@ -22,7 +22,7 @@ import numpy as np
 from sim.io.errors import InputError
 
 _EXPONENT = "(?:[eE][+-]?[0-9]+)?"
-_NUMBER = re.compile(f"[+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+){_EXPONENT}|[+-]?(?:inf|infinity)", re.I)
+_NUMBER = re.compile(f"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+){_EXPONENT}|[+-]?(?:inf|infinity)", re.I)
 _MISSING = re.compile(
     r"[-–—]*|[+-]?nan(?:\(ind\))?|<?n/?a>?|null|none|[+-]?1\.#[a-z]+|#n/?[avd](?: n/a)?|#\S*[!?]|#{4,}|err:[0-9]+",
     re.I,
@@ -41,7 +41,7 @@ _OTHER = {  # what shows that the mark is decimal
     mark: re.compile(rf"^(?![+-]?[1-9][0-9]{{0,2}}[{mark}][0-9]{{3}}$)[+-]?[0-9]*[{mark}][0-9]+{_EXPONENT}$", re.M)
     for mark in ",."
 }
-_FORMULA = re.compile(r"'*[=+\-@\t\r]")
+_FORMULA = re.compile(r"^'*[=+\-@\t\r]")
 
 
 def is_number(word: str) -> bool:

@@ -122,7 +122,7 @@ def _clock(word: str) -> float:
     if match is None:
         return math.nan
     days, hours, minutes, seconds = match.groups(default="0")
-    return 86400.0 * int(days) + 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds.replace(",", "."))
+    return 86400.0 * float(days) + 3600.0 * float(hours) + 60.0 * float(minutes) + float(seconds.replace(",", "."))
 
 
 def _date(word: str) -> float:

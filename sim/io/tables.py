@@ -36,8 +36,8 @@ from sim.io.units import find_unit
 
 LINE = "line"  # name of the index
 _PARQUET, _SHEET = (".parquet", ".pq"), (".xlsx", ".xlsm")
-_COMMENT = re.compile(r"\s*[#%]")
-_MARKED_NUMBER = re.compile(r"\s*[#%]+\s*[+-]?[.,]?[0-9]")
+_COMMENT = re.compile(r"^\s*[#%]")
+_MARKED_NUMBER = re.compile(r"^\s*[#%]+\s*[+-]?[.,]?[0-9]")
 _BLANKS = re.compile(r'("(?:[^"]|"")*")|\s+')
 _SEPARATORS = (";", "\t", ",")
 

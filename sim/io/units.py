@@ -127,7 +127,8 @@ def split(name: str) -> Name:
 
 def number_and_unit(words: str, units: Collection[str] = LENGTHS) -> tuple[float, str | None]:
     """Split a quantity: 24cm into 24.0 and cm, 3 into 3.0 and None; what is none, or in another unit, into nan."""
-    number, _, word = re.split(r"(\s*)(?=[^\W\d]*$)", words.strip(), maxsplit=1)
+    word = re.split(r"[\W\d]", words.rstrip())[-1]
+    number = words.rstrip().removesuffix(word)
     unit = next((u for u in (word, getattr(find_unit(word), "suffix", "")) if u in units), None)
     try:
         return float(number) if unit or not word else math.nan, unit

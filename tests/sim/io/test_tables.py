@@ -307,6 +307,7 @@ def test_a_synonym_may_be_a_unit_and_a_value_that_is_no_number_is_missing() -> N
         ("time_ms", pd.to_timedelta([0, 1.5], unit="s"), [0, 1500]),
         ("elapsed_min", pd.to_datetime(["2026-01-01 00:03", "2026-01-01 00:00", None]), [3, 0, NAN]),
         ("elapsed_min", ["0:03:00", "0 days 00:00:30.0", "1 day, 0:00:00"], [3, 0.5, 1440]),
+        ("elapsed_min", ["0:03:00", "9" * 5000 + " days 00:00:30"], [3, math.inf]),
         ("t_s", ["2026-05-01T12:00:00Z", "2026-05-01 14:00:01,5+02:00", "2026-05-01"], [43200, 43201.5, 0]),
         ("time_s", ["0:00:01", "1:30", "2026"], [1, NAN, NAN]),
         ("time_s", [1.7e9, 1.7e9 + 0.5], [0, 0.5]),
