@@ -71,7 +71,7 @@ LARGEST_MEAN = 5.0  # mean squared size above which the poses are not those of t
 
 
 def is_near(pose: Sequence[float]) -> bool:
-    """Tell whether all numbers of a pose are finite and below FAR: others are faults of what measures."""
+    """Tell whether all numbers of a pose are finite and below FAR, as where a robot begins."""
     return all(abs(number) < FAR for number in pose)
 
 
@@ -156,7 +156,7 @@ class Tracker(Shown):
             self._flip()
         if pose is not None and not self._finished and self._clock.believed:
             when = self._now - self._latency if seen_at is None else seen_at
-            possible = len(pose) == 3 and is_near(pose) and math.isfinite(when) and when <= self._now
+            possible = len(pose) == 3 and all(map(math.isfinite, (*pose, when))) and when <= self._now
             if possible and self._see(pose, when):
                 self._plan_flip()
         return self.command

@@ -128,10 +128,11 @@ def test_a_place_that_cannot_be_written_is_refused_before_a_film_is_tracked(
 ) -> None:
     monkeypatch.setattr("camera.tracks.track_film", None)
     (tmp_path / "file").write_text("")
+    (tmp_path / "other").write_text("")
     view = ["--robot", "paper-control", "--view", str(film().parent / "view.toml")]
     words = ["tracks", str(film()), *view, "--out", str(tmp_path / "t.csv"), option, str(tmp_path)]
     if option == "--films":
-        words = ["calibrate", "--films", str(tmp_path / "file"), *view, "--out", str(tmp_path / "file")]
+        words = ["calibrate", "--films", str(tmp_path / "file"), *view, "--out", str(tmp_path / "other")]
     assert run_command(main, words) == 2
     assert re.search("is a (file; give a folder|folder; give the name of a file)", capsys.readouterr().err)
 

@@ -44,7 +44,7 @@ REFUSED = {  # what of EXAMPLE is written otherwise, and the message
     "turned bands": (LAST, "turned_deg = 5", "[[robots]] 1: turned_deg = 5; give the degrees by which"),
     "no tag": (LAST, "tag = 1000", "[[robots]] 1: tag = 1000; give the number of a tag, 0 to 999"),
     "no dictionary": ('# dictionary = "4x4_50"', 'dictionary = "5x5"', "dictionary = '5x5'; give one of OpenCV's"),
-    "no side": (f"points_px = [[100, 650], [900, 650]]\n{RULER}", "tag_cm = 0", "the tag's side is not above 0"),
+    "no side": (f"points_px = [[100, 650], [900, 650]]\n{RULER}", "tag_cm = 0", "the tag's side is 0 m"),
     "three points": ("[100, 650], ", "[100, 650], [500, 650], ", "[scale] a length and 3 points_px; give two"),
     "no lens": ("# [lens]", f"[lens]\n{LENS}", "[lens] focal_px: give numbers above 0"),
     "side": ('"down"', '"left"', "looks = 'left'; give \"down\""),
