@@ -61,12 +61,15 @@ class DaskCluster:
     def __init__(self, address: str | None, count: int):
         import dask
         from distributed import Client, LocalCluster
+        from distributed.comm import get_address_host_port
 
         address = address or os.environ.get("DASK_SCHEDULER_ADDRESS")
         for name in ("distributed", "distributed.client", "distributed.scheduler", "distributed.nanny", "tornado"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # this program reports what matters
         local = {"n_workers": count, "threads_per_worker": 1, "dashboard_address": None, "memory_limit": 0}
         try:
+            if address is not None:  # a client that cannot read it is 20 s about its own end
+                get_address_host_port(address)
             with dask.config.set(_DASK), isolated():
                 self._cluster = LocalCluster(**local) if address is None else None
                 self._client = Client(self._cluster or address, timeout=_ANSWERS, set_as_default=False)

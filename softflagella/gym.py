@@ -87,7 +87,10 @@ class PathEnv(gymnasium.Env[Observation, np.int64]):
             raise InputError(f"actions is {actions!r}; give a whole number, 1 or more")
         if plan is None:
             plan = plan_path(polygon(4, side=3.0), "paper-control")
+        if not isinstance(plan, Plan | str | Path):
+            raise InputError(f"plan is {plan!r}; give a plan, or the path of a plan.json")
         self.plan = plan if isinstance(plan, Plan) else restore_plan(plan)
+        self._is_reset = False
         if model == "simulator":
             self.plan.schedule()  # refuses a measured vehicle
         self.model, self.actions = model, actions
@@ -116,7 +119,7 @@ class PathEnv(gymnasium.Env[Observation, np.int64]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Put another robot at rest near the start."""
         super().reset(seed=seed)
-        rng, plan = self.np_random, self.plan
+        rng, plan, self._is_reset = self.np_random, self.plan, True
         self._direction, self._kept, self._steps = plan.first_direction, 0, 0
         self._before: float | None = None  # length of the last dwell
         x, y, heading = (plan.start + rng.normal(size=3) * START).tolist()
@@ -131,7 +134,16 @@ class PathEnv(gymnasium.Env[Observation, np.int64]):
         return self._seen(), self._info(False)
 
     def step(self, action: np.int64 | int) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Keep or flip the motor, and swim on until the next action."""
+        """Keep or flip the motor, and swim on until the next action.
+
+        Raises:
+            InputError: the action is neither 0 nor 1.
+            ResetNeeded: the environment was never reset.
+        """
+        if not self._is_reset:
+            raise gymnasium.error.ResetNeeded("call reset before the first step")
+        if not self.action_space.contains(action):
+            raise InputError(f"action {action!r}; give 0 (keep) or 1 (flip)")
         flipped = bool(action == 1 and self._kept >= self.actions)
         if flipped:
             self._before, self._flipped = self._kept * self.every, self._pose

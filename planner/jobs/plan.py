@@ -94,6 +94,8 @@ def plan(
         drawn, moved = smoothed(drawn, length)
         say(f"smoothed over {in_lab(length, swims)}, which moves the path by up to {in_lab(moved, swims)}")
     say(f"path: {describe(drawn, swims)}")
+    if drawn.looks_closed:
+        say("it ends as near to its start as its points are to each other; --closed joins them")
     return make_plan(drawn, tracked, request, options.get("progress"))
 
 

@@ -74,6 +74,12 @@ class Path2D:
             table = table[:-1]
         return Path2D(table, meets if closed is None else closed)
 
+    @property
+    def looks_closed(self) -> bool:
+        """Whether it is open, and ends about as near to its start as its points are to each other."""
+        steps, gap = np.linalg.norm(np.diff(self.points, axis=0), axis=1), self.points[-1] - self.points[0]
+        return not self.closed and len(steps) > 2 and bool(np.linalg.norm(gap) <= 1.5 * np.median(steps))
+
     def scaled(self, factor: float) -> Path2D:
         """Multiply the coordinates."""
         return Path2D(self.points * factor, self.closed)

@@ -23,6 +23,11 @@ if TYPE_CHECKING:
 KINDS = {  # of files that are neither tables nor drawings: their endings, and how they begin
     "GeoJSON": ("geojson topojson",
                 r'\{[\s\S]*?"type"\s*:\s*"(?:Feature|Topology|Geometry|(?:Multi)?(?:Point|Line|Poly))'),
+    "a map of ROS": ("pgm pbm ppm",
+                     r"P[1-6]\s+(?:#[^\n]*\n\s*)*\d+\s+\d+\s|(?:[^\n]*\n)*?(?:image|resolution):\s"),
+    "a message of ROS": ("bag db3 mcap", r"(?:[^\n]*\n)*?(?:poses:|[^\n]*(?:nav|geometry)_msgs/)"),
+    "YAML": ("yaml yml", r"---\s"),
+    "a script": ("sh py m", r"#!"),
     "JSON": ("json", r"\{|\[\s*[\[{\d-]"),
     "GPX": ("gpx", r"<[\s\S]*?<gpx[\s>]|<gpx[\s>]"),
     "KML": ("kml kmz", r"<[\s\S]*?<kml[\s>]|<kml[\s>]"),

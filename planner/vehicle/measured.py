@@ -19,6 +19,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Real
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -34,6 +35,7 @@ from sim.mechanics import planar
 Measured = float | tuple[float, float]  # a value, and its standard deviation where it is known
 _TURN = 0.25  # rad in the unit of time, where the vehicle has no lag
 _LAGS = 10.0  # time constants in the unit of time, at least
+_SLOWEST = 1e-5  # rad/s
 _POINT = 0.01  # l, radius of a body without a size
 _SUBSTEPS = 10  # of a step of TIMES, for the integral of the motion
 _LINES = {  # of a vehicle.toml, with the unit that messages propose
@@ -81,6 +83,14 @@ class MeasuredVehicle:
     MODEL: ClassVar[str] = "measured"  # in place of a look-up table's identity
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise InputError(f"name = {self.name!r}; give a text")
+        for name in (*_SPREADS, "length", "width"):
+            given = getattr(self, name)
+            pair = given if isinstance(given, tuple | list) and name in _SPREADS else [given]
+            if len(pair) > 2 or not all(isinstance(each, Real) and not isinstance(each, bool) for each in pair):
+                also = ", or (value, standard deviation)" if name in _SPREADS else ""
+                raise InputError(f"{name} = {given!r}; give a number{also}")
         for name in _SPREADS:
             value, spread = self.measured(name)
             if not (math.isfinite(value) and 0 <= spread < math.inf):
@@ -89,6 +99,10 @@ class MeasuredVehicle:
                 raise InputError(
                     f"{name} = {value:g} ± {spread:g}; give a number above 0 by three standard deviations"
                 )
+        for name in _NEEDED[1:]:
+            rate = self.measured(name)[0]
+            if rate < _SLOWEST:
+                raise InputError(f"{name} = {rate:g} rad/s; give {_SLOWEST:g}, a turn in a week, or more")
         if not 0 <= self.measured("slip")[0] < math.pi / 2:
             raise InputError(
                 "slip: give an angle from 0 up to 90 degrees, to the inside of the turn; where the point slides "

@@ -22,6 +22,7 @@ import csv
 import io
 import re
 import warnings
+import zipfile
 from collections.abc import Iterator, Sequence
 from itertools import chain, islice, pairwise, zip_longest
 from pathlib import Path
@@ -31,10 +32,11 @@ import pandas as pd
 
 from sim.io.errors import InputError
 from sim.io.number_words import check_marks, is_missing, is_number, plain_text, values_of
-from sim.io.reading import decode, read_bytes
+from sim.io.reading import MOST_BYTES, decode, read_bytes
 from sim.io.units import find_unit
 
 LINE = "line"  # name of the index
+_LONGEST_TAG = 2**20  # bytes
 _PARQUET, _SHEET = (".parquet", ".pq"), (".xlsx", ".xlsm")
 _COMMENT = re.compile(r"^\s*[#%]")
 _MARKED_NUMBER = re.compile(r"^\s*[#%]+\s*[+-]?[.,]?[0-9]")
@@ -115,6 +117,7 @@ def _sheet_lines(path: str | Path) -> list[str]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # openpyxl's, of styles and extensions that it leaves out
+            _check_unpacked(data)
             formulas, values = (_cells(data, data_only=values) for values in (False, True))
     except Exception as broken:  # a damaged archive can raise any error from within the parsers
         raise InputError(f"{path} is no spreadsheet in the form .xlsx ({_reason(broken)})") from None
@@ -129,6 +132,19 @@ def _sheet_lines(path: str | Path) -> list[str]:
                 )
         writer.writerow([_word(cell) for cell in row])
     return text.getvalue().split("\n")
+
+
+def _check_unpacked(data: bytes) -> None:
+    """Refuse a workbook that is far larger than its file, or has a tag or a comment that takes long to parse.
+
+    Raises:
+        ValueError: what it is.
+    """
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        if sum(part.file_size for part in archive.infolist()) > MOST_BYTES:
+            raise ValueError(f"it unpacks to more than {MOST_BYTES / 2**20:.0f} MiB")
+        if any(len(tag) > _LONGEST_TAG for name in archive.namelist() for tag in archive.read(name).split(b">")):
+            raise ValueError(f"it has a comment or a tag of more than {_LONGEST_TAG / 2**20:.0f} MiB")
 
 
 def _cells(data: bytes, *, data_only: bool) -> list[tuple[Any, ...]]:

@@ -146,9 +146,23 @@ def test_without_dask_workers_it_ends_with_a_line(tmp_path: Path, monkeypatch: p
 def test_no_scheduler_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed", reason="the extra dask is not installed")
     monkeypatch.setattr("dataset.clusters._ANSWERS", 1.0)
-    for address in (f"tcp://127.0.0.1:{free_port()}", "nonsense://x", "127.0.0.1:http"):
-        with pytest.raises(InputError, match="no dask scheduler"):
-            build(design(9), tmp_path / "out", backend="dask", address=address, title="", simulate=invented)
+    with pytest.raises(InputError, match="no dask scheduler"):
+        build(
+            design(9),
+            tmp_path / "out",
+            backend="dask",
+            address=f"tcp://127.0.0.1:{free_port()}",
+            title="",
+            simulate=invented,
+        )
+
+
+@pytest.mark.parametrize("address", ["nonsense://x", "127.0.0.1:http", "xx://::", "tcp://:::", "here"])
+def test_no_address_of_a_scheduler(address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed", reason="the extra dask is not installed")
+    monkeypatch.setattr(distributed, "Client", None)  # it would wait for itself at its end
+    with pytest.raises(InputError, match=r"no dask scheduler answers at .* \((?!'NoneType)"):
+        build(design(9), tmp_path / "out", backend="dask", address=address, title="", simulate=invented)
 
 
 @pytest.mark.parametrize("failure", [RuntimeError("Nanny failed to start."), TimeoutError()])

@@ -38,6 +38,18 @@ def test_gymnasium_accepts_it(model: str) -> None:
     check_env(gymnasium.make("softflagella/Path-v0", plan=planned(), model=model).unwrapped)
 
 
+def test_what_cannot_be_done_is_said() -> None:
+    env = sg.PathEnv(planned())
+    with pytest.raises(gymnasium.error.ResetNeeded, match="call reset before"):
+        env.step(0)
+    env.reset(seed=0)
+    for action in (2, -1, 1.5, None, "1"):
+        with pytest.raises(InputError, match=r"action .*; give 0 \(keep\) or 1 \(flip\)"):
+            env.step(action)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="plan is 3; give a plan"):
+        sg.PathEnv(plan=3)  # type: ignore[arg-type]
+
+
 def test_it_moves_as_the_planners_vehicle(monkeypatch: pytest.MonkeyPatch) -> None:
     env = certain_env(monkeypatch)
     seen, _ = env.reset(seed=0)

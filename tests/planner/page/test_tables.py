@@ -98,6 +98,9 @@ KINDS = {
     "WKT": ["LINESTRING (0 0, 1 1)", "SRID=4326;POLYGON Z((0 0 1, 1 1 1))", "MULTILINESTRING((0 0,1 1))",
             'WKT,name\n"LINESTRING (0 0,1 1)",a\n', "id;geom\n1;POINT(1 2)\n"],
     "DXF": ["0\nSECTION\n2\nHEADER\n", "  0\r\nSECTION\r\n"],
+    "a map of ROS": ["image: tank.pgm\nresolution: 0.01\n", "# a\nresolution: 0.01\n", "P5\n8 6\n255\n"],
+    "a message of ROS": ["header:\n  frame_id: map\nposes:\n- header:\n", "#!/bin/sh\nros2 pub nav_msgs/Path\n"],
+    "YAML": ["---\na: 1\n"], "a script": ["#!/bin/sh\necho 1\n"],
     "PDF": ["%PDF-1.7"], "a picture": ["\x89PNG\r\n", "\xff\xd8\xff\xe0"],
 }  # fmt: skip
 ENDINGS = {"a.geojson": "GeoJSON", "a.gpx": "GPX", "a.GCODE": "G-code", "a.wkt": "WKT", "a.dxf": "DXF",

@@ -304,3 +304,11 @@ def test_times_have_their_units(words: str, seconds: float) -> None:
 def test_other_times_are_refused(words: str) -> None:
     with pytest.raises(InputError, match="with its unit"):
         read_time(words, "--arrive")
+
+
+def test_a_path_that_ends_where_it_began_looks_closed() -> None:
+    ring = polygon(12, side=1.0).points
+    assert Path2D.of(ring).looks_closed
+    assert not Path2D.of(ring, closed=True).looks_closed
+    assert not Path2D.of(ring[:-2]).looks_closed
+    assert not Path2D.of([[0, 0], [1, 0], [1, 1]]).looks_closed

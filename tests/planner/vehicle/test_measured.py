@@ -201,3 +201,21 @@ def test_a_vehicle_swims_as_planned_and_cannot_be_simulated(tmp_path: Path) -> N
         sf.load_schedule(file)
     with pytest.raises(InputError, match="needs no look-up table"):
         sf.plan("circle:30cm", SWIMMER, own_table=True)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"speed": "fast"}, r"speed = 'fast'; give a number, or \(value, standard deviation\)"),
+        ({"speed": None}, "speed = None; give a number"),
+        ({"lag": (1.0, 2.0, 3.0)}, r"lag = \(1.0, 2.0, 3.0\); give a number"),
+        ({"length": "9"}, "length = '9'; give a number$"),
+        ({"width": (1.0, 2.0)}, r"width = \(1.0, 2.0\); give a number$"),
+        ({"slip": True}, "slip = True; give a number"),
+        ({"name": None}, "name = None; give a text"),
+        ({"turn_left": 1e-9}, "turn_left = 1e-09 rad/s; give 1e-05, a turn in a week, or more"),
+    ],
+)
+def test_what_is_no_number_of_a_vehicle_is_refused_by_name(wrong: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        replace(SWIMMER, **wrong)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import zipfile
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -152,6 +153,22 @@ def test_cells_of_a_sheet_are_read_as_their_text(tmp_path: Path) -> None:
     assert table.iloc[0, :4].tolist() == [1, "5%", "0:01:30.500000", "2026-05-01 12:00:00"]
     assert math.isnan(table["k"].iloc[0])
     assert (numbers_of(table["t_s"]).tolist(), numbers_of(table["when_h"]).tolist()) == ([90.5], [0.0])
+
+
+@pytest.mark.parametrize(("part", "words"), [
+    (b"<!--" + b" " * 2**21 + b"-->", "a comment or a tag of more than 1 MiB"),
+    (b"<a>" * 2**20, "unpacks to more than 2 MiB"),
+])  # fmt: skip
+def test_a_workbook_that_unpacks_to_far_more_is_refused(
+    part: bytes, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "book.xlsx"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as book:
+        book.writestr("xl/worksheets/sheet1.xml", part)
+    if "unpacks" in words:
+        monkeypatch.setattr("sim.io.tables.MOST_BYTES", 2**21)
+    with pytest.raises(InputError, match=f"is no spreadsheet in the form .xlsx .it .*{words}"):
+        read_table(path)
 
 
 def test_sheets_are_refused_as_texts_are(tmp_path: Path) -> None:
