@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.io.errors import InputError
 from sim.io.reading import MOST_BYTES, decode, read_bytes
@@ -86,7 +86,7 @@ def _hdf5(path: Path) -> Any:
     return h5py.File(io.BytesIO(read_bytes(path)), "r")
 
 
-def _stored(file: Any, name: str, most: int = MOST_BYTES) -> NDArray[Any]:
+def _stored(file: Any, name: str, most: int = MOST_BYTES) -> Any:
     """Read a dataset of an HDF5 file.
 
     Raises:
@@ -135,7 +135,7 @@ def _deeplabcut(path: Path) -> Seen:
             rows = _stored(table, "table")
             texts = _pickled_texts(bytes(table["table"].attrs["values_block_0_kind"]))
         frames, values = rows["index"], rows["values_block_0"]
-        names = np.reshape(texts, (values.shape[1], -1)).tolist()
+        names: Any = np.reshape(texts, (values.shape[1], -1))
     else:
         text = _text(path)
         heads = 3 + text.split("\n", 2)[1].startswith("individuals")
