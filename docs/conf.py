@@ -23,7 +23,7 @@ author = "the softflagella developers"
 project_copyright = author
 release = version = __version__
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
-exclude_patterns = ["_build", "**/.ipynb_checkpoints"]
+exclude_patterns = ["_build", "reference/generated", "**/.ipynb_checkpoints"]
 nb_execution_mode = "force"  # notebooks are kept without outputs
 nb_execution_timeout = 600  # seconds a cell
 nb_execution_in_temp = True

@@ -16,12 +16,12 @@ import softflagella
 from dataset.schema import FLAGS, INPUTS, OUTPUTS
 from sim.effects import catalogue
 from sim.model.effect import Effect
-from softflagella.__main__ import WORDS, command, program_of
+from softflagella.__main__ import WORDS, command, further, packages
 from softflagella.shadowing import PACKAGES
 
 
 def write_generated_pages(folder: Path) -> None:
-    """Write effects.md, columns.md, objects.md and commands.md into `folder`, where they have changed."""
+    """Write what pages of the same names include into `folder`, where it has changed."""
     folder.mkdir(parents=True, exist_ok=True)
     for make in (effects_page, columns_page, objects_page, commands_page):
         page, text = folder / f"{make.__name__.removesuffix('_page')}.md", "\n\n".join(filter(None, make())) + "\n"
@@ -32,7 +32,7 @@ def write_generated_pages(folder: Path) -> None:
 def effects_page() -> Iterator[str]:
     """Describe every effect as it is declared: equation, source, unit, bounds."""
     effects = catalogue().values()
-    yield "# Effects\n\nEach adds to the base model, with a size ε; at the null of ε the model is the base model."
+    yield "Each adds to the base model, with a size ε; at the null of ε the model is the base model."
     yield "robot.toml has lines `name = size` in the table `[effects]`; a table of robots has columns."
     links = [f"[`{effect.name}`](#{effect.name.replace('_', '-')})" for effect in effects]
     rows = [(k, e.title, number(e.null), number(*e.bounds), e.unit) for k, e in zip(links, effects, strict=True)]
@@ -59,7 +59,7 @@ def _properties(effect: Effect) -> Iterator[tuple[str, str]]:
 
 def columns_page() -> Iterator[str]:
     """List the columns of a data set as its schema declares them."""
-    yield "# Columns of a data set\n\nA sweep over [effects](effects.md) has one more for each."
+    yield "A sweep over [effects](effects.md) has one more for each."
     for title, columns in (("Inputs", INPUTS), ("Outputs", OUTPUTS), ("Flags", FLAGS)):
         rows = [(f"`{c.name}`", str(c.type), c.unit, c.meaning) for c in columns]
         yield f"## {title}\n\n{table(('column', 'type', 'unit', 'meaning'), rows)}"
@@ -67,7 +67,7 @@ def columns_page() -> Iterator[str]:
 
 def objects_page() -> Iterator[str]:
     """List the fields of the public classes, then those of the classes of which their fields are made."""
-    yield "# Fields of objects\n\nLengths are in tail lengths l, times in μ0 l⁴/EI, unless a field says its unit."
+    yield "Lengths are in tail lengths l, times in μ0 l⁴/EI, unless a field says its unit."
     records = [record for name in softflagella.__all__ for record in _records(getattr(softflagella, name))]
     for record in records:  # which grows
         parts = [part for hint in get_type_hints(record).values() for part in _records(hint)]
@@ -99,12 +99,11 @@ def commands_page() -> Iterator[str]:
     """List every command with its help text."""
     os.environ["COLUMNS"] = "100"
     usage = "```text\n{}```".format
-    yield "# Commands\n\nFrequent ones have a short form. Bad input ends with one line and exit status 2."
-    for word, (package, name) in WORDS.items():
-        same = "" if package == "softflagella" else f"The same as `softflagella {package} {name}`."
-        yield from (f"## {word}", same, usage(command(word).parser(f"softflagella {word}").format_help()))
-    for package in PACKAGES:
-        program = program_of(package)
+    yield "Bad input ends with one line and exit status 2."
+    for word in WORDS:
+        yield from (f"## {word}", usage(command(word).parser(f"softflagella {word}").format_help()))
+    for package in packages():
+        program = further(package)
         yield f"## {package}\n\n{program.parser().description}"
         for name, packaged in program.commands.items():
             yield f"### {package} {name}"

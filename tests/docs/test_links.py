@@ -20,7 +20,7 @@ TEXTS = [*ROOT.glob("*.md"), *PAGES, *NOTEBOOKS]
 SOURCES = [
     file for top in TOP.split("|") for file in (ROOT / top).rglob("*.*") if file.suffix in {".py", ".js", ".h"}
 ]
-LINK = re.compile(r"\]\((?!https?:)([^)\s#]*)#?([^)\s]*)\)")
+LINK = re.compile(r"(?:\]\(|href=\")(?!https?:)([^)\"\s#]*)#?([^)\"\s]*)[)\"]")
 FILE = re.compile(rf"`((?:{TOP}|docs)/[\w/.-]+)`|(?<![\w/.-])(docs/[\w/-]+\.(?:md|py|ipynb))\b")
 MODULE = re.compile(rf"`((?:{TOP})(?:\.\w+)+)`|python -m ((?:{TOP})(?:\.\w+)*)")
 BENCHMARK = re.compile(r"python -m\s+benchmarks[ \n]([a-z_]+)\b")
@@ -38,9 +38,10 @@ def sections(page: Path) -> set[str]:
 def test_links_lead_somewhere(file: Path) -> None:
     for path, section in LINK.findall(file.read_text()):
         target = (file.parent / path) if path else file
-        if "generated" not in path:  # written when the pages are built
-            assert target.exists(), path
-            assert not section or section in sections(target), f"{path}#{section}"
+        assert "generated" not in target.parts, f"{path} is written when the pages are built; a clone has none"
+        assert target.exists(), path
+        text = target.read_text() if target.suffix == ".md" else ""
+        assert not section or "{include}" in text or section in sections(target), f"{path}#{section}"
 
 
 @cache
