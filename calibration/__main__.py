@@ -60,6 +60,7 @@ def _calibrate(
     _refuse_early(table)
     from calibration.report.path_error import DEFAULT_PATHS
     from calibration.statistics.budget import stopped_by_interrupt
+    from calibration.statistics.study import summary_of_excluded
 
     stated = () if no_path else paths or DEFAULT_PATHS
     with stopped_by_interrupt():
@@ -71,7 +72,7 @@ def _calibrate(
         print(error.sentence)
     for limit in result.caveats:
         print(f"the conclusion is weaker: {limit}")
-    for line in result.summary_of_excluded:
+    for line in summary_of_excluded(result.split.reasons, result.rows):
         print(f"excluded: {line}")
     print(f"-> {', '.join(map(str, files))}")
 

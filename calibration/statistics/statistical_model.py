@@ -82,6 +82,10 @@ class Runs:
     def __len__(self) -> int:
         return len(self.y)
 
+    def row_name(self, place: int) -> str:
+        """Name the row of a run, from 0, in the table."""
+        return f"row {self.rows[place]}"
+
     def repeats(self, rows: Flags | slice = slice(None)) -> Integers | Floats:
         """Tell what is the same in repeats among some rows, by these alone: the condition (n',), or a design.
 

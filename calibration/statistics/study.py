@@ -41,9 +41,11 @@ _FEWEST = 3  # sessions that are held out as a whole
 _BLOCKS = 4  # in all
 _HELD_OUT = 1 / 12  # least share of the runs that are held out
 MANY = 0.2  # share of the rows; if more are excluded, the rest may not be a fair sample
-_ROW = re.compile(r"row (\d+)(?: \(line \d+\))?: (.*)", re.DOTALL)
+_ROW = re.compile(r"row (\d+(?: \(line \d+\))?): (.*)", re.DOTALL)
 # A value (" = 3"), the row that was copied, the size of a deviation.
-_PARTICULAR = re.compile(r" = .*?(?= is | has )| \(row \d+\)$|(?<= is )\d+ (?=standard deviations )", re.DOTALL)
+_PARTICULAR = re.compile(
+    r" = .*?(?= is | has )| \(row \d+(?: \(line \d+\))?\)$|(?<= is )\d+ (?=standard deviations )", re.DOTALL
+)
 _LISTED = 3  # rows of a reason
 
 
@@ -187,7 +189,7 @@ def find_outliers(data: Runs, prediction: Floats) -> tuple[Flags, tuple[str, ...
             out = group[np.argmax(np.abs(residual[group, worst]))]
             bad[out] = True
             far = f"{spread[worst]:.0f} standard deviations from its repeat"
-            reasons.append(f"row {data.rows[out]}: {data.outputs[worst]} is {far}")
+            reasons.append(f"{data.row_name(int(out))}: {data.outputs[worst]} is {far}")
             group = group[group != out]
     return bad, tuple(reasons)
 

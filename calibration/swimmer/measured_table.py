@@ -58,7 +58,7 @@ from sim.inputs import RUN as INPUTS
 from sim.inputs import RUN_SYNONYMS as SYNONYMS
 from sim.io.errors import InputError, naming
 from sim.io.quantities import Converted, convert_columns, numbers_of
-from sim.io.tables import read_table, row_name
+from sim.io.tables import LINE, read_table, row_name
 from sim.io.units import to_si
 
 # Output -> (column, factor to SI, sign relative to the motor's; 0: a magnitude)
@@ -87,6 +87,11 @@ class Measurements(Runs):
     sigmas: Mapping[str, float]  # σ of camera scale, zero of the heading [rad] and tachometer, where stated
     noted_names: tuple[str, ...]  # elapsed_h, temperature_K (above the mean), tank_diameter, course_x, course_y
     converted: tuple[str, ...]  # columns that were renamed or converted, in words
+    lines: Integers | None = None  # (n,) of the rows in the file; None: it has none
+
+    def row_name(self, place: int) -> str:
+        """Name the row of a run, from 0, and its line in the file if it has one."""
+        return super().row_name(place) + (f" (line {self.lines[place]})" if self.lines is not None else "")
 
     @property
     def noted_of_repeats(self) -> Floats:
@@ -141,7 +146,7 @@ def convert_measured(table: pd.DataFrame, where: str) -> Converted:
     outputs = (column for column, _, _ in OUTPUTS.values())
     table, others = convert_columns(table, (*outputs, *RUN_NOTES, *RUN_SIGMAS), where, SYNONYMS)
     for name in (str(c) for c in table if c not in RUN_COLUMNS):
-        near = difflib.get_close_matches(name, RUN_COLUMNS, n=1)
+        near = difflib.get_close_matches(name, [column for column in RUN_COLUMNS if column not in table], n=1)
         if near:
             raise InputError(f"unknown column {name!r}: is it {near[0]!r}? rename or drop it")
     return Converted(table, (*converted, *others))
@@ -149,6 +154,7 @@ def convert_measured(table: pd.DataFrame, where: str) -> Converted:
 
 def _read(source: str | Path | pd.DataFrame) -> Measurements:
     table, where = (source, "the table") if isinstance(source, pd.DataFrame) else (read_table(source), str(source))
+    header = (table.astype(str) == [str(name) for name in table]).all(axis=1).to_numpy()
     table, converted = convert_measured(table, where)
     unknown = [str(c) for c in table if c not in RUN_COLUMNS]
     empty = [str(c) for c in table if c not in (*INPUTS, *unknown) and _is_empty(table[c])]
@@ -161,9 +167,9 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
             + (f" (without any value: {', '.join(empty)})" if empty else "")
         )
     numbers = table.drop(columns=["session", "robot"], errors="ignore").apply(numbers_of)
-    reasons = _reasons(table, numbers, outputs)
+    reasons = _reasons(table, numbers, outputs, header)
     sparse = _mark_gaps(reasons, table, numbers)
-    _mark_copies(reasons, numbers, outputs)
+    _mark_copies(reasons, numbers, outputs, table)
     keep = np.array([not r for r in reasons])
     aside = tuple(f"{row_name(table, i)}: {r}" for i, r in enumerate(reasons) if r)
     good = numbers[keep].drop(columns=sparse)
@@ -217,6 +223,7 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         sigmas=_sigmas(good),
         noted_names=tuple(noted),
         converted=converted,
+        lines=good.index.to_numpy() if good.index.name == LINE else None,
     )
     return _independent(data, sum(_COPY in reason for reason in reasons))
 
@@ -240,13 +247,13 @@ def _mark_gaps(reasons: list[str], table: pd.DataFrame, numbers: pd.DataFrame) -
     return sparse
 
 
-def _mark_copies(reasons: list[str], numbers: pd.DataFrame, outputs: tuple[str, ...]) -> None:
+def _mark_copies(reasons: list[str], numbers: pd.DataFrame, outputs: tuple[str, ...], table: pd.DataFrame) -> None:
     """Give a reason to every usable row that is a copy of an earlier one."""
     usable = [i for i, reason in enumerate(reasons) if not reason]
     used = numbers.iloc[usable]
     columns = [OUTPUTS[name][0] for name in outputs]
     for place, earlier in find_copies(used[list(INPUTS)].to_numpy(), used[columns].to_numpy()).items():
-        reasons[usable[place]] = f"{_COPY} (row {usable[earlier] + 1})"
+        reasons[usable[place]] = f"{_COPY} ({row_name(table, usable[earlier])})"
 
 
 def _independent(data: Measurements, copies: int) -> Measurements:
@@ -337,9 +344,9 @@ def _noted(good: pd.DataFrame) -> dict[str, Floats]:
     return notes
 
 
-def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...]) -> list[str]:
-    """Say why each row cannot be used; empty where it can."""
-    reasons = [""] * len(table)
+def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...], header: Flags) -> list[str]:
+    """Say why each row cannot be used; empty where it can. The header (n,) may be there again."""
+    reasons = ["the header again" if again else "" for again in header]
     used = (*INPUTS, *(OUTPUTS[name][0] for name in outputs))
     values = {column: numbers[column].where(numbers[column].abs() < _LARGEST).to_numpy() for column in used}
     positive = [column for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s") if column in values]

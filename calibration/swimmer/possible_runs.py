@@ -59,7 +59,7 @@ def check_inputs(robot: Robot, runs: Measurements) -> None:
         if not SHORTEST < length / robot.head_radius < LONGEST:
             raise InputError(
                 f"l_cm = {100 * length:.3g} is {length / robot.head_radius:.3g} head radii "
-                f"({SHORTEST} to {LONGEST} are possible); check its unit and head_radius in robot.toml"
+                f"({SHORTEST} to {LONGEST} are possible); check its unit and the radius of the head in robot.toml"
             )
     fastest = float(np.abs(runs.omega).max())
     speed = fastest * replace(robot, tail_length=longest, motor_speed=fastest).time_scale

@@ -282,7 +282,8 @@ def test_runs_that_were_mistracked_are_excluded_and_clean_ones_are_not() -> None
         """200 conditions of two runs, with two outputs of unit noise."""
         y = np.random.default_rng(seed).normal(size=(400, 2))
         condition = np.repeat(np.arange(200), 2)
-        return SimpleNamespace(y=y, condition=condition, rows=np.arange(400), outputs=("R_yr", "theta"))
+        outputs = ("R_yr", "theta")
+        return SimpleNamespace(y=y, condition=condition, row_name="row {}".format, outputs=outputs)
 
     runs, effect = pairs(0), pairs(1)
     mistracked = np.arange(0, 400, 40)

@@ -70,6 +70,19 @@ def test_bad_rows_are_named_and_set_aside() -> None:
         read_measurements(table.rename(columns={"trial": "tri al"}))
 
 
+def test_a_header_in_the_table_and_a_row_number_are_named(tmp_path: Path) -> None:
+    """As they come from tables that were written one below the other, and from spreadsheets."""
+    lines = toy_table(2).drop(columns="run").rename_axis("Nr").to_csv().splitlines()
+    path = tmp_path / "runs.csv"
+    path.write_text("\n".join(["# tank 2", *lines[:40], *lines]))
+    data = read_measurements(path)
+    assert data.excluded[0] == "row 40 (line 42): the header again"
+    assert data.excluded[1].startswith("row 41 (line 43): a copy of an earlier row")
+    assert data.excluded[1].endswith("(row 1 (line 3))")
+    assert data.excluded[-1] == "column Nr: not known, left out"
+    assert data.row_name(0) == "row 1 (line 3)"
+
+
 def test_a_single_session_gives_a_weaker_conclusion() -> None:
     table = toy_table(5, **{DRAG: 5.0}).assign(session="one")
     data = read_measurements(table)
@@ -160,9 +173,8 @@ def test_half_of_a_table_does_not_go_missing_without_a_word(tmp_path: Path, caps
     assert commanded(table, tmp_path) == 0
     printed = capsys.readouterr()
     reason = "omega_h_rpm has the wrong sign for its omega_rpm: the head turns against the motor"
-    for text in (printed.out, printed.err):
-        assert f"excluded: {wrong} of {count} rows (rows " in text
-        assert reason in text
+    assert printed.err.count(f"excluded: {wrong} of {count} rows (rows ") == printed.err.count(reason) == 1
+    assert f"excluded: {wrong}" not in printed.out  # once
     assert f"the conclusion is weaker: {wrong} of {count} rows (50 %) were excluded" in printed.out
     seen = PageText(tmp_path / "out" / "report.html").text
     assert f"Excluded: {wrong} of {count} rows:" in seen
