@@ -174,7 +174,8 @@ class _Build:
         sweep, address = self._sweep, self.folder.address
         known = (address, sweep["config"], self._key, sweep["code"], grid, self._simulate)
         chunks = [Chunk(*known, start, stop) for start, stop in cut(gaps, grid[0])]
-        settings: dict[str, Any] = {"unit": "row", "delay": 1.0, "smoothing": 0.0, "disable": not self._title}
+        hidden = not self._title or None  # None: a bar on a terminal, not in a file
+        settings: dict[str, Any] = {"unit": "row", "delay": 1.0, "smoothing": 0.0, "disable": hidden}
         with tqdm(total=self._rows, initial=_size(self._parts), desc=self._title, **settings) as bar:
             try:
                 for part in run(chunks, backend, bar.set_postfix_str):

@@ -137,7 +137,7 @@ def _film(plan: str, *, out: str, speed: float | None = None, width: int = 640) 
         raise InputError(f"--width {width}; give 100 to 2000 pixels")
     schedule = load_schedule(plan)
     film = Film(speed or fitting_speed(schedule), width=width)
-    with tqdm(total=len(schedule.dwells), desc="simulating", unit="dwell", delay=1.0) as bar:
+    with tqdm(total=len(schedule.dwells), desc="simulating", unit="dwell", delay=1.0, disable=None) as bar:
         count = write_film(read_plan_file(plan), schedule, out, film, progress=bar.update)
     print(f"{count} pictures at {film.speed:g} times the robot's speed -> {out}")
 

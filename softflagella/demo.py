@@ -154,7 +154,7 @@ def _plan_and_replay(folder: Path) -> dict[str, Swum]:
         print(f"  softflagella replay {shlex.quote(str(folder / name / 'plan.json'))} --out …/track.csv")
     with (
         ThreadPoolExecutor(min(available_jobs(), len(CASES))) as pool,
-        tqdm(total=len(CASES), desc="replay", unit="plan") as bar,
+        tqdm(total=len(CASES), desc="replay", unit="plan", disable=None) as bar,
     ):
         for _ in pool.map(replay_one, reversed(CASES)):
             bar.update()

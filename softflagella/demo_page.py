@@ -91,7 +91,7 @@ class Results:
 def write_page(out: Path, results: Results) -> None:
     """Write the page; the demo's files are in the folder `demo` beside it."""
     page = Page(
-        "A soft flagellated robot, from simulation to a schedule that works",
+        "A soft flagellated robot, from a robot.toml to a schedule, in simulation",
         "A motor in a cylindrical head turns straight elastic tails just below the surface of a viscous fluid. "
         "Its only control input is the direction of the motor. On this page the robot is simulated, its motion "
         "learned, three paths are planned without simulating and replayed in the simulator, and the model is "

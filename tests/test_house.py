@@ -151,3 +151,16 @@ def test_each_package_has_a_version_and_hashes() -> None:
         assert re.match(r"[\w.\[\]-]+==[0-9][\w.+!]*( ; [^\\]+)? \\\n {4}--hash=sha256:[0-9a-f]{64}\b", block), (
             block
         )
+
+
+def test_bars_are_for_terminals() -> None:
+    """A bar in a file is a long line that nobody reads; tqdm hides it there if `disable` is None."""
+    for package in ORDER:
+        for file in (ROOT / package).rglob("*.py"):
+            text = file.read_text()
+            for node in ast.walk(ast.parse(text)):
+                if isinstance(node, ast.Call) and ast.unparse(node.func) == "tqdm":
+                    options = {key.arg: ast.unparse(key.value) for key in node.keywords}
+                    hidden = options.get("disable", "hidden")  # named so where it is computed before
+                    where = text if hidden == "hidden" else hidden
+                    assert re.search("or None|=None|^None$|isatty", where), f"{file}: {ast.unparse(node)}"

@@ -168,7 +168,7 @@ def examine(
     examined = []
     title = " ".join(("effects", *(f"beside {e.title}" for e in beside)))
     order = np.argsort(-np.abs(misfit.scores.z)).tolist()
-    for j in tqdm(order, desc=title, unit="effect", delay=1.0, disable=not study.progress):
+    for j in tqdm(order, desc=title, unit="effect", delay=1.0, disable=not study.progress or None):
         effect, candidate = effects[j], scored[j]
         if reasons[j]:
             examined.append(replace(candidate, verdict=reasons[j]))

@@ -463,7 +463,7 @@ def _fit_all(
     Args:
         chosen_alone: whether only the exponents of the linear model are fitted.
     """
-    bar = tqdm(likely, desc="laws", unit="law", delay=1.0, disable=not study.progress)
+    bar = tqdm(likely, desc="laws", unit="law", delay=1.0, disable=not study.progress or None)
     tried = (one for one in bar if not skipped("some laws"))
     return [law for one in tried if (law := fitted_law(study, model, base, one, chosen_alone=chosen_alone))]
 

@@ -71,7 +71,7 @@ def in_batches(
     found = []
     with (
         one_thread(),  # a setting of the process: set once, not in each thread
-        tqdm(total=len(columns["N"]), desc=title, unit="row", delay=1.0, disable=not title) as bar,
+        tqdm(total=len(columns["N"]), desc=title, unit="row", delay=1.0, disable=not title or None) as bar,
     ):
         done = map(work, parts)
         if count > 1:

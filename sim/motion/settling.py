@@ -108,7 +108,8 @@ def settle_one(body: Body, tails: int, resolution: Resolution) -> Settled:
     poses = [np.zeros((1, 6))]
     doubt = ", which is very fast: are all units right?" if abs(body.omega) > _VERY_FAST else ""
     words = f"stepping in time at ω̄ = {abs(body.omega):.3g}{doubt}"
-    with tqdm(desc=words, delay=_SILENT, bar_format=_BAR, leave=False, disable=bool(parent_process())) as bar:
+    hidden = parent_process() is not None or None  # None: a bar on a terminal, not in a file
+    with tqdm(desc=words, delay=_SILENT, bar_format=_BAR, leave=False, disable=hidden) as bar:
         while True:
             poses.append(run.steps(count, dt * count)[0])
             if run.failed:

@@ -290,7 +290,7 @@ def fit(
         total = settings.epochs + stages * settings.members
         shown: Any = {
             "desc": context.title,
-            "disable": not context.title,
+            "disable": not context.title or None,
             "delay": 1.0,
             "initial": _steps(state, settings),
         }
