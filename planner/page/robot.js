@@ -143,6 +143,9 @@ function readFields(tables) {
       } else {
         fields[entry.field] = numberOf(value, key, `[${table}] ${key}`);
         keys[entry.field] = key;
+        if (!["tails", "C_yr"].includes(entry.field) && value <= 0) {
+          throw new InputError(`[${table}] ${key} = ${general(value)}; it must be above 0`);
+        }
       }
     }
   }

@@ -26,6 +26,7 @@ from sim.io.errors import InputError
 MOST_BYTES = 256 * 2**20  # of a file
 _FIRST = "# The last line is a digest of the others: a reader notices whether the file is whole.\n"
 _LAST = re.compile(r"^# digest: ([0-9a-f]{11})[ \t\r]*$\n?", re.M)
+_DECIMAL_COMMA = re.compile(r"^[ \t]*[\w-]+[ \t]*=[ \t]*([+-]?\d{1,20}),(\d{1,20})[ \t]*(?:#.*)?$", re.M)
 T = TypeVar("T")
 
 
@@ -68,7 +69,12 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
     def parse(text: str) -> dict[str, Any]:
         check_seal(text, path)
-        return tomllib.loads(text)
+        try:
+            return tomllib.loads(text)
+        except tomllib.TOMLDecodeError as broken:
+            comma = _DECIMAL_COMMA.search(text)
+            advice = f"; write {comma[1]}.{comma[2]} for {comma[1]},{comma[2]}" if comma else ""
+            raise ValueError(f"{broken}{advice}") from None
 
     return _parsed(path, "TOML", parse)
 

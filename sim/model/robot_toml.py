@@ -106,6 +106,8 @@ def read_robot(tables: Mapping[str, Any]) -> dict[str, Any]:
                 raise InputError(f"[{table}] {keys[entry.field]} and {key} are the same number; drop one")
             else:
                 values[entry.field], keys[entry.field] = _number(value, key, f"[{table}] {key}"), key
+                if entry.field not in ("tails", "C_yr") and value <= 0:
+                    raise InputError(f"[{table}] {key} = {value:g}; it must be above 0")
     for entry in ENTRIES:
         if entry.field not in values and not entry.optional:
             raise InputError(f"missing entry [{entry.table}] {entry.key}")

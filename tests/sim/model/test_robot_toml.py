@@ -106,7 +106,7 @@ REFUSALS = {
     "another kind of unit": ("length_cm = 9", "length_rpm = 9", "unknown entry [tails] length_rpm"),
     "two units": ("length_cm = 9", "length_cm = 9\nlength_mm = 90", "length_mm are the same number; drop one"),
     "text": ("length_cm = 9", "length_cm = '9'", "[tails] length_cm = '9'; give a number"),
-    "below 0": ("length_cm = 9", "length_cm = -9", "tail_length"),
+    "below 0": ("length_cm = 9", "length_cm = -9", "[tails] length_cm = -9; it must be above 0"),
     "no tails": ("count = 3", "count = 0", "N = 0"),
     "missing": ("length_cm = 9", "", "missing entry [tails] length_cm"),
     "no TOML": ("[tails]", "[tails", "not TOML"),
