@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 program = Program("planner", "plan switching schedules for paths, replay them, check tracks")
 main = program.main
 BAR_AFTER = 1.0  # s
-ROBOT = "--robot --vehicle"  # options that mean the same
 
 
 def _write(result: Plan | FleetPlan, out: str, *lines: str, arduino: str | None = None, **pictures: Any) -> None:
@@ -74,7 +73,7 @@ def _planned(call: Call, *, arduino: str | None = None, **further: Any) -> Plan:
     return plan
 
 
-@program.command("plan", of="planner.jobs.plan:plan", robot=ROBOT)
+@program.command("plan", of="planner.jobs.plan:plan", robot="--robot")
 def _plan(plan: Call, *, out: str, trade_off: bool = False, arduino: str | None = None) -> None:
     """Plan the switching times for a path.
 
@@ -95,7 +94,7 @@ def _plan(plan: Call, *, out: str, trade_off: bool = False, arduino: str | None 
     _write(result, out, f"{drawn}declared path", arduino=arduino, pictures=pictures)
 
 
-@program.command("goal", of="planner.goal.trip:to_goal", robot=ROBOT)
+@program.command("goal", of="planner.goal.trip:to_goal", robot="--robot")
 def _goal(
     to_goal: Call,
     *,
@@ -113,9 +112,9 @@ def _goal(
     _write(_planned(to_goal, arduino=arduino, start=start, goal=goal), out, arduino=arduino)
 
 
-@program.command("hold", of="planner.jobs.hold:hold", robot=ROBOT, seconds="for")
-@program.command("cover", of="planner.jobs.cover:cover", robot=ROBOT, width="--width", holes="hole")
-@program.command("tour", of="planner.jobs.tour:tour", robot=ROBOT, back="return")
+@program.command("hold", of="planner.jobs.hold:hold", robot="--robot", seconds="for")
+@program.command("cover", of="planner.jobs.cover:cover", robot="--robot", width="--width", holes="hole")
+@program.command("tour", of="planner.jobs.tour:tour", robot="--robot", back="return")
 def _job(job: Call, *, out: str, arduino: str | None = None) -> None:
     _write(_planned(job, arduino=arduino), out, arduino=arduino)
 
@@ -148,7 +147,7 @@ def _fleet(fleet: str, *, apart: str | None = None, feedback: bool = False, out:
     _write(result, out)
 
 
-@program.command("track", of="planner.jobs.plan:plan", robot=ROBOT)
+@program.command("track", of="planner.jobs.plan:plan", robot="--robot")
 def _track(
     plan_path: Call,
     path: str,
@@ -166,8 +165,8 @@ def _track(
     """Keep a robot on a path or a saved plan: poses come in on a pipe (planner.tracking.pipe) or from a camera.
 
     Args:
-        path: a path to plan for, as for planner plan; or a plan.json, its folder, or a goal.json, tour.json or
-            cover.json beside it.
+        path: a path to plan for, as for softflagella plan; or a plan.json, its folder, or a goal.json, tour.json
+            or cover.json beside it.
         robot: robot.toml or the name of a preset; a saved plan has its own.
         start: X Y DEGREES, of the head's centre, at rest; the robot finds its way to the path from there (default:
             a path's start; the first pose that comes in, for a saved plan).

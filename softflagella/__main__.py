@@ -1,4 +1,7 @@
-"""One command over all packages: `softflagella plan PATH`, or `softflagella planner plan PATH`."""
+"""One command over all packages: `softflagella plan PATH`, `softflagella camera view FILM`.
+
+The most important commands of the packages have words of their own, all others stand behind the package's name.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ import sys
 from importlib import import_module
 
 from sim.io.commands import Command, Program
-from sim.io.errors import run_command
+from sim.io.errors import InputError, run_command
 from softflagella.shadowing import PACKAGES
 
 _IMPORTANT = (
@@ -27,6 +30,7 @@ WORDS = {  # the most important commands -> package and command
     for package, words in _IMPORTANT
     for word in words.split()
 }
+_WORD_OF = {place: word for word, place in WORDS.items()}
 program = Program("softflagella", "soft flagellated robots near a surface")
 
 
@@ -54,11 +58,24 @@ def command(word: str) -> Command:
     return program_of(package).commands[name]
 
 
+def further(package: str) -> Program:
+    """Return the commands of a package that have no word of their own."""
+    packaged = program_of(package)
+    rest = Program(package, packaged.about)
+    rest.commands = {name: each for name, each in packaged.commands.items() if (package, name) not in _WORD_OF}
+    return rest
+
+
+def packages() -> list[str]:
+    """List the packages that have further commands."""
+    return [package for package in PACKAGES if further(package).commands]
+
+
 def _overview() -> str:
     lines = ["usage: softflagella COMMAND …", "", "commands:"]
     lines += [f"  {word:12} {command(word).help}" for word in WORDS]
     lines += ["", "further commands, by package (softflagella PACKAGE COMMAND …):"]
-    lines += [f"  {name:12} {program_of(name).about}" for name in PACKAGES]
+    lines += [f"  {name:12} {program_of(name).about}" for name in packages()]
     lines += ["", "--help after a command or a package tells more; --version prints the version."]
     return "\n".join(lines)
 
@@ -67,9 +84,10 @@ def _suggestion(word: str) -> str:
     """Suggest a command for a word that is none: one of a package, one that is spelt nearly so, or all."""
     for package in PACKAGES:
         if word in program_of(package).commands:
-            return f"it is softflagella {package} {word}"
-    near = difflib.get_close_matches(word, (*WORDS, *PACKAGES), 1)
-    return f"is it {near[0]}?" if near else f"there are {', '.join((*WORDS, *PACKAGES))}"
+            return f"it is softflagella {_WORD_OF.get((package, word), f'{package} {word}')}"
+    known = (*WORDS, *packages())
+    near = difflib.get_close_matches(word, known, 1)
+    return f"is it {near[0]}?" if near else f"there are {', '.join(known)}"
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -83,11 +101,12 @@ def main(argv: list[str] | None = None) -> None:
         print(f"softflagella {__version__}")
     elif words[0] in WORDS:
         command(words[0]).main(f"softflagella {words[0]}", words[1:])
-    elif words[0] in PACKAGES:
-        program_of(words[0]).main(words[1:])
+    elif tuple(words[:2]) in _WORD_OF:
+        raise InputError(f"no command {' '.join(words[:2])!r}; it is softflagella {_WORD_OF[words[0], words[1]]}")
+    elif words[0] in packages():
+        further(words[0]).main(words[1:])
     else:
-        print(f"error: no command {words[0]!r}; {_suggestion(words[0])}", file=sys.stderr)
-        raise SystemExit(2)
+        raise InputError(f"no command {words[0]!r}; {_suggestion(words[0])}")
 
 
 def run() -> None:

@@ -46,7 +46,7 @@ class RobotTable(Shown):
     """
 
     robot: dict[str, float]  # dimensionless groups, effects among them
-    steady: dict[str, list[float]]  # columns of `sim steady`, both directions
+    steady: dict[str, list[float]]  # columns of `softflagella steady`, both directions
     lag: list[Any]  # (2, D, 3)
     before: list[float]  # (K,), of `memory`
     memory: list[Any]  # (2, K, D, 3)

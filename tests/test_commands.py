@@ -56,8 +56,9 @@ COMMANDS = [(package, name) for package in PACKAGES for name in program_of(packa
 
 
 def done(*words: object) -> None:
-    """Run a command of `softflagella`; it must succeed."""
-    assert run_command(main, [str(word) for word in words]) == 0
+    """Run a command of a package; it must succeed."""
+    package, *rest = map(str, words)
+    assert run_command(program_of(package).main, rest) == 0
 
 
 def names(folder: Path) -> set[str]:
@@ -102,7 +103,7 @@ def planner_replay(made: Path, out: Path) -> str:
     track, last = pd.read_csv(out / "track.csv"), np.load(out / "shapes.npz")["head_position"][-1]
     assert 100 * last[:2] == pytest.approx(track[["x_cm", "y_cm"]].iloc[-1], abs=0.02)
     with pytest.raises(InputError, match="name their file with --shapes"):
-        main(["planner", "replay", str(out / "short.json"), "--out", str(out / "t.csv"), "--every", "1"])
+        main(["replay", str(out / "short.json"), "--out", str(out / "t.csv"), "--every", "1"])
     dwells = json.loads((out / "short.json").read_text())["dwell_bar"]
     assert track["time_bar"].iloc[-1] == pytest.approx(sum(dwells), rel=1e-6)
     assert sorted(set(track["direction"])) == [-1, 1]
@@ -224,7 +225,7 @@ def planner_plan(made: Path, out: Path) -> str:
 
 
 def planner_track(made: Path, out: Path) -> str:
-    words = ["planner", "track", "circle:1l", "--robot", made / "robot.toml"]
+    words = ["track", "circle:1l", "--robot", made / "robot.toml"]
     answer = subprocess.run(
         [sys.executable, "-m", "softflagella", *map(str, words)],
         input="0\n0.5 0 0 0\n", capture_output=True, text=True, check=True, timeout=LIMIT,

@@ -10,7 +10,7 @@
     [[member]]
     name = "second"           # of its folder; default: robot-2
     robot = "second.toml"
-    goal = [60, 20, 90]       # what `planner goal` takes: x, y and degrees, with start = [0, 0, 0]
+    goal = [60, 20, 90]       # what `softflagella goal` takes: x, y and degrees, with start = [0, 0, 0]
     delay_s = 60              # it does not begin before
 
 Instead of path or goal, a robot may have `places = [[0, 0], [40, 0]]` of a tour or a `region` to cover. All other

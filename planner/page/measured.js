@@ -303,7 +303,7 @@ function movedTrack([time, x, y, heading], plan, how) {
   ];
 }
 
-/* The track in the columns that `planner check` reads. */
+/* The track in the columns that `softflagella check` reads. */
 function trackTable([time, x, y, heading], cm, second) {
   const rows = Array.from(time, (value, i) => {
     return [value * second, x[i] * cm, y[i] * cm, (heading[i] * 180) / Math.PI].map(repr).join(",");

@@ -19,13 +19,13 @@ is True. A description that begins LOW:HIGH, or X Y, names the values. The funct
 written, so defaults stand in its signature alone: first with the public function and what is written for that,
 then with its own. Signatures are read from the source, not imported: help needs no libraries.
 
-`softflagella sim steady …` runs the function; the most important commands have a word of their own, such as
-`softflagella plan …` (`softflagella.__main__`).
+`python -m sim steady …` runs the function, and so does `softflagella steady …` (`softflagella.__main__`).
 """
 
 from __future__ import annotations
 
 import ast
+import difflib
 import os
 import re
 import sys
@@ -180,6 +180,17 @@ class Parser(ArgumentParser):
         super().__init__(**options)
         self._negative_number_matcher = re.compile(r"-\.?\d")
 
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Refuse an option that there is not, before argparse asks for those that are needed."""
+        for word in args or ():
+            option, known = word.partition("=")[0], self._option_string_actions
+            if option == "--":
+                break
+            if option.startswith("--") and not any(name.startswith(option) for name in known):
+                near = difflib.get_close_matches(option, known, 1)
+                self.error(f"no option {option}" + (f"; is it {near[0]}?" if near else ""))
+        return super().parse_known_args(args, namespace)
+
     def error(self, message: str) -> NoReturn:
         """End with exit status 2."""
         raise InputError(f"{message}; {self.prog} --help lists what can be given")
@@ -208,7 +219,7 @@ class Command(NamedTuple):
     """A command of a program: a function that is called with what was written.
 
     Its names map a parameter to its argument, where that differs: "--name" makes a positional one an option,
-    "--name --synonym" gives it two names, "" leaves it out.
+    "" leaves it out.
     """
 
     run: Callable[..., None]
@@ -308,14 +319,14 @@ def _add(parser: ArgumentParser, parameter: Parameter, name: str, words: dict[st
         words.setdefault("metavar", name.upper())
         parser.add_argument(parameter.name, help=about, **words)
         return
-    option, *synonyms = name.split() if name.startswith("--") else [f"--{name}"]
+    option = name if name.startswith("--") else f"--{name}"
     if flag and default:
         option, about = f"--no-{name}", f"do not {about}"
     if flag:
         words = {"action": f"store_{str(not default).lower()}"}
     elif many:
         words["action"], about = "append", f"{about}; may be given again"
-    parser.add_argument(option, *synonyms, dest=parameter.name, help=about, required=parameter.needed, **words)
+    parser.add_argument(option, dest=parameter.name, help=about, required=parameter.needed, **words)
 
 
 class Program:
@@ -336,27 +347,26 @@ class Program:
 
         return add
 
-    @property
-    def prog(self) -> str:
-        """What a user types to run the program."""
-        return f"softflagella {self.package}".removesuffix(" softflagella")
-
-    def parser(self) -> ArgumentParser:
+    def parser(self, prog: str = "") -> ArgumentParser:
         """Return the parser of the commands' names."""
-        parser = Parser(prog=self.prog, description=_sentence(self.about))
+        parser = Parser(prog=prog or f"softflagella {self.package}", description=_sentence(self.about))
         subparsers = parser.add_subparsers(required=True, metavar="COMMAND")
         for name, command in self.commands.items():
             subparsers.add_parser(name, help=command.help)
         return parser
 
-    def main(self, argv: list[str] | None = None) -> None:
-        """Parse and run a command; bad input raises `InputError`."""
-        words = sys.argv[1:] if argv is None else argv
+    def main(self, argv: list[str] | None = None, prog: str = "") -> None:
+        """Parse and run a command; bad input raises `InputError`.
+
+        Args:
+            prog: what a user types to run the program (default: softflagella and the package).
+        """
+        words, prog = sys.argv[1:] if argv is None else argv, prog or f"softflagella {self.package}"
         if words and words[0] in self.commands:
-            self.commands[words[0]].main(f"{self.prog} {words[0]}", words[1:])
+            self.commands[words[0]].main(f"{prog} {words[0]}", words[1:])
         else:
-            self.parser().parse_args(words)
+            self.parser(prog).parse_args(words)
 
     def exit(self) -> None:
         """Run as a process: exit status 0; for bad input 2, with one line on stderr."""
-        sys.exit(run_command(self.main))
+        sys.exit(run_command(partial(self.main, prog=f"python -m {self.package}")))

@@ -94,7 +94,7 @@ class Steady:
 
     @np.errstate(all="ignore")  # robots that do not turn have no radius
     def columns(self) -> dict[str, Any]:
-        """Return the columns of the command `softflagella sim steady`."""
+        """Return the columns of the command `softflagella steady`."""
         values = (
             self.omega_t, self.omega_h, self.omega_yr, self.v_x, self.v_z,
             self.turn_radius, np.degrees(self.slip_angle), self.converged, self.tail_gap,

@@ -14,7 +14,7 @@ import pytest
 import softflagella as sf
 from sim.io.errors import run_command
 from sim.io.keywords import keywords_of
-from softflagella.__main__ import WORDS, command, main, program_of
+from softflagella.__main__ import WORDS, command, further, main, packages, program_of
 from softflagella.shadowing import PACKAGES
 from tests.processes import LIMIT
 
@@ -57,13 +57,16 @@ def test_every_name_has_an_example_that_runs(name: str) -> None:
 
 
 def test_one_command_has_those_of_all_packages(capsys: pytest.CaptureFixture[str]) -> None:
-    for package in PACKAGES:
+    for package in packages():
         with pytest.raises(SystemExit) as ended:
             main([package, "--help"])
         assert ended.value.code == 0
         said = capsys.readouterr().out
         assert f"usage: softflagella {package}" in said
-        assert all(name in said for name in program_of(package).commands)
+        assert all(name in said for name in further(package).commands)
+    commands = [name for package in PACKAGES for name in program_of(package).commands]
+    named = [*WORDS, *(name for package in packages() for name in further(package).commands)]
+    assert len(named) == len(commands) + 1  # each has one name; demo is of no package
 
 
 def test_words_are_commands_of_packages_and_stand_first(capsys: pytest.CaptureFixture[str]) -> None:
@@ -89,8 +92,11 @@ def test_words_are_commands_of_packages_and_stand_first(capsys: pytest.CaptureFi
         (["report"], "no command 'report'; it is softflagella dataset report"),
         (["calibrat"], "no command 'calibrat'; is it calibrate?"),
         (["qqq"], "no command 'qqq'; there are robot, steady"),
-        (["plan", "square:3l"], "required: --robot/--vehicle, --out; softflagella plan --help"),
-        (["planner", "fly"], "invalid choice: 'fly'"),
+        (["plan", "square:3l"], "required: --robot, --out; softflagella plan --help"),
+        (["plan", "square:3l", "--robt", "x"], "no option --robt; is it --robot?"),
+        (["planner", "goal"], "no command 'planner goal'; it is softflagella goal"),
+        (["dataset", "build"], "no command 'dataset build'; it is softflagella sweep"),
+        (["dataset", "fly"], "invalid choice: 'fly'"),
         (["sim"], "required: COMMAND; softflagella sim --help"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

@@ -121,7 +121,7 @@ def test_help_is_the_docstring() -> None:
         ("paint hall --tin red --coats two", "argument --coats: invalid int value: 'two'"),
         ("paint hall --tin red --shape long", "invalid choice: 'long' (choose from 'round', 'square')"),
         ("paint hall --tin red --spot 1", "--spot: expected 2 arguments"),
-        ("paint hall --tin red --told x", "unrecognized arguments: --told x"),
+        ("paint hall --tin red --told x", "no option --told"),
         ("mop", "invalid choice: 'mop'"),
     ],
 )
