@@ -130,7 +130,7 @@ def transfer_p(study: Study, fitted: Fit) -> float:
     runs, used = study.model.runs, study.split.fitted
     near = fitted_again(runs, used)
     others = used & ~near
-    values = near.sum() * runs.y.shape[1]
+    values = runs.values(near)
     if not others.any() or values < _ENOUGH * len(fitted.names):
         return 1.0
     refit = fitted.products(runs, near).solve(passes=3)

@@ -122,7 +122,7 @@ def group_factors(
 
 def gain_of_a_curve(model: LawModel, fitted: Fit, used: Flags) -> float:
     """Compute by how much free shifts along the best input lower the BIC of a law; −∞ if none can be tested."""
-    values = int(used.sum()) * model.runs.y.shape[1]
+    values = model.runs.values(used)
     gains = [
         float(linear.gain(linear.as_given[None])[0]) - linear.contrasts.shape[1] * math.log(values)
         for linear in _linear_models(model, fitted, used)

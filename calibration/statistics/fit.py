@@ -323,7 +323,7 @@ def birge(runs: Runs, fitted: Fit, used: Flags) -> float:
     Source: Birge (1932).
     """
     priors = sum(p.sigma is not None for p in fitted.fitted)
-    freedom = int(used.sum()) * runs.y.shape[1] + priors - len(fitted.names)
+    freedom = runs.values(used) + priors - len(fitted.names)
     return max(1.0, float(fitted.normal(runs, used)[-1, -1]) / max(freedom, 1))
 
 

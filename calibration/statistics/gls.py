@@ -93,6 +93,7 @@ class Gls:
         session: Integers,
         scale: Floats | None = None,
         repeated: Integers | Floats | None = None,
+        completion: Floats | None = None,
     ):
         """Multiply the columns with each other.
 
@@ -102,9 +103,10 @@ class Gls:
             session: (n,) numbers of the runs' sessions.
             scale: (n,) roots of the weights of the runs.
             repeated: what tells repeats, see `Runs.repeats`; needed for the residuals' own S.
+            completion: (n, k, k) of runs with gaps, see `statistical_model`; acts on what is drawn.
         """
         n, k, m = columns.shape
-        self.precision, self.repeated = precision, repeated
+        self.precision, self.repeated, self.completion = precision, repeated, completion
         self.session = np.unique(session, return_inverse=True)[1].reshape(-1)
         self.scale = np.ones(n) if scale is None else scale
         self.picks, self.sizes = averaging_rows(session, self.scale)
@@ -175,7 +177,10 @@ class Gls:
         change = rng.normal(size=(count, p)) @ spread.T
         J = self.columns[..., :p] / self.scale[:, None, None]
         axes = np.linalg.inv(inverse_root(run))
-        return np.asarray(noise @ axes.T + np.einsum("nkp,bp->bnk", J, change, optimize=True))
+        noise = noise @ axes.T
+        if self.completion is not None:
+            noise = np.einsum("nab,Bnb->Bna", self.completion, noise)
+        return np.asarray(noise + np.einsum("nkp,bp->bnk", J, change, optimize=True))
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,12 @@
 model; a sphere that settles in a vessel is another one (`calibration/examples/spheres.py`).
 
 The noise, weights of runs and priors are those of `calibration.statistics.gls`.
+
+**Gaps.** A run may lack some of its outputs. Let T put S_mo S_oo⁻¹ r_o for what is missing (m) of a residual r,
+from what was measured (o) of the same run. Then (T r)ᵀ S⁻¹ (T r) = r_oᵀ S_oo⁻¹ r_o: where T acts on residuals,
+derivatives and drawn noise alike, least squares are those of the measured values alone, and nothing is filled in.
+A run with a gap is no repeat of another one, so S is that of whole runs. The shift of a session is weighted as if
+its runs were whole.
 """
 
 from __future__ import annotations
@@ -71,6 +77,9 @@ class Runs:
     excluded: tuple[str, ...]  # "row 7: …"
     caveats: tuple[str, ...]  # what these runs cannot show, in words
     weight: Floats | None = field(default=None, kw_only=True)  # (n,) variance of a run is S over it; None: 1
+    completion: Floats | None = field(
+        default=None, kw_only=True
+    )  # T, (n, k, k); None: no gaps. y is arbitrary there
     specimen: Integers | None = field(default=None, kw_only=True)  # (n,) 0, 1, …: what was run; None: not noted
     specimen_names: tuple[str, ...] = field(default=(), kw_only=True)  # by number
 
@@ -81,6 +90,31 @@ class Runs:
 
     def __len__(self) -> int:
         return len(self.y)
+
+    @property
+    def gaps(self) -> Flags:
+        """Outputs that were not measured, (n, k)."""
+        if self.completion is None:
+            return np.zeros(self.y.shape, dtype=bool)
+        return np.asarray(np.diagonal(self.completion, axis1=1, axis2=2) == 0)
+
+    @property
+    def apart(self) -> Integers:
+        """The condition (n,); a run with a gap has one of its own."""
+        own = self.condition.max() + 1 + np.arange(len(self))
+        return np.where(self.gaps.any(1), own, self.condition)
+
+    def values(self, rows: Flags) -> int:
+        """Count the measured values of some runs (n,)."""
+        return int((~self.gaps[rows]).sum())
+
+    def completed(self, table: Floats) -> Floats:
+        """Multiply a table (..., n, k) with T."""
+        return table if self.completion is None else np.einsum("nab,...nb->...na", self.completion, table)
+
+    def compared(self, prediction: Floats) -> Floats:
+        """Change a prediction (..., n, k) at gaps so that y less it is T times what it was."""
+        return prediction if self.completion is None else self.y + self.completed(prediction - self.y)
 
     def row_name(self, place: int) -> str:
         """Name the row of a run, from 0, in the table."""
@@ -94,9 +128,14 @@ class Runs:
         no noise of a run. Where fewer than `FEWEST_REPEATS` runs are repeated, mirror runs serve as repeats, but
         for what is odd and linear in the inputs; without them what is smooth in the inputs is no noise.
         """
-        condition, session, noted = self.condition[rows], self.session[rows], self.noted_of_repeats[rows]
+        session, noted = self.session[rows], self.noted_of_repeats[rows]
+        condition = self.apart[rows]
+        alone = np.equal.outer(np.arange(len(self)), np.flatnonzero(self.gaps.any(1)))[rows]
         if (count := repeat_count(condition)) < FEWEST_REPEATS:
-            designs = self._mirror_design(rows), np.column_stack([_levels(session), features(self, rows)[1][rows]])
+            designs = (
+                np.column_stack([self._mirror_design(rows), alone]),
+                np.column_stack([_levels(session), features(self, rows)[1][rows], alone]),
+            )
             return next((d for d in designs if repeat_count(d) >= max(FEWEST_REPEATS, count)), condition)
         crossed = len(np.unique(np.stack([condition, session]), axis=1).T) > len(np.unique(condition))
         if not crossed and not noted.size:
@@ -278,7 +317,8 @@ def regression(
     repeated: Integers | Floats | None = None,
 ) -> Gls:
     """Regress the runs in `rows` (n,) on columns (n, k, m) of all runs, the first those of `fitted`."""
-    return Gls(columns[rows], precisions(fitted), runs.session[rows], runs.scale[rows], repeated)
+    completion = None if runs.completion is None else runs.completion[rows]
+    return Gls(columns[rows], precisions(fitted), runs.session[rows], runs.scale[rows], repeated, completion)
 
 
 def _levels(factor: Integers) -> Floats:

@@ -28,8 +28,8 @@ from scipy.stats import norm as normal
 from scipy.stats import t as student
 
 from calibration.statistics.fit import Fit
-from calibration.statistics.gls import Gls, inverse_root, repeat_count
-from calibration.statistics.statistical_model import ForwardModel, Parameter, Runs, stepped
+from calibration.statistics.gls import inverse_root, repeat_count
+from calibration.statistics.statistical_model import ForwardModel, Parameter, Runs, regression, stepped
 from sim.arrays import Flags, Floats, Integers
 
 LEVEL = 0.04  # α of every claim; below 0.05, because the noise is estimated and false claims must stay below 5 %
@@ -76,7 +76,7 @@ class Study:
     @property
     def values(self) -> int:
         """Number of values that are fitted, over runs and outputs."""
-        return int(self.split.fitted.sum()) * self.model.runs.y.shape[1]
+        return self.model.runs.values(self.split.fitted)
 
     def noise_at_most(self, parameters: int) -> float:
         """Compute a deviance that noise alone hardly exceeds: `_BEYOND` standard deviations above its mean.
@@ -244,14 +244,14 @@ def errors(data: Runs, prediction: Floats, rows: Flags) -> tuple[float, dict[str
 
     The residual of a run counts as √w times itself, which noise alone makes as large as S says.
     """
-    square = _scaled_square(data, prediction, rows).mean(0)
-    each = dict(zip(data.outputs, np.sqrt(square).tolist(), strict=True))
-    return float(np.sqrt(square.mean())), each
+    square = _scaled_square(data, prediction, rows)
+    each = dict(zip(data.outputs, np.sqrt(np.nanmean(square, 0)).tolist(), strict=True))
+    return float(np.sqrt(np.nanmean(square))), each
 
 
 def error_interval(data: Runs, prediction: Floats, rows: Flags, seed: int) -> tuple[float, float]:
     """Estimate the 95 % interval of the relative rms by resampling conditions."""
-    square = _scaled_square(data, prediction, rows).mean(1)
+    square = np.nanmean(_scaled_square(data, prediction, rows), 1)
     condition = data.condition[rows]
     kinds = np.unique(condition)
     means = np.array([square[condition == c].mean() for c in kinds])
@@ -261,8 +261,9 @@ def error_interval(data: Runs, prediction: Floats, rows: Flags, seed: int) -> tu
 
 
 def _scaled_square(data: Runs, prediction: Floats, rows: Flags) -> Floats:
-    """Compute w r² of the runs in `rows`, (n', k)."""
-    return np.asarray(((data.y - prediction) * data.scale[:, None])[rows] ** 2)
+    """Compute w r² of the runs in `rows`, (n', k); NaN for what was not measured."""
+    square = ((data.y - prediction) * data.scale[:, None]) ** 2
+    return np.where(data.gaps, np.nan, square)[rows]
 
 
 def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> float:
@@ -274,7 +275,8 @@ def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> floa
     root, scale, rng = inverse_root(fitted.noise.run), data.scale[rows, None], np.random.default_rng(seed)
     residual = scale * (data.y - fitted.prediction)[rows] @ root.T
     freedom = max(repeat_count(data.repeats(~rows)), len(root) + 1)
-    linear = Gls(fitted.jacobian[rows], np.zeros(len(fitted.names)), data.session[rows], data.scale[rows])
+    free = tuple(replace(p, sigma=None) for p in fitted.fitted)
+    linear = regression(data, rows, fitted.jacobian, free)
     spread = np.asarray(np.linalg.cholesky(fitted.covariance + 1e-15 * np.diag(np.diag(fitted.covariance))))
     as_far = 0
     for _ in range(_DRAWS // _AT_ONCE):

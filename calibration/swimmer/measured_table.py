@@ -12,7 +12,8 @@ that were made together. Without it, all runs of one N are one session. `robot` 
 has several. Some effects need elapsed_min,
 temperature_C, tank_diameter_cm or course_deg (direction of the path in the lab, where a run is a part of a
 circle). Rows that cannot be used are excluded with number and reason, and so are copies of rows
-(`find_copies`), and rows that lack a note which nearly all others have. Columns without any
+(`find_copies`), and rows that lack a note which nearly all others have. A row that lacks some outputs counts
+with the others (`calibration.statistics.statistical_model`). Columns without any
 value are left out, notes that many rows lack, and columns of other names, unless the name looks like a misspelt
 one.
 
@@ -44,6 +45,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -72,6 +74,7 @@ _SIGMAS = dict(  # column -> nuisance parameter, factor
 _LARGEST = 1e9  # of a value
 _FEWEST_RUNS = 24
 _COPY = "a copy of an earlier row, equal in all inputs and outputs"
+_LISTED = 3  # rows without an output
 _GAPS = 0.1  # share of the usable rows that may lack a note
 _OWN = 1e-3  # share of an output's scatter that must be independent of the other outputs
 
@@ -167,10 +170,12 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
             + (f" (without any value: {', '.join(empty)})" if empty else "")
         )
     numbers = table.drop(columns=["session", "robot"], errors="ignore").apply(numbers_of)
-    reasons = _reasons(table, numbers, outputs, header)
+    missing = table[[OUTPUTS[name][0] for name in outputs]].isna()
+    reasons = _reasons(table, numbers, outputs, header, missing)
     sparse = _mark_gaps(reasons, table, numbers)
     _mark_copies(reasons, numbers, outputs, table)
     keep = np.array([not r for r in reasons])
+    gaps = missing.to_numpy()[keep]
     aside = tuple(f"{row_name(table, i)}: {r}" for i, r in enumerate(reasons) if r)
     good = numbers[keep].drop(columns=sparse)
     if len(good) < _FEWEST_RUNS:
@@ -190,7 +195,8 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
     for name in outputs:
         column, factor, _ = OUTPUTS[name]
         value = good[column].to_numpy(dtype=float) * factor
-        columns.append(value if name == "theta" else np.log(np.abs(value)))
+        scaled = pd.Series(value if name == "theta" else np.log(np.abs(value)))  # at gaps what repeats have
+        columns.append(scaled.fillna(scaled.groupby(condition).transform("mean")).fillna(scaled.mean()))
     factors = (1, to_si(1.0, "cm"), to_si(1.0, "rpm"))
     tails, length, omega = (good[c].to_numpy(dtype=float) * f for c, f in zip(INPUTS, factors, strict=True))
     noted = _noted(good)
@@ -206,6 +212,7 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         rows=np.flatnonzero(keep) + 1,
         excluded=(
             *aside,
+            *_gaps_in_words(table, missing & keep[:, None]),
             *(f"column {name}: without any value, left out" for name in empty),
             *(
                 f"column {name}: without a value in more than {100 * _GAPS:.0f} % of the rows, left out"
@@ -214,6 +221,7 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
             *(f"column {name}: not known, left out" for name in unknown),
         ),
         caveats=_caveats(tails, length, omega),
+        completion=_without_gaps(gaps),
         specimen=robot if noted_robot else None,
         specimen_names=tuple(map(str, robot_names)) if noted_robot else (),
         tails=tails,
@@ -226,6 +234,38 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         lines=good.index.to_numpy() if good.index.name == LINE else None,
     )
     return _independent(data, sum(_COPY in reason for reason in reasons))
+
+
+def _without_gaps(gaps: Flags) -> Floats:
+    """Make `Runs.completion` of gaps (n, k) for which nothing stands."""
+    return np.eye(gaps.shape[1]) * ~gaps[:, :, None]
+
+
+def _with_outputs(data: Measurements, kept: Sequence[int]) -> Measurements:
+    """Keep some outputs, and let those of a run stand for the one that it lacks (`Runs.completion`)."""
+    gaps = data.gaps[:, kept]
+    names, completion = tuple(data.outputs[i] for i in kept), _without_gaps(gaps)
+    data = replace(data, outputs=names, y=data.y[:, kept], completion=completion if gaps.any() else None)
+    if gaps.any():
+        run = repeat_covariance(data.y, data.repeats())
+        for T, gap in zip(completion, gaps, strict=True):
+            T[np.ix_(gap, ~gap)] = np.linalg.solve(run[np.ix_(~gap, ~gap)], run[np.ix_(~gap, gap)]).T
+    return data
+
+
+def _gaps_in_words(table: pd.DataFrame, missing: pd.DataFrame) -> list[str]:
+    """Name the rows that lack an output, a line for each output."""
+    lines = []
+    for column in (name for name in missing if missing[name].any()):
+        rows = [row_name(table, i) for i in np.flatnonzero(missing[column]).tolist()]
+        more = f" and {len(rows) - _LISTED} more" if len(rows) > _LISTED else ""
+        named = ", ".join(rows[:_LISTED]) + more
+        lines.append(f"column {column}: no value in {named}; the other outputs there count")
+    return lines
+
+
+def _not_finite(column: str, value: Any) -> str:
+    return f"{column} has no value" if pd.isna(value) else f"{column} = {value} is not a finite number"
 
 
 def _is_empty(column: pd.Series) -> bool:
@@ -243,15 +283,16 @@ def _mark_gaps(reasons: list[str], table: pd.DataFrame, numbers: pd.DataFrame) -
             sparse.append(column)
             continue
         for i in gaps:
-            reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} is not a finite number"
+            reasons[i] = reasons[i] or _not_finite(column, table[column].iloc[i])
     return sparse
 
 
 def _mark_copies(reasons: list[str], numbers: pd.DataFrame, outputs: tuple[str, ...], table: pd.DataFrame) -> None:
     """Give a reason to every usable row that is a copy of an earlier one."""
-    usable = [i for i, reason in enumerate(reasons) if not reason]
-    used = numbers.iloc[usable]
     columns = [OUTPUTS[name][0] for name in outputs]
+    whole = numbers[columns].notna().all(axis=1)
+    usable = [i for i, reason in enumerate(reasons) if not reason and whole.iloc[i]]
+    used = numbers.iloc[usable]
     for place, earlier in find_copies(used[list(INPUTS)].to_numpy(), used[columns].to_numpy()).items():
         reasons[usable[place]] = f"{_COPY} ({row_name(table, usable[earlier])})"
 
@@ -265,8 +306,8 @@ def _independent(data: Measurements, copies: int) -> Measurements:
     Raises:
         InputError: there are too few repeats, or an output is the same in all of them.
     """
-    y, outputs, repeats = data.y, data.outputs, repeat_count(data.condition)
-    repeated = data.condition if repeats >= FEWEST_REPEATS else data.repeats()
+    y, outputs, repeats = data.y, data.outputs, repeat_count(data.apart)
+    repeated = data.apart if repeats >= FEWEST_REPEATS else data.repeats()
     if (count := repeat_count(repeated)) < FEWEST_REPEATS:
         without = f", without {copies} copies of rows" if copies else ""
         raise InputError(
@@ -294,7 +335,7 @@ def _independent(data: Measurements, copies: int) -> Measurements:
         else:
             kept.append(i)
     excluded = (*data.excluded, *follows)
-    return replace(data, y=y[:, kept], outputs=tuple(outputs[i] for i in kept), excluded=excluded, caveats=caveats)
+    return _with_outputs(replace(data, excluded=excluded, caveats=caveats), kept)
 
 
 def _sigmas(good: pd.DataFrame) -> dict[str, float]:
@@ -344,19 +385,24 @@ def _noted(good: pd.DataFrame) -> dict[str, Floats]:
     return notes
 
 
-def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...], header: Flags) -> list[str]:
+def _reasons(
+    table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...], header: Flags, missing: pd.DataFrame
+) -> list[str]:
     """Say why each row cannot be used; empty where it can. The header (n,) may be there again."""
     reasons = ["the header again" if again else "" for again in header]
-    used = (*INPUTS, *(OUTPUTS[name][0] for name in outputs))
+    for i in np.flatnonzero(missing.all(axis=1)):
+        reasons[i] = reasons[i] or "no output has a value"
+    used = (*INPUTS, *missing)
     values = {column: numbers[column].where(numbers[column].abs() < _LARGEST).to_numpy() for column in used}
     positive = [column for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s") if column in values]
     for column, bad, fault in (
-        *((column, ~np.isfinite(value), "is not a finite number") for column, value in values.items()),
+        *((column, ~(np.isfinite(value) | missing.get(column, False)), "") for column, value in values.items()),
         ("N", values["N"] % 1 != 0, "is not a whole number"),
         *((column, values[column] <= 0, "is not above 0") for column in positive),
     ):
         for i in np.flatnonzero(bad):
-            reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} {fault}"
+            given = table[column].iloc[i]
+            reasons[i] = reasons[i] or (f"{column} = {given} {fault}" if fault else _not_finite(column, given))
     sign = np.sign(values["omega_rpm"])
     for i in np.flatnonzero(sign == 0):
         reasons[i] = reasons[i] or "omega_rpm = 0"
@@ -378,13 +424,13 @@ def _paper(data: Measurements) -> tuple[Measurements, Flags]:
     missing = [n for n in outputs if n not in data.outputs]
     if missing or not {2.0, 3.0, 4.0, 5.0} <= set(data.tails.tolist()):
         raise InputError("the paper's protocol needs omega_h_rpm, omega_yr_rad_s and runs with N = 2, 3, 4 and 5")
-    y = data.y[:, [data.outputs.index(n) for n in outputs]]
+    data = _with_outputs(data, [data.outputs.index(n) for n in outputs])
     held_out = ~np.isin(data.tails, (3, 4))
     if divided(data, held_out):
         raise InputError(
             "a session has runs with N = 3 or 4 and with N = 2 or 5; the paper's protocol would split it"
         )
-    return replace(data, outputs=outputs, y=y), np.asarray(held_out)
+    return data, np.asarray(held_out)
 
 
 PROTOCOLS: dict[str, Callable[[Measurements], tuple[Measurements, Flags]]] = {"session": _session, "paper": _paper}

@@ -154,7 +154,8 @@ class SwimmerModel:
         predictions = np.array(
             [table[end - len(conditions) + place] for end, (conditions, place) in zip(ends, parts, strict=True)]
         )
-        return predictions + np.array([self._turned(parameters.get(HEADING, 0.0)) for parameters in sets])
+        turned = np.array([self._turned(parameters.get(HEADING, 0.0)) for parameters in sets])
+        return self.runs.compared(predictions + turned)
 
     def derivatives(
         self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
@@ -211,7 +212,7 @@ class SwimmerModel:
         seen = view.see(sensitivities.values)[place] + self._turned(parameters.get(HEADING, 0.0))
         if not quick and not (np.isfinite(J).all() and np.isfinite(seen).all()):
             return by_differences(self, parameters, names, title=title)
-        return seen, J
+        return self.runs.compared(seen), np.moveaxis(self.runs.completed(np.moveaxis(J, -1, 0)), 0, -1)
 
     def _slope_of_number(
         self,
@@ -287,7 +288,7 @@ class SwimmerModel:
         noted = np.tile(runs.noted.mean(0), (count, 1))
         settings = [{"N": int(n), "l_cm": length, "omega_rpm": speed} for n, length, speed in grid.tolist()]
         possible_runs = replace(
-            runs, y=np.zeros((count, len(runs.outputs))), weight=None, specimen=None,
+            runs, y=np.zeros((count, len(runs.outputs))), weight=None, completion=None, specimen=None,
             condition=np.arange(count), session=np.zeros(count, int),
             session_names=("next",), inputs=np.zeros((count, runs.inputs.shape[1])), excluded=(),
             rows=np.arange(count), caveats=(), tails=grid[:, 0], length=grid[:, 1] / 100,

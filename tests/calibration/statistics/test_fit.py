@@ -95,6 +95,60 @@ def study_of(model: Line, seed: int = 0) -> Study:
     return Study.fitted_to(model, ~middle_session(model.runs), seed=seed, draws=100)
 
 
+class LineWithGaps(Line):
+    """The same where some runs lack outputs."""
+
+    def derivatives(
+        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
+    ) -> tuple[Floats, Floats]:
+        seen, J = super().derivatives(parameters, names)
+        return self.runs.compared(seen), np.moveaxis(self.runs.completed(np.moveaxis(J, -1, 0)), 0, -1)
+
+
+def test_a_run_with_a_gap_counts_by_what_was_measured_alone() -> None:
+    rng = np.random.default_rng(6)
+    runs = line(6)[0].runs
+    y = runs.y + NOISE * rng.normal(size=(COUNT, 1))  # correlated
+    gaps = rng.random((COUNT, 3)) < 0.05
+    whole = ~gaps.any(1)
+    pairs = np.repeat(whole[::2] & whole[1::2], 2)
+    S = repeat_covariance(y[pairs], runs.condition[pairs])
+    completion = np.eye(3) * ~gaps[:, :, None]
+    for T, gap in zip(completion, gaps, strict=True):
+        T[np.ix_(gap, ~gap)] = S[np.ix_(gap, ~gap)] @ np.linalg.inv(S[np.ix_(~gap, ~gap)])
+    rows, fits = np.ones(COUNT, dtype=bool), []
+    for standing in (0.0, 7.0):  # what stands in a gap does not matter
+        model = LineWithGaps(replace(runs, y=np.where(gaps, standing, y), completion=completion))
+        fits.append(fit(model, start_values(model), ("a", "b"), rows, title=""))
+        assert fits[-1].noise.run == pytest.approx(S)  # of whole runs
+        normal = fits[-1].products(model.runs, rows).at(0.0)
+        J = Line(runs).derivatives(TRUTH, ("a", "b"))[1]
+        measured = [(J[i][~g], np.linalg.inv(S[np.ix_(~g, ~g)])) for i, g in enumerate(gaps)]
+        assert normal[:2, :2] == pytest.approx(sum(j.T @ inverse @ j for j, inverse in measured))
+        assert model.runs.values(rows) == (~gaps).sum()
+        each = errors(model.runs, fits[-1].prediction, rows)[1]
+        left = np.where(gaps, np.nan, y - Line(runs).predict([fits[-1].parameters])[0])
+        assert list(each.values()) == pytest.approx(np.sqrt(np.nanmean(left**2, 0)))
+    assert fits[0].parameters == pytest.approx(fits[1].parameters)
+    assert fits[0].parameters == pytest.approx(TRUTH, abs=0.03)
+
+
+def test_noise_alone_is_no_misfit_where_runs_have_gaps() -> None:
+    """The drawn noise has the same gaps: with a third of the values missing p-values stay uniform."""
+    p_values = []
+    for seed in range(24):
+        runs = line(seed)[0].runs
+        gaps = np.random.default_rng(seed).random((COUNT, 3)) < 0.15
+        gaps[: COUNT // 3] = False
+        model = LineWithGaps(replace(runs, completion=np.eye(3) * ~gaps[:, :, None]))
+        study = study_of(model, seed)
+        fitted = fit(model, start_values(model), ("a", "b"), study.split.fitted, title="")
+        none = Directions.plain(np.empty((COUNT, 3, 0)))
+        p_values.append(examine_residual(study, fitted, none).p_value)
+    assert 0.25 < np.mean(p_values) < 0.75
+    assert np.less(p_values, 0.05).sum() <= 5
+
+
 def test_without_mistracked_runs_the_fit_is_the_plain_one() -> None:
     study = study_of(line(0)[0])
     again, fitted = fit_weighted(study, start_values(study.model))

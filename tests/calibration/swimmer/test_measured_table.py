@@ -57,7 +57,7 @@ def test_an_excluded_row_is_named_with_its_line(tmp_path: Path) -> None:
     lines[5] = "#WERT!" + lines[5][lines[5].index(";") :]
     (tmp_path / "runs.csv").write_text("\n".join(["% tank 3", *lines[:3], "", *lines[3:]]))
     runs = read_measurements(tmp_path / "runs.csv")
-    assert runs.excluded == ("row 5 (line 8): l_cm = nan is not a finite number",)
+    assert runs.excluded == ("row 5 (line 8): l_cm has no value",)
 
 
 @pytest.mark.slow

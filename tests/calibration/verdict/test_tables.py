@@ -63,11 +63,31 @@ def test_bad_rows_are_named_and_set_aside() -> None:
     table.loc[1, "theta_deg"] = np.nan
     table.loc[2, "omega_h_rpm"] *= -1
     data = read_measurements(table)
-    assert len(data) == len(table) - 3
-    assert [line.split(":")[0] for line in data.excluded] == ["row 1", "row 2", "row 3"]
+    assert len(data) == len(table) - 2
+    assert [line.split(":")[0] for line in data.excluded] == ["row 1", "row 3", "column theta_deg"]
+    assert data.gaps.sum() == data.gaps[0, data.outputs.index("theta")] == 1
+    assert data.excluded[-1] == "column theta_deg: no value in row 2; the other outputs there count"
     assert read_measurements(table.assign(colour="red")).excluded[-1] == "column colour: not known, left out"
     with pytest.raises(InputError, match="unknown"):
         read_measurements(table.rename(columns={"trial": "tri al"}))
+
+
+@pytest.mark.usefixtures("few_candidates")
+def test_an_empty_cell_costs_no_other_output(tmp_path: Path) -> None:
+    """A coefficient hardly changes, where without the rows it would, and `n/a` is no nan."""
+    table, rng = toy_table(5), np.random.default_rng(0)
+    outputs = ["omega_h_rpm", "omega_yr_rad_s", "R_yr_cm", "theta_deg"]
+    gaps = rng.random((len(table), len(outputs))) < 0.04
+    sparse = table.copy()
+    sparse[outputs] = table[outputs].astype(object).where(~gaps, "n/a")
+    sparse.to_csv(tmp_path / "t.csv", index=False)
+    data = read_measurements(tmp_path / "t.csv")
+    assert len(data) == len(table)
+    assert data.gaps.sum() == gaps.sum()
+    assert len(data.excluded) == gaps.any(0).sum()
+    assert not any("nan" in line for line in data.excluded)
+    paper = PROTOCOLS["paper"](data)[0]
+    assert paper.gaps.sum() == gaps[:, :2].sum()
 
 
 def test_a_header_in_the_table_and_a_row_number_are_named(tmp_path: Path) -> None:
