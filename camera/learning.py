@@ -19,6 +19,7 @@ from camera.view import BANDS, DOTS, Markers, Setup, View, opencv
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
+_LARGE = 1920  # pixels, of the width of the pictures from which is learnt, at most
 _SAMPLES = 12  # pictures from which is learnt what rests, and the distance of the bands
 _AGREED = 0.04  # relative difference of two distances of the bands in small pictures
 _BAND_REACH, _DOTS_REACH = 0.5, 3  # of the bands' distance, around a band's centre and a robot: there they are
@@ -39,15 +40,21 @@ def learn(
         InputError: the bands are further apart than the head is long, or hardly apart.
     """
     banded = [each for each in setup.robots if each.tag is None]
-    pictures = list(film.samples(_SAMPLES, start, end)) if banded else []
+    pictures, size, view = list[Any](), (0, 0), setup.view
+    for picture in film.samples(_SAMPLES, start, end) if banded else []:
+        size = width, height = picture.shape[1::-1]
+        fold = math.ceil(width / _LARGE)
+        small = width // fold, height // fold
+        pictures.append(opencv().resize(picture, small, interpolation=opencv().INTER_AREA))
+        view = setup.view.smaller(fold)
     hues = {hue for each in banded for hue in each.hues.values()}
     colours = {hue: np.array([_map(picture, hue) for picture in pictures]) for hue in hues}
     unknown = {each.name for each in banded if math.isnan(each.apart)}
     for still in (_resting(colours), {}):
-        agreed = {each.name: _agreed(pictures, each, setup.view, still, head_length) for each in banded
+        agreed = {each.name: _agreed(pictures, each, view, still, head_length) for each in banded
                   if each.name in unknown}  # fmt: skip
         guessed = [each._replace(apart=agreed.get(each.name, each.apart)) for each in banded]
-        seen = _seen(pictures, guessed, setup.view, still)
+        seen = _seen(pictures, guessed, view, still)
         if all(seen.values()):
             break
     _erase(colours, banded, seen)
@@ -55,9 +62,9 @@ def learn(
         known = list(seen[each.name])
         if 0 < len(known) < len(pictures):  # what is gone there was the robot, at rest
             left = _resting({hue: colours[hue][known] for hue in each.hues.values()})
-            _erase(colours, [each], _seen(pictures, [each], setup.view, left))
+            _erase(colours, [each], _seen(pictures, [each], view, left))
     still = _resting(colours)
-    seen = _seen(pictures, guessed, setup.view, still)
+    seen = _seen(pictures, guessed, view, still)
     learnt = {name: float(np.median([apart for _, apart in poses.values()])) for name, poses in seen.items()
               if poses and name in unknown}  # fmt: skip
     for apart in learnt.values():
@@ -67,6 +74,7 @@ def learn(
                 f"{100 * head_length:.3g} cm long: correct [scale] in view.toml, or give the right robot, or "
                 "the bands' distance as apart_cm"
             )
+    still = {hue: opencv().resize(weights, size) for hue, weights in still.items()}
     return [each._replace(apart=learnt.get(each.name, each.apart)) for each in setup.robots], still
 
 

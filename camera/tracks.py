@@ -70,15 +70,18 @@ def track_film(
     import pandas as pd
 
     with naming(path):
-        film = Film(path)
+        if not start < end:
+            raise InputError(f"no frame between {start:g} and {end:g} s; give the earlier time as the start")
+        film, tell = Film(path), progress or (lambda done, count: None)
+        tell(0, film.count)
         robots, still = learn(film, setup, head_length, start, end)
         detector = Detector(robots, setup.view, still=still, head_length=head_length)
         rows: dict[str, list[dict[str, float]]] = {each.name: [] for each in setup.robots}
         why = {each.name: Counter[str]() for each in setup.robots}
         times, doubled, picture = [], 0, None
         for frame in film.frames(start, end):
-            if progress is not None and frame.number % 10 == 0:
-                progress(frame.number, film.count)
+            if frame.number % 10 == 0:
+                tell(frame.number, film.count)
             times.append(frame.time_s)
             if frame.doubled:
                 doubled += 1
@@ -92,14 +95,8 @@ def track_film(
         if picture is None:
             raise InputError(f"no frame between {start:g} and {end:g} s; the film has {film.count} frames")
         notes, steps = list[str](), np.diff(times)
-        if start <= 0 and end == math.inf and film.count - len(times) > max(_UNCOUNTED * film.count, 2):
-            unread = f"the film states {film.count} frames, {len(times)} can be read"
-            if Path(path).suffix.lower() == ".avi":
-                raise InputError(
-                    f"{unread}: an AVI has no time stamps, so times after a gap are too early; track the part "
-                    "before it (--end), or film again"
-                )
-            notes.append(f"{unread}: it is damaged or cut")
+        if film.ended and film.count - film.read > max(_UNCOUNTED * film.count, 2):
+            notes.append(f"{film.stated(film.read)}: it is damaged or cut, or the camera dropped frames")
         if gaps := int((steps > _GAP * np.median(steps)).sum()) if len(steps) else 0:
             notes.append(f"{gaps} gaps in the time stamps: the camera dropped frames")
         if doubled:

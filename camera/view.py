@@ -34,7 +34,7 @@ from sim.io.units import split, to_si
 HUES = {"red": 0, "orange": 30, "yellow": 60, "green": 120, "cyan": 180, "blue": 240, "magenta": 300}  # degrees
 BANDS = ("front", "rear")
 DOTS = ("head", "tail")  # markers that come and go as the robot spins
-_POSSIBLE = (1e-5, 1e3)  # m, between which a length in a tank is
+_LEAST, _LARGEST = 1e-5, 1e3  # m, between which a length in a tank is
 _CLICK = 1.0  # pixels, standard deviation of a point that a person reads off a picture
 _APART = 40  # degrees between the hues of two markers
 _NARROW = 1e-3  # of the length of a set of points, its width at which they lie on a line
@@ -141,6 +141,18 @@ class View:
         across, down = corners[1:] - corners[0]
         return math.sqrt(abs(float(across[0] * down[1] - across[1] * down[0])))
 
+    def smaller(self, fold: int) -> View:
+        """Return the view of pictures whose pixels are `fold` × `fold` of these pixels."""
+        middle = (fold - 1) / 2
+        scale = np.array([[fold, 0, middle], [0, fold, middle], [0, 0, 1.0]])  # to the old pixels
+        back = np.linalg.inv(scale)
+        return replace(
+            self,
+            homography=None if self.homography is None else self.homography @ scale,
+            lens=None if self.lens is None else self.lens._replace(matrix=back @ self.lens.matrix),
+            region=None if self.region is None else (self.region - middle) / fold,
+        )
+
     def with_tag(self, corners: Floats, error: float) -> View:
         """Return the view with the scale of its tag, whose corners (4, 2) are seen in a picture.
 
@@ -239,10 +251,14 @@ def _read(table: str, entries: Any) -> dict[str, Any]:
             raise InputError(f"{place} has no unit of length; give {quantity}_cm, or another unit")
         elif quantity in read:
             raise InputError(f"{place}: another entry gives {quantity}, too; drop all but one")
-        elif quantity != "points" and _numbers(value).shape != ():
-            raise InputError(f"{place} = {value!r}; give a number, {quantity}_cm or in another unit")
         else:
-            read[quantity] = to_si(_numbers(value), unit.suffix)
+            read[quantity] = length = to_si(_numbers(value), unit.suffix)
+            least = -_LARGEST if quantity == "ahead" else _LEAST
+            if quantity != "points" and not (length.shape == () and least < length < _LARGEST):
+                raise InputError(
+                    f"{place} = {value!r}; give a number, {quantity}_cm or in another unit, from {least:g} to "
+                    f"{_LARGEST:g} m"
+                )
     return read
 
 
@@ -253,8 +269,6 @@ def _with_scale(view: View, scale: Mapping[str, Any]) -> View:
             "of a ruler, or points_px and points_cm, four or more and their places, or tag_cm, a tag's side"
         )
     if "tag" in scale:
-        if not _POSSIBLE[0] < scale["tag"] < _POSSIBLE[1]:
-            raise InputError(f"[scale] the tag's side is {scale['tag']:g} m; give its length, tag_cm = 4")
         return replace(view, tag=(_tag_number(scale.get("tag_id", 0), "[scale] tag_id"), float(scale["tag"])))
     pixels = _points(scale, "points_px", 2)
     plane = replace(view, homography=np.eye(3)).to_tank(pixels)
@@ -263,12 +277,8 @@ def _with_scale(view: View, scale: Mapping[str, Any]) -> View:
     if len(pixels) != 2:
         raise InputError(f"[scale] a length and {len(pixels)} points_px; give two, or points_cm, a place for each")
     distance = float(np.linalg.norm(plane[1] - plane[0]))
-    if not _POSSIBLE[0] < scale["length"] < _POSSIBLE[1]:
-        raise InputError(
-            f"[scale] the length is {scale['length']:g} m; give that between the points, length_cm = 30"
-        )
     if not distance > 0:
-        raise InputError("[scale] the two points or their distance are the same; give two ends of a ruler")
+        raise InputError("[scale] the two points are the same; give two ends of a ruler")
     homography = _scaled(plane[0], float(scale["length"]) / distance, view.up)
     return replace(view, homography=homography, scale_error=_CLICK * math.sqrt(2) / distance)
 
@@ -301,8 +311,8 @@ def _lens(table: Mapping[str, Any]) -> Lens:
     for name, numbers, count in zip(_KEYS["lens"], (focal, centre, distortion), (2, 2, 5), strict=True):
         if numbers.shape != (count,):
             raise InputError(f"[lens] {name}: give {count} numbers, as OpenCV calibrates them")
-    if not (focal > 0).all():
-        raise InputError("[lens] focal_px: give numbers above 0")
+    if not (focal >= 1).all():
+        raise InputError("[lens] focal_px: give numbers of pixels, 1 or more")
     return Lens(np.array([[focal[0], 0, centre[0]], [0, focal[1], centre[1]], [0, 0, 1.0]]), distortion)
 
 
@@ -323,8 +333,6 @@ def _markers(table: Any, number: int) -> Markers:
         if _numbers(turned).shape != () or (turned and tag is None):
             raise InputError(f"turned_deg = {turned!r}; give the degrees by which the tag's upper edge is turned")
         tag = None if tag is None else _tag_number(tag, "tag")
-        if table.get("apart", 1.0) <= 0:
-            raise InputError("the bands' distance, apart, is not above 0; leave it out, and it is learnt")
         name, ahead, apart = str(table.get("name", number)), table.get("ahead", 0.0), table.get("apart", math.nan)
         if not re.fullmatch(r"[\w .-]+", name):
             raise InputError(f"name = {name!r}; give letters, digits and - . _, as for a file")

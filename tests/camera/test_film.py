@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+import tracemalloc
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -402,31 +405,95 @@ def test_mirrored_and_slow_films_are_named_when_runs_are_measured(
     assert measured.table["R_yr_cm"][0] == pytest.approx(100 * RADIUS, rel=0.02)
 
 
-def test_a_film_with_a_hole_is_refused_since_later_frames_come_too_early(tmp_path: Path) -> None:
-    """An AVI has no time stamps; the part before the hole is tracked where it is asked for."""
-    tank, path = small(), tmp_path / "film.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10, (320, 240))
-    for k in range(60):
-        writer.write(tank.frame(SWUM, k / 10))
+def written(path: Path, pictures: Iterable[Any], rate: float = 10) -> bytes:
+    """Write a film of JPEG pictures, and return the file."""
+    first, *others = pictures
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), rate, first.shape[1::-1])
+    for picture in (first, *others):
+        writer.write(picture)
     writer.release()
-    whole = bytearray(path.read_bytes())
-    assert len(track_film(path, setup_of(tank, tmp_path)).tables["1"]) == 60
+    return path.read_bytes()
+
+
+def swimming(tank: Tank, count: int = 60) -> Iterator[Any]:
+    return (tank.frame(SWUM, k / 10) for k in range(count))
+
+
+def without(film: bytes, dropped: range) -> bytes:
+    """Leave frames of an AVI empty, as a camera does that drops them, and leave out its index."""
+    at = film.index(b"movi") + 4
+    parts = [film[:at]]
+    for k in range(60):
+        size = int.from_bytes(film[at + 4 : at + 8], "little")
+        end = at + 8 + size + size % 2
+        parts.append(film[at : at + 4] + bytes(4) if k in dropped else film[at:end])
+        at = end
+    return b"".join(parts)
+
+
+def test_what_comes_after_a_hole_in_an_avi_is_refused_since_it_comes_too_early(tmp_path: Path) -> None:
+    """An AVI has no time stamps, whatever its name; what is before the hole is tracked where it is asked for."""
+    tank, path = small(), tmp_path / "film.avi"
+    whole, setup = written(path, swimming(tank)), setup_of(tank, tmp_path)
+    assert track_film(path, setup).notes == []
     half = len(whole) // 2
-    whole[half : half + len(whole) // 6] = bytes(len(whole) // 6)
-    path.write_bytes(whole)
-    with pytest.raises(InputError, match=r"states 60 frames, \d\d can be read: an AVI has no time stamps"):
-        track_film(path, setup_of(tank, tmp_path))
-    assert len(track_film(path, setup_of(tank, tmp_path), end=2.0).tables["1"]) == 21
+    hole = whole[:half] + bytes(len(whole) // 6) + whole[half + len(whole) // 6 :]
+    path.write_bytes(hole)
+    (tmp_path / "film.mp4").write_bytes(hole)
+    for name, start, end in (("film.avi", 0, math.inf), ("film.mp4", 0, math.inf), ("film.avi", 3.5, 4.5)):
+        with pytest.raises(InputError, match=r"states 60 frames, \d\d can be read: an AVI has no time stamps, so"):
+            track_film(tmp_path / name, setup, start=start, end=end)
+    assert len(track_film(path, setup, end=2.0).tables["1"]) == 21
+
+
+def test_frames_that_are_missing_are_counted_where_times_are_right(tmp_path: Path) -> None:
+    tank, path = small(), tmp_path / "film.avi"
+    whole, setup = written(path, swimming(tank)), setup_of(tank, tmp_path)
+    for damaged, read in ((whole[: len(whole) * 2 // 5], 23), (without(whole, range(30, 40)), 50)):
+        path.write_bytes(damaged)
+        tracked = track_film(path, setup, end=9.0)
+        assert tracked.notes[0].startswith(f"the film states 60 frames, {read} can be read: it is damaged or cut")
+        assert len(tracked.tables["1"]) == read
+        assert errors_of(tracked.tables["1"], SWUM)[0].max() < 0.02 * TAIL
+
+
+def test_a_film_that_states_no_length_is_learnt_from_as_one_that_does(tmp_path: Path) -> None:
+    path = tmp_path / "film.mkv"
+    whole = written(path, swimming(small()))
+    usual = [*Film(path).samples(12)]
+    place = whole.index(b"\x44\x89\x88")  # the element Duration, with eight bytes
+    path.write_bytes(whole[:place] + b"\xec\x89" + bytes(9) + whole[place + 11 :])  # Void
+    assert Film(path).count == 60
+    assert np.array_equal([*Film(path).samples(12)], usual)
+    path.write_bytes(whole[: len(whole) * 2 // 5])
+    different = [picture.tobytes() for picture in Film(path).samples(12)]
+    assert 1 < len(different) == len({*different})
+
+
+def test_a_large_film_is_learnt_from_in_small_pictures(tmp_path: Path) -> None:
+    """It takes fewer bytes than twelve of its pictures have; progress begins before they are looked at."""
+    tank, path, told = small(), tmp_path / "film.avi", list[int]()
+    written(path, (cv2.resize(picture, (3840, 2880)) for picture in swimming(tank, 24)))
+    setup = setup_of(replace(tank, width=3840, height=2880, scale=0.001 / 12), tmp_path)
+
+    def tell(done: int, count: int) -> None:
+        if not told:
+            tracemalloc.start()
+        told.append(done)
+
+    table = track_film(path, setup, progress=tell).tables["1"]
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert told[:2] == [0, 0]
+    assert most < 12 * 3840 * 2880 * 3
+    assert len(table) == 24
+    assert errors_of(table, SWUM)[0].max() < 0.02 * TAIL
 
 
 def test_a_frozen_camera_shows_no_robot(tmp_path: Path) -> None:
     tank, path = small(), tmp_path / "film.avi"
     setup_of(tank, tmp_path)
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 50, (320, 240))
-    picture = tank.frame(SWUM, 0.0)
-    for _ in range(FROZEN + 5):
-        writer.write(picture)
-    writer.release()
+    written(path, (FROZEN + 5) * [tank.frame(SWUM, 0.0)], 50)
     sights = [*watch(str(path), str(tmp_path / "view.toml"), "1", TAIL, 0.0)(lambda: 1e9)]
     assert [sight.pose is not None for sight in sights] == FROZEN * [True] + 5 * [False]
     assert sights[-1].why.endswith("is the camera frozen?")

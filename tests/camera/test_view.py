@@ -26,11 +26,15 @@ REFUSED = {  # what of EXAMPLE is written otherwise, and the message
     "no length": (RULER, "length_deg = 30", "[scale] length_deg has no unit of length"),
     "no number": (RULER, 'length_cm = "30"', "[scale] length_cm = '30'; give a number"),
     "one point": ("[100, 650], ", "", "points_px: give 2 points or more"),
-    "the same point": ("[100, 650], ", "[900, 650], ", "[scale] the two points or their distance are the same"),
+    "the same point": ("[100, 650], ", "[900, 650], ", "[scale] the two points are the same"),
     "no scale": ("points_px = [[100, 650], [900, 650]]\n", "", "no scale, or two; give [scale] points_px"),
     "mirrored": (RULER, "points_cm = [[0, 30], [30, 30], [30, 0], [0, 0]]", "mirror images of each other"),
     "another order": (RULER, "points_cm = [[0, 0], [30, 30], [30, 0], [0, 30]]", "go around in different orders"),
-    "no distance": (LAST, "apart_mm = 0", "[[robots]] 1: the bands' distance, apart, is not above 0"),
+    "no distance": (LAST, "apart_mm = 0", "[robots] apart_mm = 0; give a number, apart_cm"),
+    "a tiny length": (RULER, "length_cm = 1e-300", "[scale] length_cm = 1e-300; give a number, length_cm or in"),
+    "a tiny distance": (LAST, "apart_cm = 1e-300", "[robots] apart_cm = 1e-300; give a number"),
+    "far ahead": (LAST, "ahead_cm = -9e8", "[robots] ahead_cm = -900000000.0; give a number"),
+    "a tiny focus": ("# [lens]", f"[lens]\n{LENS.replace('0', '1e-300', 1)}", "[lens] focal_px: give numbers"),
     "on a line": ("[900, 100], [100, 100]]", "[500, 650], [300, 650]]", "the points lie on a line"),
     "other robot": (LAST, "ahead = 0", "[[robots]] 1: [robots] ahead has no unit of length"),
     "no colour": ('"green"', '"grass"', "[[robots]] 1: rear = 'grass'; give red, orange"),
@@ -44,9 +48,9 @@ REFUSED = {  # what of EXAMPLE is written otherwise, and the message
     "turned bands": (LAST, "turned_deg = 5", "[[robots]] 1: turned_deg = 5; give the degrees by which"),
     "no tag": (LAST, "tag = 1000", "[[robots]] 1: tag = 1000; give the number of a tag, 0 to 999"),
     "no dictionary": ('# dictionary = "4x4_50"', 'dictionary = "5x5"', "dictionary = '5x5'; give one of OpenCV's"),
-    "no side": (f"points_px = [[100, 650], [900, 650]]\n{RULER}", "tag_cm = 0", "the tag's side is 0 m"),
+    "no side": (f"points_px = [[100, 650], [900, 650]]\n{RULER}", "tag_cm = 0", "tag_cm = 0; give a number"),
     "three points": ("[100, 650], ", "[100, 650], [500, 650], ", "[scale] a length and 3 points_px; give two"),
-    "no lens": ("# [lens]", f"[lens]\n{LENS}", "[lens] focal_px: give numbers above 0"),
+    "no lens": ("# [lens]", f"[lens]\n{LENS}", "[lens] focal_px: give numbers of pixels, 1 or more"),
     "side": ('"down"', '"left"', "looks = 'left'; give \"down\""),
 }  # fmt: skip
 
@@ -95,6 +99,16 @@ def test_a_robot_with_a_band_that_the_region_cuts_is_lost(tmp_path: Path) -> Non
         region = np.array([[0, 0], [u + right, 0], [u + right, v + 100], [0, v + 100]])
         (pose,) = Detector(setup.robots, replace(setup.view, region=region)).poses(tank.frame(motion, 0.0))
         assert isinstance(pose, found)
+
+
+def test_a_picture_made_smaller_shows_the_same_places(tmp_path: Path) -> None:
+    (tmp_path / "view.toml").write_text(Tank().view_toml())
+    lens = Lens(np.array([[900, 0, 640], [0, 800, 360], [0, 0, 1.0]]), np.array([-0.2, 0.01, 0.001, 0.002, 0]))
+    view = replace(read_setup(tmp_path / "view.toml").view, lens=lens, region=np.array([[0, 0], [99, 0], [0, 99]]))
+    pixels = np.array([[100, 200], [300, 400.0]])
+    smaller = view.smaller(3)
+    assert smaller.to_tank((pixels - 1) / 3) == pytest.approx(view.to_tank(pixels))
+    assert smaller.region == pytest.approx((view.region - 1) / 3)
 
 
 def test_a_tag_that_is_seen_slantwise_gives_no_scale(tmp_path: Path) -> None:
