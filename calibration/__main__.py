@@ -55,6 +55,10 @@ def _calibrate(
         raise InputError("give a table of runs, or --films runs.csv with --view view.toml")
     if no_path and paths:
         raise InputError("--path and --no-path exclude each other")
+    from calibration.report.robot_verdict import FILES
+    from sim.io.files import refuse_kept
+
+    refuse_kept(out, ["table.csv", *FILES] if films else FILES)  # before hours of work
     if films and view:
         table = _filmed(films, view, robot, out)
     _refuse_early(table)

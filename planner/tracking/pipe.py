@@ -14,9 +14,10 @@ and is answered by one line:
 
 with the direction of the motor (1, −1, or 0 at the end), the time of the next flip, the present error bound,
 and 1 if the robot is incompatible with the model. The first line is refused if it is neither a header nor has as
-many numbers as a line may have: its unit and order would be guessed. A later one that cannot be parsed counts as
-one without a pose. After a flip a line must be sent, so that the next flip is announced. From a pose where it
-begins, the tracker plans the way to the path; what it has learned of the robot is forgotten.
+many numbers as a line may have: its unit and order would be guessed. A later one that cannot be parsed, or whose
+pose has a number of FAR or more, counts as one without a pose. After a flip a line must be sent, so that the next
+flip is announced. From a pose where it begins, the tracker plans the way to the path; what it has learned of the
+robot is forgotten.
 
 A header names the columns with their units, time first: `time_s x_cm y_cm heading_deg seen_s`. A name without a
 unit is in s, tail lengths (`x_over_l` means the same) or rad. The error is then in the unit of x. Numbers are
@@ -34,12 +35,13 @@ from dataclasses import dataclass
 
 from planner.paths.units import Swimmer
 from planner.planning.request import POSE
-from planner.tracking.tracker import Tracker, is_near
+from planner.tracking.tracker import Tracker
 from sim.io.errors import InputError
 from sim.io.units import from_si, split, to_si
 
 BEGIN = "begin"  # the word before a pose where the robot begins
 FINISH = "finish"
+FAR = 1e6  # l and rad
 WAIT = 1.0  # s
 _KINDS = {"time": "time", "x": "length", "y": "length", "heading": "angle", "seen": "time"}
 _TAILS = "_over_l"
@@ -74,7 +76,7 @@ def answers(
             continue
         first = False
         now, pose, seen = columns.read(words[1:] if words[:1] == [BEGIN] else words)
-        if begin and (tracker is None or words[:1] == [BEGIN]) and pose and is_near(pose) and math.isfinite(now):
+        if begin and (tracker is None or words[:1] == [BEGIN]) and pose and math.isfinite(now):
             tracker = begin(pose, now)
             command = tracker.command
         elif tracker is None:
@@ -142,9 +144,11 @@ class Columns:
         if not row:
             return math.nan, None, None
         seen = row.get("seen")
-        complete = {"x", "y", "heading"} <= set(row) and len(numbers) <= len(self.names)
-        pose = (row["x"], row["y"], row["heading"]) if complete else None
-        return row["time"], pose, seen if complete else None
+        if not {"x", "y", "heading"} <= set(row) or len(numbers) > len(self.names):
+            return row["time"], None, None
+        pose = row["x"], row["y"], row["heading"]
+        near = all(abs(number) < FAR for number in pose)
+        return (row["time"], pose, seen) if near else (row["time"], None, None)
 
 
 def _numbers(words: list[str]) -> list[float]:

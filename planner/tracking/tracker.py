@@ -55,7 +55,6 @@ if TYPE_CHECKING:
 FALSE_ALARM = 1e-3  # probability of an alarm per WINDOW poses, for a robot of the model
 WINDOW = 40
 ALARM_AT = 173.6174364561601  # quantile 1 − FALSE_ALARM of χ² with 3 × WINDOW degrees of freedom
-FAR = 1e6  # l and rad
 GATE = 21.107513466160444  # quantile 0.9999 of χ² with 3 degrees of freedom
 LOST = 10  # consecutive rejected poses after which there is an alarm
 SPREADS = 0.5  # of the filter's standard deviation, which allows for changes (docs/results.md)
@@ -68,11 +67,6 @@ FLIPS = 4
 LARGEST_MISFIT = 21.1  # squared size of a residual above which a pose disagrees: χ² of three degrees of freedom
 MODEL_NOISE = 0.005  # standard deviation of what the model adds to a pose in some dwells [l, rad]
 LARGEST_MEAN = 5.0  # mean squared size above which the poses are not those of this robot
-
-
-def is_near(pose: Sequence[float]) -> bool:
-    """Tell whether all numbers of a pose are finite and below FAR, as where a robot begins."""
-    return all(abs(number) < FAR for number in pose)
 
 
 class Command(NamedTuple):
@@ -156,7 +150,8 @@ class Tracker(Shown):
             self._flip()
         if pose is not None and not self._finished and self._clock.believed:
             when = self._now - self._latency if seen_at is None else seen_at
-            possible = len(pose) == 3 and all(map(math.isfinite, (*pose, when))) and when <= self._now
+            finite = all(math.isfinite(4 * number) for number in (*pose, when))  # differences of two, too
+            possible = len(pose) == 3 and finite and when <= self._now
             if possible and self._see(pose, when):
                 self._plan_flip()
         return self.command

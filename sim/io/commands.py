@@ -39,6 +39,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, NoReturn, TypeVar
 
 from sim.io.errors import InputError, InputWarning, run_command
+from sim.io.files import kept
 
 _HELP = {  # of parameters that no docstring describes
     "out": "folder",
@@ -269,18 +270,17 @@ class Command(NamedTuple):
     def main(self, prog: str, words: list[str]) -> None:
         """Parse words and run the command."""
         call, own = self.read(prog, words)
-        _check_outputs({**call.given, **own})
-        with warnings.catch_warnings():
+        with kept(_inputs({**call.given, **own})), warnings.catch_warnings():
             warnings.simplefilter("default", InputWarning)  # each line once
             warnings.showwarning = partial(_show_warning, warnings.showwarning)
             self.run(*([call] if self.of else []), **own)
 
 
-def _check_outputs(given: Mapping[str, Any]) -> None:
-    """Refuse an output that is an input, or another output.
+def _inputs(given: Mapping[str, Any]) -> list[Path]:
+    """Return the files that are given and are no outputs.
 
     Raises:
-        InputError: they are the same file.
+        InputError: an output is one of them, or another output.
     """
     outputs = [(name, value) for name, value in given.items() if name in _OUTPUTS and isinstance(value, str)]
     others = [(name, each) for name, value in given.items() if name not in _OUTPUTS
@@ -293,6 +293,7 @@ def _check_outputs(given: Mapping[str, Any]) -> None:
                 raise InputError(
                     f"--{name} {value} is the same file as {other.replace('_', '-')} {word}; give another name"
                 )
+    return [Path(word).resolve() for _, word in others if os.path.isfile(word)]
 
 
 def _show_warning(otherwise: Callable[..., None], message: Warning | str, *place: Any) -> None:

@@ -2,7 +2,7 @@
 
 A regular file is written in a new folder of its own, which others cannot write, and moved when it is complete.
 So an error or an interruption leaves either the old file or the new one. A device, a pipe or the standard output
-is written into when the content is complete.
+is written into when the content is complete. What a command reads is not written over (`kept`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -24,6 +24,31 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 _DESCRIPTOR = re.compile(r"/(?:dev|proc/self)/(?:stdout|stderr|fd/(\d+))")
+_kept: set[Path] = set()
+
+
+@contextmanager
+def kept(files: Iterable[Path]) -> Iterator[None]:
+    """Refuse in a block to write over files."""
+    before = set(_kept)
+    _kept.update(files)
+    try:
+        yield
+    finally:
+        _kept.intersection_update(before)
+
+
+def refuse_kept(folder: str | Path, names: Iterable[str]) -> None:
+    """Refuse a folder into which files with these names are to be written, where one of them is `kept`.
+
+    Raises:
+        InputError: it is.
+    """
+    for name in names:
+        if (target := Path(folder, name).resolve()) in _kept:
+            raise InputError(
+                f"{target} is an input and would be written over; give another place for what is written"
+            )
 
 
 @contextmanager
@@ -45,6 +70,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     if target.is_symlink() and target.lstat().st_uid != os.geteuid():
         raise InputError(f"{target} is a symbolic link of another user; remove it, or give another name")
     target = target.resolve()  # a link of one's own stays, and what it points to is written
+    refuse_kept(target.parent, [target.name])
     make_folder(target.parent)
     with _refusals(target), TemporaryDirectory(dir=target.parent, prefix=".part-") as folder:
         part = Path(folder, target.name)
@@ -66,6 +92,7 @@ def files_together(folder: str | Path, names: Sequence[str]) -> Iterator[Path]:
     """
     target = Path(folder)
     make_folder(target)
+    refuse_kept(target, names)
     for name in names:
         if (target / name).exists() and not (target / name).is_file():
             raise InputError(f"{target / name} is not a regular file; remove it, or give another folder")

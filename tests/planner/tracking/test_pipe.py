@@ -68,6 +68,10 @@ def test_the_first_pose_or_a_line_decides_where_the_robot_begins() -> None:
 def test_a_pose_that_is_too_far_away_counts_as_none() -> None:
     lines = ["0", "1 1e200 0 0", "2 0 -1e200 0", "begin 2 1e200 0 0"]
     assert words_of(Tracker(planned()), lines) == words_of(Tracker(planned()), ["0", "1", "2", "2"])
+    far = [f"{k} {sign}1e308 0 {sign}1e308" for k in range(4, 40) for sign in ("", "-")]
+    told = words_of(Tracker(planned()), far)
+    assert len(told) == len(far)
+    assert {words[3] for words in told} == {"0"}
     assert words_of(None, ["0 1e200 0 0"])[0][0] == "0"
 
 

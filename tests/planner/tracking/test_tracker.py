@@ -168,6 +168,12 @@ def test_it_never_flips_before_the_shortest_dwell(events: list[tuple[float, floa
         last = command
 
 
+def test_poses_at_both_ends_of_the_numbers_are_no_poses() -> None:
+    tracker, without = Tracker(planned()), Tracker(planned())
+    for k in range(40):
+        assert tracker.update(k / 4, (0.0, 0.0, 1.7e308 * (-1) ** k)) == without.update(k / 4)
+
+
 def test_the_bound_is_a_quantile() -> None:
     """Against random draws: from no swing at all to a swing alone, on both sides of the path and on one."""
     rng = np.random.default_rng(2)

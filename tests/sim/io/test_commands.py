@@ -154,3 +154,16 @@ def test_an_output_that_is_an_input_or_another_output_is_refused(tmp_path: Path)
         with pytest.raises(InputError, match="is the same file as"):
             softflagella(words)
     assert table.read_text() == "x,y\n"
+
+
+def test_an_input_in_the_folder_of_the_outputs_is_not_written_over(tmp_path: Path) -> None:
+    path = tmp_path / "plan.csv"
+    path.write_text("x_cm,y_cm\n0,0\n30,0\n")
+    words = ["plan", str(path), "--robot", "paper-control", "--out"]
+    with pytest.raises(InputError, match=r"plan.csv is an input and would be written over"):
+        softflagella([*words, str(tmp_path)])
+    assert [*tmp_path.iterdir()] == [path]
+    robot = tmp_path / "corrected.toml"
+    robot.write_text("")
+    with pytest.raises(InputError, match=r"corrected.toml is an input"):
+        softflagella(["calibrate", str(path), "--robot", str(robot), "--out", str(tmp_path)])
