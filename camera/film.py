@@ -53,24 +53,23 @@ class Film:
         if not Path(path).is_file():
             raise InputError(f"{path}: no such file; check the path")
         self.path, self._cv = str(path), cv
-        self._capture = cv.VideoCapture(self.path, cv.CAP_FFMPEG, [cv.CAP_PROP_N_THREADS, 2])
-        if not self._capture.isOpened() or not self._capture.grab():
+        capture = self._open()
+        if not capture.isOpened() or not capture.grab():
             raise InputError(f"{path} is no film that can be read; convert it: ffmpeg -i FILM film.mp4")
         self._number = 0  # of the next frame
         self.damaged = 0  # frames without a picture
         self.ended = False  # all has been read
-        self._rate = float(self._capture.get(cv.CAP_PROP_FPS))
-        stated = self._capture.get(cv.CAP_PROP_FRAME_COUNT)
+        self._rate = float(capture.get(cv.CAP_PROP_FPS))
+        stated = capture.get(cv.CAP_PROP_FRAME_COUNT)
         self._stated = stated > 0
         self.count = int(stated) if self._stated else self._readable()
-        self._capture = cv.VideoCapture(self.path, cv.CAP_FFMPEG, [cv.CAP_PROP_N_THREADS, 2])
         whole = _whole_frames(self.path)
         gap = whole < self.count - 1 and self._readable() < self.count - 1
         self._early = (whole - 0.5) / self._rate if gap else math.inf  # time from which frames come too early
 
     def samples(self, number: int, start: float = 0.0, end: float = math.inf) -> Iterator[Any]:
         """Yield different pictures at about equal distances from `start` to `end` [s]."""
-        seeking = self._cv.VideoCapture(self.path, self._cv.CAP_FFMPEG)
+        seeking = self._open()
         rate = self._rate if 0 < self._rate < math.inf else 0.0
         first, last = np.clip([start * rate, end * rate if rate else math.inf], 0, self.count - 1)
         at, seen = 0, set[int]()
@@ -91,7 +90,7 @@ class Film:
         Raises:
             InputError: the time stamps do not increase, or are too early from some frame on.
         """
-        differences: list[float] = []
+        self._capture, differences = self._open(), list[float]()
         before, time = None, -math.inf
         with ThreadPoolExecutor(1) as reader:
             waiting = deque(reader.submit(self._next, start, end) for _ in range(_AHEAD))
@@ -118,6 +117,9 @@ class Film:
                 before = coarse
                 yield frame._replace(doubled=doubled)
 
+    def _open(self) -> Any:
+        return self._cv.VideoCapture(self.path, self._cv.CAP_FFMPEG, [self._cv.CAP_PROP_N_THREADS, 2])
+
     @property
     def read(self) -> int:
         """The frames that have been read so far."""
@@ -129,7 +131,7 @@ class Film:
 
     def _readable(self) -> int:
         """Count the frames that can be read."""
-        capture = self._cv.VideoCapture(self.path, self._cv.CAP_FFMPEG, [self._cv.CAP_PROP_N_THREADS, 2])
+        capture = self._open()
         return sum(1 for _ in iter(capture.grab, False))
 
     def _next(self, start: float, end: float) -> Frame | None:

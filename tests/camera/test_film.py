@@ -152,7 +152,7 @@ def test_frames_that_the_camera_dropped_are_gaps_in_the_time_stamps(tmp_path: Pa
 
 
 def test_films_that_cannot_be_used_are_refused_with_what_to_change(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     bare = Tank(width=320, height=240, scale=0.001, colours=("", "", "", ""))
     view = setup_of(small(), tmp_path)
@@ -167,11 +167,13 @@ def test_films_that_cannot_be_used_are_refused_with_what_to_change(
     with pytest.raises(InputError, match=r"bands are 4.4 cm apart, and the head of the robot is 60 cm long"):
         track_film(good, view, head_length=10 * LENGTH)
     stopped = Film(good)
-    seen = stopped._capture
-    stopped._capture = SimpleNamespace(grab=seen.grab, retrieve=seen.retrieve, get=lambda key: 40.0)
+    seen = stopped._open()
+    frozen = SimpleNamespace(grab=seen.grab, retrieve=seen.retrieve, get=lambda key: 40.0)
+    monkeypatch.setattr(stopped, "_open", lambda: frozen)
     with pytest.raises(InputError, match=r"good\.mp4: the time stamp of frame 1 is not after the one before"):
         list(stopped.frames())
-    stopped._capture = SimpleNamespace(grab=seen.grab, retrieve=lambda: 1 / 0, get=seen.get)
+    failing = SimpleNamespace(grab=seen.grab, retrieve=lambda: 1 / 0, get=seen.get)
+    monkeypatch.setattr(stopped, "_open", lambda: failing)
     with pytest.raises(ZeroDivisionError):  # what happens in the thread that decodes
         list(stopped.frames())
     apart = replace_robots(view, apart=0.06)
