@@ -18,6 +18,7 @@ const POSITIVE = ["N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s"];
 const SYNONYMS = new Map(Object.entries(RUN_SYNONYMS));
 const MEASURED = Object.values(OUTPUTS).map(({ column }) => column);
 const LARGEST = 1e9; // of a value
+const LISTED = 3; // rows without an output
 const FEWEST_RUNS = 24;
 const FEWEST_REPEATS = 8;
 
@@ -38,10 +39,10 @@ function measurementsOf(given, where) {
   const { table: whole, notes } = convertColumns(first.table, others, where, SYNONYMS);
   const unknown = whole.names.filter((name) => !RUN_COLUMNS.includes(name));
   for (const name of unknown) {
-    const near = closeMatch(name, RUN_COLUMNS);
+    const near = closeMatch(name, RUN_COLUMNS.filter((column) => !whole.names.includes(column)));
     if (near) throw new InputError(`unknown column ${quoted(name)}: is it '${near}'? rename or drop it`);
   }
-  const hasNone = (i) => whole.texts[i].every((text) => ["", "nan"].includes(text.trim()));
+  const hasNone = (i) => whole.texts[i].every(isGap);
   const empty = whole.names.filter((name, i) => hasNone(i) && ![...INPUTS, ...unknown].includes(name));
   const kept = (values) => values.filter((_, i) => !empty.includes(whole.names[i]));
   const table = { names: kept(whole.names), columns: kept(whole.columns), texts: kept(whole.texts), lines: whole.lines };
@@ -68,6 +69,7 @@ function measurementsOf(given, where) {
   const repeats = usable.length - new Set(conditions).size;
   const excluded = [
     ...reasons.flatMap((reason, row) => (reason ? [`${rowName(table, row)}: ${reason}`] : [])),
+    ...outputs.flatMap((name) => gapsInWords(table, OUTPUTS[name].column, usable)),
     ...empty.map((name) => `column ${name}: without any value, left out`),
     ...unknown.map((name) => `column ${name}: not known, left out`),
   ];
@@ -75,6 +77,19 @@ function measurementsOf(given, where) {
     outputs, columns, usable, repeats, names: table.names, sessions: [...new Set(names)].sort(),
     converted: [...first.notes, ...notes], excluded,
   };
+}
+
+function isGap(text) {
+  return ["", "nan"].includes(text.trim());
+}
+
+/* Name the usable rows that lack an output, in a line at most. */
+function gapsInWords(table, column, usable) {
+  const texts = table.texts[table.names.indexOf(column)];
+  const rows = usable.filter((row) => isGap(texts[row])).map((row) => rowName(table, row));
+  if (!rows.length) return [];
+  const more = rows.length > LISTED ? ` and ${rows.length - LISTED} more` : "";
+  return [`column ${column}: no value in ${rows.slice(0, LISTED).join(", ")}${more}; the other outputs there count`];
 }
 
 /* Name a row by its number and by its line in the file. */
@@ -91,9 +106,16 @@ function reasonsOf(table, columns, outputs) {
   const mark = (isBad, words) => {
     for (let row = 0; row < count; row++) if (!reasons[row] && isBad(row)) reasons[row] = words(row);
   };
-  const text = (name, row) => `${name} = ${table.texts[table.names.indexOf(name)][row]}`;
+  const given = (name, row) => table.texts[table.names.indexOf(name)][row];
+  const text = (name, row) => `${name} = ${given(name, row)}`;
+  const missing = (name, row) => isGap(given(name, row)), measured = outputs.map((name) => OUTPUTS[name].column);
+  mark((row) => Object.keys(columns).every((name) => given(name, row).trim() === name), () => "the header again");
+  mark((row) => measured.every((name) => missing(name, row)), () => "no output has a value");
   for (const [name, numbers] of finite) {
-    mark((row) => Number.isNaN(numbers[row]), (row) => `${text(name, row)} is not a finite number`);
+    mark(
+      (row) => Number.isNaN(numbers[row]) && !(measured.includes(name) && missing(name, row)),
+      (row) => (missing(name, row) ? `${name} has no value` : `${text(name, row)} is not a finite number`),
+    );
   }
   mark((row) => values.N[row] % 1 !== 0, (row) => `${text("N", row)} is not a whole number`);
   for (const name of POSITIVE.filter((each) => each in values)) {
@@ -157,7 +179,7 @@ function comparedRuns(table, name, fields, lookup) {
     columns,
     rows,
     left: runs.usable.length - rows.length,
-    medians: answered.length ? columns.map((_, i) => median(answered.map(({ percent }) => percent[i]))) : null,
+    medians: answered.length ? columns.map((_, i) => median(answered.map(({ percent }) => percent[i]).filter(Number.isFinite))) : null,
     excluded: runs.excluded,
     converted: runs.converted,
     missing: missingColumns(runs),

@@ -139,8 +139,9 @@ function tableOf({ columns, rows }) {
 function rowOf({ row, inputs, measured, answer, percent, outside }, count) {
   const first = [row, ...inputs].map((value) => element("td", {}, String(value).replace("-", "−")));
   const cells = measured.flatMap((value, i) => {
-    const compared = answer ? [digits(answer[i]), signed(percent[i])] : ["–", "–"];
-    return [digits(value), ...compared].map((words) => element("td", {}, words));
+    const isMeasured = Number.isFinite(value);
+    const compared = answer ? [digits(answer[i]), isMeasured ? signed(percent[i]) : "–"] : ["–", "–"];
+    return [isMeasured ? digits(value) : "–", ...compared].map((words) => element("td", {}, words));
   });
   if (!outside) return element("tr", {}, ...first, ...cells);
   const why = element("td", { colspan: 3 * count, class: "why" }, `The look-up table has no answer: ${outside}.`);

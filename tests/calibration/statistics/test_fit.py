@@ -134,7 +134,7 @@ def test_a_run_with_a_gap_counts_by_what_was_measured_alone() -> None:
 
 
 def test_noise_alone_is_no_misfit_where_runs_have_gaps() -> None:
-    """The drawn noise has the same gaps: with a third of the values missing p-values stay uniform."""
+    """The drawn noise has the same gaps: with a tenth of the values missing p-values stay uniform."""
     p_values = []
     for seed in range(24):
         runs = line(seed)[0].runs

@@ -56,6 +56,12 @@ OTHER_UNITS = {"l_cm": "length [mm]", "theta_deg": "theta_rad", "omega_rpm": "rp
 TABLES: dict[str, Change] = {
     "as it is": lambda table: table,
     "bad rows": with_bad_rows,
+    "missing outputs": lambda table: table.assign(
+        theta_deg=table["theta_deg"].where(np.arange(len(table)) % 9 != 4),
+        omega_h_rpm=table["omega_h_rpm"].where(np.arange(len(table)) != 30)),
+    "the header again": lambda table: pd.concat(
+        [table.astype(object)[:20], pd.DataFrame([list(table)], columns=list(table)), table.astype(object)[20:]],
+        ignore_index=True),
     "other units": lambda table: table.assign(
         l_cm=10 * table["l_cm"], theta_deg=np.radians(table["theta_deg"])).rename(columns=OTHER_UNITS),
     "other columns": lambda table: table.assign(remark="calm", camera=1, temperature_F=70.0),

@@ -149,7 +149,7 @@ def test_an_output_that_is_an_input_or_another_output_is_refused(tmp_path: Path)
     table.write_text("x,y\n")
     link.symlink_to(table)
     for words in (["plan", str(table), "--robot", "paper-control", "--out", str(link)],
-                  ["camera", "tracks", "f.mp4", "--robot", "r", "--view", str(table), "--out", str(table)],
+                  ["tracks", "f.mp4", "--robot", "r", "--view", str(table), "--out", str(table)],
                   ["replay", "p.json", "--out", "new.csv", "--shapes", "./new.csv"]):  # fmt: skip
         with pytest.raises(InputError, match="is the same file as"):
             softflagella(words)

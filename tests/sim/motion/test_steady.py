@@ -63,7 +63,8 @@ def test_head_share_of_the_paper_s_measured_robot() -> None:
 def test_reversing_the_motor_mirrors_the_motion(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """By both routes; stepping says on the standard error how far it is."""
+    """By both routes; stepping says on a terminal how far it is."""
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
     monkeypatch.setattr(sim.motion.settling, "_SILENT", 0.0)
     for solve in (steady, settle):
         forward, backward = solve(control(N=3)), solve(control(N=3, omega_bar=-10.0))

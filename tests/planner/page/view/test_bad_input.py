@@ -27,7 +27,7 @@ FILES: dict[str, tuple[str, str | bytes, list[str]]] = {  # part of the page, co
                    ["plan", "circle:2l", "--robot", "robot.toml", "--out", "out"]),
     "broken.json": ("path", "{", ["replay", "broken.json", "--out", "track.csv"]),
     "back.csv": ("measured", f"{HEADER}0,25,0,90\n10,25,1,90\n5,25,2,90\n20,25,3,90\n",
-                 ["planner", "check", "plan/plan.json", "back.csv"]),
+                 ["check", "plan/plan.json", "back.csv"]),
 }  # fmt: skip
 FIELDS = {"Number of tails N": ("0", "2.5", "65"), "Viscosity in Pa s": ("-1", "40")}  # 40: outside the table
 OPTIONS = {
