@@ -55,13 +55,14 @@ def _calibrate(
         raise InputError("give a table of runs, or --films runs.csv with --view view.toml")
     if no_path and paths:
         raise InputError("--path and --no-path exclude each other")
-    from calibration.report.robot_verdict import FILES
+    if table:
+        _refuse_early(table)
+    from calibration.report.robot_verdict import FILES  # loads SciPy
     from sim.io.files import refuse_kept
 
     refuse_kept(out, ["table.csv", *FILES] if films else FILES)  # before hours of work
     if films and view:
         table = _filmed(films, view, robot, out)
-    _refuse_early(table)
     from calibration.report.path_error import DEFAULT_PATHS
     from calibration.statistics.budget import stopped_by_interrupt
     from calibration.statistics.study import summary_of_excluded
