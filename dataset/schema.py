@@ -25,9 +25,8 @@ import pyarrow as pa
 
 from sim.effects import effect_named
 from sim.io.provenance import code_version
-from sim.model.groups import MOTOR_SPEED
+from sim.model.groups import MOTOR_SPEED, SLOPE_INPUTS, SLOPE_OUTPUTS
 from sim.model.response import BEFORE, DWELLS
-from sim.model.sweepable import SLOPE_INPUTS, SLOPE_OUTPUTS
 
 
 class Column(NamedTuple):

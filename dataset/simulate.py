@@ -17,9 +17,8 @@ from sim.arrays import Flags, Floats, Integers
 from sim.effects.tail_contact import EFFECT as CONTACT
 from sim.effects.tail_contact import least_gap
 from sim.inputs import check_columns
-from sim.model.groups import Groups
+from sim.model.groups import SLOPE_INPUTS, Groups
 from sim.model.response import LAG_PARTS
-from sim.model.sweepable import SLOPE_INPUTS
 from sim.motion.response import responses
 from sim.motion.sensitivity import sensitivities as derivatives
 from sim.motion.steady import steady

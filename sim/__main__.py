@@ -1,4 +1,4 @@
-"""Command line of the simulator: `steady`, `branches`, `film`, `robot`, `check`, `compile`."""
+"""Command line of the simulator: `steady`, `film`, `robot`, `check`, `compile`."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from sim.io.commands import Call, Program
 from sim.io.errors import InputError
-from sim.model.sweepable import SWEEPABLE, read_range
 
 if TYPE_CHECKING:
     from sim.model.robot import Robot
 
-program = Program("sim", "simulate robots: steady motion, branches, films, presets")
+program = Program("sim", "simulate robots: steady motion, films, presets")
 main = program.main
 
 
@@ -72,39 +71,6 @@ def _counts(robots: dict[str, Any], motion: dict[str, Any]) -> str:
     direct, ended = int((motion["method"] == "direct").sum()), motion["converged"]
     converged = f"{len(ended)} rows, {int(ended.sum())} converged ({direct} solved directly)"
     return f"{converged}, tails touch in {touching}{beside}"
-
-
-@program.command("branches", further={name: f"LOW:HIGH, sweep {what}" for name, what in SWEEPABLE.items()})
-def _branches(
-    robot: str, *, speed: str | None = None, steps: int = 24, out: str = "branches", **ranges: str
-) -> None:
-    """All steady motions along an input: folds, Hopf points, stability, hysteresis.
-
-    Args:
-        speed: LOW:HIGH, sweep the motor's speed [rpm], such as 20:200; where LOW is negative, --INPUT=LOW:HIGH.
-        steps: values in a slow sweep by time steps.
-        out: folder, or the name of a page, FILE.html.
-    """
-    given = ({} if speed is None else {"speed": speed}) | ranges
-    if len(given) != 1:
-        what = "no range is given" if not given else f"ranges of {' and '.join(given)} are given"
-        raise InputError(f"{what}; give the range of one input, such as --speed 20:200")
-    ((name, words),) = given.items()
-    low, high = read_range(name, words)
-    from sim.inputs import load_robot
-    from sim.motion.batches import one_thread
-    from sim.motion.branch_report import special_rows, summary, write_branches
-    from sim.motion.branches import find_branches
-    from sim.motion.swept_input import SweptInput
-
-    swept = SweptInput(load_robot(robot), name, low, high)
-    with one_thread():
-        result = find_branches(swept, steps=steps, progress=lambda line: print(line, file=sys.stderr, flush=True))
-    files = write_branches(result, out)
-    print(summary(result))
-    for branch, kind, value, yaw, _ in special_rows(result):
-        print(f"  branch {branch}: {kind} at {swept.column} = {value}, yaw rate {yaw}")
-    print(f"-> {', '.join(map(str, files))}")
 
 
 @program.command("effects")

@@ -14,7 +14,7 @@ from sim.io.errors import InputError, run_command
 from softflagella.shadowing import PACKAGES
 
 _IMPORTANT = (
-    ("sim", "robot steady branches effects"),
+    ("sim", "robot steady effects"),
     ("planner", "plan goal tour cover hold fleet track page replan"),
     ("dataset", "sweep"),
     ("surrogate", "train"),

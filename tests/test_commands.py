@@ -117,15 +117,6 @@ def sim_robot(made: Path, out: Path) -> str:
     return "paper-triangle -> "
 
 
-def sim_branches(made: Path, out: Path) -> str:
-    done("sim", "branches", "paper-control", "--speed", "60:80", "--steps", 2, "--out", out / "b.html")
-    table = pd.read_csv(out / "b.csv")
-    assert (table["origin"] == "continuation").sum() > 5
-    assert table["speed_rpm"].between(59.999, 80.001).all()
-    assert (out / "b.png").read_bytes()[:4] == b"\x89PNG"
-    return "1 branch, 0 folds"
-
-
 def sim_film(made: Path, out: Path) -> str:
     done("sim", "film", short_plan(made, out), "--out", out / "swim.gif", "--speed", 100, "--width", 160)
     assert (out / "swim.gif").read_bytes()[:6] == b"GIF89a"

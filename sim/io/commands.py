@@ -15,7 +15,7 @@ The command has the parameters of the public function `of` whose types can be wr
 its docstring does not describe, that of the public function does, up to a sentence that begins "In Python";
 where there is no docstring, the first sentence is that of the public function, too. Parameters before the * are
 positional, the others options. A bool is a flag, `--no-NAME` with "do not" before its description if its default
-is True. A description that begins LOW:HIGH, or X Y, names the values. The function is called with what was
+is True. A description that begins NAME=SIZE, or X Y, names the values. The function is called with what was
 written, so defaults stand in its signature alone: first with the public function and what is written for that,
 then with its own. Signatures are read from the source, not imported: help needs no libraries.
 
@@ -226,7 +226,6 @@ class Command(NamedTuple):
     run: Callable[..., None]
     of: str = ""  # module:name of the public function whose parameters it has
     names: Mapping[str, str] = {}
-    further: Mapping[str, str] = {}  # options of words for its **given -> help
 
     @property
     def place(self) -> str:
@@ -257,13 +256,11 @@ class Command(NamedTuple):
             words = _from_words(parameter.hint, parameter.file) if parameter.hint else None
             if name and words is not None:
                 _add(parser, parameter, name.replace("_", "-"), words)
-        for name, about in self.further.items():
-            _add(parser, Parameter(name, None, Path(), help=about), name, {})
         return parser
 
     def read(self, prog: str, words: list[str]) -> tuple[Call, dict[str, Any]]:
         """Parse words: the public function with what is written for it, and what is for the command itself."""
-        given, names = vars(self.parser(prog).parse_args(words)), {*self.parameters()[1], *self.further}
+        given, names = vars(self.parser(prog).parse_args(words)), self.parameters()[1]
         own = {name: given.pop(name) for name in [*given] if name in names}
         return Call(self.of, given), own
 
@@ -311,7 +308,7 @@ def _add(parser: ArgumentParser, parameter: Parameter, name: str, words: dict[st
     if default not in (None, "") and not isinstance(default, bool) and "default" not in about.lower():
         about = f"{about} (default: {default})".lstrip()
     many, flag = words.pop("many", False), words.get("type") is bool
-    if values := re.match(r"([A-Z][A-Z:=]*(?: [A-Z]+)*), (?=[a-z])", about):
+    if values := re.match(r"([A-Z][A-Z=]*(?: [A-Z]+)*), (?=[a-z])", about):
         shown, about = values[1].split(), about[values.end() :]
         words["metavar"] = tuple(shown) if "nargs" in words else shown[0]
     if parameter.positional and not name.startswith("-"):
@@ -337,13 +334,11 @@ class Program:
         self.package, self.about = package, about
         self.commands: dict[str, Command] = {}
 
-    def command(
-        self, name: str, *, of: str = "", further: Mapping[str, str] | None = None, **names: str
-    ) -> Callable[[F], F]:
+    def command(self, name: str, *, of: str = "", **names: str) -> Callable[[F], F]:
         """Decorate the function that runs a command with what a user types for it, and fields of `Command`."""
 
         def add(run: F) -> F:
-            self.commands[name] = Command(run, of, names, further or {})
+            self.commands[name] = Command(run, of, names)
             return run
 
         return add

@@ -7,7 +7,8 @@
     ω̄ = ω μ0 l⁴/EI   motor speed, tails relative to head, signed
     N                number of tails
 
-and the sizes of the effects of `sim.effects` (absent means null).
+and the sizes of the effects of `sim.effects` (absent means null). SLOPE_INPUTS and SLOPE_OUTPUTS are the names in
+derivatives of the steady motion, which `sim.motion.sensitivity` gives and data sets store.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from sim.io.errors import InputError
 MOTOR_SPEED = "motor speed, tails relative to head"  # what omega_bar is
 GROUP_COLUMNS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "N")
 OPTIONAL_COLUMNS = ("a_over_R",)
+SLOPE_INPUTS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "a_over_R")
+SLOPE_OUTPUTS = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_rad")
 DWELL = "dwell_bar"  # switching half-period, beside the robot in sweeps and look-ups
 MOST_TAILS = 64
 LEAST_SLENDERNESS = 5.0

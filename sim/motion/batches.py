@@ -120,7 +120,7 @@ def sensitivity_columns(
 
     Args:
         columns: robots by column name, each (M,).
-        parameters: names out of `sim.model.sweepable.SLOPE_INPUTS` and `sim.effects.catalogue()`, K of them.
+        parameters: names out of `sim.model.groups.SLOPE_INPUTS` and `sim.effects.catalogue()`, K of them.
         phases: number of phases to begin with, see `sim.motion.sensitivity`.
         jobs: threads; default all processors.
         title: of the progress bar; empty for none.

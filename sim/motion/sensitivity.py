@@ -19,8 +19,7 @@ from sim.effects import catalogue, effect_named, is_effect
 from sim.io.errors import InputError
 from sim.lanes import width
 from sim.linear.complex_step import derivative
-from sim.model.groups import Groups
-from sim.model.sweepable import SLOPE_INPUTS, SLOPE_OUTPUTS
+from sim.model.groups import SLOPE_INPUTS, SLOPE_OUTPUTS, Groups
 from sim.solve.assembly import are_local, batch, numbers
 from sim.solve.grouping import by_kind, slices
 from sim.solve.orbit import mean_motion, residuals_on_orbits, solve_at_orbits

@@ -185,7 +185,7 @@ def at_phases(periodic: Floats, at: Floats) -> Floats:
     return np.einsum("fm,kmc->fkc", interpolation(periodic.shape[1], at - FIRST_PHASE), periodic)
 
 
-def state_from_orbit(body: Body, x: Floats, u: Floats, phase: float = 0.0) -> State:
+def state_from_orbit(body: Body, x: Floats, u: Floats, phase: float) -> State:
     """Return the state of all tails at a disc phase, from an orbit x (n, M, 3), u (P, 4).
 
     In an orbit, tail j at disc phase φ has the shape of tail 0 at φ + 2πj/N (`sim.solve.orbit`).

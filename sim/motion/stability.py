@@ -11,30 +11,20 @@ a slow perturbation, and change the growth by up to a fifth if the robot yaws fa
 that of a robot with |ω_yr| > QUICK |ω_t|, is computed again on 12 edges and more than twice as many phases, an odd
 number in an N-th of a turn. Robots with contact are left out of that; it would take seconds.
 
-Of an orbit's exponents σ, defined up to i N ω_t and in conjugate pairs, the largest Re σ also says what the
-perturbation does to the tails. With k = Im σ/ω_t between 0 and N/2, that of the next tail has the phase 2πk/N.
-Where the growth changes its sign,
-
-    fold               k = 0: real; another such motion meets this one
-    period doubling    k = N/2: after an N-th of a turn the perturbation has changed its sign
-    Hopf               all others: a second frequency appears (Neimark-Sacker)
-
-A motion in which the tails differ is treated as one tail, with N = 1 (`sim.motion.revolution`).
-Units: l, μ0 l⁴/EI. Source: Kuznetsov, *Elements of Applied Bifurcation Theory* (2004), ch. 4 and 5.
+Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from sim.arrays import Complex, Floats
 from sim.linear.spectral import differentiation, with_phases
-from sim.model.body import Body
-from sim.solve.assembly import CONTACT, are_local, batch, row
+from sim.solve.assembly import CONTACT, are_local, batch
 from sim.solve.floquet import arnoldi
 from sim.solve.grouping import by_kind, from_groups, in_groups, robots_in_lanes
 from sim.solve.orbit import mean_motion, solve_orbits_in_place
@@ -45,9 +35,6 @@ DOUBTFUL = -0.05  # growth from which it is computed again
 _MORE_VECTORS = 30  # of Arnoldi's method, beyond two for each tail: enough for the leading eigenvalues to converge
 _CONVERGED = 1e-3  # relative residual of an eigenvalue up to which it has converged
 _SIGN_KNOWN = 1.0  # the same from which not even the sign of its real part is known
-FOLD, DOUBLING, HOPF = "fold", "period doubling", "Hopf"
-_SAME = 1e-3  # relative distance of Re σ up to which exponents are copies of one, i N ω_t apart
-_REAL = 1e-3  # distance of k from 0 or N/2 up to which it counts as that
 
 
 def growths(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats:
@@ -212,31 +199,3 @@ def first_perturbation(tails: int, n: int, columns: int) -> Floats:
         for wave in (np.cos(harmonic * phase), np.sin(harmonic * phase)):
             vector += bend[:, None, None] * wave[:, None] * numbers.normal(size=3)
     return np.asarray(vector / np.linalg.norm(vector))
-
-
-class Leading(NamedTuple):
-    """The perturbation that decays least."""
-
-    growth: float  # natural logarithm of its growth in a motor revolution; NaN: unknown
-    turns: float  # k, between 0 and N/2
-    tails: int  # N
-
-    @property
-    def kind(self) -> str:
-        """Name what happens where its growth changes the sign."""
-        if self.turns < _REAL:
-            return FOLD
-        return DOUBLING if self.tails / 2 - self.turns < _REAL else HOPF
-
-
-def leading_exponent(body: Body, tails: int, x: Floats, u: Floats) -> Leading:
-    """Find it for an orbit x (n, M, 3), u (P, 4) of N tails; the growth is NaN if none has converged."""
-    means, found = mean_motion(body, u), _exponents(row(body), tails, x[None], u[None])[0]
-    if not len(found):
-        return Leading(np.nan, np.nan, tails)
-    omega_t = means[0]
-    copies = found[found.real > found.real.max() - _SAME * abs(omega_t)]
-    largest = copies[np.argmin(np.abs(copies.imag))]
-    turns = abs(largest.imag / omega_t) % tails
-    growth = float(in_motor_revolutions(found.real.max(), means))
-    return Leading(growth, float(min(turns, tails - turns)), tails)

@@ -3,7 +3,7 @@
 The direct solution (`sim.solve.refinement`) is the relative periodic orbit in which all tails move alike. It takes
 about a millisecond a robot, states the error of its means, and how fast small perturbations grow
 (`sim.motion.stability`). Straight tails at rest reach this orbit if the robot yaws slowly compared with the spin
-of its disc (docs/steady-motions.md). If it yaws faster (|ω_yr| > QUICK |ω_t|), or if perturbations may grow, it
+of its disc (docs/results.md). If it yaws faster (|ω_yr| > QUICK |ω_t|), or if perturbations may grow, it
 is stepped in time from rest as well. If stepping reaches another motion, that one is the answer. If Newton's
 method does not converge, stepping gives the answer, too. Such rows say so. Their error is estimated from two
 meshes and steps. Units: l, μ0 l⁴/EI.

@@ -21,8 +21,8 @@ from dataset.schema import COST, Column, column_named, rows_version
 from dataset.simulate import simulate
 from dataset.verify import verify
 from sim.io.errors import InputError
+from sim.model.groups import SLOPE_INPUTS
 from sim.model.presets import PRESETS
-from sim.model.sweepable import SLOPE_INPUTS
 from sim.motion import response, run, settling, steady
 from sim.solve.march import Steps
 from sim.solve.refinement import LOST, NO_START, Orbit

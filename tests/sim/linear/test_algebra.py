@@ -19,7 +19,7 @@ from sim.linear.complex_step import derivative, magnitude, sign
 from sim.linear.dense import factor_dense, solve_factored
 from sim.linear.gmres import extend, new_krylov, solution, start
 from sim.linear.spectral import differentiation, interpolation, with_phases
-from sim.model.sweepable import SLOPE_INPUTS
+from sim.model.groups import SLOPE_INPUTS
 from sim.solve.assembly import numbers
 from tests.sim.robots import control
 

@@ -14,8 +14,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.io.errors import InputError
-from sim.model.groups import Groups
-from sim.model.sweepable import SLOPE_INPUTS, SLOPE_OUTPUTS
+from sim.model.groups import SLOPE_INPUTS, SLOPE_OUTPUTS, Groups
 from sim.motion.batches import in_batches, sensitivity_columns, split
 from sim.motion.response import mirrored, orbits_with_phases, responses
 from sim.motion.sensitivity import sensitivities, slopes_of_orbits
