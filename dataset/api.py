@@ -39,9 +39,8 @@ def sweep(
             speed, N and the coefficients of drag.
         rows: number of robots (default: the configuration's, or 1,024); more than before adds rows.
         jobs: processes; default all processors.
-        backend: where to run: local (processes here), dask or ray (default: local, or dask with a scheduler).
-        scheduler: address of a dask scheduler (default: DASK_SCHEDULER_ADDRESS) or ray head (default:
-            RAY_ADDRESS).
+        backend: where to run: local (processes here) or dask (default: local, or dask with a scheduler).
+        scheduler: address of a dask scheduler (default: DASK_SCHEDULER_ADDRESS).
         force: take over a URL whose writer was killed.
         resume: what the last line of an interrupted sweep says is to be done.
 

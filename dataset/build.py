@@ -76,7 +76,7 @@ def build(
         design: which robots.
         folder: a folder, or a URL that fsspec knows.
         jobs: processes on this machine; default all processors.
-        backend: "local", "dask" or "ray"; the latter may have the `address` of a scheduler or head.
+        backend: "local" or "dask"; the latter may have the `address` of a scheduler.
         title: of the progress line; empty for none.
         resume: what the last line of an interrupted build tells the user to do.
         simulate: makes the rows; default `dataset.simulate.simulate`. Workers must be able to import it.

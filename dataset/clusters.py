@@ -1,15 +1,12 @@
-"""Back ends by name: processes here, or a cluster of dask or ray, a running one or one started on this machine."""
+"""Back ends by name: processes here, or a cluster of dask, a running one or one started on this machine."""
 
 from __future__ import annotations
 
 import logging
 import os
-import socket
-import subprocess
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from importlib.util import find_spec
 from typing import Any
 
@@ -21,7 +18,6 @@ from sim.io.errors import InputError
 _PACKAGES = {
     "local": ("cloudpickle", "cloudpickle"),
     "dask": ("distributed", "dask[distributed]"),
-    "ray": ("ray", "ray"),
 }
 _ANSWERS, _LOOKED = 10.0, 1.0  # seconds that a scheduler may take to answer; between two looks at the workers
 _DASK = {
@@ -52,7 +48,7 @@ def open_backend(name: str, jobs: int | None, address: str | None) -> Backend:
     count = jobs or available_jobs()
     if name == "local":
         return Processes(count)
-    return (DaskCluster if name == "dask" else RayCluster)(address, count)
+    return DaskCluster(address, count)
 
 
 class DaskCluster:
@@ -133,121 +129,9 @@ def _dask_outcome(future: Any) -> Part | Failure:
     return Failure("gone")
 
 
-class RayCluster:
-    """Workers of a ray cluster."""
-
-    def __init__(self, address: str | None, count: int):
-        if os.path.exists(os.path.expanduser("~/.ray/auth_token")):
-            os.environ.setdefault("RAY_AUTH_MODE", "token")  # as `ray start` does
-        os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
-        import psutil
-        import ray
-
-        address = address or os.environ.get("RAY_ADDRESS")
-        host, _, port = (address or "").removeprefix("ray://").rpartition(":")
-        self._head = (host, int(port)) if host and port.isdigit() else None  # None: ray finds it by itself
-        if not self._answers():
-            raise InputError(
-                f"no ray cluster answers at {address}; start one with ray start --head, or give host:port"
-            )
-        local: dict[str, Any] = {"address": "local", "num_cpus": count, "include_dashboard": False}
-        before = _descendants()
-        try:
-            with _silent():
-                ray.init(
-                    **({"address": address} if address else local), log_to_driver=False, logging_level="CRITICAL"
-                )
-        except Exception as refusal:  # ray raises even `Exception` itself
-            for process in _descendants() - before:
-                with suppress(psutil.NoSuchProcess):
-                    process.kill()
-            raise InputError(
-                f"no ray cluster at {address or 'this machine'} ({_first_line(refusal)}); "
-                "where its head asks for a token, set RAY_AUTH_MODE=token and RAY_AUTH_TOKEN_PATH"
-            ) from None
-        # Head and raylet end with the process that started them, but the raylet's agents wait a minute for the
-        # head. So one more process kills them all when this one has ended, however that happens.
-        started = [str(process.pid) for process in _descendants() - before]
-        self._watchdog = subprocess.Popen(
-            ["sh", "-c", 'cat; kill -9 "$@"', "watchdog", *started],
-            stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
-        )  # fmt: skip
-        self._ray, self._run = ray, ray.remote(num_cpus=1, max_retries=0)(_run)
-        self._busy: dict[Any, Chunk] = {}
-        self._looked, self._slots = 0.0, 0
-
-    def slots(self) -> int:
-        """Count the processors of the nodes that are alive."""
-        if time.monotonic() - self._looked > _LOOKED:
-            self._slots = int(self._ray.cluster_resources().get("CPU", 0)) if self._answers() else 0
-            self._looked = time.monotonic()
-        return self._slots
-
-    def submit(self, chunk: Chunk) -> None:
-        """Submit a chunk to the cluster."""
-        self._busy[self._run.remote(chunk)] = chunk
-
-    def collect(self, seconds: float) -> Ended:
-        """Return the chunks that have ended."""
-        if not self._busy or not self._slots:
-            time.sleep(seconds)  # ray would wait for a lost head without limit
-            return []
-        done, _ = self._ray.wait(list(self._busy), num_returns=1, timeout=seconds)
-        return [(self._busy.pop(reference), self._outcome(reference)) for reference in done]
-
-    def stop(self) -> None:
-        """Cancel the chunks under way and disconnect."""
-        if self._slots:
-            for reference in self._busy:
-                self._ray.cancel(reference, force=True)
-            self._ray.shutdown()
-            self._watchdog.communicate()
-
-    def _answers(self) -> bool:
-        """Whether the head is there, as far as its address is known."""
-        with suppress(OSError):
-            if self._head is not None:
-                socket.create_connection(self._head, timeout=1).close()
-            return True
-        return False
-
-    def _outcome(self, reference: Any) -> Part | Failure:
-        errors = self._ray.exceptions
-        try:
-            outcome: Part | Failure = self._ray.get(reference)
-            return outcome
-        except errors.WorkerCrashedError:
-            return Failure("died")
-        except (errors.RayTaskError, errors.RaySystemError) as error:  # a chunk itself raises nothing
-            reason = str(error).strip().splitlines()[-1]
-            return Failure("refused", f"a ray worker cannot load this package ({reason}); install it there")
-        except errors.RayError:
-            return Failure("gone")
-
-
 def _run(chunk: Chunk) -> Part | Failure:
     return chunk.run()
 
 
 def _first_line(refusal: Exception) -> str:
     return (str(refusal) or repr(refusal)).splitlines()[0]
-
-
-@contextmanager
-def _silent() -> Iterator[None]:
-    """Discard what ray's compiled code writes to stderr: it complains of each of 20 attempts to connect."""
-    stderr = os.dup(2)
-    with open(os.devnull, "wb") as nothing:
-        os.dup2(nothing.fileno(), 2)
-    try:
-        yield
-    finally:
-        os.dup2(stderr, 2)
-        os.close(stderr)
-
-
-def _descendants() -> set[Any]:
-    """Find the processes that this one has started, and theirs."""
-    import psutil
-
-    return set(psutil.Process().children(recursive=True))

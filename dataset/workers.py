@@ -2,7 +2,7 @@
 
 A back end has the four methods of `Backend`. `Processes` starts a process for each chunk, forked from a server
 that has loaded the simulator and its machine code, so that one more costs a few hundredths of a second; its end
-says which chunk has killed it. `dataset.clusters` has the others.
+says which chunk has killed it. `dataset.clusters` has that of dask.
 """
 
 from __future__ import annotations

@@ -212,10 +212,9 @@ def test_mending_an_unfinished_build_finishes_it(
 @pytest.mark.parametrize(
     ("backend", "jobs", "words"),
     [
-        ("slurm", 1, "allowed are local"),
+        ("ray", 1, "backend 'ray'; allowed are local, dask"),
         ("local", 0, "jobs = 0"),
         ("dask", 1, r"pip install 'dask\[distributed\]'"),
-        ("ray", 1, "install 'ray'"),
     ],
 )
 def test_impossible_backends_leave_no_folder(

@@ -1,4 +1,4 @@
-"""dask and ray as separate processes: the rows are the same bits, whatever is killed meanwhile."""
+"""dask as separate processes: the rows are the same bits, whatever is killed meanwhile."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -21,18 +21,14 @@ from dataset.data_set import read
 from sim.io.errors import InputError
 from tests.dataset import sweeps
 from tests.dataset.sweeps import MARKS, ROOT, design, invented
-from tests.processes import LIMIT, alive, printed, until
+from tests.processes import LIMIT, printed, until
 from tests.shared import FOLDER
 
 pytestmark = [
     pytest.mark.rest,
     pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning"),
 ]
-Head = tuple[str, Callable[[], None]]
-ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")} | {
-    "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
-    "RAY_USAGE_STATS_ENABLED": "0",
-}
+ENVIRONMENT = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
 
 
 @pytest.fixture(autouse=True)
@@ -133,6 +129,15 @@ def test_dask_ends_when_its_scheduler_is_killed(dask: Dask, calm: Path, tmp_path
     assert len(line.splitlines()) == 1
 
 
+def test_dask_stops_when_told(dask: Dask, tmp_path: Path) -> None:
+    process = build_apart(tmp_path / "out", "endless", "dask", dask.address)
+    until(lambda: len(list(MARKS.iterdir())) >= 2 or process.poll() is not None)
+    process.send_signal(signal.SIGINT)
+    line = printed(process)[1]
+    assert line.startswith("stopped: 0 of 200 rows")
+    assert (process.returncode, len(line.splitlines())) == (130, 1)
+
+
 def test_without_dask_workers_it_ends_with_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed", reason="the extra dask is not installed")
     monkeypatch.setattr(engine, "PATIENCE", 1.0)
@@ -203,98 +208,3 @@ def build_apart(
         [sys.executable, script], env=ENVIRONMENT, cwd=ROOT, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip
-
-
-@pytest.fixture
-def home(tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Give this user no token of ray's, or one where the test asks for it."""
-    pytest.importorskip("ray", reason="the extra ray is not installed")
-    (tmp_path / ".ray").mkdir()
-    if getattr(request, "param", False):
-        (tmp_path / ".ray" / "auth_token").write_text(64 * "0")
-    monkeypatch.setitem(ENVIRONMENT, "HOME", str(tmp_path))
-
-
-@pytest.fixture
-def ray(home: None, tmp_path: Path) -> Iterator[Head]:
-    """Start a ray head with two processors; return its address and how to kill it with its children."""
-    port, log = free_port(), tmp_path / "ray.log"
-    words = ["start", "--head", "--block", "--port", str(port), "--num-cpus", "2", "--include-dashboard", "false"]
-    code = "import sys; from ray.scripts.scripts import main; sys.exit(main())"
-    with open(log, "wb") as file:
-        head = subprocess.Popen(
-            [sys.executable, "-c", code, *words, "--object-store-memory", "100000000"],
-            env=ENVIRONMENT, stdout=file, stderr=file, start_new_session=True,
-        )  # fmt: skip
-    until(lambda: b"Ray runtime started" in log.read_bytes() or head.poll() is not None, log=log)
-    assert head.poll() is None, log.read_text()
-
-    def kill() -> None:
-        with suppress(ProcessLookupError):
-            os.killpg(head.pid, signal.SIGKILL)
-        head.wait(timeout=LIMIT)
-
-    yield f"127.0.0.1:{port}", kill
-    kill()
-
-
-def test_ray_ends_when_its_head_is_killed(ray: Head, tmp_path: Path) -> None:
-    process = build_apart(tmp_path / "out", "endless", "ray", ray[0], patience=2)
-    until(lambda: len(list(MARKS.iterdir())) >= 2 or process.poll() is not None)
-    ray[1]()
-    line = printed(process)[1].strip().splitlines()[-1]
-    assert re.search(r"^error: no workers for 2 s: 0 of 200 rows are stored .* go on with", line)
-    assert process.returncode == 1
-
-
-@pytest.mark.parametrize("home", [False, True], indirect=True)
-def test_ray_makes_the_same_rows(ray: Head, calm: Path, tmp_path: Path) -> None:
-    process = build_apart(tmp_path / "out", "killing_once", "ray", ray[0])
-    shown, failures = printed(process)
-    assert (process.returncode, failures) == (0, "")
-    assert "Traceback" not in shown  # ray itself tells of the killed workers
-    assert read(tmp_path / "out").equals(read(calm))
-    assert {mark.name.split("-")[-2] for mark in MARKS.iterdir()} >= {"0", "1"}
-
-
-@pytest.mark.parametrize("home", [True], indirect=True)
-def test_ray_without_its_token_ends_with_a_line(
-    ray: Head, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(ENVIRONMENT, "RAY_AUTH_MODE", "disabled")
-    process = build_apart(tmp_path / "out", "invented", "ray", ray[0])
-    assert re.fullmatch(r"error: no ray cluster at .* set RAY_AUTH_MODE=token .*\n", printed(process)[1])
-    assert process.returncode == 2
-
-
-def test_a_local_ray_cluster_ends_with_its_parent(home: None, tmp_path: Path) -> None:
-    import psutil
-
-    process = build_apart(tmp_path / "out", "endless", "ray", None)
-    until(lambda: len(list(MARKS.iterdir())) >= 2, process)
-    cluster = [each.pid for each in psutil.Process(process.pid).children(recursive=True)]
-    agents = [each for each in cluster if b"Agent" in Path(f"/proc/{each}/cmdline").read_bytes()]
-    assert len(agents) == 2
-    for agent in agents:
-        os.kill(agent, signal.SIGSTOP)  # or they would end, by themselves, after a minute
-    process.kill()
-    assert printed(process) == ("", "")
-    until(lambda: not any(map(alive, cluster)))
-
-
-def test_ray_sets_a_poisonous_chunk_aside_and_stops_when_told(ray: Head, tmp_path: Path) -> None:
-    process = build_apart(tmp_path / "out", "poisonous", "ray", ray[0])
-    line = printed(process)[1].strip().splitlines()[-1]
-    assert re.search(r"rows \d+ to \d+ \(its worker died 3 times", line)
-    assert process.returncode == 1
-    stopped = build_apart(tmp_path / "stopped", "endless", "ray", ray[0])
-    until(lambda: any("endless" in mark.name for mark in MARKS.iterdir()))
-    stopped.send_signal(signal.SIGINT)
-    assert printed(stopped)[1].strip().splitlines()[-1].startswith("stopped: 0 of 200 rows")
-    assert stopped.returncode == 130
-
-
-def test_no_ray_there(tmp_path: Path) -> None:
-    pytest.importorskip("ray", reason="the extra ray is not installed")
-    with pytest.raises(InputError, match="no ray cluster answers"):
-        build(design(9), tmp_path / "out", backend="ray", address=f"127.0.0.1:{free_port()}", title="")
