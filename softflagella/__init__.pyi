@@ -58,7 +58,6 @@ from sim.model.schedule import load_schedule as load_schedule
 from surrogate.api import inverse as inverse
 from surrogate.api import query as query
 from surrogate.interface import LookupTable as LookupTable
-from surrogate.small_copy import export as export
 from surrogate.table_file import load_table as load_table
 from surrogate.tabulate import tabulate as tabulate
 from surrogate.tensors import torch_query as torch_query

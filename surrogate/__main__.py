@@ -1,4 +1,4 @@
-"""Command line of the look-up table: `train`, `query`, `inverse`, `errors`, `robot`, `export`, `compile`."""
+"""Command line of the look-up table: `train`, `query`, `inverse`, `errors`, `robot`, `compile`."""
 
 from __future__ import annotations
 
@@ -127,21 +127,6 @@ def _robot(robot: str, *, out: str) -> None:
     table.save(out)
     worst = max(error["rms"] for error in table.errors.values())
     print(f"both directions of the motor, largest error {100 * worst:.2f} % -> {out}")
-
-
-@program.command("export")
-def _export(lookup: str | None = None, *, small: str) -> None:
-    """Write a look-up table for other programs.
-
-    Args:
-        small: FOLDER, at most 150 kB, for a microcontroller, with a reader in C.
-    """
-    from surrogate.small_copy import export
-    from surrogate.table_file import load
-
-    table = load(lookup)
-    print(export(small, lookup=table))
-    print(f"model {table.identity} -> {small}")
 
 
 @program.command("compile")

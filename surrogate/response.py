@@ -17,7 +17,7 @@ Left out: robots with one tail, and robots whose left and right turns differ. Un
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -80,7 +80,10 @@ class ResponseTable:
 
     def put_flips(self, motions: Motions, dwells: Floats) -> None:
         """Write the response at equal dwells (M,) into the outputs of motions; NaN where none was learned."""
-        put_flips(self.networks[:2], self.equal_dwells, motions, dwells)
+        lag, memory = self.networks[:2]
+        numbers = (*lag.layers, *memory.layers, *self.equal_dwells, lag.shape["outputs"], _KNOTS)
+        own = (motions.robots, motions.motion, motions.inputs)
+        write_flips(*numbers, *own, np.ascontiguousarray(dwells, dtype=float), motions.outside, motions.outputs)
 
     @cached_property
     def equal_dwells(self) -> Basis:
@@ -93,20 +96,6 @@ class ResponseTable:
 def memory_at_equal_dwells(flat: Floats) -> Floats:
     """Return memories (C, K D 3) where the dwell before is as long as the dwell, (C, D 3)."""
     return at_equal_dwells(flat.reshape(-1, *SHAPES["memory"])).reshape(len(flat), -1)
-
-
-def put_flips(networks: Sequence[Ensemble], basis: Basis, motions: Motions, dwells: Floats) -> None:
-    """Write the response at equal dwells, one a robot (M,), into the outputs of motions.
-
-    Args:
-        networks: of lag and memory, the memory without or with what else its network gives.
-        basis: of the lag, then of the memory where the dwell before is as long.
-        motions: of M robots.
-        dwells: (M,).
-    """
-    (lag, memory), own = networks, (motions.robots, motions.motion, motions.inputs)
-    numbers = (*lag.layers, *memory.layers, *basis, lag.shape["outputs"], _KNOTS)
-    write_flips(*numbers, *own, np.ascontiguousarray(dwells, dtype=float), motions.outside, motions.outputs)
 
 
 def along_axes(speeds: Floats, shape: tuple[int, ...]) -> Floats:

@@ -201,12 +201,6 @@ def surrogate_robot(made: Path, out: Path) -> str:
     return "largest error"
 
 
-def surrogate_export(made: Path, out: Path) -> str:
-    done("surrogate", "export", SHIPPED, "--small", out / "small")
-    assert len((out / "small" / "vectors.csv").read_text().splitlines()) > 20
-    return f"model {load().identity} -> {out / 'small'}"
-
-
 def planner_plan(made: Path, out: Path) -> str:
     camera = ["--camera", "0.02l", 0.03, 1.5, 0.5, 0.1]
     done("planner", "plan", "square:3l", "--robot", made / "robot.toml", *camera, "--out", out / "plan")

@@ -17,7 +17,6 @@ import softflagella as sf
 from sim.inputs import load_robot
 from sim.io.errors import run_command
 from softflagella.__main__ import main
-from surrogate.small_copy import export
 from tests.docs.pages import DOCS, PAGES, ROOT, blocks, page_name
 from tests.planner.compiled import compile_c
 from tests.processes import LIMIT
@@ -82,7 +81,6 @@ def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytes
 def test_c_on_pages_compiles(tmp_path: Path) -> None:
     robot = sf.load_robot("paper-control")
     sf.write_plan(sf.plan(sf.circle(2.0), robot), tmp_path)
-    export(tmp_path)
     c_blocks = [block for page in PAGES for block in blocks(page) if block.language == "c"]
     assert c_blocks
     for block in c_blocks:

@@ -88,7 +88,6 @@ def test_words_are_commands_of_packages_and_stand_first(capsys: pytest.CaptureFi
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["export"], "no command 'export'; it is softflagella surrogate export"),
         (["report"], "no command 'report'; it is softflagella dataset report"),
         (["calibrat"], "no command 'calibrat'; is it calibrate?"),
         (["qqq"], "no command 'qqq'; there are robot, steady"),

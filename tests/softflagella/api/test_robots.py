@@ -165,10 +165,10 @@ def test_a_robot_is_found_by_its_motion() -> None:
         sf.inverse({**given, **targets}, free=["N"])
 
 
-def test_a_small_copy_is_of_a_trained_table(tmp_path: Path) -> None:
+def test_the_table_of_a_single_robot_answers_for_it(tmp_path: Path) -> None:
     own = own_table(biased=False)
     with pytest.raises(sf.InputError, match="table of a single robot"):
-        sf.export(tmp_path, lookup=own)
+        sf.inverse(pd.DataFrame([CONTROL.group_values()]), lookup=own)
     assert sf.query(CONTROL, lookup=own)["error"].item() < 0.01
     own.save(tmp_path / "own.json")
     assert sf.query(CONTROL, lookup=tmp_path / "own.json").equals(sf.query(CONTROL, lookup=own))
