@@ -273,13 +273,6 @@ def _page(write_page: Call, *, out: str) -> None:
     print(f"{page.stat().st_size / 1e6:.2f} MB, opens in a browser -> {page}")
 
 
-@program.command("replan", of="planner.files.tracks:replan", written_by="from")
-def _replan(replan: Call, *, out: str, arduino: str | None = None) -> None:
-    """Plan the rest of a saved plan from where a robot is now."""
-    _refuse_early(arduino)
-    _write(replan(), out, arduino=arduino)
-
-
 @program.command("replay")
 def _replay(
     plan: str,

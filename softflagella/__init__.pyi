@@ -15,7 +15,6 @@ from planner.files.saved_plan import load_plan as load_plan
 from planner.files.saved_plan import restore_plan as restore_plan
 from planner.files.tracks import TrackingError as TrackingError
 from planner.files.tracks import check as check
-from planner.files.tracks import replan as replan
 from planner.goal.trip import Trip as Trip
 from planner.goal.trip import to_goal as to_goal
 from planner.jobs.cover import Coverage as Coverage

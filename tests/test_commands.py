@@ -335,15 +335,6 @@ def calibration_simulate(made: Path, out: Path) -> str:
     return "128 runs -> "
 
 
-def planner_replan(made: Path, out: Path) -> str:
-    track = pd.read_csv(made / "track.csv")
-    track.head(len(track) // 2).to_csv(out / "half.csv", index=False)
-    done("planner", "replan", made / "plan", out / "half.csv", "--out", out / "rest")
-    whole, rest = load_plan(made / "plan" / "plan.json"), load_plan(out / "rest" / "plan.json")
-    assert len(rest["dwell_s"]) == pytest.approx(len(whole["dwell_s"]) / 2, abs=10)
-    return "the robot goes on from there"
-
-
 def calibration_tracks(made: Path, out: Path) -> str:
     track(0).to_csv(out / "tracks.csv", index=False)
     pd.DataFrame({"run": [1], "N": 2, "l_cm": 11.0, "omega_rpm": -150.0}).to_csv(out / "runs.csv", index=False)

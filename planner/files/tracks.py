@@ -1,14 +1,12 @@
-"""Replayed and measured tracks against their plans: the tracking error, an overlay, and the rest of a plan.
+"""Replayed and measured tracks against their plans: the tracking error and an overlay.
 
 A track is a camera's table: time_s, x_cm, y_cm and heading_deg of the head's centre, or in other units, or the
 columns of a replay. The error is the distance of the tracked point from the declared path, weighted by time; that
-from the path as given is computed, too. Of a trip to a goal the way from the last pose to the goal is planned
-again, through the places that are left; of any other plan the rest of its path (`planner.tracking.rest`).
+from the path as given is computed, too.
 """
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -18,13 +16,10 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 import pandas as pd
 
-from planner.files.saved_plan import load_plan, restore_plan
-from planner.goal.trip import to_goal
+from planner.files.saved_plan import load_plan
 from planner.paths.distance import distance_to, farthest
-from planner.paths.obstacles import FreeSpace
 from planner.paths.units import length_in_lab, missed_words
 from planner.planning.plan import Plan
-from planner.tracking.rest import place_reached, rest_of
 from sim.arrays import Floats
 from sim.io.errors import InputError, InputWarning, naming
 from sim.io.keywords import checks_keywords
@@ -33,7 +28,6 @@ from sim.io.quantities import convert_columns, numbers_of
 from sim.io.track_options import TrackOptions
 from sim.io.units import format_length
 from sim.mechanics import planar
-from surrogate.interface import LookupTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -154,71 +148,6 @@ def tracking_error(plan: Mapping[str, Any], track: pd.DataFrame) -> TrackingErro
     )
 
 
-@checks_keywords
-def replan(
-    plan: Plan | str | Path,
-    track: pd.DataFrame | str | Path,
-    *,
-    lookup: LookupTable | str | Path | None = None,
-    own_table: bool = False,
-    **options: Unpack[TrackOptions],
-) -> Plan:
-    """Plan the rest of a plan from where a robot is now: the last pose of its track, at rest.
-
-    The track tells which part of the path the robot has followed. Where it is away from its path, the rest begins
-    with a way back, which leaves out as little of the path as is worth its length. Of a trip to a goal the way to
-    the goal is planned again, through the places that are left.
-
-    Args:
-        plan: plan.json, its folder, or a goal.json, tour.json or cover.json beside it. In Python also a plan.
-        track: table of the robot so far: `time_s`, `x_cm`, `y_cm`, `heading_deg` of the head's centre, or in other
-            units, or the columns that `replay` writes; in its last row the robot is now, at rest.
-        lookup: the look-up table with which a saved plan was made, or its file; see `restore_plan`.
-        own_table: a saved plan was made with the robot's own table, which is simulated.
-        options: of a track that another program has written, see `TrackOptions`.
-
-    Returns:
-        A plan whose first dwell begins now; its `job` is a `Trip` for a trip to a goal.
-
-    Raises:
-        InputError: the file is no plan, the track cannot be used or has reached the end, or no way leads on.
-
-    Example:
-        >>> import pandas as pd
-        >>> import softflagella as sf
-        >>> result = sf.plan([[0, 0], [4, 0]], "paper-control")
-        >>> track = pd.DataFrame({"time_s": [600.0], "x_cm": [22.0], "y_cm": [1.0], "heading_deg": [10.0]})
-        >>> rest = sf.replan(result, track)
-        >>> round(rest.start[0], 6), len(rest.dwells) < len(result.dwells)
-        (2.0, True)
-    """
-    if isinstance(plan, str | Path):
-        plan = restore_plan(plan, lookup=lookup, own_table=own_table)
-    with naming(track):
-        return _replanned(plan, read_track(track, **options))
-
-
-def _replanned(plan: Plan, track: pd.DataFrame) -> Plan:
-    """Plan the rest of a plan from the last pose of a track, at rest there; of a trip, the way to its goal."""
-    robot = {"tail_length_m": plan.robot.length_scale, "time_scale_s": plan.robot.time_scale}
-    times, poses = poses_of(track, robot, running=True)
-    if plan.ends_at is None:
-        return rest_of(plan, times, poses)
-    place, q, kept = place_reached(plan, times, poses), plan.declared.reference.q, plan.kept_clear
-    left: list[tuple[float, float]] = []
-    passed = 0
-    for via in plan.job.via:
-        passed += int(np.hypot(*(q[passed:] - np.array(via)).T).argmin())
-        left += [via] if passed > place else []
-    x, y, heading = poses[-1].tolist()
-    space = FreeSpace() if kept is None else kept.free_space
-    return to_goal(
-        (x, y, math.remainder(heading, math.tau)), plan.ends_at, plan.tracked, via=left,
-        objective=plan.request.objective, minimum_dwell=plan.minimum_dwell, camera=plan.request.camera,
-        keep_out=space.regions, walls=space.walls, feedback=kept is not None and kept.margin < plan.stated_error,
-    )  # fmt: skip
-
-
 def read_track(track: pd.DataFrame | str | Path, **options: Unpack[TrackOptions]) -> pd.DataFrame:
     """Read the table of a track from its file, see `sim.io.pose_tracks`, and warn of poses that are lost.
 
@@ -233,21 +162,18 @@ def read_track(track: pd.DataFrame | str | Path, **options: Unpack[TrackOptions]
     return table
 
 
-def poses_of(track: pd.DataFrame, robot: Mapping[str, Any], *, running: bool = False) -> tuple[Floats, Floats]:
+def poses_of(track: pd.DataFrame, robot: Mapping[str, Any]) -> tuple[Floats, Floats]:
     """Return times (N,) and poses (N, 3) of a track, in time units, l and rad.
 
     Args:
         track: the table.
         robot: its `tail_length_m` and `time_scale_s`.
-        running: the last row may be incomplete, since it is still being written.
 
     Raises:
         InputError: a column is missing, a value is no finite number, or times go back.
     """
     table = track_in_tails(track, robot)
     rows = np.stack([numbers_of(table[name]).to_numpy() for name in _COLUMNS], 1)
-    if running and len(rows) > 1 and np.isnan(rows[-1]).any():
-        rows = rows[:-1]
     bad = np.flatnonzero(~(np.abs(rows) < _LARGEST).all(1))
     if len(bad):
         raise InputError(

@@ -310,12 +310,7 @@ class Way(NamedTuple):
 
 
 def shortest_way(
-    start: tuple[float, float, float],
-    targets: Floats,
-    left_out: Floats,
-    stride: int,
-    radius: float,
-    worth: float = LEFT_OUT,
+    start: tuple[float, float, float], targets: Floats, left_out: Floats, stride: int, radius: float
 ) -> tuple[DubinsPaths, int]:
     """Find the cheapest way, a single track, and the target where it ends.
 
@@ -325,14 +320,13 @@ def shortest_way(
         left_out: length (m,) of the path before each.
         stride: targets between two that are tried first.
         radius: of the arcs.
-        worth: what a length that is left out costs.
     """
 
     def best(rows: Integers) -> tuple[int, Floats, int]:
         lengths = words(np.array(start), targets[rows], radius)
         total = lengths.sum(-1)
         word = total.argmin(-1)
-        row = int((total.min(-1) + worth * left_out[rows]).argmin())
+        row = int((total.min(-1) + LEFT_OUT * left_out[rows]).argmin())
         return int(rows[row]), lengths[row, word[row]], int(word[row])
 
     coarse = best(np.arange(0, len(targets), stride))[0]

@@ -1,4 +1,4 @@
-"""The commands of the planner: units, what they write, `track`, `replan` and `replay`; refusals in one line."""
+"""The commands of the planner: units, what they write, `track`, `check` and `replay`; refusals in one line."""
 
 from __future__ import annotations
 
@@ -129,13 +129,13 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("track made --lost 5", "--view, --serial and --lost are for --camera"),
         ("track made --camera 0 --view view.toml --lost 0", "--lost 0.0; give a number of seconds above 0"),
         ("track made --camera film.mp4 --view none.toml", "none.toml: no such file"),
-        ("replan made no_heading.csv", "no column 'heading_deg'"),
-        ("replan made nan.csv", "row 1 of the track"),
-        ("replan made back.csv", "time goes back at row 2"),
-        ("replan made far.csv", "row 2 of the track"),
-        ("replan made/none.json track.csv", "none.json: no such file"),
-        ("replan made/plan.csv track.csv", "is not a plan.json"),
-        ("replan made none.csv", "none.csv: no such file"),
+        ("check made/plan.json no_heading.csv", "no column 'heading_deg'"),
+        ("check made/plan.json nan.csv", "row 1 of the track"),
+        ("check made/plan.json back.csv", "time goes back at row 2"),
+        ("check made/plan.json far.csv", "row 2 of the track"),
+        ("check made/none.json track.csv", "none.json: no such file"),
+        ("check made/plan.csv track.csv", "is not a plan.json"),
+        ("check made/plan.json none.csv", "none.csv: no such file"),
         ("replay empty.json", "not a plan.json"),
         ("replay none.json", "no format"),
         ("replay part.json", "no entry"),

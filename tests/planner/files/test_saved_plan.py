@@ -9,10 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 
-import softflagella as sf
 from planner.__main__ import main
 from planner.files.fleet_files import read_fleet
 from planner.files.headers import tracker_header
@@ -40,7 +38,6 @@ from tests.planner.plans import (
     WALLS,
     around,
     goal_file,
-    hindered_trip,
     own_table,
     planned,
     trip,
@@ -49,7 +46,6 @@ from tests.shared import shared
 
 pytestmark = pytest.mark.slow
 
-CM = 100 * CONTROL.tail_length
 KNOWN = CalibrationKnowledge(("C_t",), np.array([[1e-4]]), current=(2e-4, 1e-4), current_error=(1e-5, 0.0))
 
 
@@ -113,6 +109,7 @@ def test_the_files_of_jobs_and_their_folder_lead_to_the_plan(tmp_path: Path) -> 
     assert goal["plan_id"] == content["id"]
     assert content["predicted_poses"][-1] == pytest.approx(goal["predicted_end"])
     assert all(other.to_dict() == first.to_dict() for other in others)
+    assert [each.job.goal for each in (first, *others)] == [trip().job.goal] * 3
     write_plan(planned(), tmp_path / "circle")
     (tmp_path / "circle" / "goal.json").write_text((tmp_path / "trip" / "goal.json").read_text())
     with pytest.raises(InputError, match=r"is of plan .* is another one; plan again"):
@@ -156,53 +153,6 @@ def test_edited_plans_are_refused(changes: dict[str, Any], expected: str, tmp_pa
 def test_another_table_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     restore_plan({**saved("pivot"), "model": "0123"})
     assert "was made with look-up table 0123" in capsys.readouterr().err
-
-
-def track_of(result: Plan, share: float) -> pd.DataFrame:
-    """Return the camera's table of a share of the dwells."""
-    frame = result.to_frame().iloc[: round(share * len(result.dwells)) + 1]
-    return frame[["start_s", "x_cm", "y_cm", "heading_deg"]].rename(columns={"start_s": "time_s"})
-
-
-def test_a_saved_plan_and_one_in_memory_have_the_same_rest_in_other_units_too(tmp_path: Path) -> None:
-    """The last row of the track is not finished."""
-    square = PLANS["square"]()
-    track = track_of(square, 0.4)
-    words = [f"{t / 60},{10 * x},{10 * y},{np.radians(h)}" for t, x, y, h in track.to_numpy().tolist()]
-    (tmp_path / "track.csv").write_text("\n".join(["time_min,x_mm,y_mm,heading_rad", *words, "9.1,30"]) + "\n")
-    sf.write_plan(square, tmp_path / "plan")
-    rest, saved = sf.replan(square, track), sf.replan(tmp_path / "plan", tmp_path / "track.csv")
-    assert isinstance(rest, sf.Plan)
-    assert isinstance(saved, sf.Plan)
-    assert saved.dwells == pytest.approx(rest.dwells, abs=1e-5)
-    assert saved.start == pytest.approx(tuple(track.iloc[-1, 1:] / [CM, CM, 180 / np.pi]))
-
-
-@pytest.mark.parametrize(
-    ("share", "left"), [(0.5, 1), *(pytest.param(*case, marks=pytest.mark.rest) for case in ((0.1, 1), (0.9, 0)))]
-)
-def test_a_trip_goes_on_to_its_goal_through_the_places_that_are_left(
-    share: float, left: int, tmp_path: Path
-) -> None:
-    track = track_of(hindered_trip(), share)
-    sf.write_plan(hindered_trip(), tmp_path)
-    after = sf.replan(tmp_path / "goal.json", track)
-    assert isinstance(after.job, sf.Trip)
-    assert len(after.job.via) == left
-    assert after.job.end_error[0] < 0.01
-    assert after.kept_clear is not None
-    assert after.kept_clear.clearance > 0
-    assert after.start == pytest.approx(tuple(track.iloc[-1, 1:] / [CM, CM, 180 / np.pi]), abs=1e-6)
-    if share == 0.1:
-        same = sf.replan(hindered_trip(), track)
-        assert same.dwells == pytest.approx(after.dwells, abs=1e-4)
-
-
-def test_tours_go_on_along_their_path() -> None:
-    tour = sf.tour([(0, 0), (2, 0), (1.5, 1)], CONTROL)
-    rest = sf.replan(tour, track_of(tour, 0.5))
-    assert isinstance(rest, sf.Plan)
-    assert np.hypot(*(rest.track[-1] - tour.job.places[tour.job.order[-1]])) < 0.1
 
 
 def test_a_robot_that_the_package_s_table_knows_gets_that_table(tmp_path: Path) -> None:
