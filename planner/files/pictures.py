@@ -239,7 +239,7 @@ def draw_trade_off(chosen: Plan) -> Figure:
     plans = []
     for dwell in np.geomspace(QUICK, longest_dwell(chosen.tracked.vehicle, QUICK), _COUNT).tolist():
         with suppress(InputError):  # such dwells do not get the robot around the path
-            other = replace(chosen.request, dwell=dwell, tolerance=None, arrive_seconds=None, loop=False)
+            other = replace(chosen.request, dwell=dwell, tolerance=None, loop=False)
             plans.append(make_plan(chosen.drawn, chosen.tracked, other))
     errors = np.array([(plan.stated_error, plan.predicted_max, plan.predicted_rms) for plan in plans]).T
     kinds = (("stated", PREDICTED), ("predicted, max", DECLARED), ("predicted, rms", RAW))

@@ -22,7 +22,7 @@ from planner.goal.trip import FORMAT, Trip
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Reference
-from planner.planning.conditions import Arrival, KeptClear, Lap
+from planner.planning.conditions import KeptClear, Lap
 from planner.planning.declare import Declared
 from planner.planning.errors import PlanErrors, predicted_error
 from planner.planning.line_of_sight import Guidance
@@ -241,6 +241,8 @@ def _robot(content: Mapping[str, Any]) -> Robot | MeasuredVehicle:
 
 def _plan(content: Mapping[str, Any], tracked: TrackedVehicle) -> Plan[None]:
     """Put the parts of a plan together."""
+    if "arrival" in content:
+        raise InputError("it was made to arrive at a time (--arrive), which is planned no longer; plan again")
     poses, dwells = np.array(content["predicted_poses"], dtype=float), np.array(content["dwell_bar"], dtype=float)
     if dwells.shape != (len(poses) - 1,) or not (np.isfinite(dwells) & (dwells > 0)).all():
         raise ValueError("dwell_bar needs a number above 0 between two of predicted_poses")
@@ -256,15 +258,11 @@ def _plan(content: Mapping[str, Any], tracked: TrackedVehicle) -> Plan[None]:
     declared, straight, guidance = _guidance(content, tracked)
     errors = _errors(content, tracked, drawn, declared, switches)
     kept_clear = KeptClear.from_dict(content["kept_clear"]) if "kept_clear" in content else None
-    arrival = None
-    if "arrival" in content:
-        arrival, swing = Arrival.from_dict(content["arrival"], tracked.robot)
-        declared = replace(declared, swing=swing)
     camera = Camera.from_dict(content["camera"]) if "camera" in content else DOCUMENTED
     request = PlanRequest(point=tracked.point, objective=objective, camera=camera)
     lap = Lap.from_dict(content["lap"]) if "lap" in content else None
     parts = (tracked, request, drawn, declared, straight, guidance, switches, errors)
-    plan: Plan[None] = Plan(*parts, kept_clear, arrival, lap)
+    plan: Plan[None] = Plan(*parts, kept_clear, lap)
     said = tuple(str(warning) for warning in content["warnings"] if warning not in plan.warnings)
     return replace(plan, declared=replace(declared, warnings=said))
 

@@ -111,42 +111,21 @@ def words(start: Floats, goal: Floats, radius: float) -> Floats:
         angle = np.arctan2(-side * (ca + cb), d + side * (sa + sb)) - np.arctan2(-side * 2.0, p)
         put(word, square >= -ROUNDING, side * (angle - a), p, side * (angle - b))
     for word in (4, 5):
-        put(word, *_three_arcs(d, a, b, float(TURNS[word, 1]), far=True))
+        put(word, *_three_arcs(d, a, b, float(TURNS[word, 1])))
     return lengths * radius
 
 
-def three_arcs(start: Floats, goal: Floats, radius: float) -> tuple[Integers, Floats]:
-    """Compute all words of three arcs: turns (4, 3) and lengths (..., 4, 3), infinite where there is none.
-
-    Two of them are RLR and LRL of Dubins' words. The other two have a middle arc of less than half a turn.
-    """
-    move = (goal[..., :2] - start[..., :2]) / radius
-    d, direction = np.hypot(move[..., 0], move[..., 1]), np.arctan2(move[..., 1], move[..., 0])
-    a, b = start[..., 2] - direction, goal[..., 2] - direction
-    kinds = [(turns, far) for turns in (4, 5) for far in (True, False)]
-    lengths = np.full((*d.shape, 4, 3), np.inf)
-    for k, (word, far) in enumerate(kinds):
-        exists, *parts = _three_arcs(d, a, b, float(TURNS[word, 1]), far=far)
-        for i, part in enumerate(parts):
-            lengths[..., k, i] = np.where(exists, _turn(part) if i != 1 else part, np.inf)
-    return TURNS[[word for word, _ in kinds]], lengths * radius
-
-
-def _three_arcs(
-    d: Floats, a: Floats, b: Floats, side: float, *, far: bool
-) -> tuple[Floats, Floats, Floats, Floats]:
+def _three_arcs(d: Floats, a: Floats, b: Floats, side: float) -> tuple[Floats, Floats, Floats, Floats]:
     """Return where a word of three arcs exists, and its three angles.
 
     Args:
         d: distance of the poses, in radii.
         a, b: courses at start and goal, from the direction of the goal.
         side: to which the middle arc turns: 1 left, −1 right.
-        far: the middle arc is more than half a turn.
     """
     sa, sb, ca, cb = np.sin(a), np.sin(b), np.cos(a), np.cos(b)
     cosine = (6 - d**2 + 2 * np.cos(a - b) + side * 2 * d * (sa - sb)) / 8
-    p = np.arccos(np.clip(cosine, -1.0, 1.0))
-    p = _CIRCLE - p if far else p
+    p = _CIRCLE - np.arccos(np.clip(cosine, -1.0, 1.0))
     t = side * a - np.arctan2(ca - cb, d - side * (sa - sb)) + p / 2
     return np.abs(cosine) <= 1, t, p, side * (a - b) - t + p
 

@@ -20,8 +20,7 @@ import numpy as np
 from planner.goal.dubins import DubinsPaths
 from planner.goal.last_dwells import Ending
 from planner.goal.route import COURSES, Lattices, NoWayError, RouteLimits, route
-from planner.goal.swings import Delay
-from planner.options import AnyVehicle, GoalOptions, Length, asked, place_of, pose_of, seconds_of, swimmer_of
+from planner.options import AnyVehicle, GoalOptions, Length, asked, place_of, pose_of, swimmer_of
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import LONGEST, ask_about_days, heading_in_degrees, in_lab, place_in_lab
@@ -123,7 +122,6 @@ def to_goal(
     robot: AnyVehicle,
     *,
     via: Sequence[tuple[Length, Length]] = (),
-    arrive: float | str | None = None,
     objective: Objective = "time",
     progress: Callable[[float], object] | None = None,
     **options: Unpack[GoalOptions],
@@ -136,8 +134,6 @@ def to_goal(
         robot: robot.toml or the name of a preset, with its motor speed in both directions; or the vehicle.toml of
             a measured vehicle. In Python also the robot or the vehicle.
         via: X Y, of a place that the pivot passes on its way.
-        arrive: TIME, when the robot is at the goal, such as 12min: dwells are changed, or swings or waiting
-            circles added. In Python also in seconds.
         objective: what decides the dwell: small error, short time, or few flips.
         progress: called now and then with the share of what is done.
         options: see `GoalOptions`.
@@ -155,7 +151,7 @@ def to_goal(
     swims, unit = swimmer_of(robot), options.get("unit")
     begin, end = pose_of(start, unit, swims, "--start"), pose_of(goal, unit, swims, "--goal")
     passed = tuple(place_of(place, unit, swims, "--via") for place in via)
-    tracked, request = asked(robot, options, objective=objective, arrive_seconds=seconds_of(arrive, "--arrive"))
+    tracked, request = asked(robot, options, objective=objective)
     vehicle, space = tracked.vehicle, request.space
     ask_about_days(sum(map(math.dist, [begin[:2], *passed], [*passed, end[:2]])), swims, vehicle.speed)
     least_dwell = check_least(request.least_dwell(swims))
@@ -180,7 +176,7 @@ def to_goal(
         )
 
     task = Task(
-        source=source, changes=(Delay(space),), start=lambda declared: Start(begin, declared.reference.first_turn),
+        source=source, start=lambda declared: Start(begin, declared.reference.first_turn),
         ending=Ending(end, least_dwell, _SHORTER), zigzags=_ZIGZAGS, longer=False, blocked=NoWayError,
     )  # fmt: skip
     plan = solve(task, tracked, request, progress)

@@ -9,6 +9,7 @@ The look-up table gives the vehicle: both directions, and the memory of the last
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Unpack
@@ -16,8 +17,7 @@ from typing import Unpack
 from numpy.typing import ArrayLike
 
 from planner.goal.last_dwells import looped
-from planner.goal.swings import Delay
-from planner.options import AnyVehicle, Length, PathOptions, asked, length_of, seconds_of
+from planner.options import AnyVehicle, Length, PathOptions, asked, length_of
 from planner.paths.path import Path2D, smoothed
 from planner.paths.path_files import Drawing, read_path
 from planner.paths.tractrix import Drift
@@ -25,7 +25,7 @@ from planner.paths.units import check_size, describe, in_lab, in_tails
 from planner.planning.declare import Declared, Feasibility, declare
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest, Progress
-from planner.planning.solve import Change, Task, solve
+from planner.planning.solve import Task, solve
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.io.errors import InputError, naming
 from sim.io.keywords import checks_keywords
@@ -40,7 +40,6 @@ def plan(
     shape: str | None = None,
     closed: bool = False,
     smooth: Length | None = None,
-    arrive: float | str | None = None,
     loop: bool = False,
     tell: Callable[[str], object] | None = None,
     **options: Unpack[PathOptions],
@@ -57,16 +56,14 @@ def plan(
         shape: which path of an SVG with several.
         closed: join the path's end to its start.
         smooth: LENGTH, smooth the path over this length, such as 1cm.
-        arrive: TIME, when the robot is at the end, such as 12min: dwells are changed, or swings or waiting circles
-            added. In Python also in seconds; `Plan.arrival` has it.
-        loop: a closed path is followed lap after lap, until told otherwise; the time of a lap is only nearly
-            that of `arrive`. In Python `Plan.lap` says how well a lap closes.
+        loop: a closed path is followed lap after lap, until told otherwise. In Python `Plan.lap` says how well a
+            lap closes.
         tell: is told which path is planned, a line at a time.
         options: see `PathOptions`.
 
     Raises:
         InputError: the path is bad or too tight, the dwell too short, the tolerance too small, there is no way
-            around an obstacle, no plan is as fast as `arrive`, or the robot cannot be simulated.
+            around an obstacle, or the robot cannot be simulated.
 
     Example:
         >>> import softflagella as sf
@@ -74,7 +71,7 @@ def plan(
         >>> len(result.dwells) > 100, result.predicted_rms < 0.03
         (True, True)
     """
-    tracked, request = asked(robot, options, arrive_seconds=seconds_of(arrive, "--arrive"), loop=loop)
+    tracked, request = asked(robot, options, loop=loop)
     swims, unit, say = tracked.robot, options.get("unit"), tell or (lambda line: None)
     if not 0 < scale < float("inf"):
         raise InputError(f"--scale {scale}; give a number above 0")
@@ -113,16 +110,11 @@ def make_plan(
         feasibility = Feasibility(tracked.robot, vehicle, tracked.rod, drift, corner, request.time_weight)
         return declare(drawn, feasibility, progress)
 
-    changes: list[Change] = []
-    if request.arrive_seconds is not None:
-        changes.append(Delay(request.space, drawn))
+    task = Task(source=lambda setting: nearest(setting.drift), drawn=drawn, quickest=request.space.empty)
     if not request.space.empty:
         from planner.jobs.detours import Around  # loads SciPy's graphs
 
-        changes.append(Around(request.space, drawn))
-    task = Task(
-        source=lambda setting: nearest(setting.drift), changes=tuple(changes), drawn=drawn, quickest=not changes
-    )
+        task = replace(task, around=Around(request.space, drawn))
     once = solve(task, tracked, request, progress)
     if not request.loop:
         return once

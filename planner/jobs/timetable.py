@@ -200,7 +200,7 @@ def with_circles(plan: Plan[J], circles: Sequence[WaitingCircle]) -> Plan[J]:
             start=Start(plan.start, plan.first_direction), ending=Ending(goal, plan.minimum_dwell),
         )  # fmt: skip
     return replace(plan, declared=circling.declared, guidance=circling.guidance, switches=circling.switches,
-                   errors=circling.errors, arrival=None)  # fmt: skip
+                   errors=circling.errors)  # fmt: skip
 
 
 def _inserted(plan: Plan, circles: Sequence[WaitingCircle]) -> Reference:

@@ -23,7 +23,7 @@ from planner.paths.units import check_size
 from planner.planning.declare import AS_DRAWN, Declared
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest, Progress
-from planner.planning.solve import Change, Setting, Task, solve
+from planner.planning.solve import Setting, Task, solve
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.zigzag import dwells_for
 from sim.arrays import Floats, Integers
@@ -126,5 +126,5 @@ def plan_track(
 
     drawn = Path2D(source(preferred).reference.p, False)
     check_size(drawn, tracked.robot, tracked.vehicle.turn_radius, tracked.vehicle.speed)
-    changes: tuple[Change, ...] = () if space.empty else (Around(space, drawn),)
-    return solve(Task(source=source, changes=changes, drawn=drawn), tracked, request, progress)
+    around = None if space.empty else Around(space, drawn)
+    return solve(Task(source=source, around=around, drawn=drawn), tracked, request, progress)

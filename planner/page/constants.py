@@ -58,7 +58,7 @@ _NAMES = {  # of each module; a leading underscore is left out
     "TORQUE_SOFT TORQUE_POWER",
 }
 
-_NOT_ASKED = ("camera", "space", "feedback", "arrive_seconds", "loop")  # of a plan that the page makes
+_NOT_ASKED = ("camera", "space", "feedback", "loop")  # of a plan that the page makes
 
 
 def constants() -> dict[str, dict[str, Any]]:

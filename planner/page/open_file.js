@@ -55,7 +55,7 @@ function refuseOtherKinds(name, bytes) {
   throw new InputError(`${name}: ${kind} is not read; ${words}`);
 }
 
-/* The drawn path of a plan.json, which may have more: walls, laps, an arrival. */
+/* The drawn path of a plan.json, which may have more: walls, laps. */
 function pathOfPlan(text, name, stem) {
   const refused = (why) => new InputError(`${name} is not a plan.json of the planner (${why}); plan again`);
   let plan;

@@ -28,7 +28,7 @@ from planner.paths.nearest_path import nearest_path, pose_spacing
 from planner.paths.path import Path2D, smoothed, steps_of
 from planner.paths.tractrix import Drift, Reference, reference
 from planner.paths.units import LONGEST, Swimmer, extent, in_lab, place_in_lab
-from planner.planning.conditions import Detour, Swing
+from planner.planning.conditions import Detour
 from planner.planning.request import DECLARING, REMEDY, Corner, Progress, tell
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
@@ -83,13 +83,12 @@ class Declared:
     off_drawn: float = 0.0  # largest distance of a declared point from the drawn path
     missed: float = 0.0  # largest distance of a drawn point from the declared path
     warnings: tuple[str, ...] = ()  # in words
-    swing: Swing | None = None  # that takes time
     detours: tuple[Detour, ...] = ()  # around obstacles, in the order of the path
 
-    def moved(self, reference: Reference, drawn: Path2D, curvature: float | None = None) -> Declared:
-        """Declare another reference in place of this one, with `curvature` or its own one."""
+    def moved(self, reference: Reference, drawn: Path2D) -> Declared:
+        """Declare another reference in place of this one."""
         off_drawn, missed = two_sided(reference.p, drawn.polyline())
-        curvature = float(np.abs(reference.curvature).max()) if curvature is None else curvature
+        curvature = float(np.abs(reference.curvature).max())
         return replace(self, reference=reference, curvature=curvature, off_drawn=off_drawn, missed=missed)
 
     def same(self, other: Declared) -> bool:

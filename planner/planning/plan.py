@@ -15,7 +15,7 @@ from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
 from planner.paths.units import extent, heading_in_degrees, in_lab, place_in_lab, time_in_lab
-from planner.planning.conditions import Arrival, KeptClear, Lap
+from planner.planning.conditions import KeptClear, Lap
 from planner.planning.declare import Declared
 from planner.planning.errors import PlanErrors, feedback_error, plan_errors
 from planner.planning.line_of_sight import Guidance
@@ -98,7 +98,6 @@ class Plan(Shown, Generic[J]):
     switches: Switches  # the schedule
     errors: PlanErrors  # how far from the paths it leads
     kept_clear: KeptClear | None = None  # walls and regions that it avoids; None: there are none
-    arrival: Arrival | None = None  # the duration that was asked for; None: any
     lap: Lap | None = None  # of a schedule that repeats; None: it is carried out once
     job: J = None  # type: ignore[assignment]  # what it does besides following its path
 
@@ -340,10 +339,6 @@ class Plan(Shown, Generic[J]):
             *self.error_line.splitlines(),
             *([] if self.kept_clear is None else self.kept_clear.lines(robot)),
         ]
-        if self.declared.swing is not None:
-            lines.append(self.declared.swing.line(robot))
-        if self.arrival is not None:
-            lines.append(self.arrival.line(self.duration, robot))
         if self.lap is not None:
             lines.append(self.lap.line(robot))
         return lines if self.job is None else [*lines, *self.job.lines(self)]
@@ -440,6 +435,5 @@ class Plan(Shown, Generic[J]):
             "warnings": list(self.warnings),
             **({} if self.tracked.knowledge.empty else {"calibration": self.tracked.knowledge.to_dict()}),
             **({} if self.kept_clear is None else {"kept_clear": self.kept_clear.to_dict()}),
-            **({} if self.arrival is None else {"arrival": self.arrival.to_dict(self.declared.swing, robot)}),
             **({} if self.lap is None else {"lap": self.lap.to_dict()}),
         }

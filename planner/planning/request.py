@@ -92,7 +92,7 @@ DOCUMENTED = Camera()  # the camera of the stated error with feedback, unless an
 
 @dataclass(frozen=True)
 class PlanRequest:
-    """Point, corners, dwells, tolerance, obstacles and time, as `softflagella.plan` explains them."""
+    """Point, corners, dwells, tolerance and obstacles, as `softflagella.plan` explains them."""
 
     point: Point = "head_centre"
     corner: Corner = "nearest"
@@ -106,7 +106,6 @@ class PlanRequest:
     camera: Camera = DOCUMENTED
     space: FreeSpace = field(default_factory=FreeSpace)  # what the robot's body must keep clear of
     feedback: bool = False  # the pose will be measured: the margin around obstacles is the error with feedback
-    arrive_seconds: float | None = None  # from start to end, or of a lap
     loop: bool = False  # the schedule repeats
 
     def __post_init__(self) -> None:

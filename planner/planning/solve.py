@@ -1,12 +1,12 @@
 """From a request to a plan: one solver for all jobs.
 
 1. A task's source gives a declared path for a setting: the vehicle with one shortest dwell, and a margin.
-2. Changes transform it: a swing takes time, a way around keeps clear of an obstacle.
+2. Where obstacles block it, ways around them change it.
 3. Line-of-sight guidance follows the path, which gives the schedule, and its errors are computed
    (`follow_declared`).
 4. Where there are obstacles, the margin grows until it covers the stated error (`at_dwell`).
 5. The objective chooses the shortest dwell. Where the path is blocked or the tolerance is not kept, others are
-   tried (`by_dwell`). A duration that is asked for is met by the secant method (`planner.planning.arrive`).
+   tried (`solve`).
 
 Errors are distances of the tracked point from the declared path. Lengths in l, times in μ0 l⁴/EI.
 """
@@ -54,17 +54,16 @@ class Setting(NamedTuple):
     straight: Zigzag
     drift: Drift
     margin: float | None = None  # around the body; None: no error is known yet
-    longer: float = 0.0  # length that a swing must add
 
     @staticmethod
-    def of(tracked: TrackedVehicle, dwell: float, longer: float = 0.0) -> Setting:
+    def of(tracked: TrackedVehicle, dwell: float) -> Setting:
         """Compute straight motion and drift with a shortest dwell.
 
         Raises:
             InputError: with such dwells the robot does not get ahead.
         """
         straight = zigzag(tracked.vehicle, dwell, tracked.offset)
-        return Setting(tracked, dwell, straight, tracked.drift(straight), longer=longer)
+        return Setting(tracked, dwell, straight, tracked.drift(straight))
 
     def guidance(self, declared: Declared) -> Guidance:
         """Choose look-ahead and hysteresis for a declared path."""
@@ -72,7 +71,7 @@ class Setting(NamedTuple):
         return Guidance(self.dwell, ahead, self.straight.hysteresis(ahead))
 
 
-Change = Callable[[Declared, Setting], Declared]  # a constraint: transforms the reference, or returns its argument
+Change = Callable[[Declared, Setting], Declared]  # transforms a reference, or returns its argument
 Ending = Callable[[Switches, Declared, Setting], Switches]  # changes the last dwells
 
 
@@ -81,7 +80,7 @@ class Task:
     """What is to be followed."""
 
     source: Callable[[Setting], Declared]  # where the reference comes from
-    changes: tuple[Change, ...] = ()  # in order
+    around: Change | None = None  # keeps it clear of obstacles
     drawn: Path2D | None = None  # None: the declared path counts as drawn
     start: Callable[[Declared], Start] | None = None  # None: at rest on the path
     ending: Ending | None = None
@@ -91,27 +90,9 @@ class Task:
     blocked: type[BlockedError] = BlockedError
 
     def declared(self, setting: Setting) -> Declared:
-        """Declare a path with all changes."""
+        """Declare a path, with ways around what blocks it."""
         declared = self.source(setting)
-        for change in self.changes:
-            declared = change(declared, setting)
-        return declared
-
-
-def solve(
-    task: Task, tracked: TrackedVehicle, request: PlanRequest, progress: Progress | None = None
-) -> Plan[None]:
-    """Plan for a task.
-
-    Raises:
-        BlockedError: there is no way that keeps clear.
-        InputError: the path cannot be followed as asked.
-    """
-    if request.arrive_seconds is None:
-        return by_dwell(task, tracked, request, progress=progress)
-    from planner.planning.arrive import arrive
-
-    return arrive(task, tracked, request, progress)
+        return declared if self.around is None else self.around(declared, setting)
 
 
 def follow_declared(
@@ -155,7 +136,6 @@ def at_dwell(
     tracked: TrackedVehicle,
     request: PlanRequest,
     dwell: float,
-    longer: float = 0.0,
     progress: Progress | None = None,
 ) -> Plan[None]:
     """Plan with one shortest dwell; the margin grows until it covers the error that the plan states.
@@ -165,13 +145,12 @@ def at_dwell(
         tracked: the vehicle.
         request: what the plan is asked for.
         dwell: the shortest dwell.
-        longer: length that a swing adds.
         progress: called now and then with the share of the path that is done.
 
     Raises:
         BlockedError: there is no such plan.
     """
-    setting, space = Setting.of(tracked, dwell, longer), request.space
+    setting, space = Setting.of(tracked, dwell), request.space
     if task.zigzags and not space.empty:
         setting = setting._replace(margin=task.zigzags * setting.straight.largest)
     plan: Plan[None] | None = None
@@ -194,14 +173,10 @@ def at_dwell(
     )
 
 
-def by_dwell(
-    task: Task,
-    tracked: TrackedVehicle,
-    request: PlanRequest,
-    longer: float = 0.0,
-    progress: Progress | None = None,
+def solve(
+    task: Task, tracked: TrackedVehicle, request: PlanRequest, progress: Progress | None = None
 ) -> Plan[None]:
-    """Plan with the dwell that the objective chooses; where the path is blocked, with others.
+    """Plan for a task with the dwell that the objective chooses; where the path is blocked, with others.
 
     With the objective "error" the dwell is that of the path without obstacles. For the least stated error among
     the ways around, a dwell would be best whose error is so large that its way leaves out most of the path.
@@ -211,7 +186,7 @@ def by_dwell(
         InputError: the path cannot be followed, or no dwell keeps the tolerance.
     """
     vehicle, plan = tracked.vehicle, None
-    at = partial(at_dwell, task, tracked, request, longer=longer, progress=progress)
+    at = partial(at_dwell, task, tracked, request, progress=progress)
     if request.dwell is not None:
         dwells = [check_least(request.dwell)]
         others: list[float] = []
@@ -228,7 +203,7 @@ def by_dwell(
         ]
     first = dwells[0]
     if task.longer and request.objective == "error" and request.dwell is None:
-        free, unhindered = replace(task, changes=()), replace(request, space=FreeSpace())
+        free, unhindered = replace(task, around=None), replace(request, space=FreeSpace())
         with suppress(*([] if request.space.empty else [InputError])):  # there may be a way around the tight place
             plan = _least_stated(partial(at_dwell, free, tracked, unhindered, progress=progress), tracked, first)
             first = plan.minimum_dwell

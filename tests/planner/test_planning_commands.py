@@ -86,7 +86,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("cover x_mm.csv --width 4cm --unit cm R", "x_mm.csv: --unit cm: it has a size of its own"),
         ("hold 2,1 R", "place 2,1: 2 has no unit"),
         ("page --path square:3 R", "square:3: its lengths have no unit"),
-        # paths, regions, cameras, times
+        # paths, regions, cameras
         ("plan empty.csv --unit l R", "no rows"),
         ("plan path.csv --unit l --loop R", "a path that repeats is closed"),
         ("goal --goal 5l 0 0 --keep-out circle:5l,0,1l R", "error: there is no way: at the goal"),
@@ -100,9 +100,6 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("plan circle:1l --camera 0.02 0.03 1.5 0.5 0.1 R", "0.02 has no unit"),
         ("plan circle:1l --camera 0.02l 0.03cm 1.5 0.5 0.1 R", "--camera 0.02l 0.03cm 1.5 0.5 0.1: RAD"),
         ("plan circle:1l --camera 0.02l 0.03 1.5 0.5 10% R", "numbers without a unit"),
-        ("plan circle:1l --arrive=1min R", "the fastest plan takes"),
-        ("plan circle:1l --arrive=30 R", "with its unit"),
-        ("plan circle:1l --arrive=-3min R", "above 0"),
         # jobs
         ("tour 0l,0 R", "two or more"),
         ("tour 0,0 1,1 0,0 --unit l R", "places 1 and 3 are the same"),
@@ -114,6 +111,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("cover box:0,0,2l,1l --width 4km R", "--width: 4km; write a length"),
         ("cover box:0,0,2l --width 4cm R", "write box"),
         ("hold 1,2 --for 5 --unit cm R", "with its unit"),
+        ("hold 1,2 --for=-3min --unit cm R", "above 0"),
         # saved plans
         ("track made/plan.json --smooth 0.3", "--smooth: made/plan.json is planned already"),
         ("track made R", "--robot: made is planned already"),
@@ -175,16 +173,11 @@ def test_a_square_and_its_tolerance_have_units(
     assert plan["stated_error_over_l"] <= 0.005 / CONTROL.tail_length
 
 
-@pytest.mark.parametrize(("option", "said"), [("--loop", "repeat it: a lap ends"), ("--arrive=20min", "as asked")])
-def test_a_circle_is_a_lap_or_ends_at_a_time(
-    option: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = ["plan", "circle:1l", option, "--robot", "paper-control", "--out", str(tmp_path)]
+def test_a_circle_is_a_lap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["plan", "circle:1l", "--loop", "--robot", "paper-control", "--out", str(tmp_path)]
     assert run_command(main, words) == 0
-    assert said in capsys.readouterr().out
-    plan = json.loads((tmp_path / "plan.json").read_text())
-    assert ("lap" in plan) == (option == "--loop")
-    assert option == "--loop" or sum(plan["dwell_s"]) == pytest.approx(1200, abs=1)
+    assert "repeat it: a lap ends" in capsys.readouterr().out
+    assert "lap" in json.loads((tmp_path / "plan.json").read_text())
 
 
 @pytest.fixture

@@ -125,6 +125,7 @@ def test_the_files_of_jobs_and_their_folder_lead_to_the_plan(tmp_path: Path) -> 
         ({"guidance": None, "dwell_bar": [1.0]}, "dwell_bar needs a number above 0"),
         ({"first_direction": 0}, "first_direction = 0"),
         ({"objective": "fun"}, "objective = fun"),
+        ({"arrival": {"wished_s": 1800.0, "fastest_s": 900.0, "swing": None}}, r"arrive at a time \(--arrive\)"),
         ({"point": "tail"}, "point 'tail'"),
         ({"calibration": {"names": ["C_t"]}}, "calibration"),
         ({"minimum_dwell_bar": 0.0}, "not above 0"),

@@ -1,4 +1,4 @@
-"""From a pose to a pose: it ends at the goal, in nearly the least time, around obstacles; routes and swings."""
+"""From a pose to a pose: it ends at the goal, in nearly the least time, around obstacles; routes."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, three_arcs, words
+from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, words
 from planner.goal.route import COURSES, NoWayError, RouteLimits, route
-from planner.goal.swings import NoRoomError, swung
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
-from planner.paths.path import Path2D, circle
-from planner.paths.tractrix import STILL, Drift, reference
+from planner.paths.tractrix import STILL
 from planner.planning.plan import Plan
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.vehicle import Switches, roll_out
@@ -139,27 +137,15 @@ def test_a_replay_in_the_simulator_stays_out() -> None:
         ),
         ((0, 0, 0), (4, 1, 90), {}, r"goal: a heading of 90 is more than one turn; .* math\.radians\(90\)"),
         ((0, 0, -30), (4, 1, 0), {}, "start: a heading of -30"),
-        ((0, 0, 0), (0.5, 0, 0), {"minimum_dwell": 2.0, "arrive": 5.0}, "the fastest plan takes"),
     ],
-    ids=["start", "heading", "number", "same", "tolerance", "degrees", "start in degrees", "time"],
+    ids=["start", "heading", "number", "same", "tolerance", "degrees", "start in degrees"],
 )
 def test_refusals(start: Any, goal: Any, options: dict[str, Any], expected: str) -> None:
     with pytest.raises(InputError, match=expected):
         to_goal(start, goal, CONTROL, **options)
 
 
-@pytest.mark.rest
-def test_a_plan_to_a_goal_arrives_when_it_is_asked_to() -> None:
-    fastest = to_goal((0, 0, 0), (2.5, 1, 0), CONTROL, minimum_dwell=2.0)
-    seconds = 1.2 * float(fastest.seconds.sum())
-    goal_plan = to_goal((0, 0, 0), (2.5, 1, 0), CONTROL, minimum_dwell=2.0, arrive=seconds)
-    dwell = min(goal_plan.straight.dwells) * CONTROL.time_scale
-    assert float(goal_plan.seconds.sum()) == pytest.approx(seconds, abs=dwell)
-    assert goal_plan.declared.swing is not None
-    check_end(goal_plan)
-
-
-RADIUS, ROD, SWING = 0.37, 0.87, 0.45
+RADIUS = 0.37
 BODY = Footprint(np.linspace(-0.3, 1.0, 8), 0.2)
 
 
@@ -190,22 +176,6 @@ def test_no_random_track_is_shorter() -> None:
         track = DubinsPaths(end, np.repeat(turn, 3, 1), np.concatenate([piece, 0 * piece, 0 * piece], 1), RADIUS)
         end, length = track.ends, length + piece[:, 0]
     assert (shortest_paths(start, end, RADIUS).length <= length + 1e-9).all()
-
-
-def test_all_words_of_three_arcs_end_at_the_goal() -> None:
-    rng = np.random.default_rng(3)
-    start, goal = rng.normal(size=(2, 300, 3)) * [1.5, 1.5, 3.0]
-    turns, lengths = three_arcs(start, goal, 0.7)
-    best = words(start, goal, 0.7)[:, 4:].sum(-1)
-    assert lengths.sum(-1)[:, [0, 2]] == pytest.approx(best)
-    for word in range(4):
-        exists = np.isfinite(lengths[:, word]).all(-1)
-        assert exists.sum() > 50
-        track = DubinsPaths(start[exists], np.tile(turns[word], (exists.sum(), 1)), lengths[exists, word], 0.7)
-        end = track.ends
-        assert end[:, :2] == pytest.approx(goal[exists, :2], abs=1e-9)
-        assert np.cos(end[:, 2] - goal[exists, 2]) == pytest.approx(1.0)
-        assert (lengths[exists, word, 1] / 0.7 >= np.pi - 1e-9).all() == (word in (0, 2))
 
 
 def stop(*pose: float) -> Floats:
@@ -263,42 +233,3 @@ def test_a_goal_inside_a_region_is_refused_with_the_distance() -> None:
         NoWayError, match=pivot + r".* cm \(.* l\) inside what it must keep out of; it needs 1\.1 cm \(0\.1 l\)"
     ):
         route([stop(0, 0, 0), stop(5, 0, 0)], limits, 0.1, {}, CONTROL)
-
-
-@pytest.mark.parametrize("path", [Path2D.of([[0, 0], [6, 0]]), circle(2.0)], ids=["line", "circle"])
-@pytest.mark.parametrize("drift", [STILL, Drift(0.1, (0.1, 0.05))], ids=["still", "drift"])
-@pytest.mark.parametrize("longer", [0.01, 1.0, 2.5, 9.0])
-def test_a_swing_gains_its_length(path: Path2D, drift: Drift, longer: float) -> None:
-    plain = reference(path, ROD, 0.02, drift)
-    swinging, swing = swung(plain, longer, SWING, ROD, drift)
-    assert swinging.arc[-1] - plain.arc[-1] == pytest.approx(longer, abs=0.003)
-    assert swing.circles == int(longer // (2 * np.pi * SWING))
-    assert np.hypot(*np.diff(swinging.q, axis=0).T).max() < 0.06
-    assert np.abs(np.diff(swinging.heading)).max() < 0.2
-    assert swinging.q[-1] == pytest.approx(plain.q[-1])
-    turns = (swinging.heading[-1] - plain.heading[-1]) / (2 * np.pi)
-    assert turns == pytest.approx(round(turns), abs=1e-3)
-    ahead = swinging.p - swinging.q - ROD * np.stack([np.cos(swinging.heading), np.sin(swinging.heading)], 1)
-    assert np.abs(ahead).max() < 1e-9
-
-
-@pytest.mark.parametrize("longer", [0.5, 4.0])
-def test_a_swing_is_where_the_body_is_free_and_not_tighter_than_allowed(longer: float) -> None:
-    plain = reference(Path2D.of([[0, 0], [5, 0]]), ROD, 0.04)
-
-    def free(poses: Floats) -> bool:
-        return bool((poses[:, 0] < 2.2).all())
-
-    swinging, swing = swung(plain, longer, SWING, ROD, STILL)
-    assert np.abs(swinging.curvature).max() < 1.05 / SWING
-    assert swing.x > 2.2
-    assert swung(plain, longer, SWING, ROD, STILL, free)[1].x < 2.7
-    with pytest.raises(NoRoomError, match="no room"):
-        swung(plain, longer, SWING, ROD, STILL, lambda poses: False)
-
-
-def test_a_short_track_has_room_for_circles_only() -> None:
-    plain = reference(Path2D.of([[0, 0], [0.5, 0]]), ROD, 0.02)
-    with pytest.raises(NoRoomError):
-        swung(plain, 1.0, SWING, ROD, STILL)
-    assert swung(plain, 4.0, SWING, ROD, STILL)[1].circles == 1

@@ -1,4 +1,4 @@
-"""Plans that keep clear of obstacles, and plans that arrive when they are asked to, by waiting circles too."""
+"""Plans that keep clear of obstacles, and waiting circles."""
 
 from __future__ import annotations
 
@@ -8,14 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.files.saved_plan import restore_plan
-from planner.files.tracks import tracking_error
 from planner.jobs.detours import Hindered
 from planner.jobs.plan import make_plan
 from planner.jobs.timetable import WaitingCircle, circle_reference, with_circles
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.path import Path2D, circle, runs_of
-from planner.planning.arrive import EXACT
 from planner.planning.declare import TIGHTEST
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
@@ -25,7 +22,6 @@ from sim.io.errors import InputError
 from sim.motion.replay import replay
 from tests.planner.plans import CONTROL, LINE, QUICK, ROCK, around, planned, tracked, trip
 from tests.planner.vehicles import FINE
-from tests.shared import shared
 
 pytestmark = pytest.mark.slow
 
@@ -135,86 +131,6 @@ def test_random_obstacles(seed: int) -> None:
     rocks = [Circle(*(path.points[i] + rng.normal(0, 0.3, 2)).tolist(), rng.uniform(0.2, 0.6)) for i in (70, 130)]
     space = FreeSpace(tuple(rocks))
     check_clear(make_plan(path, tracked(), replace(QUICK, space=space)), space)
-
-
-BENT = Path2D.of([[0.0, 0.0], [2.0, 0.0], [3.5, 1.5]])
-FEW = PlanRequest(dwell=2.03)  # no flip is at the time of a picture
-
-
-@shared
-def waiting() -> Plan:
-    """Plan to arrive after 1.9 times the time that the path takes."""
-    own = make_plan(BENT, tracked(), FEW)
-    return make_plan(BENT, tracked(), replace(FEW, arrive_seconds=1.9 * float(own.seconds.sum())))
-
-
-def check_arrival(plan: Plan) -> None:
-    assert plan.arrival is not None
-    missed = abs(plan.duration - plan.arrival.wished)
-    assert missed <= max(EXACT * plan.arrival.wished, min(plan.straight.dwells) / 2)
-
-
-@pytest.mark.parametrize("share", [1.0, 1.5])
-def test_dwells_decide_when_a_plan_arrives(share: float) -> None:
-    fastest = make_plan(BENT, tracked(), PlanRequest(objective="time"))
-    plan = make_plan(BENT, tracked(), PlanRequest(arrive_seconds=share * float(fastest.seconds.sum())))
-    assert plan.arrival is not None
-    assert plan.arrival.fastest == pytest.approx(fastest.duration)
-    check_arrival(plan)
-    assert plan.declared.swing is None
-    assert "as asked" in repr(plan)
-
-
-def test_circles_take_time_where_dwells_do_not_suffice() -> None:
-    plan = waiting()
-    check_arrival(plan)
-    assert plan.declared.swing is not None
-    assert plan.declared.swing.circles >= 1
-    assert plan.declared.missed < 0.1  # circles leave nothing of the path out
-    assert plan.predicted_max < 0.15
-    content = plan.to_dict()["arrival"]
-    assert content["swing"] == list(plan.declared.swing)
-    restored = restore_plan(plan.to_dict())
-    assert restored.arrival == pytest.approx(plan.arrival)
-    assert restored.declared.swing == plan.declared.swing
-    assert content["wished_s"] == pytest.approx(float(plan.seconds.sum()), rel=0.01)
-
-
-def test_a_swing_takes_less_time_than_a_circle() -> None:
-    own = make_plan(BENT, tracked(), FEW)
-    plan = make_plan(BENT, tracked(), replace(FEW, arrive_seconds=1.2 * float(own.seconds.sum())))
-    check_arrival(plan)
-    assert plan.declared.swing is not None
-    assert plan.declared.swing.circles == 0
-
-
-def test_circles_keep_clear_of_obstacles() -> None:
-    space = FreeSpace((Circle(3.5, 0.3, 0.3),))
-    own = make_plan(BENT, tracked(), FEW)
-    plan = make_plan(BENT, tracked(), replace(FEW, arrive_seconds=2.2 * float(own.seconds.sum()), space=space))
-    check_arrival(plan)
-    assert plan.kept_clear is not None
-    assert plan.kept_clear.clearance > 0
-    assert plan.kept_clear.margin >= plan.stated_error
-
-
-@pytest.mark.rest
-def test_the_simulator_follows_swings() -> None:
-    plan = waiting()
-    track = replay(plan.schedule())
-    assert float(track["time_s"].iloc[-1]) == pytest.approx(float(plan.seconds.sum()))
-    error = tracking_error(plan.to_dict(), track)
-    assert error.largest < 1.1 * plan.stated_error  # which 95 % of robots keep
-    end = track[["x_over_l", "y_over_l"]].iloc[-1].to_numpy(float)
-    assert np.hypot(*(end - BENT.points[-1])) < 2 * plan.stated_error
-
-
-def test_a_tracked_robot_swims_the_circles_and_arrives() -> None:
-    car = tracked().vehicle
-    result = swim(Tracker(waiting()), replace(car, twist=car.twist * np.array([1.02, 1.0, 1.02])), FINE)
-    assert result.finished
-    assert result.distance.max() < 0.2
-    assert result.times[-1] == pytest.approx(waiting().duration, rel=0.03)  # a robot that is 2 % faster
 
 
 def straight() -> Plan:

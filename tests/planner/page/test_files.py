@@ -280,15 +280,14 @@ def check_plan_opened(content: dict[str, Any]) -> None:
 
 
 def test_a_plan_with_more_than_a_path_gives_it() -> None:
-    content = {**planned("circle:2l", objective="flips").to_dict(), "lap": {"period_s": 1.0}, "arrival": None}
+    content = {**planned("circle:2l", objective="flips").to_dict(), "lap": {"period_s": 1.0}}
     check_plan_opened({**content, "id": plan_id(content)})
 
 
 @pytest.mark.rest
-def test_plans_with_laps_walls_or_an_arrival_give_their_paths() -> None:
+def test_plans_with_laps_or_walls_give_their_paths() -> None:
     walls = [sf.Circle(6.0, 0.0, 0.5)]
-    options: dict[str, dict[str, Any]] = {"lap": {"loop": True}, "arrival": {"arrive": 1800.0},
-                                          "kept_clear": {"keep_out": walls}}  # fmt: skip
+    options: dict[str, dict[str, Any]] = {"lap": {"loop": True}, "kept_clear": {"keep_out": walls}}
     for kind, option in options.items():
         content = sf.plan(circle(2.0), CONTROL, objective="flips", **option).to_dict()
         assert kind in content

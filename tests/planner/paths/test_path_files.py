@@ -297,13 +297,13 @@ def test_long_paths_pass_if_they_are_not_absurd() -> None:
     [("12min", 720.0), ("90s", 90.0), ("1h20min", 4800.0), ("1.5 h", 5400.0), ("2min 5s", 125.0)],
 )
 def test_times_have_their_units(words: str, seconds: float) -> None:
-    assert read_time(words, "--arrive") == pytest.approx(seconds)
+    assert read_time(words, "--for") == pytest.approx(seconds)
 
 
 @pytest.mark.parametrize("words", ["12", "", "min", "-3min", "0s", "1..2s", "12minutes", "nan s", "3m", "5 min x"])
 def test_other_times_are_refused(words: str) -> None:
     with pytest.raises(InputError, match="with its unit"):
-        read_time(words, "--arrive")
+        read_time(words, "--for")
 
 
 def test_a_path_that_ends_where_it_began_looks_closed() -> None:

@@ -109,7 +109,7 @@ def test_other_points_of_the_axis(point: str) -> None:
 
 
 def test_options_are_the_fields_of_a_request() -> None:
-    others = {"space", "arrive_seconds", "loop"}  # which have arguments of their own
+    others = {"space", "loop"}  # which have arguments of their own
     wanted = {name: hint for name, hint in get_type_hints(PlanRequest).items() if name not in others}
     options = get_type_hints(PathOptions)
     words = {name: options[name] for name in ("tolerance", "camera")}  # as users write them, too
@@ -172,7 +172,6 @@ AGAINST = CalibrationKnowledge(current=(-0.05 * LAB, 0.0))
     [
         ([], "empty", {}),
         ([[0, 0]], "same|two points", {}),
-        *((circle(1.5), "above 0", {"arrive": seconds}) for seconds in (0.0, float("nan"), float("inf"))),
         ([[0, 0], [0, 0]], "same", {}),
         ([[0, 0], [float("nan"), 1]], "finite", {}),
         ([[0, 0, 0], [1, 1, 1]], r"\(n, 2\)", {}),
@@ -197,7 +196,7 @@ AGAINST = CalibrationKnowledge(current=(-0.05 * LAB, 0.0))
          {"robot": tracked(), "lookup": None, "point": "pivot"}),
         (circle(2.0), "tail_sag .*surrogate robot", {"robot": replace(CONTROL, effects={"tail_sag": 0.1})}),
     ],
-    ids=range(25),
+    ids=range(22),
 )  # fmt: skip
 def test_refusals(path: Any, expected: str, options: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=expected) as caught:
@@ -291,7 +290,7 @@ class Rungs:
 
     def plan(self, *, longer: bool = True, **options: Any) -> Any:
         task = solve.Task(source=lambda _: 1 / 0, longer=longer)
-        return solve.by_dwell(task, tracked(), PlanRequest(objective="flips", **options))
+        return solve.solve(task, tracked(), PlanRequest(objective="flips", **options))
 
 
 @pytest.mark.parametrize("longer", [True, False])
