@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from planner.paths.units import in_lab, read_length, read_pose
 from sim.io.commands import Call, Program
-from sim.io.errors import InputError, naming
+from sim.io.errors import InputError
 from sim.io.units import format_length, format_time
 
 if TYPE_CHECKING:
-    from planner.jobs.fleet_plan import FleetPlan
     from planner.planning.plan import Plan
     from planner.tracking.tracker import Tracker
 
@@ -24,7 +23,7 @@ main = program.main
 BAR_AFTER = 1.0  # s
 
 
-def _write(result: Plan | FleetPlan, out: str, *lines: str, arduino: str | None = None, **pictures: Any) -> None:
+def _write(result: Plan, out: str, *lines: str, arduino: str | None = None, **pictures: Any) -> None:
     """Write a plan, and print warnings, what there is to say of it, and its files."""
     from planner.files.arduino import write_arduino
     from planner.files.plan_files import write_plan
@@ -117,34 +116,6 @@ def _goal(
 @program.command("tour", of="planner.jobs.tour:tour", robot="--robot", back="return")
 def _job(job: Call, *, out: str, arduino: str | None = None) -> None:
     _write(_planned(job, arduino=arduino), out, arduino=arduino)
-
-
-@program.command("fleet")
-def _fleet(fleet: str, *, apart: str | None = None, feedback: bool = False, out: str) -> None:
-    """Plan several robots in one tank so that they keep apart.
-
-    Args:
-        fleet: TOML with a table [[member]] for each robot: robot, and path, goal, places or region.
-        apart: least distance between bodies, such as 10cm (default: apart of the file).
-        feedback: the poses will be measured for a tracker.
-    """
-    from planner.files.fleet_files import read_fleet
-    from planner.jobs.fleet import fleet as keep_apart
-
-    asked = read_fleet(fleet)
-    if (apart := apart or asked.apart) is None:
-        raise InputError(f"{fleet}: how far apart? give --apart 10cm, or apart in the file")
-    plans = []
-    for robot in asked.robots:
-        with naming(f"{fleet}: {robot.name}"):
-            call, own = program.commands[robot.command].read(robot.command, ["--out", out, *robot.words])
-            poses = {name: own[name] for name in own.keys() & {"start", "goal"}}
-            plans.append(call(**poses, **{"feedback": True} if feedback else {}))
-    names, delays = [robot.name for robot in asked.robots], [robot.delay for robot in asked.robots]
-    with _progress_bar() as progress:
-        result = keep_apart(plans, apart, names=names, delays_s=delays, unit=asked.unit,
-                            feedback=feedback or asked.feedback, progress=progress)  # fmt: skip
-    _write(result, out)
 
 
 @program.command("track", of="planner.jobs.plan:plan", robot="--robot")

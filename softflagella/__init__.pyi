@@ -19,8 +19,6 @@ from planner.goal.trip import Trip as Trip
 from planner.goal.trip import to_goal as to_goal
 from planner.jobs.cover import Coverage as Coverage
 from planner.jobs.cover import cover as cover
-from planner.jobs.fleet import fleet as fleet
-from planner.jobs.fleet_plan import FleetPlan as FleetPlan
 from planner.jobs.hold import Orbit as Orbit
 from planner.jobs.hold import hold as hold
 from planner.jobs.plan import plan as plan

@@ -267,24 +267,6 @@ def planner_hold(made: Path, out: Path) -> str:
     return "no schedule stays nearer"
 
 
-def planner_fleet(made: Path, out: Path) -> str:
-    """The folder of a robot that is not there any more goes."""
-    robot = f'[[member]]\nrobot = "{made / "robot.toml"}"\nunit = "l"\n'
-    goals = [f"goal = [0.8, {y}, 0]\nstart = [0, {y}, 0]\n" for y in (0, 2)]
-    for name in ("right", "left"):
-        more = robot + goals[1] + "delay_s = 10\n"
-        (out / "fleet.toml").write_text(f'{robot}{goals[0]}name = "{name}"\n{more}')
-        done("planner", "fleet", out / "fleet.toml", "--apart", "5cm", "--out", out / "fleet")
-    assert names(out / "fleet") == {"left", "robot-2", "fleet.json", "fleet.svg"}
-    content = json.loads((out / "fleet" / "fleet.json").read_text())
-    assert content["sure_distance_m"] > content["apart_m"] == pytest.approx(0.05)
-    assert content["robots"][1]["begin_s"] == pytest.approx(10)
-    for each in content["robots"]:
-        assert names(out / "fleet" / each["name"]) >= FILES
-        assert load_plan(out / "fleet" / each["name"] / "plan.json")["id"] == each["plan_id"]
-    return "left: starts at once"
-
-
 def planner_check(made: Path, out: Path) -> str:
     done("planner", "check", made / "plan" / "plan.json", made / "track.csv", "--out", out / "overlay.png")
     assert (out / "overlay.png").read_bytes().startswith(b"\x89PNG")

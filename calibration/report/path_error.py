@@ -192,7 +192,7 @@ def carry_out(plan: Plan, swims: TrackedVehicle) -> CarriedOut:
     predicted = predicted_error(path, rollout.track, closed=plan.drawn.closed)
     growth = error_growth(swims.vehicle, switches, rollout)
     missed = rollout.track[-1] - path[-1]
-    ends = np.hypot(*(missed + deviations_open_loop(growth)[0][:, -1]).T)
+    ends = np.hypot(*(missed + deviations_open_loop(growth)[:, -1]).T)
     low, high = np.quantile(ends, _INTERVAL).tolist()
     return CarriedOut(
         plan=plan,

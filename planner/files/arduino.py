@@ -7,7 +7,6 @@ the first test of the motor's sign, the schedule open loop, and the orders of a 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from planner.files.headers import c_part, safe_name, schedule_header
 from planner.planning.plan import Plan
@@ -15,9 +14,6 @@ from sim.io.errors import InputError
 from sim.io.files import files_together, write_text
 from sim.io.keywords import checks_keywords
 from sim.io.provenance import __version__
-
-if TYPE_CHECKING:
-    from planner.jobs.fleet_plan import FleetPlan
 
 _SKETCHES = ("first_turn", "open_loop", "tracked")
 _CODE = {
@@ -28,16 +24,15 @@ _FILES = ("library.properties", "src/schedule.h", *_CODE)
 
 
 @checks_keywords
-def write_arduino(result: Plan | FleetPlan, folder: str | Path) -> Path:
+def write_arduino(result: Plan, folder: str | Path) -> Path:
     """Write an Arduino library with the schedule of a plan, all of it or nothing, and return its folder.
 
     Args:
-        result: a plan; of a fleet, the plan of one robot.
+        result: a plan.
         folder: it is made if it is missing; a library that was written into it before is replaced.
 
     Raises:
-        InputError: the plan is that of a fleet, a dwell is too short for whole milliseconds, or the folder holds
-            other files.
+        InputError: a dwell is too short for whole milliseconds, or the folder holds other files.
 
     Example:
         >>> import tempfile
@@ -47,8 +42,6 @@ def write_arduino(result: Plan | FleetPlan, folder: str | Path) -> Path:
         ...     sorted(path.name for path in library.iterdir())
         ['examples', 'library.properties', 'src']
     """
-    if not isinstance(result, Plan):
-        raise InputError("a board drives one robot; give one plan of the fleet, such as result.plans[0]")
     library = check_library(folder)
     contents = {
         "library.properties": _properties(result),

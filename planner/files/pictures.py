@@ -1,4 +1,4 @@
-"""Pictures of plans: plan.svg, with the path and the stated error, and by matplotlib jobs, fleets, the trade-off.
+"""Pictures of plans: plan.svg, with the path and the stated error, and by matplotlib jobs and the trade-off.
 
 To import matplotlib takes longer than to plan a path. So plan.svg is drawn on axes of equal scale that write
 themselves as SVG. They take those calls of matplotlib's axes that `Plan.plot` makes.
@@ -28,12 +28,10 @@ from planner.vehicle.zigzag import QUICK, longest_dwell
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.files import whole_file
-from sim.io.units import format_length, format_time
+from sim.io.units import format_time
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from planner.jobs.fleet_plan import FleetPlan
 
 _SIZE = 440.0  # of the longer side of the frame, in px
 _LEAST = np.array([400.0, 100.0])  # width and height of the frame, in px
@@ -209,25 +207,6 @@ def draw_plan(plan: Plan) -> Figure:
     return figure
 
 
-def draw_fleet_plan(fleet: FleetPlan) -> Figure:
-    """Draw the tracks of a fleet, and below them the distances between bodies."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6, 8.5), layout="constrained")
-    tracks, distances = figure.subplots(2, 1, height_ratios=(3, 1.2))
-    fleet.plot(tracks)
-    robots, apart = len(fleet.names), format_length(fleet.apart_m)
-    tracks.set_title(
-        f"{robots} robots, {format_time(fleet.duration_s)}; bodies keep {apart} apart\ndots: minutes",
-        fontsize=10,
-        parse_math=False,
-    )
-    fleet.plot_distances(distances)
-    for axes in (tracks, distances):
-        axes.legend(fontsize=8, frameon=False)
-    return figure
-
-
 def draw_trade_off(chosen: Plan) -> Figure:
     """Draw errors over time and over the number of flips, for dwells from the shortest to the longest.
 
@@ -259,7 +238,7 @@ def draw_trade_off(chosen: Plan) -> Figure:
     panels[0].set_ylim(bottom=0)
     for axes, value in zip(panels, values.values(), strict=True):
         places = np.array([[value(plan), plan.stated_error] for plan in plans])
-        label_points(axes, places, [f"{plan.minimum_dwell:.2g}" for plan in plans], [PREDICTED] * len(plans), 7)
+        label_points(axes, places, [f"{plan.minimum_dwell:.2g}" for plan in plans], PREDICTED, 7)
     panels[0].legend(fontsize=8, frameon=False)
     figure.suptitle(f"{chosen.robot.name}: error against time and flips; numbers are dwells", fontsize=10)
     return figure

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from planner.files.headers import schedule_header, tracker_header
 from planner.files.pictures import plan_svg
 from planner.planning.plan import KINDS, Plan
-from sim.io.errors import InputError
 from sim.io.files import files_together, write_numbers, write_text
 from sim.io.keywords import checks_keywords
 from sim.io.provenance import code_version
@@ -21,23 +20,18 @@ from sim.io.provenance import code_version
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from planner.jobs.fleet_plan import FleetPlan
-
 FILES = ("plan.json", "plan.csv", "schedule.h", "tracker.h", "plan.svg")
 EXTRA = ("trade_off.svg", *(f"{kind}.{ending}" for kind in KINDS for ending in ("json", "svg")))  # planned before
 
 
 @checks_keywords
-def write_plan(
-    result: Plan | FleetPlan, folder: str | Path, *, pictures: Mapping[str, Figure] | None = None
-) -> list[Path]:
+def write_plan(result: Plan, folder: str | Path, *, pictures: Mapping[str, Figure] | None = None) -> list[Path]:
     """Write the files of a plan, all or none, and return their paths.
 
     Args:
-        result: a plan; that of a job has goal.json, tour.json and so on, and a picture besides; a fleet has a
-            folder for each robot.
+        result: a plan; that of a job has goal.json, tour.json and so on, and a picture besides.
         folder: it is made if it is missing.
-        pictures: of a plan, more pictures, by the name of their file, such as "trade_off.svg".
+        pictures: more pictures, by the name of their file, such as "trade_off.svg".
 
     Raises:
         InputError: a dwell is too short for whole milliseconds, or a file cannot be written.
@@ -49,14 +43,8 @@ def write_plan(
         ...     [path.name for path in write_plan(plan(circle(2.0), "paper-control"), folder)]
         ['plan.json', 'plan.csv', 'schedule.h', 'tracker.h', 'plan.svg']
     """
-    if not isinstance(result, Plan):
-        from planner.files.fleet_files import write_fleet
-
-        if pictures:
-            raise InputError("a fleet takes no further pictures; write its plans: result.plans")
-        return write_fleet(result, folder)
     with files_together(folder, (*FILES, *EXTRA)) as temporary:
-        names = write_plan_files(result, temporary)
+        names = _write_files(result, temporary)
         if pictures:
             from planner.files.pictures import write_svg  # loads matplotlib
 
@@ -65,7 +53,7 @@ def write_plan(
     return [Path(folder, name) for name in (*names, *(pictures or ()))]
 
 
-def write_plan_files(result: Plan, folder: Path) -> list[str]:
+def _write_files(result: Plan, folder: Path) -> list[str]:
     """Write the files of a plan into a folder, one after the other, and return their names."""
     identity, names = result.identity, list(FILES)
     write_text(folder / "plan.json", json.dumps({**result.to_dict(), "code_version": code_version()}) + "\n")
@@ -74,7 +62,7 @@ def write_plan_files(result: Plan, folder: Path) -> list[str]:
     write_text(folder / "schedule.h", schedule_header(result, identity))
     write_text(folder / "tracker.h", tracker_header(result, identity))
     write_text(folder / "plan.svg", plan_svg(result, identity))
-    if result.job is not None and result.job.kind:
+    if result.job is not None:
         from planner.files.pictures import draw_plan, write_svg  # loads matplotlib
 
         names += [f"{result.job.kind}.json", f"{result.job.kind}.svg"]

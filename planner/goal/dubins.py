@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -29,12 +28,6 @@ class DubinsPaths(NamedTuple):
     turns: Integers  # (M, 3), of the segments: +1 left, 0, −1
     lengths: Floats  # (M, 3), of the segments
     radius: float  # of all arcs
-
-    @staticmethod
-    def circles(begin: Floats, side: int, count: int, radius: float) -> DubinsPaths:
-        """Make whole circles from a pose (3,), to the left (+1) or to the right (−1)."""
-        lengths = np.array([[2 * math.pi * radius * count, 0.0, 0.0]])
-        return DubinsPaths(begin[None], np.array([[side, 0, 0]]), lengths, radius)
 
     @property
     def length(self) -> Floats:
@@ -80,12 +73,6 @@ class DubinsPaths(NamedTuple):
         poses = np.concatenate(parts)
         poses[:, 2] = np.unwrap(poses[:, 2])
         return poses
-
-    def sampled(self, spacing: float) -> Floats:
-        """Sample poses (m, 3) of a single path at equal steps in each segment, at most `spacing` apart."""
-        ends = np.concatenate([[0.0], np.cumsum(self.lengths[0])])
-        ways = [np.linspace(a, b, math.ceil((b - a) / spacing) + 1)[1:] for a, b in pairwise(ends) if b > a]
-        return np.asarray(self.poses(np.concatenate([[0.0], *ways])[None])[0])
 
 
 def words(start: Floats, goal: Floats, radius: float) -> Floats:

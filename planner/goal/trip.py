@@ -63,10 +63,6 @@ class Trip(Job):
     kind = "goal"
 
     @property
-    def ends_at(self) -> POSE:
-        return self.goal
-
-    @property
     def end_error(self) -> tuple[float, float]:
         """Predicted distance from the goal, and difference of the heading."""
         turn = (self.end[2] - self.goal[2] + math.pi) % (2 * math.pi) - math.pi

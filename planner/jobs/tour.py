@@ -92,7 +92,7 @@ class Visits(Job):
         places = cm * self.places
         axes.plot(*places.T, "o", color=REPLAYED, ms=5)
         numbers = [str(index + 1) for index in range(len(places))]
-        label_points(axes, places, numbers, [REPLAYED] * len(places), 9)
+        label_points(axes, places, numbers, REPLAYED, 9)
 
     def to_dict(self, plan: Plan) -> dict[str, Any]:
         """Return the content of tour.json. Lengths in l, times in seconds."""

@@ -188,11 +188,6 @@ class Footprint:
         return Footprint(places, math.hypot(width, step / 2))
 
     @property
-    def ends(self) -> tuple[float, float]:
-        """Places of the first disc and of the last one."""
-        return float(self.places.max()), float(self.places.min())
-
-    @property
     def reach(self) -> float:
         """Largest distance of a point of the body from its origin."""
         return float(np.abs(self.places).max()) + self.radius

@@ -269,7 +269,7 @@ def stated_error(growth: ErrorGrowth, predicted: Predicted, *, seed: int = 0) ->
     """
     edges = growth.flips
     low, high, normal = _extremes(predicted, edges, (len(predicted.distance) - 1) // int(edges[-1]))
-    moved, _ = deviations_open_loop(growth, seed)
+    moved = deviations_open_loop(growth, seed)
     across = np.einsum("dki,ki->dk", moved, normal)
     worst = np.maximum(np.abs(high + across), np.abs(low + across))
     if not predicted.closed:  # past the end of an open path
@@ -279,12 +279,12 @@ def stated_error(growth: ErrorGrowth, predicted: Predicted, *, seed: int = 0) ->
     return float(np.quantile(worst.max(1), LEVEL)) + WOBBLE
 
 
-def deviations_open_loop(growth: ErrorGrowth, seed: int = 0) -> tuple[Floats, Floats]:
-    """Draw deviations at the ends of the blocks: of the place (D, E − 1, 2) and of the heading (D, E − 1)."""
+def deviations_open_loop(growth: ErrorGrowth, seed: int = 0) -> Floats:
+    """Draw deviations of the place (D, E − 1, 2) at the ends of the blocks."""
     blocks, modes, _ = growth.deviation[1:].shape
     z = normals(seed, 0, _DRAWS * modes).reshape(_DRAWS, modes)
     flat = np.moveaxis(growth.deviation[1:], 1, 0).reshape(modes, 2 * blocks)
-    return (z @ flat).reshape(_DRAWS, blocks, 2), z @ growth.turned[1:].T
+    return np.asarray((z @ flat).reshape(_DRAWS, blocks, 2))
 
 
 def _extremes(predicted: Predicted, edges: Integers, samples: int) -> tuple[Floats, Floats, Floats]:

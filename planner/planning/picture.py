@@ -52,20 +52,21 @@ def draw_regions(axes: Axes, free_space: FreeSpace, length_scale: float) -> None
         axes.plot(*np.concatenate([corners, corners[:1]]).T, color=KEEP_OUT, lw=3)
 
 
-def label_points(axes: Axes, points: Floats, words: Sequence[str], colours: Sequence[str], size: float) -> None:
+def label_points(axes: Axes, points: Floats, words: Sequence[str], colour: str, size: float) -> None:
     """Write words beside points (n, 2), each on the side where it covers least of other words and points.
 
     Args:
         axes: with all that is drawn, so that their limits are known.
         points: in the axes' own units.
-        words, colours: one for each point.
+        words: one for each point.
+        colour: of all.
         size: of the font, in points.
     """
     axes.apply_aspect()
     dots = axes.transData.transform(points) * 72 / axes.figure.get_dpi() if len(points) else points
     half = 0.5 * size * np.array([0.5, 0.5])
     taken = [(dot, half) for dot in dots]
-    for point, dot, text, colour in zip(points, dots, words, colours, strict=True):
+    for point, dot, text in zip(points, dots, words, strict=True):
         box = 0.5 * size * np.array([_WIDE * len(text), _HIGH])
         places = [way * (box + 0.4 * size * aside) for aside in _ASIDE for way in _WAYS]
 

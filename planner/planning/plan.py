@@ -55,12 +55,7 @@ KINDS = ("goal", "tour", "cover", "hold")  # of jobs that have files of their ow
 class Job:
     """What a plan does besides following its path."""
 
-    kind: ClassVar[str] = ""  # one of KINDS: there are {kind}.json and {kind}.svg
-
-    @property
-    def ends_at(self) -> POSE | None:
-        """The pose at which the plan must end; None: at the end of its path."""
-        return None
+    kind: ClassVar[str]  # one of KINDS: there are {kind}.json and {kind}.svg
 
     def lines(self, plan: Plan) -> list[str]:
         """Say what the plan does for its job."""
@@ -151,11 +146,6 @@ class Plan(Shown, Generic[J]):
         """Where it is at the end, as predicted."""
         x, y, heading = self.poses[-1].tolist()
         return x, y, heading
-
-    @property
-    def ends_at(self) -> POSE | None:
-        """The pose at which its job asks it to end; None: at the end of its path."""
-        return None if self.job is None else self.job.ends_at
 
     @property
     def drift(self) -> Drift:

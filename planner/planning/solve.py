@@ -103,7 +103,6 @@ def follow_declared(
     drawn: Path2D | None = None,
     start: Start | None = None,
     ending: Ending | None = None,
-    guidance: Guidance | None = None,
     progress: Progress | None = None,
 ) -> Plan[None]:
     """Follow a declared path, and compute the errors.
@@ -115,11 +114,10 @@ def follow_declared(
         drawn: the path as drawn; None: the declared path.
         start: at rest away from the path; the error of such a plan is not guaranteed. None: on the path.
         ending: changes the last dwells.
-        guidance: default: as the setting says.
         progress: called now and then with the share of the path that is done.
     """
     tracked, straight = setting.tracked, setting.straight
-    vehicle, guidance = tracked.vehicle, guidance or setting.guidance(declared)
+    vehicle, guidance = tracked.vehicle, setting.guidance(declared)
     drawn = drawn or Path2D(declared.reference.p, False)
     switches = follow(declared.reference, vehicle, guidance, tracked.offset, start=start, progress=progress)
     if ending is not None:

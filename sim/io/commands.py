@@ -258,19 +258,14 @@ class Command(NamedTuple):
                 _add(parser, parameter, name.replace("_", "-"), words)
         return parser
 
-    def read(self, prog: str, words: list[str]) -> tuple[Call, dict[str, Any]]:
-        """Parse words: the public function with what is written for it, and what is for the command itself."""
-        given, names = vars(self.parser(prog).parse_args(words)), self.parameters()[1]
-        own = {name: given.pop(name) for name in [*given] if name in names}
-        return Call(self.of, given), own
-
     def main(self, prog: str, words: list[str]) -> None:
         """Parse words and run the command."""
-        call, own = self.read(prog, words)
-        with kept(_inputs({**call.given, **own})), warnings.catch_warnings():
+        given, names = vars(self.parser(prog).parse_args(words)), self.parameters()[1]
+        own = {name: given.pop(name) for name in [*given] if name in names}
+        with kept(_inputs({**given, **own})), warnings.catch_warnings():
             warnings.simplefilter("default", InputWarning)  # each line once
             warnings.showwarning = partial(_show_warning, warnings.showwarning)
-            self.run(*([call] if self.of else []), **own)
+            self.run(*([Call(self.of, given)] if self.of else []), **own)
 
 
 def _inputs(given: Mapping[str, Any]) -> list[Path]:

@@ -18,7 +18,7 @@ from softflagella.__main__ import WORDS, command, further, main, packages, progr
 from softflagella.shadowing import PACKAGES
 from tests.processes import LIMIT
 
-LONG = {"FleetPlan", "Orbit", "Swim", "TrackingError", "Trip", "hold", "load_goal", "tabulate"}
+LONG = {"Orbit", "Swim", "TrackingError", "Trip", "hold", "load_goal", "tabulate"}
 NAMES = [name for name in sf.__all__ if not name.startswith("_")]
 
 

@@ -13,7 +13,6 @@ import pytest
 from planner.__main__ import main
 from planner.files.arduino import write_arduino
 from planner.files.headers import milliseconds
-from planner.jobs.fleet_plan import FleetPlan
 from planner.jobs.plan import plan
 from planner.planning.plan import Plan
 from sim.io.errors import InputError
@@ -147,12 +146,6 @@ def test_the_folder_is_an_arduino_library_and_is_replaced(tmp_path: Path) -> Non
     assert once().identity in properties["sentence"]
     assert once().identity in (library / "src" / "schedule.h").read_text()
     assert "#define SCHEDULE_REPEATS" not in (library / "src" / "schedule.h").read_text()
-
-
-def test_a_fleet_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="a board drives one robot; give one plan of the fleet"):
-        write_arduino(object.__new__(FleetPlan), tmp_path)
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_folder_with_other_files_is_refused(

@@ -1,4 +1,4 @@
-"""plan.json, goal.json and fleet.toml read back, as the same plan; edited and foreign files are refused."""
+"""plan.json and goal.json read back, as the same plan; edited and foreign files are refused."""
 
 from __future__ import annotations
 
@@ -12,12 +12,10 @@ import numpy as np
 import pytest
 
 from planner.__main__ import main
-from planner.files.fleet_files import read_fleet
 from planner.files.headers import tracker_header
 from planner.files.plan_files import write_plan
 from planner.files.saved_plan import is_plan, load_goal, load_plan, restore_plan
 from planner.goal.trip import FORMAT as GOAL_FORMAT
-from planner.jobs.fleet import distance_apart
 from planner.jobs.plan import plan
 from planner.paths.path import circle
 from planner.planning.plan import Plan
@@ -27,7 +25,6 @@ from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.from_table import table_for
 from sim.inputs import save_robot
 from sim.io.errors import InputError, run_command
-from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.schedule import FORMAT, load_schedule, plan_id
 from surrogate.table_file import load
@@ -280,97 +277,3 @@ def test_edited_goals_are_refused(tmp_path: Path, changes: dict[str, Any], expec
     with pytest.raises(InputError, match=expected) as caught:
         load_goal(tmp_path / "goal.json")
     assert "\n" not in str(caught.value)
-
-
-TWO = """
-apart = "3cm"
-robot = "paper-control"
-objective = "flips"
-[[member]]
-name = "right"
-path = "right.csv"
-[[member]]
-path = "up.csv"
-delay_s = 10
-"""
-
-
-def write_files(folder: Path, text: str = TWO) -> Path:
-    (folder / "right.csv").write_text("x_cm,y_cm\n0,0\n33,0\n")
-    (folder / "up.csv").write_text("x_cm,y_cm\n11,-21\n11,24\n")
-    (folder / "fleet.toml").write_text(text)
-    return folder / "fleet.toml"
-
-
-def command(path: Path, out: Path, *words: str) -> int:
-    from planner.__main__ import main
-
-    return run_command(main, ["fleet", str(path), "--out", str(out), *words])
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "expected"),
-    [
-        (TWO, "apart = 1\n", "no robots"),
-        ('apart = "3cm"', "", "how far apart"),
-        ('apart = "3cm"', 'apart = "3 apples"', "distance apart: 3 apples; write a length"),
-        ('apart = "3cm"', 'apart = "30cm"', "right and robot-2 start"),
-        ('"right"', '"../right"', "names a folder"),
-        ('"right"', '"robot-2"', "two robots are named robot-2"),
-        ("delay_s = 10", "delay_s = -1", "start delay"),
-        ("delay_s = 10", 'delay_s = "soon"', "delay_s"),
-        ('path = "right.csv"', "", "one of path, goal, places, region"),
-        ('path = "right.csv"', 'path = "right.csv"\ngoal = [1, 1, 1]', "one of path, goal, places, region"),
-        ('path = "right.csv"', 'path = "wrong.csv"', "wrong.csv"),
-        ('path = "right.csv"', 'path = "right.csv"\nspeed = 3', "--speed"),
-        ('path = "right.csv"', 'path = "right.csv"\narduino = "board"', "arduino is of a plan on its own"),
-        ('path = "right.csv"', 'path = "right.csv"\ntrade_off = true', "trade_off is of a plan on its own"),
-        ('robot = "paper-control"', 'robot = "no-such"', "no robot 'no-such'"),
-        ('robot = "paper-control"', "", "give robot, and one of"),
-        ('apart = "3cm"', 'apart = "3cm"\nfeedback = 1', "write true or false"),
-    ],
-)
-def test_it_refuses_in_one_line_and_writes_nothing(
-    old: str, new: str, expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert old in TWO
-    path = write_files(tmp_path, TWO.replace(old, new, 1))
-    assert command(path, tmp_path / "out") == 2
-    error = capsys.readouterr().err
-    assert expected in error
-    assert len(error.splitlines()) == 1
-    assert not (tmp_path / "out").exists()
-
-
-def test_options_for_all_robots_and_places(tmp_path: Path) -> None:
-    path = write_files(tmp_path, 'unit = "cm"\n[[member]]\nrobot = "paper-control"\nplaces = [[0, 0], [-30, 5]]\n'
-                                 'return = true\nkeep_out = ["circle:1,2,3", "circle:4,5,6"]\n'
-                                 '[[member]]\nrobot = "r"\nstart = [1, 0, 0]\ngoal = [3, 2, 90]\n')  # fmt: skip
-    robot, other = read_fleet(path).robots
-    assert other.command == "goal"
-    assert other.words == ("--robot", "r", "--unit", "cm", "--start", "1", "0", "0", "--goal", "3", "2", "90")
-    assert robot.command == "tour"
-    assert robot.words == (
-        "--robot", "paper-control", "--unit", "cm", "--return", "--keep-out", "circle:1,2,3", "--keep-out",
-        "circle:4,5,6", "--", "0,0", "-30,5",
-    )  # fmt: skip
-
-
-def test_the_old_name_of_the_array_is_read(tmp_path: Path) -> None:
-    new, old = 'path = "right.csv"\n', TWO.replace('robot = "paper-control"\n', "", 1)
-    old = old.replace("[[member]]", '[[robot]]\nrobot = "paper-control"')
-    assert new in old
-    assert read_fleet(write_files(tmp_path, old)) == read_fleet(write_files(tmp_path, TWO))
-
-
-def test_distances_have_units() -> None:
-    control, other = PRESETS["paper-control"], PRESETS["paper-measured"]
-    assert distance_apart("10 cm", None, [control, other]) == pytest.approx(0.1)
-    assert distance_apart(10, "cm", [control, other]) == pytest.approx(0.1)
-    assert distance_apart("0.5l", None, [control, control]) == pytest.approx(0.5 * control.tail_length)
-    with pytest.raises(InputError, match=r"distance apart: 0\.5 has no unit"):
-        distance_apart(0.5, None, [control, control])
-    with pytest.raises(InputError, match="different tail lengths"):
-        distance_apart(0.5, "l", [control, replace(other, tail_length=0.1)])
-    with pytest.raises(InputError, match="above 0"):
-        distance_apart("0cm", None, [control])

@@ -1,4 +1,4 @@
-"""Plans that keep clear of obstacles, and waiting circles."""
+"""Plans that keep clear of obstacles."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import pytest
 
 from planner.jobs.detours import Hindered
 from planner.jobs.plan import make_plan
-from planner.jobs.timetable import WaitingCircle, circle_reference, with_circles
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.path import Path2D, circle, runs_of
 from planner.planning.declare import TIGHTEST
@@ -20,7 +19,7 @@ from planner.tracking.swim import swim
 from planner.tracking.tracker import Tracker
 from sim.io.errors import InputError
 from sim.motion.replay import replay
-from tests.planner.plans import CONTROL, LINE, QUICK, ROCK, around, planned, tracked, trip
+from tests.planner.plans import CONTROL, LINE, QUICK, ROCK, around, tracked
 from tests.planner.vehicles import FINE
 
 pytestmark = pytest.mark.slow
@@ -131,48 +130,3 @@ def test_random_obstacles(seed: int) -> None:
     rocks = [Circle(*(path.points[i] + rng.normal(0, 0.3, 2)).tolist(), rng.uniform(0.2, 0.6)) for i in (70, 130)]
     space = FreeSpace(tuple(rocks))
     check_clear(make_plan(path, tracked(), replace(QUICK, space=space)), space)
-
-
-def straight() -> Plan:
-    return planned(((0.0, 0.0), (2.5, 0.0)))
-
-
-@pytest.mark.parametrize("side", [1, -1])
-def test_a_circle_ends_where_it_began(side: int) -> None:
-    reference = straight().declared.reference
-    around = circle_reference(straight(), WaitingCircle(60, side))
-    assert around.q[0] == pytest.approx(reference.q[60])
-    assert around.q[-1] == pytest.approx(around.q[0], abs=1e-9)
-    assert around.p[-1] == pytest.approx(reference.p[60], abs=1e-9)
-    assert around.heading[-1] - around.heading[0] == pytest.approx(side * math.tau)
-    assert np.abs(around.curvature).max() * straight().tracked.vehicle.pivot_radius < 0.71
-
-
-@pytest.mark.parametrize("place", [0, 60, -1])
-def test_the_robot_follows_circles_anywhere_on_its_path(place: int) -> None:
-    plan = straight()
-    index = place % len(plan.declared.reference.q)
-    once = with_circles(plan, [WaitingCircle(index, 1)])
-    twice = with_circles(plan, [WaitingCircle(index, 1), WaitingCircle(index, -1)])
-    assert max(once.predicted_max, twice.predicted_max) < plan.predicted_max + 0.01
-    longer = once.duration - plan.duration
-    assert longer > 100
-    assert twice.duration - once.duration == pytest.approx(longer, rel=0.03)
-    assert once.poses[-1, :2] == pytest.approx(plan.poses[-1, :2], abs=0.05)
-    assert (once.dwells[:-1] >= plan.minimum_dwell * 0.999).all()
-    assert with_circles(plan, []) is plan
-
-
-def test_a_robot_with_a_goal_still_ends_there() -> None:
-    waiting = with_circles(trip(), [WaitingCircle(50, -1)])
-    x, y, heading = waiting.poses[-1]
-    assert (x, y) == pytest.approx(trip().job.goal[:2], abs=2e-3)
-    assert math.remainder(heading - trip().job.goal[2], math.tau) == pytest.approx(0, abs=2e-3)
-    assert waiting.start == trip().start
-
-
-def test_a_closed_path_and_a_current() -> None:
-    lap = planned("circle:1.5l", current=(5e-5, 0.0))
-    waiting = with_circles(lap, [WaitingCircle(100, 1)])
-    assert waiting.predicted_max < lap.predicted_max + 0.03
-    assert waiting.duration > lap.duration + 100
