@@ -112,7 +112,6 @@ def _goal(
 
 
 @program.command("hold", of="planner.jobs.hold:hold", robot="--robot", seconds="for")
-@program.command("cover", of="planner.jobs.cover:cover", robot="--robot", width="--width", holes="hole")
 @program.command("tour", of="planner.jobs.tour:tour", robot="--robot", back="return")
 def _job(job: Call, *, out: str, arduino: str | None = None) -> None:
     _write(_planned(job, arduino=arduino), out, arduino=arduino)
@@ -136,8 +135,8 @@ def _track(
     """Keep a robot on a path or a saved plan: poses come in on a pipe (planner.tracking.pipe) or from a camera.
 
     Args:
-        path: a path to plan for, as for softflagella plan; or a plan.json, its folder, or a goal.json, tour.json
-            or cover.json beside it.
+        path: a path to plan for, as for softflagella plan; or a plan.json, its folder, or a goal.json or tour.json
+            beside it.
         robot: robot.toml or the name of a preset; a saved plan has its own.
         start: X Y DEGREES, of the head's centre, at rest; the robot finds its way to the path from there (default:
             a path's start; the first pose that comes in, for a saved plan).

@@ -128,7 +128,7 @@ class CornerOptions(PointOptions, total=False):
 
 
 class JobOptions(PointOptions, SpaceOptions, total=False):
-    """Options of `tour`, `cover` and `hold`.
+    """Options of `tour` and `hold`.
 
     Attributes:
         progress: called now and then with the share of what is done.
@@ -236,10 +236,10 @@ def camera_of(given: Camera | Sequence[str], unit: str | None, robot: Swimmer) -
     return Camera((noise, heading), every_s, delay_s, lost)
 
 
-def region_of(given: AnyRegion, unit: str | None, robot: Swimmer, *, agree: bool = False) -> Circle | Polygon:
+def region_of(given: AnyRegion, unit: str | None, robot: Swimmer) -> Circle | Polygon:
     """Return a region, or read its words, see `read_region`."""
     if isinstance(given, str | Path):
-        return read_region(str(given), unit, robot, agree=agree)
+        return read_region(str(given), unit, robot)
     return given if isinstance(given, Circle | Polygon) else Polygon.of(given)
 
 
@@ -312,14 +312,13 @@ def seconds_of(given: float | str | None, name: str) -> float | None:
     return read_time(given, name) if isinstance(given, str) else given
 
 
-def read_region(words: str, unit: str | None, robot: Swimmer, *, agree: bool = False) -> Circle | Polygon:
+def read_region(words: str, unit: str | None, robot: Swimmer) -> Circle | Polygon:
     """Read a region, in tail lengths.
 
     Args:
         words: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG with a closed outline.
         unit: of numbers without one; a drawing with a size has its own.
         robot: its tail length.
-        agree: refuse a file that has another unit than `unit`.
 
     Raises:
         InputError: the words are no region, or a length has no unit.
@@ -337,7 +336,7 @@ def read_region(words: str, unit: str | None, robot: Swimmer, *, agree: bool = F
     with naming(words):
         given = drawing.unit or unit
         named = given if isinstance(given, str) else {1.0: "m", 0.001: "mm"}.get(given or 0.0, "cm")
-        path = drawing.in_tails(robot, unit if agree or drawing.unit is None else None)
+        path = drawing.in_tails(robot, unit if drawing.unit is None else None)
         return Polygon.of(path, 1.0 / in_tails(named, robot), named)
 
 

@@ -17,8 +17,6 @@ from planner.files.tracks import TrackingError as TrackingError
 from planner.files.tracks import check as check
 from planner.goal.trip import Trip as Trip
 from planner.goal.trip import to_goal as to_goal
-from planner.jobs.cover import Coverage as Coverage
-from planner.jobs.cover import cover as cover
 from planner.jobs.hold import Orbit as Orbit
 from planner.jobs.hold import hold as hold
 from planner.jobs.plan import plan as plan

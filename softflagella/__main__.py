@@ -15,7 +15,7 @@ from softflagella.shadowing import PACKAGES
 
 _IMPORTANT = (
     ("sim", "robot steady effects"),
-    ("planner", "plan goal tour cover hold track page"),
+    ("planner", "plan goal tour hold track page"),
     ("dataset", "sweep"),
     ("surrogate", "train"),
     ("camera", "tracks"),

@@ -252,14 +252,6 @@ def planner_tour(made: Path, out: Path) -> str:
     return "order: 1 3 2; no other order is quicker"
 
 
-def planner_cover(made: Path, out: Path) -> str:
-    (out / "tank.csv").write_text("x,y\n0,0\n3,0\n3,2\n0,2\n")
-    words = ["--unit", "l", "--width", "0.6", "--robot", made / "robot.toml", "--objective", "flips"]
-    done("planner", "cover", out / "tank.csv", *words, "--out", out / "swept")
-    assert names(out / "swept") > FILES
-    return "covers 100.0 %"
-
-
 def planner_hold(made: Path, out: Path) -> str:
     words = ["--for", "3min", "--robot", made / "robot.toml", "--objective", "flips"]
     done("planner", "hold", "2l,1l", *words, "--out", out / "held")

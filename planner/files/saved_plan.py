@@ -123,8 +123,8 @@ def restore_plan(
     """Make a plan again from its plan.json, to track it or to go on from where a robot is.
 
     Args:
-        source: a plan.json, a goal.json, tour.json or cover.json beside it, their folder, or the content that
-            `load_plan` returns.
+        source: a plan.json, a goal.json or tour.json beside it, their folder, or the content that `load_plan`
+            returns.
         lookup: the look-up table with which the plan was made, or its file. Default: that of the package, or the
             robot's own.
         own_table: simulate the robot's own table in any case.
@@ -196,6 +196,8 @@ def plan_json(source: str | Path) -> Path:
         InputError: a file of a job does not name the plan beside it.
     """
     path = Path(source)
+    if path.name == "cover.json":
+        raise InputError(f"{path}: coverage of an area is planned no longer; give the plan.json beside it")
     if path.is_dir():
         return path / "plan.json"
     if path.name not in _JOBS:

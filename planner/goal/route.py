@@ -46,7 +46,6 @@ _PLACES = 40  # on a leg, between which shorter joints are sought
 _ENOUGH = 1.005  # a chain at most this much longer than the shortest one without obstacles needs no lattice
 _THIN = 3  # of the courses at a stop, every third one is joined to the lattice
 _MOST_CHECKS = 300  # chains of words
-_FREE = np.zeros(1)  # cost of any option
 AROUND = 6.0  # radii that the lattice reaches beyond stops and obstacles
 
 
@@ -316,20 +315,17 @@ def _chosen(stops: list[Floats], limits: RouteLimits, margin: float) -> DubinsPa
     return None
 
 
-def best_options(legs: Sequence[Floats], start: Floats = _FREE, end: Floats = _FREE) -> tuple[list[int], float]:
+def best_options(legs: Sequence[Floats]) -> tuple[list[int], float]:
     """Choose an option at each stop of a chain; return the options and what the chain costs.
 
     Args:
         legs: (C, C') each, from the options of a stop to those of the next one.
-        start: (C,), of the options of the first stop; default: all are free.
-        end: (C',), of those of the last one.
     """
-    total, back = start, []
+    total, back = np.zeros(len(legs[0])), []
     for leg in legs:
         sums = total[:, None] + leg
         back.append(sums.argmin(0))
         total = sums.min(0)
-    total = total + end
     options = [int(total.argmin())]
     for came in reversed(back):
         options.append(int(came[options[-1]]))

@@ -1,25 +1,22 @@
 """The shortest order of visits, each of which may be made in several ways.
 
-A visit has C options, such as the headings at a place or the directions of a lane. Going from option c of visit i
-to option d of visit j costs costs[i, c, j, d]. With up to EXACT visits the order is exact: dynamic programming
-over the sets of visits that are done (Held and Karp, J. SIAM 10, 1962), with the options beside the last visit.
-Where the cost of ending depends on the first visit, as on a closed tour, this is done for each first visit.
-With more, moves of up to three visits and reversals improve the order until none helps. A lower bound says how far
-it may be from the shortest: the shortest walk of as many visits, which may visit one twice and another never, with
-prices that make such walks expensive (Christofides, Mingozzi and Toth, Networks 11, 1981), found by subgradient
-ascent.
+A visit has C options, such as the headings at a place. Going from option c of visit i to option d of visit j costs
+costs[i, c, j, d]. With up to EXACT visits the order is exact: dynamic programming over the sets of visits that are
+done (Held and Karp, J. SIAM 10, 1962), with the options beside the last visit. Where the cost of ending depends on
+the first visit, as on a closed tour, this is done for each first visit. With more, moves of up to three visits and
+reversals improve the order until none helps. A lower bound says how far it may be from the shortest: the shortest
+walk of as many visits, which may visit one twice and another never, with prices that make such walks expensive
+(Christofides, Mingozzi and Toth, Networks 11, 1981), found by subgradient ascent.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from heapq import heapify, heappop, heappush
-from itertools import chain, pairwise, repeat
+from itertools import chain, repeat
 from typing import NamedTuple
 
 import numpy as np
 
-from planner.goal.route import best_options
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
 
@@ -35,10 +32,9 @@ _BATCH = 4_000_000  # costs that are compared at once
 
 
 class Order(NamedTuple):
-    """Visits in their order, the option of each, what it costs, and what no order can cost less than."""
+    """Visits in their order, what it costs, and what no order can cost less than."""
 
     visits: list[int]
-    options: list[int]
     cost: float
     bound: float
     rivals: list[list[int]]  # the next best orders, if they cost little more; none where the order is not exact
@@ -78,10 +74,10 @@ def _exact(costs: Floats, start: Floats, end: Floats) -> Order:
         begins = [np.where(np.arange(count)[:, None] == first, start, np.inf) for first in range(count)]
         found = sorted(chain.from_iterable(map(_shortest, repeat(costs), begins, end)))
     if not found:
-        return Order([], [], np.inf, np.inf, [])
+        return Order([], np.inf, np.inf, [])
     (cost, visits), *others = found
     rivals = [order for total, order in others[:_RIVALS] if total <= _NEAR * cost]
-    return Order(visits, _options(costs, start, end, visits), cost, cost, rivals)
+    return Order(visits, cost, cost, rivals)
 
 
 def _shortest(costs: Floats, start: Floats, end: Floats) -> list[tuple[float, list[int]]]:
@@ -136,8 +132,7 @@ def _searched(costs: Floats, start: Floats, end: Floats) -> Order:
             order, cost = neighbours[at], float(totals[at])
         if cost < lowest:
             best, lowest = order, cost
-    visits = best.tolist()
-    return Order(visits, _options(costs, start, end, visits), lowest, _bound(costs, start, end, lowest), [])
+    return Order(best.tolist(), lowest, _bound(costs, start, end, lowest), [])
 
 
 def _greedy(nearest: Floats, first: int) -> Integers:
@@ -180,13 +175,7 @@ def _costs(costs: Floats, start: Floats, end: Floats, orders: Integers) -> Float
     return np.concatenate(parts)
 
 
-def _options(costs: Floats, start: Floats, end: Floats, order: Sequence[int]) -> list[int]:
-    """Choose the best option of each visit of an order."""
-    legs = [costs[i, :, j] for i, j in pairwise(order)]
-    return best_options(legs, start[order[0]], _ending(end, order[0], order[-1]))[0]
-
-
-def _ending(end: Floats, first: Integers | int, last: Integers | int) -> Floats:
+def _ending(end: Floats, first: Integers, last: Integers) -> Floats:
     """Return what ending with a visit costs (..., C) after beginning with another."""
     return np.asarray(end[last] if end.ndim == 2 else end[first, last])
 

@@ -49,7 +49,7 @@ WIDE = 0.25  # turn radii; a predicted track that is further from the declared p
 _OWN_TABLE_FROM = 1.7  # stated error over predicted error, from which a table of its own is proposed
 
 
-KINDS = ("goal", "tour", "cover", "hold")  # of jobs that have files of their own
+KINDS = ("goal", "tour", "hold")  # of jobs that have files of their own
 
 
 class Job:

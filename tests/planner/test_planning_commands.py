@@ -71,6 +71,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("plan square:3l --tolerance 5 R", "--tolerance: 5 has no unit; write 5cm, or 5l in tail"),
         ("plan square:3l --smooth 1 R", "--smooth: 1 has no unit"),
         ("plan square:3l --keep-out circle:9cm,0,2 R", "circle:9cm,0,2: 2 has no unit"),
+        ("plan square:3l --keep-out box:0,0,2l R", "write box"),
         ("plan square:3l --walls path.csv R", "path.csv: its lengths have no unit"),
         ("track circle:1l --start 1 0 0 R", "--start: 1 has no unit"),
         ("track circle:1l --noise 1 R", "--noise: 1 has no unit"),
@@ -81,9 +82,6 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("goal --goal 3l 0 0 --via 1e9m 0 R", "--via: give x and y, as finite numbers below 1e+06"),
         ("tour 0,0 300,0 R", "place 300,0: 300 has no unit"),
         ("tour path.csv R", "path.csv: its lengths have no unit"),
-        ("cover box:0,0,300,200 --width 4cm R", "box:0,0,300,200: 300 has no unit"),
-        ("cover box:0,0,3l,2l --width 4 R", "--width: 4 has no unit"),
-        ("cover x_mm.csv --width 4cm --unit cm R", "x_mm.csv: --unit cm: it has a size of its own"),
         ("hold 2,1 R", "place 2,1: 2 has no unit"),
         ("page --path square:3 R", "square:3: its lengths have no unit"),
         # paths, regions, cameras
@@ -108,8 +106,6 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("tour 0,0 1 --unit l R", "write X,Y"),
         ("tour 1e9m,0 1e9m,1l R", "place 1e9m,0: give x and y, as finite numbers below 1e+06"),
         ("tour 0,0 2,0 4,0 --unit l --keep-out circle:2,0,0.5 R", "place 2 at"),
-        ("cover box:0,0,2l,1l --width 4km R", "--width: 4km; write a length"),
-        ("cover box:0,0,2l --width 4cm R", "write box"),
         ("hold 1,2 --for 5 --unit cm R", "with its unit"),
         ("hold 1,2 --for=-3min --unit cm R", "above 0"),
         # saved plans
@@ -121,6 +117,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("track made --noise 0", "--noise: 0; write a length above 0"),
         ("track circle:2l", "circle:2l is no saved plan, so --robot is needed"),
         ("track made/tour.json", "tour.json"),
+        ("track made/cover.json", "coverage of an area is planned no longer; give the plan.json beside it"),
         ("track made --camera 0", "--camera needs --view view.toml"),
         ("track made --camera 0 --view view.toml --start 0 0 0", "leave --start out"),
         ("track made --serial /dev/ttyACM0", "--view, --serial and --lost are for --camera"),
@@ -146,7 +143,7 @@ def test_refusals_are_one_line_and_write_nothing(
 ) -> None:
     monkeypatch.chdir(files)
     given = words.replace(" R", " --robot paper-control").split()
-    if given[0] in ("plan", "tour", "cover", "hold"):
+    if given[0] in ("plan", "tour", "hold"):
         given += ["--objective", "flips"]
     given += [] if given[0] == "track" else ["--out", "out"]
     assert run_command(main, given) == (3 if "no way" in expected else 2)

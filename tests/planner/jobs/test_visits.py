@@ -1,9 +1,7 @@
-"""Tours and coverage: all places or lanes in the quickest order, also in the simulator and among obstacles."""
+"""Tours: all places in the quickest order, also in the simulator and among obstacles."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
 from itertools import pairwise, permutations
 from typing import Any
 
@@ -11,13 +9,11 @@ import numpy as np
 import pytest
 
 from planner.jobs import shortest_order as module
-from planner.jobs.cover import Field, cover, lanes, share_covered
 from planner.jobs.shortest_order import EXACT, shortest_order
 from planner.jobs.tour import tour
 from planner.jobs.travel import Travel
 from planner.paths.distance import distance_to
-from planner.paths.obstacles import Circle, FreeSpace, Polygon
-from planner.planning.declare import TIGHTEST
+from planner.paths.obstacles import Circle, FreeSpace
 from planner.planning.solve import Setting
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import dwells_for
@@ -41,10 +37,12 @@ def random_costs(seed: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndar
     return costs, rng.uniform(0, 2, (count, OPTIONS)), rng.uniform(0, 2, (count, OPTIONS))
 
 
-def cost_of(visits: list[int], options: list[int], costs: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
-    steps = pairwise(zip(visits, options, strict=True))
-    between = sum(costs[i, c, j, d] for (i, c), (j, d) in steps)
-    return float(start[visits[0], options[0]] + between + end[visits[-1], options[-1]])
+def cost_of(visits: list[int], costs: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
+    """Compute the cost of an order with the best options, one visit after another."""
+    total = start[visits[0]]
+    for i, j in pairwise(visits):
+        total = (total[:, None] + costs[i, :, j]).min(0)
+    return float((total + end[visits[-1]]).min())
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -58,7 +56,7 @@ def test_the_search_is_near_the_exact_order_and_the_bound_below(
     assert exact.cost <= searched.cost * (1 + 1e-12)
     assert searched.cost < 1.1 * exact.cost
     assert searched.bound <= exact.cost * (1 + 1e-9)
-    assert cost_of(searched.visits, searched.options, costs, start, end) == pytest.approx(searched.cost)
+    assert cost_of(searched.visits, costs, start, end) == pytest.approx(searched.cost)
     assert sorted(searched.visits) == list(range(9))
 
 
@@ -156,101 +154,3 @@ def test_the_simulator_visits_all_places() -> None:
     track = replay(result.schedule())
     points = track[["x_over_l", "y_over_l"]].to_numpy(float)
     assert distance_to(points, np.array(PLACES[:3])).max() < result.stated_error + 0.05
-
-
-FIELD = Field(Polygon.of([[0, 0], [3, 0], [3, 1.5], [0, 1.5]]))
-SMALL = Field(Polygon.of([[0, 0], [1, 0], [1, 0.5], [0, 0.5]]))
-SQUARE = Polygon.of([[0, 0], [4, 0], [4, 3], [0, 3]])
-HOLE = Field(SQUARE, (Circle(2, 1.5, 0.7),))
-
-
-def test_areas_and_shares_are_those_of_known_figures() -> None:
-    """A straight track covers its rectangle and two half discs."""
-    points, cell = HOLE.raster(0.01)
-    assert len(points) * cell == pytest.approx(12 - math.pi * 0.49, rel=0.003)
-    with pytest.raises(InputError, match="empty"):
-        Field(SQUARE, (Circle(2, 1.5, 4),)).raster(0.1)
-    share = share_covered(Field(SQUARE), np.array([[1.0, 1.5], [3.0, 1.5]]), 0.6)
-    assert share == pytest.approx((2 * 0.6 + math.pi * 0.09) / 12, rel=0.01)
-
-
-@pytest.mark.parametrize("angle", [0.0, 0.7, math.pi / 2, 2.0])
-def test_a_footprint_wider_than_the_region_needs_one_lane(angle: float) -> None:
-    for width in (5.0, 40.0):
-        (lane,) = lanes(Field(SQUARE), width, angle, apart=0.2)
-        assert np.hypot(*(lane.mean(0) - [2, 1.5])) < 0.6
-        assert share_covered(Field(SQUARE), lane, 2 * width) == 1.0
-
-
-@pytest.mark.parametrize("angle", [0.0, 0.4, math.pi / 2])
-def test_lanes_cover_the_region_and_leave_holes_out(angle: float) -> None:
-    cut = lanes(HOLE, 0.3, angle, apart=0.2)
-    along = cut[:, 1] - cut[:, 0]
-    assert np.abs(np.sin(np.arctan2(along[:, 1], along[:, 0]) - angle)).max() < 1e-9
-    points, _ = HOLE.raster(0.04)
-    near = np.min([distance_to(lane, points) for lane in cut], axis=0)
-    assert near.max() <= 0.15 + 0.02
-    assert (np.hypot(*(cut.mean(1) - [2, 1.5]).T) > 0.5).all()
-    assert len(lanes(HOLE, 0.3, angle, apart=3.0)) < len(cut)
-
-
-def test_it_covers_the_region_by_turns_that_the_robot_can_make() -> None:
-    """Neither another order of the lanes nor another direction is quicker; the bound is that of its area."""
-    swept = cover(FIELD.outline, 0.5, tracked(), holes=FIELD.holes, **QUICK)
-    assert swept.job.share > 0.995
-    assert swept.job.share == share_covered(FIELD, swept.track, 0.5)
-    assert 0.5 < swept.job.sure <= swept.job.share
-    assert swept.declared.curvature * tracked().vehicle.pivot_radius < TIGHTEST
-    assert swept.job.exact
-    assert len(swept.job.lanes) == 5
-    assert swept.job.bound == pytest.approx(4.5 / (0.5 * swept.straight.net_speed), rel=0.01)
-    assert swept.duration > swept.job.bound
-    across = cover(FIELD.outline, 0.5, tracked(), holes=FIELD.holes, **QUICK, angle=np.pi / 2)
-    assert swept.duration < across.duration
-    assert np.ptp(swept.job.lanes[:, :, 1], axis=1).max() < 1e-9
-
-
-@pytest.mark.parametrize(("share", "proposed"), [(0.8, "80.0 % if a camera"), (0.0, "give more than")])
-def test_what_is_not_certain_without_a_camera_proposes_one(share: float, proposed: str) -> None:
-    swept = cover(SMALL.outline, 0.5, tracked(), holes=SMALL.holes, **QUICK)
-    assert swept.job.sure <= swept.job.sure_tracked <= swept.job.share
-    said = replace(swept.job, sure=0.0, sure_tracked=share).lines(swept)[1]
-    assert "0.0 % wherever the robot is within the stated error" in said
-    assert proposed in said
-    assert "--feedback" in said
-    assert "--feedback" not in replace(swept.job, sure=0.9, sure_tracked=0.9).lines(swept)[1]
-
-
-def test_lanes_are_in_the_quickest_order() -> None:
-    """Neighbouring lanes one after another would need wider loops than this robot's turns."""
-    swept = cover([[0, 0], [4, 0], [4, 3], [0, 3]], 0.4, tracked(), **QUICK)
-    steps = np.abs(np.diff(swept.job.lanes[:, 0, 1]))
-    assert np.median(steps) > 0.6
-
-
-@pytest.mark.rest
-def test_keep_outs_are_not_touched() -> None:
-    rock = Circle(1.5, 0.8, 0.2)
-    swept = cover(FIELD.outline, 0.5, tracked(), keep_out=[rock])
-    kept = swept.kept_clear
-    assert kept is not None
-    assert kept.clearance > 0
-    assert kept.margin >= swept.stated_error
-    assert swept.job.share > 0.85
-
-
-@pytest.mark.rest
-def test_the_simulator_covers_the_same() -> None:
-    swept = cover(FIELD.outline, 0.5, tracked(), holes=FIELD.holes, **QUICK)
-    track = replay(swept.schedule())[["x_over_l", "y_over_l"]].to_numpy(float)
-    assert share_covered(FIELD, track, 0.5) == pytest.approx(swept.job.share, abs=0.02)
-    assert share_covered(FIELD, track, 0.5) >= swept.job.sure
-
-
-def test_refusals() -> None:
-    with pytest.raises(InputError, match="zigzag alone"):
-        cover(FIELD.outline, 0.04, tracked(), holes=FIELD.holes)
-    with pytest.raises(InputError, match="more than 80 lanes"):
-        cover([[0, 0], [60, 0], [60, 60], [0, 60]], 0.5, tracked())
-    with pytest.raises(InputError, match="no lane of the region is clear"):
-        cover(FIELD.outline, 0.5, tracked(), holes=FIELD.holes, walls=FIELD.outline)

@@ -13,7 +13,6 @@ import pytest
 
 from planner.files.headers import schedule_header
 from planner.goal.trip import Trip, to_goal
-from planner.jobs.cover import Coverage
 from planner.jobs.hold import Orbit
 from planner.jobs.plan import plan
 from planner.jobs.tour import Visits
@@ -325,7 +324,7 @@ def test_the_longest_dwell_that_keeps_a_tolerance_is_found(monkeypatch: pytest.M
 
 
 def test_files_know_the_kinds_of_jobs() -> None:
-    assert (Trip.kind, Visits.kind, Coverage.kind, Orbit.kind) == KINDS
+    assert (Trip.kind, Visits.kind, Orbit.kind) == KINDS
 
 
 @pytest.mark.parametrize("objective", ["error", "time", "flips"])

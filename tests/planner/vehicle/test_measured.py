@@ -172,7 +172,6 @@ JOBS: dict[str, Callable[[], Plan[Any]]] = {
     "path": lambda: sf.plan("circle:30cm", SWIMMER),
     "goal": lambda: sf.to_goal(("0cm", "0cm", "0"), ("80cm", "0cm", "30"), SWIMMER, feedback=True),
     "tour": lambda: sf.tour(["0,0", "50,20", "20,60"], SWIMMER, unit="cm"),
-    "cover": lambda: sf.cover("box:0,0,100,60", "20cm", SWIMMER, unit="cm"),
     "hold": lambda: sf.hold("0,0", SWIMMER, seconds="10min", unit="cm"),
 }
 

@@ -78,12 +78,10 @@ def test_a_robot_that_the_shipped_table_does_not_know_gets_its_own_once(
 def test_every_planning_function_takes_the_robot_s_own_table(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(planner.vehicle.from_table, "_TABLES", {})
     robot = "paper-control"
-    square = [[0, 0], [2, 0], [2, 2], [0, 2]]
     plans = [
         sf.plan(sf.circle(1.5), robot, own_table=True),
         sf.to_goal((0, 0, 0), (4, 1, 0), robot, own_table=True),
         sf.tour([(0, 0), (4, 0)], robot, objective="time", own_table=True),
-        sf.cover(square, 0.8, robot, objective="time", own_table=True),
     ]
     own = own_table(biased=False).identity
     assert {plan.tracked.model for plan in plans} == {own}
