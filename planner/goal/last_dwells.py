@@ -56,7 +56,7 @@ class Ending:
 
     goal: POSE  # of the head's centre
     least: float  # dwell that the motor allows
-    shorter: float = 1.0  # share of the plan's shortest dwell that these dwells must keep
+    shorter: float  # share of the plan's shortest dwell that these dwells must keep
 
     def __call__(self, switches: Switches, declared: Declared, setting: Setting) -> Switches:
         """Change a schedule: without any or some of its last dwells, whichever costs least."""

@@ -163,19 +163,10 @@ def read_pose(words: Sequence[str], unit: str | None, robot: Swimmer, name: str)
         InputError: the words are none, or have no unit.
     """
     x, y = (read_length(each, unit, robot, name) for each in words[:2])
-    return x, y, read_degrees(words[2], name)
-
-
-def read_degrees(words: str, name: str) -> float:
-    """Read a heading in degrees, in rad.
-
-    Raises:
-        InputError: the words are none.
-    """
     try:
-        return math.radians(math.remainder(float(words), 360))
+        return x, y, math.radians(math.remainder(float(words[2]), 360))
     except ValueError:
-        raise InputError(f"{name}: {words}; write the heading in degrees, such as 90") from None
+        raise InputError(f"{name}: {words[2]}; write the heading in degrees, such as 90") from None
 
 
 def extent(path: Path2D) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 1. A task's source gives a declared path for a setting: the vehicle with one shortest dwell, and a margin.
 2. Where obstacles block it, ways around them change it.
 3. Line-of-sight guidance follows the path, which gives the schedule, and its errors are computed
-   (`follow_declared`).
+   (`_followed`).
 4. Where there are obstacles, the margin grows until it covers the stated error (`at_dwell`).
 5. The objective chooses the shortest dwell. Where the path is blocked or the tolerance is not kept, others are
    tried (`solve`).
@@ -95,33 +95,17 @@ class Task:
         return declared if self.around is None else self.around(declared, setting)
 
 
-def follow_declared(
-    declared: Declared,
-    setting: Setting,
-    request: PlanRequest,
-    *,
-    drawn: Path2D | None = None,
-    start: Start | None = None,
-    ending: Ending | None = None,
-    progress: Progress | None = None,
+def _followed(
+    task: Task, declared: Declared, setting: Setting, request: PlanRequest, progress: Progress | None
 ) -> Plan[None]:
-    """Follow a declared path, and compute the errors.
-
-    Args:
-        declared: the path.
-        setting: the vehicle with its shortest dwell.
-        request: what the plan is asked for.
-        drawn: the path as drawn; None: the declared path.
-        start: at rest away from the path; the error of such a plan is not guaranteed. None: on the path.
-        ending: changes the last dwells.
-        progress: called now and then with the share of the path that is done.
-    """
+    """Follow a declared path, and compute the errors; from a start away from the path none is guaranteed."""
     tracked, straight = setting.tracked, setting.straight
     vehicle, guidance = tracked.vehicle, setting.guidance(declared)
-    drawn = drawn or Path2D(declared.reference.p, False)
+    drawn = task.drawn or Path2D(declared.reference.p, False)
+    start = task.start(declared) if task.start else None
     switches = follow(declared.reference, vehicle, guidance, tracked.offset, start=start, progress=progress)
-    if ending is not None:
-        switches = ending(switches, declared, setting)
+    if task.ending is not None:
+        switches = task.ending(switches, declared, setting)
         guidance = guidance._replace(dwell=min(guidance.dwell, float(switches.dwells.min())))
     bound = None if start else guaranteed(vehicle, tracked.rod, straight.swing, guidance.ahead)
     errors = plan_errors(tracked, drawn, declared, switches, guaranteed=bound, seed=request.seed,
@@ -155,9 +139,7 @@ def at_dwell(
     for _ in range(_MARGINS + (setting.margin is None)):
         declared = task.declared(setting)
         if plan is None or not declared.same(plan.declared):
-            start = task.start(declared) if task.start else None
-            plan = follow_declared(declared, setting, request, drawn=task.drawn, start=start, ending=task.ending,
-                                   progress=progress)  # fmt: skip
+            plan = _followed(task, declared, setting, request, progress)
         if space.empty:
             return plan
         needed, margin = plan.margin_needed, setting.margin
