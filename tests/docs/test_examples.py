@@ -25,7 +25,6 @@ RUN = ("sh", "python")
 LONG = {"tutorial/schedule.md", "howto/sweep.md", "howto/goal.md", "howto/jobs.md", "howto/page.md",
         "howto/query.md", "howto/tracker.md"}  # fmt: skip
 LONGEST = {"tutorial/calibration.md", "tutorial/bad-day.md", "tutorial/film.md"}
-NAMED = re.compile(r"# (?P<name>[\w-]+\.toml)$", re.MULTILINE)
 SIMPLE = re.compile(r"softflagella [^|<>$*;&`]+")  # a command that needs no shell
 SHOWN = {*RUN, "toml", "text", "c", "js"}
 
@@ -68,8 +67,6 @@ def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytes
     monkeypatch.chdir(work)
     shell, names = environment(commands), {"__name__": "__page__"}
     for block in blocks(page):
-        if named := NAMED.match(block.code):  # a file that the reader writes
-            (work / named["name"]).write_text(block.code)
         if block.reason or block.language not in RUN:
             continue
         if block.language == "python":
