@@ -8,7 +8,7 @@ distance in all pictures; a thing and a band have another in each.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,16 +40,11 @@ def learn(
         InputError: the bands are further apart than the head is long, or hardly apart.
     """
     banded = [each for each in setup.robots if each.tag is None]
-    pictures, size, view = list[Any](), (0, 0), setup.view
-    for picture in film.samples(_SAMPLES, start, end) if banded else []:
-        size = width, height = picture.shape[1::-1]
-        fold = math.ceil(width / _LARGE)
-        small = width // fold, height // fold
-        pictures.append(opencv().resize(picture, small, interpolation=opencv().INTER_AREA))
-        view = setup.view.smaller(fold)
+    pictures, size, view = _small_pictures(film, setup.view, start, end) if banded else ([], (0, 0), setup.view)
     hues = {hue for each in banded for hue in each.hues.values()}
     colours = {hue: np.array([_map(picture, hue) for picture in pictures]) for hue in hues}
     unknown = {each.name for each in banded if math.isnan(each.apart)}
+    # With what rests, things are no markers; without it, a robot that itself rests is seen, too.
     for still in (_resting(colours), {}):
         agreed = {each.name: _agreed(pictures, each, view, still, head_length) for each in banded
                   if each.name in unknown}  # fmt: skip
@@ -58,24 +53,46 @@ def learn(
         if all(seen.values()):
             break
     _erase(colours, banded, seen)
+    # A robot that is seen in some pictures only may rest in the others, where its colours are still in the map.
     for each in guessed:
         known = list(seen[each.name])
-        if 0 < len(known) < len(pictures):  # what is gone there was the robot, at rest
+        if 0 < len(known) < len(pictures):
             left = _resting({hue: colours[hue][known] for hue in each.hues.values()})
             _erase(colours, [each], _seen(pictures, [each], view, left))
     still = _resting(colours)
     seen = _seen(pictures, guessed, view, still)
-    learnt = {name: float(np.median([apart for _, apart in poses.values()])) for name, poses in seen.items()
-              if poses and name in unknown}  # fmt: skip
-    for apart in learnt.values():
+    distances = {name: float(np.median([apart for _, apart in poses.values()])) for name, poses in seen.items()
+                 if poses and name in unknown}  # fmt: skip
+    _check_distances(distances.values(), head_length)
+    still = {hue: opencv().resize(weights, size) for hue, weights in still.items()}
+    return [each._replace(apart=distances.get(each.name, each.apart)) for each in setup.robots], still
+
+
+def _small_pictures(film: Film, view: View, start: float, end: float) -> tuple[list[Any], tuple[int, int], View]:
+    """Return some pictures of a film, at most `_LARGE` wide, the film's width and height, and the view of them."""
+    pictures, size, small_view = list[Any](), (0, 0), view
+    for picture in film.samples(_SAMPLES, start, end):
+        size = width, height = picture.shape[1::-1]
+        fold = math.ceil(width / _LARGE)
+        small = width // fold, height // fold
+        pictures.append(opencv().resize(picture, small, interpolation=opencv().INTER_AREA))
+        small_view = view.smaller(fold)
+    return pictures, size, small_view
+
+
+def _check_distances(distances: Iterable[float], head_length: float) -> None:
+    """Compare distances of bands with the head's length.
+
+    Raises:
+        InputError: the bands are further apart than the head is long, or hardly apart.
+    """
+    for apart in distances:
         if apart > 1.05 * head_length or apart < _LEAST * head_length:
             raise InputError(
                 f"the bands are {100 * apart:.3g} cm apart, and the head of the robot is "
                 f"{100 * head_length:.3g} cm long: correct [scale] in view.toml, or give the right robot, or "
                 "the bands' distance as apart_cm"
             )
-    still = {hue: opencv().resize(weights, size) for hue, weights in still.items()}
-    return [each._replace(apart=learnt.get(each.name, each.apart)) for each in setup.robots], still
 
 
 def _agreed(

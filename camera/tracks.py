@@ -67,8 +67,6 @@ def track_film(
     Raises:
         InputError: the film cannot be read, or a robot is not seen in it; the message says what to change.
     """
-    import pandas as pd
-
     with naming(path):
         if not start < end:
             raise InputError(f"no frame between {start:g} and {end:g} s; give the earlier time as the start")
@@ -76,51 +74,95 @@ def track_film(
         tell(0, film.count)
         robots, still = learn(film, setup, head_length, start, end)
         detector = Detector(robots, setup.view, still=still, head_length=head_length)
-        rows: dict[str, list[dict[str, float]]] = {each.name: [] for each in setup.robots}
-        why = {each.name: Counter[str]() for each in setup.robots}
-        times, doubled, picture = [], 0, None
-        for frame in film.frames(start, end):
-            if frame.number % 10 == 0:
-                tell(frame.number, film.count)
-            times.append(frame.time_s)
-            if frame.doubled:
-                doubled += 1
-                continue
-            picture = frame.picture
-            for each in detector.poses(picture):
-                if isinstance(each, Lost):
-                    why[each.robot][each.why] += 1
-                else:
-                    rows[each.robot].append(_row(each, frame.number, frame.time_s - start))
-        if picture is None:
+        seen = _follow(film, detector, [each.name for each in setup.robots], start, end, tell)
+        if seen.picture is None:
             raise InputError(f"no frame between {start:g} and {end:g} s; the film has {film.count} frames")
-        notes, steps = list[str](), np.diff(times)
-        if film.ended and film.count - film.read > max(_UNCOUNTED * film.count, 2):
-            notes.append(f"{film.stated(film.read)}: it is damaged or cut, or the camera dropped frames")
-        if gaps := int((steps > _GAP * np.median(steps)).sum()) if len(steps) else 0:
-            notes.append(f"{gaps} gaps in the time stamps: the camera dropped frames")
-        if doubled:
-            notes.append(f"{doubled} of {len(times)} frames are copies of the frame before, and left out")
-        for robot, reasons in why.items():
-            for reason, count in reasons.most_common():
-                notes.append(f"robot {robot}: {count} of {len(times)} frames without a pose: {reason}")
-        if any(set(DOTS) & set(each.hues) for each in setup.robots) and len(times) > 1:
-            notes += filter(None, [aliasing(np.array(times), motor_speed)])
+        notes = _missing_frames(film, seen)
+        if any(set(DOTS) & set(each.hues) for each in setup.robots) and len(seen.times) > 1:
+            notes += filter(None, [aliasing(np.array(seen.times), motor_speed)])
         tables = {}
         for markers in setup.robots:
-            name, run = markers.name, Path(path).stem
-            if not rows[name]:
-                raise InputError(_nothing(markers, why[name].most_common(1)[0][0], len(times) - doubled))
-            table = tables[name] = pd.DataFrame(rows[name])
-            table.insert(0, "run", run if len(setup.robots) == 1 else f"{run}-{name}")
-            if markers.tag is None and float(np.ptp(table[["x_cm", "y_cm"]], axis=0).max()) < 100 * head_length:
-                notes.append(f"robot {name}: it hardly moves, so a thing of its colours may be taken for it")
-            turn = turn_sense(table)
-            if turn and turn == _spin_sense(table, motor_speed):
-                notes.append(f"robot {name}: its head spins as if front and rear were exchanged; {_EXCHANGE}")
-            elif _swims_backwards(table):
-                notes.append(f"robot {name}: it moves tail first; if it did not, {_EXCHANGE}")
-        return FilmTracks(tables, notes, detector.view, picture)
+            run = Path(path).stem if len(setup.robots) == 1 else f"{Path(path).stem}-{markers.name}"
+            table = tables[markers.name] = _table(seen, markers, run)
+            notes += _doubts(table, markers, head_length, motor_speed)
+        return FilmTracks(tables, notes, detector.view, seen.picture)
+
+
+class _Seen(NamedTuple):
+    """What the frames of a film show."""
+
+    rows: dict[str, list[dict[str, float]]]  # robot -> rows of its table
+    lost: dict[str, Counter[str]]  # robot -> frames without a pose, by their reason
+    times: list[float]  # of all frames [s]
+    doubled: int  # copies of the frame before, which are left out
+    picture: Any  # the last frame
+
+
+def _follow(
+    film: Film, detector: Detector, robots: list[str], start: float, end: float, tell: Callable[[int, int], object]
+) -> _Seen:
+    """Detect the robots in each frame of a film."""
+    rows: dict[str, list[dict[str, float]]] = {name: [] for name in robots}
+    lost = {name: Counter[str]() for name in robots}
+    times, doubled, picture = list[float](), 0, None
+    for frame in film.frames(start, end):
+        if frame.number % 10 == 0:
+            tell(frame.number, film.count)
+        times.append(frame.time_s)
+        if frame.doubled:
+            doubled += 1
+            continue
+        picture = frame.picture
+        for each in detector.poses(picture):
+            if isinstance(each, Lost):
+                lost[each.robot][each.why] += 1
+            else:
+                rows[each.robot].append(_row(each, frame.number, frame.time_s - start))
+    return _Seen(rows, lost, times, doubled, picture)
+
+
+def _missing_frames(film: Film, seen: _Seen) -> list[str]:
+    """Say which frames are missing, doubled or without a pose."""
+    notes, steps, count = list[str](), np.diff(seen.times), len(seen.times)
+    if film.ended and film.count - film.read > max(_UNCOUNTED * film.count, 2):
+        notes.append(f"{film.stated(film.read)}: it is damaged or cut, or the camera dropped frames")
+    if gaps := int((steps > _GAP * np.median(steps)).sum()) if len(steps) else 0:
+        notes.append(f"{gaps} gaps in the time stamps: the camera dropped frames")
+    if seen.doubled:
+        notes.append(f"{seen.doubled} of {count} frames are copies of the frame before, and left out")
+    for robot, reasons in seen.lost.items():
+        for reason, frames in reasons.most_common():
+            notes.append(f"robot {robot}: {frames} of {count} frames without a pose: {reason}")
+    return notes
+
+
+def _table(seen: _Seen, markers: Markers, run: str) -> pd.DataFrame:
+    """Tabulate the poses of a robot.
+
+    Raises:
+        InputError: there are none.
+    """
+    import pandas as pd
+
+    if not seen.rows[markers.name]:
+        reason = seen.lost[markers.name].most_common(1)[0][0]
+        raise InputError(_nothing(markers, reason, len(seen.times) - seen.doubled))
+    table = pd.DataFrame(seen.rows[markers.name])
+    table.insert(0, "run", run)
+    return table
+
+
+def _doubts(table: pd.DataFrame, markers: Markers, head_length: float, motor_speed: float) -> list[str]:
+    """Say where a track may not be the robot's, or where its front and rear may be exchanged."""
+    notes, name = list[str](), markers.name
+    if markers.tag is None and float(np.ptp(table[["x_cm", "y_cm"]], axis=0).max()) < 100 * head_length:
+        notes.append(f"robot {name}: it hardly moves, so a thing of its colours may be taken for it")
+    turn = turn_sense(table)
+    if turn and turn == _spin_sense(table, motor_speed):
+        notes.append(f"robot {name}: its head spins as if front and rear were exchanged; {_EXCHANGE}")
+    elif _swims_backwards(table):
+        notes.append(f"robot {name}: it moves tail first; if it did not, {_EXCHANGE}")
+    return notes
 
 
 def _nothing(markers: Markers, reason: str, count: int) -> str:

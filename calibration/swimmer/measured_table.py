@@ -162,48 +162,30 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
     unknown = [str(c) for c in table if c not in RUN_COLUMNS]
     empty = [str(c) for c in table if c not in (*INPUTS, *unknown) and _is_empty(table[c])]
     table = table.drop(columns=empty)
-    outputs = tuple(name for name, (column, _, _) in OUTPUTS.items() if column in table)
-    if len(outputs) < 2 or not {"omega_yr", "R_yr", "theta", "v"} & set(outputs):
-        raise InputError(
-            "the table needs at least two outputs, one of them omega_yr_rad_s, R_yr_cm, theta_deg or v_cm_s: "
-            "the spins alone do not tell the coefficients apart"
-            + (f" (without any value: {', '.join(empty)})" if empty else "")
-        )
+    outputs = _measured_outputs(table, empty)
     numbers = table.drop(columns=["session", "robot"], errors="ignore").apply(numbers_of)
     missing = table[[OUTPUTS[name][0] for name in outputs]].isna()
     reasons = _reasons(table, numbers, outputs, header, missing)
     sparse = _mark_gaps(reasons, table, numbers)
     _mark_copies(reasons, numbers, outputs, table)
     keep = np.array([not r for r in reasons])
-    gaps = missing.to_numpy()[keep]
     aside = tuple(f"{row_name(table, i)}: {r}" for i, r in enumerate(reasons) if r)
     good = numbers[keep].drop(columns=sparse)
     if len(good) < _FEWEST_RUNS:
         first = f" ({aside[0]})" if aside else ""
         raise InputError(f"{len(good)} usable runs{first}; a calibration needs at least {_FEWEST_RUNS}")
-    names = (
-        table.loc[keep, "session"].astype(str)
-        if "session" in table
-        else "N = " + good["N"].astype(int).astype(str)
-    )
-    noted_robot = "robot" in table
-    robots = table.loc[keep, "robot"].astype(str).to_numpy() if noted_robot else np.full(len(good), "")
+    # Runs of different robots are no repeats, even where all settings are equal.
+    robots = table.loc[keep, "robot"].astype(str).to_numpy() if "robot" in table else np.full(len(good), "")
     robot_names, robot = np.unique(robots, return_inverse=True)
     condition: Integers = np.asarray(good.groupby([*INPUTS, robot], sort=True).ngroup(), dtype=np.int64)
-    session_names, session = np.unique(names.to_numpy(dtype=str), return_inverse=True)
-    columns = []
-    for name in outputs:
-        column, factor, _ = OUTPUTS[name]
-        value = good[column].to_numpy(dtype=float) * factor
-        scaled = pd.Series(value if name == "theta" else np.log(np.abs(value)))  # at gaps what repeats have
-        columns.append(scaled.fillna(scaled.groupby(condition).transform("mean")).fillna(scaled.mean()))
+    session_names, session = np.unique(_sessions(table[keep], good), return_inverse=True)
     factors = (1, to_si(1.0, "cm"), to_si(1.0, "rpm"))
     tails, length, omega = (good[c].to_numpy(dtype=float) * f for c, f in zip(INPUTS, factors, strict=True))
     noted = _noted(good)
     inputs = [tails, np.log(length), np.log(np.abs(omega)), np.sign(omega), *noted.values()]
     data = Measurements(
         outputs=outputs,
-        y=np.stack(columns, 1),
+        y=_outputs_to_fit(good, outputs, condition),
         condition=condition,
         session=session,
         session_names=tuple(str(n) for n in session_names),
@@ -221,9 +203,9 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
             *(f"column {name}: not known, left out" for name in unknown),
         ),
         caveats=_caveats(tails, length, omega),
-        completion=_without_gaps(gaps),
-        specimen=robot if noted_robot else None,
-        specimen_names=tuple(map(str, robot_names)) if noted_robot else (),
+        completion=_without_gaps(missing.to_numpy()[keep]),
+        specimen=robot if "robot" in table else None,
+        specimen_names=tuple(map(str, robot_names)) if "robot" in table else (),
         tails=tails,
         length=length,
         omega=omega,
@@ -234,6 +216,43 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         lines=good.index.to_numpy() if good.index.name == LINE else None,
     )
     return _independent(data, sum(_COPY in reason for reason in reasons))
+
+
+def _measured_outputs(table: pd.DataFrame, empty: Sequence[str]) -> tuple[str, ...]:
+    """Name the outputs that a table has; `empty` are columns without any value.
+
+    Raises:
+        InputError: they do not tell the coefficients apart.
+    """
+    outputs = tuple(name for name, (column, _, _) in OUTPUTS.items() if column in table)
+    if len(outputs) < 2 or not {"omega_yr", "R_yr", "theta", "v"} & set(outputs):
+        raise InputError(
+            "the table needs at least two outputs, one of them omega_yr_rad_s, R_yr_cm, theta_deg or v_cm_s: "
+            "the spins alone do not tell the coefficients apart"
+            + (f" (without any value: {', '.join(empty)})" if empty else "")
+        )
+    return outputs
+
+
+def _sessions(table: pd.DataFrame, numbers: pd.DataFrame) -> Any:
+    """Name the session of each usable run, (n,): where the table has no column, runs of one N are one."""
+    if "session" in table:
+        return table["session"].astype(str).to_numpy(dtype=str)
+    return ("N = " + numbers["N"].astype(int).astype(str)).to_numpy(dtype=str)
+
+
+def _outputs_to_fit(numbers: pd.DataFrame, outputs: Sequence[str], condition: Integers) -> Floats:
+    """Return the outputs as they are fitted, (n, k): θ in rad, logarithms of all others in SI units.
+
+    At a gap stands the mean of the repeats, or of all runs, so that all arithmetic is finite.
+    """
+    columns = []
+    for name in outputs:
+        column, factor, _ = OUTPUTS[name]
+        value = numbers[column].to_numpy(dtype=float) * factor
+        scaled = pd.Series(value if name == "theta" else np.log(np.abs(value)))
+        columns.append(scaled.fillna(scaled.groupby(condition).transform("mean")).fillna(scaled.mean()))
+    return np.stack(columns, 1)
 
 
 def _without_gaps(gaps: Flags) -> Floats:

@@ -212,57 +212,85 @@ def swim(
         robot = plan.robot if truth is None else one_robot(truth)
         truth = robot if isinstance(robot, Robot) else plan.tracked.vehicle
     scale, rng = plan.robot.time_scale, np.random.default_rng(camera.seed)
-    every, delay = camera.every_s / scale, camera.delay_s / scale
     begin, limit = np.array(pilot.start if start is None else start), longest * plan.duration
     x, y = (scale * each / (100 * plan.robot.length_scale) for each in current_cm_s)
     command = pilot.update(0.0)
     swimmer = Swimmer(truth, plan, command.direction, begin, (x, y))
-    now, look, change = 0.0, every, plan.duration / 2 if later else np.inf
-    waiting: list[tuple[float, POSE, float]] = []
-    rows = [(np.zeros(1), begin[None], command)]
-    dwells: list[float] = []
-    alarms: list[float] = []
-    flipped, fed = 0.0, 0
+    now, look, change = 0.0, camera.every_s / scale, plan.duration / 2 if later else np.inf
+    waiting: list[tuple[float, POSE, float]] = []  # poses on their way from the camera
+    track = _Record(begin, command)
+    # From event to event: a flip, another robot, a look of the camera, a pose that reaches the tracker.
     while not command.finished and now < limit:
         until = min(look, change, waiting[0][0] if waiting else np.inf)
         until = command.flip_at if command.flip_at <= until + SAME else until
         if until > now:
-            times, poses = swimmer.go(until - now)
-            rows.append((now + times, poses, command))
+            track.add(now, *swimmer.go(until - now))
             now = until
-        last = command
         if until == command.flip_at:
             command = pilot.update(now)
         elif until == change and later is not None:
             swimmer.become(later)
             change = np.inf
         elif until == look:
-            x, y, heading = rows[-1][1][-1].tolist()
-            seen = camera.sees((x, y, heading), now, rng)
+            seen = camera.sees(track.pose, now, rng)
             if seen is not None:
-                waiting.append((now + delay, seen, now))
-            look += every
+                waiting.append((now + camera.delay_s / scale, seen, now))
+            look += camera.every_s / scale
         else:
             command = pilot.update(now, *waiting.pop(0)[1:])
-            fed += 1
-        if command.direction != last.direction:
-            dwells.append(now - flipped)
-            flipped = now
+            track.fed += 1
+        if track.obey(now, command):
             swimmer.flip()
-        alarms += [now] if command.alarm and not last.alarm else []
-    counts = [len(times) for times, _, _ in rows]
-    poses = np.concatenate([poses for _, poses, _ in rows])
-    followed = planar.compose(poses, np.array([plan.tracked.offset, 0.0, 0.0]))[:, :2]
-    return Swim(
-        plan,
-        np.concatenate([times for times, _, _ in rows]),
-        poses,
-        np.repeat([float(each.direction) for _, _, each in rows], counts),
-        distance_to(plan.reference, followed),
-        np.repeat([each.error for _, _, each in rows], counts),
-        farthest(plan.reference, followed),
-        np.array(dwells),
-        tuple(alarms),
-        fed,
-        command.finished,
-    )
+    return track.swim(plan, command.finished)
+
+
+class _Record:
+    """What happens as a robot swims: its track, and the commands that it obeys."""
+
+    def __init__(self, begin: Floats, command: Command):
+        self._command = command  # the last one
+        self._stretches = [(np.zeros(1), begin[None], command)]  # times, poses, and the command that held
+        self._flipped = 0.0  # when the motor turned over last
+        self._dwells: list[float] = []
+        self._alarms: list[float] = []
+        self.fed = 0  # poses that reached the tracker
+
+    @property
+    def pose(self) -> POSE:
+        """The last pose of the head's centre."""
+        x, y, heading = self._stretches[-1][1][-1].tolist()
+        return x, y, heading
+
+    def add(self, now: float, times: Floats, poses: Floats) -> None:
+        """Add times from now (K,), and poses (K, 3)."""
+        self._stretches.append((now + times, poses, self._command))
+
+    def obey(self, now: float, command: Command) -> bool:
+        """Note a command; return whether the motor flips."""
+        last, self._command = self._command, command
+        if command.alarm and not last.alarm:
+            self._alarms.append(now)
+        if command.direction == last.direction:
+            return False
+        self._dwells.append(now - self._flipped)
+        self._flipped = now
+        return True
+
+    def swim(self, plan: Plan, finished: bool) -> Swim:
+        """Compare the whole track with the declared path of a plan."""
+        times, stretches, commands = zip(*self._stretches, strict=True)
+        counts, poses = [len(each) for each in times], np.concatenate(stretches)
+        followed = planar.compose(poses, np.array([plan.tracked.offset, 0.0, 0.0]))[:, :2]
+        return Swim(
+            plan,
+            np.concatenate(times),
+            poses,
+            np.repeat([float(each.direction) for each in commands], counts),
+            distance_to(plan.reference, followed),
+            np.repeat([each.error for each in commands], counts),
+            farthest(plan.reference, followed),
+            np.array(self._dwells),
+            tuple(self._alarms),
+            self.fed,
+            finished,
+        )

@@ -82,36 +82,13 @@ def _films(folder: Path, program: Program) -> list[Path]:
 
 def _poses(seen: Seen, path: Path, program: Program, options: TrackOptions) -> pd.DataFrame:
     """Make poses of the points of a file."""
-    points, own_metres, own_seconds = seen
-    fps, scale = options.get("fps"), options.get("scale")
-    seconds = own_seconds if own_seconds is not None else 1 / fps if fps else math.nan
-    metres = own_metres or _length(scale or "")
-    faults = [
-        f"has its own units; leave out --{name}"
-        for name, given, own in (("fps", fps, own_seconds), ("scale", scale, own_metres))
-        if given is not None and own is not None
-    ]
-    if own_seconds is not None and not 0 < own_seconds < math.inf:
-        faults.append(f"has frames {own_seconds:g} s apart; correct its frame rate, above 0 and finite")
-    elif not 0 < seconds < math.inf:
-        faults.append("counts frames; give the frames per second of its film, such as --fps 30")
-    if metres is None:
-        scaled = f"cannot have --scale {scale}" if scale else "has no unit of length"
-        faults.append(f"{scaled}; give the length of a pixel, or of the file's unit, such as --scale 0.2mm")
-    if metres is None or faults:
-        raise InputError(f"{path} {', and it '.join(faults)}")
+    seconds, metres = _scales(seen, path, options)
+    points = seen.points
     points.loc[points["sure"] < program.likely, ["x", "y"]] = math.nan
     if "heading" in points and not {"front", "rear"} & set(options):
         poses = points[points["robot"] != ""]
     else:
-        names = options.get("front", "front"), options.get("rear", "rear")
-        front, rear = (_rows(points, path, name) for name in names)
-        if names[0] == names[1]:
-            raise InputError(f"--front and --rear are both {names[0]!r}; a heading needs two points")
-        poses = front.merge(rear, on=["robot", "time"], how="outer", suffixes=("_front", "_rear"))
-        along, aside = (poses[f"{axis}_front"] - poses[f"{axis}_rear"] for axis in "xy")
-        poses["heading"] = np.arctan2(-aside if program.y_down else aside, along)
-        poses["x"], poses["y"] = poses["x_rear"] + along / 2, poses["y_rear"] + aside / 2
+        poses = _poses_of_two(points, path, program, options)
     x, y = options.get("origin", (0.0, 0.0))
     if not (math.isfinite(x) and math.isfinite(y)):
         raise InputError(f"--origin {x:g} {y:g}; give two finite numbers")
@@ -133,6 +110,46 @@ def _poses(seen: Seen, path: Path, program: Program, options: TrackOptions) -> p
     table = table.loc[known]
     table.attrs["lost"] = [f"{path}: {lost} of {len(table) + lost} poses are lost"] if lost else []
     return table
+
+
+def _scales(seen: Seen, path: Path, options: TrackOptions) -> tuple[float, float]:
+    """Return the units of a file's times [s] and lengths [m]: its own ones, or those of the options.
+
+    Raises:
+        InputError: one is missing or impossible, or is given though the file has its own.
+    """
+    _, own_metres, own_seconds = seen
+    fps, scale = options.get("fps"), options.get("scale")
+    seconds = own_seconds if own_seconds is not None else 1 / fps if fps else math.nan
+    metres = own_metres or _length(scale or "")
+    faults = [
+        f"has its own units; leave out --{name}"
+        for name, given, own in (("fps", fps, own_seconds), ("scale", scale, own_metres))
+        if given is not None and own is not None
+    ]
+    if own_seconds is not None and not 0 < own_seconds < math.inf:
+        faults.append(f"has frames {own_seconds:g} s apart; correct its frame rate, above 0 and finite")
+    elif not 0 < seconds < math.inf:
+        faults.append("counts frames; give the frames per second of its film, such as --fps 30")
+    if metres is None:
+        scaled = f"cannot have --scale {scale}" if scale else "has no unit of length"
+        faults.append(f"{scaled}; give the length of a pixel, or of the file's unit, such as --scale 0.2mm")
+    if metres is None or faults:
+        raise InputError(f"{path} {', and it '.join(faults)}")
+    return seconds, metres
+
+
+def _poses_of_two(points: pd.DataFrame, path: Path, program: Program, options: TrackOptions) -> pd.DataFrame:
+    """Make poses of two points on the robot's axis: the place half-way, the heading from rear to front."""
+    names = options.get("front", "front"), options.get("rear", "rear")
+    front, rear = (_rows(points, path, name) for name in names)
+    if names[0] == names[1]:
+        raise InputError(f"--front and --rear are both {names[0]!r}; a heading needs two points")
+    poses = front.merge(rear, on=["robot", "time"], how="outer", suffixes=("_front", "_rear"))
+    along, aside = (poses[f"{axis}_front"] - poses[f"{axis}_rear"] for axis in "xy")
+    poses["heading"] = np.arctan2(-aside if program.y_down else aside, along)
+    poses["x"], poses["y"] = poses["x_rear"] + along / 2, poses["y_rear"] + aside / 2
+    return poses
 
 
 def _length(words: str) -> float | None:

@@ -274,31 +274,32 @@ def _at_some_dwells(groups: Groups) -> Floats:
     forth = orbits_with_phases(rows, groups.N, [_MEMORY_EDGES])[0]
     instants = [len(orbit.u) if orbit else 1 for orbit in forth]
     back = orbits_with_phases(reverse_rows, groups.N, [_MEMORY_EDGES], [instants])[0]
-    orbits = [(f, b) if f and b else None for f, b in zip(forth, back, strict=True)]
-    there = [_flipped(row, *pair) if pair else None for row, pair in zip(rows, orbits, strict=True)]
-    and_back = [
-        _flipped(row, *pair[::-1]) if pair else None for row, pair in zip(reverse_rows, orbits, strict=True)
-    ]
+    orbits = [(f, b) for f, b in zip(forth, back, strict=True) if f and b]
+    solved = np.array([bool(f and b) for f, b in zip(forth, back, strict=True)])
+    there = [_flipped(row, f, b) for row, (f, b) in zip(rows[solved], orbits, strict=True)]
+    and_back = [_flipped(row, b, f) for row, (f, b) in zip(reverse_rows[solved], orbits, strict=True)]
+    # A dwell after a long one in each direction; then the same dwell once more after the first.
     first = follow_flips(there, NO_MARKS, _MEMORY_TOLERANCE, _SOME_BEFORE)
     once = follow_flips(and_back, NO_MARKS, _MEMORY_TOLERANCE, _SOME_BEFORE)
     second = [
-        flip._replace(x=course.shapes[k], u=pair[1].u, until=dwell) if flip and course and pair else None
-        for flip, course, pair in zip(and_back, first, orbits, strict=True)
+        course and flip._replace(x=course.shapes[k], u=b.u, until=dwell)
+        for flip, course, (_, b) in zip(and_back, first, orbits, strict=True)
         for k, dwell in enumerate(_SOME_BEFORE.tolist())
     ]
     twice = follow_flips(second, NO_MARKS, _MEMORY_TOLERANCE)
+    # The last flips: after two dwells, and after one, whose lags differ by what is sought.
     last: list[Flip | None] = []
-    for i, (flip, course, pair) in enumerate(zip(there, once, orbits, strict=True)):
+    for i, (flip, course, (f, _)) in enumerate(zip(there, once, orbits, strict=True)):
         for k, two in enumerate(twice[i * count : (i + 1) * count]):
-            if flip and course and pair and two:
-                last += [flip._replace(x=x, u=pair[0].u) for x in (two.end, course.shapes[k])]
-            else:
-                last += [None, None]
+            ends = (two.end, course.shapes[k]) if course and two else (None, None)
+            last += [flip._replace(x=x, u=f.u) if x is not None else None for x in ends]
     unknown = np.full((len(dwells), 3), np.nan)
     lags = [course.lag.mean(1) if course else unknown for course in follow_flips(last, dwells, _MEMORY_TOLERANCE)]
-    each = np.array(lags).reshape(len(rows), count, 2, len(dwells), 3)
-    mirror = np.where(rows[:, :1] < 0, planar.MIRROR, np.ones(3))
-    return np.asarray((each[:, :, 0] - each[:, :, 1]) * mirror[:, None, None])
+    after_two, after_one = np.moveaxis(np.reshape(lags, (len(orbits), count, 2, len(dwells), 3)), 2, 0)
+    mirror = np.where(rows[solved, :1] < 0, planar.MIRROR, np.ones(3))
+    differences = np.full((len(rows), count, len(dwells), 3), np.nan)
+    differences[solved] = (after_two - after_one) * mirror[:, None, None]
+    return differences
 
 
 def _flipped(row: Floats, after: OnMesh, before: OnMesh) -> Flip:
