@@ -54,8 +54,7 @@ _PAGES = (  # of the documentation: name without suffix, title, what it is
 ROBOT_PAGE = "robot.html"  # the page that plans, beside the demo's page
 ROBOT_PICTURE = _DOCS / "page.png"  # of it; there is none without a checkout
 PLAN_FILES = {
-    "schedule.h": "the schedule for a microcontroller, open loop",
-    "tracker.h": "the same with feedback from a camera",
+    "schedule.h": "the schedule for a microcontroller",
     "plan.csv": "dwells and poses as a table",
     "plan.json": "everything about the plan",
     "plan.svg": "a drawing of it",

@@ -1,4 +1,4 @@
-"""The files of a plan: plan.json, plan.csv, plan.svg; schedule.h and tracker.h for a microcontroller.
+"""The files of a plan: plan.json, plan.csv, plan.svg, and schedule.h for a microcontroller.
 
 They appear together, and each has the identity of the plan, so files of two plans cannot be taken for one.
 """
@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planner.files.headers import schedule_header, tracker_header
+from planner.files.headers import schedule_header
 from planner.files.pictures import plan_svg
 from planner.planning.plan import KINDS, Plan
 from sim.io.files import files_together, write_numbers, write_text
@@ -20,7 +20,7 @@ from sim.io.provenance import code_version
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FILES = ("plan.json", "plan.csv", "schedule.h", "tracker.h", "plan.svg")
+FILES = ("plan.json", "plan.csv", "schedule.h", "plan.svg")
 EXTRA = ("trade_off.svg", *(f"{kind}.{ending}" for kind in KINDS for ending in ("json", "svg")))  # planned before
 
 
@@ -41,7 +41,7 @@ def write_plan(result: Plan, folder: str | Path, *, pictures: Mapping[str, Figur
         >>> from softflagella import circle, plan, write_plan
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     [path.name for path in write_plan(plan(circle(2.0), "paper-control"), folder)]
-        ['plan.json', 'plan.csv', 'schedule.h', 'tracker.h', 'plan.svg']
+        ['plan.json', 'plan.csv', 'schedule.h', 'plan.svg']
     """
     with files_together(folder, (*FILES, *EXTRA)) as temporary:
         names = _write_files(result, temporary)
@@ -60,7 +60,6 @@ def _write_files(result: Plan, folder: Path) -> list[str]:
     columns = {name: values.tolist() for name, values in result.columns().items()}
     write_numbers({**columns, "plan_id": [identity] * len(result.dwells)}, folder / "plan.csv")
     write_text(folder / "schedule.h", schedule_header(result, identity))
-    write_text(folder / "tracker.h", tracker_header(result, identity))
     write_text(folder / "plan.svg", plan_svg(result, identity))
     if result.job is not None:
         from planner.files.pictures import draw_plan, write_svg  # loads matplotlib

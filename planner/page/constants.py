@@ -18,7 +18,7 @@ from sim.model import uncertainty
 from sim.model.robot_toml import ENTRIES
 
 _NAMES = {  # of each module; a leading underscore is left out
-    "planner.files.headers": "LARGEST MOST_MS CHECKPOINTS",
+    "planner.files.headers": "MOST_MS CHECKPOINTS",
     "planner.paths.distance": "TIE",
     "planner.paths.path_files": "KINDS",
     "planner.paths.nearest_path": "SPACING MOST_POSES COARSEST WEIGHTS ITERATIONS ALONG POINTS_A_POSE ROUNDS "
@@ -34,8 +34,6 @@ _NAMES = {  # of each module; a leading underscore is left out
     "MOST_SWITCHES PATIENCE EVERY QUICKEST TIGHTEST PAIRS_AHEAD",
     "planner.planning.plan": "WIDE OWN_TABLE_FROM",
     "planner.planning.solve": "WORTH SAVED LENGTHENED_FROM",
-    "planner.tracking.guidance": "NEAR ERRORS",
-    "planner.tracking.kalman_filter": "PRIOR MOST CURRENT MOST_CURRENT MARKER MOST_MARKER STATES",
     "planner.vehicle.from_table": "ODD TIME_STEPS STEP",
     "planner.vehicle.vehicle": "SHORTEST STEP TIMES BEFORE_KNOTS",
     "planner.vehicle.zigzag": "PAIRS TRIES QUICK LONGEST KEPT NEARLY COMPARED WIDEST COUNT LONGER",

@@ -1,26 +1,20 @@
-/* The files of a plan: plan.json, plan.csv, and schedule.h and tracker.h for a microcontroller; and what it warns of.
+/* The files of a plan: plan.json, plan.csv, and schedule.h for a microcontroller; and what it warns of.
  *
  * A plan is as in plan.js, with `unmeasured`. Lengths in l, times in μ0 l⁴/EI, unless a name says its unit. */
 import { CONSTANTS } from "./constants.js";
-import { lookAhead } from "./errors.js";
-import { differences, largestSize, linspace, runningSum, sum } from "./math.js";
+import { differences, linspace, runningSum, sum } from "./math.js";
 import { extent, polyline } from "./path.js";
 import { groupValues } from "./robot.js";
 import { planId } from "./seals.js";
 import { inLab, timeInLab } from "./units.js";
-import { COUNT, lagAt, lagPlace, pivotDistance, pivotRadius, rodOf, turnRadius } from "./vehicle.js";
-import { yawRate, zigzagSpeed } from "./vehicle.js";
+import { turnRadius, yawRate } from "./vehicle.js";
 import { InputError, general, repr } from "./words.js";
 
 const { WIDE, OWN_TABLE_FROM } = CONSTANTS.plan, { CAMERA } = CONSTANTS.errors;
-const { MOST_MS, CHECKPOINTS, LARGEST } = CONSTANTS.headers;
-const { PRIOR, MOST, CURRENT, MOST_CURRENT, MARKER, MOST_MARKER, STATES } = CONSTANTS.kalman_filter;
-const { NEAR, ERRORS } = CONSTANTS.guidance;
+const { MOST_MS, CHECKPOINTS } = CONSTANTS.headers;
 const FORMAT = 2;
 const DEGREES = 180 / Math.PI;
 const A_LINE = 12; // numbers of a table
-const START = [0.02, 0.02, 0.03]; // standard deviations of the first pose [l, rad]
-const STRIDE = 0.5; // between two targets of a way back, in radii
 
 /* What the user should know, in words. */
 function planWarnings({ tracked, declared, errors, switches, guidance }) {
@@ -121,15 +115,14 @@ function pythonJson(value) {
   return `{${Object.entries(value).map(([name, entry]) => `${pythonJson(name)}: ${pythonJson(entry)}`).join(", ")}}`;
 }
 
-/* The files by name. parts: {codeVersion, schedule, tracker}, the version of the program and the templates of both
- * headers, with @NAME@ in place of what a plan decides. */
+/* The files by name. parts: {codeVersion, schedule}, the version of the program and the template of schedule.h,
+ * with @NAME@ in place of what a plan decides. */
 function planFiles(plan, parts) {
   const { id, text } = planRecord(plan, parts.codeVersion);
   return {
     "plan.json": `${text}\n`,
     "plan.csv": planTable(plan, id),
     "schedule.h": controllerHeader(plan, id, parts.schedule),
-    "tracker.h": trackerHeader(plan, id, parts.tracker),
   };
 }
 
@@ -168,18 +161,15 @@ function milliseconds(seconds) {
 function controllerHeader(plan, id, template) {
   const { robot, model } = plan.tracked, seconds = planSeconds(plan), entries = milliseconds(seconds);
   const [x, y, heading] = plan.switches.poses[0], cm = 100 * robot.tailLength, places = checkpoints(plan, seconds);
-  return filled(template, {
+  const lines = entries.flatMap((_, i) => (i % A_LINE ? [] : [entries.slice(i, i + A_LINE).join(", ")]));
+  const parts = {
     IDENTITY: id, NAME: safeName(robot), AFTER: "Stop after the last entry.", MODEL: model, STATED: statedWithin(plan),
     FIRST_DIRECTION: plan.switches.firstDirection, COUNT: entries.length, TOTAL: sum(entries),
     MOTOR: `#define SCHEDULE_MOTOR_RPM ${((robot.motorSpeed * 30) / Math.PI).toFixed(3)}\n`,
     X_CM: (cm * x).toFixed(4), Y_CM: (cm * y).toFixed(4), DEGREES: (DEGREES * heading).toFixed(3),
     X: x.toFixed(6), Y: y.toFixed(6), HEADING: heading.toFixed(6), CHECKPOINTS: places.length,
-    entries: linesOf(entries).join(",\n    "), places: places.join(",\n    "),
-  });
-}
-
-/* A template with its parts in place of @NAME@. */
-function filled(template, parts) {
+    entries: lines.join(",\n    "), places: places.join(",\n    "),
+  };
   return template.replace(/@(\w+)@/g, (_, mark) => parts[mark]);
 }
 
@@ -208,74 +198,6 @@ function checkpoints(plan, seconds) {
 /* The robot's name without characters that could end a comment in C. */
 function safeName({ name }) {
   return Array.from(name).filter((sign) => /[\p{L}\p{N} \-_.]/u.test(sign)).join("");
-}
-
-function linesOf(texts) {
-  return texts.flatMap((_, i) => (i % A_LINE ? [] : [texts.slice(i, i + A_LINE).join(", ")]));
-}
-
-/* Write tracker.h as text. id: of the plan. */
-function trackerHeader(plan, id, template) {
-  const { tracked, straight, guidance, declared, switches, errors } = plan, { robot, vehicle, model } = tracked;
-  const { q, heading, arc } = declared.reference, spacing = arc[arc.length - 1] / (arc.length - 1);
-  const unit = lagUnit(vehicle), current = MOST_CURRENT * zigzagSpeed(straight), radius = pivotRadius(vehicle);
-  const rounded = (value) => Math.sign(value) * Math.round(Math.abs(value)) || 0; // both signs alike, no −0
-  const inUnits = (lags) => Array.from(lags, (value, at) => rounded(value / unit[at % 3]));
-  const lags = [...vehicle.lag, ...vehicle.rest].reduce((total, { length }) => total + length, 0);
-  const row = (values) => `{${Array.from(values, repr).join(", ")}}`;
-  const table = (values, write = String) => `{\n${linesOf(Array.from(values, write)).join(",\n")}}`;
-  const nine = (value) => general(value, 9);
-  const numbers = {
-    TIME_SCALE: robot.timeScale, TAIL_LENGTH_M: robot.tailLength, SHORTEST: guidance.dwell, AHEAD: guidance.ahead,
-    ROD: rodOf(tracked), OFFSET: tracked.offset, LAP_TURN: 0, SWING: guidance.swing, PIVOT_RADIUS: radius,
-    NET_SPEED: straight.speed, NET_DRIFT: straight.drift, PIVOT_DISTANCE: pivotDistance(vehicle),
-    WAY_AHEAD: lookAhead(vehicle, 0, straight),
-    LIMIT: Math.max(NEAR * radius, ERRORS * errors.predictedMax), // up to which the line of sight leads back
-  };
-  const parts = {
-    ...Object.fromEntries(Object.entries(numbers).map(([name, value]) => [name, repr(value)])),
-    IDENTITY: id, NAME: safeName(robot), MODEL: model, BYTES: 2 * lags + 12 * q.length,
-    FIRST_DIRECTION: switches.firstDirection, POINTS: q.length, LAP: 0, TIMES: COUNT,
-    STRIDE: Math.max(Math.round((STRIDE * radius) / Math.max(spacing, 1e-9)), 1), // points from one target to the next
-    start: row(switches.poses[0]),
-    twist: `{${vehicle.twist.map(row).join(", ")}}`,
-    current: row(vehicle.current),
-    most: row([...MOST, current, current, ...MOST_MARKER]),
-    lag_unit: row(unit),
-    prior: table(prior(plan).flat(), repr),
-    path_x: table(q.map(([x]) => x), nine), path_y: table(q.map(([, y]) => y), nine), path_heading: table(heading, nine),
-    rest: table(vehicle.rest.flatMap(inUnits)),
-    lag_left: table(inUnits(vehicle.lag[0])), lag_right: table(inUnits(vehicle.lag[1])),
-  };
-  return filled(template, parts);
-}
-
-/* The units of the lags, forward, left and heading. */
-function lagUnit({ lag, rest }) {
-  return [0, 1, 2].map((axis) => {
-    const size = (values) => largestSize(values.filter((_, at) => at % 3 === axis));
-    return Math.max(...[...lag, ...rest].map(size), 1e-12) / LARGEST;
-  });
-}
-
-/* The covariance before the first pose, from what is uncertain of the start and the plan. */
-function prior({ tracked: { vehicle }, straight, guidance: { dwell } }) {
-  const squares = (sigmas) => sigmas.map((sigma) => sigma * sigma), { twist } = vehicle;
-  const variances = [...squares(START), ...squares(PRIOR), 1e-6, 1e-12, 1e-12, ...squares(MARKER)];
-  for (const i of [8, 9]) variances[i] += (CURRENT * zigzagSpeed(straight)) ** 2;
-  const covariance = variances.map((variance, i) => variances.map((_, j) => (i === j ? variance : 0)));
-  const speed = Math.hypot(twist[0][0], twist[0][1]);
-  for (const mode of vehicle.modes) {
-    const direction = Array(STATES).fill(0);
-    for (const i of [0, 1]) {
-      direction[3 + i] = mode.twist[i][2] / twist[i][2];
-      direction[5 + i] = (mode.twist[0][i] * twist[0][i]) / Math.max(twist[0][i] ** 2, 1e-6 * speed ** 2);
-      direction[8 + i] = mode.current[i];
-    }
-    if (mode.lag) direction[7] = lagAt(mode.lag[0], lagPlace(dwell, dwell))[2];
-    covariance.forEach((row, i) => row.forEach((_, j) => (row[j] += direction[i] * direction[j])));
-  }
-  return covariance;
 }
 
 export { planWarnings, planSeconds, planDuration, planRecord, planFiles };

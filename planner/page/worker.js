@@ -2,7 +2,7 @@
  * out. Questions and answers are plain data, lengths in cm, times in s.
  *
  * The first message is {what: "start", content: the planner's data}. Errors of the program go out as `broken`. */
-import { inflated, readData } from "./data.js";
+import { readData } from "./data.js";
 import { trackedVehicle, vehicleOfParts } from "./from_table.js";
 import { geomspace } from "./math.js";
 import { openFile } from "./open_file.js";
@@ -23,8 +23,6 @@ async function service(data) {
   const locked = data.table.vehicle ? await readData(data.table, true) : null; // a robot that is not computed anew
   if (locked) locked.vehicle = vehicleOfParts(locked.vehicle, locked.name);
   const table = locked ? null : await readTable(data.table);
-  const [schedule, tracker] = (await inflated(data.files.headers).text()).split("\f");
-  const files = { codeVersion: data.files.codeVersion, schedule, tracker };
   let last = null; // {key, plan}: the plan that the page shows
   let asked = null; // {key, swims}: the vehicle that was asked for last
 
@@ -65,7 +63,7 @@ async function service(data) {
     file: ({ name, wish }) => {
       if (name === "path.csv") return pathTable(drawnPath(wish.path));
       if (name === "robot.toml") return robotToml(makeRobot(wish.robot));
-      return planFiles(planOf(wish), files)[name];
+      return planFiles(planOf(wish), data.files)[name];
     },
     open: openFile,
     runs: ({ table: measured, name, robot }) => comparedRuns(measured, name, robot, table),

@@ -25,7 +25,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planner.files.headers import header_template, schedule_template
+from planner.files.headers import schedule_template
 from planner.options import CornerOptions, Length, length_of, request_of, table_of
 from planner.page.bundle import FOLDER, joined
 from planner.page.first_state import NamedPath, first_options, first_plan, robots_of, shapes_of, slider_ends
@@ -149,10 +149,7 @@ def write_page(
         "locked": {"name": swims.name, "why": why} if why else None,
         "planner": {
             "table": _planner_data(table, swims, tracked, why),
-            "files": {
-                "codeVersion": code_version(),
-                "headers": packed_bytes(f"{schedule_template()}\f{header_template()}".encode()),
-            },
+            "files": {"codeVersion": code_version(), "schedule": schedule_template()},
         },
     }
     version = f"softflagella {__version__}"

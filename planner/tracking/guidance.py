@@ -9,12 +9,11 @@ first order along the pivot's way σ,
 with a the distance from the pivot to the tracked point, a′ the learned one, and κ the reference's curvature: on a
 straight line ε goes to −r, on a curve it lags behind. The reference is turned by ε about the tracked point.
 
-A robot that is farther from its reference than `limit`, or turned away from the wanted heading by more than AWAY,
+A robot that is farther from its reference than a limit, or turned away from the wanted heading by more than AWAY,
 gets a way back: a shortest Dubins track of the pivot from where it is to a pose of the remaining path. The cost of
 a target is the length of the track, and LEFT_OUT times the length of the path that is left out before it. Targets
 are tried at equal strides along the path, then one by one about the best. The pivot follows the way by line of
-sight. Where it ends the robot is on the reference again. `planner/c/guidance.h` and `way_back.h` do the same in C.
-Lengths in l.
+sight. Where it ends the robot is on the reference again. Lengths in l.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.goal.dubins import TURNS, DubinsPaths, words
-from planner.paths.tractrix import Drift, Reference
+from planner.paths.tractrix import Drift
 from planner.planning.conditions import OVERLAP
 from planner.planning.line_of_sight import LineOfSight, look_ahead
 from planner.planning.plan import Plan
@@ -49,9 +48,11 @@ class TrackerGuidance(LineOfSight):
 
     def __init__(self, plan: Plan):
         tracked, straight = plan.tracked, plan.straight
-        super().__init__(tracked_reference(plan), tracked.vehicle, plan.guidance, tracked.offset)
-        self._lap = lap_points(plan)  # points of the reference in a lap; 0: the path is followed once
-        self._lap_turn = plan.declared.reference.turn
+        reference, overlap = plan.declared.reference, OVERLAP * tracked.vehicle.pivot_radius
+        followed = reference if plan.lap is None else reference.laps(1, overlap)  # on into the next lap
+        super().__init__(followed, tracked.vehicle, plan.guidance, tracked.offset)
+        self._lap = 0 if plan.lap is None else len(reference.q) - 1  # its points; 0: the path is followed once
+        self._lap_turn = reference.turn
         self._around, self._stopping = self._lap > 0, False
         x, y = (tracked.vehicle.current / straight.speed).tolist()
         self._planned = self._drift = Drift(straight.drift / straight.speed, (x, y))
@@ -59,9 +60,10 @@ class TrackerGuidance(LineOfSight):
         self._pivot_distance = tracked.vehicle.pivot_distance
         self._pivot_radius = tracked.vehicle.pivot_radius
         self._swing = plan.guidance.swing
-        self._way_ahead = way_ahead(plan)
-        self._limit, self._stride = limit(plan), stride(plan)
-        lap = float(plan.declared.reference.arc[-1])
+        self._way_ahead = float(look_ahead(tracked.vehicle, 0.0, straight))
+        self._limit = max(_NEAR * self._pivot_radius, _ERRORS * plan.predicted_max)
+        self._stride = stride(plan)
+        lap = float(reference.arc[-1])
         self._may_leave_out = self._may_leave_out_of_lap = MOST_LEFT_OUT * lap if plan.drawn.closed else math.inf
         self._way: Way | None = None
         self._leg, self._along = SEGMENTS, 0.0  # of the way; the path follows its last segment
@@ -234,27 +236,6 @@ class TrackerGuidance(LineOfSight):
         self._along, self._error = along, error
         wanted = segment.course + segment.curvature * along - math.atan(error / self._way_ahead)
         return sense * (course - wanted) - self._way_hysteresis()
-
-
-def tracked_reference(plan: Plan) -> Reference:
-    """Return the reference of a plan, continued into the next lap where it repeats."""
-    reference = plan.declared.reference
-    return reference if plan.lap is None else reference.laps(1, OVERLAP * plan.tracked.vehicle.pivot_radius)
-
-
-def lap_points(plan: Plan) -> int:
-    """Return how many points of the reference are a lap; 0: the path is followed once."""
-    return 0 if plan.lap is None else len(plan.declared.reference.q) - 1
-
-
-def way_ahead(plan: Plan) -> float:
-    """Return the look-ahead on a way back."""
-    return float(look_ahead(plan.tracked.vehicle, 0.0, plan.straight))
-
-
-def limit(plan: Plan) -> float:
-    """Return the distance from the reference up to which the line of sight leads back."""
-    return max(_NEAR * plan.tracked.vehicle.pivot_radius, _ERRORS * plan.predicted_max)
 
 
 def stride(plan: Plan) -> int:

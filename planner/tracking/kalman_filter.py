@@ -9,8 +9,8 @@
     marker angle     by which it is turned on the robot, to the left: headings are those of the marker
 
 A dwell moves the pose by lag and arc of the robot as estimated so far. The estimates follow a random walk, a small
-step in each dwell, so that changes are tracked. All derivatives are exact. `planner/c/estimate.h` does the same in
-C, one measured number after the other. Vectors in the plane are complex numbers. Lengths in l, times in μ0 l⁴/EI.
+step in each dwell, so that changes are tracked. All derivatives are exact. Vectors in the
+plane are complex numbers. Lengths in l, times in μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -84,7 +84,8 @@ class Estimate:
         self._speed, self._drift = float(plan.straight.speed), float(plan.straight.drift)
         self._law = law
         self.noise = np.square([noise[0], noise[0], noise[1]])  # variances
-        self._most = np.array(most(plan))
+        current = MOST_CURRENT * plan.straight.net_speed
+        self._most = np.array([*MOST, current, current, *MOST_MARKER])  # of the learned numbers, in size
         self.state = np.array([*plan.start, *[0.0] * (STATES - 3)])
         self.covariance = prior(plan)
         if start is not None:
@@ -267,12 +268,6 @@ def prior(plan: Plan) -> Floats:
         P += np.outer(direction, direction)
     P[[8, 9], [8, 9]] += (CURRENT * plan.straight.net_speed) ** 2
     return P
-
-
-def most(plan: Plan) -> tuple[float, ...]:
-    """Return the largest absolute values (10,) of the learned numbers."""
-    current = MOST_CURRENT * plan.straight.net_speed
-    return *MOST, current, current, *MOST_MARKER
 
 
 def difference(pose: POSE, expected: POSE) -> POSE:

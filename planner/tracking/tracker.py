@@ -29,7 +29,6 @@ The next flip is the root of the same equation as in planning (`planner.planning
 estimated pose and with the estimated robot. It is never before the shortest dwell, whatever the input.
 
 Poses are those of the head's centre in l and rad; times in μ0 l⁴/EI. `planner.tracking.pipe` has seconds.
-`planner/c/tracker.h`, `clock.h` and `displacement.h` do the same in C.
 """
 
 from __future__ import annotations

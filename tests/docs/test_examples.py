@@ -13,12 +13,10 @@ from typing import Any
 
 import pytest
 
-import softflagella as sf
 from sim.inputs import load_robot
 from sim.io.errors import run_command
 from softflagella.__main__ import main
 from tests.docs.pages import DOCS, PAGES, ROOT, blocks, page_name
-from tests.planner.compiled import compile_c
 from tests.processes import LIMIT
 
 RUN = ("sh", "python")
@@ -26,7 +24,7 @@ LONG = {"tutorial/schedule.md", "howto/sweep.md", "howto/goal.md", "howto/jobs.m
         "howto/query.md", "howto/tracker.md"}  # fmt: skip
 LONGEST = {"tutorial/calibration.md", "tutorial/bad-day.md", "tutorial/film.md"}
 SIMPLE = re.compile(r"softflagella [^|<>$*;&`]+")  # a command that needs no shell
-SHOWN = {*RUN, "toml", "text", "c", "js"}
+SHOWN = {*RUN, "toml", "text", "js"}
 
 
 def marked() -> list[Any]:
@@ -73,16 +71,6 @@ def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytes
             exec(compile(block.code, page_name(page), "exec"), names)
         else:
             run_shell(block.code, shell)
-
-
-def test_c_on_pages_compiles(tmp_path: Path) -> None:
-    robot = sf.load_robot("paper-control")
-    sf.write_plan(sf.plan(sf.circle(2.0), robot), tmp_path)
-    c_blocks = [block for page in PAGES for block in blocks(page) if block.language == "c"]
-    assert c_blocks
-    for block in c_blocks:
-        (tmp_path / "page.c").write_text(block.code)
-        compile_c(tmp_path / "page.c", tmp_path / "page.o", "-c")
 
 
 def test_every_block_is_of_a_known_language() -> None:

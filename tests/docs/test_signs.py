@@ -1,4 +1,4 @@
-"""docs/reference/signs.md and the simulator agree: its table, slip angle, camera, headers, the bench."""
+"""docs/reference/signs.md and the simulator agree: its table, slip angle, camera, header, the bench."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 import softflagella as sf
 from calibration.swimmer.camera_tracks import measure_tracks
-from planner.files.headers import DIRECTIONS
+from planner.files.headers import schedule_template
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
@@ -105,8 +105,8 @@ def test_the_picture_of_a_camera(above: bool) -> None:
         measure_tracks(picture, runs, y_down=not above)
 
 
-def test_the_c_headers_say_the_same() -> None:
-    said = " ".join(DIRECTIONS.replace("*", "").split())
+def test_the_c_header_says_the_same() -> None:
+    said = " ".join(schedule_template().replace("*", "").split())
     assert "turns the tails clockwise relative to the head, seen from behind. The robot then turns left" in said
 
 

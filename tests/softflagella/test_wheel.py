@@ -47,7 +47,7 @@ def test_all_package_data_are_in_the_wheel(wheel: Path) -> None:
     expected = data_files(ROOT)
     assert {
         "dataset/sweep.toml", "softflagella/demo.toml", "softflagella/py.typed", "softflagella/__init__.pyi",
-        "surrogate/shipped/model.safetensors", "planner/c/tracker.h",
+        "surrogate/shipped/model.safetensors", "planner/c/schedule.h",
     } <= expected  # fmt: skip
     assert data_files(wheel) == expected
 

@@ -31,7 +31,7 @@ from tests.sim.io.tracked_files import deeplabcut, two_robots
 def test_files_of_a_plan(tmp_path: Path) -> None:
     result = planned("square:3l", minimum_dwell=0.8)
     written = write_plan(result, tmp_path / "out")
-    assert [p.name for p in written] == ["plan.json", "plan.csv", "schedule.h", "tracker.h", "plan.svg"]
+    assert [p.name for p in written] == ["plan.json", "plan.csv", "schedule.h", "plan.svg"]
     content = json.loads(written[0].read_text())
     assert content["stated_error_over_l"] == pytest.approx(result.stated_error)
     assert content["model"] == result.tracked.model
@@ -43,7 +43,7 @@ def test_files_of_a_plan(tmp_path: Path) -> None:
     numbers = [int(v) for v in header.split("{")[1].split("}")[0].replace("\n", " ").split(",")]
     assert sum(numbers) == pytest.approx(1000 * result.seconds.sum(), abs=1)
     assert f"SCHEDULE_COUNT {len(numbers)}" in header
-    assert "<svg" in written[4].read_text()
+    assert "<svg" in written[3].read_text()
     table = result.to_frame()
     assert table["dwell_s"].sum() == pytest.approx(result.seconds.sum())
     for k, name in enumerate(("x", "y")):
@@ -63,10 +63,10 @@ def test_milliseconds_carry_rounding_and_split_long_dwells() -> None:
 
 def identities(folder: Path) -> set[str]:
     """What the files of a plan say which plan they belong to."""
-    header, tracker = ((folder / name).read_text().split("Plan ")[1][:12] for name in ("schedule.h", "tracker.h"))
+    header = (folder / "schedule.h").read_text().split("Plan ")[1][:12]
     (column,) = set(pd.read_csv(folder / "plan.csv")["plan_id"])
     named = (folder / "plan.svg").read_text().split("<dc:identifier>")[1].split("<")[0].strip()
-    return {json.loads((folder / "plan.json").read_text())["id"], column, header, tracker, named}
+    return {json.loads((folder / "plan.json").read_text())["id"], column, header, named}
 
 
 def test_all_files_name_the_same_plan_and_another_plan_replaces_them(tmp_path: Path) -> None:
@@ -103,7 +103,7 @@ def test_any_name_of_a_robot_can_be_drawn_and_compiled(name: str, tmp_path: Path
     named = replace(result, tracked=result.tracked._replace(robot=replace(CONTROL, name=name)))
     write_plan(named, tmp_path)
     assert len(identities(tmp_path)) == 1
-    source = '#include "schedule.h"\n#include "tracker.h"\nint main(void){return schedule_ms[0]==0;}'
+    source = '#include "schedule.h"\nint main(void){return schedule_ms[0]==0;}'
     (tmp_path / "main.c").write_text(source)
     compile_c(tmp_path / "main.c", tmp_path / "main", "-O0", "-Wno-unused")
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from planner.files.headers import rounded, schedule_header
+from planner.files.headers import schedule_header
 from planner.goal import last_dwells
 from planner.goal.last_dwells import looped
 from planner.jobs.hold import Orbit, hold
@@ -29,7 +28,6 @@ from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
-from tests.planner.compiled import CompiledTracker
 from tests.planner.plans import CONTROL, tracked
 from tests.planner.vehicles import FINE
 from tests.shared import shared
@@ -164,26 +162,6 @@ def test_a_robot_that_was_moved_comes_back_in_any_lap() -> None:
     result = swim(tracker, lap.tracked.vehicle, FINE, start=start, longest=8)
     assert result.finished
     assert result.distance[result.times > lap.duration].max() < 2 * lap.predicted_max
-
-
-def test_in_c_it_goes_around_as_well(tmp_path: Path) -> None:
-    plan = rounded(laps())
-    one, other = Tracker(plan), CompiledTracker(plan, tmp_path)
-    other.restart(None)
-    told, command = False, one.command
-    for _ in range(4 * len(plan.dwells)):
-        now = command.flip_at
-        if now > 2.4 * plan.duration and not told:
-            told = True
-            command, answer = one.finish_lap(), other.finish_lap()
-        else:
-            command, answer = one.update(now), other.update(now)
-        assert answer.direction == command.direction
-        assert answer.flip_at == pytest.approx(command.flip_at, abs=1e-4)
-        assert answer.finished == command.finished
-        if command.finished:
-            break
-    assert 2.9 < command.flip_at / plan.duration < 3.1
 
 
 def test_the_pipe_is_told_that_this_lap_is_the_last_one() -> None:

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 import softflagella as sf
-from planner.files.headers import header_template, schedule_template
+from planner.files.headers import schedule_template
 from planner.files.plan_files import write_plan
 from planner.files.saved_plan import load_plan, restore_plan
 from planner.files.tracks import tracking_error
@@ -48,7 +48,7 @@ from tests.sim.model.test_robot_toml import LAB, REFUSALS
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
 
-PARTS = {"codeVersion": code_version(), "schedule": schedule_template(), "tracker": header_template()}
+PARTS = {"codeVersion": code_version(), "schedule": schedule_template()}
 PLANS: dict[str, tuple[str, str, float, dict[str, Any]]] = {
     "circle": ("circle", "symmetric", 0.0, {"objective": "flips"}),
     "bend": ("bend", "biased", CONTROL.head_length / 2 / CONTROL.tail_length, {"objective": "flips"}),

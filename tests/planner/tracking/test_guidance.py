@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,6 @@ from planner.tracking.swim import Swim, swim
 from planner.tracking.tracker import Tracker
 from planner.vehicle.zigzag import Objective
 from sim.model.presets import PRESETS
-from tests.planner.compiled import CompiledTracker
 from tests.planner.plans import CONTROL, planned
 from tests.planner.vehicles import PROMPT, root_mean_square
 
@@ -68,7 +66,7 @@ def test_on_a_straight_line_the_reference_turns_against_the_slip() -> None:
     assert math.sin(-guidance._lean) == pytest.approx(0.2, rel=1e-3)
 
 
-def within(plan: Plan, tracker: Tracker | CompiledTracker, camera: Camera, rng: Any, current: float) -> np.ndarray:
+def within(plan: Plan, tracker: Tracker, camera: Camera, rng: Any, current: float) -> np.ndarray:
     """Swim as a vehicle within the plan's uncertainty, in a current; tell when its error is the told one."""
     angle = rng.uniform(0, 2 * math.pi)
     car = plan.tracked.vehicle.drawn(rng)
@@ -87,14 +85,12 @@ def test_the_robot_is_as_near_to_its_path_as_the_tracker_says(current: float, ro
 
 @pytest.mark.rest
 @pytest.mark.parametrize(("robot", "objective"), [("paper-control", "flips"), ("paper-triangle", "error")])
-def test_the_same_where_the_swings_are_large(robot: str, objective: Objective, tmp_path: Path) -> None:
+def test_the_same_where_the_swings_are_large(robot: str, objective: Objective) -> None:
     share = np.linspace(0, 1, 200)
     wave = np.stack([6 * share, 0.8 * np.sin(7.5 * share)], 1)
     result, rng, near = plan(wave, PRESETS[robot], objective=objective), np.random.default_rng(4), []
-    tracker = CompiledTracker(result, tmp_path)
     for current in (0.0, 0.001) * 4:
-        tracker.restart()
-        near.append(within(result, tracker, replace(PROMPT, seed=rng), rng, current))
+        near.append(within(result, Tracker(result), replace(PROMPT, seed=rng), rng, current))
     assert 0.9 < np.concatenate(near).mean() < 0.98
 
 

@@ -37,11 +37,4 @@ static inline void *memcpy_P(void *to, const void *from, size_t count)
 {
     return memcpy_PF(to, (uint_farptr_t)from, count);
 }
-static inline uint16_t pgm_read_word_far(uint_farptr_t from)
-{
-    uint16_t word;
-    memcpy_PF(&word, from, sizeof word);
-    return word;
-}
-static inline uint16_t pgm_read_word(const void *from) { return pgm_read_word_far((uint_farptr_t)from); }
 #endif

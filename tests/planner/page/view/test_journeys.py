@@ -94,15 +94,15 @@ def test_a_circle_drawn_with_the_mouse_is_planned_and_its_files_are_those_of_the
     assert "points=" in address_of(page)
     assert "closed=1" in address_of(page)
     assert "SCHEDULE_H" in saved(page, "Save the schedule", tmp_path).read_text()
-    names = ("plan.json", "plan.csv", "schedule.h", "tracker.h", "path.csv", "robot.toml", "plan.svg")
+    names = ("plan.json", "plan.csv", "schedule.h", "path.csv", "robot.toml", "plan.svg")
     files = {name: saved(page, name, tmp_path) for name in names}
     words = ["plan", str(files["path.csv"]), "--robot", str(files["robot.toml"]), "--objective", "flips"]
     assert run_command(main, [*words, "--out", str(tmp_path / "out")]) == 0
-    theirs = {name: (tmp_path / "out" / name).read_text() for name in names[:4]}
+    theirs = {name: (tmp_path / "out" / name).read_text() for name in names[:3]}
     check_plans(json.loads(files["plan.json"].read_text()), json.loads(theirs["plan.json"]))
     assert files["plan.csv"].read_text().split(",p")[0] == theirs["plan.csv"].split(",p")[0]
-    ours = files["tracker.h"].read_text().split("\n", 1)  # below the line with the plan's identity
-    check_header(ours[1], theirs["tracker.h"].split("\n", 1)[1], 1e-9)
+    ours = files["schedule.h"].read_text().split("\n", 1)  # below the line with the plan's identity
+    check_header(ours[1], theirs["schedule.h"].split("\n", 1)[1], 1e-9)
     assert "<svg" in files["plan.svg"].read_text()
 
 
