@@ -23,13 +23,13 @@ main = program.main
 BAR_AFTER = 1.0  # s
 
 
-def _write(result: Plan, out: str, *lines: str, arduino: str | None = None, **pictures: Any) -> None:
+def _write(result: Plan, out: str, *lines: str, arduino: str | None = None) -> None:
     """Write a plan, and print warnings, what there is to say of it, and its files."""
     from planner.files.arduino import write_arduino
     from planner.files.plan_files import write_plan
 
     library = [] if arduino is None else [write_arduino(result, arduino)]
-    files = [*write_plan(result, out, **pictures), *library]
+    files = [*write_plan(result, out), *library]
     for warning in result.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     for line in (*result.lines(), *lines, f"-> {', '.join(map(str, files))}"):
@@ -73,24 +73,15 @@ def _planned(call: Call, *, arduino: str | None = None, **further: Any) -> Plan:
 
 
 @program.command("plan", of="planner.jobs.plan:plan", robot="--robot")
-def _plan(plan: Call, *, out: str, trade_off: bool = False, arduino: str | None = None) -> None:
-    """Plan the switching times for a path.
-
-    Args:
-        trade_off: draw error against time and flips, for ten dwells.
-    """
+def _plan(plan: Call, *, out: str, arduino: str | None = None) -> None:
+    """Plan the switching times for a path."""
     result = _planned(plan, arduino=arduino, tell=print)
-    pictures = {}
-    if trade_off:
-        from planner.files.pictures import draw_trade_off
-
-        pictures["trade_off.svg"] = draw_trade_off(result)
     errors = result.errors
     rms, largest, missed = (
         in_lab(value, result.robot) for value in (errors.drawn_rms, errors.drawn_max, result.declared.missed)
     )
     drawn = f"from the path as drawn {rms} rms, {largest} at most; every drawn point is within {missed} of the "
-    _write(result, out, f"{drawn}declared path", arduino=arduino, pictures=pictures)
+    _write(result, out, f"{drawn}declared path", arduino=arduino)
 
 
 @program.command("goal", of="planner.goal.trip:to_goal", robot="--robot")

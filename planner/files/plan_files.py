@@ -6,32 +6,26 @@ They appear together, and each has the identity of the plan, so files of two pla
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from planner.files.headers import schedule_header
-from planner.files.pictures import plan_svg
 from planner.planning.plan import KINDS, Plan
 from sim.io.files import files_together, write_numbers, write_text
 from sim.io.keywords import checks_keywords
 from sim.io.provenance import code_version
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 FILES = ("plan.json", "plan.csv", "schedule.h", "plan.svg")
-EXTRA = ("trade_off.svg", *(f"{kind}.{ending}" for kind in KINDS for ending in ("json", "svg")))  # planned before
+EXTRA = tuple(f"{kind}.{ending}" for kind in KINDS for ending in ("json", "svg"))  # planned before
 
 
 @checks_keywords
-def write_plan(result: Plan, folder: str | Path, *, pictures: Mapping[str, Figure] | None = None) -> list[Path]:
+def write_plan(result: Plan, folder: str | Path) -> list[Path]:
     """Write the files of a plan, all or none, and return their paths.
 
     Args:
         result: a plan; that of a job has goal.json, tour.json and so on, and a picture besides.
         folder: it is made if it is missing.
-        pictures: more pictures, by the name of their file, such as "trade_off.svg".
 
     Raises:
         InputError: a dwell is too short for whole milliseconds, or a file cannot be written.
@@ -45,25 +39,20 @@ def write_plan(result: Plan, folder: str | Path, *, pictures: Mapping[str, Figur
     """
     with files_together(folder, (*FILES, *EXTRA)) as temporary:
         names = _write_files(result, temporary)
-        if pictures:
-            from planner.files.pictures import write_svg  # loads matplotlib
-
-            for name, figure in pictures.items():
-                write_svg(figure, temporary / name, result.identity)
-    return [Path(folder, name) for name in (*names, *(pictures or ()))]
+    return [Path(folder, name) for name in names]
 
 
 def _write_files(result: Plan, folder: Path) -> list[str]:
     """Write the files of a plan into a folder, one after the other, and return their names."""
+    from planner.files.pictures import draw_plan, write_svg  # loads matplotlib
+
     identity, names = result.identity, list(FILES)
     write_text(folder / "plan.json", json.dumps({**result.to_dict(), "code_version": code_version()}) + "\n")
     columns = {name: values.tolist() for name, values in result.columns().items()}
     write_numbers({**columns, "plan_id": [identity] * len(result.dwells)}, folder / "plan.csv")
     write_text(folder / "schedule.h", schedule_header(result, identity))
-    write_text(folder / "plan.svg", plan_svg(result, identity))
+    write_svg(draw_plan(replace(result, job=None)), folder / "plan.svg", identity)
     if result.job is not None:
-        from planner.files.pictures import draw_plan, write_svg  # loads matplotlib
-
         names += [f"{result.job.kind}.json", f"{result.job.kind}.svg"]
         content = {**result.job.to_dict(result), "plan_id": identity}
         write_text(folder / names[-2], json.dumps(content) + "\n")

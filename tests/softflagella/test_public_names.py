@@ -132,7 +132,10 @@ from softflagella.__main__ import main
 folder = sys.argv[1]
 main(["query", "paper-control"])
 main(["steady", "paper-control"])
-main(["plan", "circle:1l", "--robot", "paper-control", "--objective", "flips", "--out", folder])
+plan = sf.plan("circle:1l", "paper-control", objective="flips")
+import json
+with open(folder + "/plan.json", "w") as file:
+    json.dump(plan.to_dict(), file)
 check(*{SLOW!r}, "pandas", "pyarrow")
 main(["replay", folder + "/plan.json", "--out", folder + "/track.csv"])
 check(*{SLOW!r})
@@ -145,6 +148,8 @@ table.query(columns | {{"dwell_bar": np.array([1.0])}}, intervals=True)
 table.response(columns)
 table.derivatives(columns, ["C_t", "disc_drag"])
 sf.Tracker(sf.restore_plan(folder + "/plan.json")).update(0.0)
+check(*{SLOW!r})
+main(["plan", "circle:1l", "--robot", "paper-control", "--objective", "flips", "--out", folder + "/plan"])
 check("torch", "scipy.stats", "scipy.integrate", "joblib")
 """
 

@@ -12,11 +12,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.figure import Figure
 
 from planner.__main__ import main
 from planner.files.headers import milliseconds
-from planner.files.pictures import SvgAxes
+from planner.files.pictures import draw_plan
 from planner.files.plan_files import write_plan
 from planner.files.tracks import check, tracking_error
 from planner.vehicle.vehicle import Switches, roll_out
@@ -26,6 +25,8 @@ from sim.model.schedule import load_schedule
 from tests.planner.compiled import compile_c
 from tests.planner.plans import CONTROL, planned, predicted_track
 from tests.sim.io.tracked_files import deeplabcut, two_robots
+
+SVG = "{http://www.w3.org/2000/svg}"
 
 
 def test_files_of_a_plan(tmp_path: Path) -> None:
@@ -71,13 +72,12 @@ def identities(folder: Path) -> set[str]:
 
 def test_all_files_name_the_same_plan_and_another_plan_replaces_them(tmp_path: Path) -> None:
     (tmp_path / "goal.json").write_text("{}")
-    write_plan(planned(), tmp_path, pictures={"trade_off.svg": Figure()})
+    write_plan(planned(), tmp_path)
     first = identities(tmp_path)
     assert not (tmp_path / "goal.json").exists()
     write_plan(planned("circle:2l", objective="flips"), tmp_path)
     assert len(first) == len(identities(tmp_path)) == 1
     assert first != identities(tmp_path)
-    assert not (tmp_path / "trade_off.svg").exists()
 
 
 def test_a_plan_that_cannot_be_drawn_leaves_the_plan_before(
@@ -89,67 +89,50 @@ def test_a_plan_that_cannot_be_drawn_leaves_the_plan_before(
     def broken(*_: object) -> None:
         raise RuntimeError
 
-    monkeypatch.setattr("planner.files.plan_files.plan_svg", broken)
+    monkeypatch.setattr("planner.files.pictures.write_svg", broken)
     with pytest.raises(RuntimeError):
         write_plan(planned("circle:2l", objective="flips"), tmp_path)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
 @pytest.mark.parametrize(
-    "name", [r"a$\frac$b", "*/ #error", '"', "ü\n"], ids=["formula", "comment", "quote", "line"]
+    "name",
+    [r"a$\frac$b", "*/ #error", '"', "a < b & c", "ü\n", "机器人"],
+    ids=["formula", "comment", "quote", "markup", "line", "letters"],
 )
 def test_any_name_of_a_robot_can_be_drawn_and_compiled(name: str, tmp_path: Path) -> None:
     result = planned("circle:2l", objective="flips")
     named = replace(result, tracked=result.tracked._replace(robot=replace(CONTROL, name=name)))
     write_plan(named, tmp_path)
     assert len(identities(tmp_path)) == 1
+    assert name.split("\n")[0] in "".join(ElementTree.parse(tmp_path / "plan.svg").getroot().itertext())
     source = '#include "schedule.h"\nint main(void){return schedule_ms[0]==0;}'
     (tmp_path / "main.c").write_text(source)
     compile_c(tmp_path / "main.c", tmp_path / "main", "-O0", "-Wno-unused")
 
 
-SVG = "{http://www.w3.org/2000/svg}"
+@pytest.mark.parametrize("path", ["circle:2l", ((0.0, 0.0), (12.0, 0.0)), ((0.0, 0.0), (0.3, 6.0))])
+def test_the_frame_holds_the_plan_at_one_scale(path: Any) -> None:
+    """A flat or narrow plan, too, has a frame with room for numbers and labels."""
+    (axes,) = draw_plan(planned(path, objective="flips")).axes
+    axes.apply_aspect()
+    across, up = (axes.transData.transform((1.0, 1.0)) - axes.transData.transform((0.0, 0.0))).tolist()
+    assert across == pytest.approx(up)
+    drawn, shown = axes.dataLim, axes.viewLim
+    assert (shown.min < drawn.min).all()
+    assert (shown.max > drawn.max).all()
+    assert (axes.bbox.size / axes.figure.dpi >= (4.0, 1.0)).all()
+    assert len(axes.get_xticks()) > 2
+    assert len(axes.get_yticks()) > 2
 
 
-def places(text: str) -> list[np.ndarray]:
-    """Return the points of every path in px."""
-    found = []
-    for path in ElementTree.fromstring(text.encode()).iter(f"{SVG}path"):
-        pairs = [word.split(",") for word in path.attrib["d"].split()[1:] if "," in word]
-        found.append(np.array(pairs, dtype=float))
-    return found
-
-
-@pytest.mark.parametrize("size", [(3.0, 1.0), (1.0, 400.0), (0.002, 0.002), (5.0, 0.0)])
-def test_scales_are_equal_and_ticks_are_in_place(size: tuple[float, float]) -> None:
-    axes = SvgAxes()
-    corners = np.array([7.0, -2.0]) + np.array([[0.0, 0.0], [size[0], 0.0], size, [0.0, size[1]]])
-    axes.fill(*corners.T, color="#aabbcc")
-    text = axes.text("p1")
-    drawn, root = places(text)[0], ElementTree.fromstring(text.encode())
-    _, frame = (rect.attrib for rect in root.iter(f"{SVG}rect"))
-    x, y, width, height = (float(frame[name]) for name in ("x", "y", "width", "height"))
-    assert ((drawn > [x, y]) & (drawn < [x + width, y + height])).all()
-    scale = np.ptp(drawn, axis=0).max() / max(size)
-    x, y = (drawn - drawn[0]).T
-    assert x == pytest.approx(scale * (corners - corners[0])[:, 0], abs=0.02)
-    assert y == pytest.approx(-scale * (corners - corners[0])[:, 1], abs=0.02)
-    words = [word for word in root.iter(f"{SVG}text") if word.text]
-    below = [word for word in words if word.attrib["text-anchor"] == "middle"]
-    assert 2 <= len(below) <= 7
-    for word in below:
-        number = float((word.text or "").replace("−", "-"))
-        assert float(word.attrib["x"]) == pytest.approx(drawn[0, 0] + scale * (number - 7.0), abs=0.6)
-
-
-def test_any_words_can_be_written() -> None:
-    axes = SvgAxes()
-    axes.plot(1.0, 2.0, "o", color="#000000", label='a < b & "c"')
-    axes.set_title("first\n<second>")
-    axes.set_xlabel("x")
-    axes.set_ylabel("y")
-    texts = [word.text for word in ElementTree.fromstring(axes.text("p&1").encode()).iter(f"{SVG}text")]
-    assert {"first", "<second>", 'a < b & "c"', "x", "y"} <= set(texts)
+def test_a_plan_has_one_picture_with_words(tmp_path: Path) -> None:
+    """The same bytes each time; words can be found."""
+    pictures = [write_plan(planned(), tmp_path / name)[-1].read_text() for name in ("one", "two")]
+    assert pictures[0] == pictures[1]
+    texts = {word.text for word in ElementTree.fromstring(pictures[0].encode()).iter(f"{SVG}text")}
+    assert {"x [cm]", "y [cm]", "path as given", "declared", "predicted", "0"} <= texts
+    assert any("dwells" in str(text) for text in texts)
 
 
 def test_a_long_dwell_is_drawn_as_a_curve() -> None:
