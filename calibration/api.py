@@ -16,7 +16,6 @@ from calibration.report.corrected_robot import check_given
 from calibration.report.path_error import path_errors, wanted_paths
 from calibration.report.robot_verdict import RobotVerdict, read_runs
 from calibration.swimmer.camera_tracks import measure_tracks
-from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.possible_runs import Owned, owned
 from calibration.swimmer.swimmer import SwimmerModel
@@ -98,7 +97,6 @@ def calibrate(
         model,
         held_out=held_out,
         describe=find_laws if laws else None,
-        correction=learn_head_correction,
         seed=seed,
         max_seconds=limit,
         progress=progress,

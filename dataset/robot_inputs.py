@@ -28,7 +28,7 @@ LENGTHS = {"tail_length": "cm", "tail_radius": "mm", "head_radius": "mm", "head_
 WITH_UNIT = {**LENGTHS, "youngs_modulus": "MPa", "viscosity": "Pa_s", "motor_speed": "rpm"}
 WITHOUT_UNIT = {"N": "tails", "C_t": "C_t", "C_r": "C_r", "C_yr": "C_yr"}
 FIELDS = {*WITH_UNIT, *WITHOUT_UNIT.values()}  # that a sweep may vary
-_UNUSED = ("name", "sigmas", "correction", "learnt_from")  # of a robot, in a sweep
+_UNUSED = ("name", "sigmas", "learnt_from")  # of a robot, in a sweep
 
 
 def robot_of_sweep(source: object, folder: Path) -> dict[str, Any]:
@@ -39,7 +39,8 @@ def robot_of_sweep(source: object, folder: Path) -> dict[str, Any]:
         folder: of the sweep.toml.
 
     Raises:
-        InputError: there is no such robot, it has a correction, or its fields are damaged.
+        InputError: there is no such robot, it has a law that holds between its runs only, or its fields are
+            damaged.
     """
     if isinstance(source, dict):
         try:
@@ -56,11 +57,10 @@ def robot_fields(robot: Robot) -> dict[str, Any]:
     """Return the fields of a robot that a sweep keeps.
 
     Raises:
-        InputError: the robot has a correction, or a law that holds between its runs only.
+        InputError: the robot has a law that holds between its runs only.
     """
-    for table, held in (("correction", robot.correction), ("learnt_from", robot.learnt_from)):
-        if held is not None:
-            raise InputError(f"robot {robot.name!r} has a table [{table}], which no sweep covers; give it without")
+    if robot.learnt_from is not None:
+        raise InputError(f"robot {robot.name!r} has a table [learnt_from], which no sweep covers; give it without")
     return {
         field.name: dict(value) if isinstance(value := getattr(robot, field.name), Mapping) else value
         for field in fields(robot)

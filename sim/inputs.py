@@ -20,8 +20,8 @@ from sim.io.files import write_text
 from sim.io.keywords import checks_keywords
 from sim.io.reading import read_toml
 from sim.io.units import to_si
-from sim.model.correction import read_correction, read_learnt_range
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, checked_values
+from sim.model.learnt_range import read_learnt_range
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import doubtful, read_robot, robot_toml
@@ -161,14 +161,15 @@ def _read_robot(path: Path) -> Robot:
     tables = read_toml(path)
     name = tables.pop("name", path.stem)
     tables.pop("calibration", None)  # read by planner.vehicle.calibration_table
-    correction = read_correction(tables.pop("correction")) if "correction" in tables else None
+    if "correction" in tables:
+        raise InputError("[correction] is no longer read; calibrate the robot as it was given again")
     learnt_from = read_learnt_range(tables.pop("learnt_from")) if "learnt_from" in tables else None
     effects = tables.pop("effects", {})
     if not isinstance(effects, dict):
         raise InputError(f"effects = {effects!r}; write a table [effects] with lines name = size")
     values = read_robot(tables)
     check_effects(effects)
-    robot = Robot(name=str(name), effects=dict(effects), correction=correction, learnt_from=learnt_from, **values)
+    robot = Robot(name=str(name), effects=dict(effects), learnt_from=learnt_from, **values)
     if doubts := ", ".join(doubtful(tables)):
         warnings.warn(f"{path}: {doubts}", InputWarning, stacklevel=1)  # from one place, so once a command
     return robot

@@ -29,7 +29,6 @@ from tqdm import tqdm
 
 from calibration.report.corrected_robot import corrected_robot, corrected_toml
 from calibration.report.report import write_report
-from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
@@ -214,10 +213,10 @@ def _calibrate(folder: Path, name: str) -> tuple[Verdict, Measurements]:
     case.mkdir(exist_ok=True)
     write_csv(table, case / "table.csv", digits=6)
     data = read_measurements(case / "table.csv")
-    verdict = calibrate(SwimmerModel(start, data), correction=learn_head_correction)
+    verdict = calibrate(SwimmerModel(start, data))
     record = verdict_record(verdict, table="table.csv")
     write_text(case / "verdict.json", json.dumps(record, indent=1) + "\n")
     write_report(verdict, record | {"table": f"table with {name}"}, case / "report.html")
-    write_text(case / "corrected.toml", corrected_toml(start, verdict.final_refit, verdict.learnt))
+    write_text(case / "corrected.toml", corrected_toml(start, verdict.final_refit))
     print(f"  {name}: {verdict.sentence}")
     return verdict, data

@@ -131,7 +131,7 @@ def _variants(robot: Robot, group: str) -> list[Robot]:
     for value in values:
         try:
             variant = replace(robot, **{_NUMBERS[group].field: value})
-            variant.group_values()  # a correction has a range of its own
+            variant.group_values()  # a law has a range of its own
         except InputError:
             continue
         robots.append(variant)

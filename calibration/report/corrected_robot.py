@@ -5,9 +5,6 @@ The covariance is that of the fit to all runs. It goes into the table [calibrati
 the heading, the tachometer, the tracked point, slip of the motor and drift between runs. The errors of what is
 kept contain the errors of these. A current in the tank is stated on its own.
 
-Where no effect explains the runs, a correction goes into the table [correction] (`sim.model.correction`). Its
-uncertainty is that of its weights and of what it leaves beyond noise, at the robot of the file.
-
 **A law** is an effect by its name (`sim.model.laws`), whose factor is 1 at the paper's control example; that
 of the fit is 1 at the geometric mean of the runs. So the size of a term, or the coefficient that a factor
 multiplies, is written for the control example. Exponents are rounded to thousandths.
@@ -21,7 +18,7 @@ over those of the mean,
 A side force with a lever is handed on as what it is at the disc, a force and a couple, so that the uncertainty of
 its lever is that of the couple: δM/M = δε/ε + δλ/λ. Noted inputs are at the means of the runs.
 
-The range of the runs goes into the table [learnt_from] (`sim.model.correction`).
+The range of the runs goes into the table [learnt_from] (`sim.model.learnt_range`).
 """
 
 from __future__ import annotations
@@ -38,7 +35,6 @@ from calibration.laws.laws import Law
 from calibration.laws.readings import EXPONENTS
 from calibration.statistics.statistical_model import Parameters
 from calibration.statistics.study import FinalRefit, refit_to_all
-from calibration.swimmer.head_correction import HeadCorrection
 from calibration.swimmer.influences import CURRENT, LENGTH
 from calibration.swimmer.swimmer import robot_numbers
 from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge, knowledge_toml
@@ -47,8 +43,8 @@ from sim.effects import catalogue, effect_named, is_effect
 from sim.io.errors import InputError
 from sim.io.reading import sealed
 from sim.io.units import from_si, to_si
-from sim.model.correction import learnt_range
 from sim.model.laws import Load, make_law
+from sim.model.learnt_range import learnt_range
 from sim.model.presets import CONTROL
 from sim.model.robot import Robot
 from sim.model.robot_toml import ENTRIES, robot_toml
@@ -58,13 +54,12 @@ _CERTAIN = 1e-12  # least variance of a logarithm, and of a correlated combinati
 
 
 def check_given(robot: Robot) -> None:
-    """Refuse a robot that already has a correction or a law: its table of runs belongs to the robot as given."""
-    for table, held in (("correction", robot.correction), ("learnt_from", robot.learnt_from)):
-        if held is not None:
-            raise InputError(
-                f"robot {robot.name!r} has a table [{table}] from an earlier calibration: calibrate the robot as "
-                "it was given, with the runs of both"
-            )
+    """Refuse a robot that already has a law: its table of runs belongs to the robot as given."""
+    if robot.learnt_from is not None:
+        raise InputError(
+            f"robot {robot.name!r} has a table [learnt_from] from an earlier calibration: calibrate the robot as "
+            "it was given, with the runs of both"
+        )
 
 
 def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:
@@ -112,9 +107,9 @@ def calibration_knowledge(
     )
 
 
-def corrected_toml(robot: Robot, final: FinalRefit, learnt: HeadCorrection | None = None) -> str:
-    """Write corrected.toml, with the correction that was `learnt` where nothing explains the runs."""
-    return as_toml(*handed_on(robot, final, learnt))
+def corrected_toml(robot: Robot, final: FinalRefit) -> str:
+    """Write corrected.toml."""
+    return as_toml(*handed_on(robot, final))
 
 
 def as_toml(robot: Robot, known: CalibrationKnowledge) -> str:
@@ -122,16 +117,10 @@ def as_toml(robot: Robot, known: CalibrationKnowledge) -> str:
     return sealed(robot_toml(robot) + "\n" + knowledge_toml(known))
 
 
-def handed_on(
-    robot: Robot, final: FinalRefit, learnt: HeadCorrection | None = None
-) -> tuple[Robot, CalibrationKnowledge]:
-    """Return the corrected robot and what is known about it, see `corrected_toml`."""
-    corrected = corrected_robot(robot, final.parameters)
+def handed_on(robot: Robot, final: FinalRefit) -> tuple[Robot, CalibrationKnowledge]:
+    """Return the corrected robot and what is known about it."""
     known = calibration_knowledge(robot, final)
-    if learnt:
-        known = _with_correction(known, learnt, corrected)
-        corrected = replace(corrected, correction=learnt.correction)
-    return significant(corrected, known), known
+    return significant(corrected_robot(robot, final.parameters), known), known
 
 
 def significant(robot: Robot, known: CalibrationKnowledge) -> Robot:
@@ -159,22 +148,6 @@ def _rounded(value: float, sigma: float, unit: str = "") -> float:
     number, error = (from_si(size, unit) if unit else size for size in (value, abs(sigma)))
     rounded = round(number, 1 - math.floor(math.log10(error)))
     return to_si(rounded, unit) if unit else rounded
-
-
-def _with_correction(known: CalibrationKnowledge, learnt: HeadCorrection, robot: Robot) -> CalibrationKnowledge:
-    """Add the uncertainty of the correction at this robot; nothing if the robot is outside the runs."""
-    values = robot.group_values()
-    try:
-        learnt.correction.applied(values)
-    except InputError:
-        return known
-    knobs = tuple(learnt.correction.weights)
-    names = (*known.names, *(name for name in knobs if name not in known.names))
-    covariance = np.zeros((len(names), len(names)))
-    covariance[: len(known.names), : len(known.names)] = known.covariance
-    places = [names.index(name) for name in knobs]
-    covariance[np.ix_(places, places)] += learnt.knob_covariance(values)
-    return replace(known, names=names, covariance=covariance)
 
 
 def law_handed_on(given: Robot, law: Law, rows: Flags) -> tuple[Robot, CalibrationKnowledge]:

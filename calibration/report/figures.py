@@ -45,8 +45,6 @@ def compared(result: Verdict) -> list[tuple[str, Floats]]:
         models.append((final, result.final.prediction))
     elif result.described and result.law is not None:
         models.append(("with the law in corrected.toml", result.law.prediction))
-    elif result.learnt is not None:
-        models.append(("with the correction in corrected.toml", result.learnt.prediction))
     return models
 
 

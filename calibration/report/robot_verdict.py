@@ -74,7 +74,7 @@ class RobotVerdict(Shown, Verdict):
     def _handed_on(self) -> tuple[Robot, CalibrationKnowledge]:
         if self.law and self.described:
             return law_handed_on(self.robot, self.law.kept[0], self.split.kept)
-        return handed_on(self.robot, self.final_refit, self.learnt)
+        return handed_on(self.robot, self.final_refit)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the residual of each output, before and after, over the noise of a run.

@@ -297,16 +297,15 @@ class FinalRefit:
     covariance: Floats  # (p, p); a 95 % interval is 1.96 standard deviations to each side
 
 
-def refit_to_all(model: ForwardModel, fitted: Fit, rows: Flags, *, moved: bool = True) -> FinalRefit:
-    """Fit a fitted model to all runs in `rows` by one linear step; without the step if not `moved`.
+def refit_to_all(model: ForwardModel, fitted: Fit, rows: Flags) -> FinalRefit:
+    """Fit a fitted model to all runs in `rows` by one linear step.
 
     The covariance allows for the estimates of S and ρ, as the intervals of the fit do.
     """
     refit = fitted.products(model.runs, rows).solve(passes=3)
-    step = refit.step if moved else np.zeros_like(refit.step)
     at = replace(
         fitted,
-        parameters=stepped(fitted.fitted, fitted.parameters, step),
+        parameters=stepped(fitted.fitted, fitted.parameters, refit.step),
         covariance=fitted.inflation * refit.covariance,
     )
     return final_refit(at)

@@ -11,8 +11,8 @@
 4. The verdict (`calibration.verdict.verdict.Explained`).
 5. If several explanations are left, next runs that would tell them apart (`calibration.verdict.next_runs`).
    If nothing explains the residual, laws that describe it (`describe`). Where none does, the nearest form is
-   adopted (`calibration.attribution.nearest`), and a correction of what is left is handed on for steering. If
-   something outside the catalogue could imitate what is claimed, laws that fit as well.
+   adopted (`calibration.attribution.nearest`). If something outside the catalogue could imitate what is claimed,
+   laws that fit as well.
 6. Errors on the held-out runs: as given, calibrated, with the effect, with a regression of the residual
    (`calibration.statistics.residual_regression`), and from noise alone. Whether the held-out runs agree with the
    final model (`calibration.statistics.study`).
@@ -27,7 +27,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from calibration.attribution.claim_checks import check_number, with_checks
 from calibration.attribution.moves import Move, StatedMove, find_moves, groups_that_may_differ
@@ -56,13 +56,11 @@ from calibration.statistics.fit import Fit, fit, profile_intervals
 from calibration.statistics.gls import repeat_count
 from calibration.statistics.residual_regression import Regression, regress_residual
 from calibration.statistics.residual_tests import directions, examine_residual
-from calibration.statistics.shifted import Shifted
 from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values
 from calibration.statistics.study import (
     DRAWS,
     LEVEL,
     FinalRefit,
-    Split,
     Study,
     caveat_of_excluded,
     error_interval,
@@ -88,20 +86,16 @@ from sim.io.provenance import fingerprint
 
 if TYPE_CHECKING:
     from calibration.laws.laws import Laws
-    from calibration.swimmer.head_correction import HeadCorrection
 
 _SEARCH, _DESCRIBED = 0.6, 0.85  # shares of the time after which effects and descriptions are no longer looked for
 _SHARE_OF_TEST = 0.2  # of the time of the first tests, for those of what an effect leaves, with fewer draws
 
-Subject = TypeVar("Subject", bound=Experiment)
-
 
 def calibrate(
-    model: Subject,
+    model: Experiment,
     *,
     held_out: Flags | None = None,
     describe: Callable[..., Laws | None] | None = None,
-    correction: Callable[[Subject, Fit, Split], HeadCorrection | None] | None = None,
     level: float = LEVEL,
     seed: int = 0,
     draws: int = DRAWS,
@@ -115,8 +109,6 @@ def calibrate(
         held_out: (n,) runs kept for the test, whole sessions; default `study.middle_session`.
         describe: looks for laws where nothing explains the residual, and beside an uncertain claim, such as
             `calibration.laws.laws.find_laws`.
-        correction: learns a correction of the calibrated model where nothing explains the residual and no law
-            describes it, such as `calibration.swimmer.head_correction.learn_head_correction`.
         level: α of every claim.
         seed: of the bootstrap; the same seed gives the same result.
         draws: of the bootstrap. It resolves no smaller p-value than 2/(draws + 1).
@@ -126,9 +118,9 @@ def calibrate(
     """
     began = time.process_time()
     study, base, uncalibrated = first_fit(model, held_out, level=level, seed=seed, draws=draws, progress=progress)
-    model, split = cast(Subject, study.model), study.split
+    model, split = cast(Experiment, study.model), study.split
     used = time.process_time() - began
-    laws, learnt = None, None
+    laws = None
     with limited(_DESCRIBED * max_seconds - used) as budget:
         with limited(_SEARCH * max_seconds - used):
             study, found, moves = _explain_with_moves(study, base)
@@ -139,11 +131,10 @@ def calibrate(
         if unexplained and not described:
             nearest = adopt_nearest(study, found.base, found.misfit, found.candidates, found.tangents)
             found = replace(found, nearest=nearest)
-            learnt = correction(model, _of_runs(study, found), split) if correction else None
         of_all, moves_of_all = _fit_moves(study, model, found)
     moves, with_moves = (moves_of_all, of_all) if of_all else (moves, found.base)
     regression = regress_residual(model.runs, found.base.prediction, split.fitted)
-    errors = _errors(study, found, uncalibrated, regression, learnt, laws)
+    errors = _errors(study, found, uncalibrated, regression, laws)
     falls = errors.rms["after"] < errors.rms["before"]
     as_good = laws.as_good_as(found.final) if laws and uncertain else ()
     rivals = described.rivals if described else found.rivals(cast(Experiment, study.model), as_good)
@@ -166,9 +157,8 @@ def calibrate(
         base_intervals=base_intervals,
         final_intervals=final_intervals,
         pulls=pulls(found.final, study.model.nuisances),
-        final_refit=final_refit(of_all) if of_all else _handed_on(study, found, falls=falls, moved=learnt is None),
+        final_refit=final_refit(of_all) if of_all else _handed_on(study, found, falls=falls),
         regression=regression,
-        learnt=learnt,
         law=laws,
         explanations=tuple(map(Explanation.from_rival, rivals)),
         **_next_runs(rivals, seed),
@@ -250,16 +240,6 @@ def _fit_moves(study: Study, plain: Experiment, found: Explained) -> tuple[Fit |
     return fitted if moves else None, moves
 
 
-def _of_runs(study: Study, found: Explained) -> Fit:
-    """Return the fit that a correction starts from, with the parameters of the model itself, some of every run."""
-    nearest = found.nearest
-    fitted, model = (nearest.fit, nearest.model) if nearest else (found.base, study.model)
-    parameters = fitted.parameters
-    while isinstance(model, Shifted):
-        parameters, model = model.of_runs(parameters), model.inner
-    return replace(fitted, parameters=parameters)
-
-
 def explain(study: Study, base: Fit) -> Explained:
     """Test the residual of the fit without effects, and look for what explains it, from the simplest on."""
     model, level = study.model, study.level
@@ -329,12 +309,12 @@ def _intervals(model: ForwardModel, fitted: Fit, used: Flags, title: str) -> dic
         return {name: fitted.interval(name) for name in fitted.names}
 
 
-def _handed_on(study: Study, found: Explained, *, falls: bool, moved: bool) -> FinalRefit:
+def _handed_on(study: Study, found: Explained, *, falls: bool) -> FinalRefit:
     """Fit the final model to all runs, an adopted form only where it lowers the error on the held-out ones."""
     nearest, final = found.nearest, found.final
     if nearest and not falls:
         nearest, final = None, found.base
-    refit = refit_to_all(study.model, final, study.split.kept, moved=moved)
+    refit = refit_to_all(study.model, final, study.split.kept)
     return nearest.handed_on(refit) if nearest else refit
 
 
@@ -347,9 +327,8 @@ def _next_runs(rivals: tuple[Rival, ...], seed: int) -> dict[str, Any]:
 
 
 def _errors(
-    study: Study, found: Explained, uncalibrated: Floats, regression: Regression,
-    learnt: HeadCorrection | None, laws: Laws | None,
-) -> HeldOutErrors:  # fmt: skip
+    study: Study, found: Explained, uncalibrated: Floats, regression: Regression, laws: Laws | None
+) -> HeldOutErrors:
     """State the errors of every model on the held-out runs."""
     base, final = found.base, found.final
     runs, test = study.model.runs, study.split.test
@@ -359,8 +338,6 @@ def _errors(
         "after": final.prediction,
         "generic": base.prediction + regression.correction,
     }
-    if learnt is not None:
-        predictions["predictive"] = learnt.prediction
     if laws is not None:
         predictions["law"] = laws.prediction
     if found.nearest and found.nearest.sizes:

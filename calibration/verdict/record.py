@@ -24,7 +24,7 @@ from surrogate.domain import COEFFICIENTS
 if TYPE_CHECKING:
     from calibration.verdict.verdict import Verdict
 
-MODELS = ("uncalibrated", "before", "after", "generic", "predictive", "law", "new_specimen")  # with stated errors
+MODELS = ("uncalibrated", "before", "after", "generic", "law", "new_specimen")  # with stated errors
 _REPEATED = 5  # settings that are proposed for repeats where nothing explains the residual
 _NEAR = 0.5  # share of the residual that the best effect must remove to be named where none explains it
 
@@ -240,10 +240,9 @@ def _largest_departures(result: Verdict) -> list[dict[str, Any]]:
 
 
 def _descriptions(result: Verdict) -> dict[str, Any]:
-    learnt, law = result.learnt, result.law
+    law = result.law
     return {
         "generic_features": list(result.regression.features),
-        "correction_terms": list(learnt.terms) if learnt else [],
         "laws": law.to_dict(result.final if result.explaining else None) if law else None,
         "described": result.described,
     }

@@ -23,7 +23,6 @@ from calibration.statistics.residual_regression import Regression
 from calibration.statistics.residual_tests import Directions, Misfit
 from calibration.statistics.statistical_model import Experiment, Runs
 from calibration.statistics.study import FinalRefit, Split, count_of_rows, summary_of_excluded
-from calibration.swimmer.head_correction import HeadCorrection
 from calibration.verdict.next_runs import Batch, Explanation, NextRun
 from calibration.verdict.record import facts
 from calibration.words.render import errors_in_words, sentence
@@ -96,8 +95,8 @@ class HeldOutErrors:
     """How far each model is from the held-out runs, relative rms, and how far noise alone would be.
 
     The models are "uncalibrated", "before" (calibrated), "after" (with the effects of the verdict), "generic"
-    (with a regression of the residual), and, if there are such, "law" (with the best law), "predictive" (with a
-    learnt correction) and "new_specimen" (the adopted form with its mean size for every specimen).
+    (with a regression of the residual), and, if there are such, "law" (with the best law) and "new_specimen" (the
+    adopted form with its mean size for every specimen).
     """
 
     rms: dict[str, float]  # of each model, over all outputs
@@ -128,7 +127,6 @@ class Verdict:
     pulls: tuple[Pull, ...]  # of every nuisance parameter in the final model, the farthest first
     final_refit: FinalRefit  # the final model, fitted to all runs
     regression: Regression  # of the residual, for comparison
-    learnt: HeadCorrection | None  # the correction that is handed on where nothing explains or describes it
     law: Laws | None  # laws, where they were looked for
     explanations: tuple[Explanation, ...]  # that the runs cannot tell apart, best first; none if there are not two
     next_runs: tuple[NextRun, ...]  # single settings that would, the best first
@@ -197,18 +195,11 @@ class Verdict:
         return self.errors.rms["after"]
 
     @property
-    def error_predictive(self) -> float | None:
-        """Relative error with the learnt correction on the held-out runs, if there is one."""
-        return self.errors.rms.get("predictive")
-
-    @property
     def error_corrected(self) -> float:
         """Relative error of the corrected robot on the held-out runs."""
         if self.described:
             return self.errors.rms["law"]
-        if self.nearest and not self.held_out_error_falls and self.error_predictive is None:
-            return self.error_before
-        return self.error_after if self.error_predictive is None else self.error_predictive
+        return self.error_before if self.nearest and not self.held_out_error_falls else self.error_after
 
     @property
     def noise_ceiling(self) -> float:

@@ -1,6 +1,6 @@
 /* The vehicle that a look-up table gives for a robot: both directions, what is uncertain, and the current.
  *
- * Robots with effects, a correction or a calibration, and tables of one robot, are asked by Python, which writes the
+ * Robots with effects or a calibration, and tables of one robot, are asked by Python, which writes the
  * parts of their vehicle. Lengths in l, times in μ0 l⁴/EI. */
 import { CONSTANTS } from "./constants.js";
 import { MIRROR } from "./math.js";

@@ -3,8 +3,8 @@
  *
  * A robot is {name, tails, tailLength, tailRadius, youngsModulus, headRadius, headLength, viscosity, motorSpeed, C_t,
  * C_r, C_yr, discOffset, sigmas} and what follows from them: timeScale [s] and omegaBar. Lengths in m, modulus in Pa,
- * viscosity in Pa s, speed in rad/s. A robot whose groups Python has written, with its effects and corrections, has
- * them as `groups`; a file with effects, a correction or a calibration is refused: Python makes its vehicle. */
+ * viscosity in Pa s, speed in rad/s. A robot whose groups Python has written, with its effects, has them
+ * as `groups`; a file with effects or a calibration is refused: Python makes its vehicle. */
 import { CONSTANTS } from "./constants.js";
 import { isWhole } from "./seals.js";
 import { UNITS, fromSi, splitName, toSi } from "./units.js";
@@ -16,7 +16,7 @@ const POSITIVE = {
   tail_length: "tailLength", tail_radius: "tailRadius", youngs_modulus: "youngsModulus", head_radius: "headRadius",
   head_length: "headLength", viscosity: "viscosity", motor_speed: "motorSpeed", C_t: "C_t", C_r: "C_r",
 };
-const LOCKED = ["effects", "correction", "learnt_from", "calibration"];
+const LOCKED = ["effects", "learnt_from", "calibration"];
 const WORDS = /"(?:[^"\\\n]|\\.)*"?|'[^'\n]*'?|[^\s,[\]"'#]+/g; // of a value
 const DECIMAL = /^[+-]?(?:0|[1-9](?:_?\d)*)(?:\.\d(?:_?\d)*)?(?:[eE][+-]?\d(?:_?\d)*)?$/;
 const DECIMAL_COMMA = /^[ \t]*[\w-]+[ \t]*=[ \t]*([+-]?\d{1,20}),(\d{1,20})[ \t]*(?:#.*)?$/m;
@@ -67,6 +67,9 @@ function groupValues(robot) {
 /* Read a robot. where: the file's name, for messages. */
 function readRobot(text, where) {
   const { name = where.replace(/\.[^.]*$/, ""), ...tables } = readToml(text.replace(/^\ufeff/, ""), where);
+  if ("correction" in tables) {
+    throw new InputError(`${where}: [correction] is no longer read; calibrate the robot as it was given again`);
+  }
   const locked = LOCKED.find((table) => table in tables);
   if (locked) {
     throw new InputError(

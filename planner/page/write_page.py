@@ -165,8 +165,6 @@ def _locked(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowledge) 
     """Say why the page cannot compute another robot than this one; empty: it can."""
     if robot.effects:
         return f"This robot has effects ({', '.join(robot.effects)}), which the page does not compute anew."
-    if robot.correction is not None:
-        return "This robot has a calibration's correction, which the page does not compute anew."
     if knowledge.names or any(knowledge.current):
         return "A calibration has measured this robot; the page has its vehicle, and computes no other."
     if not isinstance(lookup, NeuralTable):

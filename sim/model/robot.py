@@ -15,8 +15,8 @@ from dataclasses import dataclass, field, replace
 from sim.io.errors import InputError
 from sim.io.notebook import Shown
 from sim.io.units import format_length, from_si
-from sim.model.correction import Correction, LearntRange
 from sim.model.groups import Groups, check_finite, check_positive, check_slenderness, check_tails
+from sim.model.learnt_range import LearntRange
 from sim.model.uncertainty import DEFAULTS, Sigma
 
 
@@ -50,7 +50,6 @@ class Robot(Shown):
     disc_offset: float | None = None  # a; None: the head's radius
     effects: Mapping[str, float] = field(default_factory=dict)  # name -> size
     sigmas: Mapping[str, Sigma] = field(default_factory=dict)  # of the fields that state one, see `sigma`
-    correction: Correction | None = None  # what a calibration learnt that no effect explains
     learnt_from: LearntRange | None = None  # the runs that its law was learnt from
 
     def __post_init__(self) -> None:
@@ -83,8 +82,6 @@ class Robot(Shown):
         ]
         if self.effects:
             lines.append("  effects: " + ", ".join(f"{name} {size:.4g}" for name, size in self.effects.items()))
-        if self.correction is not None:
-            lines.append("  with the correction of a calibration")
         return "\n".join(lines)
 
     def sigma(self, name: str) -> Sigma:
@@ -115,15 +112,15 @@ class Robot(Shown):
         """Compute the dimensionless groups of this robot by column name, for the positive direction of the motor.
 
         Raises:
-            InputError: the robot has a correction or a law, and is outside the runs that it was learnt from.
+            InputError: the robot has a law, and is outside the runs that it was learnt from.
         """
         values = self._given_groups()
         if self.learnt_from is not None:
-            self.learnt_from.check(values, "law")
-        return values if self.correction is None else self.correction.applied(values)
+            self.learnt_from.check(values)
+        return values
 
     def _given_groups(self) -> dict[str, float]:
-        """Compute the groups without the correction."""
+        """Compute the groups of any robot, within the runs of its law or not."""
         return {
             "C_t": self.C_t,
             "C_r": self.C_r,

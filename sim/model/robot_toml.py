@@ -1,7 +1,7 @@
 """robot.toml: a robot in the units of a laboratory, with comments.
 
-The file has the tables [tails], [head], [fluid], [motor], [drag] and, if there are any, [effects], [correction]
-and [learnt_from]. A key is a quantity with its unit as suffix: length_cm, speed_rpm, viscosity_Pa_s. Every usual
+The file has the tables [tails], [head], [fluid], [motor], [drag] and, if there are any, [effects] and
+[learnt_from]. A key is a quantity with its unit as suffix: length_cm, speed_rpm, viscosity_Pa_s. Every usual
 unit is read (`sim.io.units`), one is written. KEY_sigma states one standard deviation of a measured number: a
 number in the unit of its key, or a text like "10 %".
 """
@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 
 from sim.io.errors import InputError
 from sim.io.units import UNITS, from_si, of_kind, split, to_si
-from sim.model.correction import correction_tables
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.uncertainty import DEFAULTS, Sigma, read_sigma, sigma_text
@@ -85,7 +84,7 @@ def read_robot(tables: Mapping[str, Any]) -> dict[str, Any]:
     """Read the fields of `Robot` in SI units, and `sigmas`, from the tables of a robot.toml.
 
     Args:
-        tables: as parsed, without name, effects, correction, learnt_from and calibration.
+        tables: as parsed, without name, effects, learnt_from and calibration.
 
     Raises:
         InputError: an entry is unknown, missing, given twice, without a unit, or no number.
@@ -154,12 +153,10 @@ def robot_toml(robot: Robot) -> str:
             lines.append(_sigma_line(robot.sigmas[entry.field], entry.with_unit(unit), entry))
     if robot.effects:
         tables["effects"] = [f"{name} = {float(size)!r}" for name, size in robot.effects.items()]
-    if robot.correction:
-        tables["correction"] = [f"{k} = {json.dumps(v)}" for k, v in correction_tables(robot.correction).items()]
     if robot.learnt_from:
         learnt = robot.learnt_from
         tables["learnt_from"] = [f"low = {list(learnt.low)}", f"high = {list(learnt.high)}"]
-    known = [*dict.fromkeys(entry.table for entry in ENTRIES), "effects", "correction", "learnt_from"]
+    known = [*dict.fromkeys(entry.table for entry in ENTRIES), "effects", "learnt_from"]
     order = sorted(tables, key=known.index)
     blocks = ["\n".join([f"[{table}]", *tables[table]]) for table in order]
     name = json.dumps(robot.name, ensure_ascii=False).replace("\x7f", "\\u007f")  # escapes as TOML does

@@ -19,7 +19,6 @@ from calibration.laws.places import place_named
 from calibration.report.robot_verdict import RobotLaws, RobotVerdict, find_robot_laws
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.statistical_model import start_values
-from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.influences import influences
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.possible_runs import Owned
@@ -96,7 +95,7 @@ def calibrated(
     """Calibrate the toy with a table."""
     with on_the_toy(few=few):
         model = toy_swimmer(table, robot)
-        return calibrate(model, correction=learn_head_correction, draws=draws, progress=False, **options)
+        return calibrate(model, draws=draws, progress=False, **options)
 
 
 @shared

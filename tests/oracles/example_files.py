@@ -22,7 +22,7 @@ from planner.jobs.plan import plan
 from planner.paths.path import circle
 from planner.vehicle.calibration_table import CalibrationKnowledge, knowledge_toml
 from sim.io.provenance import fingerprint
-from sim.model.correction import Correction
+from sim.model.learnt_range import LearntRange
 from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
 from sim.motion.steady_motion import STEADY_OUTPUTS
@@ -48,10 +48,8 @@ def text(columns: Mapping[str, Any] | pd.DataFrame) -> bytes:
 
 @cache
 def corrected() -> bytes:
-    low = (2.0, 1.9, -6.0)
-    correction = Correction(low, (1.0, 0.2, 0.5), low, (4.0, 2.1, -4.0), ((0, 0, 0), (1, 0, 2)),
-                            {"C_t": (0.1, 0.0), "surface_couple": (0.2, -0.1)}, 0.02, 0.05)  # fmt: skip
-    robot = replace(ROBOT, effects={"end_over_end_drag": 4.5}, disc_offset=0.012, correction=correction)
+    learnt_from = LearntRange((2.0, 1.9, -6.0), (4.0, 2.1, -4.0))
+    robot = replace(ROBOT, effects={"end_over_end_drag": 4.5}, disc_offset=0.012, learnt_from=learnt_from)
     knowledge = CalibrationKnowledge(("C_t", "viscosity"), np.array([[0.01, 0.001], [0.001, 0.02]]), (1e-4, 0.0))
     return f"{robot_toml(robot)}\n{knowledge_toml(knowledge)}".encode()
 
@@ -207,7 +205,7 @@ def verdict() -> dict[str, Any]:
 
 TOML = (
     b"[", b"]", b"=", b"[[", b"]]", b'"""', b"'''", b"{", b"}", b",", b"inf", b"nan", b"true", b"1979-05-27",
-    b"[head]", b"[effects]", b"[correction]", b"[calibration]", b"length_m", b"_sigma", b'"10 %"', b"name = ",
+    b"[head]", b"[effects]", b"[learnt_from]", b"[calibration]", b"length_m", b"_sigma", b'"10 %"', b"name = ",
     b"a.b.c = 1\n", b"inputs.C_t.range", b"rows = ", b"N = ", b"tail_contact = 1\n", b"left_right_bias = 0.1\n",
 )  # fmt: skip
 

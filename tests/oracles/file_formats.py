@@ -127,7 +127,7 @@ def _finite(*values: Any) -> None:
 def _read_robot(path: Path) -> None:
     robot, knowledge = load_robot(path), read_knowledge(path)
     _finite(robot.time_scale, knowledge.covariance)
-    with naming(path):  # a correction holds within its runs
+    with naming(path):  # a law holds within its runs
         _finite(list(robot.group_values().values()))
     again = path.with_name("again.toml")
     again.write_text(robot_toml(robot), encoding="utf-8")

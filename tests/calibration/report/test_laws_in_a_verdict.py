@@ -86,7 +86,6 @@ def test_a_law_stands_beside_the_verdict_and_its_files_have_its_range_and_covari
     assert verdict.effects == ()
     assert "no effect and no pair of effects of the catalogue explains" in verdict.sentence
     assert "The residual is described by" in verdict.sentence
-    assert verdict.learnt is None
     assert verdict.errors.rms["law"] < 0.7 * verdict.error_before
     assert place in [law.place.name for law in laws_of(verdict).kept]
     record, report, corrected = verdict.save(tmp_path)

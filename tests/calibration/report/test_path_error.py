@@ -16,7 +16,7 @@ from calibration.report.path_error import DEFAULT_PATHS, PathError, path_errors,
 from planner.paths.distance import distance_to
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.io.errors import InputError, run_command
-from sim.model.correction import learnt_range
+from sim.model.learnt_range import learnt_range
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.motion.replay import replay

@@ -212,11 +212,19 @@ def test_texts_of_robots_are_read_or_refused(text: str, old: str, new: str) -> N
         check_robot(found["fields"], wanted)
 
 
-@pytest.mark.parametrize("table", ["effects", "correction", "learnt_from", "calibration"])
+@pytest.mark.parametrize("table", ["effects", "learnt_from", "calibration"])
 def test_a_robot_that_python_must_make_is_refused(table: str) -> None:
     found = opened("robot.toml", f"{TEXT}\n[{table}]\nx = 1\n")
     assert f"has [{table}]" in str(found)
     assert "softflagella page --robot robot.toml" in str(found)
+
+
+def test_a_correction_is_refused_as_by_python() -> None:
+    text = f"{TEXT}\n[correction]\nx = 1\n"
+    Path("robot.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as refusal:
+        load_robot("robot.toml")
+    assert str(opened("robot.toml", text)) == str(refusal.value)
 
 
 def test_robots_that_cannot_be_are_refused() -> None:

@@ -123,6 +123,7 @@ REFUSALS = {
     "no such unit": ("speed_rpm = 90", "speed_V = 6", "unknown entry [motor] speed_V; is it [motor] speed_rpm?"),
     "another table": ("C_t = 3.0", "C_t = 3.0\nlength_mm = 16", "[drag] length_mm; is it [head] length_mm?"),
     "misspelt table": ("[motor]", "[moter]", "unknown entry [moter] speed_rpm; is it [motor] speed_rpm?"),
+    "a correction": ("[motor]", "[correction]\nlow = [2]\n[motor]", "[correction] is no longer read; calibrate"),
     "like no other": ("[motor]", "colour = 1\n[motor]", "[fluid] colour; a robot has [tails], [head]"),
 }  # fmt: skip
 
