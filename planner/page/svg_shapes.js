@@ -6,7 +6,7 @@ import { CONSTANTS } from "./constants.js";
 import { TAU, mod } from "./math.js";
 import { InputError, quoted } from "./words.js";
 
-const { NAMES } = CONSTANTS.svg_attributes;
+const { LENGTHS, SIZES, PIXELS, TRANSFORMS } = CONSTANTS.svg_drawing;
 const N = "[-+]?(?:\\d+(?:\\.\\d*)?|\\.\\d+)(?:[eE][-+]?\\d+)?";
 const [COMMAND, FLOAT, FLAG, END] = ["[MmZzLlHhVvCcSsQqTtAa]", N, "[01]", "$"].map((word) => {
   return new RegExp(`[ ,\\t\\n\\f\\r]*(${word})`, "y");
@@ -107,9 +107,10 @@ function pathSegments(data) {
 }
 
 const NUMBER = new RegExp(N, "g");
-const LENGTH = new RegExp(`^(${N})\\s*([a-zA-Z]*|%)$`);
+const LENGTH = new RegExp(`^(${N})\\s*([a-zA-Z]*)$`);
 const FUNCTION = /(?<![a-zA-Z])([a-zA-Z]+)\s*\(([^()]*)\)/g;
 const ASPECT = /^(?:none|x(Min|Mid|Max)Y(Min|Mid|Max))(?:\s+(?:meet|(slice)))?$/;
+const BASES = ["x", "y", "width", "height", "cx", "cy", "x1", "y1", "x2", "y2"];
 const SHARES = { Min: 0, Mid: 0.5, Max: 1 };
 
 /* Refuse an attribute; words: what to do. */
@@ -124,15 +125,10 @@ class Lengths {
     this.sized = true; // the drawing says how large its pixels are
   }
 
-  /* Read an attribute, in pixels; missing: where it is not given. view: width and height for percentages. */
-  read(own, name, view, missing = null) {
-    const text = own[name] ?? "", found = LENGTH.exec(text);
-    if (["", "auto"].includes(text.toLowerCase())) return missing;
-    const unit = found?.[2].toLowerCase();
-    if (unit === "%" && !view.includes(null)) {
-      return (Number(found[1]) * [...view, Math.hypot(...view) / Math.SQRT2][NAMES.lengths[name]]) / 100;
-    }
-    if (!found || !(unit in NAMES.pixels)) unread(own, name, "give a number, with mm, cm, in, pt, pc, px or without");
+  /* Read an attribute, in pixels; 0: it is not given. */
+  read(own, name) {
+    const text = own[name] ?? "", found = LENGTH.exec(text || "0"), unit = found?.[2].toLowerCase();
+    if (!found || !Object.hasOwn(PIXELS, unit)) unread(own, name, "give a number, with mm, cm, in, pt, pc, px or without");
     if (unit !== "" && unit !== "px") {
       if (!this.sized) {
         const words = `in a drawing without a size; give its <svg> a width in ${unit}`;
@@ -140,7 +136,9 @@ class Lengths {
       }
       this.physical = true;
     }
-    return Number(found[1]) * NAMES.pixels[unit];
+    const value = Number(found[1]) * PIXELS[unit];
+    if (value < 0 && SIZES.includes(name)) throw new InputError(`${name}=${quoted(text)} is below 0; correct it`);
+    return value;
   }
 }
 
@@ -151,31 +149,30 @@ function numbersIn(own, name) {
   return (text.match(NUMBER) ?? []).map(Number);
 }
 
-/* The segments of a shape, before its transform; null: it shows nothing. */
-function shapeSegments(kind, own, lengths, view) {
-  const data = kind === "path" ? own.d ?? "" : shapeData(kind, own, lengths, view);
-  return data === null ? null : pathSegments(data);
+/* The segments of a shape, before its transform; none: it shows nothing. */
+function shapeSegments(kind, own, lengths) {
+  return pathSegments(kind === "path" ? own.d ?? "" : shapeData(kind, own, lengths));
 }
 
-/* A shape as data of a path; null: it shows nothing. */
-function shapeData(kind, own, lengths, view) {
+/* A shape as data of a path. */
+function shapeData(kind, own, lengths) {
   if (kind === "polyline" || kind === "polygon") {
     const numbers = numbersIn(own, "points");
     if (numbers.length % 2) throw new InputError(`a ${kind} has an odd number of coordinates; correct its points`);
     return numbers.length ? `M${numbers}${kind === "polygon" ? "Z" : ""}` : "";
   }
-  const given = Object.keys(NAMES.lengths).map((name) => [name, lengths.read(own, name, view)]);
-  const { rx, ry, ...sizes } = Object.fromEntries(given), numbers = Object.values(sizes).map((size) => size ?? 0);
-  const [x, y, width, height, cx, cy, r, x1, y1, x2, y2] = numbers;
-  if (kind === "line") return `M${x1},${y1}L${x2},${y2}`;
-  const [a, b] = kind === "circle" ? [r, r] : [rx ?? ry ?? 0, ry ?? rx ?? 0];
+  const size = (name) => ((own[name] ?? "auto") === "auto" ? null : lengths.read(own, name));
+  const given = Object.fromEntries(LENGTHS[kind].map((name) => [name, size(name)]));
+  const { r, rx = r, ry = r } = given, [a, b] = [rx ?? ry ?? 0, ry ?? rx ?? 0];
+  const [x, y, width, height, cx, cy, ...ends] = BASES.map((name) => given[name] ?? 0);
+  if (kind === "line") return `M${ends}`;
   if (kind === "rect") return rectData(x, y, width, height, Math.min(a, width / 2), Math.min(b, height / 2));
   const quarters = [[cx, cy + b], [cx - a, cy], [cx, cy - b], [cx + a, cy]].map((end) => `A${a},${b},0,0,1,${end}`);
-  return Math.min(a, b) > 0 ? `M${cx + a},${cy}${quarters.join("")}Z` : null;
+  return Math.min(a, b) > 0 ? `M${cx + a},${cy}${quarters.join("")}Z` : "";
 }
 
 function rectData(x, y, width, height, a, b) {
-  if (Math.min(width, height) <= 0) return null;
+  if (Math.min(width, height) <= 0) return "";
   const right = x + width, low = y + height, round = (...end) => `A${a},${b},0,0,1,${end}`;
   if (Math.min(a, b) <= 0) return `M${x},${y}H${right}V${low}H${x}Z`;
   return `M${x + a},${y}H${right - a}${round(right, y + b)}V${low - b}${round(right - a, low)}H${x + a}`
@@ -187,7 +184,7 @@ function transformOf(own) {
   const text = (own.transform ?? "").replace(/^none$/i, ""), calls = Array.from(text.matchAll(FUNCTION));
   const functions = calls.map(([, name, inside]) => oneTransform(name.toLowerCase(), inside));
   if (functions.includes(null) || /[^,\s]/.test(text.replace(FUNCTION, ""))) {
-    unread(own, "transform", "give matrix, translate, scale, rotate or skew, in px and deg");
+    unread(own, "transform", "give matrix, translate, scale, rotate or skewX, in px, deg");
   }
   return functions.reduce(product, [1, 0, 0, 1, 0, 0]);
 }
@@ -200,36 +197,50 @@ const MATRICES = { // of the functions of a transform; angles in degrees
   scale: (x, y = x) => [x, 0, 0, y, 0, 0],
   scalex: (x) => [x, 0, 0, 1, 0, 0],
   scaley: (y) => [1, 0, 0, y, 0, 0],
-  skew: (x, y = 0) => [1, Math.tan((y * TAU) / 360), Math.tan((x * TAU) / 360), 1, 0, 0],
-  skewx: (x) => MATRICES.skew(x),
-  skewy: (y) => MATRICES.skew(0, y),
+  skewx: (x) => [1, 0, Math.tan((x * TAU) / 360), 1, 0, 0],
+  skewy: (y) => [1, Math.tan((y * TAU) / 360), 0, 1, 0, 0],
   rotate: (angle, x = 0, y = 0) => {
     const c = Math.cos((angle * TAU) / 360), s = Math.sin((angle * TAU) / 360);
     return product(product([1, 0, 0, 1, x, y], [c, s, -s, c, 0, 0]), [1, 0, 0, 1, -x, -y]);
   },
 };
 
+const UNITS = { // of arguments: numbers, lengths, angles
+  1: { "": 1 },
+  x: { "": 1, px: 1 },
+  a: { "": 1, deg: 1, grad: 0.9, rad: 360 / TAU, turn: 360 },
+};
+
 /* The matrix of one function of a transform; null: it is not known. */
 function oneTransform(name, inside) {
   const given = inside.trim().split(/[\s,]+/).map((word) => LENGTH.exec(word));
-  const kinds = (NAMES.transforms[name] ?? []).find(({ length }) => length === given.length);
-  const unit = (word, i) => NAMES.units[kinds[i]][word[2].toLowerCase()];
+  const kinds = (Object.hasOwn(TRANSFORMS, name) ? TRANSFORMS[name] : []).find(({ length }) => length === given.length);
+  const unit = (word, i) => UNITS[kinds[i]][word[2].toLowerCase()];
   const values = given.map((word, i) => word && kinds && Number(word[1]) * unit(word, i));
   const known = kinds && values.every((value) => typeof value === "number" && !Number.isNaN(value));
   return known ? MATRICES[name](...values) : null;
 }
 
-/* Fit the viewBox (left, top, width, height) of an <svg> into its place and size. */
-function fitted(own, place, size, box) {
+/* Fit the viewBox into the size of the drawing; a side that is missing, or in per cent, follows from it. */
+function fitted(own, lengths) {
+  const sides = ["width", "height"].map((name) => {
+    return /(?:auto|%)$/.test(own[name] ?? "auto") ? null : lengths.read(own, name);
+  });
+  const box = numbersIn(own, "viewBox"), whole = box.slice(2);
   const found = ASPECT.exec(own.preserveAspectRatio || "xMidYMid");
-  if (!found) unread(own, "preserveAspectRatio", "give none, or xMidYMid and meet or slice");
-  let scale = [0, 1].map((i) => size[i] / box[2 + i]);
+  if (sides.includes(0)) throw new InputError("the width or height of the <svg> is 0; correct it");
+  if (!box.length) return [1, 0, 0, 1, 0, 0];
+  if (!found) unread(own, "preserveAspectRatio", "give none, or xMidYMid, meet or slice");
+  if (box.length !== 4 || Math.min(...whole) <= 0) unread(own, "viewBox", "give left, top, and sizes above 0");
+  lengths.sized = sides.some((side) => side !== null);
+  const scales = sides.map((side, i) => side && side / whole[i]), only = scales[0] ?? scales[1] ?? 1;
+  let scale = scales.map((each) => each ?? only);
   if (found[1]) scale = Array(2).fill(found[3] ? Math.max(...scale) : Math.min(...scale));
-  const at = [0, 1].map((i) => {
-    const spare = (SHARES[found[1 + i]] ?? 0) * (size[i] - box[2 + i] * scale[i]);
-    return place[i] - box[i] * scale[i] + spare;
+  const at = sides.map((side, i) => {
+    const spare = side === null ? 0 : side - whole[i] * scale[i];
+    return (SHARES[found[1 + i]] ?? 0) * spare - box[i] * scale[i];
   });
   return [scale[0], 0, 0, scale[1], ...at];
 }
 
-export { NAMES, product, moved, transformed, Lengths, NUMBER, fitted, numbersIn, shapeSegments, transformOf, unread };
+export { Lengths, NUMBER, fitted, product, shapeSegments, transformed, transformOf };

@@ -1,8 +1,8 @@
 """Paths from SVG drawings: the shapes that a drawing shows, each where it is seen.
 
-Elements are walked with what those around them do: style sheets, transforms, views (width, height, viewBox) and
-<use>. Whatever moves, scales or hides a shape is honoured, or refused by its name. Paint does not matter. A few
-lines of <use> can stand for millions of shapes, so elements and numbers are counted on the way.
+svgelements reads data of paths and transforms, and makes outlines. What it would pass over in silence, or read in
+another way than a browser, is refused by its name, if it moves, scales or hides a shape. Paint does not matter. A
+few lines of <use> can stand for millions of shapes, so elements and numbers are counted on the way.
 
 In SVG y points down; here it points up. Every shape that is seen, and every subpath of a shape, is a separate
 path. A file with several paths is rejected unless one is chosen by name. Curves become polylines.
@@ -13,31 +13,16 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from svgelements import Close, Line, Matrix, Move
+from svgelements import Circle, Close, Ellipse, Line, Matrix, Move, Polygon, Polyline, Rect, SimpleLine, Viewbox
 from svgelements import Path as SvgPath
 
 from planner.paths.path import Path2D, steps_of
-from planner.paths.svg_attributes import (
-    NAMES,
-    NUMBER,
-    Lengths,
-    View,
-    declarations,
-    declared,
-    fitted,
-    numbers,
-    outline,
-    read_style_sheet,
-    transform_of,
-)
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.reading import read_bytes
@@ -46,13 +31,58 @@ METRES_PER_PIXEL = 0.0254 / 96  # of SVG
 _TURN = math.radians(2.0)  # largest turn of a curve between two points
 _PROBES = 64  # places on a curve where its direction is measured
 _MOST_POINTS = 200_000
-_BROKEN = (ElementTree.ParseError, ValueError, ArithmeticError, LookupError)  # XML or its encoding; no <svg>
 _MOST_NUMBERS, _DEEPEST = 50_000, 100
+_BROKEN = (ValueError, ArithmeticError, LookupError)  # XML or its encoding, or data of a path
+
+# What readers of drawings know, the page's too
+_LENGTHS = {  # of each shape
+    "path": [], "line": ["x1", "y1", "x2", "y2"], "polyline": [], "polygon": [], "circle": ["cx", "cy", "r"],
+    "rect": ["x", "y", "width", "height", "rx", "ry"], "ellipse": ["cx", "cy", "rx", "ry"],
+}  # fmt: skip
+_SIZES = ["width", "height", "r", "rx", "ry"]  # lengths that are not below 0
+_PIXELS = {"": 1, "px": 1, "pt": 4 / 3, "pc": 16, "in": 96, "cm": 96 / 2.54, "mm": 9.6 / 2.54, "q": 2.4 / 2.54}
+_GROUPS = ["svg", "g", "a", "use"]
+_UNDRAWN = ["defs", "symbol", "clipPath", "mask", "marker", "pattern", "linearGradient", "radialGradient",
+            "filter", "text", "image", "foreignObject", "flowRoot"]  # fmt: skip
+_MOVING = ["animate", "animateTransform", "animateMotion", "set"]
+_READ = ["display", "visibility", "opacity", "transform", "d"]
+_UNREAD = ["transform-origin", "transform-box", "-webkit-transform", "translate", "rotate", "scale", "zoom",
+           "perspective", "offset", "offset-path", "animation", "animation-name", "mask", "mask-image",
+           "-webkit-mask", "-webkit-mask-image", "clip-path", "-webkit-clip-path", "clip", "filter",
+           "content-visibility", "max-width", "max-height", "min-width", "min-height", "aspect-ratio",
+           "systemLanguage", "requiredExtensions"]  # attributes and properties  # fmt: skip
+_HARMLESS = ["", "none", "auto", "normal", "visible", "0", "0 0", "0px 0px", "1", "100%"]  # values of these
+_TRANSFORMS = {  # and their arguments: numbers 1, lengths x, angles a
+    "matrix": ["111111"], "translate": ["x", "xx"], "translatex": ["x"], "translatey": ["x"], "scale": ["1", "11"],
+    "scalex": ["1"], "scaley": ["1"], "rotate": ["a", "axx"], "skewx": ["a"], "skewy": ["a"],
+}  # fmt: skip
+
+_VISIBLE = {"visible": True, "hidden": False, "collapse": False}
+_OUTLINES = {"line": SimpleLine, "polyline": Polyline, "polygon": Polygon, "circle": Circle, "rect": Rect,
+             "ellipse": Ellipse}  # fmt: skip
 _SVG = "{http://www.w3.org/2000/svg}"
 _XLINK = "{http://www.w3.org/1999/xlink}href"
-_LINK = re.compile(r"url\(\s*[\"']?(#[^\"')\s]+)[\"']?\s*\)")
-_VISIBLE = {"visible": True, "hidden": False, "collapse": False}
-_SIZE = ("width", "height")
+_N = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBER = re.compile(_N)
+_POINT = re.compile(r"(?<=\d)\.(?!\d)")  # of "5.", which svgelements does not read
+_LENGTH = re.compile(rf"({_N})\s*([a-zA-Z]*)")
+_NO_DATA = re.compile(r"[^MZLHVCSQTAE\d\s,.+-]|[MLHVCSQTA][\s,]*(?:[MZLHVCSQTA]|$)|^\s*[^M\s]", re.IGNORECASE)
+_UNITS = {"1": "", "x": "(?:px)?", "a": "(?:deg|grad|rad|turn)?"}
+_TRANSFORM = re.compile(
+    "|".join(
+        rf"\b{name}\s*\(\s*" + r"[\s,]+".join(_N + _UNITS[kind] for kind in kinds) + r"\s*\)"
+        for name, forms in _TRANSFORMS.items()
+        for kinds in forms
+    ),
+    re.IGNORECASE,
+)
+_ASPECT = re.compile(r"(?:none|x(Min|Mid|Max)Y(Min|Mid|Max))(?:\s+(?:meet|slice))?")
+_TRANSPARENT = re.compile(r"0*\.?0+%?|-.*")
+_COMMENT = re.compile(r"/\*.*?(?:\*/|\Z)|<!--|-->", re.DOTALL)
+_NO_RULE = re.compile(r"@(?:charset|namespace)[^;{}@]*;|@font-face\s*\{[^{}]*\}", re.IGNORECASE)
+_RULE = re.compile(r"(?<![^{}])([^{}]*)\{([^{}]*)\}")
+_SELECTOR = re.compile(r"[.#]?[\w-]+")
+_IMPORTANT = re.compile(r"!\s*important$", re.IGNORECASE)
 
 
 def read_svg(path: Path, closed: bool | None, shape: str | None) -> tuple[Path2D, float | None]:
@@ -66,11 +96,11 @@ def read_svg(path: Path, closed: bool | None, shape: str | None) -> tuple[Path2D
         raise InputError(f"{path}: <?xml-stylesheet> is not read; save the drawing with its style")
     try:
         with np.errstate(all="ignore"):  # `Path2D.of` refuses what is not finite
-            drawing = Drawing(ElementTree.fromstring(data))
+            drawing = _Drawing(ElementTree.fromstring(data))
             subpaths = _subpaths(drawing.shapes)
     except InputError:
         raise
-    except _BROKEN as broken:
+    except (ElementTree.ParseError, *_BROKEN) as broken:
         reason = next(iter(str(broken).splitlines()), type(broken).__name__)
         raise InputError(f"{path} is not SVG: {reason}") from None
     if not subpaths:
@@ -88,26 +118,26 @@ def read_svg(path: Path, closed: bool | None, shape: str | None) -> tuple[Path2D
     return Path2D.of(upright, closed=ends or closed), METRES_PER_PIXEL if drawing.physical else None
 
 
-def _subpaths(shapes: list[Shape]) -> dict[str, tuple[Floats, bool]]:
-    """Find the points (n, 2) of every subpath by name, and whether it is closed.
+class _Shape(NamedTuple):
+    """A shape that is seen."""
 
-    Raises:
-        InputError: a part of one is hidden.
-    """
+    kind: str
+    id: str | None
+    outline: SvgPath  # before the transform
+    matrix: Matrix  # to pixels
+
+
+def _subpaths(shapes: list[_Shape]) -> dict[str, tuple[Floats, bool]]:
+    """Find the points (n, 2) of every subpath by name, and whether it is closed."""
     subpaths: dict[str, tuple[Floats, bool]] = {}
     counts: dict[str, int] = {}
-    for kind, identity, drawn, matrix, clips in shapes:
+    for kind, identity, outline, matrix in shapes:
         counts[kind] = counts.get(kind, 0) + 1
         name = identity or f"{kind}{counts[kind]}"
-        parts = [_points(SvgPath(part), matrix) for part in SvgPath(drawn).as_subpaths()]
+        parts = [_points(SvgPath(part), matrix) for part in outline.as_subpaths()]
         parts = [part for part in parts if len(part[0]) > 1]
         for i, part in enumerate(parts):
             part_name = name if len(parts) == 1 else f"{name}/{i + 1}"
-            hiding = [clip.name for clip in clips if clip.hides(part[0])]
-            if hiding:
-                raise InputError(
-                    f"{hiding[0]} hides a part of {part_name}; cut it off in the drawing, or remove {hiding[0]}"
-                )
             subpaths[part_name if part_name not in subpaths else f"{part_name}-{kind}{counts[kind]}"] = part
     return subpaths
 
@@ -146,44 +176,7 @@ def _enough(curve: Any, matrix: Matrix) -> int:
     return max(_PROBES, steps_of(_PROBES * float(np.abs(turns).max(initial=0.0)), _TURN))
 
 
-class Clip(NamedTuple):
-    """A rectangle outside of which nothing is seen."""
-
-    name: str  # of what clips
-    matrix: Matrix  # from the rectangle's coordinates to pixels
-    low: tuple[float, ...]
-    high: tuple[float, ...]
-
-    def hides(self, points: Floats) -> bool:
-        """Tell whether one of some points (n, 2), in pixels, is outside."""
-        own = _moved(points, ~self.matrix)
-        low, high = np.array(self.low), np.array(self.high)
-        slack = 1e-6 * float((high - low).max())
-        return bool(((own < low - slack) | (own > high + slack)).any())
-
-
-class Shape(NamedTuple):
-    """A shape that is seen."""
-
-    kind: str
-    id: str | None
-    outline: Any  # of svgelements, before the transform
-    matrix: Matrix  # to pixels
-    clips: tuple[Clip, ...]
-
-
-@dataclass(frozen=True)
-class _Around:
-    """What the elements around an element do to it."""
-
-    matrix: Matrix = field(default_factory=Matrix)
-    view: View = (None, None)
-    visible: bool = True
-    unread: str = ""  # what moves, scales or hides, and is not read
-    clips: tuple[Clip, ...] = ()
-
-
-class Drawing:
+class _Drawing:
     """The shapes of a drawing, and whether its pixels have a size."""
 
     def __init__(self, root: Element):
@@ -193,42 +186,42 @@ class Drawing:
             ValueError: the root is no drawing.
             InputError: something moves, scales or hides a shape, and is not read.
         """
-        if kind_of(root) != "svg":
-            raise ValueError(f"it begins with <{kind_of(root)}>")
-        self._lengths = Lengths()
+        if _kind(root) != "svg":
+            raise ValueError(f"it begins with <{_kind(root)}>")
+        self.physical = False  # a length was given in mm or another unit of the laboratory
+        self._sized = True  # the drawing says how large its pixels are
         self._named = {f"#{element.get('id')}": element for element in root.iter() if element.get("id")}
-        styles = ["".join(element.itertext()) for element in root.iter() if kind_of(element) == "style"]
-        self._rules = read_style_sheet("\n".join(styles), {*NAMES["read"], *NAMES["lengths"], *NAMES["unread"]})
+        styles = ["".join(element.itertext()) for element in root.iter() if _kind(element) == "style"]
+        self._rules = _style_rules("\n".join(styles))
         self._count = 0
         self._open: list[Element] = []
-        self.shapes = list(self._walk(root, _Around()))
-        self.physical = self._lengths.physical
+        self.shapes = list(self._walk(root, Matrix(), True, ""))
 
-    def _walk(self, element: Element, around: _Around, used: Mapping[str, str] | None = None) -> Iterator[Shape]:
-        """Find the shapes of an element; `used`: width and height of the <use> that shows it."""
-        kind = kind_of(element)
-        if kind.startswith("{") or kind in NAMES["undrawn"] or (kind == "symbol" and used is None):
+    def _walk(self, element: Element, matrix: Matrix, visible: bool, unread: str) -> Iterator[_Shape]:
+        """Find the shapes of an element; `unread`: what around it moves, scales or hides, and is not read."""
+        kind = _kind(element)
+        if kind.startswith("{") or kind in _UNDRAWN:
             return
-        if kind not in NAMES["shapes"] and kind not in NAMES["groups"]:
+        if kind in _MOVING:
             raise InputError(f"<{kind}> is not read; remove it")
         self._enter(element)
         own = self._properties(element)
-        if not _hidden(own):
-            around = self._inside(own, around)
-            if kind in NAMES["shapes"]:
-                drawn = outline(kind, own, self._lengths, around.view)
-                if drawn is not None and around.visible:
-                    if around.unread:
-                        raise InputError(f"{around.unread} is not read; apply it in the drawing, or remove it")
-                    yield Shape(kind, own.get("id"), drawn, around.matrix, around.clips)
-            elif kind in ("svg", "symbol"):
-                around = self._in_view({**own, **(used or {})}, around)
-            elif kind == "use":
-                x, y = (self._lengths.read(own, name, around.view, 0.0) for name in ("x", "y"))
-                there = replace(around, matrix=Matrix(1, 0, 0, 1, x, y) * around.matrix)
-                yield from self._walk(self._shown(own), there, {name: own[name] for name in _SIZE if name in own})
-            for part in _parts(element) if 0.0 not in around.view else ():
-                yield from self._walk(part, around)
+        if own.get("display", "").lower() != "none" and not _TRANSPARENT.fullmatch(own.get("opacity", "")):
+            visible = _VISIBLE.get(own.get("visibility", "").lower(), visible)
+            unread = unread or self._unread(kind, own)
+            matrix = _matrix(own.get("transform", "")) * matrix
+            if len(self._open) == 1:
+                matrix = self._frame(own) * matrix
+            if kind in _LENGTHS and visible:
+                outline = self._outline(kind, own)
+                if unread and len(outline):
+                    raise InputError(f"{unread} is not read; apply it in the drawing, or remove it")
+                yield _Shape(kind, own.get("id"), outline, matrix)
+            if kind == "use":
+                there = Matrix(1, 0, 0, 1, self._length(own, "x"), self._length(own, "y"))
+                yield from self._walk(self._shown(own), there * matrix, visible, unread)
+            for part in element:
+                yield from self._walk(part, matrix, visible, unread)
         self._open.pop()
 
     def _enter(self, element: Element) -> None:
@@ -236,7 +229,7 @@ class Drawing:
         if element in self._open:
             raise InputError("a <use> shows a group that it belongs to; remove it")
         self._open.append(element)
-        self._count += 1 + sum(len(NUMBER.findall(element.get(key, ""))) for key in ("d", "points"))
+        self._count += 1 + sum(len(_NUMBER.findall(element.get(key, ""))) for key in ("d", "points"))
         if self._count > _MOST_NUMBERS or len(self._open) > _DEEPEST:
             raise InputError(
                 f"the drawing has more than {_MOST_NUMBERS} shapes and coordinates, or groups in more than "
@@ -246,117 +239,154 @@ class Drawing:
     def _properties(self, element: Element) -> dict[str, str]:
         """Return an element's attributes; style sheets are stronger, and the attribute style is strongest."""
         own = {key: value.strip() for key, value in element.attrib.items()}
-        return {**own, **declared(self._rules, kind_of(element), own), **declarations(own.get("style", ""))}
+        selectors = {_kind(element), f"#{own.get('id')}", *(f".{name}" for name in own.get("class", "").split())}
+        given = [properties for selector, properties in self._rules if selector in selectors]
+        for properties in [*given, _declarations(own.get("style", ""))]:
+            own |= properties
+        return own
+
+    def _unread(self, kind: str, own: Mapping[str, str]) -> str:
+        """Name what is not read of an element."""
+        if kind == "svg" and len(self._open) > 1:
+            return "an <svg> in another"
+        if kind not in _LENGTHS and kind not in _GROUPS:
+            return f"<{kind}>"
+        turned = [name for name in _UNREAD if "transform" in own or not name.startswith("transform-")]
+        return next((name for name in turned if own.get(name, "").lower() not in _HARMLESS), "")
 
     def _shown(self, own: Mapping[str, str]) -> Element:
         """Find what a <use> shows."""
         link = own.get("href", own.get(_XLINK, ""))
-        if link not in self._named:
-            raise InputError(f"a <use> shows {link!r}, which is not in the drawing; remove it")
+        if link not in self._named or _kind(self._named[link]) == "symbol":
+            raise InputError(f"a <use> shows {link!r}, which is no shape or group of the drawing; remove it")
         return self._named[link]
 
-    def _inside(self, own: Mapping[str, str], around: _Around) -> _Around:
-        """Apply an element's transform, visibility and clip path."""
-        unread = [
-            name
-            for name, harmless in NAMES["unread"].items()
-            if own.get(name, "").lower() not in ("", *harmless)
-            and ("transform" in own or not name.startswith("transform-"))
-        ]
-        inner = replace(
-            around,
-            matrix=transform_of(own.get("transform", "none")) * around.matrix,
-            visible=_VISIBLE.get(own.get("visibility", "").lower(), around.visible),
-            unread=around.unread or next(iter(unread), ""),
-        )
-        if own.get("clip-path", "none") == "none":
-            return inner
-        clip = self._clip(own["clip-path"], inner)
-        return replace(inner, clips=(*inner.clips, clip)) if clip else replace(inner, unread="clip-path")
+    def _length(self, own: Mapping[str, str], name: str) -> float:
+        """Read an attribute, in pixels; 0: it is not given.
 
-    def _clip(self, words: str, around: _Around) -> Clip | None:
-        """Read a clip path that is an upright rectangle; None: it is another."""
-        link = _LINK.fullmatch(words)
-        element = self._named.get(link[1]) if link else None
-        if element is None or len(element) != 1 or kind_of(element[0]) not in NAMES["shapes"]:
-            return None
-        group, own = self._properties(element), self._properties(element[0])
-        if {"clip-path", "clipPathUnits", "display", "visibility"} & {*group, *own}:
-            return None
-        inner = self._inside(own, self._inside(group, around))
-        drawn = outline(kind_of(element[0]), own, self._lengths, around.view)
-        segments = [] if drawn is None else list(SvgPath(drawn))
-        corners = [(segment.end.x, segment.end.y) for segment in segments if segment.end is not None]
-        upright = all(a[0] == b[0] or a[1] == b[1] for a, b in pairwise(corners))
-        straight = all(isinstance(segment, Move | Line | Close) for segment in segments)
-        axes = [sorted(set(axis)) for axis in zip(*corners, strict=True)]
-        if len(set(corners)) != 4 or [len(axis) for axis in axes] != [2, 2] or not (upright and straight):
-            return None
-        flat = inner.unread or _flat(inner.matrix)
-        return None if flat else Clip("clip-path", inner.matrix, *zip(*axes, strict=True))
-
-    def _in_view(self, own: dict[str, str], around: _Around) -> _Around:
-        """Enter an <svg> or a <symbol>: its place, its size, its viewBox."""
-        box = numbers(own, "viewBox") or None
-        if box is not None and (len(box) != 4 or min(box[2:]) < 0):
-            raise InputError(f"viewBox={own['viewBox']!r} is not read; give left, top, width and height")
-        x = y = 0.0
-        if len(self._open) == 1:
-            width, height = self._outer_size(own, box)
-        else:
-            x, y = (self._lengths.read(own, name, around.view) or 0.0 for name in ("x", "y"))
-            width, height = (self._lengths.read(own, _SIZE[i], around.view, around.view[i]) for i in (0, 1))
-        if min(width or 0.0, height or 0.0) < 0:
-            raise InputError("the width or height of an <svg> is below 0; correct it")
-        if width is None or height is None:
-            if box is not None:
-                raise InputError("an <svg> in another has no size; give it width and height")
-            return replace(around, matrix=Matrix(1, 0, 0, 1, x, y) * around.matrix, view=(width, height))
-        clips = around.clips
-        if len(self._open) > 1 and own.get("overflow") not in ("visible", "auto") and not _flat(around.matrix):
-            clips = (*clips, Clip("<svg>", around.matrix, (x, y), (x + width, y + height)))
-        inner, view = Matrix(1, 0, 0, 1, x, y), (width, height)
-        if box is not None:
-            view = (box[2], box[3]) if width and height else (0.0, 0.0)
-            inner = (
-                fitted(own.get("preserveAspectRatio", ""), (x, y), (width, height), box) if all(view) else inner
+        Raises:
+            InputError: it is no length that is read.
+        """
+        text = own.get(name, "")
+        found = _LENGTH.fullmatch(text or "0")
+        unit = found[2].lower() if found else "?"
+        if found is None or unit not in _PIXELS:
+            raise InputError(
+                f"{name}={text[:40]!r} is not read; give a number, with mm, cm, in, pt, pc, px or without"
             )
-        return replace(around, matrix=inner * around.matrix, view=view, clips=clips)
+        if unit not in ("", "px"):
+            if not self._sized:
+                raise InputError(f"{name}={text!r} in a drawing without a size; give its <svg> a width in {unit}")
+            self.physical = True
+        value = float(found[1]) * _PIXELS[unit]
+        if value < 0 and name in _SIZES:
+            raise InputError(f"{name}={text!r} is below 0; correct it")
+        return value
 
-    def _outer_size(self, own: dict[str, str], box: list[float] | None) -> View:
-        """Return width and height of the drawing; what is missing, or in per cent, follows from the viewBox."""
+    def _outline(self, kind: str, own: Mapping[str, str]) -> SvgPath:
+        """Return the path of a shape before its transform; it is empty where the shape shows nothing."""
+        if kind == "path":
+            return _path(own.get("d", ""))
+        given = {name: self._length(own, name) for name in _LENGTHS[kind] if own.get(name, "auto") != "auto"}
+        values = _numbers(own, "points") if kind in ("polyline", "polygon") else []
+        if len(values) % 2:
+            raise InputError(f"a {kind} has an odd number of coordinates; correct its points")
+        missing = {"width": 0.0, "height": 0.0, "rx": given.get("ry", 0.0), "ry": given.get("rx", 0.0)}
+        points = list(zip(values[::2], values[1::2], strict=True))
+        shape = _OUTLINES[kind]({**missing, **given, "points": points})  # of what is missing it would take 1
+        return SvgPath() if shape.is_degenerate() else SvgPath(shape)
+
+    def _frame(self, own: Mapping[str, str]) -> Matrix:
+        """Fit the viewBox into the drawing's size; a side that is missing, or in per cent, follows from it."""
         width, height = (
-            None if own.get(name, "").endswith("%") else self._lengths.read(own, name, (None, None))
-            for name in _SIZE
+            None if own.get(name, "auto").endswith(("auto", "%")) else self._length(own, name)
+            for name in ("width", "height")
         )
-        if box is None:
-            return width, height
-        self._lengths.sized = (width, height) != (None, None)
-        scales = [size / whole for size, whole in zip((width, height), box[2:], strict=True) if size and whole]
-        scale = next(iter(scales), 1.0)
-        return scale * box[2] if width is None else width, scale * box[3] if height is None else height
+        if 0 in (width, height):
+            raise InputError("the width or height of the <svg> is 0; correct it")
+        box = _numbers(own, "viewBox")
+        if not box:
+            return Matrix()
+        aspect = own.get("preserveAspectRatio") or "xMidYMid"
+        if not _ASPECT.fullmatch(aspect):
+            raise InputError(f"preserveAspectRatio={aspect!r} is not read; give none, or xMidYMid, meet or slice")
+        if len(box) != 4 or min(box[2:]) <= 0:
+            raise InputError(f"viewBox={own['viewBox'][:40]!r} is not read; give left, top, and sizes above 0")
+        self._sized = (width, height) != (None, None)
+        scale = width / box[2] if width else height / box[3] if height else 1.0
+        sides = (width / scale if width else box[2], height / scale if height else box[3])
+        fit = Viewbox.viewbox_transform(0, 0, *sides, *box, aspect)  # in text of 12 decimals, so near 1
+        return Matrix(fit) * Matrix(scale, 0, 0, scale, 0, 0)
 
 
-def kind_of(element: Element) -> str:
+def _kind(element: Element) -> str:
     """Return the name of an element, with its namespace if that is another than SVG's."""
     return element.tag.removeprefix(_SVG)
 
 
-def _parts(element: Element) -> list[Element]:
-    """List the children that are shown; those of a <switch> are alternatives."""
-    if kind_of(element) != "switch":
-        return list(element)
-    return [part for part in element if not part.get("requiredExtensions")][:1]
+def _numbers(own: Mapping[str, str], name: str) -> list[float]:
+    """Read an attribute that is numbers between blanks and commas.
+
+    Raises:
+        InputError: there is something else.
+    """
+    text = own.get(name, "")
+    if _NUMBER.sub("", text).strip(", \t\n\r"):
+        raise InputError(f"{name}={text[:40]!r} is not read; give numbers")
+    return [float(number) for number in _NUMBER.findall(text)]
 
 
-def _hidden(own: Mapping[str, str]) -> bool:
-    """Tell whether an element is hidden with all that it holds."""
+def _matrix(transform: str) -> Matrix:
+    """Read a transform.
+
+    Raises:
+        InputError: a part of it is not known.
+    """
+    if transform.lower() == "none":
+        return Matrix()
+    if _TRANSFORM.sub("", transform).strip(", \t\n\r"):
+        raise InputError(
+            f"transform={transform[:40]!r} is not read; give matrix, translate, scale, rotate or skewX, in px, deg"
+        )
+    return Matrix(_POINT.sub("", transform))
+
+
+def _path(data: str) -> SvgPath:
+    """Read the data of a path, all of them."""
     try:
-        transparent = float(own.get("opacity", "1").rstrip("%")) <= 0
-    except ValueError:
-        transparent = False
-    return transparent or own.get("display", "").lower() == "none" or bool(own.get("requiredExtensions"))
+        if _NO_DATA.search(data):
+            raise ValueError
+        return SvgPath(_POINT.sub(".0", data))
+    except (*_BROKEN, AttributeError, TypeError):
+        raise InputError(f"the data of a path are not read, {data[:40]!r}; correct them") from None
 
 
-def _flat(matrix: Matrix) -> bool:
-    return bool(matrix.a * matrix.d == matrix.b * matrix.c)
+def _style_rules(text: str) -> list[tuple[str, dict[str, str]]]:
+    """Read selectors and what they declare of the properties that matter, the weakest first.
+
+    Raises:
+        InputError: such a selector is no kind, class or id, or a declaration is marked as important.
+    """
+    text = _NO_RULE.sub("", _COMMENT.sub("", text))
+    rest = _RULE.sub("", text).strip()
+    if rest:
+        raise InputError(f"<style> is not read from {rest[:30]!r} on; write attributes instead")
+    known = {*_READ, *_UNREAD, *(name for names in _LENGTHS.values() for name in names)}
+    rules = []
+    for selectors, body in _RULE.findall(text):
+        given = {name: value for name, value in _declarations(body).items() if name in known}
+        for selector in map(str.strip, selectors.split(",") if given else ()):
+            if not _SELECTOR.fullmatch(selector) or "!" in body:
+                raise InputError(
+                    f"<style> sets {', '.join(given)} of {selector!r}; read are a kind, a class or an id, "
+                    "without !important; write attributes instead"
+                )
+            rules.append((selector, given))
+    return sorted(rules, key=lambda rule: ".#".find(rule[0][0]))
+
+
+def _declarations(text: str) -> dict[str, str]:
+    """Read the declarations of a rule, or of the attribute style."""
+    parts = (part.partition(":") for part in _COMMENT.sub("", text).split(";"))
+    given = {name.strip().lower(): value.strip() for name, colon, value in parts if colon}
+    return {name: _IMPORTANT.sub("", value).rstrip() for name, value in given.items()}
