@@ -18,7 +18,7 @@ from inspect import signature
 from pathlib import Path
 from typing import NamedTuple
 
-from sim.io.errors import InputError, run_command
+from common.errors import InputError, run_command
 
 FOLDER = Path(__file__).parent
 ROOMS = ("simulator", "data", "table", "planner", "calibration")

@@ -7,8 +7,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from sim.io.commands import Call, Program
-from sim.io.errors import InputError
+from common.commands import Call, Program
+from common.errors import InputError
 
 program = Program("calibration", "find from measured runs what the model of a robot lacks, and correct it")
 main = program.main
@@ -17,7 +17,7 @@ _LISTED = 8  # laws
 
 def _refuse_early(*files: str) -> None:
     """Refuse a file that is missing before anything that takes seconds to load; a pipe is read once, later."""
-    from sim.io.reading import read_bytes
+    from common.reading import read_bytes
 
     for file in files:
         if not os.path.exists(file):
@@ -58,7 +58,7 @@ def _calibrate(
     if table:
         _refuse_early(table)
     from calibration.report.robot_verdict import FILES  # loads SciPy
-    from sim.io.files import refuse_kept
+    from common.files import refuse_kept
 
     refuse_kept(out, ["table.csv", *FILES] if films else FILES)  # before hours of work
     if films and view:
@@ -84,9 +84,9 @@ def _calibrate(
 
 def _filmed(films: str, view: str, robot: str, out: str) -> str:
     """Measure films; write table.csv and return its path."""
-    from calibration.films import measure_films
+    from camera.measured_films import measure_films
+    from common.files import make_folder, write_csv
     from sim.inputs import load_robot
-    from sim.io.files import make_folder, write_csv
 
     if Path(out).is_file():  # before films are tracked, which takes a while
         raise InputError(f"{out} is a file; give a folder")
@@ -169,9 +169,9 @@ def _simulate(
     from dataclasses import replace
 
     from calibration.swimmer.synthetic_table import make_table
+    from common.files import write_csv
     from sim.effects import check_effects
     from sim.inputs import load_robot
-    from sim.io.files import write_csv
 
     given = load_robot(robot)
     hidden = dict(given.effects)
@@ -187,14 +187,14 @@ def _simulate(
     print(f"{len(table)} runs -> {out}")
 
 
-@program.command("tracks", of="calibration.api:tracks", written_by="from")
+@program.command("tracks", of="camera.api:tracks", written_by="from")
 def _tracks(tracks: Call, runs: str, *, check: str | None = None, out: str) -> None:
     """Turn camera tracks into a table of runs.
 
     Args:
         out: CSV.
     """
-    from sim.io.files import write_csv
+    from common.files import write_csv
 
     _refuse_early(tracks.given["tracks"], runs)
     table = tracks(runs=runs, check=check)

@@ -7,8 +7,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from sim.io.commands import Program
-from sim.io.errors import InputError
+from common.commands import Program
+from common.errors import InputError
 
 program = Program("camera", "track robots in films")
 main = program.main
@@ -23,7 +23,7 @@ def _view(*, out: str) -> None:
         out: TOML.
     """
     from camera.view import EXAMPLE
-    from sim.io.files import whole_file
+    from common.files import whole_file
 
     with whole_file(out) as part:
         part.write_text(EXAMPLE)
@@ -69,8 +69,8 @@ def _tracks(
     """
     from camera.tracks import track_film, turn_sense, write_check
     from camera.view import read_setup
+    from common.files import whole_file, write_csv
     from sim.inputs import load_robot
-    from sim.io.files import whole_file, write_csv
 
     setup, known = read_setup(view), load_robot(robot)
     for path in (out, check or "check.png"):  # before a film is tracked, which takes a while

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from sim.arrays import Floats
+from common.arrays import Floats
 
 LEAST_TURN = math.radians(20)  # smallest turn of a run to which a circle is fitted
 

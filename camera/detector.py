@@ -32,8 +32,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from camera.view import BANDS, DOTS, Markers, View, opencv
-from sim.arrays import Floats
-from sim.io.errors import InputError
+from common.arrays import Floats
+from common.errors import InputError
 
 _CONE = math.tan(math.radians(30))  # of hues that count as one colour
 _FAINT = 14.0  # p of the faintest marker, of 255

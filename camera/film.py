@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from camera.view import opencv
-from sim.io.errors import InputError
+from common.errors import InputError
 
 _AHEAD = 2  # decoded frames that wait
 _COPY = 0.1  # of the usual difference of two frames in a row, the difference of a copy

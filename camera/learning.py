@@ -16,8 +16,8 @@ import numpy as np
 from camera.detector import Detector, Pose, chroma
 from camera.film import Film
 from camera.view import BANDS, DOTS, Markers, Setup, View, opencv
-from sim.arrays import Floats
-from sim.io.errors import InputError
+from common.arrays import Floats
+from common.errors import InputError
 
 _LARGE = 1920  # pixels, of the width of the pictures from which is learnt, at most
 _SAMPLES = 12  # pictures from which is learnt what rests, and the distance of the bands

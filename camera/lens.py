@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from camera.view import Lens, opencv
-from sim.io.errors import InputError, naming
-from sim.io.reading import read_bytes
+from common.errors import InputError, naming
+from common.reading import read_bytes
 
 _FEWEST = 3  # pictures
 _REFINED = (3, 50, 1e-3)  # at most 50 steps, down to steps of 0.001 pixels

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from camera.circle import correlation_time
-from sim.arrays import Floats
+from common.arrays import Floats
 
 FRAMES_A_TURN = 4.0  # that a spin needs
 _FEWEST = 12  # samples of a dot

@@ -22,7 +22,7 @@ from camera.film import Film
 from camera.learning import learn
 from camera.spin import Spin, aliasing, fit_spin
 from camera.view import DOTS, Markers, Setup, View, opencv
-from sim.io.errors import InputError, naming
+from common.errors import InputError, naming
 
 if TYPE_CHECKING:
     import pandas as pd

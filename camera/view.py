@@ -26,10 +26,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
-from sim.io.errors import InputError, naming
-from sim.io.reading import read_toml
-from sim.io.units import split, to_si
+from common.arrays import Floats
+from common.errors import InputError, naming
+from common.reading import read_toml
+from common.units import split, to_si
 
 HUES = {"red": 0, "orange": 30, "yellow": 60, "green": 120, "cyan": 180, "blue": 240, "magenta": 300}  # degrees
 BANDS = ("front", "rear")

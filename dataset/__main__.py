@@ -6,7 +6,7 @@ import os
 import shlex
 import threading
 
-from sim.io.commands import Call, Program
+from common.commands import Call, Program
 
 program = Program("dataset", "simulate sweeps into data sets, report and verify them")
 main = program.main
@@ -82,10 +82,10 @@ def _config(*, out: str, robot: str | None = None) -> None:
             that comes with the package).
         out: sweep.toml.
     """
+    from common.files import write_text
     from dataset.design import SWEEP_TOML
     from dataset.robot_inputs import sweep_toml
     from sim.inputs import load_robot
-    from sim.io.files import write_text
     from sim.model.presets import PRESETS
 
     if robot is None:

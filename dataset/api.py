@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from common.errors import InputError
+from common.keywords import checks_keywords
 from dataset.build import build
 from dataset.design import SWEEP_TOML, design_around, load_design
-from sim.io.errors import InputError
-from sim.io.keywords import checks_keywords
 from sim.model.robot import Robot
 
 _SCHEDULER = "DASK_SCHEDULER_ADDRESS"

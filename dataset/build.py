@@ -25,6 +25,7 @@ from typing import Any, cast
 
 from tqdm import tqdm
 
+from common.errors import InputError
 from dataset.card import write_card
 from dataset.clusters import check_backend, open_backend
 from dataset.data_set import (
@@ -42,7 +43,6 @@ from dataset.folder import UNFINISHED, Folder
 from dataset.schema import rows_version, schema
 from dataset.shards import ROWS, BadFileError, Part, carries_key, checked_part, rows_named
 from dataset.workers import Backend, Chunk, Simulate, compile_on_this_host
-from sim.io.errors import InputError
 
 KILLS = 3  # dead workers after which a chunk is set aside
 PATIENCE = 60.0  # seconds without any worker

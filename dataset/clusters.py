@@ -10,9 +10,9 @@ from contextlib import suppress
 from importlib.util import find_spec
 from typing import Any
 
+from common.errors import InputError
 from dataset.shards import Part
 from dataset.workers import Backend, Chunk, Ended, Failure, Processes, isolated
-from sim.io.errors import InputError
 
 # Module that a back end needs, and how it is installed.
 _PACKAGES = {

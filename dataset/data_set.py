@@ -23,14 +23,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
+from common.errors import InputError
+from common.keywords import checks_keywords
+from common.provenance import fingerprint, provenance
 from dataset.design import MOST_ROWS, SweepDesign, checked_design
 from dataset.folder import Folder
 from dataset.schema import rows_version, schema
 from dataset.shards import ROWS, BadFileError, Part, record_batches, rows_named
 from sim.effects import is_effect
-from sim.io.errors import InputError
-from sim.io.keywords import checks_keywords
-from sim.io.provenance import fingerprint, provenance
 
 if TYPE_CHECKING:
     import pandas as pd

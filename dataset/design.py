@@ -20,6 +20,9 @@ from typing import Any
 
 import numpy as np
 
+from common.arrays import Floats, Integers
+from common.errors import InputError, naming
+from common.reading import read_toml
 from dataset.robot_inputs import (
     FIELDS,
     WITH_UNIT,
@@ -31,11 +34,8 @@ from dataset.robot_inputs import (
     robot_of_sweep,
     sweep_toml,
 )
-from sim.arrays import Floats, Integers
 from sim.effects import catalogue, is_effect
 from sim.inputs import check_columns
-from sim.io.errors import InputError, naming
-from sim.io.reading import read_toml
 from sim.model.groups import DWELL, GROUP_COLUMNS, MOST_TAILS, OPTIONAL_COLUMNS
 from sim.model.robot import Robot
 

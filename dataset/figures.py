@@ -12,9 +12,9 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
+from common.arrays import Floats
 from dataset.schema import column_named
 from dataset.statistics import Indices
-from sim.arrays import Floats
 from sim.model.response import DWELLS
 
 COLOURS = ("#5b6a78", "#2a7fba", "#e08a1e", "#3d9a5f", "#8a4fa3", "#c8452f", "#7a5c3e", "#1c2733")  # N = 1 to 8

@@ -16,8 +16,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from uuid import uuid4
 
-from sim.io.errors import InputError
-from sim.io.files import open_no_link
+from common.errors import InputError
+from common.files import open_no_link
 
 LOCK, UNFINISHED = ".lock", ".part-"
 

@@ -11,12 +11,12 @@ import pandas as pd
 import pyarrow as pa
 from scipy.stats import qmc
 
+from common.arrays import Floats
+from common.pages import Page
 from dataset.data_set import read, read_manifest
 from dataset.figures import RESPONSES, draw_collapse, draw_indices, draw_responses, draw_trends, draw_where
 from dataset.schema import COST, INPUTS, Column, schema, shown_outputs
 from dataset.statistics import exponents, linear_rows, rows_for_exponents, sobol_indices
-from sim.arrays import Floats
-from sim.io.pages import Page
 
 _FEW = 40  # usable rows below which nothing is fitted
 _SIZE = r" by [-+.0-9e]+ a revolution"  # of a reason: left out when reasons are counted

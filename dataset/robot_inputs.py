@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
+from common.errors import InputError
+from common.units import UNITS, from_si, of_kind, split, to_si
 from sim.effects import check_effects, is_effect
 from sim.inputs import group_columns, load_robot
-from sim.io.errors import InputError
-from sim.io.units import UNITS, from_si, of_kind, split, to_si
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot

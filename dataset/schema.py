@@ -23,8 +23,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from common.provenance import code_version
 from sim.effects import effect_named
-from sim.io.provenance import code_version
 from sim.model.groups import MOTOR_SPEED, SLOPE_INPUTS, SLOPE_OUTPUTS
 from sim.model.response import BEFORE, DWELLS
 

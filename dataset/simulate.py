@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from common.arrays import Flags, Floats, Integers
 from dataset.schema import COST, OUTPUTS
-from sim.arrays import Flags, Floats, Integers
 from sim.effects.tail_contact import EFFECT as CONTACT
 from sim.effects.tail_contact import least_gap
 from sim.inputs import check_columns

@@ -24,7 +24,7 @@ from itertools import combinations_with_replacement, pairwise
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.inputs import check_columns
 from sim.mechanics.drag import tail_coefficients
 from sim.mechanics.linear_theory import linear_motion

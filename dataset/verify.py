@@ -12,13 +12,13 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from common.errors import InputError
 from dataset.data_set import batches, check_version, read_design, read_manifest
 from dataset.design import SweepDesign
 from dataset.folder import Folder
 from dataset.schema import COST, arrow_table, schema
 from dataset.simulate import HISTORY
 from dataset.workers import simulate_here
-from sim.io.errors import InputError
 from sim.motion.batches import stepped_columns
 
 # Relative errors of stepping.

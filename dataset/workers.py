@@ -23,12 +23,12 @@ from multiprocessing.connection import wait
 from types import ModuleType
 from typing import Any, Literal, NamedTuple, Protocol
 
+from common.errors import InputError
 from dataset.data_set import SWEEP
 from dataset.design import SweepDesign
 from dataset.folder import Folder, StorageError
 from dataset.schema import arrow_table, rows_version, schema
 from dataset.shards import BadFileError, Part, checked_part, file_name, packed
-from sim.io.errors import InputError
 
 Simulate = Callable[[dict[str, Any]], dict[str, Any]]
 _ATTEMPTS, _PAUSE = 5, 0.2  # s

@@ -1,26 +1,19 @@
-"""Command line of the planner: plan a path, go to a goal, track a robot, replay a plan, check a track."""
+"""Command line of the planner: plan a path, go to a goal, visit places, hold one, write the page."""
 
 from __future__ import annotations
 
-import math
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout
-from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
-from planner.paths.units import in_lab, read_length, read_pose
-from sim.io.commands import Call, Program
-from sim.io.errors import InputError
-from sim.io.units import format_length, format_time
+from common.commands import Call, Program
+from planner.paths.units import in_lab
+from planner.progress import progress_bar
 
 if TYPE_CHECKING:
     from planner.planning.plan import Plan
-    from planner.tracking.tracker import Tracker
 
-program = Program("planner", "plan switching schedules for paths, replay them, check tracks")
+program = Program("planner", "plan switching schedules for paths")
 main = program.main
-BAR_AFTER = 1.0  # s
 
 
 def _write(result: Plan, out: str, *lines: str, arduino: str | None = None) -> None:
@@ -36,26 +29,6 @@ def _write(result: Plan, out: str, *lines: str, arduino: str | None = None) -> N
         print(line)
 
 
-@contextmanager
-def _progress_bar() -> Iterator[Callable[[float], object]]:
-    """Show a bar on a terminal, for plans that take long."""
-    from tqdm import tqdm
-
-    from planner.planning.request import Share
-
-    style = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}"
-    with tqdm(
-        total=100, leave=False, delay=1.0, miniters=0, bar_format=style, disable=not sys.stderr.isatty()
-    ) as bar:
-
-        def show(share: float) -> None:
-            if isinstance(share, Share):
-                bar.set_description_str(share.stage, refresh=False)
-                bar.update(100 * min(share.done, 1.0) - bar.n)
-
-        yield show
-
-
 def _refuse_early(arduino: str | None) -> None:
     """Refuse a folder that no library can be written into, before a plan is made for it."""
     if arduino is not None:
@@ -64,10 +37,10 @@ def _refuse_early(arduino: str | None) -> None:
         check_library(arduino)
 
 
-def _planned(call: Call, *, arduino: str | None = None, **further: Any) -> Plan:
+def planned(call: Call, *, arduino: str | None = None, **further: Any) -> Plan:
     """Plan with a public function and a bar."""
     _refuse_early(arduino)
-    with _progress_bar() as progress:
+    with progress_bar() as progress:
         plan: Plan = call(progress=progress, **further)
     return plan
 
@@ -75,7 +48,7 @@ def _planned(call: Call, *, arduino: str | None = None, **further: Any) -> Plan:
 @program.command("plan", of="planner.jobs.plan:plan", robot="--robot")
 def _plan(plan: Call, *, out: str, arduino: str | None = None) -> None:
     """Plan the switching times for a path."""
-    result = _planned(plan, arduino=arduino, tell=print)
+    result = planned(plan, arduino=arduino, tell=print)
     errors = result.errors
     rms, largest, missed = (
         in_lab(value, result.robot) for value in (errors.drawn_rms, errors.drawn_max, result.declared.missed)
@@ -99,128 +72,13 @@ def _goal(
         goal: X Y DEGREES, of the head's centre at the end.
         start: X Y DEGREES, of the head's centre at the start, at rest (default: 0 0 0).
     """
-    _write(_planned(to_goal, arduino=arduino, start=start, goal=goal), out, arduino=arduino)
+    _write(planned(to_goal, arduino=arduino, start=start, goal=goal), out, arduino=arduino)
 
 
 @program.command("hold", of="planner.jobs.hold:hold", robot="--robot", seconds="for")
 @program.command("tour", of="planner.jobs.tour:tour", robot="--robot", back="return")
 def _job(job: Call, *, out: str, arduino: str | None = None) -> None:
-    _write(_planned(job, arduino=arduino), out, arduino=arduino)
-
-
-@program.command("track", of="planner.jobs.plan:plan", robot="--robot")
-def _track(
-    plan_path: Call,
-    path: str,
-    *,
-    robot: str | None = None,
-    start: tuple[str, str, str] | None = None,
-    noise: str = "0.01l",
-    noise_rad: float = 0.01,
-    latency: float = 0.0,
-    camera: str | None = None,
-    view: str | None = None,
-    serial: str | None = None,
-    lost: float | None = None,
-) -> None:
-    """Keep a robot on a path or a saved plan: poses come in on a pipe (planner.tracking.pipe) or from a camera.
-
-    Args:
-        path: a path to plan for, as for softflagella plan; or a plan.json, its folder, or a goal.json or tour.json
-            beside it.
-        robot: robot.toml or the name of a preset; a saved plan has its own.
-        start: X Y DEGREES, of the head's centre, at rest; the robot finds its way to the path from there (default:
-            a path's start; the first pose that comes in, for a saved plan).
-        noise: LENGTH, standard deviation of x and y.
-        noise_rad: standard deviation of the heading.
-        latency: age of a pose when it comes in, or of a picture, in seconds.
-        camera: number of a camera over the tank, such as 0, or a film; the track is printed.
-        view: the camera's view.toml.
-        serial: port of the motor's board, such as /dev/ttyACM0 (default: nothing moves).
-        lost: seconds without a pose after which the motor rests (default: 2).
-    """
-    from planner.files.saved_plan import is_plan
-    from planner.tracking.pipe import answers
-    from planner.tracking.tracker import Tracker
-
-    if not 0 < noise_rad < math.inf:
-        raise InputError(f"--noise-rad {noise_rad}; give a number above 0")
-    if not 0 <= latency < math.inf:
-        raise InputError(f"--latency {latency}; give a number of seconds, 0 or more")
-    if lost is not None and not 0 < lost < math.inf:
-        raise InputError(f"--lost {lost}; give a number of seconds above 0")
-    if camera is None and (view or serial or lost):
-        raise InputError(
-            "--view, --serial and --lost are for --camera, whose number is missing, such as --camera 0"
-        )
-    if camera is not None and (view is None or start is not None):
-        raise InputError("--camera needs --view view.toml and shows where the robot is; leave --start out")
-    if isinstance(sys.stdin, TextIOWrapper):  # a damaged line must not end the tracker
-        sys.stdin.reconfigure(errors="replace")
-    saved = is_plan(path)
-    with redirect_stdout(sys.stderr):
-        if saved:
-            plan = _saved(path, robot=robot, **plan_path.given)
-        elif robot is None:
-            raise InputError(f"{path} is no saved plan, so --robot is needed: a robot.toml or a preset")
-        else:
-            plan = _planned(plan_path, path=path, robot=robot, tell=print)
-    unit, scale = plan_path.given.get("unit"), plan.robot.time_scale
-    deviations = (read_length(noise, unit, plan.robot, "--noise", above_zero=True), noise_rad)
-
-    def begin(pose: tuple[float, float, float] | None, now: float) -> Tracker:
-        return Tracker(plan, noise=deviations, latency=latency / scale, begin=now, start=pose)
-
-    if camera is not None and view is not None:
-        _live(plan, camera, view, serial, latency, lost or 2.0, begin)
-        return
-    if start is not None:
-        tracker: Tracker | None = begin(read_pose(start, unit, plan.robot, "--start"), 0.0)
-    else:
-        tracker = None if saved else begin(None, 0.0)
-    for answer in answers(tracker, sys.stdin, plan.robot, begin):
-        print(answer, flush=True)
-
-
-def _live(
-    plan: Plan, source: str, view: str, port: str | None, latency: float, lost: float,
-    begin: Callable[[tuple[float, float, float] | None, float], Tracker],
-) -> None:  # fmt: skip
-    """Follow a plan with a camera and a motor; print the track."""
-    from planner.tracking.live import Motor, Pictures, Ride, Sight, ending_on_signals, steer, watch
-
-    length = plan.robot.length_scale
-
-    def row(sight: Sight, direction: int, error: float, alarm: bool) -> None:
-        if sight.pose is not None:
-            x, y, heading = sight.pose
-            place = f"{100 * length * x:.4f},{100 * length * y:.4f},{math.degrees(heading):.3f}"
-            print(f"{sight.time:.4f},{place},{direction},{100 * length * error:.4f},{alarm:d}", flush=True)
-
-    def tell(line: str) -> None:
-        print(line, file=sys.stderr, flush=True)
-
-    sights, ride = watch(source, view, plan.robot.name, length, latency), Ride()
-    with ending_on_signals():
-        motor = Motor(port)
-        print("time_s,x_cm,y_cm,heading_deg,direction,error_cm,alarm", flush=True)
-        try:
-            with Pictures(sights) as pictures, motor:  # which stops first
-                steer(ride, pictures, motor, begin, plan.robot.time_scale, lost=lost, row=row, tell=tell)
-        finally:
-            if ride.pictures:
-                tell(ride.line())
-
-
-def _saved(path: str, *, unit: str | None = None, lookup: str | None = None, own_table: bool = False,
-           **planning: Any) -> Plan:  # fmt: skip
-    """Make a saved plan again; options of planning are refused beside it."""
-    from planner.files.saved_plan import restore_plan
-
-    for name in (name for name, value in planning.items() if value is not None):
-        option = f"--{name.replace('_', '-')}"
-        raise InputError(f"{option}: {path} is planned already; leave {option} out, or plan again")
-    return restore_plan(path, lookup=lookup, own_table=own_table)
+    _write(planned(job, arduino=arduino), out, arduino=arduino)
 
 
 @program.command("page", of="planner.page.write_page:write_page", path="", robot="--robot", paths="path")
@@ -232,95 +90,6 @@ def _page(write_page: Call, *, out: str) -> None:
     """
     page = write_page(path=out)
     print(f"{page.stat().st_size / 1e6:.2f} MB, opens in a browser -> {page}")
-
-
-@program.command("replay")
-def _replay(
-    plan: str,
-    *,
-    robot: str | None = None,
-    out: str | None = None,
-    error: bool = True,
-    shapes: str | None = None,
-    every: float | None = None,
-) -> None:
-    """Simulate a planned schedule, and compare the track with the plan.
-
-    Args:
-        robot: another robot that carries the plan out: a robot.toml or a preset (default: the plan's).
-        out: CSV with the track; needed unless --shapes is given.
-        error: estimate the error of the track, which takes more than half as long again.
-        shapes: the shape of the robot and the forces on it in time: .npz, or .pvd for ParaView.
-        every: s between the shapes (default: a 24th of a motor revolution).
-    """
-    from tqdm import tqdm
-
-    from planner.files.tracks import check
-    from sim.inputs import load_robot
-    from sim.io.files import write_csv
-    from sim.model.schedule import load_schedule, read_plan_file
-    from sim.motion.replay import replay, replay_error
-    from sim.motion.shape_files import check_name, equal_times, write_shapes
-    from sim.motion.shapes import shapes_and_track
-
-    if out is None and shapes is None:
-        raise InputError("name a file: --out for the track, or --shapes for the shapes")
-    if every is not None and shapes is None:
-        raise InputError("--every is the time between shapes; name their file with --shapes")
-    planned, swimmer = load_schedule(plan), None if robot is None else load_robot(robot)
-    schedule = planned if swimmer is None else planned.swum_by(swimmer)
-
-    def bar(what: str) -> Any:
-        """Show how many dwells are done, on a terminal alone."""
-        return tqdm(total=len(schedule.dwells), desc=what, unit="dwell", delay=BAR_AFTER, disable=None)
-
-    if shapes is None:
-        with bar("replay") as shown:
-            track = replay(schedule, progress=shown.update)
-    else:
-        check_name(shapes)
-        times = equal_times(schedule, every)
-        with bar("replay") as shown:
-            simulated, track = shapes_and_track(schedule, times, progress=shown.update)
-        write_shapes(shapes, simulated, schedule, swimmer)
-        print(f"{len(times)} shapes, {format_time(times[-1] * schedule.time_scale)} -> {shapes}")
-    if out is None:
-        return
-    own_error = ""
-    if error:
-        with bar("on a coarser mesh") as shown:
-            size = replay_error(schedule, track, progress=shown.update)
-        length = schedule.tail_length
-        in_lab = f"{size:.2g} l" if length is None else f"{format_length(size * length)} ({size:.2g} l)"
-        own_error = f", the simulator's own error is {in_lab} at most"
-    track = planned.in_own_units(track)
-    write_csv(track, out)
-    end = track.iloc[-1]
-    place = f"({end.x_over_l:.3f}, {end.y_over_l:.3f}) l"
-    if "x_cm" in track:
-        place = f"({end.x_cm:.2f}, {end.y_cm:.2f}) cm = {place}"
-    print(f"{len(schedule.dwells)} dwells, {format_time(end.time_s)}, ends at {place}{own_error} -> {out}")
-    if "reference" in read_plan_file(plan):  # a schedule alone has no path
-        print(check(plan, track).line)
-
-
-@program.command("check", of="planner.files.tracks:check", written_by="from")
-def _check(check: Call, plan: str, *, out: str | None = None) -> None:
-    """Tracking error of a replayed track.
-
-    Args:
-        out: overlay picture, PNG.
-    """
-    from planner.files.saved_plan import load_plan
-
-    content = load_plan(plan)
-    error = check(plan=content)
-    print(error.line)
-    if out is not None:
-        from planner.files.tracks import write_overlay
-
-        write_overlay(out, content, error)
-        print(f"-> {out}")
 
 
 if __name__ == "__main__":

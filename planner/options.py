@@ -15,18 +15,18 @@ from typing import Any, TypedDict
 
 from numpy.typing import ArrayLike
 
+from common.errors import InputError, naming
+from common.units import LengthUnit
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.path import Path2D, like_a_shape, shape_of
 from planner.paths.path_files import Drawing, read_path
 from planner.paths.units import Swimmer, in_tails, read_length, read_pose, read_time
 from planner.planning.request import POSE, Camera, Corner, PlanRequest
-from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
 from planner.vehicle.from_table import table_for
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import Point, TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import Objective
-from sim.io.errors import InputError, naming
-from sim.io.units import LengthUnit
+from sim.knowledge import CalibrationKnowledge, read_knowledge
 from sim.model.robot import Robot
 from sim.robot_rows import OneRobot, one_robot
 from surrogate.interface import LookupTable

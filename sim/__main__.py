@@ -6,8 +6,8 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from sim.io.commands import Call, Program
-from sim.io.errors import InputError
+from common.commands import Call, Program
+from common.errors import InputError
 
 if TYPE_CHECKING:
     from sim.model.robot import Robot
@@ -116,7 +116,7 @@ def _robot(preset: str, *, out: str) -> None:
         preset: paper-control, paper-triangle or paper-measured.
         out: robot.toml.
     """
-    from sim.io.files import write_text
+    from common.files import write_text
     from sim.model.presets import PRESETS
     from sim.model.robot_toml import robot_toml
 

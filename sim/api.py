@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 import pandas as pd
 
-from sim.arrays import Floats
-from sim.io.errors import InputError
-from sim.io.keywords import checks_keywords
+from common.arrays import Floats
+from common.errors import InputError
+from common.keywords import checks_keywords
 from sim.model.groups import DWELL, Groups
 from sim.model.response import BEFORE, DWELLS, LAGS
 from sim.model.robot import Robot

@@ -9,17 +9,18 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
+from common.errors import InputError, InputWarning, naming
+from common.files import write_text
+from common.keywords import checks_keywords
+from common.reading import read_toml
+from common.run_columns import RUN, RUN_SYNONYMS
+from common.units import to_si
 from sim.effects import catalogue, check_effects, effect_named, is_effect
-from sim.io.errors import InputError, InputWarning, naming
-from sim.io.files import write_text
-from sim.io.keywords import checks_keywords
-from sim.io.reading import read_toml
-from sim.io.units import to_si
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, checked_values
 from sim.model.learnt_range import read_learnt_range
 from sim.model.presets import PRESETS
@@ -28,42 +29,6 @@ from sim.model.robot_toml import doubtful, read_robot, robot_toml
 
 if TYPE_CHECKING:
     import pandas as pd
-
-RUN = ("N", "l_cm", "omega_rpm")  # what differs between the runs of a robot
-RUN_SYNONYMS = {
-    "rpm": "omega", "motor": "omega", "motor_speed": "omega", "length": "l", "tail_length": "l", "tails": "N",
-    "heading": "course",
-}  # fmt: skip
-
-
-class Measured(NamedTuple):
-    """An output of a measured run: its column, its sign relative to the motor's (0: a magnitude), and why."""
-
-    column: str
-    sign: int = 0
-    sense: str = ""
-
-
-MEASURED = {
-    "omega_h": Measured("omega_h_rpm", -1, "the head turns against the motor"),
-    "omega_t": Measured("omega_t_rpm", 1, "the tails turn with the motor"),
-    "omega_yr": Measured(
-        "omega_yr_rad_s", 1, "a positive motor turns the robot to the left (counter-clockwise) seen from above"
-    ),
-    "R_yr": Measured("R_yr_cm"),
-    "theta": Measured("theta_deg"),
-    "v": Measured("v_cm_s"),
-}
-RUN_NOTES = ("elapsed_min", "temperature_C", "tank_diameter_cm", "course_deg")
-RUN_SIGMAS = ("camera_scale_sigma_percent", "heading_zero_sigma_deg", "tachometer_sigma_percent")
-RUN_ERRORS = (  # of `calibration.swimmer.camera_tracks`; not used, since repeats give the noise
-    "omega_yr_error", "R_yr_error", "theta_error", "v_error", "drift_x_cm_s", "drift_y_cm_s", "drift_error",
-    "omega_h_error", "omega_t_error",
-)  # fmt: skip
-RUN_COLUMNS = (
-    *RUN, *(column for column, _, _ in MEASURED.values()), "run", "trial", "session", "robot", *RUN_NOTES,
-    *RUN_ERRORS, *RUN_SIGMAS,
-)  # fmt: skip
 
 
 def check_columns(columns: Mapping[str, Any]) -> dict[str, Floats]:
@@ -105,8 +70,8 @@ def run_columns(table: pd.DataFrame, robot: Robot, where: str) -> tuple[list[Rob
     Raises:
         InputError: there is no column of a run, or a run is not possible.
     """
-    from sim.io.quantities import convert_columns, numbers_of  # these load pandas
-    from sim.io.tables import row_name
+    from common.quantities import convert_columns, numbers_of  # these load pandas
+    from common.tables import row_name
 
     given = convert_columns(table, RUN, where, RUN_SYNONYMS).table
     if not set(RUN) & set(given):
@@ -160,7 +125,7 @@ def load_robot(source: str | Path) -> Robot:
 def _read_robot(path: Path) -> Robot:
     tables = read_toml(path)
     name = tables.pop("name", path.stem)
-    tables.pop("calibration", None)  # read by planner.vehicle.calibration_table
+    tables.pop("calibration", None)  # read by sim.knowledge
     if "correction" in tables:
         raise InputError("[correction] is no longer read; calibrate the robot as it was given again")
     learnt_from = read_learnt_range(tables.pop("learnt_from")) if "learnt_from" in tables else None

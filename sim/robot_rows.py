@@ -22,10 +22,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
+from common.errors import InputError, naming
+from common.units import column_units
 from sim.inputs import check_columns, group_columns, load_robot, names_robot, run_columns
-from sim.io.errors import InputError, naming
-from sim.io.units import column_units
 from sim.model.robot import Robot
 from sim.motion.steady_motion import QUALITY_COLUMNS, STEADY_COLUMNS, lab_motion
 
@@ -81,7 +81,7 @@ def command_rows(robots: str, robot: str | None, out: str | None, *beside: str) 
         InputError: the robots are bad, or there is no file.
     """
     if out is None and not names_robot(robots):
-        from sim.io.tables import read_table
+        from common.tables import read_table
 
         read_table(robots)  # refuses what is no table
         raise InputError(f"{robots} is a table of points; name the file of their motion with --out")
@@ -90,7 +90,7 @@ def command_rows(robots: str, robot: str | None, out: str | None, *beside: str) 
 
 def write_motion(rows: RobotRows, values: Mapping[str, Any], out: str | None, said: str) -> None:
     """Print what a command says, and write the motion of its robots as CSV where a file is named."""
-    from sim.io.files import write_csv
+    from common.files import write_csv
 
     if out is None:
         return print(said)
@@ -114,7 +114,7 @@ def robot_rows(robots: Robots, robot: OneRobot | None = None, *beside: str) -> R
         InputError: a robot cannot be simulated, or columns differ in length.
     """
     if isinstance(robots, str | Path) and not names_robot(robots):
-        from sim.io.tables import read_table
+        from common.tables import read_table
 
         return _table_rows(read_table(robots), robot, robots, beside)
     if not isinstance(robots, Robot | str | Path | Sequence):

@@ -1,11 +1,13 @@
 # The public names of softflagella and their modules: the one list, for type checkers and for `__init__.py`.
 from calibration.api import calibrate as calibrate
 from calibration.api import decide as decide
-from calibration.api import tracks as tracks
 from calibration.report.robot_verdict import RobotVerdict as RobotVerdict
 from calibration.swimmer.synthetic_table import make_table as make_table
 from calibration.verdict.next_runs import Decision as Decision
 from calibration.verdict.verdict import Verdict as Verdict
+from camera.api import tracks as tracks
+from common.errors import InputError as InputError
+from common.provenance import __version__ as __version__
 from dataset.api import sweep as sweep
 from dataset.data_set import read
 from planner.files.arduino import write_arduino as write_arduino
@@ -13,8 +15,6 @@ from planner.files.plan_files import write_plan as write_plan
 from planner.files.saved_plan import load_goal as load_goal
 from planner.files.saved_plan import load_plan as load_plan
 from planner.files.saved_plan import restore_plan as restore_plan
-from planner.files.tracks import TrackingError as TrackingError
-from planner.files.tracks import check as check
 from planner.goal.trip import Trip as Trip
 from planner.goal.trip import to_goal as to_goal
 from planner.jobs.hold import Orbit as Orbit
@@ -31,11 +31,6 @@ from planner.paths.path_files import Drawing as Drawing
 from planner.paths.path_files import read_path as read_path
 from planner.planning.plan import Plan as Plan
 from planner.planning.request import Camera as Camera
-from planner.tracking.swim import Swim as Swim
-from planner.tracking.swim import swim as swim
-from planner.tracking.tracker import Command as Command
-from planner.tracking.tracker import Tracker as Tracker
-from planner.vehicle.calibration_table import CalibrationKnowledge as CalibrationKnowledge
 from planner.vehicle.measured import MeasuredVehicle
 from sim.api import replay as replay
 from sim.api import response as response
@@ -44,8 +39,7 @@ from sim.api import steady as steady
 from sim.effects import catalogue
 from sim.inputs import load_robot as load_robot
 from sim.inputs import save_robot as save_robot
-from sim.io.errors import InputError as InputError
-from sim.io.provenance import __version__ as __version__
+from sim.knowledge import CalibrationKnowledge as CalibrationKnowledge
 from sim.model.effect import Effect as Effect
 from sim.model.robot import Robot as Robot
 from sim.model.schedule import Schedule as Schedule
@@ -58,6 +52,12 @@ from surrogate.tabulate import tabulate as tabulate
 from surrogate.tensors import torch_query as torch_query
 from surrogate.tensors import torch_steady as torch_steady
 from surrogate.training.train import train as train
+from tracking.swim import Swim as Swim
+from tracking.swim import swim as swim
+from tracking.tracker import Command as Command
+from tracking.tracker import Tracker as Tracker
+from tracking.tracks import TrackingError as TrackingError
+from tracking.tracks import check as check
 
 effects = catalogue
 read_sweep = read

@@ -9,18 +9,20 @@ import difflib
 import sys
 from importlib import import_module
 
-from sim.io.commands import Command, Program
-from sim.io.errors import InputError, run_command
-from softflagella.shadowing import PACKAGES
+from common.commands import Command, Program
+from common.errors import InputError, run_command
+from softflagella.shadowing import COMMANDED
 
 _IMPORTANT = (
     ("sim", "robot steady effects"),
-    ("planner", "plan goal tour hold track page"),
+    ("planner", "plan goal tour hold"),
+    ("tracking", "track"),
+    ("planner", "page"),
     ("dataset", "sweep"),
     ("surrogate", "train"),
     ("camera", "tracks"),
     ("calibration", "calibrate"),
-    ("planner", "replay check"),
+    ("tracking", "replay check"),
     ("sim", "film"),
     ("surrogate", "query"),
     ("softflagella", "demo"),
@@ -68,7 +70,7 @@ def further(package: str) -> Program:
 
 def packages() -> list[str]:
     """List the packages that have further commands."""
-    return [package for package in PACKAGES if further(package).commands]
+    return [package for package in COMMANDED if further(package).commands]
 
 
 def _overview() -> str:
@@ -82,7 +84,7 @@ def _overview() -> str:
 
 def _suggestion(word: str) -> str:
     """Suggest a command for a word that is none: one of a package, one that is spelt nearly so, or all."""
-    for package in PACKAGES:
+    for package in COMMANDED:
         if word in program_of(package).commands:
             return f"it is softflagella {_WORD_OF.get((package, word), f'{package} {word}')}"
     known = (*WORDS, *packages())
@@ -96,7 +98,7 @@ def main(argv: list[str] | None = None) -> None:
     if not words or words[0] in ("-h", "--help", "help"):
         print(_overview())
     elif words[0] in ("--version", "-V"):
-        from sim.io.provenance import __version__
+        from common.provenance import __version__
 
         print(f"softflagella {__version__}")
     elif words[0] in WORDS:

@@ -35,12 +35,11 @@ from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
+from common.files import whole_file, write_csv, write_text
 from dataset.data_set import read
 from planner.files.saved_plan import load_plan
-from planner.files.tracks import check
 from planner.jobs.plan import plan
 from planner.paths.path import Path2D, polygon
-from sim.io.files import whole_file, write_csv, write_text
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml
@@ -54,6 +53,7 @@ from softflagella.demo_figures import draw_plans
 from softflagella.demo_page import ROBOT_PAGE, Results, Swum, write_page
 from surrogate.table_file import load
 from surrogate.tabulate import tabulate
+from tracking.tracks import check
 
 CASES = {  # name of the path -> robot, path
     "circle": ("paper-control", "circle:1.5l"),

@@ -11,15 +11,15 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from common.arrays import Floats
+from common.pages import BLUE, GREEN, INK, ORANGE, RED, SOFT, VIOLET
 from dataset.figures import plain_logarithms
-from planner.files.tracks import TrackingError, draw_overlay
 from planner.planning.picture import draw_tracks
-from sim.arrays import Floats
-from sim.io.pages import BLUE, GREEN, INK, ORANGE, RED, SOFT, VIOLET
 from sim.model.response import DWELLS
 from sim.model.robot import Robot
 from sim.motion.robot_views import draw_from_above, draw_from_behind, scene
 from sim.motion.steady_motion import RPM, Steady, lab_columns
+from tracking.tracks import TrackingError, draw_overlay
 
 _WIDTH = 4.4  # inches: two of them stand beside each other
 _NARROW = 3.0  # three

@@ -20,12 +20,11 @@ from calibration.report.figures import draw_summary
 from calibration.swimmer.measured_table import Measurements
 from calibration.verdict.verdict import Verdict
 from calibration.words.quantities import plain
+from common.arrays import Floats
+from common.pages import Page
+from common.provenance import code_version
+from common.units import format_length, format_time
 from dataset.report import usable_rows
-from planner.files.tracks import TrackingError
-from sim.arrays import Floats
-from sim.io.pages import Page
-from sim.io.provenance import code_version
-from sim.io.units import format_length, format_time
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.model.presets import INDEPENDENT
 from sim.model.robot import Robot
@@ -42,6 +41,7 @@ from softflagella.demo_figures import (
 )
 from surrogate.table import NeuralTable
 from surrogate.table_file import load
+from tracking.tracks import TrackingError
 
 _DOCS = Path(__file__).parents[1] / "docs"
 _PAGES = (  # of the documentation: name without suffix, title, what it is

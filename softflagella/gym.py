@@ -29,6 +29,8 @@ from typing import Any, Literal, NamedTuple
 import gymnasium
 import numpy as np
 
+from common.arrays import Floats
+from common.errors import InputError
 from planner.files.saved_plan import restore_plan
 from planner.jobs.plan import plan as plan_path
 from planner.paths.distance import closest_segment
@@ -36,12 +38,10 @@ from planner.paths.path import arc_length, polygon
 from planner.planning.line_of_sight import LineOfSight
 from planner.planning.plan import Plan
 from planner.planning.request import Camera
-from planner.tracking.swim import Swimmer
-from planner.tracking.tracker import Tracker
-from sim.arrays import Floats
-from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.robot import Robot
+from tracking.swim import Swimmer
+from tracking.tracker import Tracker
 
 LONGEST = 3.0  # planned durations
 START = (0.02, 0.02, 0.03)  # standard deviations of the pose at the start

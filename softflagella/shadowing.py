@@ -10,7 +10,8 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
-PACKAGES = ("sim", "camera", "dataset", "surrogate", "planner", "calibration")
+COMMANDED = ("sim", "camera", "dataset", "surrogate", "planner", "tracking", "calibration")  # they have commands
+PACKAGES = ("common", *COMMANDED)
 _INSTALLED = {"site-packages", "dist-packages"}
 
 

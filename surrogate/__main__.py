@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
-from sim.io.commands import Call, Program
-from sim.io.errors import InputError
+from common.commands import Call, Program
+from common.errors import InputError
 
 program = Program("surrogate", "train look-up tables and query them")
 main = program.main
@@ -28,8 +28,8 @@ def _train(
     """
     from dataclasses import replace
 
+    from common.files import write_text
     from dataset.data_set import read_manifest
-    from sim.io.files import write_text
 
     if epochs is not None and epochs < 1:
         raise InputError(f"--epochs {epochs}; give a whole number from 1")
@@ -94,7 +94,7 @@ def _inverse(inverse: Call, *, out: str) -> None:
     Args:
         out: CSV: a row for each solution.
     """
-    from sim.io.files import write_csv
+    from common.files import write_csv
 
     table = inverse()
     write_csv(table, out)

@@ -20,10 +20,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
+from common.errors import InputError
+from common.units import from_si
 from sim.inputs import group_columns
-from sim.io.errors import InputError
-from sim.io.units import from_si
 from sim.model.groups import MOST_TAILS
 from sim.model.robot import Robot
 from sim.robot_rows import RobotRows

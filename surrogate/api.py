@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from sim.io.errors import naming
-from sim.io.keywords import checks_keywords
-from sim.io.tables import read_table
+from common.errors import naming
+from common.keywords import checks_keywords
+from common.tables import read_table
 from sim.model.groups import DWELL
 from sim.robot_rows import OneRobot, robot_rows, with_units
 from surrogate.answers import answer_rows

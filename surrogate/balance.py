@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.arrays import Flags, Floats
+from common.arrays import Flags, Floats
 from sim.jit import compiled_fast
 from surrogate.network import BLOCK, Layers, evaluate
 from surrogate.tails import (

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats, Integers
+from common.arrays import Floats, Integers
 from sim.jit import compiled_fast
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from surrogate.network import BLOCK, product

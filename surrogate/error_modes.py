@@ -26,7 +26,7 @@ from functools import cache
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN, LAGS
 from surrogate.interface import ErrorModes
 from surrogate.intervals import Intervals

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Flags, Floats
+from common.arrays import Flags, Floats
 from sim.model.response import LAGS
 from sim.motion.steady_motion import STEADY_OUTPUTS
 

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from sim.arrays import Floats
-from sim.io.errors import InputError
+from common.arrays import Floats
+from common.errors import InputError
 from sim.model.response import Responses
 
 

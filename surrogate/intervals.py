@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Floats, Integers
+from common.arrays import Floats, Integers
 from sim.jit import compiled_fast
 from surrogate.domain import MOST_TAILS
 from surrogate.errors import ITSELF, ONE, OUTPUTS, SCALES, SPEED, SURGE

@@ -15,8 +15,8 @@ import numpy as np
 import pandas as pd
 from scipy.stats import qmc
 
-from sim.arrays import Floats, Integers
-from sim.io.errors import InputError
+from common.arrays import Floats, Integers
+from common.errors import InputError
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.domain import BOUNDS
 from surrogate.errors import error_scale

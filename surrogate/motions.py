@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.arrays import Floats, Integers
+from common.arrays import Floats, Integers
 from sim.jit import compiled_fast
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.balance import inputs_at, network_inputs_at, solve

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled_fast
 
 BLOCK = 64  # robots that are evaluated together

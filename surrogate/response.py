@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats, Integers
+from common.arrays import Floats, Integers
 from sim.jit import compiled_fast
 from sim.mechanics.planar import zigzag_speed
 from sim.model.response import BEFORE, DWELLS, at_equal_dwells

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sim.arrays import Floats
-from sim.io.errors import InputError
-from sim.io.files import write_text
-from sim.io.notebook import Shown, given_axes
-from sim.io.reading import ContentError, read_json
+from common.arrays import Floats
+from common.errors import InputError
+from common.files import write_text
+from common.notebook import Shown, given_axes
+from common.reading import ContentError, read_json
 from sim.model.response import DWELLS, Responses
 from sim.motion.steady_motion import STEADY_OUTPUTS, net_speeds, twists
 from surrogate.domain import ROBOT

@@ -20,11 +20,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
+from common.errors import InputError
+from common.notebook import Shown, given_axes
 from sim.effects import catalogue, effect_named
 from sim.inputs import check_columns
-from sim.io.errors import InputError
-from sim.io.notebook import Shown, given_axes
 from sim.model.groups import DWELL, checked_values
 from sim.model.response import DWELLS, Responses
 from sim.motion.steady_motion import STEADY_OUTPUTS, net_speeds, twists

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from sim.io.errors import InputError
-from sim.io.keywords import checks_keywords
+from common.errors import InputError
+from common.keywords import checks_keywords
 from sim.model.response import BEFORE, LAGS
 from surrogate import tensor_file
 from surrogate.domain import ROBOT, Support, monomial_count

@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
+from common.errors import InputError
+from common.keywords import checks_keywords
+from common.provenance import provenance
 from sim.effects import effect_named, is_effect
-from sim.io.errors import InputError
-from sim.io.keywords import checks_keywords
-from sim.io.provenance import provenance
 from sim.mechanics import planar
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, LAGS, Responses, memory_after

@@ -47,9 +47,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Flags, Floats, Integers
+from common.arrays import Flags, Floats, Integers
+from common.errors import InputError
 from sim.effects import effect_named
-from sim.io.errors import InputError
 from sim.jit import compiled_fast, formula
 from sim.mechanics.drag import tail_coefficients
 from sim.model.body import head_resistance

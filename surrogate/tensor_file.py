@@ -22,8 +22,8 @@ import numpy as np
 import safetensors.numpy
 from safetensors import SafetensorError
 
-from sim.io.errors import InputError
-from sim.io.files import whole_file
+from common.errors import InputError
+from common.files import whole_file
 
 _REFERENCE = "tensor"
 _PICKLED = (b"PK\x03\x04", b"\x80\x02")  # how torch's own files begin

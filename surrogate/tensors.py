@@ -15,9 +15,9 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from sim.arrays import Floats
-from sim.io.errors import InputError
-from sim.io.keywords import checks_keywords
+from common.arrays import Floats
+from common.errors import InputError
+from common.keywords import checks_keywords
 from sim.motion.batches import sensitivity_columns
 from surrogate.interface import LookupTable
 from surrogate.table_file import trained_table

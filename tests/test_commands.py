@@ -16,17 +16,17 @@ import pytest
 from calibration.statistics.statistical_model import start_values
 from calibration.verdict.record import verdict_record
 from camera.view import read_setup
+from common.errors import InputError, run_command
+from common.units import format_time
 from dataset.build import build
 from dataset.design import Axis, load_design
 from planner.files.saved_plan import load_goal, load_plan
 from planner.planning.request import Camera
 from sim.inputs import load_robot
-from sim.io.errors import InputError, run_command
-from sim.io.units import format_time
 from sim.model.presets import PRESETS
 from sim.model.schedule import plan_id
 from softflagella.__main__ import main, program_of
-from softflagella.shadowing import PACKAGES
+from softflagella.shadowing import COMMANDED
 from surrogate.table_file import SHIPPED, load
 from tests.calibration.toy_tables import (
     DRAG,
@@ -52,7 +52,7 @@ SAID = {  # by commands that write nothing
     "sim compile": "loops compiled in",
     "surrogate compile": "loops compiled in",
 }
-COMMANDS = [(package, name) for package in PACKAGES for name in program_of(package).commands]
+COMMANDS = [(package, name) for package in COMMANDED for name in program_of(package).commands]
 
 
 def done(*words: object) -> None:
@@ -75,7 +75,7 @@ def made() -> Path:
         folder / "points.csv", index=False
     )
     done("planner", "plan", "circle:1l", "--robot", folder / "robot.toml", "--out", folder / "plan")
-    done("planner", "replay", folder / "plan" / "plan.json", "--out", folder / "track.csv")
+    done("tracking", "replay", folder / "plan" / "plan.json", "--out", folder / "track.csv")
     (folder / "sweep.toml").write_text(SMALL)
     done("dataset", "build", "--config", folder / "sweep.toml", "--out", folder / "sweep", "--jobs", 1)
     return folder
@@ -98,8 +98,8 @@ def short_plan(made: Path, out: Path) -> Path:
     return out / "short.json"
 
 
-def planner_replay(made: Path, out: Path) -> str:
-    done("planner", "replay", short_plan(made, out), "--out", out / "track.csv", "--shapes", out / "shapes.npz")
+def tracking_replay(made: Path, out: Path) -> str:
+    done("tracking", "replay", short_plan(made, out), "--out", out / "track.csv", "--shapes", out / "shapes.npz")
     track, last = pd.read_csv(out / "track.csv"), np.load(out / "shapes.npz")["head_position"][-1]
     assert 100 * last[:2] == pytest.approx(track[["x_cm", "y_cm"]].iloc[-1], abs=0.02)
     with pytest.raises(InputError, match="name their file with --shapes"):
@@ -209,7 +209,7 @@ def planner_plan(made: Path, out: Path) -> str:
     return "of the declared path"
 
 
-def planner_track(made: Path, out: Path) -> str:
+def tracking_track(made: Path, out: Path) -> str:
     words = ["track", "circle:1l", "--robot", made / "robot.toml"]
     answer = subprocess.run(
         [sys.executable, "-m", "softflagella", *map(str, words)],
@@ -259,8 +259,8 @@ def planner_hold(made: Path, out: Path) -> str:
     return "no schedule stays nearer"
 
 
-def planner_check(made: Path, out: Path) -> str:
-    done("planner", "check", made / "plan" / "plan.json", made / "track.csv", "--out", out / "overlay.png")
+def tracking_check(made: Path, out: Path) -> str:
+    done("tracking", "check", made / "plan" / "plan.json", made / "track.csv", "--out", out / "overlay.png")
     assert (out / "overlay.png").read_bytes().startswith(b"\x89PNG")
     return "within the stated error"
 

@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 
 import calibration.verdict.calibrate
 import sim.motion.run
+from common.errors import InputError, run_command
 from dataset.simulate import simulate
 from sim.effects import catalogue
-from sim.io.errors import InputError, run_command
 from sim.model.groups import DWELL, GROUP_COLUMNS
 from sim.model.presets import PRESETS
 from sim.model.schedule import FORMAT, load_schedule

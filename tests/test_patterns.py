@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[1]
 OWN_TEXTS = {"__init__", "commands", "notebook", "pages", "words"}  # do not read what people bring
 READERS = [
     ".".join(file.relative_to(ROOT).with_suffix("").parts)
-    for folder in ("sim/io", "planner/paths")
+    for folder in ("common", "planner/paths")
     for file in sorted((ROOT / folder).glob("*.py"))
     if file.stem not in OWN_TEXTS and "re." in file.read_text()
 ]

@@ -22,7 +22,7 @@ from benchmarks.calibration.law_truths import NULL, Setting, Truth
 from benchmarks.calibration.planted import NOISE, ROBOT, SESSION
 from calibration.laws.places import places
 from calibration.swimmer.swimmer import SwimmerModel
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.effects import catalogue
 from sim.model.body import Body
 from sim.model.effect import Effect

@@ -24,7 +24,7 @@ from calibration.statistics.study import Study, middle_session
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.inputs import group_columns
 from sim.model.groups import Groups
 from sim.model.laws import Powers

@@ -27,7 +27,7 @@ from benchmarks.calibration.foreign_laws import DESIGN, foreign
 from benchmarks.calibration.law_truths import Setting, Truth, hidden_law
 from benchmarks.common import Records, heading, per_cent, row
 from calibration.report.robot_verdict import RobotLaws, find_robot_laws
-from sim.io.errors import InputError
+from common.errors import InputError
 from sim.model.presets import PRESETS
 
 

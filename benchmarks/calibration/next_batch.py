@@ -26,7 +26,7 @@ from calibration.statistics.residual_tests import TESTABLE
 from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
-from sim.arrays import Floats, Integers
+from common.arrays import Floats, Integers
 
 MADE = ((2, 3, 4), (9.0,), (110.0, 150.0), (1, -1))  # N, tail length [cm], motor speed [rpm], direction
 POSSIBLE = ((2, 3, 4, 5), (7.0, 8.0, 9.0, 10.0, 11.0, 12.0), (60.0, 105.0, 150.0), (1, -1))

@@ -28,7 +28,7 @@ from calibration.statistics.statistical_model import (
 from calibration.statistics.study import middle_session
 from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
-from sim.arrays import Flags, Floats, Integers
+from common.arrays import Flags, Floats, Integers
 from sim.model.presets import PRESETS
 
 ROBOT = replace(PRESETS["paper-measured"], C_t=2.6, C_r=2.0, C_yr=3.2)

@@ -40,13 +40,13 @@ from benchmarks.calibration.planted import (
 )
 from benchmarks.calibration.simulated_truth import LENGTHS_CM, THINNING, simulated, sized, thinning
 from benchmarks.common import heading, in_parallel, per_cent, row
-from calibration.examples.balls import read_balls
 from calibration.statistics.residual_tests import TESTABLE
 from calibration.statistics.statistical_model import Experiment, Parameter
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
-from sim.arrays import Floats
+from common.arrays import Floats
+from tests.oracles.balls import read_balls
 from tests.oracles.falling_balls import DRAGS, NULLS, OUTSIDE, falls
 
 _DAYS, _MOVING = 4, ("C_t", "C_r", "C_yr", "youngs_modulus", "camera_scale")

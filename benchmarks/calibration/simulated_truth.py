@@ -22,7 +22,7 @@ from calibration.statistics.statistical_model import (
     stepped,
 )
 from calibration.swimmer.swimmer import DIRECT, SwimmerModel
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.motion.batches import stepped_columns
 
 LENGTHS_CM = (5.0, 6.2, 7.4, 8.6, 9.8, 11.0)

@@ -24,14 +24,14 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.common import heading, in_parallel, per_cent, row
 from benchmarks.planner.stated_errors import random_path
+from common.errors import InputError
 from planner.jobs.plan import plan
 from planner.paths.path import circle
 from planner.planning.request import Camera
-from planner.tracking.swim import Swim, swim
-from planner.tracking.tracker import Tracker
-from sim.io.errors import InputError
 from sim.motion.warm import compile_once
 from tests.oracles.unseen_robots import lab_robot
+from tracking.swim import Swim, swim
+from tracking.tracker import Tracker
 
 CURRENT = 0.05  # of the net speed
 LONGEST = 900  # dwells

@@ -25,17 +25,17 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.common import heading, in_parallel, per_cent, row
+from common.errors import InputError
 from planner.jobs.plan import plan
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import Plan
-from planner.tracking.swim import Swim, swim
 from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.vehicle import Vehicle
 from planner.vehicle.zigzag import Objective
-from sim.io.errors import InputError
 from sim.mechanics import planar
 from surrogate.table_file import load
 from tests.oracles.unseen_robots import lab_robot
+from tracking.swim import Swim, swim
 
 WIDTHS = (0.85, 1.3)  # turn radii
 OBJECTIVES: tuple[Objective, ...] = ("error", "time", "flips")

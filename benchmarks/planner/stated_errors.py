@@ -19,17 +19,17 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.common import heading, in_parallel, per_cent, row, two_quantiles
-from planner.files.tracks import tracking_error
+from common.errors import InputError
 from planner.jobs.plan import plan
 from planner.paths.path import Path2D, circle, polygon
-from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
-from sim.io.errors import InputError
+from sim.knowledge import COEFFICIENTS, CalibrationKnowledge
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.motion.replay import replay
 from sim.motion.warm import compile_once
 from surrogate.table_file import load
 from surrogate.tabulate import tabulate
+from tracking.tracks import tracking_error
 
 SIGMA = 0.01  # of ln C
 QUICK = 0.25  # rad that the robot turns in a time unit: from here on a fast turner

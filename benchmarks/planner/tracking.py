@@ -12,12 +12,12 @@ import time
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from planner.files.tracks import tracking_error
 from planner.jobs.plan import plan
 from planner.paths.path import circle, polygon
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay
 from surrogate.table_file import load
+from tracking.tracks import tracking_error
 
 CASES = (
     ("circle, radius 1.5 l, N = 2", circle(1.5), "paper-control"),

@@ -20,12 +20,12 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.common import heading, in_parallel, per_cent, row, two_quantiles
-from planner.files.tracks import tracking_error
-from sim.io.errors import InputError
+from common.errors import InputError
 from sim.motion.replay import replay, replay_error
 from sim.motion.warm import compile_once
 from surrogate.table_file import load
 from tests.oracles.unseen_robots import LONG, carried
+from tracking.tracks import tracking_error
 
 _LITTLE = 4e4  # radians that tails turn in a replay
 _NOVELTY = 7  # its place in `NeuralTable.width_features`

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import heading, row
-from sim.arrays import Floats
+from common.arrays import Floats
 from tests.sim.robots import control, first_body, solve_orbit, straight_start
 
 TIP = np.array([0.2871, 0.8934])  # of the boundary-value problem θ'' = −α (1 − s) cos θ

@@ -21,13 +21,13 @@ import numpy as np
 from scipy.optimize import brentq, least_squares
 
 from benchmarks.common import heading, row
-from calibration.examples.balls import read_balls
-from calibration.examples.spheres import read_spheres
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.linear.vectors import Vector
 from sim.mechanics.drag import node_resistance, tail_coefficients
 from sim.mechanics.flow import stokeslets
+from tests.oracles.balls import read_balls
 from tests.oracles.clamped_rod import ClampedRod, dead_load
+from tests.oracles.spheres import read_spheres
 from tests.oracles.twirled_rod import whirling
 
 _MESHES = (24, 48)  # edges; errors go as the square of an edge

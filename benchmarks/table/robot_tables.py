@@ -22,8 +22,8 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from common.arrays import Floats
 from planner.vehicle.from_table import table_vehicle
-from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.mechanics import planar
 from sim.mechanics.flow import has_flow

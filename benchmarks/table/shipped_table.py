@@ -30,9 +30,9 @@ from pathlib import Path
 
 import numpy as np
 
+from common.arrays import Floats
+from common.files import write_text
 from dataset.data_set import read_manifest
-from sim.arrays import Floats
-from sim.io.files import write_text
 from sim.motion.batches import steady_columns
 from surrogate.domain import INSIDE, ROBOT
 from surrogate.errors import curve_errors, error_table, relative_errors, summary

@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from benchmarks.common import interpreter_time, processor_time
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.inputs import group_columns, load_robot
 from sim.model.groups import DWELL
 from surrogate.table import NeuralTable

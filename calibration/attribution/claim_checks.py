@@ -31,7 +31,7 @@ from calibration.statistics.fit import Fit
 from calibration.statistics.gls import eliminated
 from calibration.statistics.statistical_model import Runs, regression, stepped
 from calibration.statistics.study import Study, held_out_p_value
-from sim.arrays import Flags, Floats
+from common.arrays import Flags, Floats
 
 SEEN = 6.0  # standard deviations of a remainder that the tests notice nearly always
 FEWEST = 3  # numbers of tails that are fitted

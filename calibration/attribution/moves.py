@@ -35,7 +35,7 @@ from calibration.statistics.residual_tests import TESTABLE, Directions, examine_
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import Experiment, Parameter, Runs
 from calibration.statistics.study import Study
-from sim.arrays import Flags
+from common.arrays import Flags
 
 CERTAIN = 5.0  # standard deviations
 CREDIBLE = 10.0  # tolerances of a number: a camera may be bumped, but no head is a third shorter on a day

@@ -56,7 +56,7 @@ from calibration.statistics.statistical_model import (
     regression,
 )
 from calibration.statistics.study import FinalRefit, Study
-from sim.arrays import Floats, Integers
+from common.arrays import Floats, Integers
 
 _REMOVED = 0.5  # least share of what is beyond noise
 _CERTAIN = 2.0  # standard errors of the gain

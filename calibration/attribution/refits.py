@@ -34,7 +34,7 @@ from calibration.statistics.gls import solved
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
 from calibration.statistics.statistical_model import Experiment, ForwardModel, Parameter, Parameters, start_values
 from calibration.statistics.study import Study, groups, leave_one_group_out
-from sim.arrays import Flags, Floats
+from common.arrays import Flags, Floats
 
 IMITABLE = 0.05  # imitability index above which a claim needs a reservation
 SURE = 0.01  # p-value of the transfer test below which it is

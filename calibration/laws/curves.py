@@ -54,7 +54,7 @@ from calibration.laws.law_model import LawModel
 from calibration.statistics.fit import Fit
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.study import Study
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.laws import STEEPEST
 
 POWER = "power"

@@ -36,7 +36,7 @@ from calibration.laws.readings import EXPONENTS, INPUTS, logarithms
 from calibration.statistics.fit import Fit
 from calibration.statistics.gls import Gls, eliminated
 from calibration.statistics.statistical_model import Parameter, changes, precisions, regression, stepped
-from sim.arrays import Flags, Floats, Integers
+from common.arrays import Flags, Floats, Integers
 
 DRAWS = 999  # of the bootstrap
 _AT_ONCE = 50  # draws

@@ -27,10 +27,10 @@ from calibration.statistics.statistical_model import Parameter, Parameters, by_d
 from calibration.swimmer.influences import robot_number
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.swimmer import SwimmerModel
-from sim.arrays import Floats, Integers
+from common.arrays import Floats, Integers
+from common.errors import InputError
 from sim.effects import effect_named
 from sim.inputs import group_columns
-from sim.io.errors import InputError
 from sim.model.groups import Groups
 from sim.model.laws import STEEPEST, Law, Powers
 from sim.model.robot import Robot

@@ -57,8 +57,8 @@ from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.study import LEVEL, Study, error_interval, errors
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.words.render import say_laws
-from sim.arrays import Flags, Floats
-from sim.io.errors import InputError
+from common.arrays import Flags, Floats
+from common.errors import InputError
 
 NO_SESSIONS = "does not predict left-out sessions better"
 NOT_CONVERGED = "its fit did not converge"

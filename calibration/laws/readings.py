@@ -40,7 +40,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from calibration.swimmer.measured_table import Measurements
-from sim.arrays import Floats
+from common.arrays import Floats
 
 EXPONENTS = ("law_speed", "law_length", "law_tails")  # of INPUTS
 INPUTS = ("ω", "l", "N")

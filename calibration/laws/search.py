@@ -60,7 +60,7 @@ from calibration.statistics.fit import Fit
 from calibration.statistics.gls import Gls, eliminated, solved
 from calibration.statistics.statistical_model import changes, precisions
 from calibration.swimmer.swimmer import SwimmerModel
-from sim.arrays import Flags, Floats, Integers
+from common.arrays import Flags, Floats, Integers
 from sim.effects import effect_named, is_effect
 from sim.model.laws import STEEPEST
 

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from calibration.words.render import rendered
+from common.errors import InputError
+from common.files import files_together, write_text
+from common.reading import ContentError, read_json
 from sim.effects import catalogue, check_effects, effect_named
-from sim.io.errors import InputError
-from sim.io.files import files_together, write_text
-from sim.io.reading import ContentError, read_json
 from sim.model.groups import Groups
 from sim.model.laws import COEFFICIENTS, SCALED, TAILS, Law
 from sim.model.presets import PRESETS

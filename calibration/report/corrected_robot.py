@@ -1,7 +1,7 @@
 """What a calibration hands on: the corrected robot, and how sure it is, as corrected.toml.
 
 The covariance is that of the fit to all runs. It goes into the table [calibration], which the planner reads
-(`planner.vehicle.calibration_table`). What belongs to the way of measuring is left out: the camera, the zero of
+(`sim.knowledge`). What belongs to the way of measuring is left out: the camera, the zero of
 the heading, the tachometer, the tracked point, slip of the motor and drift between runs. The errors of what is
 kept contain the errors of these. A current in the tank is stated on its own.
 
@@ -37,12 +37,12 @@ from calibration.statistics.statistical_model import Parameters
 from calibration.statistics.study import FinalRefit, refit_to_all
 from calibration.swimmer.influences import CURRENT, LENGTH
 from calibration.swimmer.swimmer import robot_numbers
-from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge, knowledge_toml
-from sim.arrays import Flags, Floats
+from common.arrays import Flags, Floats
+from common.errors import InputError
+from common.reading import sealed
+from common.units import from_si, to_si
 from sim.effects import catalogue, effect_named, is_effect
-from sim.io.errors import InputError
-from sim.io.reading import sealed
-from sim.io.units import from_si, to_si
+from sim.knowledge import NUMBERS, CalibrationKnowledge, knowledge_toml
 from sim.model.laws import Load, make_law
 from sim.model.learnt_range import learnt_range
 from sim.model.presets import CONTROL

@@ -1,4 +1,4 @@
-"""Draw the figures of a calibration's report, each readable on a telephone, and camera tracks with their fits."""
+"""Draw the figures of a calibration's report, each readable on a telephone."""
 
 from __future__ import annotations
 
@@ -19,11 +19,10 @@ from calibration.laws.places import Place
 from calibration.report.path_error import WORDS, Model, PathError
 from calibration.statistics.residual_tests import Misfit
 from calibration.statistics.statistical_model import Runs
-from calibration.swimmer.camera_tracks import Track
 from calibration.verdict.verdict import Verdict
 from calibration.words.quantities import feature_in_words, final_model, output_label, output_scale
-from sim.arrays import Flags, Floats
-from sim.io.pages import BLUE, GREEN, INK, ORANGE, PALE, RED, VIOLET
+from common.arrays import Flags, Floats
+from common.pages import BLUE, GREEN, INK, ORANGE, PALE, RED, VIOLET
 from sim.model.robot import Robot
 from sim.motion.robot_views import arrow, curved_arrow, draw_robot, scene
 
@@ -33,8 +32,6 @@ _ON_CELLS = "#101010"  # of numbers on pale cells, whatever the colours of the p
 _COLOURS: dict[Model, str] = {"as_given": ORANGE, "corrected": GREEN}
 _SCALES = {"ω": (30 / math.pi, "motor speed ω [rpm]"), "l": (100.0, "tail length l [cm]"), "N": (1.0, "tails N")}
 _LONG = 0.45  # of an arrow, in l
-_MOST_TRACKS = 48  # panels
-_TRACK, _FIT, _START = "#7a8794", "#c8452f", "#1a1a1a"
 _TICKS = (3.0, 10.0, 30.0, 100.0, 300.0)
 
 
@@ -289,42 +286,3 @@ def _draw_asked(axes: Any, asked: Curve, scale: float) -> None:
     label = f"the runs' own curve, 95 %; power law: p = {asked.p_value:.2g}"
     axes.plot(scale * asked.inputs, asked.factor, "--", color=RED, lw=1.2, label=label)
     axes.legend(frameon=False, fontsize=7)
-
-
-def draw_tracks(tracks: Sequence[Track]) -> Figure:
-    """Draw each track with its fitted circle or line, one panel for a run; of many runs, some from each part."""
-    stride = math.ceil(len(tracks) / _MOST_TRACKS)
-    shown = tracks[::stride]
-    columns = min(len(shown), 6)
-    rows = math.ceil(len(shown) / columns)
-    figure = Figure(figsize=(2.4 * columns, 2.7 * rows + 0.5), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes, track in zip(panels, shown, strict=False):
-        axes.plot(track.x, track.y, ".", color=_TRACK, ms=2, label="track")
-        axes.plot(*track.fit.path.T, color=_FIT, lw=1.2, label="fit")
-        axes.plot(track.x[0], track.y[0], "o", color=_START, ms=4, label="first sample")
-        axes.set_aspect("equal", "datalim")
-        axes.tick_params(labelsize=7)
-        axes.set_title(f"run {track.run}\n{_result(track)}", fontsize=8, parse_math=False)
-    for axes in panels[len(shown) :]:
-        axes.set_visible(False)
-    figure.supxlabel("x [cm]", fontsize=9)
-    figure.supylabel("y [cm]", fontsize=9)
-    figure.legend(
-        *panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=3, fontsize=8, frameon=False
-    )
-    return figure
-
-
-def _result(track: Track) -> str:
-    result = track.fit.result
-    if math.isnan(result.R_yr_cm):
-        return f"line, {_with_error(result.v_cm_s, result.v_error)} cm/s"
-    side = "left" if result.omega_yr_rad_s > 0 else "right"
-    return f"R = {_with_error(result.R_yr_cm, result.R_yr_error)} cm, turns {side}"
-
-
-def _with_error(value: float, error: float) -> str:
-    """Write a value to the first digit of its error."""
-    digits = max(0, -math.floor(math.log10(error))) if error > 0 else 3
-    return f"{value:.{digits}f} ± {error:.{digits}f}"

@@ -19,6 +19,9 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from common.arrays import Floats
+from common.errors import InputError, naming
+from common.units import format_length
 from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D
 from planner.paths.path_files import read_path
@@ -31,12 +34,9 @@ from planner.planning.errors import (
 )
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
-from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Switches, roll_out
-from sim.arrays import Floats
-from sim.io.errors import InputError, naming
-from sim.io.units import format_length
+from sim.knowledge import CalibrationKnowledge
 from sim.model.robot import Robot
 from surrogate.tabulate import tabulate
 

@@ -28,9 +28,9 @@ from calibration.statistics.fit import WRONG
 from calibration.verdict.next_runs import STOP
 from calibration.verdict.verdict import Verdict
 from calibration.words.render import rendered
-from sim.arrays import Flags
-from sim.io.pages import Page, figures_markup, inline
-from sim.io.provenance import code_version
+from common.arrays import Flags
+from common.pages import Page, figures_markup, inline
+from common.provenance import code_version
 
 _LAW = (
     "On what it depends. Line and band: the law. Points: the factor that the runs at this input ask for, "

@@ -32,11 +32,11 @@ from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import first_fit
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
-from planner.vehicle.calibration_table import CalibrationKnowledge
-from sim.arrays import Flags
-from sim.io.files import files_together, write_text
-from sim.io.notebook import Shown, given_axes
-from sim.io.provenance import provenance
+from common.arrays import Flags
+from common.files import files_together, write_text
+from common.notebook import Shown, given_axes
+from common.provenance import provenance
+from sim.knowledge import CalibrationKnowledge
 from sim.model.robot import Robot
 
 if TYPE_CHECKING:

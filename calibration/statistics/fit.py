@@ -44,7 +44,7 @@ from calibration.statistics.statistical_model import (
     regression,
     stepped,
 )
-from sim.arrays import Flags, Floats
+from common.arrays import Flags, Floats
 
 WRONG = 3.0  # pull beyond which a nuisance parameter is taken to be wrong
 _LEARNT = 0.02  # share of the prior's variance that the runs must remove before a pull means anything

@@ -37,7 +37,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.arrays import Floats, Integers
+from common.arrays import Floats, Integers
 
 SESSION_SHARE = 1.0  # largest ρ
 _RIDGE = 1e-11  # so that columns without any signal get a large variance

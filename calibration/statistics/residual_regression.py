@@ -16,7 +16,7 @@ import numpy as np
 from calibration.statistics.gls import repeat_covariance
 from calibration.statistics.statistical_model import Runs, features
 from calibration.statistics.study import groups, leave_one_group_out
-from sim.arrays import Flags, Floats, Integers
+from common.arrays import Flags, Floats, Integers
 
 Terms = TypeVar("Terms", bound=tuple[object, ...])
 

@@ -50,7 +50,7 @@ from calibration.statistics.statistical_model import (
     regression,
 )
 from calibration.statistics.study import Study
-from sim.arrays import Flags, Floats, Integers
+from common.arrays import Flags, Floats, Integers
 
 TESTABLE = 0.03  # an effect cannot be tested if less than this share of its signal survives the projection
 GENERAL = ("lack", "kernel", "shape")

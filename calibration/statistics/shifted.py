@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from calibration.statistics.statistical_model import Experiment, Parameter, Parameters, Runs
-from sim.arrays import Flags, Floats
+from common.arrays import Flags, Floats
 
 _LARGEST = 2.0  # change of a logarithm without a prior
 

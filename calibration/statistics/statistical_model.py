@@ -1,7 +1,7 @@
 """The statistical model of a table: its runs, a forward model with parameters and priors, and the noise.
 
 **Forward model.** Nothing in this room knows robots. The swimmer (`calibration.swimmer.swimmer`) is one forward
-model; a sphere that settles in a vessel is another one (`calibration/examples/spheres.py`).
+model; a sphere that settles in a vessel is another one (`tests/oracles/spheres.py`).
 
 The noise, weights of runs and priors are those of `calibration.statistics.gls`.
 
@@ -23,7 +23,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from calibration.statistics.gls import Gls, repeat_count, repeat_covariance
-from sim.arrays import Flags, Floats, Integers
+from common.arrays import Flags, Floats, Integers
 
 Value = float | Floats  # one number, or one for each run (n,)
 Parameters = Mapping[str, Any]  # name -> Value

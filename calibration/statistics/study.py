@@ -30,7 +30,7 @@ from scipy.stats import t as student
 from calibration.statistics.fit import Fit
 from calibration.statistics.gls import inverse_root, repeat_count
 from calibration.statistics.statistical_model import ForwardModel, Parameter, Runs, regression, stepped
-from sim.arrays import Flags, Floats, Integers
+from common.arrays import Flags, Floats, Integers
 
 LEVEL = 0.04  # α of every claim; below 0.05, because the noise is estimated and false claims must stay below 5 %
 DRAWS = 1000  # of the bootstrap

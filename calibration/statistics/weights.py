@@ -36,7 +36,7 @@ from calibration.statistics.fit import Fit, fit
 from calibration.statistics.gls import Noise, inverse_root
 from calibration.statistics.statistical_model import FEWEST_REPEATS, ForwardModel, Runs
 from calibration.statistics.study import Study
-from sim.arrays import Floats, Integers
+from common.arrays import Floats, Integers
 
 _RATIOS = (9.0, 25.0, 100.0)  # c²
 _LACK = 1.0  # least variance of a condition's departure, in S

@@ -26,8 +26,8 @@ from functools import cache
 from typing import Any
 
 from calibration.statistics.statistical_model import Parameter
+from common.units import UNITS, from_si
 from sim.effects import Effect, catalogue, effect_named, is_effect
-from sim.io.units import UNITS, from_si
 from sim.model.robot import Robot
 
 CAMERA, HEADING, TACHOMETER = "camera_scale", "heading_zero", "tachometer"

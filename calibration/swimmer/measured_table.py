@@ -40,7 +40,6 @@ Outputs in coarse steps may agree by chance, and their rows are kept. Outputs ar
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -54,20 +53,21 @@ from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs
 from calibration.statistics.study import divided, middle_session
 from calibration.swimmer.influences import CAMERA, HEADING, TACHOMETER
-from sim.arrays import Flags, Floats, Integers
-from sim.inputs import MEASURED, RUN_COLUMNS, RUN_NOTES, RUN_SIGMAS
-from sim.inputs import RUN as INPUTS
-from sim.inputs import RUN_SYNONYMS as SYNONYMS
-from sim.io.errors import InputError, naming
-from sim.io.quantities import Converted, convert_columns, numbers_of
-from sim.io.tables import LINE, read_table, row_name
-from sim.io.units import to_si
+from common.arrays import Flags, Floats, Integers
+from common.errors import InputError, naming
+from common.quantities import numbers_of
+from common.run_columns import (
+    MEASURED,
+    OUTPUTS,
+    RUN,
+    RUN_COLUMNS,
+    RUN_NOTES,
+    RUN_SIGMAS,
+    convert_measured,
+)
+from common.tables import LINE, read_table, row_name
+from common.units import to_si
 
-# Output -> (column, factor to SI, sign relative to the motor's; 0: a magnitude)
-OUTPUTS = {
-    output: (column, to_si(1.0, column.removeprefix(f"{output}_")), sign)
-    for output, (column, sign, _) in MEASURED.items()
-}
 _SIGMAS = dict(  # column -> nuisance parameter, factor
     zip(RUN_SIGMAS, ((CAMERA, 0.01), (HEADING, math.pi / 180), (TACHOMETER, 0.01)), strict=True)
 )
@@ -127,7 +127,7 @@ class Measurements(Runs):
 
 
 def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
-    """Read measurements from a file (`sim.io.tables`) or a table.
+    """Read measurements from a file (`common.tables`) or a table.
 
     Raises:
         InputError: columns are missing or misspelt, or too few runs remain.
@@ -136,31 +136,12 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
         return _read(source)
 
 
-def convert_measured(table: pd.DataFrame, where: str) -> Converted:
-    """Rename and convert the columns of a measured table, which may lack its outputs.
-
-    Raises:
-        InputError: a column is missing, misspelt or there twice.
-    """
-    table, converted = convert_columns(table, INPUTS, where, SYNONYMS)
-    for name in INPUTS:  # before the others: a table without them is no measured table
-        if name not in table:
-            raise InputError(f"the table has no column {name!r}; it needs {', '.join(INPUTS)}")
-    outputs = (column for column, _, _ in OUTPUTS.values())
-    table, others = convert_columns(table, (*outputs, *RUN_NOTES, *RUN_SIGMAS), where, SYNONYMS)
-    for name in (str(c) for c in table if c not in RUN_COLUMNS):
-        near = difflib.get_close_matches(name, [column for column in RUN_COLUMNS if column not in table], n=1)
-        if near:
-            raise InputError(f"unknown column {name!r}: is it {near[0]!r}? rename or drop it")
-    return Converted(table, (*converted, *others))
-
-
 def _read(source: str | Path | pd.DataFrame) -> Measurements:
     table, where = (source, "the table") if isinstance(source, pd.DataFrame) else (read_table(source), str(source))
     header = (table.astype(str) == [str(name) for name in table]).all(axis=1).to_numpy()
     table, converted = convert_measured(table, where)
     unknown = [str(c) for c in table if c not in RUN_COLUMNS]
-    empty = [str(c) for c in table if c not in (*INPUTS, *unknown) and _is_empty(table[c])]
+    empty = [str(c) for c in table if c not in (*RUN, *unknown) and _is_empty(table[c])]
     table = table.drop(columns=empty)
     outputs = _measured_outputs(table, empty)
     numbers = table.drop(columns=["session", "robot"], errors="ignore").apply(numbers_of)
@@ -177,10 +158,10 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
     # Runs of different robots are no repeats, even where all settings are equal.
     robots = table.loc[keep, "robot"].astype(str).to_numpy() if "robot" in table else np.full(len(good), "")
     robot_names, robot = np.unique(robots, return_inverse=True)
-    condition: Integers = np.asarray(good.groupby([*INPUTS, robot], sort=True).ngroup(), dtype=np.int64)
+    condition: Integers = np.asarray(good.groupby([*RUN, robot], sort=True).ngroup(), dtype=np.int64)
     session_names, session = np.unique(_sessions(table[keep], good), return_inverse=True)
     factors = (1, to_si(1.0, "cm"), to_si(1.0, "rpm"))
-    tails, length, omega = (good[c].to_numpy(dtype=float) * f for c, f in zip(INPUTS, factors, strict=True))
+    tails, length, omega = (good[c].to_numpy(dtype=float) * f for c, f in zip(RUN, factors, strict=True))
     noted = _noted(good)
     inputs = [tails, np.log(length), np.log(np.abs(omega)), np.sign(omega), *noted.values()]
     data = Measurements(
@@ -312,7 +293,7 @@ def _mark_copies(reasons: list[str], numbers: pd.DataFrame, outputs: tuple[str, 
     whole = numbers[columns].notna().all(axis=1)
     usable = [i for i, reason in enumerate(reasons) if not reason and whole.iloc[i]]
     used = numbers.iloc[usable]
-    for place, earlier in find_copies(used[list(INPUTS)].to_numpy(), used[columns].to_numpy()).items():
+    for place, earlier in find_copies(used[list(RUN)].to_numpy(), used[columns].to_numpy()).items():
         reasons[usable[place]] = f"{_COPY} ({row_name(table, usable[earlier])})"
 
 
@@ -411,7 +392,7 @@ def _reasons(
     reasons = ["the header again" if again else "" for again in header]
     for i in np.flatnonzero(missing.all(axis=1)):
         reasons[i] = reasons[i] or "no output has a value"
-    used = (*INPUTS, *missing)
+    used = (*RUN, *missing)
     values = {column: numbers[column].where(numbers[column].abs() < _LARGEST).to_numpy() for column in used}
     positive = [column for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s") if column in values]
     for column, bad, fault in (

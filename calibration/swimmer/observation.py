@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 
 
 @dataclass(frozen=True)

@@ -16,31 +16,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.swimmer.measured_table import OUTPUTS, Measurements
-from sim.arrays import Floats
-from sim.io.errors import InputError
-from sim.io.units import UNITS as ANY_UNIT
-from sim.io.units import convert, split
+from calibration.swimmer.measured_table import Measurements
+from common.arrays import Floats
+from common.errors import InputError
+from common.run_columns import check_factor
 from sim.model.groups import MOST_TAILS
 from sim.model.robot import Robot
 
 SHORTEST, LONGEST, FASTEST = 0.5, 50, 1000  # tails in head radii, ω̄
 SLIPS = 3.0  # factor of the spins' sum
 _SPINS = 4.0  # factor of the yaw rate beyond which all other spins may be in another unit
-_NEAR = 1.6  # factor between an output in another unit and what the robot does
-OFF = 10 / _NEAR  # factor of an output: of what is ten times too large or too small
-_USUAL = ("rpm", "rad_s", "deg_s", "rps", "mm", "cm", "m", "deg", "rad", "mm_s", "cm_s", "m_s", "cm_min")
 
 
-def _other_units(column: str) -> dict[str, float]:
-    """Return what the numbers of a column are multiplied by if they are in another usual unit."""
-    unit = split(column).unit
-    assert unit is not None
-    others = [ANY_UNIT[suffix] for suffix in _USUAL if suffix != unit.suffix]
-    return {other.text: convert(1.0, unit.suffix, other.suffix) for other in others if other.kind == unit.kind}
-
-
-UNITS = {output: _other_units(column) for output, (column, _, _) in OUTPUTS.items()}
 SETTINGS = ("N", "l_cm", "omega_rpm")
 _LENGTHS = 6  # of many, spread evenly
 _SPEEDS = (0.4, 0.7, 1.0)  # of the fastest
@@ -96,29 +83,6 @@ def _all_spins(factor: float) -> str:
         return ""
     meant, stated = ("rad/s", "rpm") if factor > 1 else ("rpm", "rad/s")
     return f"; or the spins of motor, head and tails are all in {meant} where {stated} is stated"
-
-
-def check_factor(output: str, factor: float, otherwise: str = "") -> None:
-    """Check the ratio of an output, a name of OUTPUTS, to the prediction of the model as given.
-
-    Args:
-        otherwise: what else may be wrong, for the end of the message.
-
-    Raises:
-        InputError: the output seems to be in another unit.
-    """
-    column = OUTPUTS[output][0]
-    for unit, wrong in UNITS[output].items():
-        if 1 / _NEAR < factor / wrong < _NEAR:
-            raise InputError(
-                f"{column} is {factor:.3g} times what the robot as given does: it seems to be in {unit}; "
-                f"convert it, or correct the coefficients in robot.toml if its unit is right{otherwise}"
-            )
-    if not 1 / OFF < factor < OFF:
-        raise InputError(
-            f"{column} is {factor:.3g} times what the robot as given does; "
-            f"check its unit, those of l_cm and omega_rpm, and robot.toml{otherwise}"
-        )
 
 
 def owned(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:

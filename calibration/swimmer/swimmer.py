@@ -40,10 +40,10 @@ from calibration.swimmer.influences import (
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.observation import Observation
 from calibration.swimmer.possible_runs import Owned, check_inputs, check_outputs, check_owned, possible_settings
-from sim.arrays import Flags, Floats, Integers
+from common.arrays import Flags, Floats, Integers
+from common.errors import InputError
 from sim.effects import effect_named, is_effect
 from sim.inputs import group_columns
-from sim.io.errors import InputError
 from sim.model.robot import Robot
 from sim.motion.batches import sensitivity_columns, steady_columns
 from sim.motion.sensitivity import Sensitivities

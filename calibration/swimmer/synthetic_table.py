@@ -15,10 +15,10 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from common.errors import InputError
+from common.keywords import checks_keywords
 from sim.effects import effect_named
 from sim.inputs import group_columns
-from sim.io.errors import InputError
-from sim.io.keywords import checks_keywords
 from sim.model.robot import Robot
 from sim.motion.batches import stepped_columns
 from sim.motion.steady_motion import RPM, lab_columns

@@ -80,9 +80,9 @@ from calibration.statistics.weights import (
 )
 from calibration.verdict.next_runs import Explanation, next_runs
 from calibration.verdict.verdict import Explained, HeldOutErrors, Verdict
-from sim.arrays import Flags, Floats
-from sim.io.errors import InputError
-from sim.io.provenance import fingerprint
+from common.arrays import Flags, Floats
+from common.errors import InputError
+from common.provenance import fingerprint
 
 if TYPE_CHECKING:
     from calibration.laws.laws import Laws

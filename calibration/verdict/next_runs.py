@@ -36,9 +36,9 @@ from scipy.special import ndtr
 from calibration.attribution.refits import Rival
 from calibration.statistics.gls import Noise
 from calibration.statistics.statistical_model import ForwardModel, Runs, start_values
-from sim.arrays import Flags, Floats
-from sim.io.errors import InputError
-from sim.io.reading import ContentError, read_json
+from common.arrays import Flags, Floats
+from common.errors import InputError
+from common.reading import ContentError, read_json
 
 STOP = 25.0  # ratio of likelihoods at which an explanation is given up, 1/α of the sequence of batches
 GIVEN_UP = 2 * math.log(STOP)  # the same as a difference of deviances

@@ -18,7 +18,7 @@ from calibration.statistics.gls import inverse_root
 from calibration.statistics.statistical_model import Parameter
 from calibration.statistics.study import count_of_rows
 from calibration.words.render import next_steps, sentence
-from sim.io.provenance import provenance
+from common.provenance import provenance
 from surrogate.domain import COEFFICIENTS
 
 if TYPE_CHECKING:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from common.errors import InputError
+from common.files import files_together, write_text
+from common.keywords import checks_keywords
+from common.provenance import __version__
 from planner.files.headers import c_part, safe_name, schedule_header
 from planner.planning.plan import Plan
-from sim.io.errors import InputError
-from sim.io.files import files_together, write_text
-from sim.io.keywords import checks_keywords
-from sim.io.provenance import __version__
 
 _SKETCHES = ("first_turn", "open_loop", "tracked")
 _CODE = {

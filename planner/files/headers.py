@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
+from common.errors import InputError
 from planner.paths.units import in_lab
 from planner.planning.plan import Plan
-from sim.io.errors import InputError
 from sim.model.robot import Robot
 
 _CODE = Path(__file__).parents[1] / "c"

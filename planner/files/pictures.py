@@ -11,10 +11,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
 
+from common.files import whole_file
+from common.units import format_time
 from planner.paths.units import in_lab
 from planner.planning.plan import Plan
-from sim.io.files import whole_file
-from sim.io.units import format_time
 
 _LONGER = 5.2  # inches, of the longer side of the frame
 _LEAST = np.array([4.2, 1.2])  # inches, width and height of the frame

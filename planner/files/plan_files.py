@@ -9,11 +9,11 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+from common.files import files_together, write_numbers, write_text
+from common.keywords import checks_keywords
+from common.provenance import code_version
 from planner.files.headers import schedule_header
 from planner.planning.plan import KINDS, Plan
-from sim.io.files import files_together, write_numbers, write_text
-from sim.io.keywords import checks_keywords
-from sim.io.provenance import code_version
 
 FILES = ("plan.json", "plan.csv", "schedule.h", "plan.svg")
 EXTRA = tuple(f"{kind}.{ending}" for kind in KINDS for ending in ("json", "svg"))  # planned before

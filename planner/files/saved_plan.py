@@ -18,6 +18,9 @@ from typing import Any, get_args
 
 import numpy as np
 
+from common.errors import InputError, naming
+from common.keywords import checks_keywords
+from common.reading import ContentError, read_json
 from planner.goal.trip import FORMAT, Trip
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
@@ -28,15 +31,12 @@ from planner.planning.errors import PlanErrors, predicted_error
 from planner.planning.line_of_sight import Guidance
 from planner.planning.plan import GUARANTEE, KINDS, Plan
 from planner.planning.request import DOCUMENTED, Camera, PlanRequest
-from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.from_table import table_for
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Switches, roll_out
 from planner.vehicle.zigzag import Objective, Zigzag
-from sim.io.errors import InputError, naming
-from sim.io.keywords import checks_keywords
-from sim.io.reading import ContentError, read_json
+from sim.knowledge import CalibrationKnowledge
 from sim.model.robot import Robot
 from sim.model.schedule import check_format, read_plan_file
 from surrogate.interface import LookupTable

@@ -22,6 +22,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
+from common.arrays import Floats
+from common.errors import InputError
 from planner.paths.distance import distance_to
 from planner.planning.conditions import OVERLAP, Lap
 from planner.planning.declare import Declared
@@ -31,8 +33,6 @@ from planner.planning.plan import J, Plan
 from planner.planning.request import POSE, Progress
 from planner.planning.solve import Setting
 from planner.vehicle.vehicle import Switches, Vehicle, flips_after, roll_out
-from sim.arrays import Floats
-from sim.io.errors import InputError
 from sim.mechanics import planar
 
 _STEP = 1e-4  # time units, for derivatives

@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, words
+from common.arrays import Flags, Floats, Integers
+from planner.paths.dubins import TURNS, DubinsPaths, shortest_paths, words
 from planner.paths.obstacles import Footprint, FreeSpace, Map
 from planner.paths.tractrix import Drift
 from planner.paths.units import Swimmer, in_lab, place_in_lab
 from planner.planning.conditions import BlockedError
-from sim.arrays import Flags, Floats, Integers
 
 _RANGE = 3  # of the joints between poses, in spacings
 _DETOUR = 1.15  # joints that are longer than this, beside the straight way or the turn, are left out

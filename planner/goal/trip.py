@@ -17,10 +17,13 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from planner.goal.dubins import DubinsPaths
+from common.arrays import Floats
+from common.errors import InputError
+from common.keywords import checks_keywords
 from planner.goal.last_dwells import Ending
 from planner.goal.route import COURSES, Lattices, NoWayError, RouteLimits, route
 from planner.options import AnyVehicle, GoalOptions, Length, asked, place_of, pose_of, swimmer_of
+from planner.paths.dubins import DubinsPaths
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import LONGEST, ask_about_days, heading_in_degrees, in_lab, place_in_lab
@@ -31,9 +34,6 @@ from planner.planning.plan import Job, Plan
 from planner.planning.request import POSE
 from planner.planning.solve import Setting, Task, solve
 from planner.vehicle.zigzag import Objective, check_least
-from sim.arrays import Floats
-from sim.io.errors import InputError
-from sim.io.keywords import checks_keywords
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

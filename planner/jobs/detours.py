@@ -20,9 +20,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.goal.dubins import shortest_paths
+from common.arrays import Flags, Floats
 from planner.goal.route import AROUND, LEVELS, Lattice, RouteLimits, shortened
 from planner.paths.distance import nearest
+from planner.paths.dubins import shortest_paths
 from planner.paths.nearest_path import nearest_poses, tracked_points
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D, arc_length, points_at, runs_of
@@ -33,7 +34,6 @@ from planner.planning.conditions import BlockedError, Detour
 from planner.planning.declare import AS_DRAWN, TIGHTEST, Declared
 from planner.planning.solve import Setting
 from planner.vehicle.tracked_point import TrackedVehicle
-from sim.arrays import Flags, Floats
 
 _REACH = 6.0  # radii before and behind a blocked stretch, within which a way around leaves and joins
 _STEP = 0.35  # radii between two such places

@@ -21,6 +21,9 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
+from common.errors import InputError
+from common.keywords import checks_keywords
+from common.units import format_time
 from planner.jobs.plan import make_plan
 from planner.options import AnyVehicle, JobOptions, asked, place_of, seconds_of
 from planner.paths.obstacles import Footprint, FreeSpace
@@ -29,9 +32,6 @@ from planner.paths.units import in_lab, place_in_lab
 from planner.planning.plan import Job, Plan
 from planner.planning.request import POSE
 from planner.vehicle.vehicle import roll_out
-from sim.io.errors import InputError
-from sim.io.keywords import checks_keywords
-from sim.io.units import format_time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,6 +16,8 @@ from typing import Unpack
 
 from numpy.typing import ArrayLike
 
+from common.errors import InputError, naming
+from common.keywords import checks_keywords
 from planner.goal.last_dwells import looped
 from planner.options import AnyVehicle, Length, PathOptions, asked, length_of
 from planner.paths.path import Path2D, smoothed
@@ -27,8 +29,6 @@ from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest, Progress
 from planner.planning.solve import Task, solve
 from planner.vehicle.tracked_point import TrackedVehicle
-from sim.io.errors import InputError, naming
-from sim.io.keywords import checks_keywords
 
 
 @checks_keywords

@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats, Integers
-from sim.io.errors import InputError
+from common.arrays import Floats, Integers
+from common.errors import InputError
 
 EXACT = 12  # visits
 MOST = 80

@@ -21,20 +21,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
 
-from planner.goal.dubins import DubinsPaths
+from common.arrays import Floats
+from common.errors import InputError
+from common.keywords import checks_keywords
+from common.units import format_time
 from planner.goal.route import best_options
 from planner.jobs.shortest_order import EXACT, shortest_order
 from planner.jobs.travel import SLACK, Travel, plan_track, preferred_setting
 from planner.options import AnyVehicle, JobOptions, asked, places_of
 from planner.paths.distance import distance_to
+from planner.paths.dubins import DubinsPaths
 from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.picture import REPLAYED, label_points
 from planner.planning.plan import Job, Plan
-from sim.arrays import Floats
-from sim.io.errors import InputError
-from sim.io.keywords import checks_keywords
-from sim.io.units import format_time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

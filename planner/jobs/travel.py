@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.goal.dubins import TURNS, DubinsPaths, words
+from common.arrays import Floats, Integers
 from planner.goal.route import RouteLimits
 from planner.jobs.detours import Around
+from planner.paths.dubins import TURNS, DubinsPaths, words
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D, axis_at
 from planner.paths.tractrix import Drift, Reference
@@ -26,7 +27,6 @@ from planner.planning.request import PlanRequest, Progress
 from planner.planning.solve import Setting, Task, solve
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.zigzag import dwells_for
-from sim.arrays import Floats, Integers
 
 WORDS = 3  # tried among obstacles
 DETOUR = 6.0  # turn radii that a blocked track counts longer

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from common import units
 from planner.page.first_state import camel
 from planner.planning.request import PlanRequest
-from planner.vehicle.calibration_table import UNMEASURED
-from sim.io import units
+from sim.knowledge import UNMEASURED
 from sim.model import uncertainty
 from sim.model.robot_toml import ENTRIES
 
@@ -37,11 +37,11 @@ _NAMES = {  # of each module; a leading underscore is left out
     "planner.vehicle.from_table": "ODD TIME_STEPS STEP",
     "planner.vehicle.vehicle": "SHORTEST STEP TIMES BEFORE_KNOTS",
     "planner.vehicle.zigzag": "PAIRS TRIES QUICK LONGEST KEPT NEARLY COMPARED WIDEST COUNT LONGER",
-    "sim.inputs": "RUN RUN_SYNONYMS MEASURED RUN_NOTES RUN_SIGMAS RUN_COLUMNS",
-    "sim.io.number_words": "NUMBER MISSING COMMA POINT THOUSANDS WHOLE_LINE THREE OTHER FORMULA",
-    "sim.io.quantities": "CLOCK EPOCH LATEST",
-    "sim.io.tables": "COMMENT MARKED_NUMBER BLANKS SEPARATORS",
-    "sim.io.units": "UNITS TEXTS SPELLINGS MOST_PARTS",
+    "common.run_columns": "RUN RUN_SYNONYMS MEASURED RUN_NOTES RUN_SIGMAS RUN_COLUMNS",
+    "common.number_words": "NUMBER MISSING COMMA POINT THOUSANDS WHOLE_LINE THREE OTHER FORMULA",
+    "common.quantities": "CLOCK EPOCH LATEST",
+    "common.tables": "COMMENT MARKED_NUMBER BLANKS SEPARATORS",
+    "common.units": "UNITS TEXTS SPELLINGS MOST_PARTS",
     "sim.model.groups": "MOST_TAILS LEAST_SLENDERNESS",
     "sim.model.response": "DWELLS BEFORE FORGOTTEN",
     "sim.model.robot_toml": "LARGEST SIGMA HEADER NOTES NO_EFFECTS SI",

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from common.errors import InputError
 from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D
 from planner.paths.units import extent
 from planner.planning.request import PlanRequest
 from planner.vehicle.tracked_point import TrackedVehicle
-from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 

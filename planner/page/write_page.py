@@ -25,21 +25,21 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from common.arrays import Floats
+from common.errors import naming
+from common.files import write_text
+from common.keywords import checks_keywords
+from common.provenance import __version__, code_version
 from planner.files.headers import schedule_template
 from planner.options import CornerOptions, Length, length_of, request_of, table_of
 from planner.page.bundle import FOLDER, joined
 from planner.page.first_state import NamedPath, first_options, first_plan, robots_of, shapes_of, slider_ends
 from planner.paths.path import Path2D, circle, shape_of
 from planner.paths.path_files import read_path
-from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.from_table import both_directions
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Mode
-from sim.arrays import Floats
-from sim.io.errors import naming
-from sim.io.files import write_text
-from sim.io.keywords import checks_keywords
-from sim.io.provenance import __version__, code_version
+from sim.knowledge import CalibrationKnowledge
 from sim.model.robot import Robot
 from sim.robot_rows import OneRobot, one_robot
 from surrogate.interface import LookupTable

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from common.arrays import Floats, Integers
 from planner.paths.path import arc_length, points_at, steps_of
-from sim.arrays import Floats, Integers
 
 TIE = 1e-12  # difference of distances that are equal
 _FINE = 4  # candidates a point

@@ -32,9 +32,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg.lapack import dpbsv
 
+from common.arrays import Floats, Integers
 from planner.paths.path import Path2D, axis_at, resample
 from planner.paths.tractrix import STILL, Drift
-from sim.arrays import Floats, Integers
 
 _SPACING = 0.2  # of the poses, in radii of the pivot's circle
 _MOST_POSES = 20_000  # of a path that is not longer than so many times _COARSEST

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from common.arrays import Floats, Integers
+from common.errors import InputError
 from planner.paths.path import Path2D, axis_at
 from planner.paths.units import Swimmer
-from sim.arrays import Floats, Integers
-from sim.io.errors import InputError
 
 _SIDES = 180  # of a circle as a polygon
 _BLOCK = 2_000_000  # distances computed at once

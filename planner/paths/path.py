@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sim.arrays import Flags, Floats
-from sim.io.errors import InputError
-from sim.io.keywords import checks_keywords
-from sim.io.units import number_and_unit
+from common.arrays import Flags, Floats
+from common.errors import InputError
+from common.keywords import checks_keywords
+from common.units import number_and_unit
 
 _CIRCLE_POINTS = 720
 _LARGEST = 1e100  # coordinate: squares of larger ones overflow

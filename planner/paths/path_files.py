@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from common.arrays import Floats
+from common.errors import InputError, naming
+from common.keywords import checks_keywords
+from common.units import split, to_si
 from planner.paths.path import SHAPES, Path2D, like_a_shape, nearest_shape, shape_of
 from planner.paths.units import NO_UNIT, Swimmer, in_tails
-from sim.arrays import Floats
-from sim.io.errors import InputError, naming
-from sim.io.keywords import checks_keywords
-from sim.io.units import split, to_si
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -149,8 +149,8 @@ def _read_columns(source: str | Path) -> tuple[Floats, float | None]:
     Raises:
         InputError: the table has no x and y, only one of them has a unit, or a value is no number.
     """
-    from sim.io.quantities import numbers_of  # these load pandas, and a drawing or a circle needs none of it
-    from sim.io.tables import read_table
+    from common.quantities import numbers_of  # these load pandas, and a drawing or a circle needs none of it
+    from common.tables import read_table
 
     table = read_table(source, names=False)
     if all(isinstance(column, int) for column in table):

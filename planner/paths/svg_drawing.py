@@ -22,10 +22,10 @@ import numpy as np
 from svgelements import Circle, Close, Ellipse, Line, Matrix, Move, Polygon, Polyline, Rect, SimpleLine, Viewbox
 from svgelements import Path as SvgPath
 
+from common.arrays import Floats
+from common.errors import InputError
+from common.reading import read_bytes
 from planner.paths.path import Path2D, steps_of
-from sim.arrays import Floats
-from sim.io.errors import InputError
-from sim.io.reading import read_bytes
 
 METRES_PER_PIXEL = 0.0254 / 96  # of SVG
 _TURN = math.radians(2.0)  # largest turn of a curve between two points

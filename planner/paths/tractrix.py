@@ -22,9 +22,9 @@ from functools import cached_property
 
 import numpy as np
 
+from common.arrays import Floats
+from common.errors import InputError
 from planner.paths.path import Path2D, arc_length, axis_at, resample
-from sim.arrays import Floats
-from sim.io.errors import InputError
 
 _LAPS = 6
 _MOST_SLIP = 3.0  # sideways by forward motion

@@ -12,8 +12,8 @@ import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
-from sim.io.errors import InputError, InputWarning
-from sim.io.units import LENGTHS, format_length, format_time, number_and_unit, of_kind, to_si
+from common.errors import InputError, InputWarning
+from common.units import LENGTHS, format_length, format_time, number_and_unit, of_kind, to_si
 
 if TYPE_CHECKING:  # the command needs them before it loads NumPy
     from planner.paths.path import Path2D

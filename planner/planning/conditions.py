@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from common.errors import InputError
 from planner.paths.obstacles import FreeSpace
 from planner.paths.units import Swimmer, in_lab, place_in_lab
-from sim.io.errors import InputError
 
 _SHOWN = 1e-5  # l and rad; smaller differences are rounding
 _DETOUR = ("leaves", "joins", "length_over_l", "replaced_over_l", "farthest_over_l")  # in plan.json

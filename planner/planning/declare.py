@@ -23,6 +23,8 @@ from typing import NamedTuple, get_args
 
 import numpy as np
 
+from common.arrays import Floats
+from common.errors import InputError
 from planner.paths.distance import two_sided
 from planner.paths.nearest_path import nearest_path, pose_spacing
 from planner.paths.path import Path2D, smoothed, steps_of
@@ -31,8 +33,6 @@ from planner.paths.units import LONGEST, Swimmer, extent, in_lab, place_in_lab
 from planner.planning.conditions import Detour
 from planner.planning.request import DECLARING, REMEDY, Corner, Progress, tell
 from planner.vehicle.vehicle import Vehicle
-from sim.arrays import Floats
-from sim.io.errors import InputError
 
 AS_DRAWN = 0.85  # share of the pivot's largest curvature up to which a path is followed as it was drawn
 ROOMS = (0.92, 0.85, 0.7, 0.55, 0.35, 0.2)  # shares of it that the nearest path may use

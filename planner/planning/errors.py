@@ -13,7 +13,7 @@ phase is unknown, and where in the wave it lies. The lags of each direction thus
 independent A and B of mean 0 and variance 1: two modes for each direction. Where φ comes back at every second
 flip, as with equal dwells, these errors add up; elsewhere they average out.
 
-*Stated error with feedback*, of what `planner.tracking.tracker` does with the poses of a camera: the robot is
+*Stated error with feedback*, of what `tracking.tracker` does with the poses of a camera: the robot is
 within it in 95 % of the time, from the start of the path. The zigzag is uniform between ±A, where 0.95 A is the
 distance that it keeps in 95 % of the time. The tracker adds a normal error of variance
 
@@ -40,13 +40,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from common.arrays import Floats, Integers
 from planner.paths.distance import distance_to, nearest
 from planner.paths.path import Path2D
 from planner.planning.declare import Declared
 from planner.planning.request import ERRORS, Camera, Progress, tell
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Mode, Rollout, Switches, Vehicle, interpolated, roll_out
-from sim.arrays import Floats, Integers
 from sim.mechanics import planar
 
 LEVEL = 0.95

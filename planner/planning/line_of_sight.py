@@ -24,9 +24,8 @@ where a is the distance from the pivot to the tracked point. A flip adds its lag
 
 The time of a flip is the root of one equation, which the secant method finds in about four evaluations. Their
 cost does not depend on the length of the path: the place on it is remembered, and moves forward. Plans
-(`planner.planning.solve`) and trackers (`planner.tracking.tracker`) ask for one flip at a time, so it computes
-with plain numbers, in the order of operations of `planner/c/follower.h`. A pose is x, y and heading of the
-head's centre. Lengths in l, times in μ0 l⁴/EI.
+(`planner.planning.solve`) and trackers (`tracking.tracker`) ask for one flip at a time, so it computes
+with plain numbers. A pose is x, y and heading of the head's centre. Lengths in l, times in μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -37,12 +36,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from common.arrays import Floats
+from common.errors import InputError
 from planner.paths.tractrix import Reference
 from planner.planning.request import FOLLOWING, POSE, Progress, tell
 from planner.vehicle.vehicle import BEFORE_KNOTS, SHORTEST, STEP, Switches, Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
-from sim.arrays import Floats
-from sim.io.errors import InputError
 from sim.mechanics import planar
 
 EXACT = 1e-7  # rad, of the heading at a flip

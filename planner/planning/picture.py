@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from common.arrays import Floats
+from common.units import format_length
 from planner.paths.obstacles import FreeSpace
-from sim.arrays import Floats
-from sim.io.units import format_length
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,6 +11,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from common.arrays import Floats
+from common.errors import InputError
+from common.notebook import Shown, given_axes
+from common.units import format_time
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
@@ -24,10 +28,6 @@ from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Switches, roll_out, smooth_track
 from planner.vehicle.zigzag import Zigzag
-from sim.arrays import Floats
-from sim.io.errors import InputError
-from sim.io.notebook import Shown, given_axes
-from sim.io.units import format_time
 from sim.model.robot import Robot
 from sim.model.schedule import FORMAT, Schedule, plan_id
 from sim.robot_rows import with_units

@@ -12,11 +12,11 @@ from typing import Any, Literal
 
 import numpy as np
 
+from common.errors import InputError
 from planner.paths.obstacles import FreeSpace
 from planner.paths.units import Swimmer
 from planner.vehicle.tracked_point import Point
 from planner.vehicle.zigzag import QUICK, Objective
-from sim.io.errors import InputError
 from sim.mechanics import planar
 
 Corner = Literal["nearest", "minimax", "fillet", "error"]

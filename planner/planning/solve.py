@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from common.errors import InputError
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
@@ -35,7 +36,6 @@ from planner.vehicle.from_table import OWN_TABLE
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Switches
 from planner.vehicle.zigzag import Zigzag, check_least, dwells_for, longer_dwells, nearly_fastest, zigzag
-from sim.io.errors import InputError
 
 _MARGINS = 6  # tried for each dwell
 _MORE = 1.05  # times the stated error is the next margin

@@ -21,14 +21,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge
+from common.arrays import Floats
+from common.errors import InputError
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle, lag_table, resampled
 from planner.vehicle.zigzag import LONGEST
-from sim.arrays import Floats
 from sim.effects import effect_named, is_effect
 from sim.effects.tail_contact import EFFECT as CONTACT
 from sim.effects.tail_contact import least_gap
-from sim.io.errors import InputError
+from sim.knowledge import NUMBERS, CalibrationKnowledge
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
 from sim.model.response import Responses

@@ -25,11 +25,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from common.arrays import Floats
+from common.errors import InputError, naming
+from common.reading import read_toml
+from common.units import UNITS, of_kind, split, to_si
 from planner.vehicle.vehicle import BEFORE_KNOTS, STEP, TIMES, Mode, Vehicle
-from sim.arrays import Floats
-from sim.io.errors import InputError, naming
-from sim.io.reading import read_toml
-from sim.io.units import UNITS, of_kind, split, to_si
 from sim.mechanics import planar
 
 Measured = float | tuple[float, float]  # a value, and its standard deviation where it is known

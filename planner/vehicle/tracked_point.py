@@ -6,15 +6,15 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from common.errors import InputError
 from planner.paths.obstacles import Footprint
 from planner.paths.tractrix import Drift
 from planner.paths.units import time_in_lab
-from planner.vehicle.calibration_table import COEFFICIENTS, UNMEASURED, CalibrationKnowledge
 from planner.vehicle.from_table import Motion, coefficient_modes, default_table, table_vehicle
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.vehicle import Mode, Vehicle
 from planner.vehicle.zigzag import Zigzag
-from sim.io.errors import InputError
+from sim.knowledge import COEFFICIENTS, UNMEASURED, CalibrationKnowledge
 from sim.model.robot import Robot
 from surrogate.interface import LookupTable
 

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from sim.arrays import Floats, Integers
+from common.arrays import Floats, Integers
 from sim.mechanics import planar
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED
 

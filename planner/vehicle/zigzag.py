@@ -19,10 +19,10 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from common.arrays import Floats
+from common.errors import InputError
 from planner.paths.path import axis_at
 from planner.vehicle.vehicle import SHORTEST, Switches, Vehicle, roll_out
-from sim.arrays import Floats
-from sim.io.errors import InputError
 from sim.mechanics import planar
 
 _PAIRS = 8  # simulated with the vehicle; the last one is taken

@@ -10,8 +10,8 @@ from functools import cache
 
 import numpy as np
 
-from sim.arrays import Floats
-from sim.io.errors import InputError
+from common.arrays import Floats
+from common.errors import InputError
 from sim.model.effect import Effect
 from sim.model.groups import check_finite
 from sim.model.laws import Law, read_law

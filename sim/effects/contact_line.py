@@ -10,7 +10,7 @@ that robot. Left out: the moment against yaw about the head's centre.
 
 from __future__ import annotations
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.effect import Effect
 from sim.model.groups import Groups
 from sim.model.presets import CONTROL

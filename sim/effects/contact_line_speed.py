@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.effect import Effect
 from sim.model.groups import Groups
 from sim.model.presets import CONTROL

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.body import Body
 from sim.model.effect import Effect
 from sim.model.groups import Groups

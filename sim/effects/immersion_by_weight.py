@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.body import Body, head_resistance
 from sim.model.effect import Effect
 from sim.model.groups import Groups

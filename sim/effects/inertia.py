@@ -10,7 +10,7 @@ which are no change of drag.
 
 from __future__ import annotations
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.linear.complex_step import magnitude
 from sim.model.effect import Effect, Factors
 from sim.model.groups import Groups

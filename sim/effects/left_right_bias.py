@@ -9,7 +9,7 @@ centre about J; the force itself is left out. Fit this effect before less common
 
 from __future__ import annotations
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.linear.complex_step import sign
 from sim.model.body import Body
 from sim.model.effect import Effect

@@ -9,7 +9,7 @@ effects that change the head's spin drag. Left out: slip, which is proportional 
 
 from __future__ import annotations
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.body import Body
 from sim.model.effect import Effect
 from sim.model.groups import Groups

@@ -9,7 +9,7 @@ scale of the control robot (2.207 s). For one material and fluid, time scales μ
 
 from __future__ import annotations
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.effect import Effect
 from sim.model.groups import Groups
 from sim.model.presets import CONTROL

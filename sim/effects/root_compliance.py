@@ -10,7 +10,7 @@ a rigid clamp.
 
 from __future__ import annotations
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.effect import Effect
 from sim.model.groups import Groups
 from sim.model.presets import CONTROL

@@ -9,7 +9,7 @@ forces make.
 
 from __future__ import annotations
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.effect import Effect
 from sim.model.groups import Groups
 

@@ -10,7 +10,7 @@ itself.
 
 from __future__ import annotations
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.body import Body
 from sim.model.effect import Effect
 from sim.model.groups import Groups

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.effect import Effect
 from sim.model.groups import Groups
 

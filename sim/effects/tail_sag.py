@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.body import Body
 from sim.model.effect import Effect
 from sim.model.groups import Groups

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.effect import Driver, Effect, Factors
 from sim.model.groups import Groups
 

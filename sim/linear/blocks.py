@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled
 from sim.linear.vectors import Matrix, Vector
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 
 _STEP = 1e-100
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled, formula
 from sim.lanes import choose, fma, less, load, somewhere, store
 from sim.linear.blocks import block_at

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled
 from sim.lanes import choose, empty, less, zeros
 from sim.linear.lane_arrays import divide, scalar_product, subtract_multiple

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled
 from sim.lanes import choose, fma, lane, larger, with_lane
 

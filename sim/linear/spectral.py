@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled
 
 

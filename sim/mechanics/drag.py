@@ -34,7 +34,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled, formula
 from sim.linear.vectors import Matrix, Vector, dot, minus, outer, plus, plus_identity, times
 from sim.mechanics.geometry import Geometry, node_tangent

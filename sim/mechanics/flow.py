@@ -34,7 +34,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats, Integers
+from common.arrays import Floats, Integers
 from sim.jit import compiled, formula
 from sim.linear.blocks import add, add_at, put_at, vector, vector_at
 from sim.linear.vectors import E_Z, ZERO, Vector, cross, dot, minus, plus, times

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled, formula
 from sim.linear.blocks import add, add_at, put, vector
 from sim.linear.vectors import ZERO, Vector, cross, dot, minus, plus, times

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import formula
 
 Poses = Floats  # (..., 3)

@@ -33,7 +33,7 @@ from math import erfc
 
 import numpy as np
 
-from sim.arrays import Floats, Integers
+from common.arrays import Floats, Integers
 from sim.jit import compiled
 from sim.linear.blocks import add, add_at, put, put_at, vector, vector_at
 from sim.linear.vectors import ZERO, Vector, cross, dot, minus, plus, times

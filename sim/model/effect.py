@@ -25,7 +25,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.body import Body
 from sim.model.groups import Groups
 

@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Flags, Floats, Integers
-from sim.io.errors import InputError
+from common.arrays import Flags, Floats, Integers
+from common.errors import InputError
 
 MOTOR_SPEED = "motor speed, tails relative to head"  # what omega_bar is
 GROUP_COLUMNS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "N")

@@ -39,8 +39,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
-from sim.io.errors import InputError
+from common.arrays import Floats
+from common.errors import InputError
 from sim.linear.complex_step import magnitude, sign
 from sim.model.body import Body, head_resistance
 from sim.model.effect import Effect, Factors

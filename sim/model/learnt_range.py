@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.io.errors import InputError
+from common.errors import InputError
 
 INPUTS = ("N", "ln l/R", "ln ω̄ (R/l)⁴")
 _MARGIN = (0.5, 0.1, 0.1)  # of the inputs, beyond the runs

@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sim.arrays import Flags, Floats
+from common.arrays import Flags, Floats
 
 DWELLS = np.geomspace(0.2, 4.0, 25)  # T̄ of the curves
 BEFORE = np.geomspace(0.2, 1.2, 16)  # T̄ of the dwell before

@@ -12,9 +12,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from sim.io.errors import InputError
-from sim.io.notebook import Shown
-from sim.io.units import format_length, from_si
+from common.errors import InputError
+from common.notebook import Shown
+from common.units import format_length, from_si
 from sim.model.groups import Groups, check_finite, check_positive, check_slenderness, check_tails
 from sim.model.learnt_range import LearntRange
 from sim.model.uncertainty import DEFAULTS, Sigma

@@ -2,7 +2,7 @@
 
 The file has the tables [tails], [head], [fluid], [motor], [drag] and, if there are any, [effects] and
 [learnt_from]. A key is a quantity with its unit as suffix: length_cm, speed_rpm, viscosity_Pa_s. Every usual
-unit is read (`sim.io.units`), one is written. KEY_sigma states one standard deviation of a measured number: a
+unit is read (`common.units`), one is written. KEY_sigma states one standard deviation of a measured number: a
 number in the unit of its key, or a text like "10 %".
 """
 
@@ -14,8 +14,8 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from sim.io.errors import InputError
-from sim.io.units import UNITS, from_si, of_kind, split, to_si
+from common.errors import InputError
+from common.units import UNITS, from_si, of_kind, split, to_si
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.uncertainty import DEFAULTS, Sigma, read_sigma, sigma_text

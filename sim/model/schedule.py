@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sim.arrays import Floats
-from sim.io.errors import InputError
-from sim.io.keywords import checks_keywords
-from sim.io.reading import ContentError, digest_of, read_json
+from common.arrays import Floats
+from common.errors import InputError
+from common.keywords import checks_keywords
+from common.reading import ContentError, digest_of, read_json
 
 if TYPE_CHECKING:
     import pandas as pd

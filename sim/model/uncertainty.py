@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sim.io.errors import InputError
-from sim.io.units import to_si
+from common.errors import InputError
+from common.units import to_si
 
 
 class Sigma(NamedTuple):

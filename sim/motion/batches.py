@@ -14,9 +14,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from sim.arrays import Floats, Integers
+from common.arrays import Floats, Integers
+from common.errors import InputError
 from sim.inputs import check_columns
-from sim.io.errors import InputError
 from sim.model.groups import Groups
 from sim.motion.run import Resolution
 from sim.motion.sensitivity import Sensitivities, sensitivities

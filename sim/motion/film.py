@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
-from sim.io.errors import InputError
-from sim.io.files import whole_file
-from sim.io.units import format_time
+from common.arrays import Floats
+from common.errors import InputError
+from common.files import whole_file
+from common.units import format_time
 from sim.model.schedule import Schedule
 from sim.motion.shapes import Shapes, scheduled_shapes
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
+from common.errors import InputError
 from sim.inputs import check_columns
-from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.groups import Groups
 from sim.model.schedule import Schedule

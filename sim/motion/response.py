@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.effects import check_effects, effect_named
 from sim.mechanics import planar
 from sim.mechanics.geometry import straight

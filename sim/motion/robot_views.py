@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.patches import Circle, FancyArrowPatch, Polygon
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.mechanics import planar
 from sim.model.robot import Robot
 from sim.motion.shapes import nodes_in_body, steady_states

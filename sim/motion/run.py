@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.mechanics.balance import tail_spin
 from sim.mechanics.flow import has_flow
 from sim.mechanics.tail_contact import has_contact

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
+from common.errors import InputError
 from sim.effects import catalogue, effect_named, is_effect
-from sim.io.errors import InputError
 from sim.lanes import width
 from sim.linear.complex_step import derivative
 from sim.model.groups import SLOPE_INPUTS, SLOPE_OUTPUTS, Groups

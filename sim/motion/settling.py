@@ -20,7 +20,7 @@ from multiprocessing import parent_process
 import numpy as np
 from tqdm import tqdm
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.mechanics.balance import motor_gain
 from sim.mechanics.tail_contact import tail_gap
 from sim.model.body import Body

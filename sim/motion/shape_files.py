@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Floats
-from sim.io.errors import InputError
-from sim.io.files import files_together, whole_file
+from common.arrays import Floats
+from common.errors import InputError
+from common.files import files_together, whole_file
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule
 from sim.motion.shapes import Shapes

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats, Integers
-from sim.io.errors import InputError
+from common.arrays import Floats, Integers
+from common.errors import InputError
 from sim.linear.spectral import differentiation, interpolation
 from sim.mechanics import planar
 from sim.mechanics.balance import motor_gain, tail_spin

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Complex, Floats
+from common.arrays import Complex, Floats
 from sim.linear.spectral import differentiation, with_phases
 from sim.solve.assembly import CONTACT, are_local, batch
 from sim.solve.floquet import arnoldi

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.arrays import Floats, Integers, Words
+from common.arrays import Floats, Integers, Words
 from sim.effects import check_effects
 from sim.effects.tail_contact import EFFECT as CONTACT
 from sim.model.groups import Groups

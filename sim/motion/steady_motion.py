@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Flags, Floats, Integers, Words
+from common.arrays import Flags, Floats, Integers, Words
 from sim.effects.tail_contact import EFFECT as CONTACT
 from sim.effects.tail_contact import least_gap
 from sim.mechanics import planar

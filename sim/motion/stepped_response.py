@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.mechanics import planar
 from sim.model.body import Body
 from sim.motion.run import Resolution, Run

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Flags, Floats
+from common.arrays import Flags, Floats
 from sim.effects import catalogue, effect_named
 from sim.mechanics.drag import tail_coefficients
 from sim.model.body import Body, head_resistance

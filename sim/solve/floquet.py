@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled, inlined
 from sim.lanes import choose, lanes, less, somewhere, zeros
 from sim.linear.blocks import block, put, vector

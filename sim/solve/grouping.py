@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Flags, Floats
+from common.arrays import Flags, Floats
 from sim.jit import compiled
 from sim.lanes import lane, lanes, less, named_like, width, zeros
 from sim.linear.lane_arrays import take_lane

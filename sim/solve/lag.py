@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled, formula
 from sim.lanes import choose, less, zeros
 from sim.linear.dense import factor_dense, solve_factored

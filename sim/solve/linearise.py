@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled
 from sim.lanes import zeros
 from sim.linear.blocks import put, put_block, vector

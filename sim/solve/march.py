@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled
 from sim.lanes import lanes, less, somewhere, zeros
 from sim.linear.lane_arrays import combine, copy

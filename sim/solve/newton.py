@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled, inlined
 from sim.lanes import choose, empty, larger, less, somewhere, zeros
 from sim.linear import chains as separate

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Flags, Floats
+from common.arrays import Flags, Floats
 from sim.jit import compiled
 from sim.lanes import lanes
 from sim.linear.lane_arrays import largest_entry

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Flags, Floats, Integers
+from common.arrays import Flags, Floats, Integers
 from sim.linear.spectral import with_phases
 from sim.model.body import Body
 from sim.solve.assembly import CONTACT, are_local, batch, row, without_further

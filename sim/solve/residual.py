@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled, inlined
 from sim.lanes import lane, somewhere, width, zeros
 from sim.linear.blocks import add, put, vector, vector_at

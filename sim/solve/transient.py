@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats, Integers
+from common.arrays import Floats, Integers
 from sim.jit import compiled, formula, inlined
 from sim.lanes import choose, lane, lanes, larger, less, smaller, somewhere, width, with_lane, zeros
 from sim.linear.lane_arrays import add_chosen, choose_all, combine, copy, largest_entry, put_lane, take_lane

@@ -20,7 +20,7 @@ import torch
 from scipy.optimize import line_search
 from torch import Tensor
 
-from sim.arrays import Floats
+from common.arrays import Floats
 
 ValueAndGradient = Callable[[Tensor], tuple[float, Tensor]]
 _CURVATURE = 0.9  # of the Wolfe conditions

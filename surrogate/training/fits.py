@@ -20,7 +20,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from sim.arrays import Flags, Floats, Integers
+from common.arrays import Flags, Floats, Integers
 from surrogate.motions import CLASSES, INPUT_COUNTS, WrenchTable, network_index
 from surrogate.network import Ensemble
 from surrogate.response import PARTS, SHAPES, Basis, ResponseTable, along_axes, flip_inputs

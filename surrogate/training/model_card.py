@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from sim.arrays import Flags, Floats
+from common.arrays import Flags, Floats
 from surrogate.domain import MOST_TAILS, ROBOT
 from surrogate.errors import coverage, relative_errors
 from surrogate.intervals import COVERAGE, THIRDS

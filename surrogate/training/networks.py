@@ -34,9 +34,9 @@ from torch import Tensor, nn
 from torch.nn.utils import parameters_to_vector, vector_to_parameters
 from tqdm import tqdm
 
-from sim.io.errors import InputError
-from sim.io.files import whole_file
-from sim.io.provenance import fingerprint
+from common.errors import InputError
+from common.files import whole_file
+from common.provenance import fingerprint
 from surrogate.network import SHARED, Ensemble, state_shapes
 from surrogate.training.bfgs import Minimiser
 

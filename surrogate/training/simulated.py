@@ -17,9 +17,9 @@ import numpy as np
 import pandas as pd
 from scipy.stats import qmc
 
+from common.arrays import Flags, Floats, Integers
 from dataset.data_set import read, read_manifest, usable
 from dataset.design import SWEEP_TOML, load_design
-from sim.arrays import Flags, Floats, Integers
 from sim.effects import effect_named, is_effect
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, LAG_PARTS

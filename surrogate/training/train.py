@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
+from common.arrays import Flags, Floats, Integers
+from common.errors import InputError
+from common.keywords import checks_keywords
+from common.provenance import fingerprint, provenance
 from dataset.data_set import read_manifest
-from sim.arrays import Flags, Floats, Integers
-from sim.io.errors import InputError
-from sim.io.keywords import checks_keywords
-from sim.io.provenance import fingerprint, provenance
 from surrogate.domain import INSIDE, MAX_YAW_SHARE, ROBOT, Support
 from surrogate.error_modes import KINDS, CurveErrors
 from surrogate.errors import curve_errors, relative_errors, summary

@@ -26,7 +26,7 @@ from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
-from sim.arrays import Flags
+from common.arrays import Flags
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from tests.calibration import toy

@@ -14,7 +14,7 @@ import pytest
 
 from camera.detector import Detector, Lost, Pose
 from camera.view import read_setup
-from sim.arrays import Floats
+from common.arrays import Floats
 from tests.oracles.tank import APART, LENGTH, TAIL, Tank, circling
 
 TANKS: dict[str, dict[str, Any]] = {

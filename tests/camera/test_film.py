@@ -16,19 +16,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.films import measure_films
-from calibration.swimmer.camera_tracks import measure_tracks
 from camera.film import Film
+from camera.measured_films import measure_films
+from camera.measured_runs import measure_tracks
 from camera.spin import Spin, fit_spin
 from camera.tracks import FilmTracks, track_film, turn_sense
 from camera.view import Setup, read_setup
-from planner.tracking.live import FROZEN, watch
-from sim.arrays import Floats
+from common.arrays import Floats
+from common.errors import InputError, run_command
 from sim.inputs import load_robot
-from sim.io.errors import InputError, run_command
 from softflagella.__main__ import main
 from tests.oracles.tank import LENGTH, TAIL, Motion, Tank, circling
 from tests.shared import FOLDER, shared
+from tracking.live import FROZEN, watch
 
 RATE, SECONDS = 12.0, 20.0
 HEAD, TAILS, YAW, RADIUS = -4.6, 6.2, 0.25, 0.06  # rad/s, m
@@ -239,7 +239,7 @@ def test_the_largest_error_of_a_tag_s_scale_counts_for_all_films(
         tracks = track_film(*words, **given)  # type: ignore[arg-type]
         return tracks._replace(view=replace(tracks.view, scale_error=next(errors)))
 
-    monkeypatch.setattr("calibration.films.track_film", tracked)
+    monkeypatch.setattr("camera.measured_films.track_film", tracked)
     runs = pd.DataFrame({"film": [made.name] * 2, "N": 2, "l_cm": 11.0, "rpm": RPM})
     runs.to_csv(tmp_path / "runs.csv", index=False)
     measured = measure_films(tmp_path / "runs.csv", tmp_path / "view.toml", load_robot("paper-control"))

@@ -12,7 +12,7 @@ import pytest
 from camera.detector import Detector, Pose
 from camera.lens import calibrate_lens
 from camera.view import read_setup
-from sim.io.errors import InputError, run_command
+from common.errors import InputError, run_command
 from softflagella.__main__ import main
 from tests.oracles.tank import LENGTH, TAIL, Tank, board, circling
 

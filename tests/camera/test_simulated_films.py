@@ -13,11 +13,11 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from calibration.swimmer.synthetic_table import make_table
+from common.arrays import Floats
+from common.errors import run_command
 from planner.files.plan_files import write_plan
 from planner.jobs.plan import plan
-from sim.arrays import Floats
 from sim.inputs import save_robot
-from sim.io.errors import run_command
 from sim.model.presets import PRESETS
 from sim.motion.shapes import scheduled_shapes
 from softflagella.__main__ import main

@@ -12,7 +12,7 @@ import pytest
 
 from camera.detector import Detector, Lost, Pose
 from camera.view import EXAMPLE, Lens, read_setup
-from sim.io.errors import InputError
+from common.errors import InputError
 from tests.oracles.tank import Tank, circling
 
 RULER, LAST, SQUARE = "length_cm = 30", "# ahead_mm = 0", "[[100, 650], [900, 650], [900, 100], [100, 100]]"

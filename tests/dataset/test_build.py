@@ -11,13 +11,13 @@ from tempfile import TemporaryDirectory
 import pandas as pd
 import pytest
 
+from common.errors import InputError
 from dataset import build as engine
 from dataset.build import UnfinishedError, build, cut, mend, missing
 from dataset.data_set import SWEEP, read
 from dataset.design import Axis
 from dataset.schema import rows_version
 from dataset.workers import Chunk, Ended, Failure
-from sim.io.errors import InputError
 from tests.dataset import sweeps
 from tests.dataset.sweeps import InThisProcess, design, invented
 from tests.shared import shared

@@ -15,10 +15,10 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
+from common.errors import InputError
 from dataset import build as engine
 from dataset.build import UnfinishedError, build
 from dataset.data_set import read
-from sim.io.errors import InputError
 from tests.dataset import sweeps
 from tests.dataset.sweeps import MARKS, ROOT, design, invented
 from tests.processes import LIMIT, printed, until
@@ -200,7 +200,7 @@ def build_apart(
     script.write_text(
         "import sys, dataset.build\nfrom tests.dataset.sweeps import *\n"
         f"from dataset.build import build\ndataset.build.PATIENCE = {patience}\n"
-        "from sim.io.errors import run_command\n"
+        "from common.errors import run_command\n"
         "sys.exit(run_command(lambda _: build(design(200), "
         f"{str(folder)!r}, backend={backend!r}, address={address!r}, jobs=2, title='', simulate={rows_by})))"
     )

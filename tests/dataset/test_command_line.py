@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from common.errors import InputError, run_command
 from dataset.__main__ import main
 from dataset.data_set import read, read_manifest
 from dataset.design import load_design
 from dataset.verify import verify
-from sim.io.errors import InputError, run_command
 from tests.dataset.sweeps import ROOT, SMALL, write_rows
 from tests.processes import LIMIT
 

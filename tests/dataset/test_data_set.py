@@ -14,12 +14,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from common.errors import InputError, run_command
 from dataset.__main__ import main
 from dataset.build import build, mend
 from dataset.data_set import SWEEP, batches, read, read_manifest, sweep_key, usable
 from dataset.schema import FLAGS, INPUTS, OUTPUTS, schema
 from dataset.shards import BadFileError, Part, checked_part
-from sim.io.errors import InputError, run_command
 from sim.model.response import DWELLS
 from tests.dataset.sweeps import design, invented
 

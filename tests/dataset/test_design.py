@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from common.errors import InputError, run_command
 from dataset.__main__ import main
 from dataset.build import build
 from dataset.data_set import read
@@ -15,7 +16,6 @@ from dataset.design import Axis, SweepDesign, design_around, load_design
 from dataset.robot_inputs import sweep_toml
 from dataset.verify import verify
 from sim.inputs import save_robot
-from sim.io.errors import InputError, run_command
 from sim.model.presets import PRESETS
 from tests.dataset.sweeps import SMALL, design
 

@@ -51,7 +51,7 @@ def started(code: str, *, limit: int | None = None) -> subprocess.Popen[str]:
 def building(folder: Path, rows: int, rows_by: str) -> str:
     """Write code that builds as the command line does."""
     return (
-        "import sys; from sim.io.errors import run_command; "
+        "import sys; from common.errors import run_command; "
         f"sys.exit(run_command(lambda _: build(design({rows}), {str(folder)!r}, jobs=2, title='', "
         f"simulate={rows_by}, resume='the same words')))"
     )

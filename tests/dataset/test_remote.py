@@ -13,12 +13,12 @@ from pathlib import Path
 
 import pytest
 
+from common.errors import InputError
 from dataset import build as engine
 from dataset.build import build, mend
 from dataset.data_set import batches, read
 from dataset.folder import LOCK, Folder, StorageError
 from dataset.shards import ROWS
-from sim.io.errors import InputError
 from tests.dataset.sweeps import ROOT, InThisProcess, design, invented
 from tests.processes import LIMIT
 

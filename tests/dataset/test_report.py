@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from common.pages import Page
 from dataset.build import build
 from dataset.data_set import read_manifest
 from dataset.report import write_report
 from dataset.statistics import exponents, linear_rows, sobol_indices
-from sim.io.pages import Page
 from sim.motion.batches import steady_columns
 from tests.dataset.sweeps import design, invented
 from tests.sim.robots import sweep_points

@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from matplotlib.figure import Figure
 
+from common.errors import InputError
 from dataset import build as engine
 from dataset import schema
 from dataset.build import build, mend
@@ -20,7 +21,6 @@ from dataset.report import write_report
 from dataset.schema import COST, Column, column_named, rows_version
 from dataset.simulate import simulate
 from dataset.verify import verify
-from sim.io.errors import InputError
 from sim.model.groups import SLOPE_INPUTS
 from sim.model.presets import PRESETS
 from sim.motion import response, run, settling, steady
@@ -139,7 +139,7 @@ def one_column_more(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("one_column_more")
 def test_a_declared_column_is_stored_and_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are made, but not drawn."""
-    monkeypatch.setattr("sim.io.pages.figure_markup", lambda _, description, number: f"{number}: {description}")
+    monkeypatch.setattr("common.pages.figure_markup", lambda _, description, number: f"{number}: {description}")
     monkeypatch.setattr(Figure, "tight_layout", lambda *_, **__: None)
     build(design(80), tmp_path / "out", title="", simulate=with_tip_speed)
     rows = read(tmp_path / "out")

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
+from common.errors import run_command
 from sim.inputs import load_robot
-from sim.io.errors import run_command
 from softflagella.__main__ import main
 from tests.docs.pages import DOCS, PAGES, ROOT, blocks, page_name
 from tests.processes import LIMIT

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 import softflagella as sf
-from calibration.swimmer.camera_tracks import measure_tracks
+from camera.measured_runs import measure_tracks
 from planner.files.headers import schedule_template
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS

@@ -16,12 +16,12 @@ import pandas as pd
 
 from calibration.statistics.gls import Noise
 from calibration.verdict.next_runs import Explanation
+from common.provenance import fingerprint
 from dataset.data_set import sweep_key
 from dataset.schema import rows_version
 from planner.jobs.plan import plan
 from planner.paths.path import circle
-from planner.vehicle.calibration_table import CalibrationKnowledge, knowledge_toml
-from sim.io.provenance import fingerprint
+from sim.knowledge import CalibrationKnowledge, knowledge_toml
 from sim.model.learnt_range import LearntRange
 from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from calibration.examples.balls import AIR, COLUMNS, GRAVITY
+from tests.oracles.balls import AIR, COLUMNS, GRAVITY
 
 BALLS, DROPS, DEPTHS, NOISE, STEPS = 10, 2, 8, 0.06, 600
 NULLS = ("nothing", "shifts of whole drops, 5 %")

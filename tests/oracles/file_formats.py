@@ -18,30 +18,29 @@ from typing import Any
 
 import numpy as np
 
-from calibration.swimmer.camera_tracks import measure_tracks
 from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.next_runs import read_explanations
+from camera.measured_runs import measure_tracks
+from camera.pose_tracks import read_tracks
+from camera.track_options import Source
+from common.errors import InputError, InputWarning, naming
+from common.tables import read_table
 from dataset.data_set import MANIFEST, SWEEP, batches, read_design
 from dataset.design import SWEEP_TOML, load_design
 from dataset.folder import Folder
 from dataset.schema import schema
 from dataset.shards import BadFileError, checked_part, file_name
 from planner.files.saved_plan import load_goal, load_plan, restore_plan
-from planner.files.tracks import tracking_error
 from planner.options import read_region
 from planner.paths.path_files import read_path
-from planner.tracking.tracker import Tracker
-from planner.vehicle.calibration_table import read_knowledge
 from planner.vehicle.from_table import default_table
 from sim.inputs import check_columns, load_robot
-from sim.io.errors import InputError, InputWarning, naming
-from sim.io.pose_tracks import read_tracks
-from sim.io.tables import read_table
-from sim.io.track_options import Source
+from sim.knowledge import read_knowledge
 from sim.model.robot_toml import robot_toml
 from sim.model.schedule import load_schedule
 from surrogate.robot_table import load_robot_table
 from surrogate.table_file import SHIPPED, load
+from tests.camera import tracked_files
 from tests.oracles.example_files import (
     JSON,
     NOTED,
@@ -74,7 +73,8 @@ from tests.oracles.example_files import (
 )
 from tests.oracles.mutations import changed_content, mutated
 from tests.planner.plans import goal_file
-from tests.sim.io import tracked_files
+from tracking.tracker import Tracker
+from tracking.tracks import tracking_error
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.mechanics.balance import motor_gain
 from sim.model.groups import Groups
 from tests.oracles.plain_swimmer import NOMINAL, Hardware, PlainSwimmer

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.linear.vectors import Vector
 from sim.mechanics import rod
 from sim.mechanics.balance import motor_gain

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from planner.goal.dubins import TURNS, words
+from common.arrays import Floats
+from planner.paths.dubins import TURNS, words
 from planner.vehicle.vehicle import Switches, Vehicle, flips_after
 from planner.vehicle.zigzag import QUICK
-from sim.arrays import Floats
 
 _STEP = 1e-4
 _LONGER = 1.6  # words longer than this, beside the shortest, are not tried

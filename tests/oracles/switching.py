@@ -29,9 +29,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.arrays import Flags, Floats
+from common.arrays import Flags, Floats
+from common.errors import InputError
 from sim.effects import check_effects, effect_named
-from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.body import Body
 from sim.model.groups import DWELL, Groups

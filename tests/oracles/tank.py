@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from camera.view import opencv
-from sim.arrays import Floats
+from common.arrays import Floats
 
 RADIUS, LENGTH, TAIL = 0.016, 0.06, 0.11  # m, of the head and the tails
 BAND, APART = 0.007, 0.044  # m, width of a band, distance of the bands

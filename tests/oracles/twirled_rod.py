@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import brentq
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.mechanics.balance import motion_at
 from sim.mechanics.frames import add_frames
 from sim.mechanics.geometry import measure, new_geometry

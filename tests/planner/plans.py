@@ -18,8 +18,8 @@ from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.path import Path2D, shape_of
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
-from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.tracked_point import Point, TrackedVehicle, tracked_vehicle
+from sim.knowledge import CalibrationKnowledge
 from sim.model.presets import PRESETS
 from softflagella import to_goal
 from surrogate.robot_table import RobotTable

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.errors import InputError
 from planner.options import places_of, pose_of, request_of, seconds_of
 from planner.paths.obstacles import Circle
 from planner.planning.request import Camera
-from sim.io.errors import InputError
 from tests.planner.plans import CONTROL
 
 CM = 100 * CONTROL.tail_length  # in a tail length

@@ -14,14 +14,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from planner.__main__ import main
+from common.errors import run_command
 from planner.files.plan_files import write_plan
-from planner.files.tracks import tracking_error
-from planner.tracking.tracker import Tracker
 from sim.inputs import save_robot
-from sim.io.errors import run_command
+from softflagella.__main__ import main
 from tests.planner.plans import CONTROL, planned, trip
 from tests.processes import LIMIT
+from tracking.tracker import Tracker
+from tracking.tracks import tracking_error
 
 pytestmark = pytest.mark.slow
 
@@ -228,7 +228,7 @@ def test_another_robot_carries_out_a_plan_and_its_tracking_error_is_told(
     tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its track is in the plan's tail lengths; without a terminal no bar is written."""
-    monkeypatch.setattr("planner.__main__.BAR_AFTER", 0.0)
+    monkeypatch.setattr("tracking.__main__.BAR_AFTER", 0.0)
     result = planned("circle:1l", objective="flips")
     other = replace(CONTROL, name="other", tail_length=0.9 * CONTROL.tail_length)
     write_plan(result, tmp_path)
@@ -252,7 +252,7 @@ def test_another_robot_carries_out_a_plan_and_its_tracking_error_is_told(
 
 _COMPILED = """
 import sys
-from planner.__main__ import main as planner
+from softflagella.__main__ import main as planner
 from sim.jit import Loop
 from surrogate.__main__ import main as surrogate
 def loops():

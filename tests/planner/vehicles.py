@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from common.arrays import Floats
 from planner.planning.line_of_sight import Guidance
 from planner.planning.request import Camera
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle
-from sim.arrays import Floats
 from sim.mechanics import planar
 
 PROMPT = Camera(delay_s=0.0, lost=0.0)

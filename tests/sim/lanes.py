@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled
 from sim.lanes import lanes, width
 from sim.linear.chains import Chains

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 import sim
+from common.errors import run_command
 from sim import jit
-from sim.io.errors import run_command
 from tests.processes import LIMIT
 
 SIM = Path(sim.__file__).parent
@@ -86,7 +86,7 @@ def test_another_process_reads_what_one_has_compiled_until_the_sources_change(tm
 
 
 def test_numba_without_its_compiler_is_refused_in_one_line() -> None:
-    code = "from sim.io.errors import run_command as run; from sim.linear.spectral import differentiation as d"
+    code = "from common.errors import run_command as run; from sim.linear.spectral import differentiation as d"
     done = python("-c", f"{code}; run(lambda _: d(3))", NUMBA_DISABLE_JIT="1")
     assert re.fullmatch("error: NUMBA_DISABLE_JIT: .*; unset it\n", done.stderr)
 

@@ -14,7 +14,6 @@ import pytest
 
 from planner.files.plan_files import write_plan
 from planner.files.saved_plan import load_plan
-from planner.files.tracks import tracking_error
 from planner.jobs.plan import plan
 from planner.paths.path import circle, polygon
 from sim.model.presets import PRESETS
@@ -29,6 +28,7 @@ from surrogate.table_file import load
 from tests.calibration.toy_tables import DRAG, ambiguous, none, toy_swimmer, toy_table
 from tests.page_text import PageText
 from tests.planner.plans import predicted_track
+from tracking.tracks import tracking_error
 
 ROBOT = PRESETS["paper-control"]
 SECTIONS = [

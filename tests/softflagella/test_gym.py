@@ -13,9 +13,9 @@ gymnasium = pytest.importorskip("gymnasium", reason="needs the extra gym")
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
 import softflagella.gym as sg  # noqa: E402
+from common.errors import InputError  # noqa: E402
 from planner.paths.distance import distance_to  # noqa: E402
 from planner.vehicle.vehicle import Switches, roll_out  # noqa: E402
-from sim.io.errors import InputError  # noqa: E402
 from softflagella import write_plan  # noqa: E402
 from tests.planner.plans import planned  # noqa: E402
 

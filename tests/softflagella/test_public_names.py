@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 import softflagella as sf
-from sim.io.errors import run_command
-from sim.io.keywords import keywords_of
+from common.errors import run_command
+from common.keywords import keywords_of
 from softflagella.__main__ import WORDS, command, further, main, packages, program_of
-from softflagella.shadowing import PACKAGES
+from softflagella.shadowing import COMMANDED
 from tests.processes import LIMIT
 
 LONG = {"Orbit", "Swim", "TrackingError", "Trip", "hold", "load_goal", "tabulate"}
@@ -64,7 +64,7 @@ def test_one_command_has_those_of_all_packages(capsys: pytest.CaptureFixture[str
         said = capsys.readouterr().out
         assert f"usage: softflagella {package}" in said
         assert all(name in said for name in further(package).commands)
-    commands = [name for package in PACKAGES for name in program_of(package).commands]
+    commands = [name for package in COMMANDED for name in program_of(package).commands]
     named = [*WORDS, *(name for package in packages() for name in further(package).commands)]
     assert len(named) == len(commands) + 1  # each has one name; demo is of no package
 
@@ -127,7 +127,7 @@ def check(*slow):
     assert not set(slow) & set(sys.modules), set(slow) & set(sys.modules)
 import softflagella as sf
 check("numpy", "torch", "numba", "pandas", "matplotlib", "scipy", "pyarrow", "sim")
-from sim.io.errors import run_command
+from common.errors import run_command
 from softflagella.__main__ import main
 folder = sys.argv[1]
 main(["query", "paper-control"])

@@ -89,7 +89,9 @@ def last_line(*given: object, first: str = "") -> str:
 
 
 def test_a_file_or_a_package_beside_a_script_is_named(tmp_path: Path) -> None:
-    assert {"sim", "camera", "dataset", "surrogate", "planner", "calibration"} == set(PACKAGES)
+    assert {"common", "sim", "camera", "dataset", "surrogate", "planner", "tracking", "calibration"} == set(
+        PACKAGES
+    )
     (tmp_path / "planner").mkdir()
     for name, file in (("sim", tmp_path / "sim.py"), ("planner", tmp_path / "planner" / "__init__.py")):
         file.write_text("x = 1\n")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim.io.errors import InputError
+from common.errors import InputError
 from sim.model.presets import PRESETS
 from surrogate.robot_table import RobotTable
 from surrogate.table import NeuralTable

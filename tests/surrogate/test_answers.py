@@ -14,10 +14,10 @@ import torch
 from torch import Tensor
 
 import softflagella as sf
+from common.errors import run_command
+from common.units import to_si
 from sim.__main__ import main as sim
 from sim.inputs import group_columns, save_robot
-from sim.io.errors import run_command
-from sim.io.units import to_si
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.motion.steady_motion import describe_motion

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.arrays import Flags, Floats
+from common.arrays import Flags, Floats
 from sim.model.presets import PRESETS
 from sim.model.response import BEFORE, DWELLS
 from surrogate.domain import Support

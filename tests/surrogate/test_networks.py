@@ -18,7 +18,7 @@ from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils._pytree import tree_leaves
 
 import surrogate.training.networks
-from sim.io.errors import InputError
+from common.errors import InputError
 from surrogate.network import Ensemble, state_shapes
 from surrogate.table import NeuralTable
 from surrogate.training import fits

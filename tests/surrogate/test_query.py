@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.errors import InputError
 from sim.effects import catalogue, effect_named
-from sim.io.errors import InputError
 from sim.mechanics.linear_theory import linear_filament
 from sim.model.groups import DWELL, Groups
 from sim.model.response import DWELLS, SETTLED

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.files.tracks import tracking_error
+from common.errors import InputError
 from planner.jobs.plan import plan
 from planner.paths.path import polygon
-from sim.io.errors import InputError
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.response import DWELLS
@@ -26,6 +25,7 @@ from surrogate.table_file import load_table
 from surrogate.tabulate import tabulate
 from tests.oracles.switching import switch_response
 from tests.surrogate.small import refusal, robot_table
+from tracking.tracks import tracking_error
 
 pytestmark = pytest.mark.slow
 

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from common.errors import InputError, run_command
 from dataset.design import load_design
-from sim.io.errors import InputError, run_command
 from sim.model.presets import INDEPENDENT
 from sim.motion.batches import steady_columns
 from surrogate.__main__ import main

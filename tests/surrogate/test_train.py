@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import surrogate.training.train as training
+from common.errors import InputError
 from dataset.build import build
-from sim.io.errors import InputError
 from surrogate.errors import relative_errors
 from surrogate.training import fits
 from surrogate.training.fits import learnable, wrench_samples

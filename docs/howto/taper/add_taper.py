@@ -8,7 +8,7 @@ the cell of joint k, so that the mean stiffness stays EI. Units: EI = 1, l = 1.
 
 from __future__ import annotations
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.jit import compiled
 from sim.linear.blocks import add, add_at, vector
 from sim.linear.vectors import times

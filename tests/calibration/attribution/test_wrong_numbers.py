@@ -31,8 +31,8 @@ from calibration.swimmer.swimmer import COEFFICIENTS, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record
-from sim.arrays import Flags, Floats
-from sim.io.errors import InputError
+from common.arrays import Flags, Floats
+from common.errors import InputError
 from sim.model.uncertainty import Sigma
 from tests.calibration.toy_tables import (
     DRAG,

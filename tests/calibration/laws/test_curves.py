@@ -24,7 +24,7 @@ from calibration.statistics.fit import Fit, fit
 from calibration.statistics.gls import SESSION_SHARE, Noise, repeat_covariance
 from calibration.statistics.statistical_model import precisions, start_values
 from calibration.statistics.study import Study, middle_session
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.model.laws import Powers
 from tests.calibration.toy_tables import START, on_the_toy, toy_swimmer, toy_table
 from tests.shared import shared

@@ -20,7 +20,7 @@ from calibration.report.corrected_robot import law_handed_on, robot_with_law
 from calibration.report.robot_verdict import RobotLaws, find_robot_laws
 from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.swimmer.measured_table import read_measurements
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.effects import effect_named
 from sim.inputs import group_columns, load_robot
 from tests.calibration import toy

@@ -10,7 +10,7 @@ import pytest
 
 from calibration.laws.search import LinearModels
 from calibration.statistics.gls import SESSION_SHARE, Gls, Noise, repeat_covariance
-from sim.arrays import Floats
+from common.arrays import Floats
 
 SESSION = np.repeat([0, 1, 2, 3], [6, 8, 6, 4])
 CONDITION = np.arange(len(SESSION)) // 2

@@ -17,7 +17,7 @@ from calibration.report.report import sections
 from calibration.report.robot_verdict import RobotLaws
 from calibration.verdict.record import facts
 from calibration.words.quantities import plain
-from sim.arrays import Floats
+from common.arrays import Floats
 from tests.calibration.toy_tables import laws_of_toy, none
 
 SESSION = np.repeat(np.arange(4), 16)

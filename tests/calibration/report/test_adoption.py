@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from calibration.report.adoption import adopt_law
+from common.errors import InputError
 from sim.effects import catalogue
-from sim.io.errors import InputError
 from sim.solve.assembly import numbers
 from tests.sim.model.test_laws import with_law
 

@@ -20,11 +20,11 @@ from calibration.report.figures import draw_dependences, draw_place
 from calibration.report.robot_verdict import RobotVerdict
 from calibration.statistics.study import refit_to_all
 from calibration.verdict.next_runs import BATCH, Explanation, next_runs, standings
+from common.errors import InputError
 from dataset.robot_inputs import robot_fields
-from planner.vehicle.calibration_table import read_knowledge
 from sim.effects import effect_named
 from sim.inputs import group_columns, load_robot, save_robot
-from sim.io.errors import InputError
+from sim.knowledge import read_knowledge
 from sim.model.groups import Groups
 from sim.model.robot import Robot
 from tests.calibration.toy_tables import (

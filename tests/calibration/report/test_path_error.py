@@ -13,9 +13,9 @@ import pytest
 import calibration.report.path_error
 from calibration.__main__ import main
 from calibration.report.path_error import DEFAULT_PATHS, PathError, path_errors, wanted_paths
+from common.errors import InputError, run_command
 from planner.paths.distance import distance_to
-from planner.vehicle.calibration_table import CalibrationKnowledge
-from sim.io.errors import InputError, run_command
+from sim.knowledge import CalibrationKnowledge
 from sim.model.learnt_range import learnt_range
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot

@@ -25,18 +25,17 @@ from calibration.verdict.record import facts, shown, verdict_record
 from calibration.verdict.verdict import Verdict
 from calibration.words.quantities import detectable, direction_in_words, plain, size, with_error
 from calibration.words.render import next_steps
-from planner.__main__ import main as planner
+from common.errors import run_command
 from planner.files.saved_plan import load_plan
-from planner.files.tracks import tracking_error
 from planner.jobs.plan import plan
 from planner.paths.path import circle
-from planner.vehicle.calibration_table import read_knowledge
 from sim.inputs import load_robot, save_robot
-from sim.io.errors import run_command
+from sim.knowledge import read_knowledge
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule, load_schedule
 from sim.motion.replay import replay
+from softflagella.__main__ import main as planner
 from surrogate.__main__ import main as surrogate
 from surrogate.table_file import load_table
 from tests.calibration.toy_tables import (
@@ -50,6 +49,7 @@ from tests.calibration.toy_tables import (
     verdict_of,
 )
 from tests.page_text import PageText
+from tracking.tracks import tracking_error
 
 
 def with_effect() -> RobotVerdict:

@@ -40,7 +40,7 @@ from calibration.statistics.weights import (
 )
 from calibration.verdict.record import facts
 from calibration.words.render import next_steps
-from sim.arrays import Flags, Floats, Integers
+from common.arrays import Flags, Floats, Integers
 from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, calibrated, effect, toy_table
 
 COUNT, NOISE = 192, 0.025

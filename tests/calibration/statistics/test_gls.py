@@ -12,7 +12,7 @@ from calibration.statistics.residual_tests import TESTABLE, Directions, _kernel,
 from calibration.statistics.statistical_model import changes, features, precisions
 from calibration.statistics.study import Study, middle_session
 from calibration.swimmer.influences import CAMERA, TACHOMETER
-from sim.arrays import Floats
+from common.arrays import Floats
 from tests.calibration.toy_tables import fit_all, toy_swimmer, toy_table
 
 SESSION = np.array([0, 0, 1, 1, 1, 2, 2, 2])

@@ -13,7 +13,7 @@ import pytest
 
 from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.swimmer.measured_table import find_copies, read_measurements
-from sim.io.errors import InputError
+from common.errors import InputError
 from tests.calibration.toy_tables import calibrated, none, toy_table
 from tests.processes import LIMIT
 
@@ -65,7 +65,7 @@ def test_a_missing_table_is_refused_before_anything_slow_is_loaded() -> None:
     code = """
 import sys
 from calibration.__main__ import program
-from sim.io.errors import run_command
+from common.errors import run_command
 assert run_command(program.main, ["calibrate", "none.csv", "--robot", "r.toml", "--out", "o"]) == 2
 assert run_command(program.main, ["tracks", "none.csv", "runs.csv", "--out", "o"]) == 2
 assert not {"numba", "scipy", "matplotlib"} & set(sys.modules)

@@ -13,12 +13,13 @@ import pytest
 
 from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.swimmer.influences import influences
-from calibration.swimmer.measured_table import OUTPUTS, read_measurements
-from calibration.swimmer.possible_runs import UNITS, owned, possible_settings
+from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.possible_runs import owned, possible_settings
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
-from sim.io.errors import InputError
+from common.errors import InputError
+from common.run_columns import OTHER_UNITS, OUTPUTS
 from sim.model.presets import PRESETS
 from surrogate.table_file import load
 from tests.calibration import toy
@@ -205,10 +206,10 @@ def refused(table: pd.DataFrame, words: str) -> None:
         calibrated(table)
 
 
-@pytest.mark.parametrize("name", UNITS)
+@pytest.mark.parametrize("name", OTHER_UNITS)
 def test_an_output_in_another_unit_is_refused_with_that_unit(name: str) -> None:
     column = OUTPUTS[name][0]
-    for unit, factor in UNITS[name].items():
+    for unit, factor in OTHER_UNITS[name].items():
         table = toy_table(4)
         if column not in table:
             table[column] = np.abs(table["omega_yr_rad_s"]) * table["R_yr_cm"]

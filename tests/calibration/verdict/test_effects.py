@@ -18,12 +18,13 @@ from calibration.statistics.residual_tests import Directions, directions, examin
 from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.statistics.study import DRAWS, Study, middle_session
 from calibration.swimmer.influences import influences
-from calibration.swimmer.measured_table import OUTPUTS, read_measurements
+from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import COEFFICIENTS, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
+from common.run_columns import OUTPUTS
 from tests.calibration.toy_tables import (
     DRAG,
     START,

@@ -30,7 +30,7 @@ from calibration.verdict.next_runs import (
     standings,
 )
 from calibration.verdict.record import verdict_record
-from sim.io.errors import InputError
+from common.errors import InputError
 from tests.calibration.toy_tables import DRAG, ambiguous, toy_swimmer, toy_table
 
 

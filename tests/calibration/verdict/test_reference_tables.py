@@ -12,7 +12,6 @@ import pandas as pd
 import pytest
 
 from calibration.__main__ import main
-from calibration.examples.spheres import median_error, read_spheres
 from calibration.report.report import write_report
 from calibration.statistics.gls import repeat_covariance
 from calibration.swimmer.measured_table import read_measurements
@@ -20,10 +19,11 @@ from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
+from common.errors import run_command
 from sim.inputs import load_robot
-from sim.io.errors import run_command
 from sim.model.uncertainty import DEFAULTS, Sigma
 from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, FEW_DRAWS, START, install_few_candidates
+from tests.oracles.spheres import median_error, read_spheres
 from tests.reference.make import GIVEN, HERE, TABLES
 
 

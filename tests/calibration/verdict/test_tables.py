@@ -15,7 +15,7 @@ from calibration.statistics.gls import SESSION_SHARE
 from calibration.statistics.study import middle_session
 from calibration.swimmer.measured_table import PROTOCOLS, read_measurements
 from calibration.verdict.record import verdict_record
-from sim.io.errors import InputError, run_command
+from common.errors import InputError, run_command
 from tests.calibration.toy_tables import DRAG, calibrated, effect, toy_table
 from tests.page_text import PageText
 

@@ -13,7 +13,7 @@ from calibration.verdict import calibrate
 from calibration.verdict.record import facts
 from calibration.verdict.verdict import Explained, HeldOutErrors, Verdict
 from calibration.words.render import next_steps
-from sim.io.errors import InputError
+from common.errors import InputError
 from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, ambiguous, calibrated, none, number, toy_table
 
 

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.__main__ import main
+from common.errors import InputError
 from planner.files.arduino import write_arduino
 from planner.files.headers import milliseconds
 from planner.jobs.plan import plan
 from planner.planning.plan import Plan
-from sim.io.errors import InputError
 from sim.model.presets import PRESETS
+from softflagella.__main__ import main
 from tests.planner.compiled import SOURCES, WARNINGS, compile_c
 from tests.processes import LIMIT
 from tests.shared import shared

@@ -13,18 +13,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from planner.__main__ import main
+from camera.pose_tracks import read_tracks
+from common.errors import InputError
 from planner.files.headers import milliseconds
 from planner.files.pictures import draw_plan
 from planner.files.plan_files import write_plan
-from planner.files.tracks import check, tracking_error
 from planner.vehicle.vehicle import Switches, roll_out
-from sim.io.errors import InputError
-from sim.io.pose_tracks import read_tracks
 from sim.model.schedule import load_schedule
+from softflagella.__main__ import main
+from tests.camera.tracked_files import deeplabcut, two_robots
 from tests.planner.compiled import compile_c
 from tests.planner.plans import CONTROL, planned, predicted_track
-from tests.sim.io.tracked_files import deeplabcut, two_robots
+from tracking.tracks import check, tracking_error
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.__main__ import main
+from common.errors import InputError, run_command
 from planner.files.plan_files import write_plan
 from planner.files.saved_plan import is_plan, load_goal, load_plan, restore_plan
 from planner.goal.trip import FORMAT as GOAL_FORMAT
@@ -19,14 +19,12 @@ from planner.jobs.plan import plan
 from planner.paths.path import circle
 from planner.planning.plan import Plan
 from planner.planning.request import Camera
-from planner.tracking.kalman_filter import prior
-from planner.tracking.tracker import Tracker
-from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.from_table import table_for
 from sim.inputs import save_robot
-from sim.io.errors import InputError, run_command
+from sim.knowledge import CalibrationKnowledge
 from sim.model.robot import Robot
 from sim.model.schedule import FORMAT, load_schedule, plan_id
+from softflagella.__main__ import main
 from surrogate.table_file import load
 from tests.planner.plans import (
     BIASED,
@@ -40,6 +38,8 @@ from tests.planner.plans import (
     trip,
 )
 from tests.shared import shared
+from tracking.kalman_filter import prior
+from tracking.tracker import Tracker
 
 pytestmark = pytest.mark.slow
 

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, words
+from common.arrays import Floats
+from common.errors import InputError
 from planner.goal.route import COURSES, NoWayError, RouteLimits, route
+from planner.paths.dubins import TURNS, DubinsPaths, shortest_paths, words
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.tractrix import STILL
 from planner.planning.plan import Plan
-from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.vehicle import Switches, roll_out
-from sim.arrays import Floats
-from sim.io.errors import InputError
+from sim.knowledge import CalibrationKnowledge
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from common.errors import InputError
 from planner.jobs.detours import Hindered
 from planner.jobs.plan import make_plan
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
@@ -15,12 +16,11 @@ from planner.paths.path import Path2D, circle, runs_of
 from planner.planning.declare import TIGHTEST
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
-from planner.tracking.swim import swim
-from planner.tracking.tracker import Tracker
-from sim.io.errors import InputError
 from sim.motion.replay import replay
 from tests.planner.plans import CONTROL, LINE, QUICK, ROCK, around, tracked
 from tests.planner.vehicles import FINE
+from tracking.swim import swim
+from tracking.tracker import Tracker
 
 pytestmark = pytest.mark.slow
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
+from common.arrays import Floats
+from common.errors import InputError
 from planner.files.headers import schedule_header
 from planner.goal import last_dwells
 from planner.goal.last_dwells import looped
@@ -17,20 +19,18 @@ from planner.paths.obstacles import Circle, Footprint, FreeSpace
 from planner.paths.path import Path2D, circle
 from planner.planning.plan import Plan
 from planner.planning.request import POSE, PlanRequest
-from planner.tracking.guidance import TrackerGuidance
-from planner.tracking.pipe import answers
-from planner.tracking.swim import swim
-from planner.tracking.tracker import Command, Tracker
 from planner.vehicle.tracked_point import tracked_vehicle
 from planner.vehicle.vehicle import Switches, Vehicle, roll_out
-from sim.arrays import Floats
-from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
 from tests.planner.plans import CONTROL, tracked
 from tests.planner.vehicles import FINE
 from tests.shared import shared
+from tracking.guidance import TrackerGuidance
+from tracking.pipe import answers
+from tracking.swim import swim
+from tracking.tracker import Command, Tracker
 
 pytestmark = pytest.mark.slow
 

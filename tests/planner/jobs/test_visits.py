@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.errors import InputError
 from planner.jobs import shortest_order as module
 from planner.jobs.shortest_order import EXACT, shortest_order
 from planner.jobs.tour import tour
@@ -17,7 +18,6 @@ from planner.paths.obstacles import Circle, FreeSpace
 from planner.planning.solve import Setting
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import dwells_for
-from sim.io.errors import InputError
 from sim.motion.replay import replay
 from tests.planner.plans import CONTROL, tracked
 

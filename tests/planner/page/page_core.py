@@ -20,6 +20,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pytest
 
+from common.errors import InputError
 from planner.page.constants import constants_module
 from planner.page.first_state import robot_fields
 from planner.page.write_page import table_data
@@ -27,7 +28,6 @@ from planner.paths.tractrix import Reference
 from planner.planning.plan import Plan
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Vehicle
-from sim.io.errors import InputError
 from sim.model.robot import Robot
 from surrogate.table_file import load
 from tests.processes import LIMIT

@@ -13,18 +13,17 @@ import pandas as pd
 import pytest
 
 import softflagella as sf
+from common.errors import InputError
+from common.provenance import code_version
+from common.reading import sealed
 from planner.files.headers import schedule_template
 from planner.files.plan_files import write_plan
 from planner.files.saved_plan import load_plan, restore_plan
-from planner.files.tracks import tracking_error
 from planner.page.first_state import first_options, slider_ends
 from planner.paths.path import circle, shape_of
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from sim.inputs import load_robot
-from sim.io.errors import InputError
-from sim.io.provenance import code_version
-from sim.io.reading import sealed
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml
@@ -45,6 +44,7 @@ from tests.planner.page.page_core import (
 )
 from tests.planner.plans import planned, predicted_track
 from tests.sim.model.test_robot_toml import LAB, REFUSALS
+from tracking.tracks import tracking_error
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from common.errors import InputError
 from planner.jobs.plan import make_plan, plan
 from planner.page.first_state import first_plan
 from planner.page.write_page import packed_data, table_data
@@ -20,7 +21,6 @@ from planner.planning.request import PlanRequest
 from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.tracked_point import tracked_vehicle
 from sim.inputs import load_robot
-from sim.io.errors import InputError
 from sim.model.response import BEFORE
 from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml

@@ -9,11 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from common.errors import InputError
+from common.quantities import numbers_of
+from common.tables import parse_table
 from planner.paths.path_files import read_path
 from planner.paths.svg_drawing import read_svg
-from sim.io.errors import InputError
-from sim.io.quantities import numbers_of
-from sim.io.tables import parse_table
+from tests.common.test_tables import READ, REFUSED, TEXTS
 from tests.planner.page.page_core import (
     EXACT,
     FOLDER,
@@ -28,7 +29,6 @@ from tests.planner.page.view.browser import chromium
 from tests.planner.paths import svg_cases
 from tests.planner.paths.svg_cases import BROKEN, svg
 from tests.planner.paths.test_path_files import ALIKE, SIZED, UNCLEAR
-from tests.sim.io.test_tables import READ, REFUSED, TEXTS
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
 

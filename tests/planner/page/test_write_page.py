@@ -16,10 +16,10 @@ import pytest
 
 import planner.page.bundle
 import softflagella as sf
+from common.errors import run_command
 from planner.page.bundle import joined, read_module
 from planner.page.constants import constants
 from planner.vehicle.from_table import both_directions
-from sim.io.errors import run_command
 from softflagella.__main__ import main
 from tests.planner.page.cases import shipped
 from tests.planner.page.page_core import FOLDER, answer, answers, node

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from common.errors import InputError
 from planner.jobs.plan import plan
 from planner.paths.distance import distance_to, nearest, two_sided
 from planner.paths.nearest_path import nearest_path
 from planner.paths.path import Path2D, circle, polygon, resample, smoothed
 from planner.paths.tractrix import STILL, Drift, Reference, reference
 from planner.planning.declare import fillet, largest_fillet
-from sim.io.errors import InputError
 from tests.planner.plans import CONTROL
 
 

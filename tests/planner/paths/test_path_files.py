@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from common.errors import InputError
 from planner.options import read_region
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.path import SHAPES, Path2D, polygon
@@ -21,7 +22,6 @@ from planner.paths.units import (
     read_time,
 )
 from planner.planning.declare import CORNER, kinks
-from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from tests.planner.paths import svg_cases
 from tests.planner.plans import CONTROL

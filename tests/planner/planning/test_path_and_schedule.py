@@ -10,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from common.errors import InputError
 from planner.jobs.plan import plan
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon, smoothed
@@ -18,7 +19,6 @@ from planner.planning.declare import MOST_WORK, Feasibility, changed, cost, decl
 from planner.planning.line_of_sight import follow, guaranteed, hysteresis, look_ahead
 from planner.planning.request import DECLARING, REMEDY, Corner, Share
 from planner.vehicle.vehicle import roll_out
-from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot

@@ -11,6 +11,7 @@ from typing import Any, get_type_hints
 import numpy as np
 import pytest
 
+from common.errors import InputError, InputWarning
 from planner.files.headers import schedule_header
 from planner.goal.trip import Trip, to_goal
 from planner.jobs.hold import Orbit
@@ -25,11 +26,10 @@ from planner.planning.conditions import BlockedError
 from planner.planning.line_of_sight import LineOfSight
 from planner.planning.plan import KINDS
 from planner.planning.request import ERRORS, PlanRequest
-from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
 from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.vehicle import roll_out
 from planner.vehicle.zigzag import dwells_for, longer_dwells, longest_dwell
-from sim.io.errors import InputError, InputWarning
+from sim.knowledge import COEFFICIENTS, CalibrationKnowledge
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from surrogate.table_file import load

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from common.errors import InputError
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Reference, reference
@@ -24,16 +25,15 @@ from planner.planning.errors import (
 )
 from planner.planning.line_of_sight import follow, look_ahead
 from planner.planning.request import Camera
-from planner.tracking.swim import swim
-from planner.tracking.tracker import Tracker
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Rollout, Switches, Vehicle, roll_out
-from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.motion.replay import replay
 from surrogate.table_file import load
 from tests.oracles.unseen_robots import carried
 from tests.planner.plans import planned as plan_of
 from tests.planner.vehicles import plain_guidance, vehicle
+from tracking.swim import swim
+from tracking.tracker import Tracker
 
 CIRCLE, LINE = circle(1.0), Path2D.of([[0, 0], [25, 0]])
 JITTER = np.tile([0.0, 0.0, 1e-3], (2, len(TIMES), 1))  # of the lag, over the disc's phase

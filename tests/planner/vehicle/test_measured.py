@@ -11,13 +11,13 @@ import pytest
 from scipy.integrate import cumulative_simpson, solve_ivp
 
 import softflagella as sf
+from common.errors import InputError
 from planner.jobs.plan import plan
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import Plan
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.vehicle import Switches, Vehicle, roll_out
-from sim.io.errors import InputError
 from sim.mechanics import planar
 
 NUMBERS = ("speed", "turn_left", "turn_right", "slip", "lag")

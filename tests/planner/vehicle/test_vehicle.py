@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.errors import InputError
 from planner.jobs.plan import plan
 from planner.paths.path import circle
-from planner.vehicle.calibration_table import (
+from planner.vehicle.from_table import table_vehicle
+from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Switches, interpolated, lag_table, roll_out
+from planner.vehicle.zigzag import Zigzag, zigzag
+from sim.inputs import load_robot
+from sim.knowledge import (
     COEFFICIENTS,
     NUMBERS,
     CalibrationKnowledge,
     knowledge_toml,
     read_knowledge,
 )
-from planner.vehicle.from_table import table_vehicle
-from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Switches, interpolated, lag_table, roll_out
-from planner.vehicle.zigzag import Zigzag, zigzag
-from sim.inputs import load_robot
-from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.response import BEFORE, DWELLS, memory_after
 from sim.model.robot import Robot

@@ -14,11 +14,11 @@ import pytest
 from scipy.integrate import quad
 
 import sim.effects
+from common.arrays import Floats
+from common.errors import InputError
 from dataset.simulate import simulate
-from sim.arrays import Floats
 from sim.effects import catalogue, effect_named
 from sim.effects.tail_contact import least_gap
-from sim.io.errors import InputError
 from sim.model.groups import Groups
 from sim.motion.steady import orbits, steady
 from sim.solve.assembly import assemble, numbers

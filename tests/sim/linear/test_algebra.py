@@ -11,7 +11,7 @@ import numba
 import numpy as np
 import pytest
 
-from sim.arrays import Floats
+from common.arrays import Floats
 from sim.effects import catalogue
 from sim.jit import compiled
 from sim.lanes import choose, fma, lane, lanes, larger, less, smaller, somewhere, width, with_lane

@@ -8,10 +8,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from sim.arrays import Floats
+from common.arrays import Floats
+from common.errors import InputError
 from sim.effects import catalogue, check_effects, effect_named, is_effect
 from sim.inputs import check_columns
-from sim.io.errors import InputError
 from sim.model.groups import Groups
 from sim.model.laws import (
     COEFFICIENTS,

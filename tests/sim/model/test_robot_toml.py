@@ -13,8 +13,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from common.errors import InputError, InputWarning
 from sim.inputs import load_robot, save_robot
-from sim.io.errors import InputError, InputWarning
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from sim.arrays import Floats
+from common.arrays import Floats
+from common.errors import InputError
 from sim.effects import catalogue
-from sim.io.errors import InputError
 from sim.model.groups import SLOPE_INPUTS, SLOPE_OUTPUTS, Groups
 from sim.motion.batches import in_batches, sensitivity_columns, split
 from sim.motion.response import mirrored, orbits_with_phases, responses

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.io.errors import InputError
+from common.errors import InputError
 from sim.mechanics import planar
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN, Responses, at_equal_dwells, memory_after

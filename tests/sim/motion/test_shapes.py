@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 from scipy.interpolate import interp1d
 
+from common.errors import InputError, run_command
 from sim.__main__ import main
-from sim.io.errors import InputError, run_command
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule

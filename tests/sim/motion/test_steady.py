@@ -12,9 +12,9 @@ import pytest
 
 import sim.motion.settling
 import sim.motion.steady
+from common.errors import run_command
 from sim.__main__ import _counts, main
 from sim.inputs import save_robot
-from sim.io.errors import run_command
 from sim.model.presets import INDEPENDENT, PRESETS
 from sim.model.robot import Robot
 from sim.motion.batches import steady_columns, stepped_columns

@@ -13,7 +13,7 @@ import pytest
 import planner.vehicle.from_table
 import softflagella as sf
 import surrogate.tabulate
-from sim.io.errors import InputError
+from common.errors import InputError
 from tests.calibration.toy_tables import DRAG, START, ambiguous, on_the_toy, toy_table
 from tests.planner.plans import BIASED, CONTROL, own_table
 from tests.planner.vehicles import FINE

@@ -11,8 +11,8 @@ import pytest
 
 import softflagella as sf
 import surrogate.__main__
+from common.tables import read_table
 from dataset.schema import INPUTS, OUTPUTS
-from sim.io.tables import read_table
 from sim.motion.steady_motion import LAB_COLUMNS
 from sim.robot_rows import UNITS, robot_rows, with_units
 from tests.planner.plans import CONTROL, own_table

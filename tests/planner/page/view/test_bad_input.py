@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.errors import run_command
 from planner.files.plan_files import write_plan
-from sim.io.errors import run_command
 from softflagella.__main__ import main
 from tests.planner.page.page_core import answer, without_digits
 from tests.planner.page.view.browser import address_of, drop, is_seen, planned, text_of, unfold

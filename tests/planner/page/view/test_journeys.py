@@ -12,14 +12,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from planner.files.tracks import tracking_error
+from common.errors import run_command
 from planner.jobs.plan import plan
 from planner.page.write_page import write_page
 from planner.paths.path import circle
 from planner.planning.plan import Plan
 from planner.vehicle.vehicle import roll_out
 from sim.inputs import load_robot
-from sim.io.errors import run_command
 from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
 from softflagella.__main__ import main
@@ -40,6 +39,7 @@ from tests.planner.page.view.browser import (
 )
 from tests.planner.plans import BIASED, CONTROL, own_table
 from tests.planner.plans import planned as planned_by_python
+from tracking.tracks import tracking_error
 
 pytestmark = pytest.mark.slow
 

@@ -1,1 +1,0 @@
-"""Models other than the swimmer. The calibration itself knows nothing about robots."""

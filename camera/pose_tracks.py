@@ -1,0 +1,171 @@
+"""Tracks as tables of poses, also of what other programs have tracked: run, time_s, x_cm, y_cm, heading_deg.
+
+A pose needs two points on the axis of the robot, equally far ahead of and behind the head's centre:
+
+    (x, y) = (front + rear) / 2,   heading = atan2(y_front - y_rear, x_front - x_rear)
+
+A rigid body of Motive and a TUM trajectory have a heading of their own. The y axis of pictures points down and
+is reversed. Where a program is not sure of a point (`Program.likely`), the pose is lost.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from pathlib import Path
+from typing import Unpack
+
+import numpy as np
+import pandas as pd
+
+from camera.track_options import TrackOptions
+from camera.tracking_programs import PROGRAMS, Program, Seen
+from common.errors import InputError, naming
+from common.reading import read_bytes
+from common.tables import read_table
+from common.units import number_and_unit, of_kind, to_si
+
+_LISTED, _HEAD = 8, 400  # names in a message; bytes that tell which program wrote a file
+
+
+def read_tracks(path: str | Path, **options: Unpack[TrackOptions]) -> pd.DataFrame:
+    """Read tracks that the program `written_by` has written; without it a table, which is returned as it is.
+
+    A run is named as its file, without what DeepLabCut adds from "DLC" on. Where a file has several robots, each
+    is a run, with its name behind that of the file. `attrs["lost"]` says how many poses are lost.
+
+    Raises:
+        InputError: the file is not as the program writes it, or an option is missing, or has no meaning for it.
+    """
+    path, source = Path(path), options.get("written_by")
+    if source is None:
+        if others := options.keys() - {"written_by"}:
+            raise InputError(f"--{min(others)} is for tracks of another program; say which with --from")
+        start = read_bytes(path, first=_HEAD).decode("latin-1").removeprefix("ï»¿") if path.is_file() else ""
+        wrote = [name for name, program in PROGRAMS.items() if re.match(program.begins, start)]
+        if not wrote:
+            return read_table(path)
+        if wrote != ["tum"]:  # which needs no options
+            raise InputError(f"{path} is no table of poses; say what wrote it: --from {' or '.join(wrote)}")
+        source = "tum"
+    if source not in PROGRAMS:
+        raise InputError(f"no program {source!r}; there are {', '.join(PROGRAMS)}")
+    program, runs = PROGRAMS[source], []
+    for file in _films(path, program) if path.is_dir() else [path]:
+        try:
+            with warnings.catch_warnings(), naming(file):
+                warnings.simplefilter("ignore")  # pandas' of columns of mixed types
+                seen = program.read(file)
+        except InputError:
+            raise
+        except Exception as broken:  # a damaged file can raise any error from within the parsers
+            reason = (str(broken).splitlines() or ["it ends early"])[0]
+            reason = f"it has no {reason}" if isinstance(broken, KeyError) else reason
+            raise InputError(f"{file} is not as {program.title} writes it ({reason})") from None
+        runs.append(_poses(seen, file, program, options))
+    table = pd.concat(runs, ignore_index=True)
+    table.attrs["lost"] = [line for run in runs for line in run.attrs["lost"]]
+    return table
+
+
+def _films(folder: Path, program: Program) -> list[Path]:
+    """List a folder's files of a program, one for each film."""
+    films: dict[str, Path] = {}
+    for ending in program.endings:
+        for file in sorted(folder.glob(f"*{ending}")):
+            films.setdefault(file.stem, file)
+    if not films:
+        raise InputError(f"{folder} has no files of {program.title}: {', '.join(program.endings)}")
+    return list(films.values())
+
+
+def _poses(seen: Seen, path: Path, program: Program, options: TrackOptions) -> pd.DataFrame:
+    """Make poses of the points of a file."""
+    seconds, metres = _scales(seen, path, options)
+    points = seen.points
+    points.loc[points["sure"] < program.likely, ["x", "y"]] = math.nan
+    if "heading" in points and not {"front", "rear"} & set(options):
+        poses = points[points["robot"] != ""]
+    else:
+        poses = _poses_of_two(points, path, program, options)
+    x, y = options.get("origin", (0.0, 0.0))
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise InputError(f"--origin {x:g} {y:g}; give two finite numbers")
+    up, run = (-1 if program.y_down else 1), path.stem
+    if program is PROGRAMS["deeplabcut"]:
+        run = run.partition("DLC")[0].rstrip("_-") or run
+    several = len(poses["robot"].unique()) > 1
+    table = pd.DataFrame({
+        "run": run + " " + poses["robot"] if several else run,
+        "time_s": seconds * poses["time"],
+        "x_cm": 100 * metres * (poses["x"] - x),
+        "y_cm": 100 * metres * (poses["y"] - y) * up,
+        "heading_deg": np.degrees(poses["heading"]),
+    }).sort_values(["run", "time_s"], kind="stable")  # fmt: skip
+    known = np.isfinite(table.drop(columns="run").to_numpy()).all(axis=1)
+    lost = len(table) - int(known.sum())
+    if lost == len(table):
+        raise InputError(f"{path}: its two points are never both seen; name others with --front and --rear")
+    table = table.loc[known]
+    table.attrs["lost"] = [f"{path}: {lost} of {len(table) + lost} poses are lost"] if lost else []
+    return table
+
+
+def _scales(seen: Seen, path: Path, options: TrackOptions) -> tuple[float, float]:
+    """Return the units of a file's times [s] and lengths [m]: its own ones, or those of the options.
+
+    Raises:
+        InputError: one is missing or impossible, or is given though the file has its own.
+    """
+    _, own_metres, own_seconds = seen
+    fps, scale = options.get("fps"), options.get("scale")
+    seconds = own_seconds if own_seconds is not None else 1 / fps if fps else math.nan
+    metres = own_metres or _length(scale or "")
+    faults = [
+        f"has its own units; leave out --{name}"
+        for name, given, own in (("fps", fps, own_seconds), ("scale", scale, own_metres))
+        if given is not None and own is not None
+    ]
+    if own_seconds is not None and not 0 < own_seconds < math.inf:
+        faults.append(f"has frames {own_seconds:g} s apart; correct its frame rate, above 0 and finite")
+    elif not 0 < seconds < math.inf:
+        faults.append("counts frames; give the frames per second of its film, such as --fps 30")
+    if metres is None:
+        scaled = f"cannot have --scale {scale}" if scale else "has no unit of length"
+        faults.append(f"{scaled}; give the length of a pixel, or of the file's unit, such as --scale 0.2mm")
+    if metres is None or faults:
+        raise InputError(f"{path} {', and it '.join(faults)}")
+    return seconds, metres
+
+
+def _poses_of_two(points: pd.DataFrame, path: Path, program: Program, options: TrackOptions) -> pd.DataFrame:
+    """Make poses of two points on the robot's axis: the place half-way, the heading from rear to front."""
+    names = options.get("front", "front"), options.get("rear", "rear")
+    front, rear = (_rows(points, path, name) for name in names)
+    if names[0] == names[1]:
+        raise InputError(f"--front and --rear are both {names[0]!r}; a heading needs two points")
+    poses = front.merge(rear, on=["robot", "time"], how="outer", suffixes=("_front", "_rear"))
+    along, aside = (poses[f"{axis}_front"] - poses[f"{axis}_rear"] for axis in "xy")
+    poses["heading"] = np.arctan2(-aside if program.y_down else aside, along)
+    poses["x"], poses["y"] = poses["x_rear"] + along / 2, poses["y_rear"] + aside / 2
+    return poses
+
+
+def _length(words: str) -> float | None:
+    """Read the length of a pixel, in metres; None: the words are none."""
+    value, unit = number_and_unit(words, of_kind("length"))
+    return float(to_si(value, unit)) if unit is not None and 0 < value < math.inf else None
+
+
+def _rows(points: pd.DataFrame, path: Path, name: str) -> pd.DataFrame:
+    """Return the rows of a point, one for each time."""
+    rows = points[points["point"] == name]
+    if rows.empty:
+        names = list(points["point"].unique())
+        listed = ", ".join(names[:_LISTED]) + (", …" if len(names) > _LISTED else "")
+        raise InputError(
+            f"{path} has no point {name!r} but {listed}; a heading needs two on the robot's axis: --front NAME "
+            "--rear NAME"
+        )
+    return rows.drop_duplicates(["robot", "time"])
