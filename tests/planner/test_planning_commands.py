@@ -55,7 +55,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, text in FILES_OF_REFUSALS.items():
         (folder / name).write_text(text)
     write_plan(planned(), folder / "made")
-    (folder / "made" / "tour.json").write_text("{}")
+    for name in ("tour.json", "cover.json"):
+        (folder / "made" / name).write_text("{}")
     return folder
 
 
