@@ -65,7 +65,7 @@ def _calibrate(
         table = _filmed(films, view, robot, out)
     from calibration.report.path_error import DEFAULT_PATHS
     from calibration.statistics.budget import stopped_by_interrupt
-    from calibration.statistics.study import summary_of_excluded
+    from calibration.statistics.excluded import summary_of_excluded
 
     stated = () if no_path else paths or DEFAULT_PATHS
     with stopped_by_interrupt():
@@ -77,7 +77,7 @@ def _calibrate(
         print(error.sentence)
     for limit in result.caveats:
         print(f"the conclusion is weaker: {limit}")
-    for line in summary_of_excluded(result.split.reasons, result.rows):
+    for line in summary_of_excluded(result.split.outliers, result.rows):
         print(f"excluded: {line}")
     print(f"-> {', '.join(map(str, files))}")
 

@@ -24,9 +24,10 @@ from calibration.laws.readings import EXPONENTS
 from calibration.report.corrected_robot import as_toml, check_given, handed_on, law_handed_on
 from calibration.report.path_error import PathError
 from calibration.report.report import write_report
+from calibration.statistics.excluded import count_of_rows, summary_of_excluded
 from calibration.statistics.fit import Fit
 from calibration.statistics.residual_tests import Directions, examine_residual
-from calibration.statistics.study import Study, count_of_rows, errors, summary_of_excluded
+from calibration.statistics.study import Study, errors
 from calibration.swimmer.measured_table import PROTOCOLS, Measurements, read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import first_fit

@@ -22,6 +22,7 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.special import fdtrc
 
+from calibration.statistics.excluded import Excluded
 from calibration.statistics.gls import Gls, repeat_count, repeat_covariance
 from common.arrays import Flags, Floats, Integers
 
@@ -74,7 +75,7 @@ class Runs:
     inputs: Floats  # (n, q) what was set or noted, scaled (some by logarithm)
     input_names: tuple[str, ...]  # (q,)
     rows: Integers  # (n,) numbers in the table, from 1
-    excluded: tuple[str, ...]  # "row 7: …"
+    excluded: tuple[Excluded, ...]  # rows and columns of the table
     caveats: tuple[str, ...]  # what these runs cannot show, in words
     weight: Floats | None = field(default=None, kw_only=True)  # (n,) variance of a run is S over it; None: 1
     completion: Floats | None = field(

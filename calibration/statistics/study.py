@@ -8,18 +8,13 @@ estimated. Its variance is taken to be `SESSION_SHARE`, so a shift of all its ru
 one output, the runs of a condition are more than `FAR` robust standard deviations apart, the run that is farthest
 from the model as given is excluded. A missing effect does not cause this: it changes all repeats alike.
 
-**Excluded rows.** A reader of tables and the search for outliers say for each row why it was not used, as in "row
-7: omega_h_rpm = 3 has the wrong sign for its omega_rpm". These lines are grouped by reason, without what is
-particular to a row.
-
 **Held-out runs** tell the error of a model, and whether they agree with it. In the end it is fitted to all runs.
 """
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,6 +22,7 @@ import numpy as np
 from scipy.stats import norm as normal
 from scipy.stats import t as student
 
+from calibration.statistics.excluded import Excluded
 from calibration.statistics.fit import Fit
 from calibration.statistics.gls import inverse_root, repeat_count
 from calibration.statistics.statistical_model import ForwardModel, Parameter, Runs, regression, stepped
@@ -40,13 +36,6 @@ _MAD = 1.4826  # median absolute deviation to standard deviation
 _FEWEST = 3  # sessions that are held out as a whole
 _BLOCKS = 4  # in all
 _HELD_OUT = 1 / 12  # least share of the runs that are held out
-MANY = 0.2  # share of the rows; if more are excluded, the rest may not be a fair sample
-_ROW = re.compile(r"row (\d+(?: \(line \d+\))?): (.*)", re.DOTALL)
-# A value (" = 3"), the row that was copied, the size of a deviation.
-_PARTICULAR = re.compile(
-    r" = .*?(?= is | has )| \(row \d+(?: \(line \d+\))?\)$|(?<= is )\d+ (?=standard deviations )", re.DOTALL
-)
-_LISTED = 3  # rows of a reason
 
 
 @dataclass(frozen=True)
@@ -57,7 +46,7 @@ class Split:
     test: Flags  # (n,) runs on which errors are stated: whole sessions or blocks
     kept: Flags  # (n,) both, for the final refit: all runs but outliers
     names: str = ""  # of the held-out groups
-    reasons: tuple[str, ...] = ()  # for each outlier
+    outliers: tuple[Excluded, ...] = ()
     caveats: tuple[str, ...] = ()  # what the split weakens
 
 
@@ -130,7 +119,7 @@ def middle_session(data: Runs) -> Flags:
     return np.isin(group, by_distance[:count])
 
 
-def split_runs(data: Runs, held_out: Flags | None, outliers: tuple[Flags, tuple[str, ...]]) -> Split:
+def split_runs(data: Runs, held_out: Flags | None, outliers: tuple[Flags, tuple[Excluded, ...]]) -> Split:
     """Divide the runs, and say what is weaker if the held-out ones are not whole sessions.
 
     Args:
@@ -150,9 +139,9 @@ def split_runs(data: Runs, held_out: Flags | None, outliers: tuple[Flags, tuple[
         if count == 1:
             caveat += ", and a shift that is equal in all runs is no evidence for an effect"
         caveats = (caveat,)
-    bad, reasons = outliers
+    bad, excluded = outliers
     held_out_names = ", ".join(names[g] for g in np.unique(group[held_out]))
-    return Split(~held_out & ~bad, held_out & ~bad, ~bad, held_out_names, reasons, caveats)
+    return Split(~held_out & ~bad, held_out & ~bad, ~bad, held_out_names, excluded, caveats)
 
 
 def leave_one_group_out(group: Integers, used: Flags) -> Iterator[tuple[Flags, Flags]]:
@@ -166,7 +155,7 @@ def divided(data: Runs, held_out: Flags) -> bool:
     return bool(set(data.session[held_out]) & set(data.session[~held_out]))
 
 
-def find_outliers(data: Runs, prediction: Floats) -> tuple[Flags, tuple[str, ...]]:
+def find_outliers(data: Runs, prediction: Floats) -> tuple[Flags, tuple[Excluded, ...]]:
     """Find the runs (n,) to exclude, and say why; `prediction` (n, k) of the model as given."""
     bad = np.zeros(len(data.y), dtype=bool)
     residual = data.y - prediction
@@ -179,7 +168,7 @@ def find_outliers(data: Runs, prediction: Floats) -> tuple[Flags, tuple[str, ...
     # The deviation of two repeats from their median is half their difference.
     pairs = np.sqrt(np.mean([(len(g) - 1) / len(g) for g in groups]))
     scatter = _MAD * np.median(np.abs(centred), 0) / pairs
-    reasons = []
+    excluded = []
     for group in groups:
         while len(group) > 1:
             spread = np.ptp(data.y[group], axis=0) / np.maximum(scatter, 1e-300)
@@ -188,52 +177,11 @@ def find_outliers(data: Runs, prediction: Floats) -> tuple[Flags, tuple[str, ...
                 break
             out = group[np.argmax(np.abs(residual[group, worst]))]
             bad[out] = True
-            far = f"{spread[worst]:.0f} standard deviations from its repeat"
-            reasons.append(f"{data.row_name(int(out))}: {data.outputs[worst]} is {far}")
+            far = f"{data.outputs[worst]} is far from its repeat{{}}"
+            distance = f" ({spread[worst]:.0f} standard deviations)"
+            excluded.append(Excluded(far, data.row_name(int(out)), distance))
             group = group[group != out]
-    return bad, tuple(reasons)
-
-
-def summary_of_excluded(excluded: Sequence[str], total: int) -> list[str]:
-    """Group lines such as "row 7: …" by their reason, the most frequent first; other lines follow as they are.
-
-    Args:
-        total: rows of the table.
-    """
-    rows: dict[str, list[tuple[str, str]]] = {}
-    others = []
-    for line in excluded:
-        match = _ROW.fullmatch(line)
-        if match:
-            rows.setdefault(_PARTICULAR.sub("", match[2]), []).append((match[1], line))
-        else:
-            others.append(line)
-    groups = sorted(rows.items(), key=lambda group: -len(group[1]))
-    return [_words(reason, members, total) for reason, members in groups] + others
-
-
-def _words(reason: str, members: list[tuple[str, str]], total: int) -> str:
-    if len(members) == 1:
-        return members[0][1]
-    numbers = ", ".join(number for number, _ in members[:_LISTED])
-    more = f" and {len(members) - _LISTED} more" if len(members) > _LISTED else ""
-    return f"{len(members)} of {total} rows (rows {numbers}{more}): {reason}"
-
-
-def count_of_rows(excluded: Sequence[str]) -> int:
-    """Count the rows among excluded rows and columns."""
-    return sum(_ROW.fullmatch(line) is not None for line in excluded)
-
-
-def caveat_of_excluded(excluded: Sequence[str], total: int) -> tuple[str, ...]:
-    """Warn where many of the `total` rows are excluded."""
-    count = count_of_rows(excluded)
-    if count <= MANY * total:
-        return ()
-    return (
-        f"{count} of {total} rows ({100 * count / total:.0f} %) were excluded: see why, and whether the rest is a "
-        "fair sample of the runs",
-    )
+    return bad, tuple(excluded)
 
 
 _DRAWS, _AT_ONCE = 2000, 50

@@ -49,6 +49,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from calibration.statistics.excluded import Excluded
 from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs
 from calibration.statistics.study import divided, middle_session
@@ -73,7 +74,7 @@ _SIGMAS = dict(  # column -> nuisance parameter, factor
 )
 _LARGEST = 1e9  # of a value
 _FEWEST_RUNS = 24
-_COPY = "a copy of an earlier row, equal in all inputs and outputs"
+_COPY = "a copy of an earlier row, equal in all inputs and outputs{}"
 _LISTED = 3  # rows without an output
 _GAPS = 0.1  # share of the usable rows that may lack a note
 _OWN = 1e-3  # share of an output's scatter that must be independent of the other outputs
@@ -146,11 +147,11 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
     outputs = _measured_outputs(table, empty)
     numbers = table.drop(columns=["session", "robot"], errors="ignore").apply(numbers_of)
     missing = table[[OUTPUTS[name][0] for name in outputs]].isna()
-    reasons = _reasons(table, numbers, outputs, header, missing)
-    sparse = _mark_gaps(reasons, table, numbers)
-    _mark_copies(reasons, numbers, outputs, table)
-    keep = np.array([not r for r in reasons])
-    aside = tuple(f"{row_name(table, i)}: {r}" for i, r in enumerate(reasons) if r)
+    faults = _faults(table, numbers, outputs, header, missing)
+    sparse = _add_gaps(faults, table, numbers)
+    _add_copies(faults, numbers, outputs, table)
+    keep = np.array([i not in faults for i in range(len(table))])
+    aside = [faults[i] for i in sorted(faults)]
     good = numbers[keep].drop(columns=sparse)
     if len(good) < _FEWEST_RUNS:
         first = f" ({aside[0]})" if aside else ""
@@ -176,12 +177,12 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         excluded=(
             *aside,
             *_gaps_in_words(table, missing & keep[:, None]),
-            *(f"column {name}: without any value, left out" for name in empty),
+            *(Excluded(f"column {name}: without any value, left out") for name in empty),
             *(
-                f"column {name}: without a value in more than {100 * _GAPS:.0f} % of the rows, left out"
+                Excluded(f"column {name}: without a value in more than {100 * _GAPS:.0f} % of the rows, left out")
                 for name in sparse
             ),
-            *(f"column {name}: not known, left out" for name in unknown),
+            *(Excluded(f"column {name}: not known, left out") for name in unknown),
         ),
         caveats=_caveats(tails, length, omega),
         completion=_without_gaps(missing.to_numpy()[keep]),
@@ -196,7 +197,7 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         converted=converted,
         lines=good.index.to_numpy() if good.index.name == LINE else None,
     )
-    return _independent(data, sum(_COPY in reason for reason in reasons))
+    return _independent(data, sum(fault.reason == _COPY for fault in aside))
 
 
 def _measured_outputs(table: pd.DataFrame, empty: Sequence[str]) -> tuple[str, ...]:
@@ -253,19 +254,22 @@ def _with_outputs(data: Measurements, kept: Sequence[int]) -> Measurements:
     return data
 
 
-def _gaps_in_words(table: pd.DataFrame, missing: pd.DataFrame) -> list[str]:
+def _gaps_in_words(table: pd.DataFrame, missing: pd.DataFrame) -> list[Excluded]:
     """Name the rows that lack an output, a line for each output."""
     lines = []
     for column in (name for name in missing if missing[name].any()):
         rows = [row_name(table, i) for i in np.flatnonzero(missing[column]).tolist()]
         more = f" and {len(rows) - _LISTED} more" if len(rows) > _LISTED else ""
         named = ", ".join(rows[:_LISTED]) + more
-        lines.append(f"column {column}: no value in {named}; the other outputs there count")
+        lines.append(Excluded(f"column {column}: no value in {named}; the other outputs there count"))
     return lines
 
 
-def _not_finite(column: str, value: Any) -> str:
-    return f"{column} has no value" if pd.isna(value) else f"{column} = {value} is not a finite number"
+def _not_finite(table: pd.DataFrame, row: int, column: str) -> Excluded:
+    value = table[column].iloc[row]
+    if pd.isna(value):
+        return Excluded(f"{column} has no value", row_name(table, row))
+    return Excluded(f"{column}{{}} is not a finite number", row_name(table, row), f" = {value}")
 
 
 def _is_empty(column: pd.Series) -> bool:
@@ -273,28 +277,31 @@ def _is_empty(column: pd.Series) -> bool:
     return bool((column.isna() | (column.astype(str).str.strip() == "")).all())
 
 
-def _mark_gaps(reasons: list[str], table: pd.DataFrame, numbers: pd.DataFrame) -> list[str]:
-    """Give a reason to every usable row that lacks a note, and return the notes that many rows lack."""
+def _add_gaps(faults: dict[int, Excluded], table: pd.DataFrame, numbers: pd.DataFrame) -> list[str]:
+    """Add every usable row that lacks a note, and return the notes that many rows lack."""
     sparse = []
-    usable = np.array([not reason for reason in reasons])
+    usable = np.array([i not in faults for i in range(len(table))])
     for column in (name for name in RUN_NOTES if name in numbers):
         gaps = np.flatnonzero(usable & ~np.isfinite(numbers[column].to_numpy()))
         if len(gaps) > _GAPS * usable.sum():
             sparse.append(column)
             continue
-        for i in gaps:
-            reasons[i] = reasons[i] or _not_finite(column, table[column].iloc[i])
+        for i in gaps.tolist():
+            faults.setdefault(i, _not_finite(table, i, column))
     return sparse
 
 
-def _mark_copies(reasons: list[str], numbers: pd.DataFrame, outputs: tuple[str, ...], table: pd.DataFrame) -> None:
-    """Give a reason to every usable row that is a copy of an earlier one."""
+def _add_copies(
+    faults: dict[int, Excluded], numbers: pd.DataFrame, outputs: tuple[str, ...], table: pd.DataFrame
+) -> None:
+    """Add every usable row that is a copy of an earlier one."""
     columns = [OUTPUTS[name][0] for name in outputs]
     whole = numbers[columns].notna().all(axis=1)
-    usable = [i for i, reason in enumerate(reasons) if not reason and whole.iloc[i]]
+    usable = [i for i in range(len(table)) if i not in faults and whole.iloc[i]]
     used = numbers.iloc[usable]
     for place, earlier in find_copies(used[list(RUN)].to_numpy(), used[columns].to_numpy()).items():
-        reasons[usable[place]] = f"{_COPY} ({row_name(table, usable[earlier])})"
+        original = f" ({row_name(table, usable[earlier])})"
+        faults[usable[place]] = Excluded(_COPY, row_name(table, usable[place]), original)
 
 
 def _independent(data: Measurements, copies: int) -> Measurements:
@@ -331,7 +338,7 @@ def _independent(data: Measurements, copies: int) -> Measurements:
         remainder = run[i, i] - run[i, kept] @ np.linalg.solve(covariance, run[kept, i]) if kept else run[i, i]
         if remainder < _OWN * run[i, i]:
             others = ", ".join(OUTPUTS[outputs[j]][0] for j in kept)
-            follows.append(f"column {column}: follows from {others}, so it is not counted twice")
+            follows.append(Excluded(f"column {column}: follows from {others}, so it is not counted twice"))
         else:
             kept.append(i)
     excluded = (*data.excluded, *follows)
@@ -385,34 +392,44 @@ def _noted(good: pd.DataFrame) -> dict[str, Floats]:
     return notes
 
 
-def _reasons(
+def _faults(
     table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...], header: Flags, missing: pd.DataFrame
-) -> list[str]:
-    """Say why each row cannot be used; empty where it can. The header (n,) may be there again."""
-    reasons = ["the header again" if again else "" for again in header]
-    for i in np.flatnonzero(missing.all(axis=1)):
-        reasons[i] = reasons[i] or "no output has a value"
+) -> dict[int, Excluded]:
+    """Say why rows cannot be used, by their place; the first fault of a row counts.
+
+    Args:
+        table: as given.
+        numbers: its columns as numbers.
+        outputs: names of OUTPUTS that it has.
+        header: (n,) rows that are the header again.
+        missing: outputs without a value.
+    """
+    faults: dict[int, Excluded] = {}
+
+    def add(bad: Flags, reason: str, values: Any = ()) -> None:
+        for i in np.flatnonzero(bad).tolist():
+            value = f" = {values[i]}" if len(values) else ""
+            faults.setdefault(i, Excluded(reason, row_name(table, i), value))
+
+    add(header, "the header again")
+    add(missing.all(axis=1).to_numpy(), "no output has a value")
     used = (*RUN, *missing)
     values = {column: numbers[column].where(numbers[column].abs() < _LARGEST).to_numpy() for column in used}
-    positive = [column for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s") if column in values]
-    for column, bad, fault in (
-        *((column, ~(np.isfinite(value) | missing.get(column, False)), "") for column, value in values.items()),
-        ("N", values["N"] % 1 != 0, "is not a whole number"),
-        *((column, values[column] <= 0, "is not above 0") for column in positive),
-    ):
-        for i in np.flatnonzero(bad):
-            given = table[column].iloc[i]
-            reasons[i] = reasons[i] or (f"{column} = {given} {fault}" if fault else _not_finite(column, given))
+    for column, value in values.items():
+        for i in np.flatnonzero(~(np.isfinite(value) | missing.get(column, False))).tolist():
+            faults.setdefault(i, _not_finite(table, i, column))
+    add(values["N"] % 1 != 0, "N{} is not a whole number", table["N"].tolist())
+    for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s"):
+        if column in values:
+            add(values[column] <= 0, f"{column}{{}} is not above 0", table[column].tolist())
     sign = np.sign(values["omega_rpm"])
-    for i in np.flatnonzero(sign == 0):
-        reasons[i] = reasons[i] or "omega_rpm = 0"
-    for name, (column, _, expected) in ((name, OUTPUTS[name]) for name in outputs if OUTPUTS[name][2]):
-        for i in np.flatnonzero(values[column] * sign * expected <= 0):
-            fault = (
-                f"{column} = {values[column][i]:g} has the wrong sign for its omega_rpm: {MEASURED[name].sense}"
-            )
-            reasons[i] = reasons[i] or fault
-    return reasons
+    add(sign == 0, "omega_rpm = 0")
+    for name in outputs:
+        column, _, expected = OUTPUTS[name]
+        if expected:
+            wrong = f"{column}{{}} has the wrong sign for its omega_rpm: {MEASURED[name].sense}"
+            add(values[column] * sign * expected <= 0, wrong, [f"{value:g}" for value in values[column]])
+    return faults
 
 
 def _session(data: Measurements) -> tuple[Measurements, Flags]:

@@ -52,6 +52,7 @@ from calibration.attribution.wrong_numbers import (
     without_wrong_priors,
 )
 from calibration.statistics.budget import Budget, limited, seconds_left
+from calibration.statistics.excluded import caveat_of_excluded
 from calibration.statistics.fit import Fit, fit, profile_intervals
 from calibration.statistics.gls import repeat_count
 from calibration.statistics.residual_regression import Regression, regress_residual
@@ -62,7 +63,6 @@ from calibration.statistics.study import (
     LEVEL,
     FinalRefit,
     Study,
-    caveat_of_excluded,
     error_interval,
     errors,
     final_refit,

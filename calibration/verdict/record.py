@@ -13,10 +13,10 @@ import numpy as np
 from calibration.attribution.nearest import largest_along
 from calibration.attribution.refits import UNSEEN, Candidate
 from calibration.attribution.wrong_numbers import notable_gains, notable_pull, overall_gains
+from calibration.statistics.excluded import count_of_rows
 from calibration.statistics.fit import Fit, Pull, least_determined
 from calibration.statistics.gls import inverse_root
 from calibration.statistics.statistical_model import Parameter
-from calibration.statistics.study import count_of_rows
 from calibration.words.render import next_steps, sentence
 from common.provenance import provenance
 from surrogate.domain import COEFFICIENTS
@@ -274,7 +274,7 @@ def _data(result: Verdict) -> dict[str, Any]:
         "sessions": list(runs.session_names),
         "fixed_before": result.fixed_before,
         "rows": result.rows,
-        "rows_set_aside": list(result.excluded),
+        "rows_set_aside": list(map(str, result.excluded)),
         "number_of_rows_set_aside": count_of_rows(result.excluded),
         "summary_of_rows_set_aside": result.summary_of_excluded,
         "rows_of_little_weight": list(result.little_weight),

@@ -18,11 +18,12 @@ from calibration.attribution.nearest import Nearest
 from calibration.attribution.refits import Candidate, Rival
 from calibration.attribution.wrong_numbers import wrong_number
 from calibration.laws.laws import Laws
+from calibration.statistics.excluded import Excluded, count_of_rows, summary_of_excluded
 from calibration.statistics.fit import Fit, Pull
 from calibration.statistics.residual_regression import Regression
 from calibration.statistics.residual_tests import Directions, Misfit
 from calibration.statistics.statistical_model import Experiment, Runs
-from calibration.statistics.study import FinalRefit, Split, count_of_rows, summary_of_excluded
+from calibration.statistics.study import FinalRefit, Split
 from calibration.verdict.next_runs import Batch, Explanation, NextRun
 from calibration.verdict.record import facts
 from calibration.words.render import errors_in_words, sentence
@@ -207,9 +208,9 @@ class Verdict:
         return self.errors.noise
 
     @property
-    def excluded(self) -> tuple[str, ...]:
+    def excluded(self) -> tuple[Excluded, ...]:
         """Rows and columns that were not used, and why."""
-        return (*self.runs.excluded, *self.split.reasons)
+        return (*self.runs.excluded, *self.split.outliers)
 
     @property
     def rows(self) -> int:

@@ -70,7 +70,7 @@ def constants() -> dict[str, dict[str, Any]]:
     found["paths_units"] = _of("planner.paths.units", ["LONGEST", "SMALLEST"])
     found["errors"]["CAMERA"] = request.camera.to_dict()
     found["units"]["SIGNS"] = {chr(sign): str(word) for sign, word in units._SIGNS.items()}
-    found["calibration_table"] = {
+    found["knowledge"] = {
         "UNMEASURED": dict(zip(UNMEASURED.names, np.sqrt(np.diag(UNMEASURED.covariance)).tolist(), strict=True))
     }
     found["robot_toml"] |= {

@@ -11,7 +11,7 @@ import { BEFORE, lagTable, resampled, trackedPoint } from "./vehicle.js";
 import { InputError, general, quoted, refusing } from "./words.js";
 
 const { ODD, TIME_STEPS } = CONSTANTS.from_table, { STEP: CHANGE } = CONSTANTS.from_table;
-const { UNMEASURED } = CONSTANTS.calibration_table; // standard deviations of ln C, of another robot's
+const { UNMEASURED } = CONSTANTS.knowledge; // standard deviations of ln C, of another robot's
 const SIDES = [[1, 1, 1], MIRROR];
 const NUMBERS = { // that decide a group: words, field, unit
   l_over_R: ["tail length", "tailLength", "cm"], l_over_r0: ["tail radius", "tailRadius", "mm"],

@@ -12,7 +12,7 @@ import { query } from "./table.js";
 import { convertColumns, labColumns, splitName, toSi } from "./units.js";
 import { InputError, closeMatch, general, inPage, naming, quoted, refusing, repr } from "./words.js";
 
-const { RUN: INPUTS, MEASURED: OUTPUTS, RUN_SYNONYMS, RUN_NOTES, RUN_SIGMAS, RUN_COLUMNS } = CONSTANTS.inputs;
+const { RUN: INPUTS, MEASURED: OUTPUTS, RUN_SYNONYMS, RUN_NOTES, RUN_SIGMAS, RUN_COLUMNS } = CONSTANTS.run_columns;
 const PLANAR = ["omega_yr", "R_yr", "theta", "v"]; // outputs beyond the spins
 const POSITIVE = ["N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s"];
 const SYNONYMS = new Map(Object.entries(RUN_SYNONYMS));

@@ -173,5 +173,5 @@ def test_a_row_with_a_gap_is_left_out_by_its_number_and_an_effect_that_is_not_th
         read_balls(table, ["drag"])
     table.loc[4, "speed_m_s"] = np.nan
     runs = read_balls(table).runs
-    assert runs.excluded == ("row 5: a number is missing or not above 0",)
+    assert tuple(map(str, runs.excluded)) == ("row 5: a number is missing or not above 0",)
     assert 5 not in runs.rows

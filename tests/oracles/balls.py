@@ -30,6 +30,7 @@ import pandas as pd
 from scipy.special import lambertw
 
 from calibration.report.report import write_report
+from calibration.statistics.excluded import Excluded
 from calibration.statistics.statistical_model import Parameter, Parameters, Runs, Value, by_differences
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record
@@ -140,7 +141,9 @@ def read_balls(source: str | Path | pd.DataFrame, without: Sequence[str] = ()) -
         inputs=np.stack([np.log(depth), np.log(radius), np.log(mass)], 1),
         input_names=("ln h", "ln r", "ln m"),
         rows=np.flatnonzero(good) + 1,
-        excluded=tuple(f"row {i + 1}: a number is missing or not above 0" for i in np.flatnonzero(~good)),
+        excluded=tuple(
+            Excluded("a number is missing or not above 0", f"row {i + 1}") for i in np.flatnonzero(~good)
+        ),
         caveats=(),
         specimen=specimen,
         specimen_names=tuple(balls.tolist()),

@@ -17,19 +17,17 @@ from scipy.stats import binom
 
 from calibration.attribution import refits
 from calibration.statistics.budget import limited, limited_as_one, skipped, spent, stopped_by_interrupt
+from calibration.statistics.excluded import Excluded, caveat_of_excluded, count_of_rows, summary_of_excluded
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.gls import repeat_covariance
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import Parameter, Parameters, Runs, start_values
 from calibration.statistics.study import (
     Study,
-    caveat_of_excluded,
-    count_of_rows,
     error_interval,
     errors,
     find_outliers,
     middle_session,
-    summary_of_excluded,
 )
 from calibration.statistics.weights import (
     caveat_of_weights,
@@ -346,34 +344,30 @@ def test_runs_that_were_mistracked_are_excluded_and_clean_ones_are_not() -> None
     bad, reasons = find_outliers(runs, np.zeros_like(runs.y))
     assert set(np.flatnonzero(bad)) <= set(mistracked)
     assert bad.sum() >= 8
-    assert all("theta is" in reason for reason in reasons)
+    assert all(each.reason.startswith("theta is") for each in reasons)
     assert runs.y[~bad].std(0) == pytest.approx([1, 1], abs=0.12)
     effect.y[:200] += 15.0  # it changes all repeats
     assert not find_outliers(effect, np.zeros_like(effect.y))[0].any()
 
 
 def test_excluded_rows_of_one_reason_are_one_line() -> None:
-    sign = "has the wrong sign for its omega_rpm: the head turns against the motor"
+    sign = "has the wrong sign for its omega_rpm"
     excluded = (
-        "row 9: theta_deg = nan is not a finite number",
-        *(f"row {i}: omega_h_rpm = {i / 7:g} {sign}" for i in (2, 3, 5, 8)),
-        *(f"row {i}: a copy of an earlier row, equal in all inputs and outputs (row {i - 10})" for i in (11, 12)),
-        *(f"row {i}: R_yr is {i} standard deviations from its repeat" for i in (14, 17)),
-        "column colour: not known, left out",
+        Excluded("theta_deg{} is not a finite number", "row 9", " = inf"),
+        *(Excluded(f"omega_h_rpm{{}} {sign}", f"row {i}", f" = {i / 7:g}") for i in (2, 3, 5, 8)),
+        *(Excluded("a copy of an earlier row{}", f"row {i} (line {i + 1})", f" (row {i - 10})") for i in (11, 12)),
+        Excluded("column colour: not known, left out"),
     )
     assert summary_of_excluded(excluded, 40) == [
         f"4 of 40 rows (rows 2, 3, 5 and 1 more): omega_h_rpm {sign}",
-        "2 of 40 rows (rows 11, 12): a copy of an earlier row, equal in all inputs and outputs",
-        "2 of 40 rows (rows 14, 17): R_yr is standard deviations from its repeat",
-        "row 9: theta_deg = nan is not a finite number",
+        "2 of 40 rows (rows 11 (line 12), 12 (line 13)): a copy of an earlier row",
+        "row 9: theta_deg = inf is not a finite number",
         "column colour: not known, left out",
     ]
     assert summary_of_excluded((), 40) == []
-    assert count_of_rows(excluded) == 9
-    lines = [f"row {i}: N = {why}" for i, why in enumerate(("2.5 is not a whole number", "7 is not above 0"))]
-    assert summary_of_excluded(tuple(lines), 9) == lines  # they differ in more than a value
-    assert caveat_of_excluded(excluded, 45) == ()  # a fifth
-    assert caveat_of_excluded(excluded, 44)[0].startswith("9 of 44 rows (20 %) were excluded")
+    assert count_of_rows(excluded) == 7
+    assert caveat_of_excluded(excluded, 35) == ()  # a fifth
+    assert caveat_of_excluded(excluded, 34)[0].startswith("7 of 34 rows (21 %) were excluded")
 
 
 def test_limits_end_with_those_around_them() -> None:

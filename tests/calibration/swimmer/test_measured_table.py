@@ -31,7 +31,7 @@ def test_an_optional_column_without_any_value_is_left_out(blank: object) -> None
     for column in ("v_cm_s", "R_yr_mm", "elapsed_min", "session", "camera_scale_sigma_percent"):
         runs = read_measurements(table.assign(**{column: blank}))
         name = "R_yr_cm" if column == "R_yr_mm" else column
-        assert runs.excluded == (f"column {name}: without any value, left out",)
+        assert tuple(map(str, runs.excluded)) == (f"column {name}: without any value, left out",)
         assert (runs.outputs, runs.session_names) == (plain.outputs, plain.session_names)
         assert np.array_equal(runs.y, plain.y)
 
@@ -45,7 +45,7 @@ def test_a_note_with_one_gap_keeps_its_other_values() -> None:
     table.loc[4, "temperature_C"] = "cold"
     runs = read_measurements(table)
     assert runs.noted_names == ("temperature_K",)
-    assert runs.excluded == (
+    assert tuple(map(str, runs.excluded)) == (
         "row 5: temperature_C = cold is not a finite number",
         "column elapsed_min: without a value in more than 10 % of the rows, left out",
     )
@@ -57,7 +57,7 @@ def test_an_excluded_row_is_named_with_its_line(tmp_path: Path) -> None:
     lines[5] = "#WERT!" + lines[5][lines[5].index(";") :]
     (tmp_path / "runs.csv").write_text("\n".join(["% tank 3", *lines[:3], "", *lines[3:]]))
     runs = read_measurements(tmp_path / "runs.csv")
-    assert runs.excluded == ("row 5 (line 8): l_cm has no value",)
+    assert tuple(map(str, runs.excluded)) == ("row 5 (line 8): l_cm has no value",)
 
 
 @pytest.mark.slow
@@ -111,7 +111,7 @@ def test_copied_rows_are_no_repeats() -> None:
     runs = read_measurements(copied)
     assert len(runs) == len(table)
     assert runs.y == pytest.approx(read_measurements(table).y, rel=1e-14)
-    assert runs.excluded[0] == "row 97: a copy of an earlier row, equal in all inputs and outputs (row 1)"
+    assert str(runs.excluded[0]) == "row 97: a copy of an earlier row, equal in all inputs and outputs (row 1)"
     assert len(runs.excluded) == 40
     result, without = calibrated(copied, few=True), none()
     assert result.found.misfit.p_value == without.found.misfit.p_value

@@ -64,10 +64,12 @@ def test_bad_rows_are_named_and_set_aside() -> None:
     table.loc[2, "omega_h_rpm"] *= -1
     data = read_measurements(table)
     assert len(data) == len(table) - 2
-    assert [line.split(":")[0] for line in data.excluded] == ["row 1", "row 3", "column theta_deg"]
+    assert [line.split(":")[0] for line in map(str, data.excluded)] == ["row 1", "row 3", "column theta_deg"]
     assert data.gaps.sum() == data.gaps[0, data.outputs.index("theta")] == 1
-    assert data.excluded[-1] == "column theta_deg: no value in row 2; the other outputs there count"
-    assert read_measurements(table.assign(colour="red")).excluded[-1] == "column colour: not known, left out"
+    assert str(data.excluded[-1]) == "column theta_deg: no value in row 2; the other outputs there count"
+    assert (
+        read_measurements(table.assign(colour="red")).excluded[-1].reason == "column colour: not known, left out"
+    )
     with pytest.raises(InputError, match="unknown"):
         read_measurements(table.rename(columns={"trial": "tri al"}))
 
@@ -85,7 +87,7 @@ def test_an_empty_cell_costs_no_other_output(tmp_path: Path) -> None:
     assert len(data) == len(table)
     assert data.gaps.sum() == gaps.sum()
     assert len(data.excluded) == gaps.any(0).sum()
-    assert not any("nan" in line for line in data.excluded)
+    assert not any("nan" in line for line in map(str, data.excluded))
     paper = PROTOCOLS["paper"](data)[0]
     assert paper.gaps.sum() == gaps[:, :2].sum()
 
@@ -96,10 +98,10 @@ def test_a_header_in_the_table_and_a_row_number_are_named(tmp_path: Path) -> Non
     path = tmp_path / "runs.csv"
     path.write_text("\n".join(["# tank 2", *lines[:40], *lines]))
     data = read_measurements(path)
-    assert data.excluded[0] == "row 40 (line 42): the header again"
-    assert data.excluded[1].startswith("row 41 (line 43): a copy of an earlier row")
-    assert data.excluded[1].endswith("(row 1 (line 3))")
-    assert data.excluded[-1] == "column Nr: not known, left out"
+    assert str(data.excluded[0]) == "row 40 (line 42): the header again"
+    assert str(data.excluded[1]).startswith("row 41 (line 43): a copy of an earlier row")
+    assert str(data.excluded[1]).endswith("(row 1 (line 3))")
+    assert str(data.excluded[-1]) == "column Nr: not known, left out"
     assert data.row_name(0) == "row 1 (line 3)"
 
 
@@ -161,7 +163,7 @@ def test_a_slipped_decimal_point_is_named_and_set_aside() -> None:
     table = toy_table(12)
     table.loc[17, "omega_yr_rad_s"] *= 10
     result, without = (calibrated(each, few=True) for each in (table, table.drop(index=17)))
-    assert [line.split(" is ")[0] for line in result.excluded] == ["row 18: omega_yr"]
+    assert [line.split(" is ")[0] for line in map(str, result.excluded)] == ["row 18: omega_yr"]
     assert not result.split.fitted[17]
     assert result.verdict == without.verdict
     assert result.noise_ceiling == pytest.approx(without.noise_ceiling, rel=0.05)
@@ -206,7 +208,7 @@ def test_an_output_that_follows_from_others_is_counted_once() -> None:
     table["v_cm_s"] = table["R_yr_cm"] * table["omega_yr_rad_s"].abs()
     data = read_measurements(table)
     assert "v" not in data.outputs
-    assert any("v_cm_s: follows from" in line for line in data.excluded)
+    assert any("v_cm_s: follows from" in line for line in map(str, data.excluded))
 
 
 def test_the_papers_protocol_fits_three_and_four_tails_and_predicts_two_and_five() -> None:

@@ -1,0 +1,65 @@
+"""Rows and columns of a table that are not used, and why.
+
+A reader of tables and the search for outliers give a reason for each row. Rows of one reason are counted and named
+together; what is particular to a row, its value, is told of a single row alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+MANY = 0.2  # share of the rows; if more are excluded, the rest may not be a fair sample
+_LISTED = 3  # rows of a reason
+
+
+class Excluded(NamedTuple):
+    """What is not used: a row with its name, such as "row 7 (line 9)", or else a column."""
+
+    reason: str  # "{}" stands for the value
+    row: str = ""
+    value: str = ""  # of the row, such as " = 3"
+
+    def __str__(self) -> str:
+        words = self.reason.replace("{}", self.value)
+        return f"{self.row}: {words}" if self.row else words
+
+
+def summary_of_excluded(excluded: Sequence[Excluded], total: int) -> list[str]:
+    """Group rows by their reason, the most frequent first; columns follow.
+
+    Args:
+        excluded: rows and columns.
+        total: rows of the table.
+    """
+    groups: dict[str, list[Excluded]] = {}
+    for each in excluded:
+        if each.row:
+            groups.setdefault(each.reason, []).append(each)
+    by_frequency = sorted(groups.values(), key=lambda group: -len(group))
+    return [_words(group, total) for group in by_frequency] + [str(each) for each in excluded if not each.row]
+
+
+def _words(group: Sequence[Excluded], total: int) -> str:
+    if len(group) == 1:
+        return str(group[0])
+    numbers = ", ".join(each.row.removeprefix("row ") for each in group[:_LISTED])
+    more = f" and {len(group) - _LISTED} more" if len(group) > _LISTED else ""
+    reason = Excluded(group[0].reason)
+    return f"{len(group)} of {total} rows (rows {numbers}{more}): {reason}"
+
+
+def count_of_rows(excluded: Sequence[Excluded]) -> int:
+    """Count the rows among excluded rows and columns."""
+    return sum(bool(each.row) for each in excluded)
+
+
+def caveat_of_excluded(excluded: Sequence[Excluded], total: int) -> tuple[str, ...]:
+    """Warn where many of the `total` rows are excluded."""
+    count = count_of_rows(excluded)
+    if count <= MANY * total:
+        return ()
+    return (
+        f"{count} of {total} rows ({100 * count / total:.0f} %) were excluded: see why, and whether the rest is a "
+        "fair sample of the runs",
+    )
