@@ -63,8 +63,6 @@ class Candidate:
     gain_error: float = 0.0  # standard error of `gain`
     imitable: float = 0.0  # imitability index of the claim (`calibration.attribution.claim_checks`), if it is kept
     transfer: float = 1.0  # p-value that it carries over to other runs, if it is kept
-    detectable_halved: Mapping[str, float] = field(default_factory=dict)  # the same as `detectable`, with half of
-    # the tolerance of one nuisance parameter, by its name
 
     @property
     def kept(self) -> bool:
@@ -119,9 +117,6 @@ def unexamined(
             detectable=threshold / max(float(scores.length[j]), 1e-300),
             detectable_exact=threshold / max(float(misfit.exact_length[j]), 1e-300),
             verdict="not needed",
-            detectable_halved={
-                name: threshold / max(float(length[j]), 1e-300) for name, length in misfit.halved_length.items()
-            },
         )
         for j, effect in enumerate(effects)
     ]

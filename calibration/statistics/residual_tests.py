@@ -39,7 +39,7 @@ import numpy as np
 from scipy.stats import rankdata
 
 from calibration.statistics.fit import Fit
-from calibration.statistics.gls import Products, averaging_rows, eliminated, inverse_root, solved
+from calibration.statistics.gls import Products, averaging_rows, eliminated, inverse_root
 from calibration.statistics.statistical_model import (
     ForwardModel,
     Parameter,
@@ -138,7 +138,6 @@ class Misfit:
     critical_z: float  # quantile of max |z_j| at the level
     features: tuple[str, ...]  # names of the features of the inputs
     exact_length: Floats  # (e,) `Scores.length` if the nuisance parameters were exact
-    halved_length: dict[str, Floats]  # (e,) the same if the σ of one nuisance parameter were halved, by its name
     second: Floats  # (e,) value of each effect's second number at its largest score; NaN where there is none
 
 
@@ -184,23 +183,6 @@ class _Tester:
         largest = np.abs(shapes).max((-1, -2)) if shapes.size else np.zeros(len(share))
         return Scores(np.stack([lack, kernel, largest], -1), *projected, shapes, share)
 
-    def lengths_if_halved(self, residual: Floats) -> Floats:
-        """Compute the length of every projected direction if one prior had half of its σ, (e, p).
-
-        Half of σ adds c = 3/σ² to the place i of A, the products of the first p columns. With b, their products
-        with a direction d, the length grows by |d′|² = |d|² + c w_i²/(1 + c V_ii), V = A⁻¹ and w = V b (Sherman
-        and Morrison 1950). The noise is what it is today.
-
-        Args:
-            residual: (n, k), as `scores` takes it.
-        """
-        normal = _score_equations(self.design.products(residual), self.p)[..., :-1, :-1]  # (e, p + 1, p + 1)
-        weights, covariance = solved(normal)
-        further = 3 * self.design.precision
-        variance = np.diagonal(covariance, axis1=-2, axis2=-1)
-        grown = eliminated(normal, self.p)[..., 0] + further * weights**2 / (1 + further * variance)
-        return np.sqrt(np.maximum(grown, 1e-300))
-
     def _shapes(self, covariance: Floats, white: Floats, root: Floats, share: Floats) -> Floats:
         """Compute z of every output along every feature, (B, k, f).
 
@@ -241,19 +223,14 @@ def projected_scores(products: Products, p: int) -> tuple[Floats, Floats, Floats
     Returns:
         z of the last column along it, the share of it that survives the projection, and the length of the rest.
     """
-    normal = _score_equations(products, p)
+    e = products.within.shape[-1] - p - 1
+    columns = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
+    part = products.take(columns)
+    normal = part.at(part.share(passes=_PASSES_OF_A_SCORE))  # (..., e, p + 2, p + 2)
     left = eliminated(normal, p)
     length = np.sqrt(np.maximum(left[..., 0, 0], 1e-300))
     survived = length / np.sqrt(np.maximum(normal[..., p, p], 1e-300))
     return np.where(survived > 1e-6, left[..., 0, 1] / length, 0.0), survived, length
-
-
-def _score_equations(products: Products, p: int) -> Floats:
-    """Multiply the first `p` columns, one more and the last with each other, (..., e, p + 2, p + 2)."""
-    e = products.within.shape[-1] - p - 1
-    columns = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
-    part = products.take(columns)
-    return part.at(part.share(passes=_PASSES_OF_A_SCORE))
 
 
 def examine_residual(
@@ -291,7 +268,6 @@ def examine_residual(
     null_table = np.concatenate(batches)
     scores = Scores(*(getattr(observed, name)[0] for name in Scores.__dataclass_fields__))
     best = _best(scores.z, testable, directions)
-    halved = tester.lengths_if_halved(residual + shift)[best]
     return Misfit(
         scores=replace(scores, z=scores.z[best], survived=scores.survived[best], length=scores.length[best]),
         p={name: _p_value(null_table[:, [i]], statistics[[i]]) for i, name in enumerate((*GENERAL, "score"))},
@@ -302,7 +278,6 @@ def examine_residual(
         critical_z=float(np.quantile(null_table[:, -1], 1 - study.level)),
         features=tester.names,
         exact_length=projected_scores(exact, int(free.sum()))[2][best],
-        halved_length={fitted.names[i]: halved[:, i] for i in np.flatnonzero(~free).tolist()},
         second=directions.second[best],
     )
 

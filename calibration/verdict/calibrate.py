@@ -13,9 +13,8 @@
    If nothing explains the residual, laws that describe it (`describe`). Where none does, the nearest form is
    adopted (`calibration.attribution.nearest`). If something outside the catalogue could imitate what is claimed,
    laws that fit as well.
-6. Errors on the held-out runs: as given, calibrated, with the effect, with a regression of the residual
-   (`calibration.statistics.residual_regression`), and from noise alone. Whether the held-out runs agree with the
-   final model (`calibration.statistics.study`).
+6. Errors on the held-out runs: as given, calibrated, with the effect, and from noise alone. Whether the held-out
+   runs agree with the final model (`calibration.statistics.study`).
 7. For use, the model is fitted once more to all runs, the held-out ones included.
 """
 
@@ -55,7 +54,6 @@ from calibration.statistics.budget import Budget, limited, seconds_left
 from calibration.statistics.excluded import caveat_of_excluded
 from calibration.statistics.fit import Fit, fit, profile_intervals
 from calibration.statistics.gls import repeat_count
-from calibration.statistics.residual_regression import Regression, regress_residual
 from calibration.statistics.residual_tests import directions, examine_residual
 from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values
 from calibration.statistics.study import (
@@ -133,8 +131,7 @@ def calibrate(
             found = replace(found, nearest=nearest)
         of_all, moves_of_all = _fit_moves(study, model, found)
     moves, with_moves = (moves_of_all, of_all) if of_all else (moves, found.base)
-    regression = regress_residual(model.runs, found.base.prediction, split.fitted)
-    errors = _errors(study, found, uncalibrated, regression, laws)
+    errors = _errors(study, found, uncalibrated, laws)
     falls = errors.rms["after"] < errors.rms["before"]
     as_good = laws.as_good_as(found.final) if laws and uncertain else ()
     rivals = described.rivals if described else found.rivals(cast(Experiment, study.model), as_good)
@@ -158,7 +155,6 @@ def calibrate(
         final_intervals=final_intervals,
         pulls=pulls(found.final, study.model.nuisances),
         final_refit=final_refit(of_all) if of_all else _handed_on(study, found, falls=falls),
-        regression=regression,
         law=laws,
         explanations=tuple(map(Explanation.from_rival, rivals)),
         **_next_runs(rivals, seed),
@@ -326,18 +322,11 @@ def _next_runs(rivals: tuple[Rival, ...], seed: int) -> dict[str, Any]:
     return {"next_runs": (), "next_batch": None}
 
 
-def _errors(
-    study: Study, found: Explained, uncalibrated: Floats, regression: Regression, laws: Laws | None
-) -> HeldOutErrors:
+def _errors(study: Study, found: Explained, uncalibrated: Floats, laws: Laws | None) -> HeldOutErrors:
     """State the errors of every model on the held-out runs."""
     base, final = found.base, found.final
     runs, test = study.model.runs, study.split.test
-    predictions = {
-        "uncalibrated": uncalibrated,
-        "before": base.prediction,
-        "after": final.prediction,
-        "generic": base.prediction + regression.correction,
-    }
+    predictions = {"uncalibrated": uncalibrated, "before": base.prediction, "after": final.prediction}
     if laws is not None:
         predictions["law"] = laws.prediction
     if found.nearest and found.nearest.sizes:

@@ -12,7 +12,7 @@ import numpy as np
 
 from calibration.attribution.nearest import largest_along
 from calibration.attribution.refits import UNSEEN, Candidate
-from calibration.attribution.wrong_numbers import notable_gains, notable_pull, overall_gains
+from calibration.attribution.wrong_numbers import notable_pull
 from calibration.statistics.excluded import count_of_rows
 from calibration.statistics.fit import Fit, Pull, least_determined
 from calibration.statistics.gls import inverse_root
@@ -24,7 +24,7 @@ from surrogate.domain import COEFFICIENTS
 if TYPE_CHECKING:
     from calibration.verdict.verdict import Verdict
 
-MODELS = ("uncalibrated", "before", "after", "generic", "law", "new_specimen")  # with stated errors
+MODELS = ("uncalibrated", "before", "after", "law", "new_specimen")  # with stated errors
 _REPEATED = 5  # settings that are proposed for repeats where nothing explains the residual
 _NEAR = 0.5  # share of the residual that the best effect must remove to be named where none explains it
 
@@ -131,7 +131,6 @@ def _candidate(c: Candidate) -> dict[str, Any]:
         "survived_share": c.survived,
         "smallest_detectable": c.detectable,
         "smallest_detectable_if_numbers_were_exact": c.detectable_exact,
-        "smallest_detectable_with_half_of_a_tolerance": dict(c.detectable_halved),
         "size": c.refit.parameters[c.effect.name] if c.refit else None,
         "deviance": c.refit.deviance if c.refit else None,
         "session_gain": [c.gain, c.gain_error],
@@ -151,8 +150,7 @@ def _nearest_candidate(result: Verdict) -> dict[str, Any] | None:
 
 
 def _numbers(result: Verdict) -> dict[str, Any]:
-    pulls, candidates = result.pulls, result.found.candidates
-    titles = {p.name: p.title for p in result.base.fitted}
+    pulls = result.pulls
     learnt = [p for p in pulls if p.learnt]
     explained = result.verdict not in ("partial", "unexplained")
     notable = explained and learnt and abs(learnt[0].z) > notable_pull(len(learnt))
@@ -164,13 +162,6 @@ def _numbers(result: Verdict) -> dict[str, Any]:
         "wrong_number_records": [[_number(p) for p in alike] for alike in result.wrong_numbers],
         "notable_number": learnt[0].words if notable else None,
         "numbers_as_given": [_number(p) for p in pulls],
-        "halved_tolerances": [
-            {"name": name, "title": titles[name], "smallest_detectable_sizes_fall_by": gain}
-            for name, gain in overall_gains(candidates).items()
-        ],
-        "notable_halved_tolerances": [
-            {"effect": halved.effect.effect.name, "name": halved.nuisance} for halved in notable_gains(candidates)
-        ],
         "moves": [{"words": move.words, **move.record} for move in result.moves],
     }
 
@@ -242,7 +233,6 @@ def _largest_departures(result: Verdict) -> list[dict[str, Any]]:
 def _descriptions(result: Verdict) -> dict[str, Any]:
     law = result.law
     return {
-        "generic_features": list(result.regression.features),
         "laws": law.to_dict(result.final if result.explaining else None) if law else None,
         "described": result.described,
     }

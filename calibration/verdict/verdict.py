@@ -20,7 +20,6 @@ from calibration.attribution.wrong_numbers import wrong_number
 from calibration.laws.laws import Laws
 from calibration.statistics.excluded import Excluded, count_of_rows, summary_of_excluded
 from calibration.statistics.fit import Fit, Pull
-from calibration.statistics.residual_regression import Regression
 from calibration.statistics.residual_tests import Directions, Misfit
 from calibration.statistics.statistical_model import Experiment, Runs
 from calibration.statistics.study import FinalRefit, Split
@@ -95,9 +94,8 @@ class Explained:
 class HeldOutErrors:
     """How far each model is from the held-out runs, relative rms, and how far noise alone would be.
 
-    The models are "uncalibrated", "before" (calibrated), "after" (with the effects of the verdict), "generic"
-    (with a regression of the residual), and, if there are such, "law" (with the best law) and "new_specimen" (the
-    adopted form with its mean size for every specimen).
+    The models are "uncalibrated", "before" (calibrated), "after" (with the effects of the verdict), and, if there
+    are such, "law" (with the best law) and "new_specimen" (the adopted form, of mean size for every specimen).
     """
 
     rms: dict[str, float]  # of each model, over all outputs
@@ -127,7 +125,6 @@ class Verdict:
     final_intervals: dict[str, tuple[float, float]]  # the same, of the final model
     pulls: tuple[Pull, ...]  # of every nuisance parameter in the final model, the farthest first
     final_refit: FinalRefit  # the final model, fitted to all runs
-    regression: Regression  # of the residual, for comparison
     law: Laws | None  # laws, where they were looked for
     explanations: tuple[Explanation, ...]  # that the runs cannot tell apart, best first; none if there are not two
     next_runs: tuple[NextRun, ...]  # single settings that would, the best first

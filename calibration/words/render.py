@@ -18,7 +18,6 @@ from calibration.words.quantities import (
     detectable,
     digits,
     direction_in_words,
-    feature_in_words,
     final_model,
     fitted_value,
     given,
@@ -95,6 +94,6 @@ def _environment() -> Environment:
 _FILTERS: dict[str, Callable[..., str]] = {
     "percent": percent, "digits": digits, "p": p_in_words, "plain": plain, "size": size, "detectable": detectable,
     "given": given, "tolerance": tolerance, "fitted_value": fitted_value, "output": output_label,
-    "output_error": output_error, "feature": feature_in_words, "direction": direction_in_words,
+    "output_error": output_error, "direction": direction_in_words,
     "along": along_in_words, "ranges": ranges_in_words, "in_lab": length_in_lab,
 }  # fmt: skip

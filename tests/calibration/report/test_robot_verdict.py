@@ -14,14 +14,13 @@ import pytest
 from matplotlib.figure import Figure
 
 from calibration.__main__ import main as calibration
-from calibration.attribution.wrong_numbers import notable_gains, overall_gains
 from calibration.report.corrected_robot import calibration_knowledge, corrected_robot, corrected_toml, handed_on
 from calibration.report.report import write_report
 from calibration.report.robot_verdict import FILES, RobotVerdict
 from calibration.statistics.fit import Pull
 from calibration.swimmer.influences import CURRENT, nuisance_parameters
 from calibration.swimmer.synthetic_table import make_table
-from calibration.verdict.record import facts, shown, verdict_record
+from calibration.verdict.record import facts, verdict_record
 from calibration.verdict.verdict import Verdict
 from calibration.words.quantities import detectable, direction_in_words, plain, size, with_error
 from calibration.words.render import next_steps
@@ -41,7 +40,6 @@ from surrogate.table_file import load_table
 from tests.calibration.toy_tables import (
     DRAG,
     START,
-    calibrated_toy,
     effect,
     install_few_candidates,
     none,
@@ -202,29 +200,6 @@ def test_a_report_is_in_the_words_and_units_of_a_lab_with_what_to_do_next_first(
     assert given["youngs_modulus"] == START.youngs_modulus
     assert given["head_length"] == START.head_length
     assert record["next_steps"] == next_steps(facts(result))
-
-
-@pytest.mark.slow
-def test_the_number_to_measure_better_is_listed_with_what_it_would_show(tmp_path: Path) -> None:
-    result = calibrated_toy(2)
-    seen = page(result, tmp_path).text
-    gains = overall_gains(result.found.candidates)
-    assert list(gains.values()) == sorted(gains.values(), reverse=True)
-    assert set(gains) == {p.name for p in result.base.fitted if p.sigma is not None}
-    assert all(0 <= gain < 0.5 for gain in gains.values())
-    for halved in notable_gains(result.found.candidates):
-        assert halved.effect.detectable_exact < halved.halved < halved.today
-        assert halved.halved == min(halved.effect.detectable_halved.values())
-    record = verdict_record(result, table="t")
-    assert [entry["name"] for entry in record["halved_tolerances"]] == list(gains)
-    smallest = record["candidates"][0]["smallest_detectable_with_half_of_a_tolerance"]
-    assert smallest == result.found.candidates[0].detectable_halved
-    title = "Which number, measured better, would show what"
-    best = next(p.title for p in result.base.fitted if p.name == facts(result)["halved_tolerances"][0]["name"])
-    assert f"by: {best} (" in seen[seen.index(title) :]
-    halved = notable_gains(result.found.candidates)[0]
-    effect = shown(halved.effect.effect) | {"bounds": halved.effect.effect.bounds}
-    assert detectable(halved.halved, effect) in seen[seen.index(title) :]
 
 
 def test_numbers_are_written_without_exponents_and_changes_in_words() -> None:

@@ -11,7 +11,6 @@ from calibration.statistics.gls import Gls, Noise, eliminated, inverse_root, rep
 from calibration.statistics.residual_tests import TESTABLE, Directions, _kernel, directions, examine_residual
 from calibration.statistics.statistical_model import changes, features, precisions
 from calibration.statistics.study import Study, middle_session
-from calibration.swimmer.influences import CAMERA, TACHOMETER
 from common.arrays import Floats
 from tests.calibration.toy_tables import fit_all, toy_swimmer, toy_table
 
@@ -131,7 +130,7 @@ def test_the_kernel_of_repeats_is_that_of_all_runs() -> None:
     assert np.einsum("bik,ij,bjk->b", added, kernel, added) == pytest.approx(expected, rel=1e-12)
 
 
-def test_lengths_are_those_of_a_dense_covariance_also_with_one_tolerance_halved() -> None:
+def test_lengths_are_those_of_a_dense_covariance() -> None:
     """Σ + G P Gᵀ formed and the coefficients projected out; of one session, so that ρ is 1 for every effect."""
     model = toy_swimmer(toy_table(3).assign(session="one"))
     used = np.ones(len(model.runs), dtype=bool)
@@ -145,19 +144,12 @@ def test_lengths_are_those_of_a_dense_covariance_also_with_one_tolerance_halved(
     flat = fitted.jacobian.reshape(used.size * 5, -1)
     bound = [p.sigma is not None for p in fitted.fitted]
 
-    def lengths(halved: str) -> Floats:
-        covariance = replace(fitted.noise, share=1.0).covariance(model.runs.session)
-        for p, column in zip(fitted.fitted, flat.T, strict=True):
-            sigma = (p.sigma or 0.0) * (0.5 if p.name == halved else 1.0)
-            covariance += sigma**2 * np.outer(column, column)
-        white = np.linalg.inv(np.linalg.cholesky(covariance))
-        free, seen = white @ flat[:, ~np.array(bound)], white @ tangents.table[..., chosen].reshape(len(flat), -1)
-        return np.asarray(np.linalg.norm(seen - free @ np.linalg.lstsq(free, seen, rcond=None)[0], axis=0))
-
-    today, seen = lengths(""), np.asarray(misfit.scores.survived) > TESTABLE
-    assert seen.sum() > 5
-    assert misfit.scores.length[seen] == pytest.approx(today[seen], rel=1e-4)
-    for name in (CAMERA, TACHOMETER, "disc_offset"):
-        halved = lengths(name)
-        assert misfit.halved_length[name][seen] == pytest.approx(halved[seen], rel=1e-4), name
-        assert (halved[seen] >= today[seen] * (1 - 1e-9)).all()
+    covariance = replace(fitted.noise, share=1.0).covariance(model.runs.session)
+    for p, column in zip(fitted.fitted, flat.T, strict=True):
+        covariance += (p.sigma or 0.0) ** 2 * np.outer(column, column)
+    white = np.linalg.inv(np.linalg.cholesky(covariance))
+    free, seen = white @ flat[:, ~np.array(bound)], white @ tangents.table[..., chosen].reshape(len(flat), -1)
+    lengths = np.linalg.norm(seen - free @ np.linalg.lstsq(free, seen, rcond=None)[0], axis=0)
+    shown = np.asarray(misfit.scores.survived) > TESTABLE
+    assert shown.sum() > 5
+    assert misfit.scores.length[shown] == pytest.approx(lengths[shown], rel=1e-4)
