@@ -1,4 +1,4 @@
-"""Command line of the calibration: `calibrate`, `decide`, `laws`, `adopt`, `simulate`, `tracks`."""
+"""Command line of the calibration: `calibrate`, `decide`, `simulate`, `tracks`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from common.errors import InputError
 
 program = Program("calibration", "find from measured runs what the model of a robot lacks, and correct it")
 main = program.main
-_LISTED = 8  # laws
 
 
 def _refuse_early(*files: str) -> None:
@@ -109,50 +108,6 @@ def _decide(decide: Call, table: str) -> None:
     for explanation in decision.standings:
         print(f"  {explanation.title}: {f'behind by {explanation.behind:.1f}' if explanation.behind else 'best'}")
     print(decision.sentence)
-
-
-@program.command("laws")
-def _laws(table: str, *, robot: str, out: str, seed: int = 0, jobs: int | None = None) -> None:
-    """Describe a residual that no effect explains: where a term acts, and on which inputs it depends.
-
-    Args:
-        seed: of the bootstrap.
-    """
-    _refuse_early(table)
-    from calibration.report.robot_verdict import find_robot_laws
-    from sim.inputs import load_robot
-
-    described = find_robot_laws(table, load_robot(robot), seed=seed, jobs=jobs, tell=_to_stderr)
-    paths = described.save(out)
-    print(described.sentence)
-    print(
-        f"error on the held-out runs ({described.study.split.names}): calibrated "
-        f"{100 * described.error_without:.2f} %, noise {100 * described.noise:.2f} %"
-    )
-    fitted = described.laws.fitted if described.laws else ()
-    for law in fitted[:_LISTED]:
-        reason = law.reason or f"error {100 * law.error:.2f} %"
-        print(f"  {law.place.name}: {reason}; gain in BIC {law.gain:.0f}")
-    if len(fitted) > _LISTED:
-        print(f"  and {len(fitted) - _LISTED} others, in laws.json")
-    print(f"-> {', '.join(map(str, paths))}")
-
-
-@program.command("adopt")
-def _adopt(verdict: str, *, name: str, law: str = "", out: str) -> None:
-    """Write a law that describes a table as an effect for the catalogue, with its test.
-
-    Args:
-        verdict: verdict.json or laws.json.
-        name: of the effect, such as speed_dependent_side_force.
-        law: PLACE, which of the laws that were kept (default: the best).
-    """
-    import sim.effects
-    from calibration.report.adoption import adopt_law
-
-    paths = adopt_law(verdict, name, out, place=law)
-    print(f"-> {', '.join(map(str, paths))}")
-    print(f"{paths[0].name} belongs in {sim.effects.__path__[0]}; {paths[1].name} tests it there")
 
 
 @program.command("simulate", effects="effect")

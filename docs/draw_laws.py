@@ -17,8 +17,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from calibration.api import calibrate
-from calibration.laws.laws import Laws, dependences
-from calibration.report.figures import draw_dependences, draw_place
+from calibration.laws.group_factors import group_factors
+from calibration.laws.laws import Laws
+from calibration.report.figures import draw_factors, draw_place
 from calibration.swimmer.synthetic_table import make_table
 from sim.model.presets import PRESETS
 
@@ -33,8 +34,8 @@ def main(path: str = "docs/tutorial/laws.png") -> None:
     laws = verdict.law
     assert isinstance(laws, Laws)
     best = laws.kept[0]
-    curves = dependences(best, verdict.split.fitted)
-    parts = [_pixels(draw_place(best.model.robot, best.place)), _pixels(draw_dependences(curves))]
+    inputs = group_factors(best.model, best.fit, verdict.split.fitted)
+    parts = [_pixels(draw_place(best.model.robot, best.place)), _pixels(draw_factors(inputs))]
     width = max(part.shape[1] for part in parts)
     image.imsave(Path(path), np.concatenate([_wide(part, width) for part in parts]))
 

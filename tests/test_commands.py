@@ -30,10 +30,7 @@ from softflagella.shadowing import COMMANDED
 from surrogate.table_file import SHIPPED, load
 from tests.calibration.toy_tables import (
     DRAG,
-    FEW_PLACES,
     ambiguous,
-    few_places,
-    laws_of_toy,
     on_the_toy,
     toy_swimmer,
     toy_table,
@@ -326,26 +323,6 @@ def calibration_decide(made: Path, out: Path) -> str:
         words = [out / "more.csv", out / "verdict.json", "--robot", "paper-measured"]
         done("calibration", "decide", *words)
     return "Decided: head's end-over-end drag."
-
-
-HIDDEN = {"law_Cyr_speed500_length-500_tails0": 1.0}
-
-
-def calibration_laws(made: Path, out: Path) -> str:
-    toy_table(4, **HIDDEN).to_csv(out / "t.csv", index=False)
-    with on_the_toy(), few_places(FEW_PLACES):
-        done("calibration", "laws", out / "t.csv", "--robot", "paper-measured", "--out", out / "laws")
-    assert "Cyr" in json.loads((out / "laws" / "laws.json").read_text())["kept"]  # runs cannot tell it from C_t
-    assert load_robot(out / "laws" / "law.toml").effects
-    return "The residual is described by "
-
-
-def calibration_adopt(made: Path, out: Path) -> str:
-    laws_of_toy(4, **HIDDEN).save(out)
-    done("calibration", "adopt", out / "laws.json", "--name", "new_effect", "--law", "Cyr", "--out", out)
-    assert "make_law" in (out / "new_effect.py").read_text()
-    assert (out / "test_new_effect.py").exists()
-    return "new_effect.py belongs in "
 
 
 @pytest.mark.slow

@@ -26,14 +26,25 @@ import numpy as np
 from benchmarks.calibration.foreign_laws import DESIGN, foreign
 from benchmarks.calibration.law_truths import Setting, Truth, hidden_law
 from benchmarks.common import Records, heading, per_cent, row
-from calibration.report.robot_verdict import RobotLaws, find_robot_laws
+from calibration.laws.laws import Laws, find_laws
+from calibration.statistics.residual_tests import Directions, examine_residual
+from calibration.statistics.study import errors
+from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.swimmer import SwimmerModel
+from calibration.verdict.calibrate import first_fit
 from common.errors import InputError
 from sim.model.presets import PRESETS
 
 
-def record_of(described: RobotLaws, truth: Truth) -> dict[str, Any]:
+def record_of(truth: Truth, seed: int) -> dict[str, Any]:
     """Record what a search says: the places that are not told apart, numbers covered, errors over the noise."""
-    laws = described.laws.kept if described.laws else ()
+    model = SwimmerModel(PRESETS["paper-measured"], read_measurements(truth.table()))
+    study, base, _ = first_fit(model, seed=seed)
+    none = Directions.plain(np.empty((*model.runs.y.shape, 0)))
+    missing = examine_residual(study, base, none).general_p < study.level
+    found: Laws | None = find_laws(study, base) if missing else None
+    laws = found.kept if found else ()
+    before, noise = errors(model.runs, base.prediction, study.split.test)[0], base.noise.rms
     hidden = truth.kind == "hidden"  # a side force whose lever is not told from none is at the disc and elsewhere
     law = next((one for one in laws if one.place.name in truth.places), None)
     intervals = {n: law.fit.interval(n) for n in truth.exponents if n in law.fit.names} if law else {}
@@ -41,11 +52,11 @@ def record_of(described: RobotLaws, truth: Truth) -> dict[str, Any]:
         "kind": truth.kind,
         "score": truth.score,
         "true": truth.places,
-        "described": bool(described.laws and described.laws.complete),
+        "described": bool(found and found.complete),
         "named": [one.place.name for law in laws for one in (law, *(law.elsewhere if hidden else ()))],
         "kept": [law.place.name for law in laws],
-        "before": described.error_without / described.noise,
-        "after": laws[0].error / described.noise if laws else float("nan"),
+        "before": before / noise,
+        "after": laws[0].error / noise if laws else float("nan"),
         "numbers": len(intervals),
         "covered": sum(low <= truth.exponents[n] <= high for n, (low, high) in intervals.items()),
     }
@@ -90,12 +101,10 @@ def main(kind: str = "hidden", tables: str = "24", first_seed: str = "0", file: 
         if seed in records:
             continue
         try:
-            truth = truths[kind](seed)
-            described = find_robot_laws(truth.table(), PRESETS["paper-measured"], seed=seed, progress=False)
+            record = {"seed": seed, **record_of(truths[kind](seed), seed)}
         except InputError as reason:
             print(f"{seed}: not made: {reason}", flush=True)
             continue
-        record = {"seed": seed, **record_of(described, truth)}
         records.add(record)
         print(record, flush=True)
     summary(records.all)

@@ -22,8 +22,7 @@ leaves no more than noise and its deviance is not larger by what one parameter c
 Kept laws cannot be told apart if their BIC differ by less than one parameter can gain by chance (6.63). The place
 that is true need not be among the places of the search: a law describes the runs, and is no claim about their
 cause. Laws are claimed only if tables without a law, searched in the same way, hardly ever gain as much
-(`calibration.laws.search`). Intervals do not count the choice among the places; those of
-`Laws.simultaneous_interval` do.
+(`calibration.laws.search`). Intervals do not count the choice among the places.
 """
 
 from __future__ import annotations
@@ -37,8 +36,6 @@ import numpy as np
 from tqdm import tqdm
 
 from calibration.attribution.refits import INDISTINGUISHABLE, Rival, session_gain
-from calibration.laws.curves import Curve, error_bars, factors, find_curves
-from calibration.laws.group_factors import gain_of_a_curve, group_factors
 from calibration.laws.law_model import LEVER, SIZE, LawModel
 from calibration.laws.places import Place, in_common, places
 from calibration.laws.readings import (
@@ -50,14 +47,14 @@ from calibration.laws.readings import (
     noted_in_words,
     parameter_of,
 )
-from calibration.laws.search import Ranked, Selection, examine_selection, search
+from calibration.laws.search import DRAWS, Ranked, search, search_p_value
 from calibration.statistics.budget import skipped
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.study import LEVEL, Study, error_interval, errors
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.words.render import say_laws
-from common.arrays import Flags, Floats
+from common.arrays import Floats
 from common.errors import InputError
 
 NO_SESSIONS = "does not predict left-out sessions better"
@@ -68,8 +65,6 @@ NO_LEVER = "its lever is not told from none: a side force at the disc"  # unless
 _LARGEST_AT_START = 50.0  # size of a term
 _RPM = 30 / math.pi
 _DRAWS = 400  # of the bootstrap, for the residual that a law leaves
-_POINTS = 60  # of a curve
-_LARGEST = 20.0  # logarithm of a factor: what the runs do not determine may be of any size
 
 
 @dataclass(frozen=True)
@@ -87,14 +82,7 @@ class Law:
     error: float  # relative rms on the held-out runs
     error_interval: tuple[float, float]  # 95 %
     reason: str  # why it is not kept; empty if it is
-    gain_with_curve: float = -math.inf  # gain with free factors along the best input, linearised
-    curves: tuple[Curve, ...] = ()  # along each input; of the best law, and of the best with a curve
     elsewhere: tuple[Law, ...] = ()  # of a side force at the disc: the same with a lever that is not told from 0
-
-    @property
-    def numbers(self) -> int:
-        """How many of its numbers were fitted, without the lever, of which a search has a few."""
-        return sum(p.name in self.fit.names and p.name != LEVER for p in self.model.effects)
 
     @property
     def words(self) -> str:
@@ -137,7 +125,7 @@ class Law:
         return f"{-low:.2f} l behind" if unit == "l" else f"{high:.2f} {unit} ahead of"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the law as laws.json has it; `size` is at the geometric mean of the runs."""
+        """Return the law as verdict.json has it; `size` is at the geometric mean of the runs."""
         effect, size, _ = self.model.law(self.fit.parameters)
         runs = self.model.runs
         numbers = {
@@ -165,38 +153,7 @@ class Law:
             "error": self.error,
             "error_interval": list(self.error_interval),
             "reason": self.reason,
-            "curves": [curve.to_dict() for curve in self.curves],
         }
-
-
-@dataclass(frozen=True)
-class Dependence:
-    """The load of a law along one input, over that at the mean of the runs, the other inputs at their means."""
-
-    symbol: str  # of INPUTS
-    inputs: Floats  # (m,) along the curve: rad/s, m, or a number of tails
-    factor: Floats  # (m,) of the law
-    low: Floats  # (m,) 95 % band of the law
-    high: Floats
-    groups: Floats  # (g,) inputs at which there are runs
-    by_runs: Floats  # (g,) the factor that these runs ask for, everything else fitted anew
-    errors: Floats  # (2, g) one standard error of it, below and above
-    curve: Curve | None  # what the runs ask for where they contradict the power law
-
-
-def dependences(law: Law, used: Flags) -> list[Dependence]:
-    """Compute how a law depends on each input that differs between the runs in `used` (n,)."""
-    results = []
-    for asked in group_factors(law.model, law.fit, used, draws=0, fewest=1):
-        at = law.fit.names.index(EXPONENTS[INPUTS.index(asked.symbol)])
-        curve = next((one for one in law.curves if one.symbol == asked.symbol and one.rejected), None)
-        groups = curve.groups if curve else asked.levelled()
-        x = np.linspace(asked.x[0], asked.x[-1], _POINTS)
-        half = law.fit.half_width(at) * np.abs(x)
-        factor, low, high = np.exp(np.clip(asked.exponent * x + np.outer((0, -1, 1), half), -_LARGEST, _LARGEST))
-        law_itself = (asked.symbol, np.exp(x + asked.centre), factor, low, high)
-        results.append(Dependence(*law_itself, groups.inputs, factors(groups), error_bars(groups), curve))
-    return results
 
 
 def fitted_law(
@@ -293,7 +250,7 @@ def _best_fit(
 
 
 _FITTED = 6  # places that are fitted first
-_CURVED = 0.3  # share of the best gain below which a place is not among them
+_LIKELY = 0.3  # share of the best gain below which a place is not among them
 _SAME = 0.1  # of the noise of a run
 
 
@@ -304,7 +261,7 @@ class Laws:
     base: Fit  # coefficients and nuisance parameters, without a law
     ranked: tuple[Ranked, ...]  # every place, the best first
     fitted: tuple[Law, ...]  # those that were fitted, the largest gain first
-    selection: Selection | None = None  # what the choice among the places costs; None: nothing was searched
+    search_p_value: float  # of the largest gain among all places
     level: float = LEVEL  # α of the search, and of the residual that a law leaves; of this, half of it decides
 
     @property
@@ -332,13 +289,7 @@ class Laws:
     @property
     def significant(self) -> bool:
         """Whether the p-value of the search is below the level."""
-        return self.selection is not None and self.selection.p_value < self.level
-
-    @property
-    def curved(self) -> Law | None:
-        """The law that describes best with a curve in place of a power law, where one is rejected."""
-        curved = [law for law in self.fitted if any(curve.rejected for curve in law.curves)]
-        return max(curved, key=lambda law: law.gain_with_curve, default=None)
+        return self.search_p_value < self.level
 
     @property
     def sentence(self) -> str:
@@ -369,7 +320,7 @@ class Laws:
         return [law for law in good if np.abs((law.fit.prediction - claim.prediction) / scatter).max() > _SAME]
 
     def to_dict(self, claim: Fit | None = None) -> dict[str, Any]:
-        """Return the record for laws.json and verdict.json.
+        """Return the record for verdict.json.
 
         Args:
             claim: an effect that is claimed, with which laws are compared.
@@ -383,47 +334,22 @@ class Laws:
         return {
             "complete": self.complete,
             "significant": self.significant,
-            **(self.selection.to_dict() if self.selection else {}),
-            "places": [self._place_record(one) for one in self.ranked],
-            "laws": [self._law_record(law) for law in self.fitted],
+            "search_p_value": self.search_p_value,
+            "tables_without_law": DRAWS,
+            "places": [{"place": one.place.name, "gain": one.gain} for one in self.ranked],
+            "laws": [
+                {
+                    **law.to_dict(),
+                    "leaves_noise": law.p_value >= self.level / 2,
+                    "undetermined": law.reason in UNDETERMINED,
+                }
+                for law in self.fitted
+            ],
             "kept": [law.place.name for law in self.kept],
-            "curved": self.curved.place.name if self.curved else None,
             "in_common": _in_common(self.kept),
             "as_good": [law.place.name for law in as_good] if claim else None,
             "in_common_of_as_good": _in_common(as_good),
         }
-
-    def simultaneous_interval(self, law: Law, name: str) -> tuple[float, float]:
-        """Compute the 95 % interval of a number of a law that covers those of all places at once."""
-        assert self.selection is not None
-        place, value = law.fit.names.index(name), law.fit.parameters[name]
-        variance = law.fit.covariance[place, place] / law.fit.inflation  # K contains that S is estimated
-        half = max(self.selection.widest * math.sqrt(variance), law.fit.half_width(place))
-        return value - half, value + half
-
-    def _law_record(self, law: Law) -> dict[str, Any]:
-        record = {
-            **law.to_dict(),
-            "ebic_gain": self._ebic_gain(law.gain, law.numbers),
-            "first": self.selection.first[law.place.name] if self.selection else None,
-            "leaves_noise": law.p_value >= self.level / 2,
-            "undetermined": law.reason in UNDETERMINED,
-        }
-        for name in (SIZE, *EXPONENTS):
-            if self.selection and name in law.fit.names:
-                interval = list(self.simultaneous_interval(law, name))
-                record[name.removeprefix("law_")]["simultaneous_interval"] = interval
-        return record
-
-    def _place_record(self, ranked: Ranked) -> dict[str, Any]:
-        name = ranked.place.name
-        record = {"place": name, "gain": ranked.gain, "ebic_gain": self._ebic_gain(ranked.gain, ranked.columns)}
-        if self.selection:
-            record |= {"first": self.selection.first[name], "near_first": self.selection.near[name]}
-        return record
-
-    def _ebic_gain(self, gain: float, columns: int) -> float | None:
-        return self.selection.ebic_gain(gain, columns) if self.selection else None
 
 
 def find_laws(study: Study, base: Fit, *, beside_claim: bool = False) -> Laws:
@@ -442,17 +368,15 @@ def find_laws(study: Study, base: Fit, *, beside_claim: bool = False) -> Laws:
     both = len(np.unique(np.sign(model.runs.omega[study.split.fitted]))) == 2
     candidates = places(both_directions=both)
     searched = search(model, base, study.split.fitted, candidates, title="places" if study.progress else "")
-    ranked, selection = searched.ranked, examine_selection(searched, seed=study.seed + 2)
-    least = max(_CURVED * ranked[0].gain, 0.0)
+    ranked, p_value = searched.ranked, search_p_value(searched, seed=study.seed + 2)
+    least = max(_LIKELY * ranked[0].gain, 0.0)
     likely = [one for one in ranked[:_FITTED] if one.gain > least]
     laws = _fit_all(study, model, base, likely, chosen_alone=beside_claim)
     kept = _kept(laws)
     if not beside_claim and (not kept or kept[0].p_value < study.level / 2):
         laws += _fit_all(study, model, base, [one for one in ranked if one.gain > 0 and one not in likely])
     laws = _with_levers(study, model, base, laws, ranked, chosen_alone=beside_claim)
-    if not beside_claim:
-        laws = _with_curves(study, laws)
-    return Laws(base, tuple(ranked), tuple(sorted(laws, key=lambda law: -law.gain)), selection, study.level)
+    return Laws(base, tuple(ranked), tuple(sorted(laws, key=lambda law: -law.gain)), p_value, study.level)
 
 
 def _fit_all(
@@ -492,24 +416,6 @@ def _with_levers(
         if not law.reason else law
         for law in fitted.values()
     ]  # fmt: skip
-
-
-def _with_curves(study: Study, laws: Sequence[Law]) -> list[Law]:
-    """Find the curves of the best law and, where it leaves more than noise, of the best one with a curve."""
-    used = study.split.fitted
-    gains = [law.gain + gain_of_a_curve(law.model, law.fit, used) for law in laws]
-    laws = [replace(law, gain_with_curve=gain) for law, gain in zip(laws, gains, strict=True)]
-    kept = _kept(laws)
-    shown = {kept[0].place.name} if kept else set()
-    converged = [law for law in laws if law.fit.converged]
-    if converged and (not kept or kept[0].p_value < study.level / 2):
-        shown.add(max(converged, key=lambda law: law.gain_with_curve).place.name)
-    return [
-        replace(law, curves=find_curves(replace(study, model=law.model, seed=study.seed + 2), law.fit))
-        if law.place.name in shown
-        else law
-        for law in laws
-    ]
 
 
 def _in_common(laws: Sequence[Law]) -> str:

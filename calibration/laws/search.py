@@ -16,43 +16,24 @@ so that a model costs the inverse of its q × q matrix: weights C⁻¹ b, of cov
 
     BIC = rᵀ Σ⁻¹ r − aᵀ A⁻¹ a − bᵀ C⁻¹ b + ln |Σ|/|S ⊗ I| + q ln(n k),   a = Jᵀ Σ⁻¹ r.
 
-What the choice among the places costs, `examine_selection` tells.
-
-**p-value of the search.** Tables are drawn from the fit without laws: noise of the runs and of the sessions, and
-nuisance parameters from their priors (`Gls.draw`). The whole search runs on each. With the largest gain in BIC of
-the runs, and those of B drawn tables,
+What the choice among the places costs, the p-value of the search tells. Tables are drawn from the fit without
+laws: noise of the runs and of the sessions, and nuisance parameters from their priors (`Gls.draw`). The whole
+search runs on each. With the largest gain in BIC of the runs, and those of B drawn tables,
 
     p = (1 + number of tables that gain as much)/(1 + B).
 
-**EBIC** counts the models among which one with q columns was chosen, with γ = 1:
-
-    EBIC = BIC + 2 γ ln(number of models with q columns).
-
-**Selection frequency.** Tables are drawn in the same way from laws: from the best linear model of every place, in
-proportion to its probability e^(−BIC/2) among them. The search runs on each. The share of tables in which a place
-ranks first, or within `INDISTINGUISHABLE` of the first, says how far other runs of the same design would choose
-it. Whole sessions are not resampled: there are three to six, which differ in their tails.
-
-**Intervals after selection.** K is the 95 % quantile over the tables without a law of the largest |z| of all
-weights of all models. Estimates ± K standard errors cover all weights of all models at once, and so those of any
-model that was chosen by its fit (Berk et al. 2013), to first order in the law.
-
-Source: Schwarz (1978); Westfall and Young (1993) for the largest of many statistics; Chen and Chen (2008) for
-EBIC; Kass and Raftery (1995) for BIC as a probability; Efron (2014) for the bootstrap of a choice.
+Source: Schwarz (1978) for BIC; Westfall and Young (1993) for the largest of many statistics.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from calibration.attribution.refits import INDISTINGUISHABLE
 from calibration.laws.law_model import LEVER, lever_arms
 from calibration.laws.places import Place
 from calibration.laws.readings import EXPONENTS, logarithms, noted_values, parameter_of
@@ -69,10 +50,7 @@ _PASSES = 3  # iterations for the scatter of the sessions
 _ABSORBED = 1e-6  # of a column's square, added to it: what is left of one that others explain is rounding
 _POWERS_AT_START = 2.0  # largest exponent with which a fit starts
 _MOST_INPUTS = 3  # of one law
-_NULL_DRAWS = 999  # tables without a law
-_LAW_DRAWS = 400  # tables with one
-_COVERED = 0.95
-_GAMMA = 1.0  # of EBIC
+DRAWS = 999  # tables without a law
 
 
 @dataclass(frozen=True)
@@ -81,8 +59,6 @@ class LinearFits:
 
     gain: Floats  # (B, M) BIC of the model without a place less that with it
     weights: Floats  # (B, M, v) of the place's columns; 0 where the column is not in the model
-    errors: Floats  # (B, M, v) their standard errors; infinite where the column is not in the model
-    share: Floats  # (B, P, k) ρ
     base_share: Floats  # (B, k) ρ without a place
 
 
@@ -138,19 +114,17 @@ class LinearModels:
         left[..., own, own] += _ABSORBED * normal[..., p + own, p + own]
         shape = len(residual), len(self.models)
         gain, weights = np.empty(shape), np.zeros((*shape, self._count))
-        errors = np.full_like(weights, np.inf)
         for q in sorted({len(chosen) for _, chosen in self.models}):
             which = np.array([i for i, (_, chosen) in enumerate(self.models) if len(chosen) == q])
             place, chosen = (np.array([self.models[i][part] for i in which]) for part in (0, 1))
             at = np.column_stack([chosen, np.full(len(which), -1)])
             of_models = left[:, place[:, None, None], at[:, :, None], at[:, None, :]]  # (B, models, q + 1, q + 1)
-            step, covariance = solved(of_models)
+            step = solved(of_models)[0]
             deviance = of_models[..., -1, -1] - (step * of_models[..., :-1, -1]).sum(-1) + determinant[:, place]
             price = (q + self._further[which]) * math.log(residual[0].size)
             gain[:, which] = without - deviance - price
             weights[:, which[:, None], chosen] = step
-            errors[:, which[:, None], chosen] = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
-        return LinearFits(gain, weights, errors, share, base_share[:, 0])
+        return LinearFits(gain, weights, base_share[:, 0])
 
 
 @dataclass(frozen=True)
@@ -172,11 +146,6 @@ class Ranked:
     def noted(self) -> tuple[str, ...]:
         """Noted inputs in the model."""
         return tuple(name.removeprefix("law_") for name in self.exponents if name not in EXPONENTS)
-
-    @property
-    def columns(self) -> int:
-        """Number of its columns."""
-        return len(self.chosen) + self.place.is_term
 
     @property
     def start(self) -> dict[str, float]:
@@ -212,17 +181,6 @@ class Search:
             if ranked.is_bounded:
                 best.setdefault(ranked.place.name, ranked)
         return list(best.values())
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the places."""
-        return tuple(dict.fromkeys(place.name for place in self.places))
-
-    def best(self, gain: Floats) -> Integers:
-        """Find the best model of every name, by the gains (B, M) of all models; (B, names)."""
-        of_model = np.array([self.places[number].name for number, _ in self.models.models])
-        members = [np.flatnonzero(of_model == name) for name in self.names]
-        return np.stack([which[gain[:, which].argmax(1)] for which in members], 1)
 
     def _ranked(self, model: int) -> Ranked:
         number, chosen = self.models.models[model]
@@ -311,52 +269,10 @@ def _subsets(items: Sequence[int] | range, *, at_least: int) -> list[tuple[int, 
     return [chosen for count in counts for chosen in itertools.combinations(items, count)]
 
 
-@dataclass(frozen=True)
-class Selection:
-    """What the choice among the places costs."""
-
-    p_value: float  # of the largest gain in BIC
-    first: dict[str, float]  # place -> share of tables with a law in which it ranks first
-    near: dict[str, float]  # place -> share in which it is within INDISTINGUISHABLE of the first
-    widest: float  # K: standard errors that cover all weights of all models in 95 %
-    models: dict[int, int]  # number of columns -> number of models
-
-    def ebic_gain(self, gain: float, columns: int) -> float:
-        """Compute the gain in EBIC of a law with so many columns, by its gain in BIC."""
-        return gain - 2 * _GAMMA * math.log(self.models[min(columns, max(self.models))])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the record for laws.json."""
-        return {
-            "search_p_value": self.p_value,
-            "tables_without_law": _NULL_DRAWS,
-            "tables_with_law": _LAW_DRAWS,
-            "simultaneous_z": self.widest,
-        }
-
-
-def examine_selection(search: Search, *, seed: int) -> Selection:
-    """Draw tables without and with laws, and run the whole search on each; `seed` of the draws."""
-    rng, models, fits = np.random.default_rng(seed), search.models, search.fits
-    run = models.design.noise(search.residual)
-    null = models.fit(models.design.draw(rng, run, np.tile(fits.base_share, (_NULL_DRAWS, 1))))
+def search_p_value(search: Search, *, seed: int) -> float:
+    """Estimate the probability that noise alone gains as much in a search; `seed` of the draws."""
+    models, fits = search.models, search.fits
+    run, share = models.design.noise(search.residual), np.tile(fits.base_share, (DRAWS, 1))
+    null = models.fit(models.design.draw(np.random.default_rng(seed), run, share))
     as_large = int(np.count_nonzero(null.gain.max(1) >= fits.gain.max()))
-    largest = np.abs(null.weights / null.errors).max((1, 2))
-    best: Integers = search.best(fits.gain)[0]
-    gain = fits.gain[0, best]
-    probability = np.exp((gain - gain.max()) / 2)
-    true = rng.choice(best, _LAW_DRAWS, p=probability / probability.sum())  # the law of each table
-    place = np.array([models.models[m][0] for m in true])
-    law = np.einsum("nkbv,bv->bnk", models.columns[:, :, place], fits.weights[0, true])
-    gains = models.fit(law + models.design.draw(rng, run, fits.share[0, place])).gain
-    of_places = np.take_along_axis(gains, search.best(gains), 1)  # (tables, names)
-    behind = of_places.max(1)[:, None] - of_places
-    first, near = (dict(zip(search.names, chosen.mean(0).tolist(), strict=True))
-                   for chosen in (behind == 0, behind < INDISTINGUISHABLE))  # fmt: skip
-    return Selection(
-        p_value=(1 + as_large) / (1 + _NULL_DRAWS),
-        first=first,
-        near=near,
-        widest=float(np.quantile(largest, _COVERED)),
-        models=dict(Counter(len(chosen) for _, chosen in models.models)),
-    )
+    return (1 + as_large) / (1 + DRAWS)

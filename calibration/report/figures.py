@@ -13,8 +13,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLoca
 
 from calibration.attribution.nearest import Nearest
 from calibration.attribution.refits import UNSEEN
-from calibration.laws.curves import Curve
-from calibration.laws.laws import Dependence
+from calibration.laws.group_factors import GroupFactors
 from calibration.laws.places import Place
 from calibration.report.path_error import WORDS, Model, PathError
 from calibration.statistics.residual_tests import Misfit
@@ -260,29 +259,20 @@ def _draw_load(axes: Any, place: Place, disc: Floats, head_length: float) -> Non
         curved_arrow(axes, at + _LONG * np.stack([0.25 * np.cos(angles), 0.7 * np.sin(angles)], -1), RED, 2.6)
 
 
-def draw_dependences(curves: list[Dependence]) -> Figure:
+def draw_factors(inputs: list[GroupFactors]) -> Figure:
     """Draw the factor of a law against every input, with its band and what the runs ask for."""
-    figure = Figure(figsize=(_WIDTH, 1.75 * len(curves) + 0.2))
-    panels = figure.subplots(len(curves), 1, squeeze=False)[:, 0]
-    for axes, curve in zip(panels, curves, strict=True):
-        scale, label = _SCALES[curve.symbol]
-        axes.fill_between(scale * curve.inputs, curve.low, curve.high, color=PALE, lw=0)
-        axes.plot(scale * curve.inputs, curve.factor, color=BLUE)
-        axes.errorbar(scale * curve.groups, curve.by_runs, curve.errors, fmt="o", ms=4, color=RED, lw=1.2)
-        if curve.curve is not None:
-            _draw_asked(axes, curve.curve, scale)
+    figure = Figure(figsize=(_WIDTH, 1.75 * len(inputs) + 0.2))
+    panels = figure.subplots(len(inputs), 1, squeeze=False)[:, 0]
+    for axes, groups in zip(panels, inputs, strict=True):
+        scale, label = _SCALES[groups.symbol]
+        along, factor, low, high = groups.line()
+        axes.fill_between(scale * along, low, high, color=PALE, lw=0)
+        axes.plot(scale * along, factor, color=BLUE)
+        axes.errorbar(scale * groups.inputs, groups.factors, groups.errors, fmt="o", ms=4, color=RED, lw=1.2)
         axes.set_xlabel(label, fontsize=9)
         axes.set_ylabel("factor", fontsize=9)
         axes.tick_params(labelsize=8)
-        if curve.symbol == "N":
+        if groups.symbol == "N":
             axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     figure.tight_layout(h_pad=0.5)
     return figure
-
-
-def _draw_asked(axes: Any, asked: Curve, scale: float) -> None:
-    """Draw the smooth curve that the runs ask for in place of a power law, with its band and a legend."""
-    axes.fill_between(scale * asked.inputs, asked.low, asked.high, color=RED, alpha=0.15, lw=0)
-    label = f"the runs' own curve, 95 %; power law: p = {asked.p_value:.2g}"
-    axes.plot(scale * asked.inputs, asked.factor, "--", color=RED, lw=1.2, label=label)
-    axes.legend(frameon=False, fontsize=7)

@@ -11,11 +11,12 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from calibration.attribution.refits import IMITABLE, SURE
+from calibration.laws.group_factors import group_factors
 from calibration.laws.law_model import LEVER
-from calibration.laws.laws import Laws, dependences
+from calibration.laws.laws import Law
 from calibration.report.figures import (
-    draw_dependences,
     draw_evidence,
+    draw_factors,
     draw_maps,
     draw_paths,
     draw_place,
@@ -34,8 +35,7 @@ from common.provenance import code_version
 
 _LAW = (
     "On what it depends. Line and band: the law. Points: the factor that the runs at this input ask for, "
-    "everything else fitted anew, with one standard error. Dashed: where they contradict a power law, a smooth "
-    "curve through them."
+    "everything else fitted anew, with one standard error."
 )
 
 Drawn = tuple[Figure, str, str]  # with a description and a caption
@@ -84,27 +84,15 @@ def _figures(result: Verdict, paths: Sequence[PathError]) -> dict[str, list[Draw
     if result.nearest and result.nearest.sizes:
         words = f"size of {result.nearest.effect.title} for each specimen"
         figures["sizes"] = [(draw_sizes(result.nearest), words, "")]
-    if result.law:
-        figures |= figures_of_laws(result.law, result.split.fitted)
+    if result.law and result.law.kept:
+        figures["law"] = _figures_of_law(result.law.kept[0], result.split.fitted)
     return figures
 
 
-def figures_of_laws(laws: Laws, used: Flags) -> dict[str, list[Drawn]]:
-    """Draw the best law, and the law that describes with a curve in place of a power law, if it is another one.
-
-    Args:
-        used: (n,) the runs that were fitted.
-    """
-    figures: dict[str, list[Drawn]] = {}
-    if laws.kept:
-        best = laws.kept[0]
-        place = draw_place(best.model.robot, best.place, best.fit.parameters.get(LEVER, 0.0))
-        figures["law"] = [(place, f"where it acts: {best.place.words}", "Where it acts (red).")]
-        if curves := dependences(best, used):
-            figures["law"].append((draw_dependences(curves), "the factor of the load against each input", _LAW))
-    curved = laws.curved
-    if curved and not (laws.kept and curved.place == laws.kept[0].place):
-        words, drawn = curved.place.words, draw_dependences(dependences(curved, used))
-        figures["curved"] = [(drawn, f"the factor of another law against each input: {words}",
-                              f"With a curve in place of a power law: {words}.")]  # fmt: skip
-    return figures
+def _figures_of_law(law: Law, used: Flags) -> list[Drawn]:
+    """Draw where a law acts, and on what it depends in the runs `used` (n,)."""
+    place = draw_place(law.model.robot, law.place, law.fit.parameters.get(LEVER, 0.0))
+    drawn = [(place, f"where it acts: {law.place.words}", "Where it acts (red).")]
+    if inputs := group_factors(law.model, law.fit, used):
+        drawn.append((draw_factors(inputs), "the factor of the load against each input", _LAW))
+    return drawn

@@ -84,7 +84,6 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         autoescape=lambda name: name == "report.j2",
-        extensions=["jinja2.ext.do"],
     )
     environment.filters |= _FILTERS
     environment.globals["final_model"] = final_model

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -15,16 +15,18 @@ import calibration.swimmer.swimmer
 import calibration.swimmer.synthetic_table
 from calibration.attribution import moves
 from calibration.laws import laws
+from calibration.laws.laws import Laws, find_laws
 from calibration.laws.places import place_named
-from calibration.report.robot_verdict import RobotLaws, RobotVerdict, find_robot_laws
+from calibration.report.robot_verdict import RobotVerdict
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.statistical_model import start_values
+from calibration.statistics.study import Study
 from calibration.swimmer.influences import influences
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.possible_runs import Owned
 from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
-from calibration.verdict.calibrate import calibrate
+from calibration.verdict.calibrate import calibrate, first_fit
 from calibration.verdict.verdict import Verdict
 from common.arrays import Flags
 from sim.model.presets import PRESETS
@@ -147,9 +149,22 @@ def few_places(names: Sequence[str]) -> Iterator[None]:
         yield
 
 
-@shared
-def laws_of_toy(seed: int, *, places: tuple[str, ...] = FEW_PLACES, **effects: float) -> RobotLaws:
-    """The laws that describe a toy table of four lengths, at these places or all."""
+class FoundLaws(NamedTuple):
+    """The laws of a table, and the fit without them."""
+
+    study: Study
+    base: Fit
+    laws: Laws
+
+
+def laws_of(table: pd.DataFrame, places: tuple[str, ...] = ()) -> FoundLaws:
+    """The laws that describe a table, at these places or all."""
     with on_the_toy(), few_places(places) if places else nullcontext():
-        table = toy_table(seed, lengths_cm=(5.0, 7.0, 9.0, 11.0), **effects)
-        return find_robot_laws(table, START, progress=False)
+        study, base, _ = first_fit(toy_swimmer(table))
+        return FoundLaws(study, base, find_laws(study, base))
+
+
+@shared
+def laws_of_toy(seed: int, *, places: tuple[str, ...] = FEW_PLACES, **effects: float) -> FoundLaws:
+    """The laws that describe a toy table of four lengths."""
+    return laws_of(toy_table(seed, lengths_cm=(5.0, 7.0, 9.0, 11.0), **effects), places)

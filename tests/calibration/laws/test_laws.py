@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,24 +12,23 @@ import pandas as pd
 import pytest
 
 from calibration.laws.law_model import LEVER, SIZE, LawModel, with_law
-from calibration.laws.laws import NO_LEVER, NO_SESSIONS, UNDETERMINED, Law, Laws
+from calibration.laws.laws import NO_LEVER, NO_SESSIONS, UNDETERMINED, Law
 from calibration.laws.places import in_common, place_named, places
 from calibration.laws.readings import EXPONENTS, in_words, logarithms, motion_patterns, readings
 from calibration.report.corrected_robot import law_handed_on, robot_with_law
-from calibration.report.robot_verdict import RobotLaws, find_robot_laws
 from calibration.statistics.statistical_model import by_differences, start_values
+from calibration.statistics.study import errors
 from calibration.swimmer.measured_table import read_measurements
 from common.arrays import Floats
 from sim.effects import effect_named
-from sim.inputs import group_columns, load_robot
+from sim.inputs import group_columns
 from tests.calibration import toy
 from tests.calibration.toy_tables import (
     FEW_PLACES,
     START,
     TRUTH,
-    few_places,
+    laws_of,
     laws_of_toy,
-    on_the_toy,
     toy_swimmer,
     toy_table,
 )
@@ -45,13 +43,7 @@ LAWS = {
 WARMER = 0.05  # of C_yr, per kelvin
 
 
-def laws_in(described: RobotLaws) -> Laws:
-    return described.laws
-
-
-def described_by(table: pd.DataFrame) -> RobotLaws:
-    with on_the_toy(), few_places(("Cyr", "Ct", "Fx_wt")):
-        return find_robot_laws(table, START, progress=False)
+PLACES = ("Cyr", "Ct", "Fx_wt")
 
 
 @pytest.mark.slow
@@ -80,11 +72,8 @@ def test_derivatives_are_those_by_differences() -> None:
     ids=lambda value: value if isinstance(value, str) else "few" if value else "all",
 )
 def test_a_law_is_found_at_its_place_with_its_exponents(name: str, places: tuple[str, ...]) -> None:
-    described = laws_of_toy(4, places=places, **LAWS[name])
-    selection = laws_in(described).selection
-    if not places:
-        assert selection.models == {1: 86, 2: 228, 3: 218, 4: 71}  # of 71 terms and 5 factors of three inputs
-    kept = {law.place.name: law for law in laws_in(described).kept}
+    study, base, found = laws_of_toy(4, places=places, **LAWS[name])
+    kept = {law.place.name: law for law in found.kept}
     assert name in kept
     law = kept[name]
     (effect,) = LAWS[name]
@@ -92,8 +81,9 @@ def test_a_law_is_found_at_its_place_with_its_exponents(name: str, places: tuple
         low, high = law.fit.interval(exponent)
         margin = high - low  # the interval is one of 95 %
         assert low - margin / 2 < true < high + margin / 2
-    assert law.error < min(0.7 * described.error_without, 1.2 * described.noise)
-    assert "described by" in described.sentence
+    without = errors(law.model.runs, base.prediction, study.split.test)[0]
+    assert law.error < min(0.7 * without, 1.2 * base.noise.rms)
+    assert "described by" in found.sentence
     speeds = toy_table(4)["omega_rpm"].abs()
     assert law.to_dict()["runs"]["omega_rpm"] == pytest.approx([speeds.min(), speeds.max()])
     robot = robot_with_law(START, law, law.fit.parameters)  # it moves as the fit says
@@ -111,13 +101,13 @@ def test_a_law_is_found_at_its_place_with_its_exponents(name: str, places: tuple
 @pytest.mark.slow
 def test_the_lever_of_a_side_force_is_found_and_handed_on() -> None:
     """What is handed on is a force and a couple, whose uncertainty has that of the lever."""
-    described = laws_of_toy(4, **LAWS["Fx_wt_at_l"])
-    law = laws_in(described).kept[0]
+    study, _, found = laws_of_toy(4, **LAWS["Fx_wt_at_l"])
+    law = found.kept[0]
     low, high = law.fit.interval(LEVER)
     assert low < -0.5 < high < -0.2
     assert "l (" in law.words
     assert "behind the disc" in law.words
-    robot, known = law_handed_on(START, law, described.study.split.kept)
+    robot, known = law_handed_on(START, law, study.split.kept)
     force, couple = robot.effects
     assert (force[:10], couple[:10]) == ("law_Fx_wt_", "law_My_wt_")
     errors = {
@@ -137,31 +127,18 @@ def test_a_law_depends_on_what_the_table_notes() -> None:
         robot = replace(TRUTH, C_yr=TRUTH.C_yr * float(np.exp(WARMER * kelvin)))
         table = toy_table(seed, truth=robot, lengths_cm=(6.0, 9.0))
         tables.append(table.assign(temperature_C=20.0 + kelvin))
-    described = described_by(pd.concat(tables, ignore_index=True).assign(run=range(1, 1 + sum(map(len, tables)))))
-    law = laws_in(described).kept[0]
+    table = pd.concat(tables, ignore_index=True).assign(run=range(1, 1 + sum(map(len, tables))))
+    study, _, found = laws_of(table, PLACES)
+    law = found.kept[0]
     assert law.place.name == "Cyr"
     low, high = law.fit.interval("law_temperature_K")
     assert low < WARMER < high < 2 * WARMER
     assert "an exponential of the temperature" in law.words
     assert "per K" in law.words
-    robot = law_handed_on(START, law, described.study.split.kept)[0]
+    robot = law_handed_on(START, law, study.split.kept)[0]
     assert robot.C_yr == pytest.approx(TRUTH.C_yr, rel=0.1)
     again = with_law(toy_swimmer(toy_table(1)), law.model.record)  # a table that notes no temperature
     assert again.factor(law.fit.parameters) == pytest.approx(np.ones(len(again.runs)), rel=0.2)
-
-
-@pytest.mark.slow
-def test_files_of_a_law_are_read_back_and_there_are_none_where_nothing_is_missing(tmp_path: Path) -> None:
-    described = laws_of_toy(4, **LAWS["Cyr"])
-    assert [path.name for path in described.save(tmp_path)] == ["laws.json", "law.toml"]
-    law = laws_in(described).kept[0]
-    assert load_robot(tmp_path / "law.toml") == law_handed_on(START, law, described.study.split.kept)[0]
-    assert SIZE.removeprefix("law_") in described.to_frame().columns
-    nothing = described_by(toy_table(3, lengths_cm=(6.0, 9.0)))
-    assert nothing.laws is None
-    assert "within the noise" in nothing.sentence
-    assert nothing.to_frame().empty
-    assert [path.name for path in nothing.save(tmp_path / "nothing")] == ["laws.json"]
 
 
 @pytest.mark.rest
@@ -177,7 +154,7 @@ def test_a_factor_in_the_speed_of_the_robot_is_read_from_the_inputs() -> None:
             robot = replace(TRUTH, C_yr=TRUTH.C_yr * float(swims / 4.0) ** -0.5)
         parts.append(toy_table(100 + seed, truth=robot, lengths_cm=(length,), design=cell))
     table = pd.concat(parts, ignore_index=True).assign(run=range(sum(map(len, parts))))
-    law = next(law for law in laws_in(described_by(table)).kept if law.place.name == "Cyr")
+    law = next(law for law in laws_of(table, PLACES).laws.kept if law.place.name == "Cyr")
     power = re.search(r"\|v\|\^(-[\d.]+) \((-[\d.]+) to (-[\d.]+)\)", law.words)
     _, low, high = map(float, power.groups())
     assert low < -0.5 < high
@@ -185,7 +162,7 @@ def test_a_factor_in_the_speed_of_the_robot_is_read_from_the_inputs() -> None:
 
 @pytest.mark.slow
 def test_a_side_force_at_the_disc_says_how_far_from_it_it_may_act() -> None:
-    laws = laws_in(laws_of_toy(5, places=("Fx_wt", "Fx_wt_at_l"), law_Fx_wt_speed0_length0_tails1000=4.0))
+    laws = laws_of_toy(5, places=("Fx_wt", "Fx_wt_at_l"), law_Fx_wt_speed0_length0_tails1000=4.0).laws
     law = next(law for law in laws.kept if law.place.name == "Fx_wt")
     (behind,) = (one for one in law.elsewhere if one.place.name == "Fx_wt_at_l")
     assert behind.reason == NO_LEVER
@@ -196,7 +173,7 @@ def test_a_side_force_at_the_disc_says_how_far_from_it_it_may_act() -> None:
 
 def test_what_the_runs_do_not_exclude_stays_in_the_set() -> None:
     """A law that fits better, but does not predict sessions, and one whose numbers the runs do not determine."""
-    laws = laws_in(laws_of_toy(4, **LAWS["Cyr"]))
+    laws = laws_of_toy(4, **LAWS["Cyr"]).laws
     best = laws.kept[0]
     worse = replace(best, place=place_named("Ct"), gain=best.gain - 1, gain_at_lever=best.gain - 1)
     far = replace(worse, gain=best.gain - 10, gain_at_lever=best.gain - 10)

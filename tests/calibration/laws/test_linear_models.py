@@ -34,8 +34,8 @@ def residuals(count: int, *, share: float = 0.3, seed: int = 1) -> Floats:
     return np.asarray((rng.normal(size=shape) + sessions) @ np.array([[1.0, 0.4, 0], [0, 0.8, 0.1], [0, 0, 1.3]]))
 
 
-def dense(residual: Floats, share: Floats, table: Floats) -> tuple[float, Floats, Floats]:
-    """Fit columns (n, k, q) with ρ by the definitions; return the deviance, all weights, and their covariance."""
+def dense(residual: Floats, share: Floats, table: Floats) -> tuple[float, Floats]:
+    """Fit columns (n, k, q) with ρ by the definitions; return the deviance and all weights."""
     run = repeat_covariance(residual, CONDITION)
     flat = table.reshape(residual.size, -1)
     covariance = Noise(run, share).covariance(SESSION)
@@ -45,7 +45,7 @@ def dense(residual: Floats, share: Floats, table: Floats) -> tuple[float, Floats
     weights = np.linalg.solve(normal, toward)
     determinant = np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(np.kron(np.eye(len(SESSION)), run))[1]
     deviance = residual.ravel() @ inverse @ residual.ravel() - toward @ weights + determinant
-    return float(deviance), weights, np.linalg.inv(normal)
+    return float(deviance), weights
 
 
 @pytest.mark.slow
@@ -54,28 +54,26 @@ def test_gains_and_weights_are_those_of_dense_matrices() -> None:
     models, residual = design(), residuals(60)
     fits = models.fit(residual)
     single = design(np.zeros_like(SESSION)).fit(residual[:2])  # of a single session ρ is the largest
-    assert np.concatenate([single.base_share[:, None], single.share], 1) == pytest.approx(SESSION_SHARE)
+    assert single.base_share == pytest.approx(SESSION_SHARE)
     absorbed = models.design.columns[..., : len(PRECISION)]
     for b, one in enumerate(residual[:2]):
         alone = models.fit(one[None])
         np.testing.assert_allclose(fits.gain[b], alone.gain[0], rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(fits.weights[b], alone.weights[0], rtol=1e-7, atol=1e-12)
         without = dense(one, fits.base_share[b], absorbed)[0]
-        for place in range(PLACES):
-            every = np.concatenate([absorbed, models.columns[:, :, place]], -1)
-            fitted = Gls(every, PRECISION, SESSION, None, CONDITION).products(one).solve(passes=3)
-            np.testing.assert_allclose(fits.share[b, place], fitted.share, rtol=1e-9)
+        shares = [
+            Gls(every, PRECISION, SESSION, None, CONDITION).products(one).solve(passes=3).share
+            for place in range(PLACES)
+            for every in [np.concatenate([absorbed, models.columns[:, :, place]], -1)]
+        ]
         for m, (place, chosen) in enumerate(MODELS):
             table = np.concatenate([absorbed, models.columns[:, :, place, list(chosen)]], -1)
-            deviance, weights, covariance = dense(one, fits.share[b, place], table)
-            errors = np.sqrt(np.diag(covariance))[-len(chosen) :]
+            deviance, weights = dense(one, shares[place], table)
             gain = without - deviance - len(chosen) * math.log(one.size)
             assert fits.gain[b, m] == pytest.approx(gain, abs=1e-4)
-            np.testing.assert_allclose(fits.errors[b, m, list(chosen)], errors, rtol=1e-5)
             np.testing.assert_allclose(fits.weights[b, m, list(chosen)], weights[-len(chosen) :], rtol=1e-4)
             absent = [j for j in range(COLUMNS) if j not in chosen]
             assert not fits.weights[b, m, absent].any()
-            assert np.isinf(fits.errors[b, m, absent]).all()
 
 
 @pytest.mark.parametrize("seed", range(3))

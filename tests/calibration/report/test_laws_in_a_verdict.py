@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from calibration.attribution.refits import INDISTINGUISHABLE, Rival
+from calibration.laws.group_factors import group_factors
 from calibration.laws.law_model import SIZE, LawModel, with_law
-from calibration.laws.laws import Laws, dependences, find_laws
+from calibration.laws.laws import Laws, find_laws
 from calibration.laws.places import place_named
 from calibration.laws.readings import EXPONENTS
 from calibration.report.corrected_robot import _slopes, check_given, robot_with_law
-from calibration.report.figures import draw_dependences, draw_place
+from calibration.report.figures import draw_factors, draw_place
 from calibration.report.robot_verdict import RobotVerdict
 from calibration.statistics.study import refit_to_all
 from calibration.verdict.next_runs import BATCH, Explanation, next_runs, standings
@@ -222,20 +223,21 @@ def test_new_runs_decide_between_two_laws() -> None:
 def test_the_runs_at_each_input_lie_on_the_law() -> None:
     found = laws_of_toy(4, **HIDDEN["Cyr"])
     law, used = next(one for one in found.laws.kept if one.place.name == "Cyr"), found.study.split.fitted
-    curves = dependences(law, used)
-    assert [curve.symbol for curve in curves] == ["ω", "l", "N"]
+    inputs = group_factors(law.model, law.fit, used)
+    assert [groups.symbol for groups in inputs] == ["ω", "l", "N"]
     pulls = []
-    for curve in curves:
-        assert ((curve.low <= curve.factor) & (curve.factor <= curve.high)).all()
-        on_curve = np.interp(curve.groups, curve.inputs, curve.factor)
-        pulls += list((curve.by_runs - on_curve) / curve.errors.mean(0))
-        assert curve.curve is None
+    for groups in inputs:
+        along, factor, low, high = groups.line()
+        assert ((low <= factor) & (factor <= high)).all()
+        pulls += list((groups.factors - np.interp(groups.inputs, along, factor)) / groups.errors.mean(0))
     assert 0 < np.abs(pulls).max() < 4
-    assert draw_dependences(curves).axes
+    assert draw_factors(inputs).axes
+    one_length = used & (law.model.runs.length == law.model.runs.length[0])  # of which a picture tells nothing
+    assert [groups.symbol for groups in group_factors(law.model, law.fit, one_length)] == ["ω", "N"]
     far = replace(law.fit, covariance=1e12 * law.fit.covariance, jacobian=1e-9 * law.fit.jacobian)
-    undetermined = dependences(replace(law, fit=far), used)
-    numbers = [part for curve in undetermined for part in vars(curve).values() if isinstance(part, np.ndarray)]
-    assert all(np.isfinite(part).all() for part in numbers)
-    draw_dependences(undetermined).canvas.draw()
+    undetermined = group_factors(law.model, far, used)
+    for groups in undetermined:
+        assert all(np.isfinite(part).all() for part in (*groups.line(), groups.factors, groups.errors))
+    draw_factors(undetermined).canvas.draw()
     for place in ("Fx_wh", "Fz_vz", "My_wt", "Mz_wh", "Ct", "Cr", "tail_drag"):
         assert draw_place(START, place_named(place)).axes[0].has_data()

@@ -93,7 +93,7 @@ def test_every_branch_of_the_sentence(name: str, changes: dict[str, Any], said: 
         ("none", UNEXPLAINED | {"largest_along": "v along course_x"}, "first whether the tank has a current"),
         ("none", UNEXPLAINED | {"largest_departures": [{"at": ["N = 2", "l = 5 cm"]}]}, "): N = 2, l = 5 cm."),
         ("none", UNEXPLAINED | {"untestable": {"drift": "needs elapsed_min"}}, "Note more in the table, so"),
-        ("none", UNEXPLAINED | {"described": True}, "When the cause is known, make the law an effect"),
+        ("none", UNEXPLAINED | {"described": True}, "Look for a cause where the law acts (below), and"),
         ("none", UNEXPLAINED, "Plan with corrected.toml only where a residual of this size does not matter"),
     ],
 )  # fmt: skip
