@@ -98,7 +98,7 @@ plan: $(STAMP) ## plan PLANPATH for ROBOT into reports/plan
 
 calibrate: $(STAMP) ## close the loop on TABLE=… for ROBOT into reports/calibration
 	@test -n "$(TABLE)" || { echo "error: no table; write make calibrate TABLE=runs.csv ROBOT=robot.toml" >&2; exit 2; }
-	$(RUN) -m calibration calibrate "$(TABLE)" --robot "$(ROBOT)" --out reports/calibration
+	$(RUN) -m softflagella calibrate "$(TABLE)" --robot "$(ROBOT)" --out reports/calibration
 
 report: $(DATA)/manifest.json ## picture page of DATA into OUT
 	$(RUN) -m dataset report "$(DATA)" --out "$(OUT)"

@@ -361,3 +361,8 @@ class Program:
     def exit(self) -> None:
         """Run as a process: exit status 0; for bad input 2, with one line on stderr."""
         sys.exit(run_command(partial(self.main, prog=f"python -m {self.package}")))
+
+
+def to_stderr(line: str) -> None:
+    """Print a line that is no result."""
+    print(line, file=sys.stderr)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import codecs
 import json
+import os
 import re
 import sys
 import tomllib
@@ -52,6 +53,17 @@ def read_bytes(path: str | Path, *, first: int = MOST_BYTES + 1) -> bytes:
     if len(data) > MOST_BYTES:
         raise InputError(f"{path} has more than {MOST_BYTES / 2**20:.0f} MiB; such a file is not read")
     return data
+
+
+def refuse_missing(*files: str) -> None:
+    """Refuse a file that is missing before anything that takes seconds to load; a pipe is read once, later.
+
+    Raises:
+        InputError: there is no such file.
+    """
+    for file in files:
+        if not os.path.exists(file):
+            read_bytes(file)
 
 
 def decode(data: bytes) -> str:

@@ -188,6 +188,16 @@ def format_length(metres: float) -> str:
     return f"{metres:.3g} m" if size >= 2 else f"{100 * metres:.3g} cm"
 
 
+def length_in_lab(value: float, length_scale: float) -> str:
+    """Write a length given in tail lengths; one of them is `length_scale` in m."""
+    return f"{format_length(value * length_scale)} ({tails_in_words(value)} l)"
+
+
+def tails_in_words(value: float) -> str:
+    """Write a length in tail lengths: 0.32, 12, 1200."""
+    return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
+
+
 def column_units(names: Iterable[object]) -> dict[str, str]:
     """Find the units of columns by their names: as a suffix, or l where a name ends with `_over_l`.
 

@@ -16,12 +16,12 @@ import matplotlib.image as image
 import numpy as np
 from matplotlib.figure import Figure
 
-from calibration.api import calibrate
 from calibration.laws.group_factors import group_factors
 from calibration.laws.laws import Laws
 from calibration.report.figures import draw_factors, draw_place
 from calibration.swimmer.synthetic_table import make_table
 from sim.model.presets import PRESETS
+from softflagella.closed_loop import calibrate
 
 HIDDEN = {"law_tail_drag_speed-150_length-500_tails0": 1.0}
 _DPI = 130

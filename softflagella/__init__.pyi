@@ -1,5 +1,4 @@
 # The public names of softflagella and their modules: the one list, for type checkers and for `__init__.py`.
-from calibration.api import calibrate as calibrate
 from calibration.api import decide as decide
 from calibration.report.robot_verdict import RobotVerdict as RobotVerdict
 from calibration.swimmer.synthetic_table import make_table as make_table
@@ -44,6 +43,7 @@ from sim.model.effect import Effect as Effect
 from sim.model.robot import Robot as Robot
 from sim.model.schedule import Schedule as Schedule
 from sim.model.schedule import load_schedule as load_schedule
+from softflagella.closed_loop import calibrate as calibrate
 from surrogate.api import inverse as inverse
 from surrogate.api import query as query
 from surrogate.interface import LookupTable as LookupTable

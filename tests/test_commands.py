@@ -50,6 +50,7 @@ SAID = {  # by commands that write nothing
     "surrogate compile": "loops compiled in",
 }
 COMMANDS = [(package, name) for package in COMMANDED for name in program_of(package).commands]
+COMMANDS.append(("softflagella", "calibrate"))
 
 
 def done(*words: object) -> None:
@@ -284,11 +285,11 @@ def camera_tracks(made: Path, out: Path) -> str:
     return "15 poses -> "
 
 
-def calibration_calibrate(made: Path, out: Path) -> str:
+def softflagella_calibrate(made: Path, out: Path) -> str:
     with on_the_toy(few=True):
         toy_table(5, lengths_cm=(6.0, 9.0)).to_csv(out / "t.csv", index=False)
         words = [out / "t.csv", "--robot", "paper-measured", "--no-path", "--own", "l_cm=5,11", "--out"]
-        done("calibration", "calibrate", *words, out / "out")
+        done("softflagella", "calibrate", *words, out / "out")
     assert json.loads((out / "out" / "verdict.json").read_text())["verdict"] == "none"
     assert load_robot(out / "out" / "corrected.toml").C_t == pytest.approx(3.1, rel=0.1)
     assert "<svg" in (out / "out" / "report.html").read_text()

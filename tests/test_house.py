@@ -75,6 +75,8 @@ def test_statistics_and_networks_know_no_robot() -> None:
         assert all(name.startswith(("calibration.statistics", "surrogate.network.", "surrogate.training."))
                    for name in others), file  # fmt: skip
     assert rooms_imported("calibration")["swimmer"] == {"statistics"}
+    for file in (ROOT / "calibration").rglob("*.py"):
+        assert not {name.split(".")[0] for name in imported(file)} & {"planner", "tracking"}, file
 
 
 LIBRARIES = {"jinja2", "joblib", "matplotlib", "numba", "numpy", "pandas", "pyarrow", "safetensors", "scipy",

@@ -22,10 +22,10 @@ from common.arrays import Floats
 from common.errors import InputError, InputWarning, naming
 from common.keywords import checks_keywords
 from common.quantities import convert_columns, numbers_of
-from common.units import format_length
+from common.units import format_length, length_in_lab
 from planner.files.saved_plan import load_plan
 from planner.paths.distance import distance_to, farthest
-from planner.paths.units import length_in_lab, missed_words
+from planner.paths.units import missed_words
 from planner.planning.plan import Plan
 from sim.mechanics import planar
 

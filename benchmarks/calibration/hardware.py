@@ -24,10 +24,10 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.common import Records, heading, in_parallel, per_cent, row
-from calibration.api import calibrate
 from calibration.verdict.verdict import Verdict
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
+from softflagella.closed_loop import calibrate
 from tests.oracles.harmonic_balance import settle_in_harmonics
 from tests.oracles.plain_swimmer import NOMINAL, Hardware
 

@@ -211,7 +211,7 @@ def _draw_path(axes: Axes, error: PathError) -> None:
         axes.plot(*track.T, color=colour, lw=0.9, label=f"planned with {WORDS[name]}")
         axes.plot(*track[-1], "o", color=colour, ms=5)
     axes.set_aspect("equal", "datalim")
-    axes.set_title(error.wanted.words, fontsize=9, parse_math=False)
+    axes.set_title(error.words, fontsize=9, parse_math=False)
     axes.set_xlabel("x [cm]", fontsize=9)
     axes.set_ylabel("y [cm]", fontsize=9)
     axes.tick_params(labelsize=8)

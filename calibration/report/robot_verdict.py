@@ -81,7 +81,7 @@ class RobotVerdict(Shown, Verdict):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of verdict.json."""
-        paths = {error.wanted.words: error.record() for error in self.paths}
+        paths = {error.words: error.record() for error in self.paths}
         return verdict_record(self, table=self.table, path=paths or None)
 
     def save(self, folder: str | Path) -> list[Path]:

@@ -30,7 +30,7 @@ from calibration.words.quantities import (
     size,
     tolerance,
 )
-from planner.paths.units import length_in_lab
+from common.units import length_in_lab
 
 if TYPE_CHECKING:
     from jinja2 import Environment

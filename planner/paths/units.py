@@ -13,7 +13,16 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
 from common.errors import InputError, InputWarning
-from common.units import LENGTHS, format_length, format_time, number_and_unit, of_kind, to_si
+from common.units import (
+    LENGTHS,
+    format_length,
+    format_time,
+    length_in_lab,
+    number_and_unit,
+    of_kind,
+    tails_in_words,
+    to_si,
+)
 
 if TYPE_CHECKING:  # the command needs them before it loads NumPy
     from planner.paths.path import Path2D
@@ -50,11 +59,6 @@ class Swimmer(Protocol):
 def in_lab(value: float, robot: Swimmer) -> str:
     """Write a length given in tail lengths: 3.52 cm (0.32 l)."""
     return length_in_lab(value, robot.length_scale)
-
-
-def length_in_lab(value: float, length_scale: float) -> str:
-    """Write a length given in tail lengths; one of them is `length_scale` in m."""
-    return f"{format_length(value * length_scale)} ({_tails(value)} l)"
 
 
 def missed_words(missed: float, stated: float, length: float) -> str:
@@ -110,16 +114,12 @@ def _fixed(value: float, places: int) -> str:
     return f"{round(value, places) + 0.0:.{places}f}"
 
 
-def _tails(value: float) -> str:
-    """Write a length in tail lengths: 0.32, 12, 1200."""
-    return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
-
-
 def describe(path: Path2D, robot: Swimmer) -> str:
     """Describe length and extent of a path."""
     width, height = extent(path)
     across = [format_length(value * robot.length_scale) for value in (width, height)]
-    return f"{in_lab(path.length, robot)} long, {' by '.join(across)} ({_tails(width)} by {_tails(height)} l)"
+    in_tail_lengths = f"({tails_in_words(width)} by {tails_in_words(height)} l)"
+    return f"{in_lab(path.length, robot)} long, {' by '.join(across)} {in_tail_lengths}"
 
 
 def in_tails(unit: str, robot: Swimmer) -> float:

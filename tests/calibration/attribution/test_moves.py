@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.api import calibrate
 from calibration.attribution.moves import groups_that_may_differ
 from calibration.report.robot_verdict import RobotVerdict
 from calibration.statistics.gls import repeat_count, repeat_covariance
@@ -24,6 +23,7 @@ from calibration.verdict.record import facts, verdict_record
 from calibration.words.render import next_steps
 from sim.inputs import load_robot
 from sim.model.uncertainty import DEFAULTS, Sigma
+from softflagella.closed_loop import calibrate
 from tests.calibration.toy_tables import (
     DRAG,
     LENGTHS_CM,

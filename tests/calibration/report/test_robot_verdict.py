@@ -13,7 +13,6 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from calibration.__main__ import main as calibration
 from calibration.report.corrected_robot import calibration_knowledge, corrected_robot, corrected_toml, handed_on
 from calibration.report.report import write_report
 from calibration.report.robot_verdict import FILES, RobotVerdict
@@ -34,7 +33,7 @@ from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule, load_schedule
 from sim.motion.replay import replay
-from softflagella.__main__ import main as planner
+from softflagella.__main__ import main as softflagella
 from surrogate.__main__ import main as surrogate
 from surrogate.table_file import load_table
 from tests.calibration.toy_tables import (
@@ -148,9 +147,9 @@ def test_from_a_table_to_a_path_whose_stated_error_holds(
     make_table(truth, seed=8, tails=(2, 3, 4), lengths_cm=(6.0, 9.0), title="").to_csv(tmp_path / "runs.csv")
     robot, table, out = (str(tmp_path / name) for name in ("out/corrected.toml", "robot.json", "plan"))
     words = ["calibrate", str(tmp_path / "runs.csv"), "--robot", str(tmp_path / "given.toml")]
-    assert run_command(calibration, [*words, "--no-laws", "--no-path", "--out", str(tmp_path / "out")]) == 0
+    assert run_command(softflagella, [*words, "--no-laws", "--no-path", "--out", str(tmp_path / "out")]) == 0
     assert run_command(surrogate, ["robot", robot, "--out", table]) == 0
-    assert run_command(planner, ["plan", "circle:2l", "--robot", robot, "--lookup", table, "--out", out]) == 0
+    assert run_command(softflagella, ["plan", "circle:2l", "--robot", robot, "--lookup", table, "--out", out]) == 0
     record = load_plan(Path(out) / "plan.json")
     error = tracking_error(record, _swum(load_schedule(Path(out) / "plan.json"), load_robot(robot), truth))
     assert error.largest < record["stated_error_over_l"] < 6 * error.largest

@@ -65,8 +65,9 @@ def test_a_missing_table_is_refused_before_anything_slow_is_loaded() -> None:
     code = """
 import sys
 from calibration.__main__ import program
+from softflagella.__main__ import main
 from common.errors import run_command
-assert run_command(program.main, ["calibrate", "none.csv", "--robot", "r.toml", "--out", "o"]) == 2
+assert run_command(main, ["calibrate", "none.csv", "--robot", "r.toml", "--out", "o"]) == 2
 assert run_command(program.main, ["tracks", "none.csv", "runs.csv", "--out", "o"]) == 2
 assert not {"numba", "scipy", "matplotlib"} & set(sys.modules)
 """

@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.__main__ import main
 from calibration.report.report import write_report
 from calibration.statistics.gls import repeat_covariance
 from calibration.swimmer.measured_table import read_measurements
@@ -22,6 +21,7 @@ from calibration.verdict.verdict import Verdict
 from common.errors import run_command
 from sim.inputs import load_robot
 from sim.model.uncertainty import DEFAULTS, Sigma
+from softflagella.__main__ import main
 from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, FEW_DRAWS, START, install_few_candidates
 from tests.oracles.spheres import median_error, read_spheres
 from tests.reference.make import GIVEN, HERE, TABLES

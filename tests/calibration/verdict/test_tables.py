@@ -10,12 +10,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.__main__ import main
 from calibration.statistics.gls import SESSION_SHARE
 from calibration.statistics.study import middle_session
 from calibration.swimmer.measured_table import PROTOCOLS, read_measurements
 from calibration.verdict.record import verdict_record
 from common.errors import InputError, run_command
+from softflagella.__main__ import main
 from tests.calibration.toy_tables import DRAG, calibrated, effect, toy_table
 from tests.page_text import PageText
 

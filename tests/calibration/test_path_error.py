@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import calibration.report.path_error
-from calibration.__main__ import main
-from calibration.report.path_error import DEFAULT_PATHS, PathError, path_errors, wanted_paths
+import softflagella.path_error
+from calibration.report.path_error import PathError
 from common.errors import InputError, run_command
 from planner.paths.distance import distance_to
 from sim.knowledge import CalibrationKnowledge
@@ -20,6 +19,8 @@ from sim.model.learnt_range import learnt_range
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.motion.replay import replay
+from softflagella.__main__ import main
+from softflagella.path_error import DEFAULT_PATHS, path_errors, wanted_paths
 from surrogate.interface import LookupTable
 from surrogate.robot_table import RobotTable
 from surrogate.table_file import load
@@ -47,7 +48,7 @@ def _own_tables_once(monkeypatch: pytest.MonkeyPatch) -> None:
     def table(robot: Robot) -> LookupTable:
         return next((own_table(name) for name, known in ROBOTS.items() if known == robot), load())
 
-    monkeypatch.setattr(calibration.report.path_error, "tabulate", table)
+    monkeypatch.setattr(softflagella.path_error, "tabulate", table)
 
 
 @shared
@@ -65,7 +66,7 @@ def error_of(knowledge: str = "sure") -> PathError:
 def test_the_error_is_that_of_a_replay_in_time_steps() -> None:
     error = error_of()
     carried = error.carried_out["as_given"]
-    track = replay(carried.plan.schedule(CORRECTED))
+    track = replay(carried.schedule)
     places = CORRECTED.tail_length * track[["x_over_l", "y_over_l"]].to_numpy()
     distance = distance_to(error.polyline, places)
     weight = np.gradient(track["time_bar"].to_numpy())
@@ -95,7 +96,7 @@ def test_the_corrected_robot_s_plan_leads_along_the_path_and_the_other_does_not(
         for key in ("rms", "largest", "end", "within", "end_interval"):
             lengths = np.array(entry[f"{key}_over_l"]) * 100 * LENGTH
             np.testing.assert_allclose(entry[f"{key}_cm"], lengths, rtol=1e-12)
-        assert entry["dwells"] == len(carried.plan.dwells)
+        assert entry["dwells"] == len(carried.schedule.dwells)
     assert "planned with the robot as given" in error.sentence
     assert "cm rms" in error.sentence
 
@@ -108,7 +109,8 @@ def test_a_less_certain_calibration_states_wider_errors_and_a_current_carries_th
         assert two.rms == pytest.approx(one.rms, rel=0.2)
         assert two.within > one.within
         assert np.ptp(two.end_interval) > 2 * np.ptp(one.end_interval)
-    seconds = float(sure["as_given"].plan.seconds.sum())
+    schedule = sure["as_given"].schedule
+    seconds = float(schedule.dwells.sum()) * schedule.time_scale
     moved = carried["as_given"].track[-1] - sure["as_given"].track[-1]
     np.testing.assert_allclose(moved, seconds * np.array([2e-5, -1e-5]), rtol=1e-6)
     assert carried["corrected"].rms < 0.03 * LENGTH
