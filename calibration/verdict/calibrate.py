@@ -8,7 +8,7 @@
    of every effect unless it would be far outside its prior (`calibration.attribution.wrong_numbers`). Single
    effects (`calibration.attribution.refits`), effects beside a wrong number, and pairs follow, each only if
    nothing before explains the residual.
-4. The verdict (`calibration.verdict.verdict.Explained`).
+4. The verdict (`calibration.verdict.findings.Explained`).
 5. If several explanations are left, next runs that would tell them apart (`calibration.verdict.next_runs`).
    If nothing explains the residual, laws that describe it (`describe`). Where none does, the nearest form is
    adopted (`calibration.attribution.nearest`). If something outside the catalogue could imitate what is claimed,
@@ -76,8 +76,9 @@ from calibration.statistics.weights import (
     noise_of_any_run,
     rows_of_little_weight,
 )
+from calibration.verdict.findings import Explained, HeldOutErrors
 from calibration.verdict.next_runs import Explanation, next_runs
-from calibration.verdict.verdict import Explained, HeldOutErrors, Verdict
+from calibration.verdict.verdict import Verdict
 from common.arrays import Flags, Floats
 from common.errors import InputError
 from common.provenance import fingerprint

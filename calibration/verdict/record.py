@@ -6,7 +6,7 @@ Its keys are a format, and older than the names here. `calibration.words` has th
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,19 +17,17 @@ from calibration.statistics.excluded import count_of_rows
 from calibration.statistics.fit import Fit, Pull, least_determined
 from calibration.statistics.gls import inverse_root
 from calibration.statistics.statistical_model import Parameter
+from calibration.verdict.findings import Findings
 from calibration.words.render import next_steps, sentence
 from common.provenance import provenance
 from surrogate.domain import COEFFICIENTS
-
-if TYPE_CHECKING:
-    from calibration.verdict.verdict import Verdict
 
 MODELS = ("uncalibrated", "before", "after", "law", "new_specimen")  # with stated errors
 _REPEATED = 5  # settings that are proposed for repeats where nothing explains the residual
 _NEAR = 0.5  # share of the residual that the best effect must remove to be named where none explains it
 
 
-def verdict_record(result: Verdict, *, table: str, path: dict[str, Any] | None = None) -> dict[str, Any]:
+def verdict_record(result: Findings, *, table: str, path: dict[str, Any] | None = None) -> dict[str, Any]:
     """Write a verdict as verdict.json has it, with the errors on paths."""
     record = facts(result)
     return {
@@ -43,7 +41,7 @@ def verdict_record(result: Verdict, *, table: str, path: dict[str, Any] | None =
     }
 
 
-def facts(result: Verdict) -> dict[str, Any]:
+def facts(result: Findings) -> dict[str, Any]:
     """Collect what a verdict is made of: numbers and names, without sentences."""
     return {
         "verdict": result.verdict,
@@ -70,7 +68,7 @@ def shown(parameter: Parameter) -> dict[str, Any]:
     }
 
 
-def _fitted(result: Verdict) -> dict[str, Any]:
+def _fitted(result: Findings) -> dict[str, Any]:
     final, refit = result.final, result.final_refit.parameters
     fitted = {p.name: p for p in (*result.base.fitted, *final.fitted)}
     intervals = result.final_intervals
@@ -102,7 +100,7 @@ def _least_determined(final: Fit) -> dict[str, Any] | None:
     return {"direction": direction, "error": error}
 
 
-def _claims(result: Verdict) -> dict[str, Any]:
+def _claims(result: Findings) -> dict[str, Any]:
     found, nearest = result.found, result.nearest
     return {
         "claims": [
@@ -138,7 +136,7 @@ def _candidate(c: Candidate) -> dict[str, Any]:
     }
 
 
-def _nearest_candidate(result: Verdict) -> dict[str, Any] | None:
+def _nearest_candidate(result: Findings) -> dict[str, Any] | None:
     """Find the single effect that removes most of the residual, if one was refitted and removes much."""
     refits = [(c.refit.deviance, c.effect.title, c.verdict) for c in result.found.candidates if c.refit]
     if not refits:
@@ -149,7 +147,7 @@ def _nearest_candidate(result: Verdict) -> dict[str, Any] | None:
     return {"title": title, "removed_share": share, "reason": reason} if share >= _NEAR else None
 
 
-def _numbers(result: Verdict) -> dict[str, Any]:
+def _numbers(result: Findings) -> dict[str, Any]:
     pulls = result.pulls
     learnt = [p for p in pulls if p.learnt]
     explained = result.verdict not in ("partial", "unexplained")
@@ -184,7 +182,7 @@ def _number(pull: Pull) -> dict[str, Any]:
     }
 
 
-def _errors(result: Verdict) -> dict[str, Any]:
+def _errors(result: Findings) -> dict[str, Any]:
     errors = result.errors
     return {
         **{f"error_{name}": errors.rms.get(name) for name in MODELS},
@@ -200,7 +198,7 @@ def _errors(result: Verdict) -> dict[str, Any]:
     }
 
 
-def _tests(result: Verdict) -> dict[str, Any]:
+def _tests(result: Findings) -> dict[str, Any]:
     misfit = result.found.misfit
     return {
         "p_value": misfit.p_value,
@@ -213,7 +211,7 @@ def _tests(result: Verdict) -> dict[str, Any]:
     }
 
 
-def _largest_departures(result: Verdict) -> list[dict[str, Any]]:
+def _largest_departures(result: Findings) -> list[dict[str, Any]]:
     """List the settings at which fitted runs depart most from the calibrated model, the farthest first.
 
     A departure is the root mean square, over the outputs, of the mean over repeats in its standard deviations.
@@ -230,7 +228,7 @@ def _largest_departures(result: Verdict) -> list[dict[str, Any]]:
     return [{"at": list(at), "departure": departure} for at, departure in ranked]
 
 
-def _descriptions(result: Verdict) -> dict[str, Any]:
+def _descriptions(result: Findings) -> dict[str, Any]:
     law = result.law
     return {
         "laws": law.to_dict(result.final if result.explaining else None) if law else None,
@@ -238,7 +236,7 @@ def _descriptions(result: Verdict) -> dict[str, Any]:
     }
 
 
-def _next(result: Verdict) -> dict[str, Any]:
+def _next(result: Findings) -> dict[str, Any]:
     return {
         "explanations": [e.record() for e in result.explanations],
         "next_runs": [run.record() for run in result.next_runs],
@@ -246,7 +244,7 @@ def _next(result: Verdict) -> dict[str, Any]:
     }
 
 
-def _data(result: Verdict) -> dict[str, Any]:
+def _data(result: Findings) -> dict[str, Any]:
     runs = result.runs
     scatter = np.sqrt(np.diag(result.base.noise.run)).tolist()
     settings = runs.settings.items()

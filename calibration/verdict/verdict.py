@@ -1,112 +1,18 @@
-"""The verdict on a table of runs: its rule, and what it contains.
-
-"none": no departure beyond noise. "number": a nuisance parameter is wrong, and explains it. "effect": one effect,
-or one pair, explains it. "ambiguous": several do, and the runs cannot tell them apart. "unexplained": there is a
-departure, and nothing in the catalogue explains it. A law may describe it; a law is no claim about the cause.
-"partial": the same, but an effect, with a size that may differ between specimens, predicts runs that it has not
-seen (`calibration.attribution.nearest`). It is adopted as a description, and claims no cause.
-"""
+"""The verdict on a table of runs, in words."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from calibration.attribution.claim_checks import NumberCheck
-from calibration.attribution.moves import StatedMove
-from calibration.attribution.nearest import Nearest
-from calibration.attribution.refits import Candidate, Rival
-from calibration.attribution.wrong_numbers import wrong_number
-from calibration.laws.laws import Laws
-from calibration.statistics.excluded import Excluded, count_of_rows, summary_of_excluded
-from calibration.statistics.fit import Fit, Pull
-from calibration.statistics.residual_tests import Directions, Misfit
-from calibration.statistics.statistical_model import Experiment, Runs
-from calibration.statistics.study import FinalRefit, Split
-from calibration.verdict.next_runs import Batch, Explanation, NextRun
+from calibration.verdict.findings import Findings
 from calibration.verdict.record import facts
 from calibration.words.render import errors_in_words, sentence
 
-_DISAGREES = 0.01  # p of the held-out runs below which they do not agree with the final model
 _LONGEST = 500  # letters of a sentence in a repr
-_LAWS_TOLD_APART = 3  # beside a claim; the more there are, the fewer runs tell all of them apart
-
-
-@dataclass(frozen=True)
-class Explained:
-    """The fit without effects, its residual, and what explains the residual."""
-
-    base: Fit
-    misfit: Misfit  # of the base
-    tangents: Directions  # of the effects
-    candidates: tuple[Candidate, ...]  # all effects of the catalogue
-    best: tuple[Candidate, ...] = ()  # what explains the residual, best first; more than one: not told apart
-    number: Fit | None = None  # the fit with a wrong nuisance parameter freed, if that explains the residual
-    rival_effects: tuple[Candidate, ...] = ()  # effects that explain as much as the wrong number does
-    rival_numbers: tuple[Pull, ...] = ()  # the wrong numbers, where effects come ahead of them
-    number_check: NumberCheck | None = None  # of the wrong number, where it comes ahead of effects
-    nearest: Nearest | None = None  # the form that is adopted where nothing explains the residual
-    unkept: Fit | None = None  # the best fit with effects, where none explains the residual
-
-    @property
-    def final(self) -> Fit:
-        """The model with the effects of the verdict, with the form that is adopted, or without any."""
-        if self.nearest:
-            return self.nearest.fit
-        if self.best and self.best[0].refit:
-            return self.best[0].refit
-        return self.number or self.base
-
-    def verdict(self, level: float) -> str:
-        """Decide the verdict; this is the rule of the whole calibration.
-
-        A wrong nuisance parameter comes ahead of every effect that is not better, or it is one of several
-        explanations. Without one, a residual within the noise is "none". Beyond it, the number of explanations
-        that the runs cannot tell apart decides. What new runs say about an "ambiguous" verdict is decided by
-        `calibration.verdict.next_runs.standings`.
-
-        Args:
-            level: α of the residual's p-value.
-        """
-        if self.number and not self.best:
-            return "number"
-        if self.misfit.p_value >= level:
-            return "none"
-        explanations = len(self.best) + bool(self.rival_numbers)
-        return ("partial" if self.nearest else "unexplained", "effect", "ambiguous")[min(explanations, 2)]
-
-    def rivals(self, model: Experiment, laws: tuple[Rival, ...]) -> tuple[Rival, ...]:
-        """List explanations that the runs cannot tell apart, best first; none if there are not two.
-
-        Args:
-            laws: that fit as well as the best effect; the first of them come last.
-        """
-        known = [(c.title, c.refit) for c in (*self.best, *self.rival_effects) if c.refit]
-        if self.number and known:
-            wrong = ", ".join(alike[0].parameter.title for alike in self.number.wrong_numbers)
-            number = f"the stated value of {wrong} is wrong", self.number
-            known = [*known, number] if self.best else [number, *known]
-        rivals = (*(Rival(title, refit, model) for title, refit in known), *laws[:_LAWS_TOLD_APART])
-        return rivals if len(rivals) > 1 else ()
-
-
-@dataclass(frozen=True)
-class HeldOutErrors:
-    """How far each model is from the held-out runs, relative rms, and how far noise alone would be.
-
-    The models are "uncalibrated", "before" (calibrated), "after" (with the effects of the verdict), and, if there
-    are such, "law" (with the best law) and "new_specimen" (the adopted form, of mean size for every specimen).
-    """
-
-    rms: dict[str, float]  # of each model, over all outputs
-    by_output: dict[str, dict[str, float]]  # model -> output -> relative rms
-    after_interval: tuple[float, float]  # 95 %
-    noise: float  # of a run, from the repeats
-    p_value: float  # agreement of the held-out runs with the final model
 
 
 @dataclass(frozen=True, repr=False)
-class Verdict:
+class Verdict(Findings):
     """What runs say about a model; made by `softflagella.calibrate`.
 
     Example:
@@ -114,27 +20,6 @@ class Verdict:
         >>> calibrate("runs.csv", "robot.toml").sentence  # doctest: +SKIP
         'No effect is missing that these runs can show (p = 0.43).'
     """
-
-    verdict: str  # "none", "number", "effect", "ambiguous", "partial", "unexplained"; see `Explained.verdict`
-    runs: Runs  # that were calibrated with
-    split: Split  # fitted and held-out runs
-    found: Explained  # the residual, and what explains it
-    moves: tuple[StatedMove, ...]  # numbers that differ in some runs
-    errors: HeldOutErrors  # on the held-out runs
-    base_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
-    final_intervals: dict[str, tuple[float, float]]  # the same, of the final model
-    pulls: tuple[Pull, ...]  # of every nuisance parameter in the final model, the farthest first
-    final_refit: FinalRefit  # the final model, fitted to all runs
-    law: Laws | None  # laws, where they were looked for
-    explanations: tuple[Explanation, ...]  # that the runs cannot tell apart, best first; none if there are not two
-    next_runs: tuple[NextRun, ...]  # single settings that would, the best first
-    next_batch: Batch | None  # the same, for several runs together
-    untestable: dict[str, str]  # effects that these runs cannot test: what is missing
-    draws: int  # of the bootstrap
-    fixed_before: str  # hash of what was fixed before the runs were looked at
-    little_weight: tuple[int, ...]  # rows of the table whose runs have less than half of the usual weight
-    not_tried: tuple[str, ...]  # because no time was left; such a verdict is provisional
-    caveats: tuple[str, ...]  # what weakens the conclusion, in words
 
     def __repr__(self) -> str:
         record = facts(self)
@@ -151,120 +36,3 @@ class Verdict:
     def errors_in_words(self) -> str:
         """The errors on the held-out runs, in a line."""
         return errors_in_words(facts(self))
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Names of the effects that explain the residual."""
-        return tuple(dict.fromkeys(e.name for c in self.explaining for e in c.claimed))
-
-    @property
-    def explaining(self) -> tuple[Candidate, ...]:
-        """What explains the residual, best first."""
-        return self.found.best
-
-    @property
-    def nearest(self) -> Nearest | None:
-        """The form that is adopted, of a partial verdict."""
-        return self.found.nearest
-
-    @property
-    def base(self) -> Fit:
-        """The calibrated model, without effects."""
-        return self.found.base
-
-    @property
-    def final(self) -> Fit:
-        """The model with the effects of the verdict, with the form that is adopted, or without any."""
-        return self.found.final
-
-    @property
-    def error_uncalibrated(self) -> float:
-        """Relative error of the model as given on the held-out runs."""
-        return self.errors.rms["uncalibrated"]
-
-    @property
-    def error_before(self) -> float:
-        """Relative error of the calibrated model on the held-out runs."""
-        return self.errors.rms["before"]
-
-    @property
-    def error_after(self) -> float:
-        """Relative error of the model with the effects of the verdict on the held-out runs."""
-        return self.errors.rms["after"]
-
-    @property
-    def error_corrected(self) -> float:
-        """Relative error of the corrected robot on the held-out runs."""
-        if self.described:
-            return self.errors.rms["law"]
-        return self.error_before if self.nearest and not self.held_out_error_falls else self.error_after
-
-    @property
-    def noise_ceiling(self) -> float:
-        """Relative error that noise alone makes."""
-        return self.errors.noise
-
-    @property
-    def excluded(self) -> tuple[Excluded, ...]:
-        """Rows and columns that were not used, and why."""
-        return (*self.runs.excluded, *self.split.outliers)
-
-    @property
-    def rows(self) -> int:
-        """Number of rows of the table, used or not."""
-        return len(self.runs) + count_of_rows(self.runs.excluded)
-
-    @property
-    def summary_of_excluded(self) -> list[str]:
-        """What was excluded, by reason, with the number of rows."""
-        return summary_of_excluded(self.excluded, self.rows)
-
-    @property
-    def wrong_numbers(self) -> tuple[tuple[Pull, ...], ...]:
-        """Nuisance parameters that the runs contradict; each with those that may be wrong in its place.
-
-        Where nothing explains the residual there are none: what is missing pulls at them, too.
-        """
-        if self.verdict in ("partial", "unexplained"):
-            return ()
-        freed = {p.parameter.name: p for p in self.pulls if p.freed}
-        known = tuple((freed[alike[0].parameter.name], *alike[1:]) for alike in self.final.wrong_numbers)
-        further = wrong_number([p for p in self.pulls if not p.freed])
-        return (*known, further) if further else known
-
-    @property
-    def held_out_error_falls(self) -> bool | None:
-        """Whether what is claimed lowers the error on the held-out runs; None where nothing is claimed."""
-        return None if self.verdict in ("none", "unexplained") else self.error_after < self.error_before
-
-    @property
-    def held_out_runs_agree(self) -> bool:
-        """Whether the held-out runs agree with the final model."""
-        return self.errors.p_value >= _DISAGREES
-
-    @property
-    def harmless(self) -> bool:
-        """Whether an unexplained residual is so small that predictions do not suffer from it.
-
-        If noise and departure add in squares, the departure is smaller than the noise of a run where the error on
-        the held-out runs is below √2 times that noise. The whole 95 % interval of the error must be below it, the
-        interval must reach down to the noise, and the held-out runs must agree with the calibrated model.
-        """
-        low, high = self.errors.after_interval
-        small = low <= self.noise_ceiling and high < math.sqrt(2) * self.noise_ceiling
-        return self.verdict == "unexplained" and small and self.held_out_runs_agree
-
-    @property
-    def described(self) -> bool:
-        """Whether a law describes a residual that nothing explains, and leaves no more than noise."""
-        return self.verdict == "unexplained" and self.law is not None and self.law.complete
-
-    @property
-    def in_form_only(self) -> tuple[str, ...]:
-        """Named effects whose whole interval is outside the sizes that their source allows."""
-        names = []
-        for effect in self.explaining[0].claimed if self.explaining else ():
-            low, high = self.final_intervals[effect.name]
-            if effect.plausible and (high < effect.plausible[0] or low > effect.plausible[1]):
-                names.append(effect.name)
-        return tuple(names)

@@ -10,8 +10,9 @@ import pytest
 
 from calibration.attribution.claim_checks import NumberCheck
 from calibration.verdict import calibrate
+from calibration.verdict.findings import Explained, HeldOutErrors
 from calibration.verdict.record import facts
-from calibration.verdict.verdict import Explained, HeldOutErrors, Verdict
+from calibration.verdict.verdict import Verdict
 from calibration.words.render import next_steps
 from common.errors import InputError
 from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, ambiguous, calibrated, none, number, toy_table
