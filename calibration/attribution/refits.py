@@ -23,6 +23,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -40,10 +41,28 @@ IMITABLE = 0.05  # imitability index above which a claim needs a reservation
 SURE = 0.01  # p-value of the transfer test below which it is
 INDISTINGUISHABLE = 6.63  # χ² with one degree of freedom, 99 %
 UNSEEN = 1e9  # smallest detectable size of an effect that changes nothing
-NO_TIME = "no time was left for its fit"
 FIRST = 3  # number of single effects to which a second one is added
 _CURVED = 0.3  # share of the best score's z² below which an effect is not refitted if it leaves too much
 _DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
+
+
+class Judgement(StrEnum):
+    """Whether an effect is kept; if not, why, in the words of the report."""
+
+    KEPT = "kept"
+    NOT_NEEDED = "not needed"
+    NO_CHANGE = "it changes nothing in these runs"
+    ABSORBED = "the coefficients absorb it: not testable with these runs"
+    NOISE = "score within the noise"
+    WRONG_SIGN = "its score has a sign that the effect cannot have"
+    LEAVES_MUCH = "leaves far more than noise, by its score"
+    NO_TIME = "no time was left for its fit"
+    NOT_SOLVED = "with it the motion of some runs is not found directly"
+    NOT_CONVERGED = "its fit did not converge"
+    LEAVES_RESIDUAL = "leaves a residual"
+    INCLUDES_NULL = "its interval includes the null"
+    NOT_PREDICTIVE = "does not predict left-out sessions better"
+    COSTS_MORE = "costs more than it gains beside a single effect"
 
 
 @dataclass(frozen=True)
@@ -56,7 +75,7 @@ class Candidate:
     survived: float  # share of its signal that the fit cannot absorb
     detectable: float  # size that is found half of the time: critical |z| / signal per unit
     detectable_exact: float  # the same if every nuisance parameter were exact
-    verdict: str  # why it was kept or not
+    judgement: Judgement
     refit: Fit | None = None  # the model with this effect
     refit_misfit: Misfit | None = None  # tests of the residual that the refit leaves
     gain: float = 0.0  # predictive gain summed over left-out sessions, in log likelihood
@@ -66,7 +85,14 @@ class Candidate:
 
     @property
     def kept(self) -> bool:
-        return self.verdict == "kept"
+        return self.judgement is Judgement.KEPT
+
+    @property
+    def reason(self) -> str:
+        """Why it was kept or not, in words."""
+        if self.judgement is Judgement.LEAVES_RESIDUAL and self.refit_misfit:
+            return f"{self.judgement} (p ≤ {self.refit_misfit.p_value:.1g})"
+        return str(self.judgement)
 
     @property
     def uncertain(self) -> bool:
@@ -116,7 +142,7 @@ def unexamined(
             survived=float(scores.survived[j]),
             detectable=threshold / max(float(scores.length[j]), 1e-300),
             detectable_exact=threshold / max(float(misfit.exact_length[j]), 1e-300),
-            verdict="not needed",
+            judgement=Judgement.NOT_NEEDED,
         )
         for j, effect in enumerate(effects)
     ]
@@ -165,12 +191,12 @@ def examine(
     order = np.argsort(-np.abs(misfit.scores.z)).tolist()
     for j in tqdm(order, desc=title, unit="effect", delay=1.0, disable=not study.progress or None):
         effect, candidate = effects[j], scored[j]
-        if reasons[j]:
-            examined.append(replace(candidate, verdict=reasons[j]))
+        if reason := reasons[j]:
+            examined.append(replace(candidate, judgement=reason))
             continue
         guess = _guess(base, misfit, candidate, j) if local else effect.start
         if skipped(f"a second effect beside {beside[0].title}" if beside else effect.title):
-            examined.append(replace(candidate, verdict=NO_TIME))
+            examined.append(replace(candidate, judgement=Judgement.NO_TIME))
             continue
         size = {effect.name: min(max(guess, effect.bounds[0]), effect.bounds[1])}
         if effect.second is not None:
@@ -181,22 +207,22 @@ def examine(
         try:
             refit = fit(study.model, start, names, study.split.fitted, target=target, title="")
         except UnsolvedError:
-            examined.append(replace(candidate, verdict="with it the motion of some runs is not found directly"))
+            examined.append(replace(candidate, judgement=Judgement.NOT_SOLVED))
             continue
         examined.append(judge(study, candidate, base, refit, directions.without(j)))
         if after_first:
-            after_first(reasons.count(""), time.process_time() - began)
+            after_first(reasons.count(None), time.process_time() - began)
             after_first = None
     return examined
 
 
 def reasons_not_to_refit(
     study: Study, base: Fit, misfit: Misfit, needed: float, beside: tuple[Parameter, ...] = ()
-) -> list[str]:
-    """Say for each effect why it is not worth a refit by its score; empty if it is. See `examine`."""
+) -> list[Judgement | None]:
+    """Say for each effect why it is not worth a refit by its score; None if it is. See `examine`."""
     effects = [e for e in study.model.effects if e not in beside]
     if not coefficients_within_range(study.model, base.parameters):
-        return [""] * len(effects)
+        return [None] * len(effects)
     most = study.noise_at_most(len(base.names))
     return [_reason(c, base, misfit, j, needed, most) for j, c in enumerate(unexamined(misfit, effects, needed))]
 
@@ -206,24 +232,26 @@ def _guess(base: Fit, misfit: Misfit, candidate: Candidate, place: int) -> float
     return base.parameters[candidate.effect.name] + candidate.z / max(float(misfit.scores.length[place]), 1e-300)
 
 
-def _reason(candidate: Candidate, base: Fit, misfit: Misfit, place: int, needed: float, most: float) -> str:
+def _reason(
+    candidate: Candidate, base: Fit, misfit: Misfit, place: int, needed: float, most: float
+) -> Judgement | None:
     """Say why an effect with this score is not worth a refit; `most`: what noise may leave."""
     effect, z, guess = candidate.effect, candidate.z, _guess(base, misfit, candidate, place)
     low, high = effect.bounds
     if candidate.detectable > UNSEEN:
-        return "it changes nothing in these runs"
+        return Judgement.NO_CHANGE
     if candidate.survived < TESTABLE:
-        return "the coefficients absorb it: not testable with these runs"
+        return Judgement.ABSORBED
     if abs(z) < needed:
-        return "score within the noise"
+        return Judgement.NOISE
     if not low <= guess <= high and (guess < low) == (effect.start == low):
-        return "its score has a sign that the effect cannot have"
+        return Judgement.WRONG_SIGN
     # A refit takes z² from the deviance if the model is linear. `_CURVED` allows for its curvature.
     remainder = base.deviance - z**2 / _CURVED
     best = float(np.max(np.where(misfit.scores.survived >= TESTABLE, misfit.scores.z**2, 0.0)))
     if z**2 < _CURVED * best and remainder > most:
-        return "leaves far more than noise, by its score"
-    return ""
+        return Judgement.LEAVES_MUCH
+    return None
 
 
 def coefficients_within_range(model: ForwardModel, fitted: Parameters) -> bool:
@@ -249,7 +277,7 @@ def pairs(study: Study, candidates: Sequence[Candidate]) -> list[Candidate]:
     judged: dict[frozenset[str], Candidate] = {}
     for pair in second:
         if pair.kept and pair.refit is not None and ebic(study, pair.refit, 2) >= single:
-            pair = replace(pair, verdict="costs more than it gains beside a single effect")
+            pair = replace(pair, judgement=Judgement.COSTS_MORE)
         known = judged.setdefault(frozenset(e.name for e in pair.claimed), pair)
         if pair.kept and not known.kept:
             judged[frozenset(e.name for e in pair.claimed)] = pair
@@ -285,18 +313,18 @@ def judge(study: Study, candidate: Candidate, base: Fit, refit: Fit, others: Dir
     )
     gain, error = session_gain(study, base, refit)
     low, high = interval_at_second(refit, candidate.effect)
-    verdict = "kept"
+    judgement = Judgement.KEPT
     if refit.stopped:
-        verdict = NO_TIME
+        judgement = Judgement.NO_TIME
     elif not refit.converged:
-        verdict = "its fit did not converge"
+        judgement = Judgement.NOT_CONVERGED
     elif after.p_value < study.level / 2:
-        verdict = f"leaves a residual (p ≤ {after.p_value:.1g})"
+        judgement = Judgement.LEAVES_RESIDUAL
     elif low <= candidate.effect.start <= high:
-        verdict = "its interval includes the null"
+        judgement = Judgement.INCLUDES_NULL
     elif gain <= error:
-        verdict = "does not predict left-out sessions better"
-    return replace(candidate, refit=refit, refit_misfit=after, gain=gain, gain_error=error, verdict=verdict)
+        judgement = Judgement.NOT_PREDICTIVE
+    return replace(candidate, refit=refit, refit_misfit=after, gain=gain, gain_error=error, judgement=judgement)
 
 
 def interval_at_second(refit: Fit, effect: Parameter) -> tuple[float, float]:

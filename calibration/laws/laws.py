@@ -30,6 +30,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -57,14 +58,24 @@ from calibration.words.render import say_laws
 from common.arrays import Floats
 from common.errors import InputError
 
-NO_SESSIONS = "does not predict left-out sessions better"
-NOT_CONVERGED = "its fit did not converge"
-AT_THE_END = "a number is at the end of its range"
-UNDETERMINED = (NOT_CONVERGED, AT_THE_END)  # reasons for which the runs exclude the numbers, not the place
-NO_LEVER = "its lever is not told from none: a side force at the disc"  # unless that one fits worse
 _LARGEST_AT_START = 50.0  # size of a term
 _RPM = 30 / math.pi
 _DRAWS = 400  # of the bootstrap, for the residual that a law leaves
+
+
+class Rejection(StrEnum):
+    """Why a law is not kept, in the words of the report."""
+
+    NOT_CONVERGED = "its fit did not converge"
+    AT_THE_END = "a number is at the end of its range"
+    NO_GAIN = "its BIC is not smaller than that without a law"
+    INCLUDES_NULL = "the intervals of all its numbers include the null"
+    NO_LEVER = "its lever is not told from none: a side force at the disc"  # unless that one fits worse
+    NOT_PREDICTIVE = "does not predict left-out sessions better"
+
+
+# The runs exclude the numbers, not the place.
+UNDETERMINED = (Rejection.NOT_CONVERGED, Rejection.AT_THE_END)
 
 
 @dataclass(frozen=True)
@@ -81,7 +92,7 @@ class Law:
     p_value: float  # of the residual that it leaves
     error: float  # relative rms on the held-out runs
     error_interval: tuple[float, float]  # 95 %
-    reason: str  # why it is not kept; empty if it is
+    reason: Rejection | None  # why it is not kept; None if it is
     elsewhere: tuple[Law, ...] = ()  # of a side force at the disc: the same with a lever that is not told from 0
 
     @property
@@ -152,7 +163,7 @@ class Law:
             "p_value": self.p_value,
             "error": self.error,
             "error_interval": list(self.error_interval),
-            "reason": self.reason,
+            "reason": self.reason or "",
         }
 
 
@@ -174,17 +185,16 @@ def fitted_law(
         return None
     gain = base.deviance - refit.deviance - len(names) * math.log(study.values)
     predictive = session_gain(study, base, refit)
-    reason = ""
     if not refit.converged:
-        reason = NOT_CONVERGED
+        reason: Rejection | None = Rejection.NOT_CONVERGED
     elif any(refit.parameters[p.name] in p.bounds for p in with_law.effects if p.name in names):
-        reason = AT_THE_END
+        reason = Rejection.AT_THE_END
     elif gain <= 0:
-        reason = "its BIC is not smaller than that without a law"
+        reason = Rejection.NO_GAIN
     elif all(_includes(refit.interval(name), 0.0) for name in names if name != LEVER):
-        reason = "the intervals of all its numbers include the null"
+        reason = Rejection.INCLUDES_NULL
     elif LEVER in names and _includes(refit.interval(LEVER), 0.0):
-        reason = NO_LEVER
+        reason = Rejection.NO_LEVER
     else:
         reason = _of_sessions(predictive)
     again = replace(study, model=with_law, seed=study.seed + 1)
@@ -204,9 +214,9 @@ def fitted_law(
     )
 
 
-def _of_sessions(gain: tuple[float, float]) -> str:
+def _of_sessions(gain: tuple[float, float]) -> Rejection | None:
     """Say whether a law fails to predict left-out sessions better."""
-    return NO_SESSIONS if gain[0] <= gain[1] else ""
+    return Rejection.NOT_PREDICTIVE if gain[0] <= gain[1] else None
 
 
 def with_a_lever(law: Law) -> Law:
@@ -275,7 +285,9 @@ class Laws:
         if not kept:
             return ()
         near = [law for law in kept if law.behind(kept[0]) < INDISTINGUISHABLE]
-        unconfirmed = [law for law in self.fitted if law.reason == NO_SESSIONS and law.gain >= kept[0].gain]
+        unconfirmed = [
+            law for law in self.fitted if law.reason is Rejection.NOT_PREDICTIVE and law.gain >= kept[0].gain
+        ]
         undetermined = [
             law for law in self.fitted if law.reason in UNDETERMINED and law.behind(kept[0]) < INDISTINGUISHABLE
         ]
@@ -402,16 +414,17 @@ def _with_levers(
     """
     fitted = {law.place.name: law for law in laws}
     wanted = {name for law in _kept(laws) for name in law.place.elsewhere}
-    wanted |= {law.place.at_disc for law in laws if law.reason == NO_LEVER}
+    wanted |= {law.place.at_disc for law in laws if law.reason is Rejection.NO_LEVER}
     missing = [one for one in ranked if one.place.name in wanted - set(fitted)]
     fitted |= {law.place.name: law for law in _fit_all(study, model, base, missing, chosen_alone=chosen_alone)}
     for name, law in fitted.items():
         at_disc = fitted.get(law.place.at_disc)
-        if law.reason == NO_LEVER and at_disc and law.gain_at_lever - at_disc.gain > INDISTINGUISHABLE:
+        if law.reason is Rejection.NO_LEVER and at_disc and law.gain_at_lever - at_disc.gain > INDISTINGUISHABLE:
             fitted[name] = with_a_lever(law)
     return [
         replace(law, elsewhere=tuple(
-            fitted[name] for name in law.place.elsewhere if name in fitted and fitted[name].reason == NO_LEVER
+            fitted[name] for name in law.place.elsewhere
+            if name in fitted and fitted[name].reason is Rejection.NO_LEVER
         ))
         if not law.reason else law
         for law in fitted.values()

@@ -132,13 +132,13 @@ def _candidate(c: Candidate) -> dict[str, Any]:
         "size": c.refit.parameters[c.effect.name] if c.refit else None,
         "deviance": c.refit.deviance if c.refit else None,
         "session_gain": [c.gain, c.gain_error],
-        "verdict": c.verdict,
+        "verdict": c.reason,
     }
 
 
 def _nearest_candidate(result: Findings) -> dict[str, Any] | None:
     """Find the single effect that removes most of the residual, if one was refitted and removes much."""
-    refits = [(c.refit.deviance, c.effect.title, c.verdict) for c in result.found.candidates if c.refit]
+    refits = [(c.refit.deviance, c.effect.title, c.reason) for c in result.found.candidates if c.refit]
     if not refits:
         return None
     (deviance, title, reason), before = min(refits), result.base.deviance

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from calibration.laws.law_model import LEVER, SIZE, LawModel, with_law
-from calibration.laws.laws import NO_LEVER, NO_SESSIONS, UNDETERMINED, Law
+from calibration.laws.laws import UNDETERMINED, Law, Rejection
 from calibration.laws.places import in_common, place_named, places
 from calibration.laws.readings import EXPONENTS, in_words, logarithms, motion_patterns, readings
 from calibration.report.corrected_robot import law_handed_on, robot_with_law
@@ -165,7 +165,7 @@ def test_a_side_force_at_the_disc_says_how_far_from_it_it_may_act() -> None:
     laws = laws_of_toy(5, places=("Fx_wt", "Fx_wt_at_l"), law_Fx_wt_speed0_length0_tails1000=4.0).laws
     law = next(law for law in laws.kept if law.place.name == "Fx_wt")
     (behind,) = (one for one in law.elsewhere if one.place.name == "Fx_wt_at_l")
-    assert behind.reason == NO_LEVER
+    assert behind.reason is Rejection.NO_LEVER
     low, high = behind.fit.interval(LEVER)
     assert low < 0.0 < high
     assert f"at the disc or up to {-low:.2f} l behind" in law.words
@@ -181,13 +181,13 @@ def test_what_the_runs_do_not_exclude_stays_in_the_set() -> None:
     def kept(*fitted: Law) -> list[str]:
         return [law.place.name for law in replace(laws, fitted=fitted).kept]
 
-    assert kept(replace(best, reason=NO_SESSIONS), worse) == ["Ct", "Cyr"]
+    assert kept(replace(best, reason=Rejection.NOT_PREDICTIVE), worse) == ["Ct", "Cyr"]
     for reason in UNDETERMINED:
         assert kept(replace(best, reason=reason), worse) == ["Ct", "Cyr"]
         assert kept(best, replace(worse, reason=reason)) == ["Cyr", "Ct"]
         assert kept(best, replace(far, reason=reason)) == ["Cyr"]
-    assert kept(replace(best, reason="its BIC is not smaller than that without a law"), worse) == ["Ct"]
-    assert kept(best, replace(worse, reason=NO_SESSIONS)) == ["Cyr"]
+    assert kept(replace(best, reason=Rejection.NO_GAIN), worse) == ["Ct"]
+    assert kept(best, replace(worse, reason=Rejection.NOT_PREDICTIVE)) == ["Cyr"]
     assert kept(best, far) == ["Cyr"]
     assert kept(best, replace(far, gain_at_lever=best.gain - 4)) == ["Cyr", "Ct"]
     assert kept(replace(best, gain_at_lever=best.gain + 7), worse) == ["Cyr", "Ct"]

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
+from calibration.attribution.refits import Judgement
 from calibration.report.corrected_robot import corrected_robot
 from calibration.report.report import write_report
 from calibration.statistics.fit import Fit, fit, least_determined
@@ -181,7 +182,7 @@ def test_an_effect_that_changes_nothing_says_so(tmp_path: Path) -> None:
     """The toy's tails cannot touch: no size of contact shows, and the report has no size for it."""
     result = ambiguous()
     contact = next(c for c in result.found.candidates if c.effect.name == "tail_contact")
-    assert contact.verdict == "it changes nothing in these runs"
+    assert contact.judgement is Judgement.NO_CHANGE
     write_report(result, verdict_record(result, table="t"), tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text()
     assert "–</td>" in text
