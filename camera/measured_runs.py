@@ -120,45 +120,29 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
     for name in COLUMNS:
         if name not in samples:
             raise InputError(f"the tracks have no column {name!r}; they need {', '.join(COLUMNS)}")
-    dots = [name for name in _DOTS if name in samples]
-    values = pd.DataFrame({name: numbers_of(samples[name]) for name in (*COLUMNS[1:], *dots)})
-    values = values.reset_index(drop=True)
-    values[~(values.abs() < _LARGEST)] = np.nan
-    of_run = {str(name): track for name, track in values.groupby(_names(samples["run"]).to_numpy(), sort=False)}
-    nothing = values.iloc[:0]
+    of_run = _tracks_by_run(samples)
+    nothing = pd.DataFrame(columns=COLUMNS[1:], dtype=float)
     unnamed = of_run.pop("", nothing)
     runs = list(_names(table["run"]))
     if not set(runs) & set(of_run):
         raise InputError(f"no run has a track: the runs are {_listed(runs)}; the tracks are {_listed(of_run)}")
     aside = [f"{len(unnamed)} samples have no name of a run"] if len(unnamed) else []
     aside += [f"run {name}: a track, but no row among the runs" for name in of_run if name not in runs]
-    tracked: list[TrackedRun] = []
+    tracked: list[TrackedRun] = [TrackedRun() for _ in runs]
     spins: list[dict[str, float]] = [{} for _ in runs]
     fitted: list[Track] = []
     for index, run in enumerate(runs):
-        track = of_run.get(run, nothing)
-        known_samples = track[list(COLUMNS[1:])].notna().all(axis=1)
-        if not known_samples.all():
-            aside.append(f"run {run}: {int((~known_samples).sum())} samples with a value that is not a number")
-        track = track[known_samples]
-        back = track.index[1:][np.diff(track["time_s"]) < 0]
-        if len(back) or len(track) < _FEWEST:
-            aside.append(
-                f"run {run}: its time goes back at {row_name(samples, back[0])}; give its samples in order, with "
-                "a clock that runs on"
-                if len(back)
-                else f"run {run}: {len(track)} samples; a track needs at least {_FEWEST}"
-            )
-            tracked.append(TrackedRun())
+        track = _usable(of_run.get(run, nothing), run, samples, aside)
+        if track is None:
             continue
         time, x, y, heading = (track[c].to_numpy(dtype=float) for c in COLUMNS[1:])
         _check_radians(run, x, y, heading)
         side = -1.0 if y_down else 1.0
         fit = _fitted(time, x, side * y, side * heading)
-        tracked.append(TrackedRun() if fit is None else fit.result)
         if fit is None:
             aside.append(f"run {run}: neither a circle nor a line fits its samples")
             continue
+        tracked[index] = fit.result
         fitted.append(Track(run, x, side * y, fit))
         spins[index], reasons = _spins(track, table.iloc[index], fit.result.omega_yr_rad_s)
         aside += [f"run {run}: {reason}" for reason in reasons]
@@ -170,6 +154,41 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
     if robot is not None:
         _check_motion(robot, table, columns)
     return MeasuredTracks(pd.concat([table, columns[known]], axis=1), aside, fitted, ())
+
+
+def _tracks_by_run(samples: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Divide samples by the names of their runs; what is no number of a possible size becomes NaN."""
+    dots = [name for name in _DOTS if name in samples]
+    values = pd.DataFrame({name: numbers_of(samples[name]) for name in (*COLUMNS[1:], *dots)})
+    values = values.reset_index(drop=True)
+    values[~(values.abs() < _LARGEST)] = np.nan
+    return {str(name): track for name, track in values.groupby(_names(samples["run"]).to_numpy(), sort=False)}
+
+
+def _usable(track: pd.DataFrame, run: str, samples: pd.DataFrame, aside: list[str]) -> pd.DataFrame | None:
+    """Return the samples of a run that have all values; None where they make no track.
+
+    Args:
+        track: the samples of the run.
+        run: its name.
+        samples: of all runs, to name a row.
+        aside: is told what is left out, and why.
+    """
+    known = track[list(COLUMNS[1:])].notna().all(axis=1)
+    if not known.all():
+        aside.append(f"run {run}: {int((~known).sum())} samples with a value that is not a number")
+    track = track[known]
+    back = track.index[1:][np.diff(track["time_s"]) < 0]
+    if len(back):
+        aside.append(
+            f"run {run}: its time goes back at {row_name(samples, back[0])}; give its samples in order, with a "
+            "clock that runs on"
+        )
+    elif len(track) < _FEWEST:
+        aside.append(f"run {run}: {len(track)} samples; a track needs at least {_FEWEST}")
+    else:
+        return track
+    return None
 
 
 def _spins(track: pd.DataFrame, run: pd.Series, yaw: float) -> tuple[dict[str, float], list[str]]:

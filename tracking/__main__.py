@@ -59,12 +59,7 @@ def _track(
     from tracking.pipe import answers
     from tracking.tracker import Tracker
 
-    if not 0 < noise_rad < math.inf:
-        raise InputError(f"--noise-rad {noise_rad}; give a number above 0")
-    if not 0 <= latency < math.inf:
-        raise InputError(f"--latency {latency}; give a number of seconds, 0 or more")
-    if lost is not None and not 0 < lost < math.inf:
-        raise InputError(f"--lost {lost}; give a number of seconds above 0")
+    _check_options(noise_rad, latency, lost)
     if camera is None and (view or serial or lost):
         raise InputError(
             "--view, --serial and --lost are for --camera, whose number is missing, such as --camera 0"
@@ -97,6 +92,16 @@ def _track(
         tracker = None if saved else begin(None, 0.0)
     for answer in answers(tracker, sys.stdin, plan.robot, begin):
         print(answer, flush=True)
+
+
+def _check_options(noise_rad: float, latency: float, lost: float | None) -> None:
+    """Refuse numbers that cannot be."""
+    if not 0 < noise_rad < math.inf:
+        raise InputError(f"--noise-rad {noise_rad}; give a number above 0")
+    if not 0 <= latency < math.inf:
+        raise InputError(f"--latency {latency}; give a number of seconds, 0 or more")
+    if lost is not None and not 0 < lost < math.inf:
+        raise InputError(f"--lost {lost}; give a number of seconds above 0")
 
 
 def _live(

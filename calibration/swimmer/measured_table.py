@@ -177,12 +177,7 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         excluded=(
             *aside,
             *_gaps_in_words(table, missing & keep[:, None]),
-            *(Excluded(f"column {name}: without any value, left out") for name in empty),
-            *(
-                Excluded(f"column {name}: without a value in more than {100 * _GAPS:.0f} % of the rows, left out")
-                for name in sparse
-            ),
-            *(Excluded(f"column {name}: not known, left out") for name in unknown),
+            *_unused_columns(empty, sparse, unknown),
         ),
         caveats=_caveats(tails, length, omega),
         completion=_without_gaps(missing.to_numpy()[keep]),
@@ -198,6 +193,13 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         lines=good.index.to_numpy() if good.index.name == LINE else None,
     )
     return _independent(data, sum(fault.reason == _COPY for fault in aside))
+
+
+def _unused_columns(empty: Sequence[str], sparse: Sequence[str], unknown: Sequence[str]) -> list[Excluded]:
+    """Say which columns are left out, without values, with few values, or not known."""
+    few = f"without a value in more than {100 * _GAPS:.0f} % of the rows"
+    faults = {"without any value": empty, few: sparse, "not known": unknown}
+    return [Excluded(f"column {name}: {fault}, left out") for fault, names in faults.items() for name in names]
 
 
 def _measured_outputs(table: pd.DataFrame, empty: Sequence[str]) -> tuple[str, ...]:

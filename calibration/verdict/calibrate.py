@@ -120,6 +120,7 @@ def calibrate(
     model, split = cast(Experiment, study.model), study.split
     used = time.process_time() - began
     laws = None
+    # Explanations come first; what is left of the time is for descriptions of what nothing explains.
     with limited(_DESCRIBED * max_seconds - used) as budget:
         with limited(_SEARCH * max_seconds - used):
             study, found, moves = _explain_with_moves(study, base)
@@ -136,14 +137,9 @@ def calibrate(
     falls = errors.rms["after"] < errors.rms["before"]
     as_good = laws.as_good_as(found.final) if laws and uncertain else ()
     rivals = described.rivals if described else found.rivals(cast(Experiment, study.model), as_good)
+    # The next runs are not weighted, so they have the noise of any run.
     rivals = tuple(replace(r, fit=replace(r.fit, noise=noise_of_any_run(study, r.fit.noise))) for r in rivals)
-    title = "intervals" if progress else ""
-    base_intervals = final_intervals = _intervals(study.model, found.base, split.fitted, title)
-    if found.final is not found.base:
-        final_model = found.nearest.model if found.nearest else study.model
-        final_intervals = _intervals(final_model, found.final, split.fitted, title)
-    if found.nearest:
-        final_intervals[found.nearest.effect.name] = found.nearest.interval
+    base_intervals, final_intervals = _both_intervals(study, found, progress=progress)
     fixed = {"level": level, "seed": seed, "catalogue": [e.name for e in model.effects], "locked": split.names}
     verdict = Verdict(
         verdict=found.verdict(level),
@@ -167,6 +163,20 @@ def calibrate(
         caveats=(),
     )
     return replace(verdict, caveats=_caveats(verdict, model, budget, max_seconds))
+
+
+def _both_intervals(
+    study: Study, found: Explained, *, progress: bool
+) -> tuple[dict[str, tuple[float, float]], dict[str, tuple[float, float]]]:
+    """Compute the 95 % intervals of the calibrated model, and of the final one."""
+    title = "intervals" if progress else ""
+    base = final = _intervals(study.model, found.base, study.split.fitted, title)
+    if found.final is not found.base:
+        model = found.nearest.model if found.nearest else study.model
+        final = _intervals(model, found.final, study.split.fitted, title)
+    if found.nearest:
+        final[found.nearest.effect.name] = found.nearest.interval
+    return base, final
 
 
 def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any) -> tuple[Study, Fit, Floats]:
@@ -266,16 +276,8 @@ def explain(study: Study, base: Fit) -> Explained:
     candidates = examine(study, base, misfit, tangents, threshold=threshold, after_first=forecast)
     best = explaining(candidates)
     if number_explains and (misfit.p_value >= level or not beats_number(best, freed)):
-        rival_effects = tuple(as_good_as_number(candidates, freed, level))
-        claims = [c for c in rival_effects if c.kept]
-        off = tuple(p for p in pulls(freed, model.nuisances) if p.freed)
-        if claims and misfit.p_value < level and implausible(off):
-            checked = tuple(with_checks(study, claims, base))
-            return Explained(base, misfit, tangents, tuple(candidates), checked, freed, rival_numbers=off)
-        checked_number = check_number(study, freed, base)
-        return Explained(
-            base, misfit, tangents, tuple(candidates), (), freed, rival_effects, number_check=checked_number
-        )
+        return _explained_by_number(study, Explained(base, misfit, tangents, tuple(candidates)), freed)
+    # From the simplest on: one effect, one beside a wrong number, two effects.
     best = best or explaining(beside_wrong_numbers(study, base, candidates, tangents))
     second = [] if best else pairs(study, candidates)
     best = best or explaining(second)
@@ -283,6 +285,23 @@ def explain(study: Study, base: Fit) -> Explained:
     unkept = min(tried, key=lambda each: each[0])[1] if tried and not best else None
     checked = tuple(with_checks(study, best, base))
     return Explained(base, misfit, tangents, tuple(candidates), checked, unkept=unkept)
+
+
+def _explained_by_number(study: Study, found: Explained, freed: Fit) -> Explained:
+    """Name a wrong number, unless an effect explains as much and the number is implausibly far off.
+
+    Args:
+        found: the residual, and what each effect does about it.
+        freed: the fit without the prior of the number.
+    """
+    rival_effects = tuple(as_good_as_number(list(found.candidates), freed, study.level))
+    claims = [c for c in rival_effects if c.kept]
+    off = tuple(p for p in pulls(freed, study.model.nuisances) if p.freed)
+    if claims and found.misfit.p_value < study.level and implausible(off):
+        checked = tuple(with_checks(study, claims, found.base))
+        return replace(found, best=checked, number=freed, rival_numbers=off)
+    check = check_number(study, freed, found.base)
+    return replace(found, number=freed, rival_effects=rival_effects, number_check=check)
 
 
 def _forecast(count: int, single: float, pairs_at_most: float) -> str:
