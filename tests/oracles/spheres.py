@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from calibration.statistics.excluded import Excluded
 from calibration.statistics.statistical_model import Parameter, Parameters, Runs, by_differences
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
@@ -105,7 +106,7 @@ def read_spheres(source: str | Path, name: str) -> Spheres:
             raise InputError(f"the table has no column {column!r}")
     part = table[table["set"] == name].reset_index(drop=True)
     bad = ~(np.isfinite(part["v_mm_s"]) & (part["v_mm_s"] > 0))
-    aside = tuple(f"row {i + 1}: no speed above 0" for i in np.flatnonzero(bad))
+    aside = tuple(Excluded("no speed above 0", f"row {i + 1}") for i in np.flatnonzero(bad))
     part = part[~bad]
     beads, condition = np.unique(part["bead"].astype(str), return_inverse=True)
     rounds, session = np.unique(part["trial"].astype(int), return_inverse=True)
@@ -153,7 +154,7 @@ def main(table: str, name: str = "KW2023") -> None:
     verdict = calibrate(model, progress=False)
     print(f"{name}: {verdict.sentence}")
     for candidate in verdict.found.candidates:
-        print(f"  {candidate.effect.title}: score {candidate.z:+.1f}, {candidate.verdict}")
+        print(f"  {candidate.effect.title}: score {candidate.z:+.1f}, {candidate.reason}")
     for label, effects in (
         ("Stokes", {}),
         ("with the wall", {"wall": 1.0}),
