@@ -16,10 +16,10 @@ from benchmarks.calibration.planted import ROBOT, Signals, design, scatter
 from calibration.statistics.statistical_model import (
     Experiment,
     Parameter,
-    changes,
+    apply_step,
     precisions,
+    prior_offsets,
     start_values,
-    stepped,
 )
 from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from common.arrays import Floats
@@ -77,9 +77,9 @@ def _strength(outputs: Floats, model: SwimmerModel, signals: Signals) -> float:
         prediction, J = model.derivatives(parameters, names)
         root = np.sqrt(precisions(fitted))
         columns = np.concatenate([signals.white(J[used]), np.diag(root)])
-        pull = -root * changes(fitted, parameters)
+        pull = -root * prior_offsets(fitted, parameters)
         values = np.concatenate([signals.white((outputs - prediction)[used]), pull])
         step = np.linalg.lstsq(columns, values, rcond=None)[0]
         unabsorbed = values - columns @ step
-        parameters = stepped(fitted, parameters, step)
+        parameters = apply_step(fitted, parameters, step)
     return float(np.linalg.norm(unabsorbed))

@@ -29,7 +29,7 @@ from calibration.attribution.refits import IMITABLE, SURE, Candidate
 from calibration.attribution.wrong_numbers import IMPLAUSIBLE, pulls
 from calibration.statistics.fit import Fit
 from calibration.statistics.gls import eliminated
-from calibration.statistics.statistical_model import Runs, regression, stepped
+from calibration.statistics.statistical_model import Runs, apply_step, regression
 from calibration.statistics.study import Study, held_out_p_value
 from common.arrays import Flags, Floats
 
@@ -98,7 +98,7 @@ def absorbable_shares(study: Study, fitted: Fit, names: Sequence[str]) -> Floats
     factors = deformations(runs, used, _DRAWS, study.seed)
     signals = np.concatenate([fitted.jacobian[used, :, p] * factors.T[..., None] for p in claimed])  # (B, n, k)
     linear = regression(runs, used, fitted.jacobian[..., order], [fitted.fitted[i] for i in order])
-    normal = linear.products(signals, noise.run).at(np.tile(noise.share, (len(signals), 1)))
+    normal = linear.products(signals, noise.run_covariance).at(np.tile(noise.session_ratio, (len(signals), 1)))
     before = eliminated(normal, len(order) - len(claimed))
     after = eliminated(before, len(claimed))
     return np.asarray(1 - after[:, -1, -1] / np.maximum(before[:, -1, -1], 1e-300))
@@ -136,7 +136,7 @@ def transfer_p(study: Study, fitted: Fit) -> float:
     refit = fitted.products(runs, near).solve(passes=3)
     moved = replace(
         fitted,
-        parameters=stepped(fitted.fitted, fitted.parameters, refit.step),
+        parameters=apply_step(fitted.fitted, fitted.parameters, refit.step),
         prediction=fitted.prediction + fitted.jacobian @ refit.step,
         covariance=fitted.inflation * refit.covariance,
     )

@@ -52,7 +52,7 @@ from calibration.statistics.statistical_model import (
     Parameter,
     Parameters,
     Runs,
-    changes,
+    prior_offsets,
     regression,
 )
 from calibration.statistics.study import FinalRefit, Study
@@ -326,7 +326,9 @@ def _differs_from_null(study: Study, model: Shifted, fitted: Fit, seen: Integers
     others = [fitted.fitted[i] for i in kept]
     linear = regression(runs, used, np.concatenate([fitted.jacobian[..., kept], along], -1), others)
     residual, noise = (runs.y - fitted.prediction)[used], fitted.noise
-    normal = linear.products(residual, noise.run, changes(others, fitted.parameters)).at(noise.share)
+    normal = linear.products(residual, noise.run_covariance, prior_offsets(others, fitted.parameters)).at(
+        noise.session_ratio
+    )
     asked = sizes - effect.start + solved(normal)[0][len(kept) :]
     error = asked.std(ddof=1) / math.sqrt(len(seen))
     return bool(abs(asked.mean()) > student.ppf(0.975, len(seen) - 1) * error)

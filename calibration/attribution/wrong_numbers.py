@@ -30,7 +30,7 @@ from calibration.attribution.refits import INDISTINGUISHABLE, Candidate, ebic, j
 from calibration.statistics.budget import skipped
 from calibration.statistics.fit import Fit, Pull, UnsolvedError, fit
 from calibration.statistics.residual_tests import Directions
-from calibration.statistics.statistical_model import Parameter, change
+from calibration.statistics.statistical_model import Parameter
 from calibration.statistics.study import Study
 
 IMPLAUSIBLE = 5.0  # standard deviations of its prior: a ruler is seldom wrong by so many
@@ -51,7 +51,7 @@ def pulls(fitted: Fit, nuisances: Sequence[Parameter]) -> tuple[Pull, ...]:
             continue
         place = fitted.names.index(nuisance.name)
         variance = fitted.covariance[place, place] / fitted.inflation
-        x, prior = change(nuisance, fitted.parameters[nuisance.name]), nuisance.sigma**2
+        x, prior = nuisance.offset(fitted.parameters[nuisance.name]), nuisance.sigma**2
         if fitted.fitted[place].sigma is None:
             error = math.sqrt(variance)
             computed.append(Pull(nuisance, x, error, x, error, x / math.sqrt(prior + variance), True))

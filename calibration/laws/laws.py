@@ -328,7 +328,7 @@ class Laws:
         """List them without those that predict what the claim does: they are the claim in other words."""
         limit = claim.deviance + INDISTINGUISHABLE
         good = [law for law in self.kept if law.p_value >= self.level / 2 and law.fit.deviance < limit]
-        scatter = np.sqrt(np.diag(claim.noise.run))
+        scatter = np.sqrt(np.diag(claim.noise.run_covariance))
         return [law for law in good if np.abs((law.fit.prediction - claim.prediction) / scatter).max() > _SAME]
 
     def to_dict(self, claim: Fit | None = None) -> dict[str, Any]:

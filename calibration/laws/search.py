@@ -39,7 +39,7 @@ from calibration.laws.places import Place
 from calibration.laws.readings import EXPONENTS, logarithms, noted_values, parameter_of
 from calibration.statistics.fit import Fit
 from calibration.statistics.gls import Gls, eliminated, solved
-from calibration.statistics.statistical_model import changes, precisions
+from calibration.statistics.statistical_model import precisions, prior_offsets
 from calibration.swimmer.swimmer import SwimmerModel
 from common.arrays import Flags, Floats, Integers
 from sim.effects import effect_named, is_effect
@@ -224,7 +224,7 @@ def search(model: SwimmerModel, base: Fit, used: Flags, candidates: Sequence[Pla
         scale=data.scale[used],
         further=with_lever,
     )
-    residual = (data.y - base.prediction)[used] + absorbed @ changes(base.fitted, base.parameters)
+    residual = (data.y - base.prediction)[used] + absorbed @ prior_offsets(base.fitted, base.parameters)
     places, levers = zip(*variants, strict=True)
     exponents = tuple(names[i - 1] for i in varied[1:])
     return Search(places, levers, models, exponents, residual, models.fit(residual[None]))

@@ -56,7 +56,7 @@ def draw_summary(result: Verdict) -> Figure:
 def plot_summary(axes: Axes, result: Verdict) -> None:
     """Draw the bars of `draw_summary`, without a legend."""
     data = result.runs
-    noise = np.sqrt(np.diag(result.base.noise.run))
+    noise = np.sqrt(np.diag(result.base.noise.run_covariance))
     place = np.arange(len(data.outputs))[::-1]
     models = compared(result)
     height = 0.7 / len(models)

@@ -38,11 +38,10 @@ from calibration.statistics.statistical_model import (
     Parameter,
     Parameters,
     Runs,
-    changes,
-    moved,
+    apply_step,
     parameter,
+    prior_offsets,
     regression,
-    stepped,
 )
 from common.arrays import Flags, Floats
 
@@ -152,13 +151,13 @@ class Fit:
         """Multiply the derivatives and the residual of the runs in `rows` (n,), with the priors, in an S."""
         residual = (runs.y - self.prediction)[rows]
         linear = regression(runs, rows, self.jacobian, self.fitted)
-        run = self.noise.run if run is None else run
-        return linear.products(residual, run, changes(self.fitted, self.parameters))
+        run = self.noise.run_covariance if run is None else run
+        return linear.products(residual, run, prior_offsets(self.fitted, self.parameters))
 
     def normal(self, runs: Runs, rows: Flags, noise: Noise | None = None) -> Floats:
         """Return them at ρ, (p + 1, p + 1); default: in the noise of the fit."""
         noise = noise or self.noise
-        return self.products(runs, rows, noise.run).at(noise.share)
+        return self.products(runs, rows, noise.run_covariance).at(noise.session_ratio)
 
 
 def fit(
@@ -267,7 +266,7 @@ class _Problem:
             prediction = self.model.derivatives(parameters, [], title=title, quick=quick)[0]
         linear = regression(self.model.runs, self.used, derivative, self.fitted)
         residual = (self.model.runs.y - prediction)[self.used]
-        products = linear.products(residual, self.run, changes(self.fitted, parameters))
+        products = linear.products(residual, self.run, prior_offsets(self.fitted, parameters))
         return _Point(parameters, prediction, derivative, products)
 
 
@@ -338,7 +337,7 @@ def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: F
         change = _damped(fitted, parameters, normal, _DAMPING[place])
         if all(abs(c) <= _LARGEST for c, p in zip(change, fitted, strict=True) if p.logarithmic):
             break
-    new = stepped(fitted, parameters, change)
+    new = apply_step(fitted, parameters, change)
     promise = 2 * change @ normal[:-1, -1] - change @ normal[:-1, :-1] @ change
     return _Step(new, float(np.abs(change).max()), float(promise), place)
 
@@ -400,12 +399,12 @@ def profile_intervals(
             continue
         half = fitted.half_width(i)
         for side in (-1, 1):
-            end = moved(p, fitted.parameters[p.name], side * half)
+            end = p.moved(fitted.parameters[p.name], side * half)
             change = (
                 math.log(end / fitted.parameters[p.name]) if p.logarithmic else end - fitted.parameters[p.name]
             )
             step = fitted.covariance[i] / fitted.covariance[i, i] * change  # how the others change with it
-            sets.append(stepped(fitted.fitted, fitted.parameters, step))
+            sets.append(apply_step(fitted.fitted, fitted.parameters, step))
             ends.append((i, change))
     predictions = model.predict(sets, title=title)
     least = _deviance(fitted, data, used, list(range(count)))
@@ -417,7 +416,7 @@ def profile_intervals(
         expected = change**2 / (fitted.covariance[i, i] / fitted.inflation)
         scale = math.sqrt(expected / rise) if _FLAT * expected < rise < _STEEP * expected else 1.0
         p = fitted.fitted[i]
-        intervals[p.name].append(moved(p, fitted.parameters[p.name], change * scale))
+        intervals[p.name].append(p.moved(fitted.parameters[p.name], change * scale))
     given = {p.name: fitted.interval(p.name) for p in fitted.fitted if p.sigma is not None}
     return {**{name: (low, high) for name, (low, high) in intervals.items()}, **given}
 

@@ -47,13 +47,13 @@ _RIDGE = 1e-11  # so that columns without any signal get a large variance
 class Noise:
     """S (k, k) of a run and ρ of a session."""
 
-    run: Floats  # S: covariance (k, k) of a run
-    share: Floats | float  # ρ: variance of a session over that of a run, of each output (k,) or of all
+    run_covariance: Floats  # S: covariance (k, k) of a run
+    session_ratio: Floats | float  # ρ: variance of a session over that of a run, of each output (k,) or of all
 
     @property
     def rms(self) -> float:
         """Standard deviation of a run, root mean square over the outputs."""
-        return float(np.sqrt(np.trace(self.run) / len(self.run)))
+        return float(np.sqrt(np.trace(self.run_covariance) / len(self.run_covariance)))
 
     def whitener(self, session: Integers, scale: Floats | None = None) -> Callable[[Floats], Floats]:
         """Make Σ^−½, which flattens (n, k, ...) to (n k, ...), for runs of `session` (n,).
@@ -62,8 +62,8 @@ class Noise:
             scale: (n,) roots of the weights of the runs.
         """
         along = np.ones(len(session)) if scale is None else scale
-        root, (picks, sizes) = inverse_root(self.run), averaging_rows(session, along)
-        less = 1 / np.sqrt(1 + sizes[:, None] * np.broadcast_to(self.share, len(root))) - 1  # (s, k)
+        root, (picks, sizes) = inverse_root(self.run_covariance), averaging_rows(session, along)
+        less = 1 / np.sqrt(1 + sizes[:, None] * np.broadcast_to(self.session_ratio, len(root))) - 1  # (s, k)
 
         def whiten(table: Floats) -> Floats:
             white = np.einsum("n,ab,nb...->na...", along, root, table, optimize=True)
@@ -74,10 +74,10 @@ class Noise:
 
     def covariance(self, session: Integers) -> Floats:
         """Compute Σ of the runs of `session` (n,), (n k, n k)."""
-        axes = np.linalg.inv(inverse_root(self.run))
-        shifts = (axes * np.broadcast_to(self.share, len(axes))) @ axes.T
+        axes = np.linalg.inv(inverse_root(self.run_covariance))
+        shifts = (axes * np.broadcast_to(self.session_ratio, len(axes))) @ axes.T
         together = session[:, None] == session
-        return np.asarray(np.kron(np.eye(len(session)), self.run) + np.kron(together, shifts))
+        return np.asarray(np.kron(np.eye(len(session)), self.run_covariance) + np.kron(together, shifts))
 
 
 class Gls:

@@ -45,8 +45,8 @@ from calibration.statistics.statistical_model import (
     Parameter,
     Parameters,
     Runs,
-    changes,
     features,
+    prior_offsets,
     regression,
 )
 from calibration.statistics.study import Study
@@ -249,7 +249,7 @@ def examine_residual(
     data, used = study.model.runs, study.split.fitted
     tester = _Tester(data, used, fitted, directions.table)
     residual = (data.y - fitted.prediction)[used]
-    shift = fitted.jacobian[used] @ changes(fitted.fitted, fitted.parameters)
+    shift = fitted.jacobian[used] @ prior_offsets(fitted.fitted, fitted.parameters)
     observed = tester.scores(residual[None] + shift)
     free = tester.design.precision == 0
     columns = np.concatenate([fitted.jacobian[..., free], directions.table], -1)

@@ -57,6 +57,16 @@ class Parameter:
     ] = ()  # of a second number: values at which the effect is looked for. Of a number: changes
     # from which one is fitted that differs in some runs
 
+    def moved(self, value: Any, by: Any) -> Any:
+        """Change a value by `by`, on the parameter's own scale, within its bounds."""
+        new = value * np.exp(np.minimum(by, _LARGEST)) if self.logarithmic else value + by
+        within = np.clip(new, *self.bounds)
+        return within if np.ndim(within) else float(within)
+
+    def offset(self, value: float) -> float:
+        """Return how far a value is from that as given, on the parameter's own scale."""
+        return math.log(value / self.start) if self.logarithmic else value - self.start
+
     @property
     def words(self) -> str:
         """The number in words, and as one types it."""
@@ -265,17 +275,10 @@ def _every(model: ForwardModel) -> tuple[Parameter, ...]:
     return (*model.coefficients, *model.nuisances, *model.effects, *seconds)
 
 
-def moved(changed: Parameter, value: Any, by: Any) -> Any:
-    """Change a Value by `by`, on the parameter's own scale, within its bounds."""
-    new = value * np.exp(np.minimum(by, _LARGEST)) if changed.logarithmic else value + by
-    within = np.clip(new, *changed.bounds)
-    return within if np.ndim(within) else float(within)
-
-
-def stepped(fitted: Sequence[Parameter], parameters: Parameters, step: Floats) -> dict[str, float]:
-    """Change those `parameters` that are in `fitted` (p,) by `step` (p,), see `moved`."""
+def apply_step(fitted: Sequence[Parameter], parameters: Parameters, step: Floats) -> dict[str, float]:
+    """Change those `parameters` that are in `fitted` (p,) by `step` (p,), see `Parameter.moved`."""
     changes = zip(fitted, step.tolist(), strict=True)
-    return {**parameters, **{p.name: moved(p, parameters[p.name], by) for p, by in changes}}
+    return {**parameters, **{p.name: p.moved(parameters[p.name], by) for p, by in changes}}
 
 
 def by_differences(
@@ -286,9 +289,9 @@ def by_differences(
     for name in names:
         changed = parameter(model, name)
         width = _LOG_STEP if changed.logarithmic else _STEP * abs(changed.typical)
-        if np.any(moved(changed, parameters[name], 2 * width) == changed.bounds[1]):  # downwards near the bound
+        if np.any(changed.moved(parameters[name], 2 * width) == changed.bounds[1]):  # downwards near the bound
             width = -width
-        sets.append({**parameters, name: moved(changed, parameters[name], width)})
+        sets.append({**parameters, name: changed.moved(parameters[name], width)})
         widths.append(width)
     predictions = model.predict(sets, title=title)
     slopes = (predictions[1:] - predictions[0]) / np.array(widths)[:, None, None]
@@ -300,14 +303,9 @@ def precisions(fitted: Sequence[Parameter]) -> Floats:
     return np.array([0.0 if p.sigma is None else p.sigma**-2 for p in fitted])
 
 
-def changes(fitted: Sequence[Parameter], parameters: Parameters) -> Floats:
+def prior_offsets(fitted: Sequence[Parameter], parameters: Parameters) -> Floats:
     """Return the change of each parameter from its value as given; 0 for those that are free, (p,)."""
-    return np.array([0.0 if p.sigma is None else change(p, parameters[p.name]) for p in fitted])
-
-
-def change(given: Parameter, value: float) -> float:
-    """Return the change from a parameter's value as given, on its own scale."""
-    return math.log(value / given.start) if given.logarithmic else value - given.start
+    return np.array([0.0 if p.sigma is None else p.offset(parameters[p.name]) for p in fitted])
 
 
 def regression(

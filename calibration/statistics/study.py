@@ -25,7 +25,7 @@ from scipy.stats import t as student
 from calibration.statistics.excluded import Excluded
 from calibration.statistics.fit import Fit
 from calibration.statistics.gls import inverse_root, repeat_count
-from calibration.statistics.statistical_model import ForwardModel, Parameter, Runs, regression, stepped
+from calibration.statistics.statistical_model import ForwardModel, Parameter, Runs, apply_step, regression
 from common.arrays import Flags, Floats, Integers
 
 LEVEL = 0.04  # α of every claim; below 0.05, because the noise is estimated and false claims must stay below 5 %
@@ -60,7 +60,7 @@ class Study:
     seed: int = 0  # of the bootstrap
     draws: int = DRAWS  # of the bootstrap
     progress: bool = False  # show progress bars
-    spread: float = 1.0  # variance of any run over that of a run of S, where runs have weights
+    variance_ratio: float = 1.0  # variance of any run over that of a run of S, where runs have weights
 
     @property
     def values(self) -> int:
@@ -220,7 +220,11 @@ def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> floa
     The statistic is the sum of squares of the residual, whitened by S. Its null distribution is drawn with the
     noise of runs and sessions, the error of the fitted parameters, and the uncertainty of S.
     """
-    root, scale, rng = inverse_root(fitted.noise.run), data.scale[rows, None], np.random.default_rng(seed)
+    root, scale, rng = (
+        inverse_root(fitted.noise.run_covariance),
+        data.scale[rows, None],
+        np.random.default_rng(seed),
+    )
     residual = scale * (data.y - fitted.prediction)[rows] @ root.T
     freedom = max(repeat_count(data.repeats(~rows)), len(root) + 1)
     free = tuple(replace(p, sigma=None) for p in fitted.fitted)
@@ -228,7 +232,9 @@ def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> floa
     spread = np.asarray(np.linalg.cholesky(fitted.covariance + 1e-15 * np.diag(np.diag(fitted.covariance))))
     as_far = 0
     for _ in range(_DRAWS // _AT_ONCE):
-        drawn = linear.draw(rng, fitted.noise.run, np.tile(fitted.noise.share, (_AT_ONCE, 1)), spread)
+        drawn = linear.draw(
+            rng, fitted.noise.run_covariance, np.tile(fitted.noise.session_ratio, (_AT_ONCE, 1)), spread
+        )
         repeats = rng.normal(size=(_AT_ONCE, freedom, len(root)))
         of_repeats = inverse_root(np.swapaxes(repeats, -1, -2) @ repeats / freedom)
         white = scale * drawn @ root.T @ np.swapaxes(of_repeats, -1, -2)
@@ -253,7 +259,7 @@ def refit_to_all(model: ForwardModel, fitted: Fit, rows: Flags) -> FinalRefit:
     refit = fitted.products(model.runs, rows).solve(passes=3)
     at = replace(
         fitted,
-        parameters=stepped(fitted.fitted, fitted.parameters, refit.step),
+        parameters=apply_step(fitted.fitted, fitted.parameters, refit.step),
         covariance=fitted.inflation * refit.covariance,
     )
     return final_refit(at)

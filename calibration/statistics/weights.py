@@ -221,14 +221,14 @@ def fit_weighted(study: Study, start: Mapping[str, float]) -> tuple[Study, Fit]:
         weight = np.ones(len(used))
         for rows in filter(np.any, (used, study.split.test)):
             weight[rows] = noise.weights(residual[rows], condition[rows])
-        study = replace(study, model=with_weights(model, weight), spread=noise.spread)
+        study = replace(study, model=with_weights(model, weight), variance_ratio=noise.spread)
         fitted = fit(study.model, fitted.parameters, names, used, title=title)
     return study, fitted
 
 
 def noise_of_any_run(study: Study, noise: Noise) -> Noise:
     """Return the noise of a run that may be one of the worse ones, by its variance."""
-    return Noise(noise.run * study.spread, noise.share / study.spread)
+    return Noise(noise.run_covariance * study.variance_ratio, noise.session_ratio / study.variance_ratio)
 
 
 def rows_of_little_weight(study: Study) -> tuple[int, ...]:

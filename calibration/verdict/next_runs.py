@@ -120,7 +120,10 @@ def next_runs(rivals: Sequence[Rival], *, count: int = 3, seed: int = 0) -> tupl
         Pair(true[0] - wrong[0], wrong[1], again.covariance)
         for (_, true), (again, wrong) in itertools.permutations(zip(fits, sides, strict=True), 2)
     ]
-    noise = Noise(np.mean([f.noise.run for f in fits], 0), np.mean([np.asarray(f.noise.share) for f in fits], 0))
+    noise = Noise(
+        np.mean([f.noise.run_covariance for f in fits], 0),
+        np.mean([np.asarray(f.noise.session_ratio) for f in fits], 0),
+    )
     alone = np.array([_together(pairs, noise, [place]).min() for place in range(len(settings))])
     runs = []
     rng = np.random.default_rng(seed)
@@ -191,8 +194,8 @@ class Explanation:
             "title": self.title,
             "parameters": self.parameters,
             "covariance": self.covariance.tolist(),
-            "noise_of_a_run": self.noise.run.tolist(),
-            "share_of_sessions": np.broadcast_to(self.noise.share, len(self.outputs)).tolist(),
+            "noise_of_a_run": self.noise.run_covariance.tolist(),
+            "share_of_sessions": np.broadcast_to(self.noise.session_ratio, len(self.outputs)).tolist(),
             "outputs": list(self.outputs),
             **({"law": dict(self.law)} if self.law else {}),
         }

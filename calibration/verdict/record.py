@@ -217,7 +217,9 @@ def _largest_departures(result: Findings) -> list[dict[str, Any]]:
     A departure is the root mean square, over the outputs, of the mean over repeats in its standard deviations.
     """
     runs, used = result.runs, result.split.fitted
-    white = runs.scale[:, None] * (runs.y - result.base.prediction) @ inverse_root(result.base.noise.run).T
+    white = (
+        runs.scale[:, None] * (runs.y - result.base.prediction) @ inverse_root(result.base.noise.run_covariance).T
+    )
     found: dict[tuple[str, ...], float] = {}
     for condition in np.unique(runs.condition[used]):
         rows = used & (runs.condition == condition)
@@ -246,7 +248,7 @@ def _next(result: Findings) -> dict[str, Any]:
 
 def _data(result: Findings) -> dict[str, Any]:
     runs = result.runs
-    scatter = np.sqrt(np.diag(result.base.noise.run)).tolist()
+    scatter = np.sqrt(np.diag(result.base.noise.run_covariance)).tolist()
     settings = runs.settings.items()
     return {
         "outputs": list(runs.outputs),
@@ -255,9 +257,9 @@ def _data(result: Findings) -> dict[str, Any]:
         "settings": {name: [float(v.min()), float(v.max()), unit] for name, (v, unit) in settings},
         "drawn_against": [runs.drawn[0], runs.drawn[1][0]],
         "scatter_of_a_run": dict(zip(runs.outputs, scatter, strict=True)),
-        "scatter_of_sessions": math.sqrt(np.mean(result.final.noise.share)),
+        "scatter_of_sessions": math.sqrt(np.mean(result.final.noise.session_ratio)),
         "scatter_of_sessions_by_output": dict(
-            zip(runs.outputs, np.sqrt(result.final.noise.share).tolist(), strict=True)
+            zip(runs.outputs, np.sqrt(result.final.noise.session_ratio).tolist(), strict=True)
         ),
         "sessions": list(runs.session_names),
         "fixed_before": result.fixed_before,

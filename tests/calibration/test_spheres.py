@@ -146,7 +146,7 @@ def test_a_profile_interval_sees_that_the_model_bends() -> None:
     middle = fitted.parameters["inertia"]
     assert high - middle > middle - low
     # The deviance at the ends, by brute force over the viscosity, has risen alike on both sides.
-    white = Noise(fitted.noise.run, fitted.noise.share).whitener(model.runs.session)
+    white = Noise(fitted.noise.run_covariance, fitted.noise.session_ratio).whitener(model.runs.session)
 
     def deviance(inertia: float) -> float:
         grid = [{"viscosity": v, "wall": 0.0, "inertia": inertia} for v in np.linspace(0.8, 1.8, 501)]

@@ -231,8 +231,8 @@ def _read_verdict(path: Path) -> None:
     for explanation in explanations:
         size = len(explanation.parameters)
         assert explanation.covariance.shape == (size, size), "a covariance of another size"
-        _finite(explanation.covariance, list(explanation.parameters.values()), explanation.noise.run)
-        _finite(explanation.noise.share)
+        _finite(explanation.covariance, list(explanation.parameters.values()), explanation.noise.run_covariance)
+        _finite(explanation.noise.session_ratio)
         hash(explanation.title)
     assert all(isinstance(session, str) for session in sessions)
 

@@ -118,7 +118,7 @@ def test_a_run_with_a_gap_counts_by_what_was_measured_alone() -> None:
     for standing in (0.0, 7.0):  # what stands in a gap does not matter
         model = LineWithGaps(replace(runs, y=np.where(gaps, standing, y), completion=completion))
         fits.append(fit(model, start_values(model), ("a", "b"), rows, title=""))
-        assert fits[-1].noise.run == pytest.approx(S)  # of whole runs
+        assert fits[-1].noise.run_covariance == pytest.approx(S)  # of whole runs
         normal = fits[-1].products(model.runs, rows).at(0.0)
         J = Line(runs).derivatives(TRUTH, ("a", "b"))[1]
         measured = [(J[i][~g], np.linalg.inv(S[np.ix_(~g, ~g)])) for i, g in enumerate(gaps)]
@@ -155,7 +155,7 @@ def test_without_mistracked_runs_the_fit_is_the_plain_one() -> None:
     assert fitted.parameters == plain.parameters
     assert (fitted.covariance == plain.covariance).all()
     assert rows_of_little_weight(again) == ()
-    assert noise_of_any_run(again, fitted.noise).run == pytest.approx(fitted.noise.run)
+    assert noise_of_any_run(again, fitted.noise).run_covariance == pytest.approx(fitted.noise.run_covariance)
     assert caveat_of_weights((), 96) == ()
     (one,), (many,) = caveat_of_weights((7,), 96), caveat_of_weights(tuple(range(1, 15)), 96)
     assert one.startswith("1 of 96 runs has a weight below one half (row 7)")
@@ -178,11 +178,13 @@ def test_mistracked_runs_do_not_raise_the_noise() -> None:
         little = np.array(rows_of_little_weight(study), dtype=int) - 1
         assert (off[little] > 0).mean() > 0.9
         found, hidden = found + len(little), hidden + int((off > 0).sum())
-        plain_noises.append(float(np.sqrt(np.trace(plain.noise.run) / 3)))
-        noise = float(np.sqrt(np.trace(fitted.noise.run) / 3))
+        plain_noises.append(float(np.sqrt(np.trace(plain.noise.run_covariance) / 3)))
+        noise = float(np.sqrt(np.trace(fitted.noise.run_covariance) / 3))
         noises.append(noise)
         held_out.append(errors(study.model.runs, fitted.prediction, study.split.test)[0] / noise)
-        assert np.trace(noise_of_any_run(study, fitted.noise).run) > 1.5 * np.trace(fitted.noise.run)
+        assert np.trace(noise_of_any_run(study, fitted.noise).run_covariance) > 1.5 * np.trace(
+            fitted.noise.run_covariance
+        )
     assert found > 0.6 * hidden
     assert np.linalg.norm(weighted_errors) < np.linalg.norm(plain_errors)
     assert np.mean(plain_noises) > 1.4 * NOISE

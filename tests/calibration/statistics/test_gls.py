@@ -9,7 +9,7 @@ import pytest
 
 from calibration.statistics.gls import Gls, Noise, eliminated, inverse_root, repeat_covariance, solved
 from calibration.statistics.residual_tests import TESTABLE, Directions, _kernel, directions, examine_residual
-from calibration.statistics.statistical_model import changes, features, precisions
+from calibration.statistics.statistical_model import features, precisions, prior_offsets
 from calibration.statistics.study import Study, middle_session
 from common.arrays import Floats
 from tests.calibration.toy_tables import fit_all, toy_swimmer, toy_table
@@ -67,7 +67,7 @@ def test_whitener_is_the_inverse_root_of_the_block_covariance(scale: Floats | No
     noise = Noise(root @ root.T + np.eye(3), np.array([0.7, 0.0, 0.3]))
     factors = np.zeros((8, 8)) if scale is None else np.diag(scale**-2) - np.eye(8)
     W = noise.whitener(SESSION, scale)(np.eye(24).reshape(8, 3, 24))
-    covariance = noise.covariance(SESSION) + np.kron(factors, noise.run)
+    covariance = noise.covariance(SESSION) + np.kron(factors, noise.run_covariance)
     assert W @ covariance @ W.T == pytest.approx(np.eye(24), abs=1e-10)
 
 
@@ -102,7 +102,7 @@ def test_scores_along_features_are_those_of_least_squares() -> None:
     scores = examine_residual(Study.fitted_to(model, used, draws=50), fitted, none).scores
     _, table = features(model.runs, used)
     J = fitted.jacobian[used]
-    residual = (model.runs.y - fitted.prediction)[used] + J @ changes(fitted.fitted, fitted.parameters)
+    residual = (model.runs.y - fitted.prediction)[used] + J @ prior_offsets(fitted.fitted, fitted.parameters)
     noise = Noise(repeat_covariance(residual, model.runs.condition[used]), scores.share)
     white = noise.whitener(model.runs.session[used])
     prior = np.diag(np.sqrt(precisions(fitted.fitted)))

@@ -121,7 +121,7 @@ def test_a_single_session_gives_a_weaker_conclusion() -> None:
     table["omega_h_rpm"] *= 0.98
     shifted = calibrated(table, few=True)
     assert shifted.verdict == "none"
-    assert (shifted.base.noise.share == SESSION_SHARE).all()
+    assert (shifted.base.noise.session_ratio == SESSION_SHARE).all()
 
 
 def test_two_sessions_kept_whole_are_not_called_blocks() -> None:
