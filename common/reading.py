@@ -15,14 +15,16 @@ import json
 import os
 import re
 import sys
+import textwrap
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar
 
-from common.errors import InputError
+from common.errors import InputError, naming
 
 MOST_BYTES = 256 * 2**20  # of a file
 _FIRST = "# The last line is a digest of the others: a reader notices whether the file is whole.\n"
@@ -33,6 +35,35 @@ T = TypeVar("T")
 
 class ContentError(InputError):
     """A file can be read, but its content is not what it should be."""
+
+
+@contextmanager
+def expecting(kind: str, source: object, remedy: str) -> Iterator[None]:
+    """Refuse content that a block cannot read, in one line with the name of its file; name it in other refusals.
+
+    Args:
+        kind: what the file should be, such as "a plan.json of the planner".
+        source: the path of the file, or a name of the content.
+        remedy: what to do.
+
+    Raises:
+        InputError: an entry is missing or has another form, or the block refuses it.
+    """
+    try:
+        with naming(source):
+            yield
+        return
+    except ContentError as unreadable:
+        reason = str(unreadable).removeprefix(f"{source} ")
+    except InputError:
+        raise
+    except KeyError as missing:
+        reason = f"no entry {missing}"
+    except (TypeError, AttributeError, IndexError):
+        reason = "an entry is missing or has another form"
+    except (ValueError, ArithmeticError) as broken:
+        reason = textwrap.shorten(str(broken), 150, placeholder=" …")
+    raise InputError(f"{source} is not {kind} ({reason}); {remedy}")
 
 
 def read_bytes(path: str | Path, *, first: int = MOST_BYTES + 1) -> bytes:

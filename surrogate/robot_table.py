@@ -11,7 +11,7 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import MISSING, asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,7 @@ from common.arrays import Floats
 from common.errors import InputError
 from common.files import write_text
 from common.notebook import Shown, given_axes
-from common.reading import ContentError, read_json
+from common.reading import expecting, read_json
 from sim.model.response import DWELLS, Responses
 from sim.motion.steady_motion import STEADY_OUTPUTS, net_speeds, twists
 from surrogate.domain import ROBOT
@@ -154,30 +154,15 @@ def load_robot_table(path: str | Path) -> RobotTable:
         InputError: the file is not such a table, or one of another version, or it was changed.
     """
     remedy = "make one with softflagella surrogate robot"
-    try:
+    with expecting("a table of a robot", path, remedy):
         content = read_json(path)
-    except ContentError as unreadable:
-        reason = str(unreadable).removeprefix(f"{path} ")
-        raise InputError(f"{path} is no table of a robot, or is damaged ({reason}); {remedy}") from None
-    if not isinstance(content, dict):
-        raise InputError(f"{path} is no table of a robot, or is damaged; {remedy}")
-    version = content.pop("format", 1)
-    if version != FORMAT:
-        raise InputError(f"{path} has format {str(version)[:20]}, this version reads {FORMAT}; {remedy}")
-    if content.pop("hash", "") != _digest(content):
-        raise InputError(f"{path} was changed after it was written; {remedy}")
-    names = {part.name for part in fields(RobotTable)}
-    needed = [part.name for part in fields(RobotTable) if part.default_factory is MISSING]
-    lacking = [name for name in needed if name not in content]
-    if lacking or not names.issuperset(content):
-        first = f": it has no {lacking[0]!r}" if lacking else ""
-        raise InputError(f"{path} is no complete table of a robot{first}; {remedy}")
-    try:
-        wrong = _wrong(RobotTable(**content))
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
-        wrong = "its numbers have no such form"
-    if wrong:
-        raise InputError(f"{path} is no table of a robot: {wrong}; {remedy}")
+        version = content.pop("format", 1)
+        if version != FORMAT:
+            raise InputError(f"{path} has format {str(version)[:20]}, this version reads {FORMAT}; {remedy}")
+        if content.pop("hash", "") != _digest(content):
+            raise InputError(f"{path} was changed after it was written; {remedy}")
+        if wrong := _wrong(RobotTable(**content)):
+            raise InputError(f"{path} is no table of a robot: {wrong}; {remedy}")
     return RobotTable(**content)
 
 

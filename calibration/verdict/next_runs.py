@@ -38,7 +38,7 @@ from calibration.statistics.gls import Noise
 from calibration.statistics.statistical_model import ForwardModel, Runs, start_values
 from common.arrays import Flags, Floats
 from common.errors import InputError
-from common.reading import ContentError, read_json
+from common.reading import expecting, read_json
 
 STOP = 25.0  # ratio of likelihoods at which an explanation is given up, 1/α of the sequence of batches
 GIVEN_UP = 2 * math.log(STOP)  # the same as a difference of deviances
@@ -239,17 +239,13 @@ def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
     Raises:
         InputError: no such file, or its verdict has nothing to decide.
     """
-    try:
+    with expecting("a verdict.json of this version", path, "calibrate the table again"):
         record = read_json(path)
-    except ContentError as unreadable:
-        raise InputError(f"{path} is not a verdict.json ({str(unreadable).removeprefix(f'{path} ')})") from None
-    if not isinstance(record, dict) or not record.get("explanations"):
-        raise InputError(f"{path}: this verdict has no two explanations between which new runs could decide")
-    try:
+        if not record.get("explanations"):
+            raise InputError("this verdict has no two explanations between which new runs could decide")
         explanations = [Explanation.read(explanation) for explanation in record["explanations"]]
-        return explanations, set(map(str, record["sessions"]))
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
-        raise InputError(f"{path} is no verdict.json of this version: calibrate the table again") from None
+        sessions = set(map(str, record["sessions"]))
+    return explanations, sessions
 
 
 def new_runs(runs: Runs, before: set[str]) -> Flags:

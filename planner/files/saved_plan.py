@@ -10,17 +10,16 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 
-from common.errors import InputError, naming
+from common.errors import InputError
 from common.keywords import checks_keywords
-from common.reading import ContentError, read_json
+from common.reading import expecting, read_json
 from planner.goal.trip import FORMAT, Trip
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
@@ -37,13 +36,13 @@ from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Switches, roll_out
 from planner.vehicle.zigzag import Objective, Zigzag
 from sim.knowledge import CalibrationKnowledge
+from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.model.robot import Robot
-from sim.model.schedule import check_format, read_plan_file
+from sim.model.schedule import PLAN_FILE, check_format, read_plan_file
 from surrogate.interface import LookupTable
 from surrogate.table_file import load_table
 
 _JOBS = tuple(f"{kind}.json" for kind in KINDS)  # beside the plan.json whose id they name
-_GROUPS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "N", "a_over_R")
 _LARGEST = 1e100  # of a number, so that sums and squares of them are finite
 
 
@@ -96,10 +95,10 @@ def load_goal(path: str | Path) -> dict[str, Any]:
         ...     goal["goal"], goal["plan_id"] == load_plan(Path(folder, "plan.json"))["id"]
         ([3.0, 1.0, 1.0], True)
     """
-    with _checking(path, "goal.json"):
+    with expecting("a goal.json of the planner", path, "plan again"):
         content = read_json(path)
         if content["format"] != FORMAT:
-            raise InputError(f"format {content['format']}, this version reads {FORMAT}")
+            raise InputError(f"{path} has format {content['format']}, this version reads {FORMAT}: plan again")
         for key in ("end_error_over_l", "end_error_rad", "length_over_l", "margin_over_l"):
             _check(content, key)
         if content["predicted_clearance_over_l"] is not None:
@@ -109,7 +108,7 @@ def load_goal(path: str | Path) -> dict[str, Any]:
         _check(content, "via", 2, rows=0)
         FreeSpace.from_dict(content)
         if not isinstance(content["plan_id"], str):
-            raise InputError("plan_id must be text")
+            raise InputError("plan_id must be text; plan again")
     return dict(content)
 
 
@@ -152,20 +151,15 @@ def restore_plan(
     else:
         path = plan_json(source)
         name, kept, content = str(path), str(path), load_plan(path)
-    try:
-        with naming(name), np.errstate(over="raise", invalid="raise"):
-            robot = _robot(content["robot"])
-            knowledge = CalibrationKnowledge.from_dict(content.get("calibration", {}), name)
-            own = own_table or bool(content.get("own_table", False))
-            table = load_table(lookup) if isinstance(lookup, str | Path) else lookup
-            if table is None and isinstance(robot, Robot):
-                table = table_for(robot, kept, knowledge, own=own)
-            tracked = tracked_vehicle(robot, table, content["point"], knowledge)
-            plan = _plan(content, tracked)
-    except InputError:
-        raise
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError) as broken:
-        raise InputError(f"{name} lacks what is needed to go on with it ({broken}); plan again") from None
+    with expecting(PLAN_FILE, name, "plan again"), np.errstate(over="raise", invalid="raise"):
+        robot = _robot(content["robot"])
+        knowledge = CalibrationKnowledge.from_dict(content.get("calibration", {}), name)
+        own = own_table or bool(content.get("own_table", False))
+        table = load_table(lookup) if isinstance(lookup, str | Path) else lookup
+        if table is None and isinstance(robot, Robot):
+            table = table_for(robot, kept, knowledge, own=own)
+        tracked = tracked_vehicle(robot, table, content["point"], knowledge)
+        plan = _plan(content, tracked)
     if tracked.model != content.get("model") and not tracked.own_table:
         made = content.get("model")
         print(f"warning: {name} was made with look-up table {made}; this one is {tracked.model}", file=sys.stderr)
@@ -203,10 +197,8 @@ def plan_json(source: str | Path) -> Path:
     if path.name not in _JOBS:
         return path
     beside = path.with_name("plan.json")
-    try:
+    with expecting("a file of a plan", path, "give the plan.json beside it"):
         named = read_json(path)["plan_id"]
-    except (ContentError, KeyError, TypeError):
-        raise InputError(f"{path} names no plan; give the plan.json beside it") from None
     if load_plan(beside)["id"] != named:
         raise InputError(f"{path} is of plan {named}, and {beside} is another one; plan again")
     return beside
@@ -220,7 +212,7 @@ def _robot(content: Mapping[str, Any]) -> Robot | MeasuredVehicle:
     if "vehicle" in content:
         return MeasuredVehicle.from_dict(content["vehicle"])
     groups = {name: float(value) for name, value in content["groups"].items()}
-    effects = {name: value for name, value in groups.items() if name not in _GROUPS}
+    effects = {name: value for name, value in groups.items() if name not in (*GROUP_COLUMNS, *OPTIONAL_COLUMNS)}
     length, time = float(content["tail_length_m"]), float(content["time_scale_s"])
     head, radius = length / groups["l_over_R"], length / groups["l_over_r0"]
     return Robot(
@@ -308,7 +300,7 @@ def _errors(
 
 def _check_plan(content: Mapping[str, Any], name: str | Path) -> None:
     """Check the errors and tables of a plan.json; `name` is that of the file in messages."""
-    with _checking(name, "plan.json"):
+    with expecting(PLAN_FILE, name, "plan again"):
         errors = [
             f"{each}_over_l" for each in ("stated_error", "feedback_error", "predicted_rms", "predicted_max")
         ]
@@ -319,21 +311,6 @@ def _check_plan(content: Mapping[str, Any], name: str | Path) -> None:
         for key, width in (("reference", 2), ("raw_path", 2), ("predicted_poses", 3)):
             _check(content, key, width, rows=2)
         content["point"]
-
-
-@contextmanager
-def _checking(name: str | Path, kind: str) -> Iterator[None]:
-    """Name the file in refusals, and refuse content that lacks an entry, or has one of another type."""
-    try:
-        yield
-        return
-    except ContentError as unreadable:
-        reason = str(unreadable).removeprefix(f"{name} ")
-    except InputError as impossible:
-        raise InputError(f"{name}: {impossible}; plan again") from None
-    except (KeyError, TypeError, ValueError, OverflowError) as broken:
-        reason = str(broken)
-    raise InputError(f"{name} is not a {kind} of the planner ({reason}); plan again")
 
 
 def _check(content: Mapping[str, Any], key: str, width: int | None = None, *, rows: int | None = None) -> None:
@@ -354,4 +331,4 @@ def _check(content: Mapping[str, Any], key: str, width: int | None = None, *, ro
         shape = (max(rows, len(given) if isinstance(given, list) else 0), *shape)
         values = values.reshape(shape) if not values.size and not shape[0] else values
     if values.shape != shape or not (np.abs(values) < _LARGEST).all():
-        raise InputError(f"{key} must be {wanted} below {_LARGEST:g}")
+        raise InputError(f"{key} must be {wanted} below {_LARGEST:g}; plan again")

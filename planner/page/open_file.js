@@ -64,14 +64,14 @@ function pathOfPlan(text, name, stem) {
   } catch (broken) {
     throw refused(broken.message);
   }
-  if (plan?.format === undefined) throw refused("it has no format");
+  if (plan?.format === undefined) throw refused("no entry 'format'");
   if (plan.format !== FORMAT) {
     throw new InputError(`${name} has format ${plan.format}, this version reads ${FORMAT}: plan again`);
   }
   checkPlanId(plan.id, text, name);
   const { robot, raw_path: path, closed } = plan;
   const isPoint = (point) => Array.isArray(point) && point.length === 2 && point.every(Number.isFinite);
-  if (!(robot?.tail_length_m > 0)) throw refused("'tail_length_m'");
+  if (!(robot?.tail_length_m > 0)) throw refused("no entry 'tail_length_m'");
   if (!(Array.isArray(path) && path.length >= 2 && path.every(isPoint))) {
     throw new InputError(`${name}: raw_path must have two or more rows of 2 finite numbers; plan again`);
   }

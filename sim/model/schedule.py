@@ -19,7 +19,7 @@ import numpy as np
 from common.arrays import Floats
 from common.errors import InputError
 from common.keywords import checks_keywords
-from common.reading import ContentError, digest_of, read_json
+from common.reading import digest_of, expecting, read_json
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from sim.model.robot import Robot
 
 FORMAT = 2
+PLAN_FILE = "a plan.json of the planner"
 _ID = re.compile("p[0-9a-f]{11}")  # ids of older versions have another form
 FASTEST = 1e4  # ω̄ above which the file is taken for edited
 
@@ -118,10 +119,10 @@ def load_schedule(path: str | Path) -> Schedule:
         True
     """
     content = read_plan_file(path)
-    if "vehicle" in content["robot"]:
-        raise InputError(f"{path} is the plan of a measured vehicle; only robots can be simulated")
-    try:
-        return Schedule(
+    with expecting(PLAN_FILE, path, "plan again"):
+        if "vehicle" in content["robot"]:
+            raise InputError(f"{path} is the plan of a measured vehicle; only robots can be simulated")
+        schedule = Schedule(
             robot={str(k): float(v) for k, v in content["robot"]["groups"].items()},
             first_direction=content["first_direction"],
             dwells=np.asarray(content["dwell_bar"], dtype=float),
@@ -130,10 +131,7 @@ def load_schedule(path: str | Path) -> Schedule:
             tail_length=None if (length := content["robot"].get("tail_length_m")) is None else float(length),
             plan_id=str(content["id"]),
         )
-    except KeyError as missing:
-        raise InputError(f"{path} has no entry {missing}; give a plan.json of the planner") from None
-    except (TypeError, ValueError, AttributeError, OverflowError) as wrong:
-        raise InputError(f"{path}: {wrong}; give a plan.json of the planner") from None
+    return schedule
 
 
 def read_plan_file(path: str | Path) -> dict[str, Any]:
@@ -145,11 +143,8 @@ def read_plan_file(path: str | Path) -> dict[str, Any]:
     """
     if Path(path, "plan.json").is_file():
         raise InputError(f"{path} is the folder of a plan; give {Path(path, 'plan.json')}")
-    try:
+    with expecting(PLAN_FILE, path, "plan again"):
         content = read_json(path, parse_constant=_finite, parse_float=_finite)
-    except ContentError as unreadable:
-        reason = str(unreadable).removeprefix(f"{path} ")
-        raise InputError(f"{path} is not a plan.json of the planner ({reason}); plan again") from None
     check_format(content, path)
     found = plan_id(content)
     if content.setdefault("id", found) != found and _ID.fullmatch(str(content["id"])):
@@ -172,18 +167,12 @@ def check_format(content: Any, name: str | Path) -> None:
     Raises:
         InputError: it is no plan.json of this format, or has a motor speed that cannot be.
     """
-    if not isinstance(content, dict) or "format" not in content:
-        raise InputError(f"{name} is not a plan.json of the planner (it has no format); plan again")
-    if content["format"] != FORMAT:
-        raise InputError(f"{name} has format {content['format']}, this version reads {FORMAT}: plan again")
-    if isinstance(content.get("robot"), dict) and "vehicle" in content["robot"]:  # that was measured
-        return
-    try:
-        speed = float(content["robot"]["groups"]["omega_bar"])
-    except (KeyError, TypeError, ValueError, OverflowError) as broken:
-        raise InputError(f"{name} is not a plan.json of the planner ({broken}); plan again") from None
-    if not 0 < abs(speed) <= FASTEST:
-        raise InputError(f"{name}: omega_bar is not between 0 and {FASTEST:g}; plan again")
+    with expecting(PLAN_FILE, name, "plan again"):
+        if content["format"] != FORMAT:
+            raise InputError(f"{name} has format {content['format']}, this version reads {FORMAT}: plan again")
+        robot = content["robot"]
+        if "vehicle" not in robot and not 0 < abs(float(robot["groups"]["omega_bar"])) <= FASTEST:
+            raise InputError(f"omega_bar is not between 0 and {FASTEST:g}; plan again")
 
 
 def _finite(text: str) -> float:

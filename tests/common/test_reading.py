@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import InputError, run_command
-from common.reading import ContentError, check_seal, read_bytes, read_json, sealed
+from common.reading import ContentError, check_seal, expecting, read_bytes, read_json, sealed
 from common.tables import read_table
 from dataset.design import load_design
 from sim.__main__ import main
@@ -57,6 +57,31 @@ def test_what_is_no_json_is_said_so(data: bytes, tmp_path: Path) -> None:
     (tmp_path / "a.json").write_bytes(data)
     with pytest.raises(ContentError, match=r"a\.json is no"):
         read_json(tmp_path / "a.json")
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("{", "is not JSON: Expecting property name"),
+        ("{}", "no entry 'rows'"),
+        ("[1]", "an entry is missing or has another form"),
+        ('{"rows": "many"}', r"could not convert string to float: 'many'"),
+        ('{"rows": 0}', "float division by zero"),
+    ],
+)
+def test_content_that_a_reader_does_not_expect_is_refused_with_the_reason(
+    text: str, reason: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.json"
+    path.write_text(text)
+    words = rf"{path} is not a list of rows \({reason}.*\); write one"
+    with pytest.raises(InputError, match=words), expecting("a list of rows", path, "write one"):
+        1 / float(read_json(path)["rows"])
+
+
+def test_a_refusal_of_what_is_read_has_the_name_of_the_file() -> None:
+    with pytest.raises(InputError, match=r"^a\.json: rows must be above 0$"), expecting("a list", "a.json", ""):
+        raise InputError("rows must be above 0")
 
 
 def test_missing_files_and_folders_are_one_line(tmp_path: Path) -> None:

@@ -133,7 +133,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("check made/plan.csv track.csv", "is not a plan.json"),
         ("check made/plan.json none.csv", "none.csv: no such file"),
         ("replay empty.json", "not a plan.json"),
-        ("replay none.json", "no format"),
+        ("replay none.json", "no entry 'format'"),
         ("replay part.json", "no entry"),
         ("replay words.json", "not a plan.json"),
         ("replay made", "made is the folder of a plan; give made/plan.json"),

@@ -56,7 +56,7 @@ def test_a_table_of_one_robot_comes_back_as_it_was_and_damaged_ones_are_refused(
         refusal(path, load_robot_table)
     for content in (b"\xff\xfe", b"[" * 100_000, b"[1]", b"9" * 10_000):
         path.write_bytes(content)
-        assert "no table of a robot" in refusal(path, load_robot_table)
+        assert "not a table of a robot" in refusal(path, load_robot_table)
     assert "no such file" in refusal(tmp_path / "absent.json", load_robot_table)
     path.write_text('{"robot": {}, "dwells": [1.0]}')
     assert "has format 1, this version reads 3" in refusal(path, load_robot_table)
@@ -65,7 +65,7 @@ def test_a_table_of_one_robot_comes_back_as_it_was_and_damaged_ones_are_refused(
 WRONG = [
     ("lag", [[1.0]], "'lag' is not finite numbers, 2 × 25 × 3"), ("spread", None, "'spread' is not"),
     ("steady", {}, "'omega_t_bar' is not"), ("robot", {"C_t": float("nan")}, "'C_t' is not finite numbers, one"),
-    ("slopes", {"C_t": [1.0]}, "'slope in C_t' is not"), ("before", 5, "its numbers have no such form"),
+    ("slopes", {"C_t": [1.0]}, "'slope in C_t' is not"), ("before", 5, "has another form"),
     ("errors", {"v_x": {"rms": float("inf")}}, "'error of v_x' is not"),
     ("errors", {"v_x": {"rms": "0.1"}}, "'error of v_x' is not"),
     ("slopes", {"C_t": [["1", 2.0, 3.0], [1.0, 2.0, 3.0]]}, "'slope in C_t' is not"),

@@ -120,9 +120,9 @@ def test_an_explanation_is_given_up_where_another_is_25_times_as_likely(ratio: f
     ("text", "said"),
     [
         ('{"explanations": []}', "no two explanations"),
-        ("[1]", "no two explanations"),
-        ("{", "is not a verdict"),
-        ('{"explanations": [{"title": "A"}]}', "no verdict.json of this version"),
+        ("[1]", "not a verdict.json of this version"),
+        ("{", "not a verdict.json"),
+        ('{"explanations": [{"title": "A"}]}', "not a verdict.json of this version"),
         (None, "no such file"),
     ],
     ids=["no rivals", "a list", "no JSON", "an old one", "no file"],

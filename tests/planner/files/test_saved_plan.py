@@ -118,7 +118,7 @@ def test_the_files_of_jobs_and_their_folder_lead_to_the_plan(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({"guidance": {}}, "lacks what is needed"),
+        ({"guidance": {}}, "no entry 'straight'"),
         ({"guidance": None, "dwell_bar": [1.0]}, "dwell_bar needs a number above 0"),
         ({"first_direction": 0}, "first_direction = 0"),
         ({"objective": "fun"}, "objective = fun"),
@@ -129,8 +129,8 @@ def test_the_files_of_jobs_and_their_folder_lead_to_the_plan(tmp_path: Path) -> 
         ({"format": 1}, "has format 1"),
         ({"stated_error_over_l": 1e200}, "stated_error_over_l must be a finite number below 1e\\+100"),
         ({"reference": [[0.0, 0.0], [1e200, 0.0]]}, "reference must be 2 or more rows of 2 finite numbers"),
-        ({"off_drawn_over_l": 1.0, "guidance": {"heading_rad": [1e300, -1e300]}}, "lacks what is needed"),
-        ({"robot": {"groups": {"omega_bar": 10.0}}}, "lacks what is needed"),
+        ({"off_drawn_over_l": 1.0, "guidance": {"heading_rad": [1e300, -1e300]}}, "no entry 'straight'"),
+        ({"robot": {"groups": {"omega_bar": 10.0}}}, "no entry 'tail_length_m'"),
         ({"robot": 3}, "not a plan.json"),
         ({"reference": []}, "reference must be 2 or more rows of 2 finite numbers"),
         ({"reference": [["nan", 0.0], [1.0, 1.0]]}, "reference must be 2 or more rows of 2 finite numbers"),
