@@ -176,7 +176,8 @@ def to_goal(
         ending=Ending(end, least_dwell, _SHORTER), zigzags=_ZIGZAGS, longer=False, blocked=NoWayError,
     )  # fmt: skip
     plan = solve(task, tracked, request, progress)
-    length = track(plan.drift, 0.0 if plan.kept_clear is None else plan.kept_clear.margin).total
+    margin = 0.0 if plan.kept_clear is None else plan.kept_clear.margin
+    length = track(tracked.drift(plan.straight), margin).total
     return plan.with_job(Trip(end, plan.end, passed, length))
 
 

@@ -17,7 +17,6 @@ from common.notebook import Shown, given_axes
 from common.units import format_time
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D
-from planner.paths.tractrix import Drift
 from planner.paths.units import extent, heading_in_degrees, in_lab, place_in_lab, time_in_lab
 from planner.planning.conditions import KeptClear, Lap
 from planner.planning.declare import Declared
@@ -146,11 +145,6 @@ class Plan(Shown, Generic[J]):
         """Where it is at the end, as predicted."""
         x, y, heading = self.poses[-1].tolist()
         return x, y, heading
-
-    @property
-    def drift(self) -> Drift:
-        """What carries the robot off its heading in straight motion."""
-        return self.tracked.drift(self.straight)
 
     @property
     def poses(self) -> Floats:
