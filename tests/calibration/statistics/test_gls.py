@@ -144,7 +144,7 @@ def test_lengths_are_those_of_a_dense_covariance() -> None:
     flat = fitted.jacobian.reshape(used.size * 5, -1)
     bound = [p.sigma is not None for p in fitted.fitted]
 
-    covariance = replace(fitted.noise, share=1.0).covariance(model.runs.session)
+    covariance = replace(fitted.noise, session_ratio=1.0).covariance(model.runs.session)
     for p, column in zip(fitted.fitted, flat.T, strict=True):
         covariance += (p.sigma or 0.0) ** 2 * np.outer(column, column)
     white = np.linalg.inv(np.linalg.cholesky(covariance))
