@@ -5,7 +5,7 @@ A pose needs two points on the axis of the robot, equally far ahead of and behin
     (x, y) = (front + rear) / 2,   heading = atan2(y_front - y_rear, x_front - x_rear)
 
 A rigid body of Motive and a TUM trajectory have a heading of their own. The y axis of pictures points down and
-is reversed. Where a program is not sure of a point (`Program.likely`), the pose is lost.
+is reversed. Where a program is not sure of a point (`TrackingProgram.likely`), the pose is lost.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 
 from camera.track_options import TrackOptions
-from camera.tracking_programs import PROGRAMS, Program, Seen
+from camera.tracking_programs import PROGRAMS, Seen, TrackingProgram
 from common.errors import InputError, naming
 from common.reading import read_bytes
 from common.tables import read_table
@@ -69,7 +69,7 @@ def read_tracks(path: str | Path, **options: Unpack[TrackOptions]) -> pd.DataFra
     return table
 
 
-def _films(folder: Path, program: Program) -> list[Path]:
+def _films(folder: Path, program: TrackingProgram) -> list[Path]:
     """List a folder's files of a program, one for each film."""
     films: dict[str, Path] = {}
     for ending in program.endings:
@@ -80,7 +80,7 @@ def _films(folder: Path, program: Program) -> list[Path]:
     return list(films.values())
 
 
-def _poses(seen: Seen, path: Path, program: Program, options: TrackOptions) -> pd.DataFrame:
+def _poses(seen: Seen, path: Path, program: TrackingProgram, options: TrackOptions) -> pd.DataFrame:
     """Make poses of the points of a file."""
     seconds, metres = _scales(seen, path, options)
     points = seen.points
@@ -139,7 +139,9 @@ def _scales(seen: Seen, path: Path, options: TrackOptions) -> tuple[float, float
     return seconds, metres
 
 
-def _poses_of_two(points: pd.DataFrame, path: Path, program: Program, options: TrackOptions) -> pd.DataFrame:
+def _poses_of_two(
+    points: pd.DataFrame, path: Path, program: TrackingProgram, options: TrackOptions
+) -> pd.DataFrame:
     """Make poses of two points on the robot's axis: the place half-way, the heading from rear to front."""
     names = options.get("front", "front"), options.get("rear", "rear")
     front, rear = (_rows(points, path, name) for name in names)

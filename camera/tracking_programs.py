@@ -39,7 +39,7 @@ class Seen(NamedTuple):
     seconds: float | None = None  # of the unit of time; None: a frame
 
 
-class Program(NamedTuple):
+class TrackingProgram(NamedTuple):
     """A program that tracks."""
 
     title: str
@@ -292,15 +292,15 @@ def _tum(path: Path) -> Seen:
 
 
 PROGRAMS = {
-    "deeplabcut": Program("DeepLabCut", _deeplabcut, (".csv", *_HDF5), "scorer,|\x89HDF", likely=0.6),
-    "sleap": Program("SLEAP", _sleap, (".csv", *_HDF5), "track,frame_idx,|\x89HDF", likely=0.2),
-    "trackmate": Program("TrackMate", _trackmate, (".csv", ".xml"), "LABEL,ID,TRACK_ID,|<"),
-    "tracker": Program("Tracker", _tracker, (".txt", ".csv"), "#?multi:", y_down=False),
-    "idtrackerai": Program(
+    "deeplabcut": TrackingProgram("DeepLabCut", _deeplabcut, (".csv", *_HDF5), "scorer,|\x89HDF", likely=0.6),
+    "sleap": TrackingProgram("SLEAP", _sleap, (".csv", *_HDF5), "track,frame_idx,|\x89HDF", likely=0.2),
+    "trackmate": TrackingProgram("TrackMate", _trackmate, (".csv", ".xml"), "LABEL,ID,TRACK_ID,|<"),
+    "tracker": TrackingProgram("Tracker", _tracker, (".txt", ".csv"), "#?multi:", y_down=False),
+    "idtrackerai": TrackingProgram(
         "idtracker.ai", _idtrackerai, (".csv", *_HDF5, ".npy"), "seconds,x1,y1|\x93NUMPY|\x89HDF"
     ),
-    "motive": Program("Motive", _motive, (".csv",), "Format Version,"),
-    "tum": Program(
+    "motive": TrackingProgram("Motive", _motive, (".csv",), "Format Version,"),
+    "tum": TrackingProgram(
         "TUM", _tum, (".txt", ".tum"), rf"(?:(?:#.*\n)*#.* tx .*\n)?{_NUMBERS}[ \t]*\r?\n", y_down=False
     ),
 }

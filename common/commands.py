@@ -55,7 +55,7 @@ _PLAIN: dict[str, dict[str, Any]] = {kind.__name__: {"type": kind} for kind in (
 F = TypeVar("F", bound=Callable[..., None])
 
 
-class Parameter(NamedTuple):
+class FunctionParameter(NamedTuple):
     """A parameter of a function, as its source says."""
 
     name: str
@@ -92,7 +92,7 @@ def _function(place: str) -> tuple[ast.FunctionDef, Path]:
 
 
 @cache
-def read_function(place: str) -> dict[str, Parameter]:
+def read_function(place: str) -> dict[str, FunctionParameter]:
     """Read a function's parameters from the source, those of **options: Unpack[Options] among them."""
     function, file = _function(place)
     signature, about = function.args, _read_docstring(function)
@@ -101,25 +101,27 @@ def read_function(place: str) -> dict[str, Parameter]:
     parameters = {}
     for node, default in zip([*plain, *signature.kwonlyargs], defaults, strict=True):
         value = default.value if isinstance(default, ast.Constant) else None
-        parameters[node.arg] = Parameter(node.arg, node.annotation, file, value, default is None,
+        parameters[node.arg] = FunctionParameter(node.arg, node.annotation, file, value, default is None,
                                          node in plain, about.get(node.arg))  # fmt: skip
     options = signature.kwarg.annotation if signature.kwarg else None
     further = _read_options(ast.unparse(options.slice), file) if isinstance(options, ast.Subscript) else {}
     return further | parameters
 
 
-def _read_options(name: str, file: Path) -> dict[str, Parameter]:
+def _read_options(name: str, file: Path) -> dict[str, FunctionParameter]:
     """Read the fields of a TypedDict from the source, those of its bases first."""
     node, home = _named(name, file)
     if not isinstance(node, ast.ClassDef):
         return {}
-    fields, about = dict[str, Parameter](), _read_docstring(node)
+    fields, about = dict[str, FunctionParameter](), _read_docstring(node)
     for base in node.bases:
         fields |= _read_options(ast.unparse(base), home)
     own = [field for field in node.body if isinstance(field, ast.AnnAssign)]
     keys = [ast.unparse(field.target) for field in own]
     hints = [field.annotation for field in own]
-    return fields | {k: Parameter(k, hint, home, help=about.get(k)) for k, hint in zip(keys, hints, strict=True)}
+    return fields | {
+        k: FunctionParameter(k, hint, home, help=about.get(k)) for k, hint in zip(keys, hints, strict=True)
+    }
 
 
 def _named(name: str, file: Path) -> tuple[ast.stmt | None, Path]:
@@ -216,7 +218,7 @@ class Call(NamedTuple):
         return getattr(import_module(module), name)(**{**self.given, **further})
 
 
-class Command(NamedTuple):
+class Subcommand(NamedTuple):
     """A command of a program: a function that is called with what was written.
 
     Its names map a parameter to its argument, where that differs: "--name" makes a positional one an option,
@@ -239,7 +241,7 @@ class Command(NamedTuple):
         words = " ".join(text.split("\n\n")[0].split()).removesuffix(".")
         return words[0].lower() + words[1:]
 
-    def parameters(self) -> tuple[dict[str, Parameter], dict[str, Parameter]]:
+    def parameters(self) -> tuple[dict[str, FunctionParameter], dict[str, FunctionParameter]]:
         """Return the parameters of the public function, and its own, without the first, which is that function."""
         own = read_function(self.place)
         if not self.of:
@@ -296,7 +298,7 @@ def _show_warning(otherwise: Callable[..., None], message: Warning | str, *place
         otherwise(message, *place)
 
 
-def _add(parser: ArgumentParser, parameter: Parameter, name: str, words: dict[str, Any]) -> None:
+def _add(parser: ArgumentParser, parameter: FunctionParameter, name: str, words: dict[str, Any]) -> None:
     """Add a parameter to a parser, as a positional argument or as an option."""
     about = (parameter.help or _HELP.get(parameter.name, "")).replace("%", "%%")  # % is argparse's own sign
     default = parameter.default
@@ -327,13 +329,13 @@ class Program:
 
     def __init__(self, package: str, about: str):  # begins with a small letter, for overviews
         self.package, self.about = package, about
-        self.commands: dict[str, Command] = {}
+        self.commands: dict[str, Subcommand] = {}
 
     def command(self, name: str, *, of: str = "", **names: str) -> Callable[[F], F]:
-        """Decorate the function that runs a command with what a user types for it, and fields of `Command`."""
+        """Decorate the function that runs a command with what a user types for it, and fields of `Subcommand`."""
 
         def add(run: F) -> F:
-            self.commands[name] = Command(run, of, names)
+            self.commands[name] = Subcommand(run, of, names)
             return run
 
         return add

@@ -23,7 +23,7 @@ from sim.motion.robot_views import (
     PALE,
     SIZE,
     TURN,
-    Scene,
+    RobotScene,
     arrow,
     draw_from_above,
     draw_from_behind,
@@ -52,7 +52,7 @@ def draw_camera(axes: Any) -> None:
     axes.set_ylim(-2.7, 0.2)
 
 
-def draw(shown: Scene) -> dict[str, Figure]:
+def draw(shown: RobotScene) -> dict[str, Figure]:
     """Draw the three views, by the names of their files."""
     views: dict[str, tuple[float, Callable[[Any], None]]] = {  # file -> height over width, what draws it
         "signs-from-above.svg": (0.67, lambda axes: draw_from_above(axes, shown)),

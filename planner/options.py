@@ -20,7 +20,7 @@ from common.units import LengthUnit
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.path import Path2D, like_a_shape, shape_of
 from planner.paths.path_files import Drawing, read_path
-from planner.paths.units import Swimmer, in_tails, read_length, read_pose, read_time
+from planner.paths.units import Scales, in_tails, read_length, read_pose, read_time
 from planner.planning.request import POSE, Camera, Corner, PlanRequest
 from planner.vehicle.from_table import table_for
 from planner.vehicle.measured import MeasuredVehicle
@@ -193,7 +193,7 @@ def table_of(
     return lookup or table_for(swims, source, known, own=options.get("own_table", False)), known
 
 
-def request_of(options: Mapping[str, Any], robot: Swimmer, **own: Any) -> PlanRequest:
+def request_of(options: Mapping[str, Any], robot: Scales, **own: Any) -> PlanRequest:
     """Return what is asked of a plan; `own` are further fields.
 
     Raises:
@@ -212,12 +212,12 @@ def request_of(options: Mapping[str, Any], robot: Swimmer, **own: Any) -> PlanRe
     return PlanRequest(**given, **own, space=FreeSpace(regions, outline))
 
 
-def length_of(given: Length, unit: str | None, robot: Swimmer, name: str) -> float:
+def length_of(given: Length, unit: str | None, robot: Scales, name: str) -> float:
     """Return a length above 0 in l; a number is one."""
     return read_length(given, unit, robot, name, above_zero=True) if isinstance(given, str) else given
 
 
-def camera_of(given: Camera | Sequence[str], unit: str | None, robot: Swimmer) -> Camera:
+def camera_of(given: Camera | Sequence[str], unit: str | None, robot: Scales) -> Camera:
     """Return a camera, or read its words.
 
     Raises:
@@ -236,14 +236,14 @@ def camera_of(given: Camera | Sequence[str], unit: str | None, robot: Swimmer) -
     return Camera((noise, heading), every_s, delay_s, lost)
 
 
-def region_of(given: AnyRegion, unit: str | None, robot: Swimmer) -> Circle | Polygon:
+def region_of(given: AnyRegion, unit: str | None, robot: Scales) -> Circle | Polygon:
     """Return a region, or read its words, see `read_region`."""
     if isinstance(given, str | Path):
         return read_region(str(given), unit, robot)
     return given if isinstance(given, Circle | Polygon) else Polygon.of(given)
 
 
-def pose_of(given: Sequence[Length], unit: str | None, robot: Swimmer, name: str) -> POSE:
+def pose_of(given: Sequence[Length], unit: str | None, robot: Scales, name: str) -> POSE:
     """Return a pose in l and rad, or read its words: X, Y and degrees.
 
     Raises:
@@ -262,7 +262,7 @@ def pose_of(given: Sequence[Length], unit: str | None, robot: Swimmer, name: str
 
 
 def place_of(
-    given: Sequence[Length] | str, unit: str | None, robot: Swimmer, name: str = "place"
+    given: Sequence[Length] | str, unit: str | None, robot: Scales, name: str = "place"
 ) -> tuple[float, float]:
     """Return a place in l, or read its words: X,Y in one or in two; `name` is what messages call it.
 
@@ -281,7 +281,7 @@ def place_of(
 
 
 def places_of(
-    given: Sequence[Sequence[float] | str] | str | Path, unit: str | None, robot: Swimmer
+    given: Sequence[Sequence[float] | str] | str | Path, unit: str | None, robot: Scales
 ) -> list[tuple[float, float]]:
     """Return places in l, or read their words: X,Y of each, or one file with a point for each.
 
@@ -312,7 +312,7 @@ def seconds_of(given: float | str | None, name: str) -> float | None:
     return read_time(given, name) if isinstance(given, str) else given
 
 
-def read_region(words: str, unit: str | None, robot: Swimmer) -> Circle | Polygon:
+def read_region(words: str, unit: str | None, robot: Scales) -> Circle | Polygon:
     """Read a region, in tail lengths.
 
     Args:

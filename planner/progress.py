@@ -12,7 +12,7 @@ def progress_bar() -> Iterator[Callable[[float], object]]:
     """Show a bar on a terminal, for plans that take long."""
     from tqdm import tqdm
 
-    from planner.planning.request import Share
+    from planner.planning.request import Progress
 
     style = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}"
     with tqdm(
@@ -20,7 +20,7 @@ def progress_bar() -> Iterator[Callable[[float], object]]:
     ) as bar:
 
         def show(share: float) -> None:
-            if isinstance(share, Share):
+            if isinstance(share, Progress):
                 bar.set_description_str(share.stage, refresh=False)
                 bar.update(100 * min(share.done, 1.0) - bar.n)
 

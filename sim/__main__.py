@@ -97,12 +97,12 @@ def _film(plan: str, *, out: str, speed: float | None = None, width: int = 640) 
     from tqdm import tqdm
 
     from sim.model.schedule import load_schedule, read_plan_file
-    from sim.motion.film import Film, fitting_speed, write_film
+    from sim.motion.film import FilmSettings, fitting_speed, write_film
 
     if not 100 <= width <= 2000:
         raise InputError(f"--width {width}; give 100 to 2000 pixels")
     schedule = load_schedule(plan)
-    film = Film(speed or fitting_speed(schedule), width=width)
+    film = FilmSettings(speed or fitting_speed(schedule), width=width)
     with tqdm(total=len(schedule.dwells), desc="simulating", unit="dwell", delay=1.0, disable=None) as bar:
         count = write_film(read_plan_file(plan), schedule, out, film, progress=bar.update)
     print(f"{count} pictures at {film.speed:g} times the robot's speed -> {out}")

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
-from common.commands import Call, Command, Program, to_stderr
+from common.commands import Call, Program, Subcommand, to_stderr
 from common.errors import InputError, run_command
 from common.reading import refuse_missing
 from softflagella.shadowing import COMMANDED
@@ -128,7 +128,7 @@ def program_of(package: str) -> Program:
     return packaged
 
 
-def command(word: str) -> Command:
+def command(word: str) -> Subcommand:
     """Return the command that a word stands for."""
     package, name = WORDS[word]
     return program_of(package).commands[name]

@@ -40,7 +40,7 @@ from planner.planning.plan import Plan
 from planner.planning.request import Camera
 from sim.mechanics import planar
 from sim.model.robot import Robot
-from tracking.swim import Swimmer
+from tracking.swim import SteppedSwimmer
 from tracking.tracker import Tracker
 
 LONGEST = 3.0  # planned durations
@@ -129,7 +129,7 @@ class PathEnv(gymnasium.Env[Observation, np.int64]):
             vehicle = vehicle.drawn(rng)
         else:
             assert isinstance(plan.robot, Robot)
-            self._swimmer = Swimmer(plan.robot, plan, self._direction, np.array(self._pose), (0.0, 0.0))
+            self._swimmer = SteppedSwimmer(plan.robot, plan, self._direction, np.array(self._pose), (0.0, 0.0))
         self._law = LineOfSight(plan.declared.reference, vehicle, plan.guidance, self._offset)
         return self._seen(), self._info(False)
 

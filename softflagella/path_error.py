@@ -7,7 +7,7 @@ carries it along. Against a replay of the whole schedule in time steps the track
 most a few hundredths of l on paths of 12 l, in a tenth of the time.
 
 The covariance of the calibration, the errors of the table, and the unknown phase of the disc give what 95 % of the
-robots that the calibration allows do on the same schedules (`planner.planning.errors`). Lengths are in
+robots that the calibration allows do on the same schedules (`planner.planning.stated_error`). Lengths are in
 metres, unless a name says l; l is the tail length of the robot as given.
 """
 
@@ -23,15 +23,15 @@ from common.errors import InputError, naming
 from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D
 from planner.paths.path_files import read_path
-from planner.planning.errors import (
+from planner.planning.plan import Plan
+from planner.planning.request import PlanRequest
+from planner.planning.stated_error import (
     deviations_open_loop,
     error_growth,
     predicted_error,
     rms_in_time,
     stated_error,
 )
-from planner.planning.plan import Plan
-from planner.planning.request import PlanRequest
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Switches, roll_out
 from sim.knowledge import CalibrationKnowledge

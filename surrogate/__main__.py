@@ -35,7 +35,7 @@ def _train(
         raise InputError(f"--epochs {epochs}; give a whole number from 1")
     for folder in data:  # before torch is loaded
         read_manifest(folder)
-    from surrogate.errors import shortcomings
+    from surrogate.held_out import shortcomings
     from surrogate.training.fits import CURVES
     from surrogate.training.model_card import model_card
     from surrogate.training.networks import Settings, device_named, remove_states
@@ -104,7 +104,7 @@ def _inverse(inverse: Call, *, out: str) -> None:
 @program.command("errors")
 def _errors(*, lookup: str | None = None) -> None:
     """Print the stored held-out errors."""
-    from surrogate.errors import error_table
+    from surrogate.held_out import error_table
     from surrogate.table_file import load
 
     table = load(lookup)

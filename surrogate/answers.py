@@ -27,7 +27,7 @@ from sim.inputs import group_columns
 from sim.model.groups import MOST_TAILS
 from sim.model.robot import Robot
 from sim.robot_rows import RobotRows
-from surrogate.errors import CERTIFIED_OUTPUTS, RATES
+from surrogate.held_out import CERTIFIED_OUTPUTS, RATES
 from surrogate.interface import LookupTable, OutsideError
 from surrogate.table import OUTSIDE, NeuralTable
 

@@ -48,7 +48,7 @@ def error_modes(
     """Return the modes of errors of which only the sizes are known.
 
     Args:
-        errors: relative errors by output, each with its "rms", see `surrogate.errors`. "rest", where given,
+        errors: relative errors by output, each with its "rms", see `surrogate.held_out`. "rest", where given,
             is the part of it that is in no known mode.
         motion: the robot's steady motion, by output.
         known: modes (Q, K + 1, D, 3) of the lags that are known besides, after dwells BEFORE and after a long one.

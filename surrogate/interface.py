@@ -49,7 +49,7 @@ class LookupTable(Protocol):
 
     @property
     def errors(self) -> Mapping[str, Mapping[str, float]]:
-        """Errors by output; each has at least "rms", see `surrogate.errors`."""
+        """Errors by output; each has at least "rms", see `surrogate.held_out`."""
         ...
 
     @property

@@ -25,7 +25,7 @@ import numpy as np
 from common.arrays import Floats, Integers
 from sim.jit import compiled_fast
 from surrogate.domain import MOST_TAILS
-from surrogate.errors import ITSELF, ONE, OUTPUTS, SCALES, SPEED, SURGE
+from surrogate.held_out import ITSELF, ONE, OUTPUTS, SCALES, SPEED, SURGE
 from surrogate.tails import COUPLE, NUMBER, ROBOT_NUMBERS
 
 COVERAGE = 0.90

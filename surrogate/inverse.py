@@ -19,7 +19,7 @@ from common.arrays import Floats, Integers
 from common.errors import InputError
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.domain import BOUNDS
-from surrogate.errors import error_scale
+from surrogate.held_out import error_scale
 from surrogate.table import OUTSIDE, NeuralTable
 
 Bounds = Mapping[str, tuple[float, float]]
@@ -47,7 +47,7 @@ def inverse(
     Args:
         lookup: the table.
         robots: the inputs that are given, each (M,).
-        targets: outputs by name, each (M,); errors are relative as in `surrogate.errors`.
+        targets: outputs by name, each (M,); errors are relative as in `surrogate.held_out`.
         bounds: free inputs and their ranges.
 
     Returns:

@@ -1,6 +1,6 @@
 """The steady motion of robots from the networks of their tails: what is in balance, how novel it is, all outputs.
 
-Robots are packed as in `surrogate.tails.pack_robots`, (M, 39). Outputs are those of `surrogate.errors.OUTPUTS`,
+Robots are packed as in `surrogate.tails.pack_robots`, (M, 39). Outputs are those of `surrogate.held_out.OUTPUTS`,
 (12, M): eight of the steady motion, then four of the response to a flip.
 """
 

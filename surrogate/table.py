@@ -30,7 +30,7 @@ from sim.model.response import DWELLS, Responses
 from sim.motion.steady_motion import STEADY_OUTPUTS, net_speeds, twists
 from surrogate.domain import INSIDE, NO_RESPONSE, NOT_LEARNED, ROBOT, Support, reason_of
 from surrogate.error_modes import CURVE_ERRORS, NORMAL_90, STEADY, CurveErrors, error_modes, joined
-from surrogate.errors import OUTPUTS, RELATIVE, certified_error, error_scale
+from surrogate.held_out import OUTPUTS, RELATIVE, certified_error, error_scale
 from surrogate.interface import ErrorModes, OutsideError
 from surrogate.intervals import Intervals
 from surrogate.motions import (
@@ -76,7 +76,7 @@ class NeuralTable(Shown):
     support: tuple[Support | None, ...]  # for each of the classes of `surrogate.motions`
     intervals: Intervals | None
     ranges: dict[str, tuple[float, float]]  # of the robots that were learned, by input
-    errors: dict[str, dict[str, float]]  # output -> held-out error, see `surrogate.errors`
+    errors: dict[str, dict[str, float]]  # output -> held-out error, see `surrogate.held_out`
     provenance: dict[str, Any]
     curve_errors: CurveErrors | None = None  # of the response; None: only the sizes in `errors` are known
 
@@ -244,7 +244,7 @@ class NeuralTable(Shown):
         return ax
 
     def to_frame(self) -> pd.DataFrame:
-        """Tabulate the held-out errors: a row for each output, see `surrogate.errors`."""
+        """Tabulate the held-out errors: a row for each output, see `surrogate.held_out`."""
         import pandas as pd  # a query does not need it
 
         return pd.DataFrame.from_dict(self.errors, orient="index")

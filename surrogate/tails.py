@@ -80,7 +80,7 @@ _ON_TAILS = ("tail_sag",)  # local, but on the tails
 _SENSES = np.array([-1.0, 1.0, -1.0, -1.0, -1.0])  # mirror image of (v_x, v_z, ω_yr, ω_h, ω_t)
 
 
-class Robots(NamedTuple):
+class RobotColumns(NamedTuple):
     """M robots, in the mirror image if the motor is reversed; each (M,) where nothing else is said."""
 
     speed: Floats  # |ω|
@@ -96,24 +96,24 @@ class Robots(NamedTuple):
     spin_drag: Floats  # moment on the head per ω_h
     head: Floats  # (M, 9) HEAD_INPUTS; drag over that of the tails
 
-    def at(self, rows: Integers | Flags | slice) -> Robots:
+    def at(self, rows: Integers | Flags | slice) -> RobotColumns:
         """Return the robots at indices, flags or a slice (M',)."""
-        return Robots(*[part[rows] for part in self])
+        return RobotColumns(*[part[rows] for part in self])
 
 
-def pack_robots(robots: Robots) -> Floats:
+def pack_robots(robots: RobotColumns) -> Floats:
     """Return robots for the compiled loops, (M, ROBOT_NUMBERS), in the order of the fields."""
     resistance = robots.resistance.reshape(-1, 20).T
     rows = [*robots[:RESISTANCE], resistance, *robots[RESISTANCE + 1 : -1], robots.head.T]
     return np.ascontiguousarray(np.vstack(rows).T)
 
 
-def unpack_robots(packed: Floats) -> Robots:
+def unpack_robots(packed: Floats) -> RobotColumns:
     """Return packed robots (M, ROBOT_NUMBERS) by field, without copying them."""
     columns = packed.T
     resistance = packed[:, RESISTANCE:HEAD_LENGTH].reshape(-1, 4, 5)
     parts: Any = (columns[0], columns[1], resistance, *columns[HEAD_LENGTH:30], packed[:, 30:])
-    return Robots(*parts)
+    return RobotColumns(*parts)
 
 
 def packed_robots(columns: Mapping[str, Floats]) -> tuple[Floats, Floats]:
@@ -129,7 +129,7 @@ def packed_robots(columns: Mapping[str, Floats]) -> tuple[Floats, Floats]:
 
 
 @np.errstate(all="ignore")  # a robot that cannot be has no motion, and is refused for that
-def robots_of(columns: Mapping[str, Floats]) -> Robots:
+def robots_of(columns: Mapping[str, Floats]) -> RobotColumns:
     """Return robots by column name, each (M,), a_over_R and effects included.
 
     Raises:
@@ -157,7 +157,7 @@ def robots_of(columns: Mapping[str, Floats]) -> Robots:
     entries = resistance[:, [0, 1, 2, 3, 0, 0, 3, 2], [0, 1, 2, 3, 2, 3, 4, 4]].T
     numbers: Any = (*entries, body.head_length, gain, count * body.zeta_perp, body.offset)
     head = inputs_of_head(*numbers)
-    return Robots(
+    return RobotColumns(
         np.abs(body.omega), gain, resistance, body.head_length, sense, body.zeta_perp, body.zeta_parallel,
         body.offset, body.tail_radius, count, spin_drag, np.stack(head, -1),
     )  # fmt: skip
@@ -301,7 +301,7 @@ def wrench_terms(perp: Any, parallel: Any, offset: Any, number: Any, motion: Any
     )
 
 
-def straight_resistance(robots: Robots) -> Floats:
+def straight_resistance(robots: RobotColumns) -> Floats:
     """Return the resistance of straight tails to (v_x, v_z, ω_yr), (M, 3, 3)."""
     across, along = robots.number * robots.perp, robots.number * robots.parallel
     none = np.zeros(len(across))
@@ -309,7 +309,7 @@ def straight_resistance(robots: Robots) -> Floats:
     return np.stack([np.stack(row, -1) for row in rows], -2)
 
 
-def network_inputs(robots: Robots, motion: Floats, count: int) -> Floats:
+def network_inputs(robots: RobotColumns, motion: Floats, count: int) -> Floats:
     """Return the inputs of a network of the wrench that has so many: SINGLE_INPUTS or INPUTS, (M, F).
 
     Args:
@@ -325,7 +325,7 @@ def network_inputs(robots: Robots, motion: Floats, count: int) -> Floats:
     return np.stack(inputs_of_tail(perp, offset, radius, robots.number, spin_drag, motion.T, beta), -1)
 
 
-def wrench_slopes(robots: Robots, motion: Floats) -> Floats:
+def wrench_slopes(robots: RobotColumns, motion: Floats) -> Floats:
     """Return ∂(wrench)/∂y at motions (M, 5), (M, 4, 6)."""
     *_, force, thrust, torque, squared = wrench_terms(
         robots.perp, robots.parallel, robots.offset, robots.number, motion.T
@@ -339,7 +339,7 @@ def wrench_slopes(robots: Robots, motion: Floats) -> Floats:
     return slopes
 
 
-def motion_sensitivity(robots: Robots, motion: Floats) -> Floats:
+def motion_sensitivity(robots: RobotColumns, motion: Floats) -> Floats:
     """Return ∂(relative motion)/∂(wrench) with the drag of straight tails, (M, 4, 4)."""
     matrix = robots.resistance[:, :, :4].copy()
     matrix[:, :, 3] += robots.gain[:, None] * robots.resistance[:, :, 4]

@@ -7,6 +7,7 @@ import json
 import re
 import subprocess
 import sys
+from collections import defaultdict
 from functools import cache
 from graphlib import TopologicalSorter
 from itertools import product
@@ -168,3 +169,13 @@ def test_bars_are_for_terminals() -> None:
                     hidden = options.get("disable", "hidden")  # named so where it is computed before
                     where = text if hidden == "hidden" else hidden
                     assert re.search("or None|=None|^None$|isatty", where), f"{file}: {ast.unparse(node)}"
+
+
+def test_a_class_has_a_name_of_its_own() -> None:
+    homes: defaultdict[str, list[str]] = defaultdict(list)
+    for package in (*ORDER, "tests", "benchmarks"):
+        for file in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text())):
+                if isinstance(node, ast.ClassDef):
+                    homes[node.name].append(f"{file.relative_to(ROOT)}:{node.lineno}")
+    assert {name: places for name, places in homes.items() if len(places) > 1} == {}

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.arrays import Floats, Integers
-from planner.paths.dubins import TURNS, DubinsPaths, words
+from planner.paths.dubins import TURNS, DubinsPaths, segment_lengths
 from planner.paths.tractrix import Drift
 from planner.planning.conditions import OVERLAP
 from planner.planning.line_of_sight import LineOfSight, look_ahead
@@ -65,7 +65,7 @@ class TrackerGuidance(LineOfSight):
         self._stride = stride(plan)
         lap = float(reference.arc[-1])
         self._may_leave_out = self._may_leave_out_of_lap = MOST_LEFT_OUT * lap if plan.drawn.closed else math.inf
-        self._way: Way | None = None
+        self._way: WayBack | None = None
         self._leg, self._along = SEGMENTS, 0.0  # of the way; the path follows its last segment
 
     def update_drift(self, drift: Drift) -> None:
@@ -167,7 +167,7 @@ class TrackerGuidance(LineOfSight):
         track, target = shortest_way(start, targets, left_out, self._stride, radius)
         self._may_leave_out -= float(left_out[target])
         at = min(place + target, self._last)
-        self._way = Way.of(track, at)
+        self._way = WayBack.of(track, at)
         turns = round((self._way.course - course[target]) / (2 * math.pi))
         self._leg, self._along = 0, 0.0
         self.place, self.share = at, 0.0
@@ -269,19 +269,19 @@ class Segment(NamedTuple):
         return near + turned / self.curvature, error
 
 
-class Way(NamedTuple):
+class WayBack(NamedTuple):
     """A track of three segments, and the step of the path at which it ends."""
 
     segments: list[Segment]
     target: int
 
     @staticmethod
-    def of(track: DubinsPaths, target: int) -> Way:
+    def of(track: DubinsPaths, target: int) -> WayBack:
         """Make a way of a single track."""
         lengths, curvatures = track.lengths[0], track.turns[0] / track.radius
         starts = track.poses((np.cumsum(lengths) - lengths)[None])[0]
         rows = np.column_stack([starts, curvatures, lengths]).tolist()
-        return Way([Segment(*row) for row in rows], target)
+        return WayBack([Segment(*row) for row in rows], target)
 
     @property
     def course(self) -> float:
@@ -304,7 +304,7 @@ def shortest_way(
     """
 
     def best(rows: Integers) -> tuple[int, Floats, int]:
-        lengths = words(np.array(start), targets[rows], radius)
+        lengths = segment_lengths(np.array(start), targets[rows], radius)
         total = lengths.sum(-1)
         word = total.argmin(-1)
         row = int((total.min(-1) + LEFT_OUT * left_out[rows]).argmin())

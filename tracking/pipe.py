@@ -35,7 +35,7 @@ from dataclasses import dataclass
 
 from common.errors import InputError
 from common.units import from_si, split, to_si
-from planner.paths.units import Swimmer
+from planner.paths.units import Scales
 from planner.planning.request import POSE
 from tracking.tracker import Tracker
 
@@ -52,7 +52,7 @@ _COUNTS = (1, 4, 5)  # of the numbers of a plain line
 def answers(
     tracker: Tracker | None,
     lines: Iterable[str],
-    robot: Swimmer,
+    robot: Scales,
     begin: Callable[[POSE, float], Tracker] | None = None,
 ) -> Iterator[str]:
     """Answer every line, until the path ends.
@@ -104,12 +104,12 @@ class Columns:
     length: str | None = None  # suffix of the unit of x; None: tail lengths
 
     @classmethod
-    def plain(cls, robot: Swimmer) -> Columns:
+    def plain(cls, robot: Scales) -> Columns:
         """Return the columns of lines without a header."""
         return cls.named(list(_KINDS), robot)
 
     @classmethod
-    def named(cls, header: list[str], robot: Swimmer) -> Columns:
+    def named(cls, header: list[str], robot: Scales) -> Columns:
         """Read a header.
 
         Raises:

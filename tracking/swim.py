@@ -24,7 +24,7 @@ from planner.vehicle.vehicle import Vehicle
 from sim.mechanics import planar
 from sim.model.robot import Robot
 from sim.motion.replay import run_at_rest
-from sim.motion.run import Run
+from sim.motion.run import SteppedRobot
 from sim.robot_rows import OneRobot, one_robot, with_units
 from sim.solve.march import YAW, X, Y
 from tracking.tracker import Command, Tracker
@@ -114,7 +114,7 @@ class Swim:
         )
 
 
-class Swimmer:
+class SteppedSwimmer:
     """A robot in time steps, or a vehicle, from rest; it advances at constant motor speed, and flips."""
 
     def __init__(
@@ -124,7 +124,7 @@ class Swimmer:
         self._current, self._now = np.array([*current, 0.0]), 0.0
         self._pose, self._elapsed = np.zeros(3), 0.0  # of a vehicle: pose at the last flip, time since then
         self._before: float | None = None  # length of its last dwell
-        self._run: Run | None = None
+        self._run: SteppedRobot | None = None
         self.become(truth)
 
     def become(self, truth: Robot | Vehicle) -> None:
@@ -215,7 +215,7 @@ def swim(
     begin, limit = np.array(pilot.start if start is None else start), longest * plan.duration
     x, y = (scale * each / (100 * plan.robot.length_scale) for each in current_cm_s)
     command = pilot.update(0.0)
-    swimmer = Swimmer(truth, plan, command.direction, begin, (x, y))
+    swimmer = SteppedSwimmer(truth, plan, command.direction, begin, (x, y))
     now, look, change = 0.0, camera.every_s / scale, plan.duration / 2 if later else np.inf
     waiting: list[tuple[float, POSE, float]] = []  # poses on their way from the camera
     track = _Record(begin, command)

@@ -42,9 +42,9 @@ from common.errors import InputError
 from common.notebook import Shown
 from common.units import format_time
 from planner.paths.units import heading_in_degrees, in_lab
-from planner.planning.errors import KEPT, bound
 from planner.planning.plan import Plan
 from planner.planning.request import POSE
+from planner.planning.stated_error import KEPT, bound
 from tracking.guidance import TrackerGuidance
 from tracking.kalman_filter import NAMES, Dwell, Estimate, difference
 

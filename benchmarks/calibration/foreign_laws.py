@@ -18,7 +18,7 @@ from unittest.mock import patch
 import numpy as np
 import pandas as pd
 
-from benchmarks.calibration.law_truths import NULL, Setting, Truth
+from benchmarks.calibration.law_truths import NULL, Design, Truth
 from benchmarks.calibration.planted import NOISE, ROBOT, SESSION
 from calibration.laws.places import places
 from calibration.swimmer.swimmer import SwimmerModel
@@ -36,7 +36,7 @@ _STEPS = 4  # of a drift
 _MULTIPLIED = ["omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s", "R_yr_cm"]  # outputs with relative noise
 
 
-def foreign(setting: Setting, seed: int) -> Truth:
+def foreign(setting: Design, seed: int) -> Truth:
     """Draw the truth of a seed."""
     rng, kind = np.random.default_rng(seed), KINDS[seed % len(KINDS)]
     score = _SCORES[seed // len(KINDS) % len(_SCORES)]
@@ -64,7 +64,7 @@ def foreign(setting: Setting, seed: int) -> Truth:
     return Truth(kind, score, [chosen[0].name], lambda: _with_sizes(setting, name, size * factor, seed))
 
 
-def _factor(kind: str, setting: Setting, rng: np.random.Generator) -> Floats:
+def _factor(kind: str, setting: Design, rng: np.random.Generator) -> Floats:
     """Compute the factor of every run (n,), which is no power law."""
     speed = setting.made["omega_rpm"].abs().to_numpy()
     if kind == "resonance":
@@ -77,7 +77,7 @@ def _factor(kind: str, setting: Setting, rng: np.random.Generator) -> Floats:
     return np.asarray(1.0 + _STEPS * place // count) / _STEPS
 
 
-def _with_sizes(setting: Setting, name: str, sizes: Floats, seed: int) -> pd.DataFrame:
+def _with_sizes(setting: Design, name: str, sizes: Floats, seed: int) -> pd.DataFrame:
     """Make a table in which an effect has a size of its own in every run (n,), with the noise of `make_table`."""
     table = setting.made.copy()
     for size in np.unique(sizes):

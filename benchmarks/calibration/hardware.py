@@ -38,7 +38,7 @@ _CURRENT = 0.2  # cm/s
 Change = Callable[[Robot], tuple[Robot, Hardware]]
 
 
-class Case(NamedTuple):
+class HardwareCase(NamedTuple):
     """What is off."""
 
     label: str
@@ -82,21 +82,25 @@ def _numbers(**factors: float) -> Callable[[float], Change]:
 
 
 CASES = (
-    Case("nothing", 6, _numbers(), (0, 0), ()),
-    Case("one tail shorter", 4, _tails(lengths=lambda x: (1 - x,)), (0.15, 0.3), ("one_tail_shorter",)),
-    Case("one tail softer", 3, _tails(stiffness=lambda x: (1 - x,)), (0.3, 0.6), ("one_tail_softer",)),
-    Case("a tail lost on day 3", 3, _tails(lengths=lambda x: (0.0,)), (1, 1), ("since session day3",), (3, 4)),
-    Case("clamps that give", 4, _clamps, (0.1, 0.3), ("root_compliance",)),
-    Case("disc tilted, degrees", 3, _tails(tilt=math.radians), (4, 8), ()),
-    Case("bubbles on day 3", 3, _numbers(C_r=-1), (0.15, 0.25), ("C_r in session day3",), (3,)),
-    Case("another robot from day 3 on", 3, _numbers(youngs_modulus=1, C_yr=-0.6), (0.2, 0.3), ("day3",), (3, 4)),
-    Case("camera turned on day 3", 3, _numbers(), (0, 0), ("course", "current_along"), (3, 4)),
-    Case("viscosity that falls with depth", 4, _layers, (0.05, 0.15), ("stratified_viscosity",)),
-    Case("immersion by the tails' weight", 4, _weight, (0.03, 0.1), ("immersion_by_weight",)),
+    HardwareCase("nothing", 6, _numbers(), (0, 0), ()),
+    HardwareCase("one tail shorter", 4, _tails(lengths=lambda x: (1 - x,)), (0.15, 0.3), ("one_tail_shorter",)),
+    HardwareCase("one tail softer", 3, _tails(stiffness=lambda x: (1 - x,)), (0.3, 0.6), ("one_tail_softer",)),
+    HardwareCase(
+        "a tail lost on day 3", 3, _tails(lengths=lambda x: (0.0,)), (1, 1), ("since session day3",), (3, 4)
+    ),
+    HardwareCase("clamps that give", 4, _clamps, (0.1, 0.3), ("root_compliance",)),
+    HardwareCase("disc tilted, degrees", 3, _tails(tilt=math.radians), (4, 8), ()),
+    HardwareCase("bubbles on day 3", 3, _numbers(C_r=-1), (0.15, 0.25), ("C_r in session day3",), (3,)),
+    HardwareCase(
+        "another robot from day 3 on", 3, _numbers(youngs_modulus=1, C_yr=-0.6), (0.2, 0.3), ("day3",), (3, 4)
+    ),
+    HardwareCase("camera turned on day 3", 3, _numbers(), (0, 0), ("course", "current_along"), (3, 4)),
+    HardwareCase("viscosity that falls with depth", 4, _layers, (0.05, 0.15), ("stratified_viscosity",)),
+    HardwareCase("immersion by the tails' weight", 4, _weight, (0.03, 0.1), ("immersion_by_weight",)),
 )
 
 
-def make_table(case: Case, place: int, seed: int) -> pd.DataFrame:
+def make_table(case: HardwareCase, place: int, seed: int) -> pd.DataFrame:
     """Make a table; `place`: of the table in its case."""
     rng = np.random.default_rng(seed)
     size = float(np.linspace(*case.sizes, case.tables)[place])
@@ -129,7 +133,7 @@ def make_table(case: Case, place: int, seed: int) -> pd.DataFrame:
     return table.assign(elapsed_min=4.0 * np.arange(len(table)) + 1000 * table["day"]).drop(columns="day")
 
 
-def _states(case: Case, days: list[Any]) -> set[bool]:
+def _states(case: HardwareCase, days: list[Any]) -> set[bool]:
     return {day in case.days for trials in days for day in trials.tolist()}
 
 
@@ -151,7 +155,7 @@ def _seen(robot: Robot, hardware: Hardware) -> np.ndarray:
     )
 
 
-def answer(verdict: Verdict, case: Case) -> str:
+def answer(verdict: Verdict, case: HardwareCase) -> str:
     """Say whether a verdict names what is off."""
     claims = (*verdict.explaining, *verdict.found.rival_effects)
     names = [e.name for c in claims for e in c.claimed] + [move.words for move in verdict.moves]
@@ -166,7 +170,7 @@ def answer(verdict: Verdict, case: Case) -> str:
     return "wrong" if len(sure) == len(verdict.explaining) == 1 or not claims else "warned"
 
 
-def calibrated(case: Case, place: int, seed: int) -> dict[str, Any]:
+def calibrated(case: HardwareCase, place: int, seed: int) -> dict[str, Any]:
     """Calibrate one table."""
     table = make_table(case, place, seed)
     began = time.process_time()

@@ -47,7 +47,7 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Setting:
+class Design:
     """The runs of a design with the model that is fitted to them, where nothing is missing."""
 
     made: pd.DataFrame
@@ -57,7 +57,7 @@ class Setting:
     design: Mapping[str, Any]  # arguments of `make_table`
 
     @classmethod
-    def of(cls, **design: Any) -> Setting:
+    def of(cls, **design: Any) -> Design:
         """Fit the model to a table of a design (`make_table`) in which nothing is missing."""
         table = make_table(ROBOT, seed=NULL, title="", **design)
         model = SwimmerModel(ROBOT, read_measurements(table))
@@ -91,7 +91,7 @@ class Setting:
         return np.array(logs)[of_run]
 
 
-def hidden_law(setting: Setting, seed: int, *, nothing: bool) -> Truth:
+def hidden_law(setting: Design, seed: int, *, nothing: bool) -> Truth:
     """Draw place, exponents, lever and sign of a law; one seed after the other has each of `SCORES` in turn.
 
     One place in two is one at the disc, odd ones included; the others are side forces elsewhere and laws of the

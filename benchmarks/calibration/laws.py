@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.calibration.foreign_laws import DESIGN, foreign
-from benchmarks.calibration.law_truths import Setting, Truth, hidden_law
+from benchmarks.calibration.law_truths import Design, Truth, hidden_law
 from benchmarks.common import Records, heading, per_cent, row
 from calibration.laws.laws import Laws, find_laws
 from calibration.statistics.residual_tests import Directions, examine_residual
@@ -89,7 +89,7 @@ def summary(records: list[dict[str, Any]]) -> None:
 
 
 def main(kind: str = "hidden", tables: str = "24", first_seed: str = "0", file: str = "") -> None:
-    setting, records = Setting.of(**(DESIGN if kind == "foreign" else {})), Records(file)
+    setting, records = Design.of(**(DESIGN if kind == "foreign" else {})), Records(file)
     truths: dict[str, Callable[[int], Truth]] = {
         "hidden": lambda seed: hidden_law(setting, seed, nothing=seed % 4 == 0),
         "foreign": lambda seed: foreign(setting, seed),

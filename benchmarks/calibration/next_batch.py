@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from benchmarks.calibration.planted import Linear, Signals, linearised, scatter, with_values
+from benchmarks.calibration.planted import LinearSwimmer, Signals, linearised, scatter, with_values
 from benchmarks.common import heading, in_parallel, per_cent, row
 from calibration.statistics.residual_tests import TESTABLE
 from calibration.swimmer.measured_table import read_measurements
@@ -34,7 +34,7 @@ DAYS, LEVEL = 3, 8.0
 _AT_ONCE = 20  # tables that are tried together
 
 
-def table() -> tuple[Linear, int]:
+def table() -> tuple[LinearSwimmer, int]:
     """Return the runs that were made and then those that can be made next; how many were made."""
     made = [(n, a, s * w, f"day {d}") for d in range(DAYS) for n, a, w, s in itertools.product(*MADE)]
     possible = [(n, a, s * w, "next") for n, a, w, s in itertools.product(*POSSIBLE)]
@@ -43,7 +43,7 @@ def table() -> tuple[Linear, int]:
     return replace(model, next=model.subset(np.arange(len(made), len(rows)))), len(made)
 
 
-def close(all_runs: Linear, signal: Floats, seed: int, *parts: Integers) -> Verdict:
+def close(all_runs: LinearSwimmer, signal: Floats, seed: int, *parts: Integers) -> Verdict:
     """Calibrate the runs of some parts; a run that comes twice is measured twice."""
     k = all_runs.prediction.shape[1]
     noise = np.concatenate([scatter(all_runs.subset(p).runs, k, seed + i * 10**6) for i, p in enumerate(parts)])
@@ -62,7 +62,7 @@ def outcome(verdict: Verdict, truth: str) -> str:
     return "right" if len(sets) == 1 else "still ambiguous"
 
 
-def decided(model: Linear, count: int, effect: int, size: float, seed: int) -> tuple[str, str] | None:
+def decided(model: LinearSwimmer, count: int, effect: int, size: float, seed: int) -> tuple[str, str] | None:
     """Return what the table says and what it says with the new runs; None if it is not ambiguous."""
     truth, signal, made = model.effects[effect].name, model.D[..., effect] * size, np.arange(count)
     first = close(model, signal, seed, made)

@@ -37,7 +37,7 @@ LENGTHS_CM = (5.0, 7.0, 9.0, 11.0, 13.0, 15.0)
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearSwimmer:
     """The swimmer near one robot: prediction + J (ln C − ln C0) + G x + D (ε − null), x: nuisance parameters."""
 
     runs: Runs
@@ -49,9 +49,9 @@ class Linear:
     G: Floats  # (n, k, g)
     D: Floats  # (n, k, e)
     untestable: Mapping[str, str]
-    next: Linear | None = None  # runs that can be made next; None: the same runs
+    next: LinearSwimmer | None = None  # runs that can be made next; None: the same runs
 
-    def subset(self, rows: Integers) -> Linear:
+    def subset(self, rows: Integers) -> LinearSwimmer:
         """The runs at places `rows`, which may come more than once."""
         parts = {k: getattr(self, k)[rows] for k in ("prediction", "J", "G", "D")}
         return replace(self, runs=self.runs.subset(rows), **parts)
@@ -74,7 +74,7 @@ class Linear:
     def check(self, prediction: Floats) -> None:
         """Nothing to check."""
 
-    def possible(self) -> tuple[Linear, list[dict[str, Any]]]:
+    def possible(self) -> tuple[LinearSwimmer, list[dict[str, Any]]]:
         """Runs that can be made next, and their places."""
         model = self.next or self
         return model, [{"run": i} for i in range(len(model.runs))]
@@ -114,17 +114,17 @@ def with_values(settings: pd.DataFrame, rng: np.random.Generator) -> pd.DataFram
     return settings.assign(**{name: v * f for (name, v), f in zip(values.items(), spread.T, strict=True)})
 
 
-def linearised(data: Measurements) -> Linear:
+def linearised(data: Measurements) -> LinearSwimmer:
     """Derivatives of the simulator at ROBOT and the runs of a table."""
     model = SwimmerModel(ROBOT, data)
     names = [p.name for p in (*model.coefficients, *model.nuisances, *model.effects)]
     prediction, table = model.derivatives(start_values(model), names)
     J, G, D = np.split(table, np.cumsum([len(model.coefficients), len(model.nuisances)]), -1)
     effects = tuple(replace(e, second=None) for e in model.effects)  # it is linear in the sizes alone
-    return Linear(model.runs, model.coefficients, model.nuisances, effects, prediction, J, G, D, {})
+    return LinearSwimmer(model.runs, model.coefficients, model.nuisances, effects, prediction, J, G, D, {})
 
 
-def restated(model: Linear, sigmas: Mapping[str, float]) -> Linear:
+def restated(model: LinearSwimmer, sigmas: Mapping[str, float]) -> LinearSwimmer:
     """The same with other standard deviations; numbers with none are exact."""
     given = tuple(replace(p, sigma=sigmas[p.name]) for p in model.nuisances if sigmas.get(p.name))
     keep = [i for i, p in enumerate(model.nuisances) if sigmas.get(p.name)]
@@ -139,13 +139,13 @@ def scatter(runs: Runs, outputs: int, seed: int) -> Floats:
     return NOISE * noise + shift
 
 
-def measured(model: Linear, signal: Floats, seed: int) -> Linear:
+def measured(model: LinearSwimmer, signal: Floats, seed: int) -> LinearSwimmer:
     """Return the model with data: its prediction, a signal (n, k), and the noise of a seed."""
     noise = scatter(model.runs, model.prediction.shape[1], seed)
     return replace(model, runs=replace(model.runs, y=model.prediction + signal + noise))
 
 
-def in_days(model: Linear, days: int, seed: int) -> Linear:
+def in_days(model: LinearSwimmer, days: int, seed: int) -> LinearSwimmer:
     """Return the model with runs of every kind in each of some sessions; repeats are in different ones."""
     rng = np.random.default_rng(seed)
     session = np.concatenate([rng.permutation(days)[:2] for _ in range(len(model.runs) // 2)])
@@ -157,7 +157,7 @@ def in_days(model: Linear, days: int, seed: int) -> Linear:
 class Signals:
     """What is seen of signals in this design."""
 
-    def __init__(self, model: Linear, used: Flags | None = None):
+    def __init__(self, model: LinearSwimmer, used: Flags | None = None):
         k = model.prediction.shape[1]
         self.used = ~middle_session(model.runs) if used is None else used
         white = Noise(NOISE**2 * np.eye(k), (SESSION / NOISE) ** 2)
@@ -192,7 +192,7 @@ class Signals:
         return float(np.sqrt(max(unabsorbed @ unabsorbed - taken.max(), 0.0)))
 
 
-def outside(model: Linear) -> dict[str, Floats]:
+def outside(model: LinearSwimmer) -> dict[str, Floats]:
     """Signals that no effect of the catalogue has, unscaled."""
     tails, length = model.runs.inputs[:, 0], model.runs.inputs[:, 1]
     wave, odd = np.zeros_like(model.prediction), np.zeros_like(model.prediction)

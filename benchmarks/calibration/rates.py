@@ -29,7 +29,7 @@ import numpy as np
 
 from benchmarks.calibration.planted import (
     ROBOT,
-    Linear,
+    LinearSwimmer,
     Signals,
     design,
     in_days,
@@ -64,7 +64,7 @@ _OF_AN_EFFECT = (_NAMED, _OTHER, _NUMBER) = (
 
 
 @dataclass(frozen=True)
-class Case:
+class RateCase:
     """A truth, and what is asked of the verdicts on it."""
 
     label: str
@@ -83,7 +83,7 @@ class Result(NamedTuple):
     seconds: float
 
 
-def answers(verdict: Verdict, case: Case) -> dict[str, bool]:
+def answers(verdict: Verdict, case: RateCase) -> dict[str, bool]:
     """Answer every question that can be asked of a verdict."""
     sets = [{e.name for e in c.claimed} for c in verdict.explaining]
     beside = [{e.name for e in c.claimed} for c in verdict.found.rival_effects]
@@ -106,7 +106,7 @@ def answers(verdict: Verdict, case: Case) -> dict[str, bool]:
     return found | ({_COVERED: intervals[-1][0] <= value <= intervals[-1][1]} if intervals else {})
 
 
-def results(case: Case, seeds: list[int]) -> list[Result]:
+def results(case: RateCase, seeds: list[int]) -> list[Result]:
     """Calibrate the tables of some seeds."""
     done = []
     for model in case.tables(seeds):
@@ -117,12 +117,12 @@ def results(case: Case, seeds: list[int]) -> list[Result]:
     return done
 
 
-def linear_tables(model: Linear, signal: Floats, seeds: list[int]) -> list[Experiment]:
+def linear_tables(model: LinearSwimmer, signal: Floats, seeds: list[int]) -> list[Experiment]:
     """Add the same signal to every table."""
     return [measured(model, signal, seed) for seed in seeds]
 
 
-def drawn_tables(model: Linear, truth: Linear, seeds: list[int]) -> list[Experiment]:
+def drawn_tables(model: LinearSwimmer, truth: LinearSwimmer, seeds: list[int]) -> list[Experiment]:
     """Nuisance parameters of `truth` off by a draw of their priors, of which `model` may know nothing."""
     sigma = np.array([p.sigma for p in truth.nuisances], dtype=float)
     off = [np.random.default_rng(10_000 + seed).normal(size=len(sigma)) * sigma for seed in seeds]
@@ -134,16 +134,16 @@ def falling(truth: str, withheld: tuple[str, ...], seeds: list[int]) -> list[Exp
     return [read_balls(falls(truth, seed), withheld) for seed in seeds]
 
 
-def falling_cases() -> list[Case]:
+def falling_cases() -> list[RateCase]:
     """Truths of falling balls, with quadratic drag in the catalogue and without it."""
     return [
-        Case(f"{truth}; {words}", partial(falling, truth, withheld), (_CLAIMED, _ADOPTED, _RISES))
+        RateCase(f"{truth}; {words}", partial(falling, truth, withheld), (_CLAIMED, _ADOPTED, _RISES))
         for truth in (*NULLS, *DRAGS, *OUTSIDE)
         for words, withheld in (("all effects", ()), ("no quadratic drag", ("quadratic_drag",)))
     ]
 
 
-def moved_tables(model: Linear, place: int, day: int, seeds: list[int]) -> list[Experiment]:
+def moved_tables(model: LinearSwimmer, place: int, day: int, seeds: list[int]) -> list[Experiment]:
     """Let a number differ on a day of four, by 8 standard deviations of its score over all runs."""
     tables: list[Experiment] = []
     for seed in seeds:
@@ -156,16 +156,18 @@ def moved_tables(model: Linear, place: int, day: int, seeds: list[int]) -> list[
     return tables
 
 
-def days_without(model: Linear, seeds: list[int]) -> list[Experiment]:
+def days_without(model: LinearSwimmer, seeds: list[int]) -> list[Experiment]:
     """The same days, on which nothing differs."""
     return [measured(in_days(model, _DAYS, seed), np.zeros_like(model.prediction), seed) for seed in seeds]
 
 
-def cases_in_days(model: Linear) -> list[Case]:
+def cases_in_days(model: LinearSwimmer) -> list[RateCase]:
     """Truths in sessions that have runs of every kind."""
     numbers = (*model.coefficients, *model.nuisances)
     listed = [
-        Case("four days, nothing differs", partial(days_without, model), (_MOVED, _CLAIMED, _ADOPTED), weight=2.0)
+        RateCase(
+            "four days, nothing differs", partial(days_without, model), (_MOVED, _CLAIMED, _ADOPTED), weight=2.0
+        )
     ]
     for name in _MOVING:
         place = [p.name for p in numbers].index(name)
@@ -173,14 +175,14 @@ def cases_in_days(model: Linear) -> list[Case]:
             planted = f"{numbers[place].title} in session day {day + 1}"
             tables = partial(moved_tables, model, place, day)
             listed.append(
-                Case(
+                RateCase(
                     f"{name} differs on a day, 8 σ", tables, (_MOVED_NAMED, _MOVED, _CLAIMED), (planted, 0.0), 0.1
                 )
             )
     return listed
 
 
-def linear_cases() -> list[Case]:
+def linear_cases() -> list[RateCase]:
     """Truths of the stand-in."""
     model = linearised(design())
     sigmas = {p.name: float(p.sigma or 0.0) for p in model.nuisances}
@@ -189,13 +191,13 @@ def linear_cases() -> list[Case]:
     of_table = {k: sigmas[k] for k in ("camera_scale", "heading_zero", "tachometer")}
     bare, both = restated(model, {**of_table, "youngs_modulus": 0.03}), (_CLAIMED, _WRONG, _ADOPTED, _RISES)
 
-    def soft(words: str, share: float, given: Linear, *asked: str) -> Case:
+    def soft(words: str, share: float, given: LinearSwimmer, *asked: str) -> RateCase:
         tables = partial(linear_tables, given, model.G[..., place] * math.log(share))
-        return Case(words, tables, asked, ("youngs_modulus", share * model.nuisances[place].start))
+        return RateCase(words, tables, asked, ("youngs_modulus", share * model.nuisances[place].start))
 
     listed = [
-        Case("numbers drawn from their priors", partial(drawn_tables, model, model), both, weight=5.0),
-        Case("the same, numbers exact", partial(drawn_tables, exact, model), (_CLAIMED,)),
+        RateCase("numbers drawn from their priors", partial(drawn_tables, model, model), both, weight=5.0),
+        RateCase("the same, numbers exact", partial(drawn_tables, exact, model), (_CLAIMED,)),
         soft("E off by 10 %", 0.9, model, _CLAIMED),
         soft("E off by 10 %, numbers exact", 0.9, exact, _CLAIMED),
         soft("E off by 20 %", 0.8, model, *both, _COVERED),
@@ -212,17 +214,17 @@ def linear_cases() -> list[Case]:
             if survived[j] >= TESTABLE and effect.start + size <= effect.bounds[1]:
                 tables, planted = partial(linear_tables, model, model.D[..., j] * size), effect.start + size
                 label = f"one effect, λ = {level:g}"
-                listed.append(Case(label, tables, _OF_AN_EFFECT, (effect.name, planted), weight=0.05))
+                listed.append(RateCase(label, tables, _OF_AN_EFFECT, (effect.name, planted), weight=0.05))
     for label, signal in outside(model).items():
         for level in (8.0, 16.0):
             tables = partial(linear_tables, model, signal * (level / signals.beyond_catalogue(signal)))
             kind = "mimics" if label.startswith("mimic") else "others"
             words = f"outside, three {kind}, size {level:g}"
-            listed.append(Case(words, tables, (_CLAIMED, _CLAIMED_PLAINLY, _ADOPTED, _RISES), weight=0.5))
+            listed.append(RateCase(words, tables, (_CLAIMED, _CLAIMED_PLAINLY, _ADOPTED, _RISES), weight=0.5))
     return listed + cases_in_days(model)
 
 
-def simulated_cases(tables: int) -> list[Case]:
+def simulated_cases(tables: int) -> list[RateCase]:
     """Truths of the simulator; each effect has the same number of tables, however few are asked for."""
     linear = linearised(design(LENGTHS_CM))
     signals, model = Signals(linear), SwimmerModel(ROBOT, linear.runs)  # type: ignore[arg-type]
@@ -235,15 +237,15 @@ def simulated_cases(tables: int) -> list[Case]:
     truths = [found for found in map(sizes, testable) if found]
     asked = (*_OF_AN_EFFECT, _UNEXPLAINED, _COVERED)
     return [
-        *(Case("one effect, λ = 8", partial(simulated, each), asked, next(iter(each.items())), 1 / len(truths))
+        *(RateCase("one effect, λ = 8", partial(simulated, each), asked, next(iter(each.items())), 1 / len(truths))
           for each in truths),
-        Case("nothing", partial(simulated, {}), (_CLAIMED, _UNEXPLAINED), weight=_NULLS / tables),
-        *(Case("thinning", partial(simulated, each), asked, (THINNING, each[THINNING]), 0.5 / tables)
+        RateCase("nothing", partial(simulated, {}), (_CLAIMED, _UNEXPLAINED), weight=_NULLS / tables),
+        *(RateCase("thinning", partial(simulated, each), asked, (THINNING, each[THINNING]), 0.5 / tables)
           for each in thinning()),
     ]  # fmt: skip
 
 
-def report(done: list[Result], cases: list[Case]) -> None:
+def report(done: list[Result], cases: list[RateCase]) -> None:
     """Print the table."""
     print(heading("case", "tables", "asked", "share (95 %)", "error / noise: median, largest"))
     for case in {case.label: case for case in cases}.values():

@@ -43,7 +43,7 @@ CAMERAS = {
 }
 
 
-class Outcome(NamedTuple):
+class SwimOutcome(NamedTuple):
     """A swim; lengths in l."""
 
     seed: int
@@ -55,7 +55,7 @@ class Outcome(NamedTuple):
     largest: float
 
 
-def outcomes(seed: int, vehicle: bool) -> list[Outcome] | str:
+def outcomes(seed: int, vehicle: bool) -> list[SwimOutcome] | str:
     """Plan one seed, and let the robot swim; or say why there is no plan."""
     threadpool_limits(1)
     rng = np.random.default_rng(seed)
@@ -80,17 +80,19 @@ def outcomes(seed: int, vehicle: bool) -> list[Outcome] | str:
     return found
 
 
-def _outcome(seed: int, camera: str, current: float, stated: float, result: Swim) -> Outcome:
+def _outcome(seed: int, camera: str, current: float, stated: float, result: Swim) -> SwimOutcome:
     order = np.argsort(result.distance)
     place = np.searchsorted(np.cumsum(result.weights()[order]), 0.95)
     quantile = float(result.distance[order][place])
-    return Outcome(seed, camera, current, stated, result.within(stated), quantile, float(result.distance.max()))
+    return SwimOutcome(
+        seed, camera, current, stated, result.within(stated), quantile, float(result.distance.max())
+    )
 
 
 def main(robots: str = "40", first: str = "5000", vehicle: str = "") -> None:
     compile_once()
     wanted, seed, refused = int(robots), int(first), 0
-    lists: list[list[Outcome]] = []
+    lists: list[list[SwimOutcome]] = []
     while len(lists) < wanted:
         batch = range(seed, seed + wanted - len(lists))
         seed = batch.stop

@@ -31,7 +31,7 @@ _LITTLE = 4e4  # radians that tails turn in a replay
 _NOVELTY = 7  # its place in `NeuralTable.width_features`
 
 
-class Outcome(NamedTuple):
+class PlanOutcome(NamedTuple):
     """A plan and what became of it; lengths in l."""
 
     seed: int
@@ -46,7 +46,7 @@ class Outcome(NamedTuple):
     replay_error: float  # of the simulator itself
 
 
-def outcome(seed: int, in_time_steps: bool) -> Outcome | str:
+def outcome(seed: int, in_time_steps: bool) -> PlanOutcome | str:
     """Plan and carry out one seed; or say why there is no plan."""
     lookup = load()
     try:
@@ -60,13 +60,13 @@ def outcome(seed: int, in_time_steps: bool) -> Outcome | str:
     if in_time_steps and schedule.dwells.sum() * schedule.robot["omega_bar"] * schedule.robot["N"] < _LITTLE:
         track = replay(schedule)
         replayed, error = tracking_error(result.to_dict(), track).largest, replay_error(schedule, track)
-    return Outcome(
+    return PlanOutcome(
         seed, len(result.dwells), result.drawn.length, float(features[0, _NOVELTY]), result.predicted_max,
         result.stated_error, found, own_stated, replayed, error,
     )  # fmt: skip
 
 
-def line(name: str, some: list[Outcome], found: Callable[[Outcome], float]) -> str:
+def line(name: str, some: list[PlanOutcome], found: Callable[[PlanOutcome], float]) -> str:
     """Format the figures of a class of plans."""
     held = sum(found(one) <= one.stated for one in some)
     ratio = np.median([one.stated / found(one) for one in some])
@@ -82,7 +82,7 @@ def main(count: str = "60", first: str = "9000", replays: str = "10") -> None:
     compile_once()
     seeds = range(int(first), int(first) + int(count))
     results = in_parallel(outcome, [(seed, place < int(replays)) for place, seed in enumerate(seeds)])
-    plans = [result for result in results if isinstance(result, Outcome)]
+    plans = [result for result in results if isinstance(result, PlanOutcome)]
     for refused in (result for result in results if isinstance(result, str)):
         print(refused)
     print(heading("carried out by the robot's own table", "plans", "held", "stated / found",

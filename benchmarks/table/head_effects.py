@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.table.shipped_table import as_reached
 from sim.effects import catalogue
-from surrogate.errors import coverage, relative_errors
+from surrogate.held_out import coverage, relative_errors
 from surrogate.table_file import load
 from surrogate.tails import needs_no_learning
 from surrogate.training.simulated import draw_robots

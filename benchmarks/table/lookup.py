@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 from benchmarks.table.shipped_table import FRESH, simulate_as_users
-from surrogate.errors import COMPARED, error_table
+from surrogate.held_out import COMPARED, error_table
 from surrogate.intervals import COVERAGE
 from surrogate.table_file import load
 from surrogate.training.model_card import coverage_by_group

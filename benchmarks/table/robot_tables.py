@@ -32,7 +32,7 @@ from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.response import DWELLS
 from sim.model.robot import Robot
-from sim.motion.run import Resolution, Run
+from sim.motion.run import Resolution, SteppedRobot
 from sim.motion.settling import steady_state
 from sim.motion.stepped_response import steady_twist
 from sim.motion.warm import compile_once
@@ -95,7 +95,7 @@ def stepped(robot: Robot, twist: Floats) -> Floats:
 def _lags(body: Body, reverse: Body, tails: int, dwell: float, mesh: Resolution) -> Floats:
     """Compute the lags (2, 3) of equal dwells in each direction, mean over phases of the disc."""
     runs = [
-        Run(forth, tails, mesh, steady_state(forth, tails, mesh), reverse=back, most_work=np.inf)
+        SteppedRobot(forth, tails, mesh, steady_state(forth, tails, mesh), reverse=back, most_work=np.inf)
         for forth, back in ((body, reverse), (reverse, body))
     ]
     steady_parts = [

@@ -35,7 +35,7 @@ from common.files import write_text
 from dataset.data_set import read_manifest
 from sim.motion.batches import steady_columns
 from surrogate.domain import INSIDE, ROBOT
-from surrogate.errors import curve_errors, error_table, relative_errors, summary
+from surrogate.held_out import curve_errors, error_table, relative_errors, summary
 from surrogate.table import NeuralTable
 from surrogate.table_file import load
 from surrogate.tabulate import TOLERANCE

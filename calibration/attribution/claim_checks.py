@@ -28,7 +28,7 @@ import numpy as np
 from calibration.attribution.refits import IMITABLE, SURE, Candidate
 from calibration.attribution.wrong_numbers import IMPLAUSIBLE, pulls
 from calibration.statistics.fit import Fit
-from calibration.statistics.gls import eliminated
+from calibration.statistics.gls import schur_complement
 from calibration.statistics.statistical_model import Runs, apply_step, regression
 from calibration.statistics.study import Study, held_out_p_value
 from common.arrays import Flags, Floats
@@ -99,8 +99,8 @@ def absorbable_shares(study: Study, fitted: Fit, names: Sequence[str]) -> Floats
     signals = np.concatenate([fitted.jacobian[used, :, p] * factors.T[..., None] for p in claimed])  # (B, n, k)
     linear = regression(runs, used, fitted.jacobian[..., order], [fitted.fitted[i] for i in order])
     normal = linear.products(signals, noise.run_covariance).at(np.tile(noise.session_ratio, (len(signals), 1)))
-    before = eliminated(normal, len(order) - len(claimed))
-    after = eliminated(before, len(claimed))
+    before = schur_complement(normal, len(order) - len(claimed))
+    after = schur_complement(before, len(claimed))
     return np.asarray(1 - after[:, -1, -1] / np.maximum(before[:, -1, -1], 1e-300))
 
 

@@ -47,7 +47,7 @@ _FEWEST = 6  # runs in a group, and outside it
 
 
 @dataclass(frozen=True)
-class Move:
+class LocalShift:
     """A number of the model that differs in some runs."""
 
     shift: Shift
@@ -117,7 +117,7 @@ def _has_partners(runs: Runs, rows: Flags) -> bool:
     return inside <= outside
 
 
-def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[Move, ...]]:
+def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[LocalShift, ...]]:
     """Find the numbers that differ in some runs, the clearest first, and fit them.
 
     Args:
@@ -133,9 +133,9 @@ def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[Move, ...]]:
         if min((rows & used).sum(), (~rows & used).sum()) >= _FEWEST
     ]
     numbers = (*plain.coefficients, *plain.nuisances, *(e for e in plain.effects if e.name in base.names))
-    moves: tuple[Move, ...] = ()
+    moves: tuple[LocalShift, ...] = ()
     while groups and len(moves) < _MOST:
-        fits: list[tuple[Move, Study, Fit]] = []
+        fits: list[tuple[LocalShift, Study, Fit]] = []
         for move in _clearest(study, base, groups, numbers):
             shifts = (*(m.shift for m in moves), move.shift)
             moved, names = replace(study, model=Shifted(plain, shifts)), (*base.names, move.name)
@@ -159,7 +159,7 @@ def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[Move, ...]]:
     return study, base, moves
 
 
-def _is_real(runs: Runs, used: Flags, move: Move, fitted: Fit) -> bool:
+def _is_real(runs: Runs, used: Flags, move: LocalShift, fitted: Fit) -> bool:
     """Tell whether a number that differs is beyond what the fit with it leaves, and credible."""
     certain = abs(move.z) >= CERTAIN * math.sqrt(birge(runs, fitted, used))
     return fitted.converged and certain and _credible(move.shift.of, fitted.parameters[move.name])
@@ -173,7 +173,7 @@ def _credible(number: Parameter, change: float) -> bool:
     return low <= change <= high
 
 
-def _tolerances(move: Move, fitted: Fit) -> float:
+def _tolerances(move: LocalShift, fitted: Fit) -> float:
     """Return how many of its tolerances a number is off; none for a coefficient, and for a zero of any size."""
     number = move.shift.of
     return abs(fitted.parameters[move.name]) / (math.inf if number.plausible else number.sigma or math.inf)
@@ -181,7 +181,7 @@ def _tolerances(move: Move, fitted: Fit) -> float:
 
 def _clearest(
     study: Study, base: Fit, groups: Sequence[tuple[str, Flags]], numbers: Sequence[Parameter]
-) -> list[Move]:
+) -> list[LocalShift]:
     """Find the numbers and the groups with the largest scores, if these are real, the largest first."""
     pairs = [(number, words, rows) for words, rows in groups for number in numbers if number.name in base.names]
     columns = [base.jacobian[..., base.names.index(n.name)] * rows[:, None] for n, _, rows in pairs]
@@ -197,4 +197,4 @@ def _clearest(
         (place, words) for place, (n, words, _) in enumerate(pairs) if n.grid and n.sigma and words in where
     ]
     found = {j: float(z[j]) for j in near} | {j: where[words] for j, words in with_grid}
-    return [Move(Shift(pairs[j][0], pairs[j][2], pairs[j][1]), score) for j, score in found.items()]
+    return [LocalShift(Shift(pairs[j][0], pairs[j][2], pairs[j][1]), score) for j, score in found.items()]

@@ -43,7 +43,7 @@ from scipy.stats import t as student
 from calibration.attribution.refits import FIRST, Candidate, left_out_residuals
 from calibration.statistics.budget import skipped, spent
 from calibration.statistics.fit import Fit, UnsolvedError, birge, fit
-from calibration.statistics.gls import solved
+from calibration.statistics.gls import solve_normal
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, examine_residual
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import (
@@ -69,7 +69,7 @@ _ROUNDS, _SETTLED = 12, 0.03  # of the estimate of τ; its last relative change
 
 
 @dataclass(frozen=True)
-class Nearest:
+class AdoptedForm:
     """An effect that is adopted as a description of what no effect explains."""
 
     effect: Parameter
@@ -180,7 +180,7 @@ def sizes_of(model: Shifted, parameters: Parameters) -> Floats:
 
 def adopt_nearest(
     study: Study, base: Fit, misfit: Misfit, candidates: Sequence[Candidate], tangents: Directions
-) -> Nearest | None:
+) -> AdoptedForm | None:
     """Find the form that describes best what no effect explains; None if none does.
 
     Args:
@@ -189,7 +189,7 @@ def adopt_nearest(
         candidates: all effects, with their refits.
         tangents: their directions.
     """
-    adopted: list[Nearest] = []
+    adopted: list[AdoptedForm] = []
     for candidate in _promising(base, misfit, candidates):
         if skipped(f"{candidate.title} as the nearest form"):
             continue
@@ -279,7 +279,7 @@ def _restricted(study: Study, fitted: Fit, b: float) -> float:
 
 def _judged(
     study: Study, base: Fit, effect: Parameter, model: ForwardModel, fitted: Fit, spread: float
-) -> Nearest | None:
+) -> AdoptedForm | None:
     """Describe a form by its left-out runs; None if it is not adopted."""
     size = fitted.parameters[effect.name]
     if not fitted.converged or not effect.bounds[0] < size < effect.bounds[1]:
@@ -311,7 +311,7 @@ def _judged(
         return None
     leaves = math.sqrt(max(float((after**2).sum()) / values - 1, 0.0))
     left = leaves * fitted.noise.rms
-    return Nearest(effect, model, fitted, spread, b, (low, high), sizes, gain, error, min(removed, 1.0), left)
+    return AdoptedForm(effect, model, fitted, spread, b, (low, high), sizes, gain, error, min(removed, 1.0), left)
 
 
 def _differs_from_null(study: Study, model: Shifted, fitted: Fit, seen: Integers) -> bool:
@@ -329,7 +329,7 @@ def _differs_from_null(study: Study, model: Shifted, fitted: Fit, seen: Integers
     normal = linear.products(residual, noise.run_covariance, prior_offsets(others, fitted.parameters)).at(
         noise.session_ratio
     )
-    asked = sizes - effect.start + solved(normal)[0][len(kept) :]
+    asked = sizes - effect.start + solve_normal(normal)[0][len(kept) :]
     error = asked.std(ddof=1) / math.sqrt(len(seen))
     return bool(abs(asked.mean()) > student.ppf(0.975, len(seen) - 1) * error)
 

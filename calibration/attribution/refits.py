@@ -31,7 +31,7 @@ from tqdm import tqdm
 
 from calibration.statistics.budget import skipped
 from calibration.statistics.fit import Fit, UnsolvedError, fit
-from calibration.statistics.gls import solved
+from calibration.statistics.gls import solve_normal
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
 from calibration.statistics.statistical_model import Experiment, ForwardModel, Parameter, Parameters, start_values
 from calibration.statistics.study import Study, groups, leave_one_group_out
@@ -366,6 +366,6 @@ def left_out_residuals(study: Study, base: Fit, refit: Fit) -> tuple[Floats, Flo
 def _left_out_residual(study: Study, fitted: Fit, refit: Fit, learn: Flags, out: Flags) -> Floats:
     """Whiten the residuals of a left-out session, for a model fitted to the others, in the noise of `refit`."""
     data = study.model.runs
-    step = solved(fitted.normal(data, learn, refit.noise))[0]
+    step = solve_normal(fitted.normal(data, learn, refit.noise))[0]
     predicted = (data.y - fitted.prediction)[out] - fitted.jacobian[out] @ step
     return np.asarray(refit.noise.whitener(data.session[out], data.scale[out])(predicted))

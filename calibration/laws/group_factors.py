@@ -24,7 +24,7 @@ import numpy as np
 from calibration.laws.law_model import SIZE, LawModel
 from calibration.laws.readings import EXPONENTS, INPUTS, logarithms
 from calibration.statistics.fit import Fit
-from calibration.statistics.gls import Gls, eliminated
+from calibration.statistics.gls import Regression, schur_complement
 from calibration.statistics.statistical_model import precisions, prior_offsets
 from common.arrays import Flags, Floats
 
@@ -116,10 +116,10 @@ def _along(model: LawModel, fitted: Fit, used: Flags, place: int, x: Floats) -> 
     parameters = [fitted.fitted[i] for i in others]
     J, members = fitted.jacobian[used][..., others], np.stack(_grouped(x), 1).astype(float)  # (n, k, p), (n, G)
     columns = np.concatenate([J, _along_load(model, fitted)[used][..., None] * members[:, None]], -1)
-    linear = Gls(columns, precisions(parameters), data.session[used], data.scale[used], data.repeats(used))
+    linear = Regression(columns, precisions(parameters), data.session[used], data.scale[used], data.repeats(used))
     as_given = (data.y - fitted.prediction)[used] + J @ prior_offsets(parameters, fitted.parameters)
     products = linear.products(as_given, fitted.noise.run_covariance)
-    left = eliminated(products.at(products.share(passes=_PASSES)), len(others))
+    left = schur_complement(products.at(products.share(passes=_PASSES)), len(others))
     information, score = left[:-1, :-1], left[:-1, -1]
     if not is_term:  # a factor that all groups have in common is free
         common = information.sum(1)

@@ -32,7 +32,7 @@ from common.errors import InputError
 from sim.effects import effect_named
 from sim.inputs import group_columns
 from sim.model.groups import Groups
-from sim.model.laws import STEEPEST, Law, Powers
+from sim.model.laws import STEEPEST, PowerLawEffect, Powers
 from sim.model.robot import Robot
 from surrogate.table import NeuralTable
 
@@ -123,7 +123,7 @@ class LawModel(SwimmerModel):
         """Compute m of every run, (n,)."""
         return np.exp(self._inputs @ [parameters.get(name, 0.0) for name in self.exponents])
 
-    def law(self, parameters: Parameters) -> tuple[Law, float, float]:
+    def law(self, parameters: Parameters) -> tuple[PowerLawEffect, float, float]:
         """Return the law, at the means of noted inputs.
 
         Args:

@@ -79,7 +79,7 @@ UNDETERMINED = (Rejection.NOT_CONVERGED, Rejection.AT_THE_END)
 
 
 @dataclass(frozen=True)
-class Law:
+class FittedLaw:
     """A place with its exponents, fitted to the runs."""
 
     place: Place
@@ -93,7 +93,9 @@ class Law:
     error: float  # relative rms on the held-out runs
     error_interval: tuple[float, float]  # 95 %
     reason: Rejection | None  # why it is not kept; None if it is
-    elsewhere: tuple[Law, ...] = ()  # of a side force at the disc: the same with a lever that is not told from 0
+    elsewhere: tuple[
+        FittedLaw, ...
+    ] = ()  # of a side force at the disc: the same with a lever that is not told from 0
 
     @property
     def words(self) -> str:
@@ -124,7 +126,7 @@ class Law:
         low, high = sorted(away * end for end in self.fit.interval(LEVER))
         return f"{abs(lever):.2f} {self.place.lever_unit} ({low:.2f} to {high:.2f}) {side} the disc"
 
-    def behind(self, best: Law) -> float:
+    def behind(self, best: FittedLaw) -> float:
         """Compute how far its gain is behind that of the best law, with the price of levers or without."""
         return min(best.gain - self.gain, best.gain_at_lever - self.gain_at_lever)
 
@@ -169,7 +171,7 @@ class Law:
 
 def fitted_law(
     study: Study, model: SwimmerModel, base: Fit, ranked: Ranked, *, chosen_alone: bool = False
-) -> Law | None:
+) -> FittedLaw | None:
     """Fit a law from its linear model, and judge it; None where its motion cannot be simulated.
 
     Args:
@@ -199,7 +201,7 @@ def fitted_law(
         reason = _of_sessions(predictive)
     again = replace(study, model=with_law, seed=study.seed + 1)
     none = Directions.plain(np.empty((*data.y.shape, 0)))
-    return Law(
+    return FittedLaw(
         place=ranked.place,
         ranked=ranked,
         model=with_law,
@@ -219,7 +221,7 @@ def _of_sessions(gain: tuple[float, float]) -> Rejection | None:
     return Rejection.NOT_PREDICTIVE if gain[0] <= gain[1] else None
 
 
-def with_a_lever(law: Law) -> Law:
+def with_a_lever(law: FittedLaw) -> FittedLaw:
     """Return a law whose interval of the lever includes 0, after the same force at the disc has fitted worse."""
     return replace(law, reason=_of_sessions(law.session_gain))
 
@@ -270,12 +272,12 @@ class Laws:
 
     base: Fit  # coefficients and nuisance parameters, without a law
     ranked: tuple[Ranked, ...]  # every place, the best first
-    fitted: tuple[Law, ...]  # those that were fitted, the largest gain first
+    fitted: tuple[FittedLaw, ...]  # those that were fitted, the largest gain first
     search_p_value: float  # of the largest gain among all places
     level: float = LEVEL  # α of the search, and of the residual that a law leaves; of this, half of it decides
 
     @property
-    def kept(self) -> tuple[Law, ...]:
+    def kept(self) -> tuple[FittedLaw, ...]:
         """Laws that the runs cannot tell from the best one, best first.
 
         Those that would be the best one if they predicted left-out sessions better are among them: they fit the
@@ -324,7 +326,7 @@ class Laws:
         """List the kept laws that leave no more than noise and fit as well as a claimed effect, best first."""
         return tuple(map(_rival, self._as_good_as(claim)))
 
-    def _as_good_as(self, claim: Fit) -> list[Law]:
+    def _as_good_as(self, claim: Fit) -> list[FittedLaw]:
         """List them without those that predict what the claim does: they are the claim in other words."""
         limit = claim.deviance + INDISTINGUISHABLE
         good = [law for law in self.kept if law.p_value >= self.level / 2 and law.fit.deviance < limit]
@@ -393,7 +395,7 @@ def find_laws(study: Study, base: Fit, *, beside_claim: bool = False) -> Laws:
 
 def _fit_all(
     study: Study, model: SwimmerModel, base: Fit, likely: Sequence[Ranked], *, chosen_alone: bool = False
-) -> list[Law]:
+) -> list[FittedLaw]:
     """Fit and judge places, without those where the motion cannot be simulated.
 
     Args:
@@ -405,8 +407,14 @@ def _fit_all(
 
 
 def _with_levers(
-    study: Study, model: SwimmerModel, base: Fit, laws: list[Law], ranked: Sequence[Ranked], *, chosen_alone: bool
-) -> list[Law]:
+    study: Study,
+    model: SwimmerModel,
+    base: Fit,
+    laws: list[FittedLaw],
+    ranked: Sequence[Ranked],
+    *,
+    chosen_alone: bool,
+) -> list[FittedLaw]:
     """Compare side forces at the disc with the same ones elsewhere.
 
     A lever that the interval does not tell from none is told from it if the same force at the disc fits worse. A
@@ -431,15 +439,15 @@ def _with_levers(
     ]  # fmt: skip
 
 
-def _in_common(laws: Sequence[Law]) -> str:
+def _in_common(laws: Sequence[FittedLaw]) -> str:
     """Say what several laws have in common, wherever they may act; empty if nothing."""
     return in_common([one.place for law in laws for one in (law, *law.elsewhere)]) if len(laws) > 1 else ""
 
 
-def _rival(law: Law) -> Rival:
+def _rival(law: FittedLaw) -> Rival:
     return Rival(law.words, law.fit, law.model, law.model.record)
 
 
-def _kept(laws: Sequence[Law]) -> list[Law]:
+def _kept(laws: Sequence[FittedLaw]) -> list[FittedLaw]:
     """Return the laws that are kept, the largest gain first."""
     return sorted((law for law in laws if not law.reason), key=lambda law: -law.gain)

@@ -34,8 +34,8 @@ from sim.model.laws import (
     SCALED,
     TAILS,
     WRENCHES,
-    Law,
     Load,
+    PowerLawEffect,
     Powers,
     make_law,
 )
@@ -114,7 +114,7 @@ class Place:
         """Least and largest λ of a place that has one."""
         return _LEVER_BOUNDS[self.lever_unit]
 
-    def law(self, powers: Powers, lever: float = 0.0) -> Law:
+    def law(self, powers: Powers, lever: float = 0.0) -> PowerLawEffect:
         """Return the law at this place (`sim.model.laws`)."""
         if not self.wrench:
             return make_law(_effects_on_tails().get(self.name, self.name), powers)

@@ -17,8 +17,8 @@ so that a model costs the inverse of its q × q matrix: weights C⁻¹ b, of cov
     BIC = rᵀ Σ⁻¹ r − aᵀ A⁻¹ a − bᵀ C⁻¹ b + ln |Σ|/|S ⊗ I| + q ln(n k),   a = Jᵀ Σ⁻¹ r.
 
 What the choice among the places costs, the p-value of the search tells. Tables are drawn from the fit without
-laws: noise of the runs and of the sessions, and nuisance parameters from their priors (`Gls.draw`). The whole
-search runs on each. With the largest gain in BIC of the runs, and those of B drawn tables,
+laws: noise of the runs and of the sessions, and nuisance parameters from their priors (`Regression.draw`). The
+whole search runs on each. With the largest gain in BIC of the runs, and those of B drawn tables,
 
     p = (1 + number of tables that gain as much)/(1 + B).
 
@@ -38,7 +38,7 @@ from calibration.laws.law_model import LEVER, lever_arms
 from calibration.laws.places import Place
 from calibration.laws.readings import EXPONENTS, logarithms, noted_values, parameter_of
 from calibration.statistics.fit import Fit
-from calibration.statistics.gls import Gls, eliminated, solved
+from calibration.statistics.gls import Regression, schur_complement, solve_normal
 from calibration.statistics.statistical_model import precisions, prior_offsets
 from calibration.swimmer.swimmer import SwimmerModel
 from common.arrays import Flags, Floats, Integers
@@ -92,7 +92,7 @@ class LinearModels:
         self.columns, self.models = columns, tuple(models)
         self.p, (self._places, self._count) = absorbed.shape[-1], columns.shape[2:]
         table = np.concatenate([absorbed, columns.reshape(*columns.shape[:2], -1)], -1)
-        self.design = Gls(table, precision, session, scale, repeated)
+        self.design = Regression(table, precision, session, scale, repeated)
         self._further = np.array(further if len(further) else [0] * len(self.models))
 
     def fit(self, residuals: Floats) -> LinearFits:
@@ -105,12 +105,12 @@ class LinearModels:
         products = self.design.products(residual)
         base = products.take(np.array([[*absorbed, -1]]))
         base_share = base.share(passes=_PASSES)
-        without = eliminated(base.at(base_share), p)[..., 0, 0] + base.determinant(base_share)  # (B, 1)
+        without = schur_complement(base.at(base_share), p)[..., 0, 0] + base.determinant(base_share)  # (B, 1)
         firsts = range(p, p + self._places * self._count, self._count)
         places = products.take(np.array([[*absorbed, *(first + own), -1] for first in firsts]))
         share = places.share(passes=_PASSES)
         normal, determinant = places.at(share), places.determinant(share)
-        left = eliminated(normal, p)  # (B, P, v + 1, v + 1)
+        left = schur_complement(normal, p)  # (B, P, v + 1, v + 1)
         left[..., own, own] += _ABSORBED * normal[..., p + own, p + own]
         shape = len(residual), len(self.models)
         gain, weights = np.empty(shape), np.zeros((*shape, self._count))
@@ -119,7 +119,7 @@ class LinearModels:
             place, chosen = (np.array([self.models[i][part] for i in which]) for part in (0, 1))
             at = np.column_stack([chosen, np.full(len(which), -1)])
             of_models = left[:, place[:, None, None], at[:, :, None], at[:, None, :]]  # (B, models, q + 1, q + 1)
-            step = solved(of_models)[0]
+            step = solve_normal(of_models)[0]
             deviance = of_models[..., -1, -1] - (step * of_models[..., :-1, -1]).sum(-1) + determinant[:, place]
             price = (q + self._further[which]) * math.log(residual[0].size)
             gain[:, which] = without - deviance - price

@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 
 from calibration.laws.law_model import LEVER, SIZE
-from calibration.laws.laws import Law
+from calibration.laws.laws import FittedLaw
 from calibration.laws.readings import EXPONENTS
 from calibration.statistics.statistical_model import Parameters
 from calibration.statistics.study import FinalRefit, refit_to_all
@@ -150,7 +150,7 @@ def _rounded(value: float, sigma: float, unit: str = "") -> float:
     return to_si(rounded, unit) if unit else rounded
 
 
-def law_handed_on(given: Robot, law: Law, rows: Flags) -> tuple[Robot, CalibrationKnowledge]:
+def law_handed_on(given: Robot, law: FittedLaw, rows: Flags) -> tuple[Robot, CalibrationKnowledge]:
     """Return the corrected robot with a law, fitted once more to the runs in `rows` (n,), and its covariance."""
     final = refit_to_all(law.model, law.fit, rows)
     robot = robot_with_law(given, law, final.parameters)
@@ -158,7 +158,7 @@ def law_handed_on(given: Robot, law: Law, rows: Flags) -> tuple[Robot, Calibrati
     return significant(robot, known), known
 
 
-def robot_with_law(given: Robot, law: Law, parameters: Parameters) -> Robot:
+def robot_with_law(given: Robot, law: FittedLaw, parameters: Parameters) -> Robot:
     """Return the corrected robot with a law as an effect.
 
     Args:
@@ -178,7 +178,7 @@ def robot_with_law(given: Robot, law: Law, parameters: Parameters) -> Robot:
     )
 
 
-def effects_of_law(law: Law, parameters: Parameters) -> tuple[dict[str, float], float]:
+def effects_of_law(law: FittedLaw, parameters: Parameters) -> tuple[dict[str, float], float]:
     """Return the sizes of a law's effects, in the order of its moves, and the factor of `LawModel.law`."""
     model = law.model
     at_place, size, factor = model.law(parameters)
@@ -196,7 +196,7 @@ def effects_of_law(law: Law, parameters: Parameters) -> tuple[dict[str, float], 
     }, factor
 
 
-def _slopes(robot: Robot, law: Law, final: FinalRefit) -> dict[str, Floats]:
+def _slopes(robot: Robot, law: FittedLaw, final: FinalRefit) -> dict[str, Floats]:
     """Compute how the load at this robot depends on the numbers of its law, (p,) each."""
     inputs = np.log([robot.motor_speed, robot.tail_length, robot.tails]) - np.array(
         law.model.centre[: len(EXPONENTS)]

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
-from calibration.attribution.nearest import Nearest
+from calibration.attribution.nearest import AdoptedForm
 from calibration.attribution.refits import UNSEEN
 from calibration.laws.group_factors import GroupFactors
 from calibration.laws.places import Place
@@ -140,7 +140,7 @@ def _draw_map(misfit: Misfit, outputs: Sequence[str], limit: float) -> Figure:
     return figure
 
 
-def draw_sizes(nearest: Nearest) -> Figure:
+def draw_sizes(nearest: AdoptedForm) -> Figure:
     """Draw the size of an adopted form for each specimen, with its interval, and the interval of the mean."""
     figure = Figure(figsize=(_WIDTH, 0.9 + 0.3 * len(nearest.sizes)))
     axes = figure.add_subplot()

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from calibration.attribution.refits import IMITABLE, SURE
 from calibration.laws.group_factors import group_factors
 from calibration.laws.law_model import LEVER
-from calibration.laws.laws import Law
+from calibration.laws.laws import FittedLaw
 from calibration.report.figures import (
     draw_evidence,
     draw_factors,
@@ -89,7 +89,7 @@ def _figures(result: Verdict, paths: Sequence[PathError]) -> dict[str, list[Draw
     return figures
 
 
-def _figures_of_law(law: Law, used: Flags) -> list[Drawn]:
+def _figures_of_law(law: FittedLaw, used: Flags) -> list[Drawn]:
     """Draw where a law acts, and on what it depends in the runs `used` (n,)."""
     place = draw_place(law.model.robot, law.place, law.fit.parameters.get(LEVER, 0.0))
     drawn = [(place, f"where it acts: {law.place.words}", "Where it acts (red).")]

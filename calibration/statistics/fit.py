@@ -32,7 +32,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from calibration.statistics.budget import limited_as_one, skipped, spent
-from calibration.statistics.gls import Noise, Products, eliminated, repeat_count, repeat_covariance
+from calibration.statistics.gls import Noise, NormalEquations, repeat_count, repeat_covariance, schur_complement
 from calibration.statistics.statistical_model import (
     ForwardModel,
     Parameter,
@@ -147,7 +147,7 @@ class Fit:
             return value * math.exp(-half), value * math.exp(half)
         return value - half, value + half
 
-    def products(self, runs: Runs, rows: Flags, run: Floats | None = None) -> Products:
+    def products(self, runs: Runs, rows: Flags, run: Floats | None = None) -> NormalEquations:
         """Multiply the derivatives and the residual of the runs in `rows` (n,), with the priors, in an S."""
         residual = (runs.y - self.prediction)[rows]
         linear = regression(runs, rows, self.jacobian, self.fitted)
@@ -217,7 +217,7 @@ class _Point:
     parameters: dict[str, float]
     prediction: Floats  # (n, k)
     derivative: Floats  # (n, k, p), at these parameters or near them
-    products: Products  # of the derivatives and the residual
+    products: NormalEquations  # of the derivatives and the residual
 
     @property
     def solved(self) -> bool:
@@ -270,7 +270,7 @@ class _Problem:
         return _Point(parameters, prediction, derivative, products)
 
 
-class _Step(NamedTuple):
+class _FitStep(NamedTuple):
     parameters: dict[str, float]  # after it
     size: float  # largest change, of ln C or ε
     promise: float  # by how much it reduces rᵀ Σ⁻¹ r if the model is linear
@@ -326,7 +326,7 @@ def birge(runs: Runs, fitted: Fit, used: Flags) -> float:
     return max(1.0, float(fitted.normal(runs, used)[-1, -1]) / max(freedom, 1))
 
 
-def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, least: int) -> _Step:
+def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, least: int) -> _FitStep:
     """Compute a step from `parameters`.
 
     Args:
@@ -339,7 +339,7 @@ def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: F
             break
     new = apply_step(fitted, parameters, change)
     promise = 2 * change @ normal[:-1, -1] - change @ normal[:-1, :-1] @ change
-    return _Step(new, float(np.abs(change).max()), float(promise), place)
+    return _FitStep(new, float(np.abs(change).max()), float(promise), place)
 
 
 def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, damping: float) -> Floats:
@@ -373,7 +373,7 @@ def _inflation(repeats: int, outputs: int) -> float:
     return repeats / (repeats - outputs - 1) * (1 + (outputs - 1) / (repeats - outputs))
 
 
-def _freedom(products: Products, share: Floats, count: int) -> Floats:
+def _freedom(products: NormalEquations, share: Floats, count: int) -> Floats:
     """Estimate the degrees of freedom of the parameters' variances, (p,)."""
     least = 1 / products.sizes.mean()
     steps = 0.01 * share + 1e-3 * least
@@ -424,7 +424,7 @@ def profile_intervals(
 def _deviance(fitted: Fit, data: Runs, used: Flags, others: list[int]) -> float:
     """Compute rᵀ Σ⁻¹ r with those parameters of `others` refitted (linearised), in the noise of the fit."""
     normal = fitted.normal(data, used)[np.ix_([*others, -1], [*others, -1])]
-    return float(eliminated(normal, len(others))[0, 0])
+    return float(schur_complement(normal, len(others))[0, 0])
 
 
 def least_determined(fitted: Fit) -> tuple[dict[str, float], float]:

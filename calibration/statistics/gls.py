@@ -80,7 +80,7 @@ class Noise:
         return np.asarray(np.kron(np.eye(len(session)), self.run_covariance) + np.kron(together, shifts))
 
 
-class Gls:
+class Regression:
     """The columns of some runs, which stay the same for any batch of residuals of these runs, each in its own S.
 
     Products of two columns are linear in S⁻¹, so they are made once for every pair of outputs.
@@ -130,7 +130,9 @@ class Gls:
         assert self.repeated is not None
         return repeat_covariance(residual, self.repeated, self.scale)
 
-    def products(self, residual: Floats, run: Floats | None = None, change: Floats | None = None) -> Products:
+    def products(
+        self, residual: Floats, run: Floats | None = None, change: Floats | None = None
+    ) -> NormalEquations:
         """Multiply the columns, and a residual behind them, with each other, with the priors.
 
         Args:
@@ -157,7 +159,7 @@ class Gls:
             total[..., m, own] -= self.precision * change
             total[..., m, m] += (self.precision * change**2).sum()
         means = means.reshape(*batch, -1, m + 1)
-        return Products(total - np.swapaxes(means, -1, -2) @ means, means, self.sizes, k)
+        return NormalEquations(total - np.swapaxes(means, -1, -2) @ means, means, self.sizes, k)
 
     def draw(self, rng: np.random.Generator, run: Floats, share: Floats, spread: Floats | None = None) -> Floats:
         """Draw residuals (B, n, k) from the parameters as given: noise of runs and sessions, and the parameters.
@@ -184,7 +186,7 @@ class Gls:
 
 
 @dataclass(frozen=True)
-class Linear:
+class LeastSquares:
     """Generalised least squares of the last column by the others; `...` stands for batches."""
 
     step: Floats  # (..., p)
@@ -193,7 +195,7 @@ class Linear:
 
 
 @dataclass(frozen=True)
-class Products:
+class NormalEquations:
     """Products of columns within sessions, and the sessions' means, for any ρ; `...` stands for batches."""
 
     within: Floats  # (..., m, m)
@@ -216,16 +218,16 @@ class Products:
         """Compute ln |Σ|/|S ⊗ I|, (...), for ρ (..., k)."""
         return np.asarray(-np.log(self._weights(share)).sum(-1))
 
-    def take(self, columns: Integers) -> Products:
+    def take(self, columns: Integers) -> NormalEquations:
         """Choose columns (c, q), (..., c, q, q)."""
         rows, cols = columns[:, :, None], columns[:, None, :]
         means = np.moveaxis(self.means[..., columns], -3, -2)
-        return Products(self.within[..., rows, cols], means, self.sizes, self.outputs)
+        return NormalEquations(self.within[..., rows, cols], means, self.sizes, self.outputs)
 
-    def solve(self, *, passes: int) -> Linear:
+    def solve(self, *, passes: int) -> LeastSquares:
         """Fit the last of the columns, with ρ from its own residuals after `passes` iterations (0: ρ = 0)."""
         share = self.share(passes=passes)
-        return Linear(*solved(self.at(share)), share)
+        return LeastSquares(*solve_normal(self.at(share)), share)
 
     def share(self, *, passes: int) -> Floats:
         """Estimate ρ (..., k) from the residuals of a fit of the last column, after `passes` iterations from 0.
@@ -242,7 +244,7 @@ class Products:
             return np.full_like(share, SESSION_SHARE)
         columns = self.means[..., :-1]
         for _ in range(passes):
-            step, covariance = solved(self.at(share))
+            step, covariance = solve_normal(self.at(share))
             between = (self.means[..., -1] - (columns @ step[..., None])[..., 0]) ** 2
             used = ((columns @ covariance) * columns).sum(-1) * self._weights(share)
             each, taken = (part.reshape(*batch, count, k).sum(-2) for part in (between, used))
@@ -257,13 +259,13 @@ class Products:
         return share
 
 
-def solved(normal: Floats) -> tuple[Floats, Floats]:
+def solve_normal(normal: Floats) -> tuple[Floats, Floats]:
     """Solve for the coefficients (..., p) of the last of the columns; with their covariance (..., p, p)."""
     covariance = _inverse(normal[..., :-1, :-1])
     return (covariance @ normal[..., :-1, -1:])[..., 0], covariance
 
 
-def eliminated(normal: Floats, count: int) -> Floats:
+def schur_complement(normal: Floats, count: int) -> Floats:
     """Return what the first `count` columns cannot absorb of the others' products (Schur complement)."""
     across = normal[..., :count, count:]
     absorbed = np.swapaxes(across, -1, -2) @ _inverse(normal[..., :count, :count]) @ across

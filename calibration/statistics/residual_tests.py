@@ -39,7 +39,7 @@ import numpy as np
 from scipy.stats import rankdata
 
 from calibration.statistics.fit import Fit
-from calibration.statistics.gls import Products, averaging_rows, eliminated, inverse_root
+from calibration.statistics.gls import NormalEquations, averaging_rows, inverse_root, schur_complement
 from calibration.statistics.statistical_model import (
     ForwardModel,
     Parameter,
@@ -215,7 +215,7 @@ def _kernel(inputs: Floats) -> tuple[Floats, Floats]:
     return (np.arange(len(kinds))[:, None] == place.reshape(-1)).astype(float), np.exp(-distance / 2)
 
 
-def projected_scores(products: Products, p: int) -> tuple[Floats, Floats, Floats]:
+def projected_scores(products: NormalEquations, p: int) -> tuple[Floats, Floats, Floats]:
     """Score each column after the first `p`, and before the last, without the part that the first `p` can absorb.
 
     Each column has the scatter of sessions that remains with it in the fit.
@@ -227,7 +227,7 @@ def projected_scores(products: Products, p: int) -> tuple[Floats, Floats, Floats
     columns = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
     part = products.take(columns)
     normal = part.at(part.share(passes=_PASSES_OF_A_SCORE))  # (..., e, p + 2, p + 2)
-    left = eliminated(normal, p)
+    left = schur_complement(normal, p)
     length = np.sqrt(np.maximum(left[..., 0, 0], 1e-300))
     survived = length / np.sqrt(np.maximum(normal[..., p, p], 1e-300))
     return np.where(survived > 1e-6, left[..., 0, 1] / length, 0.0), survived, length

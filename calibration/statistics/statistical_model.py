@@ -23,7 +23,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from calibration.statistics.excluded import Excluded
-from calibration.statistics.gls import Gls, repeat_count, repeat_covariance
+from calibration.statistics.gls import Regression, repeat_count, repeat_covariance
 from common.arrays import Flags, Floats, Integers
 
 Value = float | Floats  # one number, or one for each run (n,)
@@ -314,10 +314,12 @@ def regression(
     columns: Floats,
     fitted: Sequence[Parameter],
     repeated: Integers | Floats | None = None,
-) -> Gls:
+) -> Regression:
     """Regress the runs in `rows` (n,) on columns (n, k, m) of all runs, the first those of `fitted`."""
     completion = None if runs.completion is None else runs.completion[rows]
-    return Gls(columns[rows], precisions(fitted), runs.session[rows], runs.scale[rows], repeated, completion)
+    return Regression(
+        columns[rows], precisions(fitted), runs.session[rows], runs.scale[rows], repeated, completion
+    )
 
 
 def _levels(factor: Integers) -> Floats:

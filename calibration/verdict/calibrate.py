@@ -8,7 +8,7 @@
    of every effect unless it would be far outside its prior (`calibration.attribution.wrong_numbers`). Single
    effects (`calibration.attribution.refits`), effects beside a wrong number, and pairs follow, each only if
    nothing before explains the residual.
-4. The verdict (`calibration.verdict.findings.Explained`).
+4. The verdict (`calibration.verdict.findings.Attribution`).
 5. If several explanations are left, next runs that would tell them apart (`calibration.verdict.next_runs`).
    If nothing explains the residual, laws that describe it (`describe`). Where none does, the nearest form is
    adopted (`calibration.attribution.nearest`). If something outside the catalogue could imitate what is claimed,
@@ -29,7 +29,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 from calibration.attribution.claim_checks import check_number, with_checks
-from calibration.attribution.moves import Move, StatedMove, find_moves, groups_that_may_differ
+from calibration.attribution.moves import LocalShift, StatedMove, find_moves, groups_that_may_differ
 from calibration.attribution.nearest import adopt_nearest
 from calibration.attribution.refits import (
     FIRST,
@@ -76,7 +76,7 @@ from calibration.statistics.weights import (
     noise_of_any_run,
     rows_of_little_weight,
 )
-from calibration.verdict.findings import Explained, HeldOutErrors
+from calibration.verdict.findings import Attribution, HeldOutErrors
 from calibration.verdict.next_runs import Explanation, next_runs
 from calibration.verdict.verdict import Verdict
 from common.arrays import Flags, Floats
@@ -166,7 +166,7 @@ def calibrate(
 
 
 def _both_intervals(
-    study: Study, found: Explained, *, progress: bool
+    study: Study, found: Attribution, *, progress: bool
 ) -> tuple[dict[str, tuple[float, float]], dict[str, tuple[float, float]]]:
     """Compute the 95 % intervals of the calibrated model, and of the final one."""
     title = "intervals" if progress else ""
@@ -204,7 +204,7 @@ def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any)
     return *fit_weighted(study, model.guess(start, study.split.fitted)), given
 
 
-def _explain_with_moves(study: Study, base: Fit) -> tuple[Study, Explained, tuple[Move, ...]]:
+def _explain_with_moves(study: Study, base: Fit) -> tuple[Study, Attribution, tuple[LocalShift, ...]]:
     """Explain the residual, with numbers that differ in some runs, unless effects do without them as well.
 
     Such numbers are looked for before the effects, and again beside those that are named, or, where nothing
@@ -230,7 +230,7 @@ def _explain_with_moves(study: Study, base: Fit) -> tuple[Study, Explained, tupl
     return study, explained, ()
 
 
-def _fit_moves(study: Study, plain: Experiment, found: Explained) -> tuple[Fit | None, tuple[Move, ...]]:
+def _fit_moves(study: Study, plain: Experiment, found: Attribution) -> tuple[Fit | None, tuple[LocalShift, ...]]:
     """Fit the final model to all runs, the held-out ones included, with the numbers that differ in some of them.
 
     Returns:
@@ -247,7 +247,7 @@ def _fit_moves(study: Study, plain: Experiment, found: Explained) -> tuple[Fit |
     return fitted if moves else None, moves
 
 
-def explain(study: Study, base: Fit) -> Explained:
+def explain(study: Study, base: Fit) -> Attribution:
     """Test the residual of the fit without effects, and look for what explains it, from the simplest on."""
     model, level = study.model, study.level
     began = time.process_time()
@@ -262,7 +262,7 @@ def explain(study: Study, base: Fit) -> Explained:
         misfit.p_value >= level or examine_residual(study, freed, tangents).p_value >= level
     )
     if misfit.p_value >= level and not number_is_wrong:
-        return Explained(base, misfit, tangents, tuple(unexamined(misfit, model.effects, misfit.critical_z)))
+        return Attribution(base, misfit, tangents, tuple(unexamined(misfit, model.effects, misfit.critical_z)))
     threshold = misfit.critical_z
     if number_is_wrong:  # every effect that may explain as much as the wrong number does
         gain = base.deviance - freed.deviance
@@ -276,7 +276,7 @@ def explain(study: Study, base: Fit) -> Explained:
     candidates = examine(study, base, misfit, tangents, threshold=threshold, after_first=forecast)
     best = explaining(candidates)
     if number_explains and (misfit.p_value >= level or not beats_number(best, freed)):
-        return _explained_by_number(study, Explained(base, misfit, tangents, tuple(candidates)), freed)
+        return _explained_by_number(study, Attribution(base, misfit, tangents, tuple(candidates)), freed)
     # From the simplest on: one effect, one beside a wrong number, two effects.
     best = best or explaining(beside_wrong_numbers(study, base, candidates, tangents))
     second = [] if best else pairs(study, candidates)
@@ -284,10 +284,10 @@ def explain(study: Study, base: Fit) -> Explained:
     tried = [(ebic(study, c.refit, len(c.claimed)), c.refit) for c in (*candidates, *second) if c.refit]
     unkept = min(tried, key=lambda each: each[0])[1] if tried and not best else None
     checked = tuple(with_checks(study, best, base))
-    return Explained(base, misfit, tangents, tuple(candidates), checked, unkept=unkept)
+    return Attribution(base, misfit, tangents, tuple(candidates), checked, unkept=unkept)
 
 
-def _explained_by_number(study: Study, found: Explained, freed: Fit) -> Explained:
+def _explained_by_number(study: Study, found: Attribution, freed: Fit) -> Attribution:
     """Name a wrong number, unless an effect explains as much and the number is implausibly far off.
 
     Args:
@@ -325,7 +325,7 @@ def _intervals(model: ForwardModel, fitted: Fit, used: Flags, title: str) -> dic
         return {name: fitted.interval(name) for name in fitted.names}
 
 
-def _handed_on(study: Study, found: Explained, *, falls: bool) -> FinalRefit:
+def _handed_on(study: Study, found: Attribution, *, falls: bool) -> FinalRefit:
     """Fit the final model to all runs, an adopted form only where it lowers the error on the held-out ones."""
     nearest, final = found.nearest, found.final
     if nearest and not falls:
@@ -342,7 +342,7 @@ def _next_runs(rivals: tuple[Rival, ...], seed: int) -> dict[str, Any]:
     return {"next_runs": (), "next_batch": None}
 
 
-def _errors(study: Study, found: Explained, uncalibrated: Floats, laws: Laws | None) -> HeldOutErrors:
+def _errors(study: Study, found: Attribution, uncalibrated: Floats, laws: Laws | None) -> HeldOutErrors:
     """State the errors of every model on the held-out runs."""
     base, final = found.base, found.final
     runs, test = study.model.runs, study.split.test

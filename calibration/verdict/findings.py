@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from calibration.attribution.claim_checks import NumberCheck
 from calibration.attribution.moves import StatedMove
-from calibration.attribution.nearest import Nearest
+from calibration.attribution.nearest import AdoptedForm
 from calibration.attribution.refits import Candidate, Rival
 from calibration.attribution.wrong_numbers import wrong_number
 from calibration.laws.laws import Laws
@@ -30,7 +30,7 @@ _LAWS_TOLD_APART = 3  # beside a claim; the more there are, the fewer runs tell 
 
 
 @dataclass(frozen=True)
-class Explained:
+class Attribution:
     """The fit without effects, its residual, and what explains the residual."""
 
     base: Fit
@@ -42,7 +42,7 @@ class Explained:
     rival_effects: tuple[Candidate, ...] = ()  # effects that explain as much as the wrong number does
     rival_numbers: tuple[Pull, ...] = ()  # the wrong numbers, where effects come ahead of them
     number_check: NumberCheck | None = None  # of the wrong number, where it comes ahead of effects
-    nearest: Nearest | None = None  # the form that is adopted where nothing explains the residual
+    nearest: AdoptedForm | None = None  # the form that is adopted where nothing explains the residual
     unkept: Fit | None = None  # the best fit with effects, where none explains the residual
 
     @property
@@ -106,10 +106,10 @@ class HeldOutErrors:
 class Findings:
     """What runs say about a model, in numbers."""
 
-    verdict: str  # "none", "number", "effect", "ambiguous", "partial", "unexplained"; see `Explained.verdict`
+    verdict: str  # "none", "number", "effect", "ambiguous", "partial", "unexplained"; see `Attribution.verdict`
     runs: Runs  # that were calibrated with
     split: Split  # fitted and held-out runs
-    found: Explained  # the residual, and what explains it
+    found: Attribution  # the residual, and what explains it
     moves: tuple[StatedMove, ...]  # numbers that differ in some runs
     errors: HeldOutErrors  # on the held-out runs
     base_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
@@ -138,7 +138,7 @@ class Findings:
         return self.found.best
 
     @property
-    def nearest(self) -> Nearest | None:
+    def nearest(self) -> AdoptedForm | None:
         """The form that is adopted, of a partial verdict."""
         return self.found.nearest
 

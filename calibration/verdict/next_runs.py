@@ -274,7 +274,7 @@ def standings(
 ) -> list[Standing]:
     """Judge explanations by the new runs in `new` (n,), best first.
 
-    It takes up where `calibration.verdict.findings.Explained.verdict` says "ambiguous", and where several laws
+    It takes up where `calibration.verdict.findings.Attribution.verdict` says "ambiguous", and where several laws
     describe what nothing explains.
 
     Args:

@@ -25,11 +25,11 @@ from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Reference
 from planner.planning.conditions import KeptClear, Lap
-from planner.planning.declare import Declared
-from planner.planning.errors import PlanErrors, predicted_error
+from planner.planning.declare import FeasiblePath
 from planner.planning.line_of_sight import Guidance
 from planner.planning.plan import GUARANTEE, KINDS, Plan
 from planner.planning.request import DOCUMENTED, Camera, PlanRequest
+from planner.planning.stated_error import PlanErrors, predicted_error
 from planner.vehicle.from_table import table_for
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
@@ -261,14 +261,14 @@ def _plan(content: Mapping[str, Any], tracked: TrackedVehicle) -> Plan[None]:
     return replace(plan, declared=replace(declared, warnings=said))
 
 
-def _guidance(content: Mapping[str, Any], tracked: TrackedVehicle) -> tuple[Declared, Zigzag, Guidance]:
+def _guidance(content: Mapping[str, Any], tracked: TrackedVehicle) -> tuple[FeasiblePath, Zigzag, Guidance]:
     """Read the reference and the numbers of the guidance."""
     saved, p = content["guidance"], np.array(content["reference"], dtype=float)
     straight, heading = Zigzag.from_dict(saved["straight"]), np.array(saved["heading_rad"], dtype=float)
     reference = Reference.of_path(p, heading, tracked.rod, closed=bool(content["closed"]))
     to_pose = content[GUARANTEE] is None  # its arcs turn as much as the robot can, which asks for no look-ahead
     curvature = 0.0 if to_pose else float(np.abs(reference.curvature).max())
-    declared = Declared(
+    declared = FeasiblePath(
         reference, curvature, float(content["off_drawn_over_l"]), float(content["missed_over_l"]), ()
     )
     dwell, ahead, swing = content["minimum_dwell_bar"], saved["look_ahead_over_l"], saved["swing_rad"]
@@ -280,7 +280,7 @@ def _guidance(content: Mapping[str, Any], tracked: TrackedVehicle) -> tuple[Decl
 
 
 def _errors(
-    content: Mapping[str, Any], tracked: TrackedVehicle, drawn: Path2D, declared: Declared, switches: Switches
+    content: Mapping[str, Any], tracked: TrackedVehicle, drawn: Path2D, declared: FeasiblePath, switches: Switches
 ) -> PlanErrors:
     """Read the errors that are stated, and predict the track again."""
     guaranteed, closure, path = content[GUARANTEE], content["closure_over_l"], declared.reference.p

@@ -26,12 +26,12 @@ from common.arrays import Floats
 from common.errors import InputError
 from planner.paths.distance import distance_to
 from planner.planning.conditions import OVERLAP, Lap
-from planner.planning.declare import Declared
-from planner.planning.errors import drift_of_a_lap, plan_errors
+from planner.planning.declare import FeasiblePath
 from planner.planning.line_of_sight import follow
 from planner.planning.plan import J, Plan
-from planner.planning.request import POSE, Progress
-from planner.planning.solve import Setting
+from planner.planning.request import POSE, ProgressCallback
+from planner.planning.solve import Trial
+from planner.planning.stated_error import drift_of_a_lap, plan_errors
 from planner.vehicle.vehicle import Switches, Vehicle, flips_after, roll_out
 from sim.mechanics import planar
 
@@ -58,7 +58,7 @@ class Ending:
     least: float  # dwell that the motor allows
     shorter: float  # share of the plan's shortest dwell that these dwells must keep
 
-    def __call__(self, switches: Switches, declared: Declared, setting: Setting) -> Switches:
+    def __call__(self, switches: Switches, declared: FeasiblePath, setting: Trial) -> Switches:
         """Change a schedule: without any or some of its last dwells, whichever costs least."""
         vehicle, track = setting.tracked.vehicle, declared.reference.q
         dwell = min(setting.dwell, max(self.least, self.shorter * setting.dwell))
@@ -138,7 +138,7 @@ def _least_squares(
     return np.asarray(least_squares(values, first, slopes, bounds=(least, np.inf), **options).x)
 
 
-def looped(plan: Plan[J], progress: Progress | None = None) -> Plan[J]:
+def looped(plan: Plan[J], progress: ProgressCallback | None = None) -> Plan[J]:
     """Turn the plan of a closed path into a schedule that repeats.
 
     Args:

@@ -24,10 +24,10 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from common.arrays import Flags, Floats, Integers
-from planner.paths.dubins import TURNS, DubinsPaths, shortest_paths, words
+from planner.paths.dubins import TURNS, DubinsPaths, segment_lengths, shortest_paths
 from planner.paths.obstacles import Footprint, FreeSpace, Map
 from planner.paths.tractrix import Drift
-from planner.paths.units import Swimmer, in_lab, place_in_lab
+from planner.paths.units import Scales, in_lab, place_in_lab
 from planner.planning.conditions import BlockedError
 
 _RANGE = 3  # of the joints between poses, in spacings
@@ -215,7 +215,7 @@ Lattices = dict[tuple[float, int], "Lattice"]  # by spacing and number of course
 
 
 def route(
-    stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lattices, robot: Swimmer
+    stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lattices, robot: Scales
 ) -> DubinsPaths:
     """Find a short route through the stops.
 
@@ -251,7 +251,7 @@ def route(
     )
 
 
-def _check(stop: Floats, number: int, count: int, limits: RouteLimits, margin: float, robot: Swimmer) -> None:
+def _check(stop: Floats, number: int, count: int, limits: RouteLimits, margin: float, robot: Scales) -> None:
     clearance = float(limits.clearance(stop).max())
     if clearance >= margin:
         return
@@ -296,7 +296,7 @@ def _chosen(stops: list[Floats], limits: RouteLimits, margin: float) -> DubinsPa
 
     Words are checked only when they are on the shortest chain. Those that are not free are excluded.
     """
-    legs = [words(starts[:, None], ends[None], limits.radius) for starts, ends in pairwise(stops)]
+    legs = [segment_lengths(starts[:, None], ends[None], limits.radius) for starts, ends in pairwise(stops)]
     lengths = [leg.sum(-1) for leg in legs]
     for _ in range(_MOST_CHECKS):
         options, total = best_options([length.min(-1) for length in lengths])

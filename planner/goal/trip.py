@@ -27,12 +27,12 @@ from planner.paths.dubins import DubinsPaths
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import LONGEST, ask_about_days, heading_in_degrees, in_lab, place_in_lab
-from planner.planning.declare import Declared
+from planner.planning.declare import FeasiblePath
 from planner.planning.line_of_sight import Start
 from planner.planning.picture import BODY, REPLAYED
 from planner.planning.plan import Job, Plan
 from planner.planning.request import POSE
-from planner.planning.solve import Setting, Task, solve
+from planner.planning.solve import PathTask, Trial, solve
 from planner.vehicle.zigzag import Objective, check_least
 
 if TYPE_CHECKING:
@@ -159,7 +159,7 @@ def to_goal(
         stops = _stops(begin, end, passed, vehicle.pivot_distance, drift)
         return route(stops, limits, margin, lattices.setdefault(drift, {}), swims)
 
-    def source(setting: Setting) -> Declared:
+    def source(setting: Trial) -> FeasiblePath:
         way = track(setting.drift, setting.margin or 0.0)
         if way.total > LONGEST:
             raise InputError(f"the way is {in_lab(way.total, swims)} long; at most {LONGEST:g} l can be planned")
@@ -167,11 +167,11 @@ def to_goal(
         if len(poses) < 2:
             raise InputError("start and goal are the same; nothing to do")
         # The guaranteed bound is for paths that turn less than the robot can; these arcs turn as much as it can.
-        return Declared(
+        return FeasiblePath(
             Reference.of_pivot(poses, tracked.rod, drift=setting.drift, heading=begin[2]), curvature=0.0
         )
 
-    task = Task(
+    task = PathTask(
         source=source, start=lambda declared: Start(begin, declared.reference.first_turn),
         ending=Ending(end, least_dwell, _SHORTER), zigzags=_ZIGZAGS, longer=False, blocked=NoWayError,
     )  # fmt: skip

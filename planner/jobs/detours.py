@@ -31,8 +31,8 @@ from planner.paths.tractrix import Drift, Reference
 from planner.paths.tractrix import reference as follow_path
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.conditions import BlockedError, Detour
-from planner.planning.declare import AS_DRAWN, TIGHTEST, Declared
-from planner.planning.solve import Setting
+from planner.planning.declare import AS_DRAWN, TIGHTEST, FeasiblePath
+from planner.planning.solve import Trial
 from planner.vehicle.tracked_point import TrackedVehicle
 
 _REACH = 6.0  # radii before and behind a blocked stretch, within which a way around leaves and joins
@@ -56,7 +56,7 @@ class Around:
     drawn: Path2D  # the path as drawn
     detours: dict[Drift, Detours] = field(default_factory=dict)  # they have lattices
 
-    def __call__(self, declared: Declared, setting: Setting) -> Declared:
+    def __call__(self, declared: FeasiblePath, setting: Trial) -> FeasiblePath:
         """Keep clear.
 
         Raises:
@@ -77,7 +77,7 @@ class Around:
         return replace(declared.moved(reference, self.drawn), detours=detours) if detours else declared
 
 
-class Stretch(NamedTuple):
+class BlockedStretch(NamedTuple):
     """A blocked part of a reference, and the parts where a way around may leave and join; indices."""
 
     leave_from: int
@@ -86,7 +86,7 @@ class Stretch(NamedTuple):
     join_until: int
 
 
-class Way(NamedTuple):
+class WayAround(NamedTuple):
     """A way around: the points of the reference where it leaves and joins, and the part between."""
 
     leave: int
@@ -137,7 +137,7 @@ class Detours:
         return changed, _compared(reference, changed)
 
     def _nearest(
-        self, reference: Reference, ways: list[Way], stretches: list[Stretch], margin: float
+        self, reference: Reference, ways: list[WayAround], stretches: list[BlockedStretch], margin: float
     ) -> Reference:
         """Move ways around as near to the path as possible."""
         rod, done = max(self.tracked.rod, 0.0), 0
@@ -172,7 +172,7 @@ class Detours:
         path = Path2D.of(points, closed=reference.closed)
         return follow_path(path, rod, _SPACING, self.drift)
 
-    def _check_ends(self, reference: Reference, stretches: list[Stretch], margin: float) -> None:
+    def _check_ends(self, reference: Reference, stretches: list[BlockedStretch], margin: float) -> None:
         for index, at, name in ((0, 0, "begins"), (-1, len(reference.q) - 1, "ends")):
             if at in (stretches[index].first, stretches[index].last):
                 room = float(self.clearance(reference.part(at, at + 1))[0])
@@ -183,7 +183,7 @@ class Detours:
                     f"{in_lab(margin, robot)}, the stated error"
                 )
 
-    def _way(self, reference: Reference, stretch: Stretch, margin: float) -> Way:
+    def _way(self, reference: Reference, stretch: BlockedStretch, margin: float) -> WayAround:
         """Find a way around one stretch.
 
         Raises:
@@ -213,7 +213,7 @@ class Detours:
                     part = Reference.of_pivot(
                         route.chain(_SPACING), self.tracked.rod, self.drift, float(reference.heading[leave])
                     )
-                    return Way(leave, int(joins[best]), part)
+                    return WayAround(leave, int(joins[best]), part)
         robot = self.tracked.robot
         first, last = (place_in_lab(*_place(reference.p[i]), robot) for i in (stretch.first, stretch.last))
         raise BlockedError(
@@ -264,7 +264,7 @@ def _turned(reference: Reference, blocked: Flags) -> Reference:
     return reference.begun_at(begin)
 
 
-def _stretches(blocked: Flags, arc: Floats, radius: float) -> list[Stretch]:
+def _stretches(blocked: Flags, arc: Floats, radius: float) -> list[BlockedStretch]:
     """Find blocked stretches; those that are near one another are one."""
     runs, stretches = runs_of(blocked, arc, 2 * radius), []
     for k, (first, last) in enumerate(runs):
@@ -272,7 +272,7 @@ def _stretches(blocked: Flags, arc: Floats, radius: float) -> list[Stretch]:
         middle_behind = len(arc) - 1 if k == len(runs) - 1 else _halfway(arc, last, runs[k + 1][0]) - 1
         leave_from = max(middle_before, int(np.searchsorted(arc, arc[first] - _REACH * radius)))
         join_until = min(middle_behind, int(np.searchsorted(arc, arc[last] + _REACH * radius)))
-        stretches.append(Stretch(leave_from, first, last, join_until))
+        stretches.append(BlockedStretch(leave_from, first, last, join_until))
     return stretches
 
 
@@ -287,7 +287,7 @@ def _places(arc: Floats, near: int, far: int, step: float) -> Floats:
     return np.unique(np.clip(rows, min(near, far), max(near, far)))
 
 
-def _with_ways(reference: Reference, ways: list[Way]) -> Reference:
+def _with_ways(reference: Reference, ways: list[WayAround]) -> Reference:
     """Replace parts of a reference by ways around."""
     parts, done = [], 0
     for way in ways:

@@ -24,10 +24,10 @@ from planner.paths.path import Path2D, smoothed
 from planner.paths.path_files import Drawing, read_path
 from planner.paths.tractrix import Drift
 from planner.paths.units import check_size, describe, in_lab, in_tails
-from planner.planning.declare import Declared, Feasibility, declare
+from planner.planning.declare import Feasibility, FeasiblePath, make_feasible
 from planner.planning.plan import Plan
-from planner.planning.request import PlanRequest, Progress
-from planner.planning.solve import Task, solve
+from planner.planning.request import PlanRequest, ProgressCallback
+from planner.planning.solve import PathTask, solve
 from planner.vehicle.tracked_point import TrackedVehicle
 
 
@@ -97,7 +97,7 @@ def plan(
 
 
 def make_plan(
-    drawn: Path2D, tracked: TrackedVehicle, request: PlanRequest, progress: Progress | None = None
+    drawn: Path2D, tracked: TrackedVehicle, request: PlanRequest, progress: ProgressCallback | None = None
 ) -> Plan[None]:
     """Plan for a path [l] that the tracked point follows, see `plan`."""
     if request.loop and not drawn.closed:
@@ -105,12 +105,12 @@ def make_plan(
     check_size(drawn, tracked.robot, tracked.vehicle.turn_radius, tracked.vehicle.speed)
 
     @cache
-    def nearest(drift: Drift) -> Declared:
+    def nearest(drift: Drift) -> FeasiblePath:
         vehicle, corner = tracked.vehicle, request.corner
         feasibility = Feasibility(tracked.robot, vehicle, tracked.rod, drift, corner, request.time_weight)
-        return declare(drawn, feasibility, progress)
+        return make_feasible(drawn, feasibility, progress)
 
-    task = Task(source=lambda setting: nearest(setting.drift), drawn=drawn, quickest=request.space.empty)
+    task = PathTask(source=lambda setting: nearest(setting.drift), drawn=drawn, quickest=request.space.empty)
     if not request.space.empty:
         from planner.jobs.detours import Around  # loads SciPy's graphs
 

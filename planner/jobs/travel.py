@@ -16,15 +16,15 @@ import numpy as np
 from common.arrays import Floats, Integers
 from planner.goal.route import RouteLimits
 from planner.jobs.detours import Around
-from planner.paths.dubins import TURNS, DubinsPaths, words
+from planner.paths.dubins import TURNS, DubinsPaths, segment_lengths
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D, axis_at
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import check_size
-from planner.planning.declare import AS_DRAWN, Declared
+from planner.planning.declare import AS_DRAWN, FeasiblePath
 from planner.planning.plan import Plan
-from planner.planning.request import PlanRequest, Progress
-from planner.planning.solve import Setting, Task, solve
+from planner.planning.request import PlanRequest, ProgressCallback
+from planner.planning.solve import PathTask, Trial, solve
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.zigzag import dwells_for
 
@@ -47,7 +47,7 @@ class Travel:
     turning: float  # speed in turns
 
     @staticmethod
-    def of(setting: Setting, space: FreeSpace, margin: float) -> Travel:
+    def of(setting: Trial, space: FreeSpace, margin: float) -> Travel:
         """Take the vehicle's radius and speeds."""
         tracked, straight = setting.tracked, setting.straight.net_speed
         own = float(np.abs(tracked.vehicle.twist[:, 0]).mean())
@@ -78,7 +78,7 @@ class Travel:
         return self._best(start, goal, self.margin)[0]
 
     def _best(self, start: Floats, goal: Floats, margin: float) -> tuple[DubinsPaths, Floats]:
-        lengths = words(start, goal, self.radius)
+        lengths = segment_lengths(start, goal, self.radius)
         times = (lengths / self._speed(TURNS)).sum(-1)
         order = times.argsort(-1)
         rows = np.arange(len(start))
@@ -104,14 +104,17 @@ class Travel:
         return np.where(turns == 0, self.straight, self.turning)
 
 
-def preferred_setting(tracked: TrackedVehicle, request: PlanRequest) -> Setting:
+def preferred_setting(tracked: TrackedVehicle, request: PlanRequest) -> Trial:
     """Return the vehicle with the dwell that the objective prefers."""
     least = request.least_dwell(tracked.robot)
-    return Setting.of(tracked, request.dwell or dwells_for(tracked.vehicle, request.objective, least)[0])
+    return Trial.of(tracked, request.dwell or dwells_for(tracked.vehicle, request.objective, least)[0])
 
 
 def plan_track(
-    track: Callable[[Drift], DubinsPaths], preferred: Setting, request: PlanRequest, progress: Progress | None
+    track: Callable[[Drift], DubinsPaths],
+    preferred: Trial,
+    request: PlanRequest,
+    progress: ProgressCallback | None,
 ) -> Plan[None]:
     """Plan for the pivot's track that a job gives for a drift.
 
@@ -120,11 +123,11 @@ def plan_track(
     """
     tracked, space = preferred.tracked, request.space
 
-    def source(setting: Setting) -> Declared:
+    def source(setting: Trial) -> FeasiblePath:
         reference = Reference.of_pivot(track(setting.drift).chain(_SPACING), tracked.rod, setting.drift)
-        return Declared(reference, float(np.abs(reference.curvature).max()))
+        return FeasiblePath(reference, float(np.abs(reference.curvature).max()))
 
     drawn = Path2D(source(preferred).reference.p, False)
     check_size(drawn, tracked.robot, tracked.vehicle.turn_radius, tracked.vehicle.speed)
     around = None if space.empty else Around(space, drawn)
-    return solve(Task(source=source, around=around, drawn=drawn), tracked, request, progress)
+    return solve(PathTask(source=source, around=around, drawn=drawn), tracked, request, progress)

@@ -28,8 +28,8 @@ _NAMES = {  # of each module; a leading underscore is left out
     "planner.paths.tractrix": "BACK LAPS MOST_SLIP",
     "planner.planning.declare": "WARN FAR SCALES MOST_WORK SMOOTHINGS FIRST CORNER AS_DRAWN ROOMS TIGHTEST "
     "LOST ROUNDED SMALL NOISY FEWEST_POSES FILLET_ROOM SPACING MOST_POINTS MINIMAX ROUNDING POINTS_A_POSE",
-    "planner.planning.errors": "LEVEL WOBBLE DRAWS BLOCKS WITHIN KEPT ZIGZAG PLACE COURSE STRETCH WEYL FIRST "
-    "SECOND MIDDLE TAIL",
+    "planner.planning.stated_error": "LEVEL WOBBLE DRAWS BLOCKS WITHIN KEPT ZIGZAG PLACE COURSE STRETCH WEYL "
+    "FIRST SECOND MIDDLE TAIL",
     "planner.planning.line_of_sight": "EXACT LARGEST_STEP LARGEST_TURN TURNS MOST_BIAS HALVINGS MOST_LOOKS "
     "MOST_SWITCHES PATIENCE EVERY QUICKEST TIGHTEST PAIRS_AHEAD",
     "planner.planning.plan": "WIDE OWN_TABLE_FROM",
@@ -46,7 +46,7 @@ _NAMES = {  # of each module; a leading underscore is left out
     "sim.model.response": "DWELLS BEFORE FORGOTTEN",
     "sim.model.robot_toml": "LARGEST SIGMA HEADER NOTES NO_EFFECTS SI",
     "surrogate.error_modes": "NORMAL_90 LAGS",
-    "surrogate.errors": "RELATIVE",
+    "surrogate.held_out": "RELATIVE",
     "surrogate.intervals": "NOVELTY",
     "surrogate.table": "OF_TAILS",
     "surrogate.response": "PARTS SMALL_SURGE OF_HEAD",
@@ -68,7 +68,7 @@ def constants() -> dict[str, dict[str, Any]]:
     options = [name for name in vars(request) if name not in _NOT_ASKED]
     found["request"] = {"DEFAULTS": {camel(name): getattr(request, name) for name in options}}
     found["paths_units"] = _of("planner.paths.units", ["LONGEST", "SMALLEST"])
-    found["errors"]["CAMERA"] = request.camera.to_dict()
+    found["stated_error"]["CAMERA"] = request.camera.to_dict()
     found["units"]["SIGNS"] = {chr(sign): str(word) for sign, word in units._SIGNS.items()}
     found["knowledge"] = {
         "UNMEASURED": dict(zip(UNMEASURED.names, np.sqrt(np.diag(UNMEASURED.covariance)).tolist(), strict=True))

@@ -4,7 +4,7 @@
  * μ0 l⁴/EI, unless a name says its unit. */
 import { CONSTANTS } from "./constants.js";
 import { declare } from "./declare.js";
-import { Followed, guaranteedError, lookAhead } from "./errors.js";
+import { Followed, guaranteedError, lookAhead } from "./stated_error.js";
 import { follow } from "./guidance.js";
 import { sum } from "./math.js";
 import { checkSize } from "./path.js";
@@ -42,7 +42,7 @@ function makePlan(drawn, tracked, request, progress = null) {
   return { tracked, objective, drawn, declared, straight, guidance, switches, errors, unmeasured };
 }
 
-/* The schedule that a request chooses, as in errors.js. */
+/* The schedule that a request chooses, as in stated_error.js. */
 function followedPath(drawn, tracked, request, progress = null) {
   const { vehicle, robot } = tracked, declaredPaths = new Map();
   checkSize(drawn, robot, turnRadius(vehicle));

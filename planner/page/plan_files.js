@@ -10,7 +10,7 @@ import { inLab, timeInLab } from "./units.js";
 import { turnRadius, yawRate } from "./vehicle.js";
 import { InputError, general, repr } from "./words.js";
 
-const { WIDE, OWN_TABLE_FROM } = CONSTANTS.plan, { CAMERA } = CONSTANTS.errors;
+const { WIDE, OWN_TABLE_FROM } = CONSTANTS.plan, { CAMERA } = CONSTANTS.stated_error;
 const { MOST_MS, CHECKPOINTS } = CONSTANTS.headers;
 const FORMAT = 2;
 const DEGREES = 180 / Math.PI;

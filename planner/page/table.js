@@ -12,7 +12,7 @@ import { BEFORE, CURVE } from "./vehicle.js";
 import { InputError } from "./words.js";
 
 const { OF_TAILS } = CONSTANTS.table, { PARTS, SMALL_SURGE, OF_HEAD } = CONSTANTS.response;
-const { NORMAL_90, LAGS } = CONSTANTS.error_modes, { NOVELTY } = CONSTANTS.intervals, { RELATIVE } = CONSTANTS.errors;
+const { NORMAL_90, LAGS } = CONSTANTS.error_modes, { NOVELTY } = CONSTANTS.intervals, { RELATIVE } = CONSTANTS.held_out;
 const { DEGREE, DEGREE_OF_MANY, MANY, MOST_TAILS } = CONSTANTS.domain; // of monomials; of so many inputs and more
 const STEADY = ["v_z", "v_x", "omega_yr_bar"];
 const END = 1.02; // of half an input's range

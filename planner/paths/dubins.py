@@ -75,7 +75,7 @@ class DubinsPaths(NamedTuple):
         return poses
 
 
-def words(start: Floats, goal: Floats, radius: float) -> Floats:
+def segment_lengths(start: Floats, goal: Floats, radius: float) -> Floats:
     """Compute the lengths (..., 6, 3) of the segments of all words; infinite where a word does not exist."""
     move = (goal[..., :2] - start[..., :2]) / radius
     d, direction = np.hypot(move[..., 0], move[..., 1]), np.arctan2(move[..., 1], move[..., 0])
@@ -119,7 +119,7 @@ def _three_arcs(d: Floats, a: Floats, b: Floats, side: float) -> tuple[Floats, F
 
 def shortest_paths(start: Floats, goal: Floats, radius: float) -> DubinsPaths:
     """Find the shortest paths between M pairs of poses (M, 3)."""
-    lengths = words(start, goal, radius)
+    lengths = segment_lengths(start, goal, radius)
     best = lengths.sum(-1).argmin(-1)
     return DubinsPaths(start, TURNS[best], lengths[np.arange(len(best)), best], radius)
 

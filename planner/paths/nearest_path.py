@@ -80,7 +80,7 @@ def nearest_path(
     if raw.closed:
         target = target[:-1]
     poses, turn = _start(target, pivot_distance, closed=raw.closed)
-    task = Task(
+    task = PoseProblem(
         target, _sides(target, closed=raw.closed), np.ones(len(target)), pivot_distance, radius, drift, spacing,
         time_weight, turn,
     )  # fmt: skip
@@ -126,7 +126,7 @@ def nearest_poses(
     """
     shares = np.concatenate([[_PINNED], shares[1:-1], [_PINNED]])
     spacing = float(np.hypot(*np.diff(poses[:, :2], axis=0).T).mean())
-    task = Task(
+    task = PoseProblem(
         target, _sides(target, closed=False), shares, pivot_distance, radius, drift, spacing, 0.0, None, hindrance
     )
     for weight in _HINDERED:
@@ -181,7 +181,7 @@ def _sides(target: Floats, *, closed: bool) -> Floats:
     return np.stack([_ALONG * along, across], 1)
 
 
-def _minimax(poses: Floats, task: Task, told: Callable[[int], object]) -> Floats:
+def _minimax(poses: Floats, task: PoseProblem, told: Callable[[int], object]) -> Floats:
     """Find poses whose largest distance from the target is small."""
     best, shares = poses, task.shares
     for stage in range(_ROUNDS):
@@ -195,13 +195,13 @@ def _minimax(poses: Floats, task: Task, told: Callable[[int], object]) -> Floats
     return best
 
 
-def _distances(poses: Floats, task: Task) -> Floats:
+def _distances(poses: Floats, task: PoseProblem) -> Floats:
     """Compute the distances (m,) of the tracked point from the target."""
     ahead = task.distance * axis_at(poses[:, 2])
     return np.asarray(np.hypot(*(poses[:, :2] + ahead - task.target).T))
 
 
-def _descend(poses: Floats, task: Task, weight: float) -> Floats:
+def _descend(poses: Floats, task: PoseProblem, weight: float) -> Floats:
     """Minimise by Gauss-Newton with Levenberg's damping, for one weight of the constraints."""
     damping = 1e-3
     place = places(len(poses), closed=task.turn is not None)
@@ -228,7 +228,7 @@ def _descend(poses: Floats, task: Task, weight: float) -> Floats:
     return poses
 
 
-class Task(NamedTuple):
+class PoseProblem(NamedTuple):
     """What stays the same while the poses are sought."""
 
     target: Floats  # (m, 2), points on the path as drawn
@@ -256,7 +256,7 @@ def damped_step(band: Floats, right: Floats, damping: float) -> Floats | None:
     return step if info == 0 else None
 
 
-class NormalEquations(NamedTuple):
+class PoseNormalEquations(NamedTuple):
     """The linearised least squares: cost, and normal equations without damping."""
 
     cost: float  # sum of squared residuals
@@ -265,7 +265,7 @@ class NormalEquations(NamedTuple):
     across: Floats  # (3, 3, k), blocks of neighbours: row of the first pose, column of the second
 
 
-def normal_equations(poses: Floats, task: Task, weight: float) -> NormalEquations:
+def normal_equations(poses: Floats, task: PoseProblem, weight: float) -> PoseNormalEquations:
     """Compute cost and normal equations at poses (m, 3).
 
     There are k = m − 1 steps on an open path, and m on a closed one. The residuals of a step depend on its forward
@@ -312,10 +312,10 @@ def normal_equations(poses: Floats, task: Task, weight: float) -> NormalEquation
         [-xy, -yy, -y_swing - y_turn],
         [x_swing - x_turn, y_swing - y_turn, swing - part.tt],
     ])  # fmt: skip
-    return NormalEquations(cost + part.cost, gradient, diagonal, across)
+    return PoseNormalEquations(cost + part.cost, gradient, diagonal, across)
 
 
-def _add_distances(poses: Floats, task: Task, gradient: Floats, diagonal: Floats) -> float:
+def _add_distances(poses: Floats, task: PoseProblem, gradient: Floats, diagonal: Floats) -> float:
     """Add the squared distances from the target to the normal equations; return their sum."""
     (along_x, along_y), (across_x, across_y) = np.moveaxis(task.sides, 0, -1)
     x, y, heading = poses.T
@@ -357,7 +357,12 @@ class _StepPart(NamedTuple):
 
 
 def _step_part(
-    forward: Floats, aside: Floats, turn: Floats, direction: tuple[Floats, Floats], task: Task, weight: float
+    forward: Floats,
+    aside: Floats,
+    turn: Floats,
+    direction: tuple[Floats, Floats],
+    task: PoseProblem,
+    weight: float,
 ) -> _StepPart:
     """Compute what the residuals of the steps add."""
     c, s = direction
@@ -398,7 +403,7 @@ def places(count: int, *, closed: bool) -> Integers:
     return place
 
 
-def sorted_equations(system: NormalEquations, place: Integers) -> tuple[Floats, Floats]:
+def sorted_equations(system: PoseNormalEquations, place: Integers) -> tuple[Floats, Floats]:
     """Assemble the normal matrix, lower form (band, 3 m), and the right side (3 m,), sorted by `place`."""
     count, first = len(place), place[: system.across.shape[2]]
     second = np.roll(place, -1)[: len(first)]

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from common.arrays import Floats, Integers
 from common.errors import InputError
 from planner.paths.path import Path2D, axis_at
-from planner.paths.units import Swimmer
+from planner.paths.units import Scales
 
 _SIDES = 180  # of a circle as a polygon
 _BLOCK = 2_000_000  # distances computed at once
@@ -179,7 +179,7 @@ class Footprint:
     radius: float  # of all
 
     @staticmethod
-    def of(swimmer: Swimmer, origin: float) -> Footprint:
+    def of(swimmer: Scales, origin: float) -> Footprint:
         """Cover the body; `origin` is the distance from its pose's point forward to the point of the axis."""
         front, back, width = swimmer.outline
         count = max(2, math.ceil((front - back) / width))

@@ -15,7 +15,7 @@ from common.errors import InputError, naming
 from common.keywords import checks_keywords
 from common.units import split, to_si
 from planner.paths.path import SHAPES, Path2D, like_a_shape, nearest_shape, shape_of
-from planner.paths.units import NO_UNIT, Swimmer, in_tails
+from planner.paths.units import NO_UNIT, Scales, in_tails
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,7 +59,7 @@ class Drawing:
     path: Path2D  # in the unit of the file
     unit: float | str | None  # its size in m, or "m", "cm", "mm", "l"; None: the numbers have no unit
 
-    def in_tails(self, robot: Swimmer, unit: str | None = None) -> Path2D:
+    def in_tails(self, robot: Scales, unit: str | None = None) -> Path2D:
         """Return the path in tail lengths of a robot.
 
         Args:

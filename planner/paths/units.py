@@ -36,7 +36,7 @@ NO_UNIT = (
 )
 
 
-class Swimmer(Protocol):
+class Scales(Protocol):
     """What the planner must know besides the motion: a robot has it, and a vehicle that was measured."""
 
     @property
@@ -56,7 +56,7 @@ class Swimmer(Protocol):
         """Front and back of the body, forward from the point whose poses count, and half of the width [l]."""
 
 
-def in_lab(value: float, robot: Swimmer) -> str:
+def in_lab(value: float, robot: Scales) -> str:
     """Write a length given in tail lengths: 3.52 cm (0.32 l)."""
     return length_in_lab(value, robot.length_scale)
 
@@ -74,7 +74,7 @@ def missed_words(missed: float, stated: float, length: float) -> str:
     return f"MISSED a part of the declared path: it is up to {length_in_lab(missed, length)} from the track; "
 
 
-def time_in_lab(value: float, robot: Swimmer) -> str:
+def time_in_lab(value: float, robot: Scales) -> str:
     """Write a time given in units of μ0 l⁴/EI: 1.79 s (0.81 time units)."""
     return f"{format_time(value * robot.time_scale)} ({value:.2g} time units)"
 
@@ -96,7 +96,7 @@ def read_time(words: str, name: str) -> float:
     return seconds
 
 
-def place_in_lab(x: float, y: float, robot: Swimmer) -> str:
+def place_in_lab(x: float, y: float, robot: Scales) -> str:
     """Write a place given in tail lengths: (3.52, 1.1) cm = (0.32, 0.1) l."""
     cm = 100 * robot.length_scale
     lab, tails = (", ".join(_fixed(s * value, n) for value in (x, y)) for s, n in ((cm, 2), (1.0, 3)))
@@ -114,7 +114,7 @@ def _fixed(value: float, places: int) -> str:
     return f"{round(value, places) + 0.0:.{places}f}"
 
 
-def describe(path: Path2D, robot: Swimmer) -> str:
+def describe(path: Path2D, robot: Scales) -> str:
     """Describe length and extent of a path."""
     width, height = extent(path)
     across = [format_length(value * robot.length_scale) for value in (width, height)]
@@ -122,7 +122,7 @@ def describe(path: Path2D, robot: Swimmer) -> str:
     return f"{in_lab(path.length, robot)} long, {' by '.join(across)} {in_tail_lengths}"
 
 
-def in_tails(unit: str, robot: Swimmer) -> float:
+def in_tails(unit: str, robot: Scales) -> float:
     """Convert a unit of length to tail lengths; l is the tail length itself.
 
     Raises:
@@ -133,7 +133,7 @@ def in_tails(unit: str, robot: Swimmer) -> float:
     return 1.0 if unit == "l" else to_si(1.0, unit) / robot.length_scale
 
 
-def read_length(words: str, unit: str | None, robot: Swimmer, name: str, *, above_zero: bool = False) -> float:
+def read_length(words: str, unit: str | None, robot: Scales, name: str, *, above_zero: bool = False) -> float:
     """Read a length, in tail lengths.
 
     Args:
@@ -156,7 +156,7 @@ def read_length(words: str, unit: str | None, robot: Swimmer, name: str, *, abov
     return value * in_tails(own or unit or "l", robot)
 
 
-def read_pose(words: Sequence[str], unit: str | None, robot: Swimmer, name: str) -> tuple[float, float, float]:
+def read_pose(words: Sequence[str], unit: str | None, robot: Scales, name: str) -> tuple[float, float, float]:
     """Read a pose, in tail lengths and rad, from two lengths and an angle in degrees.
 
     Raises:
@@ -175,7 +175,7 @@ def extent(path: Path2D) -> tuple[float, float]:
     return width, height
 
 
-def check_size(path: Path2D, robot: Swimmer, turn_radius: float, speed: float) -> None:
+def check_size(path: Path2D, robot: Scales, turn_radius: float, speed: float) -> None:
     """Refuse a path that no schedule can be meant for, and ask about one that takes days.
 
     Raises:
@@ -191,7 +191,7 @@ def check_size(path: Path2D, robot: Swimmer, turn_radius: float, speed: float) -
     ask_about_days(path.length, robot, speed)
 
 
-def ask_about_days(length: float, robot: Swimmer, speed: float) -> None:
+def ask_about_days(length: float, robot: Scales, speed: float) -> None:
     """Ask whether the units are right of a way that takes more than a day."""
     seconds = length / speed * robot.time_scale
     if seconds > _DAY:

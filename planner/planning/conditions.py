@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from common.errors import InputError
 from planner.paths.obstacles import FreeSpace
-from planner.paths.units import Swimmer, in_lab, place_in_lab
+from planner.paths.units import Scales, in_lab, place_in_lab
 
 _SHOWN = 1e-5  # l and rad; smaller differences are rounding
 _DETOUR = ("leaves", "joins", "length_over_l", "replaced_over_l", "farthest_over_l")  # in plan.json
@@ -36,7 +36,7 @@ class Detour(NamedTuple):
     replaced: float  # of the part of the path that is not followed
     farthest: float  # largest distance of the tracked point from the path
 
-    def line(self, robot: Swimmer) -> str:
+    def line(self, robot: Scales) -> str:
         """Say in one sentence where the way around leaves the path and joins it again."""
         leaves, joins = (place_in_lab(*place, robot) for place in (self.leaves, self.joins))
         return (
@@ -55,7 +55,7 @@ class KeptClear:
     clearance: float  # smallest, of the body on the predicted track
     detours: tuple[Detour, ...]  # in the order of the path
 
-    def lines(self, robot: Swimmer) -> list[str]:
+    def lines(self, robot: Scales) -> list[str]:
         """Say how the plan keeps clear, a sentence for each detour and one for the margin."""
         margin, clearance = (in_lab(value, robot) for value in (self.margin, self.clearance))
         last = f"margin {margin} around the body; predicted clearance {clearance}"
@@ -90,7 +90,7 @@ class Lap(NamedTuple):
     drift: float  # distance that 95 % of the robots keep to that the model's uncertainty allows, open loop
     drift_turn: float  # angle of the same robots
 
-    def line(self, robot: Swimmer) -> str:
+    def line(self, robot: Scales) -> str:
         """Say in one sentence how well the laps repeat."""
         closes, drift = in_lab(max(self.closes, _SHOWN), robot), in_lab(self.drift, robot)
         turned, drift_turn = (math.degrees(angle) for angle in (max(self.closes_turn, _SHOWN), self.drift_turn))

@@ -29,9 +29,9 @@ from planner.paths.distance import two_sided
 from planner.paths.nearest_path import nearest_path, pose_spacing
 from planner.paths.path import Path2D, smoothed, steps_of
 from planner.paths.tractrix import Drift, Reference, reference
-from planner.paths.units import LONGEST, Swimmer, extent, in_lab, place_in_lab
+from planner.paths.units import LONGEST, Scales, extent, in_lab, place_in_lab
 from planner.planning.conditions import Detour
-from planner.planning.request import DECLARING, REMEDY, Corner, Progress, tell
+from planner.planning.request import DECLARING, REMEDY, Corner, ProgressCallback, tell
 from planner.vehicle.vehicle import Vehicle
 
 AS_DRAWN = 0.85  # share of the pivot's largest curvature up to which a path is followed as it was drawn
@@ -61,7 +61,7 @@ _FIRST = 0.5  # of the turn radius: the first length over which a path that is n
 class Feasibility(NamedTuple):
     """What decides whether a path can be followed, and which one is declared if it cannot."""
 
-    robot: Swimmer  # whose lengths messages are in
+    robot: Scales  # whose lengths messages are in
     vehicle: Vehicle  # its pivot radius limits the curvature
     rod: float  # from the pivot to the tracked point
     drift: Drift  # what carries the robot off its heading
@@ -75,7 +75,7 @@ class Feasibility(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Declared:
+class FeasiblePath:
     """The declared path with its tractrix, and its distances from the path as drawn [l]."""
 
     reference: Reference  # the path and the pivot that follows it
@@ -85,18 +85,20 @@ class Declared:
     warnings: tuple[str, ...] = ()  # in words
     detours: tuple[Detour, ...] = ()  # around obstacles, in the order of the path
 
-    def moved(self, reference: Reference, drawn: Path2D) -> Declared:
+    def moved(self, reference: Reference, drawn: Path2D) -> FeasiblePath:
         """Declare another reference in place of this one."""
         off_drawn, missed = two_sided(reference.p, drawn.polyline())
         curvature = float(np.abs(reference.curvature).max())
         return replace(self, reference=reference, curvature=curvature, off_drawn=off_drawn, missed=missed)
 
-    def same(self, other: Declared) -> bool:
+    def same(self, other: FeasiblePath) -> bool:
         """Tell whether the pivot has the same way."""
         return self is other or np.array_equal(self.reference.q, other.reference.q)
 
 
-def feasible(raw: Path2D, feasibility: Feasibility, progress: Progress | None = None) -> Declared | None:
+def feasible(
+    raw: Path2D, feasibility: Feasibility, progress: ProgressCallback | None = None
+) -> FeasiblePath | None:
     """Find the path to declare: the first way that is accepted; None if there is none.
 
     Raises:
@@ -112,7 +114,7 @@ def feasible(raw: Path2D, feasibility: Feasibility, progress: Progress | None = 
     return None
 
 
-def as_drawn(raw: Path2D, feasibility: Feasibility) -> Declared | None:
+def as_drawn(raw: Path2D, feasibility: Feasibility) -> FeasiblePath | None:
     """Take the path as it was drawn, if the robot can follow it.
 
     Raises:
@@ -128,7 +130,9 @@ def as_drawn(raw: Path2D, feasibility: Feasibility) -> Declared | None:
     return _accepted(raw, drawn, feasibility)
 
 
-def changed(raw: Path2D, feasibility: Feasibility, way: Way, progress: Progress | None = None) -> Declared | None:
+def changed(
+    raw: Path2D, feasibility: Feasibility, way: Way, progress: ProgressCallback | None = None
+) -> FeasiblePath | None:
     """Change a path in one way so that the robot can follow it; None if that fails, or loses the shape."""
     vehicle, rod, drift, corner = feasibility.vehicle, feasibility.rod, feasibility.drift, feasibility.corner
     if way == ROUNDED:
@@ -143,12 +147,12 @@ def changed(raw: Path2D, feasibility: Feasibility, way: Way, progress: Progress 
     return _accepted(raw, reference(path, rod, spacing(path), drift), feasibility)
 
 
-def _accepted(raw: Path2D, followed: Reference, feasibility: Feasibility) -> Declared | None:
+def _accepted(raw: Path2D, followed: Reference, feasibility: Feasibility) -> FeasiblePath | None:
     """Accept a reference that turns wide enough, only goes ahead, and keeps the shape of the drawn path."""
     curvature = float(followed.sharpness.max())
     if curvature > TIGHTEST / feasibility.vehicle.pivot_radius or not np.ptp(followed.p, axis=0).any():
         return None
-    declared = Declared(followed, curvature, *two_sided(followed.p, raw.polyline()))
+    declared = FeasiblePath(followed, curvature, *two_sided(followed.p, raw.polyline()))
     lost = min(LOST * max(extent(raw)), feasibility.vehicle.turn_radius)
     return None if max(declared.off_drawn, declared.missed) > lost else declared
 
@@ -181,7 +185,7 @@ def spacing(path: Path2D) -> float:
     return max(_SPACING, path.length / _MOST_POINTS)
 
 
-def _refuse_corner(raw: Path2D, robot: Swimmer) -> None:
+def _refuse_corner(raw: Path2D, robot: Scales) -> None:
     """Refuse a path with a sharp corner, and name the corner."""
     angle = np.abs(kinks(raw))
     sharpest = place_of_largest(angle)
@@ -263,7 +267,7 @@ def fillet(path: Path2D, radius: float) -> Path2D:
     return Path2D(np.concatenate(rounded), path.closed)
 
 
-def declare(raw: Path2D, feasibility: Feasibility, progress: Progress | None = None) -> Declared:
+def make_feasible(raw: Path2D, feasibility: Feasibility, progress: ProgressCallback | None = None) -> FeasiblePath:
     """Choose the path that the robot will follow.
 
     Raises:
@@ -295,7 +299,7 @@ def declare(raw: Path2D, feasibility: Feasibility, progress: Progress | None = N
     return replace(accepted, warnings=(warning,))
 
 
-def _too_tight(raw: Path2D, feasibility: Feasibility, progress: Progress | None) -> str:
+def _too_tight(raw: Path2D, feasibility: Feasibility, progress: ProgressCallback | None) -> str:
     """Say where a path is too tight, and what to change."""
     robot, vehicle = feasibility.robot, feasibility.vehicle
     drawn = reference(raw, feasibility.rod, spacing(raw), feasibility.drift)
@@ -311,7 +315,7 @@ def _too_tight(raw: Path2D, feasibility: Feasibility, progress: Progress | None)
     )
 
 
-def remedy(raw: Path2D, feasibility: Feasibility, progress: Progress | None = None) -> str:
+def remedy(raw: Path2D, feasibility: Feasibility, progress: ProgressCallback | None = None) -> str:
     """Say what helps a path that is too tight."""
     search = _Search(feasibility, progress)
     robot = feasibility.robot
@@ -342,7 +346,7 @@ def remedy(raw: Path2D, feasibility: Feasibility, progress: Progress | None = No
 class _Search:
     """A search whose work is bounded."""
 
-    def __init__(self, feasibility: Feasibility, progress: Progress | None):
+    def __init__(self, feasibility: Feasibility, progress: ProgressCallback | None):
         self._feasibility, self._progress = feasibility, progress
         self._work = 0.0
 

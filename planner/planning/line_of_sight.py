@@ -39,7 +39,7 @@ import numpy as np
 from common.arrays import Floats
 from common.errors import InputError
 from planner.paths.tractrix import Reference
-from planner.planning.request import FOLLOWING, POSE, Progress, tell
+from planner.planning.request import FOLLOWING, POSE, ProgressCallback, tell
 from planner.vehicle.vehicle import BEFORE_KNOTS, SHORTEST, STEP, Switches, Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.mechanics import planar
@@ -311,7 +311,7 @@ def follow(
     offset: float = 0.0,
     *,
     start: Start | None = None,
-    progress: Progress | None = None,
+    progress: ProgressCallback | None = None,
 ) -> Switches:
     """Choose dwell times that keep the tracked point on the reference.
 

@@ -19,10 +19,10 @@ from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.units import extent, heading_in_degrees, in_lab, place_in_lab, time_in_lab
 from planner.planning.conditions import KeptClear, Lap
-from planner.planning.declare import Declared
-from planner.planning.errors import PlanErrors, feedback_error, plan_errors
+from planner.planning.declare import FeasiblePath
 from planner.planning.line_of_sight import Guidance
 from planner.planning.request import POSE, PlanRequest
+from planner.planning.stated_error import PlanErrors, feedback_error, plan_errors
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Switches, roll_out, smooth_track
@@ -86,7 +86,7 @@ class Plan(Shown, Generic[J]):
     tracked: TrackedVehicle  # who follows
     request: PlanRequest  # what was asked for
     drawn: Path2D  # the path that was asked for
-    declared: Declared  # the path that is followed, with the pivot's reference
+    declared: FeasiblePath  # the path that is followed, with the pivot's reference
     straight: Zigzag  # straight motion with the shortest dwell: no schedule has a smaller rms error
     guidance: Guidance  # when the motor flips
     switches: Switches  # the schedule

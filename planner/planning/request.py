@@ -14,7 +14,7 @@ import numpy as np
 
 from common.errors import InputError
 from planner.paths.obstacles import FreeSpace
-from planner.paths.units import Swimmer
+from planner.paths.units import Scales
 from planner.vehicle.tracked_point import Point
 from planner.vehicle.zigzag import QUICK, Objective
 from sim.mechanics import planar
@@ -24,7 +24,7 @@ DECLARING = "finding the nearest path that can be followed"
 REMEDY = "too tight: looking for a change that helps"
 FOLLOWING = "following the path"
 ERRORS = "computing the error of the path"
-Progress = Callable[[float], object]  # called with a Share
+ProgressCallback = Callable[[float], object]  # called with a Progress
 POSE = tuple[float, float, float]
 _ANYWHERE = (5.0, 5.0, 2.0)  # standard deviations of wrong poses
 
@@ -112,7 +112,7 @@ class PlanRequest:
         if self.tolerance is not None and not (math.isfinite(self.tolerance) and self.tolerance > 0):
             raise InputError(f"tolerance {self.tolerance:g} l; give a number above 0")
 
-    def least_dwell(self, robot: Swimmer) -> float | None:
+    def least_dwell(self, robot: Scales) -> float | None:
         """Return the shortest dwell that the motor allows, in time units; None: the user gave none."""
         seconds, dwell = self.minimum_seconds, self.minimum_dwell
         if seconds is None:
@@ -122,16 +122,16 @@ class PlanRequest:
         return max(seconds / robot.time_scale, QUICK if dwell is None else dwell)
 
 
-class Share(float):
+class Progress(float):
     """The share of the path that has been followed, with the stage of the plan and the share of the stage."""
 
     stage: str
     done: float
 
 
-def tell(progress: Progress | None, stage: str, done: float) -> None:
+def tell(progress: ProgressCallback | None, stage: str, done: float) -> None:
     """Tell how far a stage is."""
     if progress is not None:
-        share = Share(done if stage == FOLLOWING else float(stage == ERRORS))
+        share = Progress(done if stage == FOLLOWING else float(stage == ERRORS))
         share.stage, share.done = stage, done
         progress(share)

@@ -27,11 +27,11 @@ from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab, time_in_lab
 from planner.planning.conditions import BlockedError, KeptClear
-from planner.planning.declare import Declared
-from planner.planning.errors import plan_errors
+from planner.planning.declare import FeasiblePath
 from planner.planning.line_of_sight import Guidance, Start, follow, guaranteed, look_ahead
 from planner.planning.plan import Plan
-from planner.planning.request import PlanRequest, Progress
+from planner.planning.request import PlanRequest, ProgressCallback
+from planner.planning.stated_error import plan_errors
 from planner.vehicle.from_table import OWN_TABLE
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Switches
@@ -46,7 +46,7 @@ _LENGTHENED_FROM = 1.2  # stated error over predicted error, below which fewer f
 _SAVED = 3.0  # dwells that corners and the end of a path may save
 
 
-class Setting(NamedTuple):
+class Trial(NamedTuple):
     """A vehicle with one shortest dwell, and what its reference keeps to. Lengths in l, times in μ0 l⁴/EI."""
 
     tracked: TrackedVehicle
@@ -56,47 +56,47 @@ class Setting(NamedTuple):
     margin: float | None = None  # around the body; None: no error is known yet
 
     @staticmethod
-    def of(tracked: TrackedVehicle, dwell: float) -> Setting:
+    def of(tracked: TrackedVehicle, dwell: float) -> Trial:
         """Compute straight motion and drift with a shortest dwell.
 
         Raises:
             InputError: with such dwells the robot does not get ahead.
         """
         straight = zigzag(tracked.vehicle, dwell, tracked.offset)
-        return Setting(tracked, dwell, straight, tracked.drift(straight))
+        return Trial(tracked, dwell, straight, tracked.drift(straight))
 
-    def guidance(self, declared: Declared) -> Guidance:
+    def guidance(self, declared: FeasiblePath) -> Guidance:
         """Choose look-ahead and hysteresis for a declared path."""
         ahead = look_ahead(self.tracked.vehicle, declared.curvature, self.straight)
         return Guidance(self.dwell, ahead, self.straight.hysteresis(ahead))
 
 
-Change = Callable[[Declared, Setting], Declared]  # transforms a reference, or returns its argument
-Ending = Callable[[Switches, Declared, Setting], Switches]  # changes the last dwells
+Change = Callable[[FeasiblePath, Trial], FeasiblePath]  # transforms a reference, or returns its argument
+Ending = Callable[[Switches, FeasiblePath, Trial], Switches]  # changes the last dwells
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class PathTask:
     """What is to be followed."""
 
-    source: Callable[[Setting], Declared]  # where the reference comes from
+    source: Callable[[Trial], FeasiblePath]  # where the reference comes from
     around: Change | None = None  # keeps it clear of obstacles
     drawn: Path2D | None = None  # None: the declared path counts as drawn
-    start: Callable[[Declared], Start] | None = None  # None: at rest on the path
+    start: Callable[[FeasiblePath], Start] | None = None  # None: at rest on the path
     ending: Ending | None = None
     zigzags: float | None = None  # first margin over the zigzag; None: first there is no margin
     longer: bool = True  # longer dwells are tried, too: for a small error, and where the path is blocked
     quickest: bool = False  # for the shortest time, the path is followed with several dwells
     blocked: type[BlockedError] = BlockedError
 
-    def declared(self, setting: Setting) -> Declared:
+    def declared(self, setting: Trial) -> FeasiblePath:
         """Declare a path, with ways around what blocks it."""
         declared = self.source(setting)
         return declared if self.around is None else self.around(declared, setting)
 
 
 def _followed(
-    task: Task, declared: Declared, setting: Setting, request: PlanRequest, progress: Progress | None
+    task: PathTask, declared: FeasiblePath, setting: Trial, request: PlanRequest, progress: ProgressCallback | None
 ) -> Plan[None]:
     """Follow a declared path, and compute the errors; from a start away from the path none is guaranteed."""
     tracked, straight = setting.tracked, setting.straight
@@ -114,11 +114,11 @@ def _followed(
 
 
 def at_dwell(
-    task: Task,
+    task: PathTask,
     tracked: TrackedVehicle,
     request: PlanRequest,
     dwell: float,
-    progress: Progress | None = None,
+    progress: ProgressCallback | None = None,
 ) -> Plan[None]:
     """Plan with one shortest dwell; the margin grows until it covers the error that the plan states.
 
@@ -132,7 +132,7 @@ def at_dwell(
     Raises:
         BlockedError: there is no such plan.
     """
-    setting, space = Setting.of(tracked, dwell), request.space
+    setting, space = Trial.of(tracked, dwell), request.space
     if task.zigzags and not space.empty:
         setting = setting._replace(margin=task.zigzags * setting.straight.largest)
     plan: Plan[None] | None = None
@@ -154,7 +154,7 @@ def at_dwell(
 
 
 def solve(
-    task: Task, tracked: TrackedVehicle, request: PlanRequest, progress: Progress | None = None
+    task: PathTask, tracked: TrackedVehicle, request: PlanRequest, progress: ProgressCallback | None = None
 ) -> Plan[None]:
     """Plan for a task with the dwell that the objective chooses; where the path is blocked, with others.
 
@@ -194,7 +194,7 @@ def solve(
     return _shortened(plan, dwells, at, request.tolerance)
 
 
-def _quickest(task: Task, tracked: TrackedVehicle, fastest: float, least: float | None) -> float:
+def _quickest(task: PathTask, tracked: TrackedVehicle, fastest: float, least: float | None) -> float:
     """Choose the dwell with which a declared path takes the least time.
 
     Shorter dwells are tried until they cost more time than corners and the end may save.
@@ -205,11 +205,11 @@ def _quickest(task: Task, tracked: TrackedVehicle, fastest: float, least: float 
         fastest: the dwell with which straight motion is the fastest.
         least: the shortest dwell that the motor allows.
     """
-    declared = task.declared(Setting.of(tracked, fastest))
+    declared = task.declared(Trial.of(tracked, fastest))
     times: dict[float, float] = {}
     for dwell in nearly_fastest(tracked.vehicle, least):
         with suppress(InputError):  # too long for this path
-            guidance = Setting.of(tracked, dwell).guidance(declared)
+            guidance = Trial.of(tracked, dwell).guidance(declared)
             switches = follow(declared.reference, tracked.vehicle, guidance, tracked.offset)
             times[dwell] = float(switches.dwells.sum())
             if times[dwell] > min(times.values()) + _SAVED * fastest:

@@ -171,7 +171,7 @@ def table_vehicle(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowl
         phase_rate=robot.tails * motion["omega_t_bar"],
         modes=(
             *_table_modes(twist, lookup.error_modes(columns)),
-            *coefficient_modes(robot, lookup, Motion(twist, lag), knowledge),
+            *coefficient_modes(robot, lookup, TwistsAndLags(twist, lag), knowledge),
         ),
         current=np.asarray(knowledge.current) * unit,
         tail_gap=float(np.min(motion["tail_gap"])),
@@ -189,7 +189,7 @@ def check_known(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowled
     with refusing_robots([robot, robot], lookup):
         twist = _twists(lookup.query(columns))
         lag = _lags(lookup.response(columns))
-    coefficient_modes(robot, lookup, Motion(twist, lag), knowledge)
+    coefficient_modes(robot, lookup, TwistsAndLags(twist, lag), knowledge)
 
 
 def _twists(motion: Mapping[str, Floats]) -> Floats:
@@ -221,15 +221,15 @@ def _table_modes(twist: Floats, errors: ErrorModes) -> list[Mode]:
     return modes
 
 
-class Motion(NamedTuple):
+class TwistsAndLags(NamedTuple):
     """Twists and lags of both directions, or their derivatives by one parameter."""
 
     twist: Floats  # (2, 3)
     lag: Floats  # (2, K, T, 3), as in `planner.vehicle.vehicle`
 
-    def plus(self, other: Motion, factor: float) -> Motion:
+    def plus(self, other: TwistsAndLags, factor: float) -> TwistsAndLags:
         """Add a multiple of another motion."""
-        return Motion(self.twist + factor * other.twist, self.lag + factor * other.lag)
+        return TwistsAndLags(self.twist + factor * other.twist, self.lag + factor * other.lag)
 
 
 def mirrored(curves: Floats) -> Floats:
@@ -246,7 +246,7 @@ def both_directions(values: Mapping[str, float]) -> dict[str, Floats]:
 
 
 def coefficient_modes(
-    robot: Robot, lookup: LookupTable, motion: Motion, knowledge: CalibrationKnowledge
+    robot: Robot, lookup: LookupTable, motion: TwistsAndLags, knowledge: CalibrationKnowledge
 ) -> list[Mode]:
     """Turn the covariances of the robot's parameters and of the current into modes.
 
@@ -265,7 +265,7 @@ def coefficient_modes(
         values, vectors = np.linalg.eigh(knowledge.covariance / np.outer(scale, scale))
         root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
         for k, column in enumerate(root.T):
-            total = Motion(np.zeros((2, 3)), np.zeros_like(motion.lag))
+            total = TwistsAndLags(np.zeros((2, 3)), np.zeros_like(motion.lag))
             for slope, factor in zip(slopes, column.tolist(), strict=True):
                 total = total.plus(slope, factor)
             modes.append(Mode(f"coefficients: {k + 1}", total.twist, total.lag))
@@ -278,7 +278,7 @@ def coefficient_modes(
     return modes
 
 
-def _slope_of_number(robot: Robot, lookup: LookupTable, motion: Motion, name: str) -> Motion:
+def _slope_of_number(robot: Robot, lookup: LookupTable, motion: TwistsAndLags, name: str) -> TwistsAndLags:
     """Compute the derivative of the motion by the logarithm of a number of the robot.
 
     It changes groups, and the units of time and length. The schedule keeps its seconds, the path its metres.
@@ -295,7 +295,7 @@ def _slope_of_number(robot: Robot, lookup: LookupTable, motion: Motion, name: st
     faster = -math.log(ends[0].time_scale / ends[1].time_scale) / (2 * _STEP)
     longer = math.log(ends[0].length_scale / ends[1].length_scale) / (2 * _STEP)
     by_before, by_time = np.gradient(motion.lag, np.log(BEFORE_KNOTS), TIMES, axis=(1, 2))
-    slope = Motion(
+    slope = TwistsAndLags(
         motion.twist * [faster + longer, faster + longer, faster],
         motion.lag * [longer, longer, 0.0] + faster * (by_before + TIMES[:, None] * by_time),
     )
@@ -304,14 +304,14 @@ def _slope_of_number(robot: Robot, lookup: LookupTable, motion: Motion, name: st
     return slope
 
 
-def _slope(robot: Robot, lookup: LookupTable, motion: Motion, name: str) -> Motion:
+def _slope(robot: Robot, lookup: LookupTable, motion: TwistsAndLags, name: str) -> TwistsAndLags:
     """Compute the derivative of the motion by the logarithm of a group, or by the size of an effect."""
     values = robot.group_values()
     stored = getattr(lookup, "slopes", {})
     if name in stored:
         twist = np.asarray(stored[name])
         turned = (twist[:, 2] / motion.twist[:, 2])[:, None, None, None]
-        return Motion(twist, motion.lag * turned * [0.0, 0.0, 1.0])
+        return TwistsAndLags(twist, motion.lag * turned * [0.0, 0.0, 1.0])
     effect = is_effect(name)
     step = _STEP * effect_named(name).typical if effect else _STEP
     ends = []
@@ -327,10 +327,10 @@ def _slope(robot: Robot, lookup: LookupTable, motion: Motion, name: str) -> Moti
             f"the table does not say what {name} changes; make the robot's own table with {OWN_TABLE}"
         )
     width = step_up - step_down
-    return Motion((above.twist - below.twist) / width, (above.lag - below.lag) / width)
+    return TwistsAndLags((above.twist - below.twist) / width, (above.lag - below.lag) / width)
 
 
-def _other(lookup: LookupTable, values: Mapping[str, float], motion: Motion) -> Motion:
+def _other(lookup: LookupTable, values: Mapping[str, float], motion: TwistsAndLags) -> TwistsAndLags:
     """Ask a table for the motion of another robot; it has the lags of `motion` if its own are not known.
 
     Raises:
@@ -341,5 +341,5 @@ def _other(lookup: LookupTable, values: Mapping[str, float], motion: Motion) -> 
     try:
         curves = lookup.response(columns)
     except InputError:  # of robots whose left and right turns differ
-        return Motion(twist, motion.lag)
-    return Motion(twist, motion.lag if curves.failed.any() else _lags(curves))
+        return TwistsAndLags(twist, motion.lag)
+    return TwistsAndLags(twist, motion.lag if curves.failed.any() else _lags(curves))

@@ -10,7 +10,7 @@ from common.errors import InputError
 from planner.paths.obstacles import Footprint
 from planner.paths.tractrix import Drift
 from planner.paths.units import time_in_lab
-from planner.vehicle.from_table import Motion, coefficient_modes, default_table, table_vehicle
+from planner.vehicle.from_table import TwistsAndLags, coefficient_modes, default_table, table_vehicle
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.vehicle import Mode, Vehicle
 from planner.vehicle.zigzag import Zigzag
@@ -108,7 +108,7 @@ def tracked_vehicle(
     if tracked.calibrated:
         return tracked
     try:
-        modes = coefficient_modes(robot, lookup, Motion(vehicle.twist, vehicle.lag), UNMEASURED)
+        modes = coefficient_modes(robot, lookup, TwistsAndLags(vehicle.twist, vehicle.lag), UNMEASURED)
     except InputError:  # the table of one robot that does not say what a coefficient changes
         return tracked
     return tracked._replace(unmeasured=tuple(modes))

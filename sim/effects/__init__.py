@@ -14,7 +14,7 @@ from common.arrays import Floats
 from common.errors import InputError
 from sim.model.effect import Effect
 from sim.model.groups import check_finite
-from sim.model.laws import Law, read_law
+from sim.model.laws import PowerLawEffect, read_law
 
 __all__ = ["Effect", "catalogue", "check_effects", "effect_named", "is_effect"]
 
@@ -38,7 +38,7 @@ def catalogue() -> dict[str, Effect]:
 
 
 @cache
-def _law(name: str) -> Law | None:
+def _law(name: str) -> PowerLawEffect | None:
     return read_law(name, catalogue())
 
 

@@ -58,7 +58,7 @@ def tail_spin(body: Body, u: Any) -> Any:
     return body.omega + motor_gain(body) * u[3]
 
 
-class Motion(NamedTuple):
+class TailMotion(NamedTuple):
     """Velocities of the robot in the frame of a tail at some phase."""
 
     e_x: Vector
@@ -69,17 +69,17 @@ class Motion(NamedTuple):
 
 
 @compiled
-def motion_at(body: Body, u: Floats, phase: float) -> Motion:
+def motion_at(body: Body, u: Floats, phase: float) -> TailMotion:
     """Compute the motion for the velocities u = (v_x, v_z, ω_yr, ω_h) at a phase."""
     e_x, e_y = (np.cos(phase), -np.sin(phase), 0.0), (np.sin(phase), np.cos(phase), 0.0)
     linear = plus(times(u[0], e_x), times(u[1], E_Z))
     load = plus(plus(times(body.tail_load[0], e_x), times(body.tail_load[1], e_y)), times(body.tail_load[2], E_Z))
-    return Motion(e_x, e_y, linear, plus(times(u[2], e_y), times(tail_spin(body, u), E_Z)), load)
+    return TailMotion(e_x, e_y, linear, plus(times(u[2], e_y), times(tail_spin(body, u), E_Z)), load)
 
 
 @compiled
 def node_balance(
-    geometry: Geometry, body: Body, motion: Motion, k: int, m: int, velocity: Vector
+    geometry: Geometry, body: Body, motion: TailMotion, k: int, m: int, velocity: Vector
 ) -> tuple[Vector, Matrix, Matrix, Matrix]:
     """Balance of the free node k + 1: drag, elastic force and load, and the drag's derivatives.
 
@@ -115,7 +115,9 @@ class Clamp(NamedTuple):
 
 
 @compiled
-def clamp_balance(geometry: Geometry, body: Body, m: int, motion: Motion, flow: Vector, moment: Vector) -> Clamp:
+def clamp_balance(
+    geometry: Geometry, body: Body, m: int, motion: TailMotion, flow: Vector, moment: Vector
+) -> Clamp:
     """Load of edge 0, its bending spring and the drag on node 0 on the disc; n ≥ 2 edges.
 
     If the nodes are in balance, this is equal to the sum of drag over the tail. But its derivative depends only on
@@ -151,7 +153,7 @@ def clamp_balance(geometry: Geometry, body: Body, m: int, motion: Motion, flow: 
 
 
 @compiled
-def body_wrench(motion: Motion, force: Vector, moment: Vector) -> tuple[float, float, float, float]:
+def body_wrench(motion: TailMotion, force: Vector, moment: Vector) -> tuple[float, float, float, float]:
     """Compute the wrench (F_x, F_z, M_y, M_z) in the body frame of a force and a moment in a tail's frame."""
     return dot(motion.e_x, force), force[2], dot(motion.e_y, moment), moment[2]
 

@@ -38,7 +38,7 @@ from common.arrays import Floats, Integers
 from sim.jit import compiled, formula
 from sim.linear.blocks import add, add_at, put_at, vector, vector_at
 from sim.linear.vectors import E_Z, ZERO, Vector, cross, dot, minus, plus, times
-from sim.mechanics.balance import Motion, head_drag, motion_at
+from sim.mechanics.balance import TailMotion, head_drag, motion_at
 from sim.mechanics.drag import node_drag
 from sim.mechanics.geometry import Geometry, node_tangent
 from sim.model.body import Body
@@ -48,7 +48,7 @@ _SEGMENTS = 4  # of the head's axis
 _ROUNDS = 3
 
 
-class Scene(NamedTuple):
+class FlowScene(NamedTuple):
     """A robot at one instant in the body frame: places where the flow is computed, and segments that produce it.
 
     Places: nodes 0..n of each tail, then the midpoints of the head's segments. Segments: edges of the tails under
@@ -64,9 +64,9 @@ class Scene(NamedTuple):
 
 
 @compiled
-def _new_scene(n: int, tails: int) -> Scene:
+def _new_scene(n: int, tails: int) -> FlowScene:
     places, segments = (n + 1) * tails + _SEGMENTS, (n + 1) * tails + _SEGMENTS
-    return Scene(
+    return FlowScene(
         np.zeros((places, 3)),
         np.full(places, tails),
         np.zeros((segments, 3)),
@@ -123,7 +123,7 @@ def add_flow(
 
 @compiled
 def _place_tail(
-    scene: Scene, body: Body, geometry: Geometry, motion: Motion, x: Floats, j: int, column: int
+    scene: FlowScene, body: Body, geometry: Geometry, motion: TailMotion, x: Floats, j: int, column: int
 ) -> None:
     """Place the nodes of tail j, and its edges under the forces of its free nodes."""
     n = x.shape[0]
@@ -153,7 +153,7 @@ def _place_tail(
 
 
 @compiled
-def _place_head(scene: Scene, body: Body, n: int, tails: int) -> None:
+def _place_head(scene: FlowScene, body: Body, n: int, tails: int) -> None:
     """Add the head's segments, which follow the nodes and edges of the tails."""
     first, length = (n + 1) * tails, body.head_length / _SEGMENTS
     for i in range(_SEGMENTS):
@@ -164,7 +164,14 @@ def _place_head(scene: Scene, body: Body, n: int, tails: int) -> None:
 
 @compiled
 def _answer(
-    scene: Scene, body: Body, geometry: Geometry, u: Floats, phase: float, instant: int, tails: int, moved: Floats
+    scene: FlowScene,
+    body: Body,
+    geometry: Geometry,
+    u: Floats,
+    phase: float,
+    instant: int,
+    tails: int,
+    moved: Floats,
 ) -> None:
     """Find the forces on the fluid of clamps and head, whose velocities are given, in a fluid moving by `moved`.
 
@@ -197,19 +204,19 @@ def _answer(
 
 
 @compiled
-def _in_body(motion: Motion, v: Vector) -> Vector:
+def _in_body(motion: TailMotion, v: Vector) -> Vector:
     """Convert a vector from a tail's frame to the body frame."""
     return dot(motion.e_x, v), dot(motion.e_y, v), v[2]
 
 
 @compiled
-def _in_tail(motion: Motion, v: Vector) -> Vector:
+def _in_tail(motion: TailMotion, v: Vector) -> Vector:
     """Convert a vector from the body frame to a tail's frame."""
     return plus(plus(times(v[0], motion.e_x), times(v[1], motion.e_y)), times(v[2], E_Z))
 
 
 @compiled
-def _add_stokeslets(body: Body, scene: Scene, places: Integers, segments: Integers, flow: Floats) -> None:
+def _add_stokeslets(body: Body, scene: FlowScene, places: Integers, segments: Integers, flow: Floats) -> None:
     """Add to `flow` (K, 3), at some places, the flow of the forces of some segments."""
     height = HEIGHT * max(body.offset, body.head_radius)
     head = scene.of[len(scene.of) - 1]
@@ -256,7 +263,7 @@ def _head_resistance(body: Body) -> tuple[float, float]:
 
 
 @compiled
-def _add_rotlets(body: Body, scene: Scene, nodes: int, torque: float, flow: Floats) -> None:
+def _add_rotlets(body: Body, scene: FlowScene, nodes: int, torque: float, flow: Floats) -> None:
     """Add to `flow`, at the tails' nodes, the flow of the head's spin."""
     terms = body.nonlocal_terms
     height = HEIGHT * max(body.offset, body.head_radius)

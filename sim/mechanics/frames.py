@@ -28,7 +28,7 @@ from common.arrays import Floats
 from sim.jit import compiled, formula
 from sim.linear.blocks import add, add_at, put, vector
 from sim.linear.vectors import ZERO, Vector, cross, dot, minus, plus, times
-from sim.mechanics.balance import Motion
+from sim.mechanics.balance import TailMotion
 from sim.mechanics.geometry import ROOT_TANGENT, Geometry, inverse_voronoi
 from sim.model.body import Body
 
@@ -164,7 +164,7 @@ def has_frames(body: Body) -> bool:
 
 
 @compiled
-def add_frames(body: Body, geometry: Geometry, motion: Motion, m: int, x_dot: Floats, moments: Floats) -> None:
+def add_frames(body: Body, geometry: Geometry, motion: TailMotion, m: int, x_dot: Floats, moments: Floats) -> None:
     """Add the forces of the frames to the edges of tail m, and the clamp's further moment to `moments`.
 
     Args:
@@ -206,7 +206,14 @@ def add_frames(body: Body, geometry: Geometry, motion: Motion, m: int, x_dot: Fl
 
 @compiled
 def _untwisted(
-    body: Body, geometry: Geometry, motion: Motion, m: int, directors: Floats, a: Floats, b: Floats, torque: Floats
+    body: Body,
+    geometry: Geometry,
+    motion: TailMotion,
+    m: int,
+    directors: Floats,
+    a: Floats,
+    b: Floats,
+    torque: Floats,
 ) -> None:
     """Carry the clamp's director along tail m without twist, and compute the torques on the edges.
 

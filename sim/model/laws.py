@@ -135,7 +135,7 @@ LOADS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Law(Effect):
+class PowerLawEffect(Effect):
     """An effect at one place, times a power of motor speed, tail length and number of tails; see `make_law`."""
 
     place: str
@@ -190,7 +190,7 @@ LOCAL_DRAG = {
 }
 
 
-def make_law(place: str | Effect, powers: Powers = Powers(), *, lever: float = 0.0) -> Law:
+def make_law(place: str | Effect, powers: Powers = Powers(), *, lever: float = 0.0) -> PowerLawEffect:
     """Make a law.
 
     Args:
@@ -222,7 +222,7 @@ def make_law(place: str | Effect, powers: Powers = Powers(), *, lever: float = 0
         d = d_force + d_motion
         scale = f"μ0 R^{d}" if d > 1 else "μ0 R"
         where = (" sgn ω" if load.rectified else "") + (f" at z = {lever:g} {unit}" if unit else "")
-        return Law(
+        return PowerLawEffect(
             **stated,
             title=f"{symbol} on the {'tails' if unit == 'l' else 'head'} from {driver}",
             equation=f"{symbol} = ε {scale}{powers.words} {driver}{where}",
@@ -238,7 +238,7 @@ def make_law(place: str | Effect, powers: Powers = Powers(), *, lever: float = 0
             stated["adds"] = partial(_scale_coefficient, place, powers)
         else:
             stated["scales"] = partial(_scale_tails, place, powers)
-        return Law(
+        return PowerLawEffect(
             **stated,
             title=f"{COEFFICIENTS.get(place) or TAILS[place]} as a power law",
             equation=f"{_SYMBOLS[place]} × [{formula}]^ε",
@@ -249,7 +249,7 @@ def make_law(place: str | Effect, powers: Powers = Powers(), *, lever: float = 0
     if effect is None:
         raise InputError(f"no place {place!r} of a law; such are {', '.join([*_SYMBOLS, *LOADS][:8])}")
     stated |= {way: partial(_scale_effect, way, effect, powers) for way in ("adds", "scales", "number")}
-    return Law(
+    return PowerLawEffect(
         **stated,
         title=f"{effect.title}, as a power law",
         equation=f"{effect.equation}, ε times {formula}" if formula else effect.equation,
@@ -265,7 +265,7 @@ def make_law(place: str | Effect, powers: Powers = Powers(), *, lever: float = 0
     )
 
 
-def read_law(name: str, effects: Mapping[str, Effect]) -> Law | None:
+def read_law(name: str, effects: Mapping[str, Effect]) -> PowerLawEffect | None:
     """Read the name that a file has for a law; None if it is none, or not as a law's own name is written.
 
     Args:

@@ -29,7 +29,7 @@ _INK, _SOFT, _HEAD, _TAIL = "#1c2733", "#8a97a3", "#1769a5", "#c8452f"
 _SENSES = {1: ("#1769a5", "+"), -1: ("#a85100", "−")}
 
 
-class Film(NamedTuple):
+class FilmSettings(NamedTuple):
     """How a schedule is filmed."""
 
     speed: float  # seconds of the robot in a second of the film
@@ -63,7 +63,7 @@ def write_film(
     content: Mapping[str, Any],
     schedule: Schedule,
     path: str | Path,
-    film: Film,
+    film: FilmSettings,
     *,
     progress: Callable[[int], object] | None = None,
 ) -> int:
@@ -94,7 +94,9 @@ def write_film(
     return len(shapes.times)
 
 
-def _pictures(content: Mapping[str, Any], schedule: Schedule, shapes: Shapes, film: Film) -> Iterator[Image]:
+def _pictures(
+    content: Mapping[str, Any], schedule: Schedule, shapes: Shapes, film: FilmSettings
+) -> Iterator[Image]:
     """Draw one picture after the other, in cm."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -155,7 +157,7 @@ def _draw_scale_bar(axes: Axes, width: float, unit: str) -> None:
     axes.text(middle, 0.04, f"{length:g} {unit}", transform=below, fontsize=11, color=_INK, ha="center")
 
 
-def _write_animation(pictures: Iterator[Image], path: Path, film: Film, ending: str) -> None:
+def _write_animation(pictures: Iterator[Image], path: Path, film: FilmSettings, ending: str) -> None:
     """Write a GIF with one palette, or a WebP."""
     from PIL.Image import Dither
 
@@ -173,7 +175,7 @@ def _write_animation(pictures: Iterator[Image], path: Path, film: Film, ending: 
     )
 
 
-def _write_mp4(pictures: Iterator[Image], path: Path, film: Film) -> None:
+def _write_mp4(pictures: Iterator[Image], path: Path, film: FilmSettings) -> None:
     """Hand the pictures to ffmpeg."""
     first = next(pictures)
     size = f"{first.width}x{first.height}"

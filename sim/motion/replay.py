@@ -19,7 +19,7 @@ from sim.inputs import check_columns
 from sim.mechanics import planar
 from sim.model.groups import Groups
 from sim.model.schedule import Schedule
-from sim.motion.run import COARSER, MOST_REPLAY_WORK, Resolution, Run
+from sim.motion.run import COARSER, MOST_REPLAY_WORK, Resolution, SteppedRobot
 from sim.solve.assembly import bodies
 from sim.solve.march import YAW, X, Y
 
@@ -30,10 +30,10 @@ _SAMPLES = 12  # track points in a dwell, or up to twice as many where it has fe
 _NONE = np.empty(0)
 
 
-class Stretch(NamedTuple):
+class SimulatedStretch(NamedTuple):
     """A stretch of a simulated schedule."""
 
-    run: Run  # at the end of the stretch, until the next one is simulated
+    run: SteppedRobot  # at the end of the stretch, until the next one is simulated
     dwell: int  # index
     direction: int  # of the motor
     times: Floats  # (K,) of the steps, from the start of the schedule
@@ -85,7 +85,7 @@ def _resolution(schedule: Schedule) -> Resolution:
     return Resolution.for_tracks(schedule.robot["omega_bar"])
 
 
-def run_at_rest(schedule: Schedule, resolution: Resolution | None = None) -> Run:
+def run_at_rest(schedule: Schedule, resolution: Resolution | None = None) -> SteppedRobot:
     """Make the run of a schedule's robot, at rest, with the motor in the schedule's first direction.
 
     Raises:
@@ -96,7 +96,7 @@ def run_at_rest(schedule: Schedule, resolution: Resolution | None = None) -> Run
     if body.omega * schedule.first_direction < 0:
         body, reverse = reverse, body
     chosen = resolution or _resolution(schedule)
-    run = Run(body, groups.N, chosen, reverse=reverse, most_work=MOST_REPLAY_WORK)
+    run = SteppedRobot(body, groups.N, chosen, reverse=reverse, most_work=MOST_REPLAY_WORK)
     if not run.can_afford(float(schedule.dwells.sum()), flips=len(schedule.dwells)):
         raise InputError(
             f"the schedule asks for more time steps than a replay may take ({len(schedule.dwells)} dwells, "
@@ -111,7 +111,7 @@ def stretches(
     stops: Floats = _NONE,
     resolution: Resolution | None = None,
     progress: Callable[[int], object] | None = None,
-) -> Iterator[Stretch]:
+) -> Iterator[SimulatedStretch]:
     """Simulate a schedule in stretches that end at the stops, (F,) and increasing, and where dwells end.
 
     Raises:
@@ -131,14 +131,14 @@ def stretches(
                 raise InputError(
                     f"the simulation failed in dwell {index + 1} of the schedule; a finer step may help"
                 )
-            yield Stretch(run, index, direction, now + times, poses, stop is not None)
+            yield SimulatedStretch(run, index, direction, now + times, poses, stop is not None)
             now = until
         if progress is not None:
             progress(1)
 
 
 @np.errstate(over="ignore")  # seconds of an absurd time scale
-def track_of(schedule: Schedule, simulated: Iterable[Stretch]) -> pd.DataFrame:
+def track_of(schedule: Schedule, simulated: Iterable[SimulatedStretch]) -> pd.DataFrame:
     """Tabulate the track of a schedule, see `replay`, with about 12 samples in each dwell and one at its end."""
     import pandas as pd  # slow to import, and batches of steady motions need no track
 

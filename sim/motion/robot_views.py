@@ -22,7 +22,7 @@ INK, PALE, TAIL, HEAD, PATH, TURN = "#222222", "#9aa3ab", "#c8452f", "#2a6fa8", 
 SIZE = 9.5
 
 
-class Scene(NamedTuple):
+class RobotScene(NamedTuple):
     """What the picture shows: a robot at the origin of the lab, with its steady motion at motor direction +1.
 
     Lengths are in l, angles in rad. From behind means looking along e_z: e_x is on the left, e_y is up.
@@ -46,11 +46,11 @@ class Scene(NamedTuple):
         return np.asarray(pose[:2] + planar.turn(np.stack([forward, left], -1), pose[2]))
 
 
-def scene(robot: Robot) -> Scene:
+def scene(robot: Robot) -> RobotScene:
     """Simulate the robot with its motor at +1."""
     motion = steady(robot.groups(), stability=False)
     body, (state,) = steady_states(robot, np.array([math.pi / 4]))
-    return Scene(
+    return RobotScene(
         robot.head_radius / robot.tail_length,
         robot.head_length / robot.tail_length,
         nodes_in_body(body, state),
@@ -89,7 +89,7 @@ def polar(angle: float, radius: float) -> Floats:
     return np.array([radius * math.cos(angle), radius * math.sin(angle)])
 
 
-def draw_robot(axes: Any, shown: Scene, pose: Floats, alpha: float) -> None:
+def draw_robot(axes: Any, shown: RobotScene, pose: Floats, alpha: float) -> None:
     """Draw head and tails from above."""
     z, x = np.array([0, 1, 1, 0]) * shown.length, np.array([-1, -1, 1, 1]) * shown.radius
     corners = shown.seen_from_above(pose, np.stack([x, 0 * x, z], -1))
@@ -98,7 +98,7 @@ def draw_robot(axes: Any, shown: Scene, pose: Floats, alpha: float) -> None:
         axes.plot(*shown.seen_from_above(pose, tail).T, color=TAIL, lw=2.2, alpha=alpha, zorder=2)
 
 
-def draw_from_above(axes: Any, shown: Scene) -> None:
+def draw_from_above(axes: Any, shown: RobotScene) -> None:
     """Draw the robot in the frame of the lab, with heading, path and slip angle."""
     turning = math.copysign(1.0, shown.twist[2])
     way = math.atan2(shown.twist[1], shown.twist[0])  # direction of the path relative to the heading
@@ -142,7 +142,7 @@ def draw_from_above(axes: Any, shown: Scene) -> None:
     axes.set_ylim(-1.2, 1.45)
 
 
-def draw_from_behind(axes: Any, shown: Scene) -> None:
+def draw_from_behind(axes: Any, shown: RobotScene) -> None:
     """Draw head and disc, looking from the tails to the head, with the senses of their spins."""
     R = 1.0
     axes.add_patch(Circle((0, 0), R, facecolor="#dfe9f1", edgecolor=HEAD, lw=1.5))

@@ -93,7 +93,7 @@ def steps_in(duration: float, dt: float) -> float:
         return max(1.0, float(np.ceil(np.float64(duration) / dt - 1e-9)))
 
 
-class Run:
+class SteppedRobot:
     """A robot stepped in time. `failed` says why it cannot go on: BROKE_DOWN, TOO_MUCH, or empty."""
 
     def __init__(
@@ -120,7 +120,7 @@ class Run:
         self._work_of_a_step = resolution.work_of_a_step(body, tails)
         self._work_left = most_work
 
-    def copy(self) -> Run:
+    def copy(self) -> SteppedRobot:
         """Return an independent copy of this run."""
         duplicate = copy(self)
         duplicate.state = copied(self.state)

@@ -23,7 +23,15 @@ from sim.model.groups import SLOPE_INPUTS, SLOPE_OUTPUTS, Groups
 from sim.solve.assembly import are_local, batch, numbers
 from sim.solve.grouping import by_kind, slices
 from sim.solve.orbit import mean_motion, residuals_on_orbits, solve_at_orbits
-from sim.solve.refinement import MESHES, PHASES_FOR_SLOPES, SOLVED, Orbit, extrapolate, refined_orbits, stacked
+from sim.solve.refinement import (
+    MESHES,
+    PHASES_FOR_SLOPES,
+    SOLVED,
+    OrbitOnMeshes,
+    extrapolate,
+    refined_orbits,
+    stacked,
+)
 
 WIDTH = 1e-5  # finite-difference step in a robot's numbers; the balance depends almost linearly on them
 
@@ -104,7 +112,7 @@ def _at_once(rows: Floats, directions: Floats, tails: int, phases: int) -> tuple
     return np.array([orbit.means for orbit in orbits]).reshape(-1, 5), slopes
 
 
-def slopes_of_orbits(rows: Floats, directions: Floats, orbits: Sequence[Orbit]) -> Floats:
+def slopes_of_orbits(rows: Floats, directions: Floats, orbits: Sequence[OrbitOnMeshes]) -> Floats:
     """Compute the derivatives of the extrapolated means (`sim.solve.orbit.mean_motion`), (B, K, 5).
 
     Args:

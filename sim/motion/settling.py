@@ -25,7 +25,7 @@ from sim.mechanics.balance import motor_gain
 from sim.mechanics.tail_contact import tail_gap
 from sim.model.body import Body
 from sim.model.groups import Groups
-from sim.motion.run import BROKE_DOWN, Resolution, Run, steps_in
+from sim.motion.run import BROKE_DOWN, Resolution, SteppedRobot, steps_in
 from sim.motion.shapes import state_on_orbit
 from sim.motion.steady_motion import STEPPING, Steady
 from sim.solve.assembly import bodies
@@ -96,7 +96,7 @@ def _drift_note(settled: Settled) -> str:
 
 def settle_one(body: Body, tails: int, resolution: Resolution) -> Settled:
     """Step one robot with N tails from rest until its motion is steady."""
-    run = Run(body, tails, resolution)
+    run = SteppedRobot(body, tails, resolution)
 
     def lost() -> Settled:
         return Settled(np.full(4, np.nan), np.nan, False, run.failed, np.nan, run.state)
@@ -139,7 +139,7 @@ def steady_state(body: Body, tails: int, resolution: Resolution) -> State | None
     return None if settled.failed else settled.state
 
 
-def _smallest_gap(run: Run, revolution: float) -> float:
+def _smallest_gap(run: SteppedRobot, revolution: float) -> float:
     """Compute the smallest gap between tails at some instants of the next revolution."""
     part = revolution / _GAP_SHAPES
     smallest = np.inf

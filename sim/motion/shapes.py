@@ -21,7 +21,7 @@ from sim.model.body import Body
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule
 from sim.motion.replay import stretches, track_of
-from sim.motion.run import Run
+from sim.motion.run import SteppedRobot
 from sim.solve.assembly import bodies
 from sim.solve.march import PHASE, YAW, State, X, Y
 from sim.solve.rates import FIRST_PHASE
@@ -128,7 +128,7 @@ def shapes_and_track(
     return shapes, track_of(schedule, simulated)
 
 
-def _moving(run: Run) -> State:
+def _moving(run: SteppedRobot) -> State:
     """Return the state just after a jump of the motor's speed, when its velocities are known."""
     later = run.copy()
     later.steps(2, _JUST_AFTER * run.time_step)

@@ -28,7 +28,7 @@ from sim.solve.assembly import CONTACT, are_local, batch
 from sim.solve.floquet import arnoldi
 from sim.solve.grouping import by_kind, from_groups, in_groups, robots_in_lanes
 from sim.solve.orbit import mean_motion, solve_orbits_in_place
-from sim.solve.refinement import ROUGH, Orbit, stacked
+from sim.solve.refinement import ROUGH, OrbitOnMeshes, stacked
 
 QUICK = 0.4  # |ω_yr/ω_t| from which a robot yaws fast
 DOUBTFUL = -0.05  # growth from which it is computed again
@@ -37,7 +37,7 @@ _CONVERGED = 1e-3  # relative residual of an eigenvalue up to which it has conve
 _SIGN_KNOWN = 1.0  # the same from which not even the sign of its real part is known
 
 
-def growths(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats:
+def growths(rows: Floats, tails: int, orbits: Sequence[OrbitOnMeshes]) -> Floats:
     """Compute the growth (B,) of robots with N tails; NaN where it cannot be computed.
 
     Args:
@@ -55,7 +55,7 @@ def growths(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats:
     return found
 
 
-def _alike(robots: Iterable[int], rows: Floats, orbits: Sequence[Orbit]) -> list[list[int]]:
+def _alike(robots: Iterable[int], rows: Floats, orbits: Sequence[OrbitOnMeshes]) -> list[list[int]]:
     """Sort robots by phases, sense of the motor and reach of their effects."""
     local = are_local(rows)
     return by_kind(robots, lambda i: (len(orbits[i].u[1]), rows[i, 0] < 0, bool(local[i])))
@@ -74,7 +74,7 @@ def is_doubtful(means: Floats, value: Any) -> Any:
     return yaws_fast | np.isnan(value) | (value > DOUBTFUL)
 
 
-def growths_on_more_phases(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats:
+def growths_on_more_phases(rows: Floats, tails: int, orbits: Sequence[OrbitOnMeshes]) -> Floats:
     """Compute the growths (B,) on the third mesh, from eigenvalues that have converged; NaN: unknown."""
     instants = 2 * len(orbits[0].u[2]) + 1
     x, u = stacked(orbits, 2)

@@ -15,7 +15,7 @@ import numpy as np
 from common.arrays import Floats
 from sim.mechanics import planar
 from sim.model.body import Body
-from sim.motion.run import Resolution, Run
+from sim.motion.run import Resolution, SteppedRobot
 from sim.motion.settling import steady_state
 from sim.solve.march import PHASE, SURGE, SWAY, YAW
 
@@ -50,7 +50,7 @@ def stepped_response(
         body: with the motor's speed after the flip.
         dwells: T̄, (D,), increasing; the last one long enough for the motion to settle.
         before: T̄ of the dwell before, (K,), increasing.
-        reverse: the robot before the flip; by default the same with another sign of ω̄, see `Run`.
+        reverse: the robot before the flip; by default the same with another sign of ω̄, see `SteppedRobot`.
         resolution: mesh and step; by default what the motor's speed needs.
         history: step memory and rest, too; else they are NaN.
         settled: T̄ from which the lag is taken to be constant.
@@ -65,7 +65,7 @@ def stepped_response(
     state = steady_state(reverse, tails, chosen)
     if state is None:
         return lost
-    run = Run(reverse, tails, chosen, state, reverse=body)
+    run = SteppedRobot(reverse, tails, chosen, state, reverse=body)
     sense = float(np.sign(body.omega))
     times, place = np.unique(np.minimum(dwells, settled), return_inverse=True)
     _, turn = steady_twist(run, tails, sense)
@@ -87,7 +87,7 @@ def stepped_response(
     lag, spread = each.mean(0), each.std(0)
     rest, memory = lost.rest, lost.memory
     if history:
-        from_rest = Run(body, tails, chosen)
+        from_rest = SteppedRobot(body, tails, chosen)
         rest = planar.compose(_poses(from_rest, times, sense), circle)
         memory = planar.compose(np.mean(after_short, 0), circle) - lag
         if from_rest.failed:
@@ -96,7 +96,7 @@ def stepped_response(
     return Curves(lag[place], memory, rest, spread[place])
 
 
-def _after_short_dwells(run: Run, before: Floats, dwells: Floats, sense: float) -> Floats:
+def _after_short_dwells(run: SteppedRobot, before: Floats, dwells: Floats, sense: float) -> Floats:
     """Compute the pose changes (K, D, 3) from a steady run: back for each of `before`, then forth."""
     back = run.copy()
     back.flip()
@@ -108,12 +108,12 @@ def _after_short_dwells(run: Run, before: Floats, dwells: Floats, sense: float) 
     return lags
 
 
-def _flipped_poses(run: Run, dwells: Floats, sense: float) -> Floats:
+def _flipped_poses(run: SteppedRobot, dwells: Floats, sense: float) -> Floats:
     run.flip()
     return _poses(run, dwells, sense)
 
 
-def _poses(run: Run, dwells: Floats, sense: float) -> Floats:
+def _poses(run: SteppedRobot, dwells: Floats, sense: float) -> Floats:
     """Step to each dwell: pose changes (D, 3), seen as for a positive motor; NaN where the run breaks down."""
     start, now = run.pose, 0.0
     poses = np.full((len(dwells), 3), np.nan)
@@ -127,7 +127,7 @@ def _poses(run: Run, dwells: Floats, sense: float) -> Floats:
 
 
 def steady_twist(
-    run: Run, tails: int, sense: float, *, adapts: float = _ADAPTS, window: float = _WINDOW
+    run: SteppedRobot, tails: int, sense: float, *, adapts: float = _ADAPTS, window: float = _WINDOW
 ) -> tuple[Floats, float]:
     """Average forward, leftward and yaw rate for a positive motor; return the time of a turn by one spacing, too.
 

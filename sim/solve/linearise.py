@@ -36,7 +36,7 @@ from sim.linear.vectors import (
     turned,
 )
 from sim.mechanics.balance import (
-    Motion,
+    TailMotion,
     body_wrench,
     clamp_balance,
     head_drag,
@@ -95,7 +95,7 @@ def _head(body: Body, u: Floats, corner: Floats, t: Floats) -> None:
 
 @compiled
 def _tail(
-    body: Body, motion: Motion, rates: Rates, x: Floats, scratch: Scratch, equations: Equations, m: int
+    body: Body, motion: TailMotion, rates: Rates, x: Floats, scratch: Scratch, equations: Equations, m: int
 ) -> None:
     """Balance of the nodes of column m, its blocks, and its derivative in the robot's velocities."""
     n, gain, rate = x.shape[0], motor_gain(body), rates.rate
@@ -140,7 +140,7 @@ def _tail(
 
 @compiled
 def _clamp(
-    body: Body, motion: Motion, rates: Rates, scratch: Scratch, equations: Equations, m: int, p: int
+    body: Body, motion: TailMotion, rates: Rates, scratch: Scratch, equations: Equations, m: int, p: int
 ) -> None:
     """Compute the force and moment of column m on the disc at instant p."""
     clamp = clamp_balance(scratch.geometry, body, m, motion, ZERO, ZERO)
@@ -167,7 +167,7 @@ def _clamp(
 
 @compiled
 def _subtract_clamp_drag(
-    corner: Floats, c: int, motion: Motion, resistance: Matrix, root: Vector, direction: Vector
+    corner: Floats, c: int, motion: TailMotion, resistance: Matrix, root: Vector, direction: Vector
 ) -> None:
     """Subtract the drag on the half cell at the clamp, which moves with the disc, from column c of the corner."""
     drag = applied(resistance, direction)
@@ -177,13 +177,13 @@ def _subtract_clamp_drag(
 
 
 @compiled
-def _load_by_phase(body: Body, motion: Motion) -> Vector:
+def _load_by_phase(body: Body, motion: TailMotion) -> Vector:
     """Compute the derivative of the load on a tail, force per length, in the phase."""
     return minus(times(body.tail_load[1], motion.e_x), times(body.tail_load[0], motion.e_y))
 
 
 @compiled
-def _put_foot(foot: Floats, m: int, motion: Motion, force: Matrix, moment: Matrix) -> None:
+def _put_foot(foot: Floats, m: int, motion: TailMotion, force: Matrix, moment: Matrix) -> None:
     """Put the rows of the robot's equations for one node of column m."""
     put(foot, m, 0, applied(transposed(force), motion.e_x))
     put(foot, m, 1, force[2])

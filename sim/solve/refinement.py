@@ -55,7 +55,7 @@ _SLOW, _FASTER, _LEAST_FASTER = 3.0, 1.5, 1.02  # ω̄ to begin with where tails
 _START, _SOFT = 1e-3, 0.05  # limit of the last Newton correction on the way, and factor on the contact there
 
 
-class Orbit(NamedTuple):
+class OrbitOnMeshes(NamedTuple):
     """One robot's orbit on the three MESHES: shapes x (n, M, 3) and velocities u (P, 4)."""
 
     status: int  # SOLVED or why not
@@ -83,7 +83,7 @@ class OnMesh(NamedTuple):
 
 
 @np.errstate(all="ignore")  # robots that overflow are flagged
-def refined_orbits(rows: Floats, tails: int, least: int) -> list[Orbit]:
+def refined_orbits(rows: Floats, tails: int, least: int) -> list[OrbitOnMeshes]:
     """Solve for B robots with N tails, on `least` phases or more; `status` says which are not solved, and why.
 
     Args:
@@ -103,27 +103,27 @@ def refined_orbits(rows: Floats, tails: int, least: int) -> list[Orbit]:
     return orbits
 
 
-def stacked(orbits: Iterable[Orbit], mesh: int) -> tuple[Floats, Floats]:
+def stacked(orbits: Iterable[OrbitOnMeshes], mesh: int) -> tuple[Floats, Floats]:
     """Stack the shapes (B, n, M, 3) and velocities (B, P, 4) of B orbits with equal phases on a mesh, 0 to 2."""
     x, u = zip(*((orbit.x[mesh], orbit.u[mesh]) for orbit in orbits), strict=True)
     return np.stack(x), np.stack(u)
 
 
-def refined_orbit(body: Body, tails: int, least: int) -> Orbit:
+def refined_orbit(body: Body, tails: int, least: int) -> OrbitOnMeshes:
     """Solve for one robot as `refined_orbits` does."""
     return refined_orbits(row(body), tails, least)[0]
 
 
-def _unsolved(status: int, error: float, x: Floats, u: Floats) -> Orbit:
-    return Orbit(status, np.nan, np.full(5, np.nan), (x, x, x), (u, u, u))
+def _unsolved(status: int, error: float, x: Floats, u: Floats) -> OrbitOnMeshes:
+    return OrbitOnMeshes(status, np.nan, np.full(5, np.nan), (x, x, x), (u, u, u))
 
 
-def _by_softer_contact(rows: Floats, tails: int, least: int) -> list[Orbit | None]:
+def _by_softer_contact(rows: Floats, tails: int, least: int) -> list[OrbitOnMeshes | None]:
     """Solve from the robots' orbits with softer contact, on the same meshes and phases; None where that fails."""
     soft = rows.copy()
     soft[:, CONTACT] /= _SOFTER
     starts = refined_orbits(soft, tails, least)
-    orbits: list[Orbit | None] = [None] * len(rows)
+    orbits: list[OrbitOnMeshes | None] = [None] * len(rows)
     solved = [i for i, orbit in enumerate(starts) if orbit.status == SOLVED]
     for robots in by_kind(solved, lambda i: len(starts[i].u[0])):
         given, found = rows[robots], np.ones(len(robots), bool)
@@ -135,7 +135,9 @@ def _by_softer_contact(rows: Floats, tails: int, least: int) -> list[Orbit | Non
         for at, i in enumerate(robots):
             if found[at]:
                 shapes, velocities = (tuple(part[at] for part in parts) for parts in (xs, us))
-                orbits[i] = Orbit(SOLVED, max(float(error[at]), starts[i].error), limit[at], shapes, velocities)
+                orbits[i] = OrbitOnMeshes(
+                    SOLVED, max(float(error[at]), starts[i].error), limit[at], shapes, velocities
+                )
     return orbits
 
 
@@ -277,7 +279,7 @@ def _next_change(last: Floats, change: Floats) -> Floats:
     return change * np.where(np.isfinite(last), fall, _SHRINKS)
 
 
-def _on_finer_meshes(rows: Floats, coarse: Sequence[Coarse]) -> list[Orbit]:
+def _on_finer_meshes(rows: Floats, coarse: Sequence[Coarse]) -> list[OrbitOnMeshes]:
     """Solve on all MESHES for robots with the same number of phases, and extrapolate."""
     body, (_, b, c) = batch(rows), MESHES
     x0, u0 = np.stack([one.x for one in coarse]), np.stack([one.u for one in coarse])
@@ -299,7 +301,7 @@ def _on_finer_meshes(rows: Floats, coarse: Sequence[Coarse]) -> list[Orbit]:
     limit, error = _limit_and_error(body, (u0, u1, u2))
     error += [one.error for one in coarse]
     return [
-        Orbit(SOLVED, float(error[i]), limit[i], (x0[i], x1[i], x2[i]), (u0[i], u1[i], u2[i]))
+        OrbitOnMeshes(SOLVED, float(error[i]), limit[i], (x0[i], x1[i], x2[i]), (u0[i], u1[i], u2[i]))
         if status[i] == SOLVED
         else _unsolved(int(status[i]), np.nan, x2[i], u2[i])
         for i in range(len(rows))

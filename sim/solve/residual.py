@@ -25,7 +25,7 @@ from sim.lanes import lane, somewhere, width, zeros
 from sim.linear.blocks import add, put, vector, vector_at
 from sim.linear.lane_arrays import put_lane, take_lane
 from sim.linear.vectors import ZERO, Vector, cross, dot, minus, plus
-from sim.mechanics.balance import Motion, body_wrench, clamp_balance, head_drag, motion_at, node_balance
+from sim.mechanics.balance import TailMotion, body_wrench, clamp_balance, head_drag, motion_at, node_balance
 from sim.mechanics.drag import add_contact_line, node_drag, thinned, thins
 from sim.mechanics.flow import add_flow, has_flow
 from sim.mechanics.frames import add_frames, has_frames
@@ -105,7 +105,7 @@ def fill_residual(
 
 
 @compiled
-def _velocity(motion: Motion, position: Vector, x_dot: Vector, flow: Vector) -> Vector:
+def _velocity(motion: TailMotion, position: Vector, x_dot: Vector, flow: Vector) -> Vector:
     """Compute the velocity of a node through the fluid."""
     return minus(plus(plus(motion.linear, cross(motion.spin, position)), x_dot), flow)
 

@@ -29,7 +29,7 @@ from surrogate.tails import (
     SINGLE_SMOOTHNESS,
     SMOOTHNESS,
     TYPICAL,
-    Robots,
+    RobotColumns,
     motion_sensitivity,
     network_inputs,
     pack_robots,
@@ -51,7 +51,7 @@ _SMOOTH = 2.0  # standard deviations over which the components change
 class WrenchSamples(NamedTuple):
     """Simulated steady motions of M robots: what is learned."""
 
-    robots: Robots
+    robots: RobotColumns
     motion: Floats  # (M, 5): (v_x of J, v_z, ω_yr, ω_h, ω_t), positive motor
     gap: Floats  # (M,)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from common.arrays import Flags, Floats
 from surrogate.domain import MOST_TAILS, ROBOT
-from surrogate.errors import coverage, relative_errors
+from surrogate.held_out import coverage, relative_errors
 from surrogate.intervals import COVERAGE, THIRDS
 from surrogate.table import NeuralTable
 from surrogate.tails import robots_of

@@ -23,7 +23,7 @@ from common.provenance import fingerprint, provenance
 from dataset.data_set import read_manifest
 from surrogate.domain import INSIDE, MAX_YAW_SHARE, ROBOT, Support
 from surrogate.error_modes import KINDS, CurveErrors
-from surrogate.errors import curve_errors, relative_errors, summary
+from surrogate.held_out import curve_errors, relative_errors, summary
 from surrogate.intervals import Intervals
 from surrogate.motions import CLASSES, INPUT_COUNTS, network_index
 from surrogate.response import PARTS, SHAPES, along_axes, flip_inputs

@@ -25,7 +25,7 @@ from sim.model.groups import SLOPE_INPUTS
 from sim.model.presets import PRESETS
 from sim.motion import response, run, settling, steady
 from sim.solve.march import Steps
-from sim.solve.refinement import LOST, NO_START, Orbit
+from sim.solve.refinement import LOST, NO_START, OrbitOnMeshes
 from tests.dataset.sweeps import InThisProcess, design, invented
 
 CONTROL = {**PRESETS["paper-control"].group_values(), "history": True}
@@ -41,11 +41,11 @@ def some_rows(*changes: dict[str, float]) -> dict[str, np.ndarray]:
 def test_a_row_does_not_depend_on_its_batch(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor does one that falls back to time steps, whose mesh is that of its own speed."""
 
-    def lose_slow_and_fast(rows: np.ndarray, *words: Any) -> list[Orbit]:
+    def lose_slow_and_fast(rows: np.ndarray, *words: Any) -> list[OrbitOnMeshes]:
         orbits = zip(np.abs(rows[:, 0]), refined_orbits(rows, *words), strict=True)
         return [lost(orbit) if speed < 9 or speed > 29 else orbit for speed, orbit in orbits]
 
-    def lost(orbit: Orbit) -> Orbit:
+    def lost(orbit: OrbitOnMeshes) -> OrbitOnMeshes:
         return orbit._replace(status=LOST, means=np.full(5, np.nan))
 
     refined_orbits = steady.refined_orbits
@@ -108,7 +108,7 @@ def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> No
     """Neither an orbit nor a time step can be solved."""
 
     none = (np.full((6, 2, 3), np.nan),) * 3
-    lost = Orbit(NO_START, np.nan, np.full(5, np.nan), none, none)
+    lost = OrbitOnMeshes(NO_START, np.nan, np.full(5, np.nan), none, none)
     monkeypatch.setattr(steady, "refined_orbits", lambda rows, *_: [lost] * len(rows))
     monkeypatch.setattr(response, "orbits_with_phases", lambda rows, _, meshes: [[None] * len(rows)] * len(meshes))
     monkeypatch.setattr(settling, "state_on_orbit", lambda *_: None)

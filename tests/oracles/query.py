@@ -17,7 +17,7 @@ from sim.model.response import DWELLS
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate import tails
 from surrogate.domain import Support, products_of
-from surrogate.errors import RESPONSE_OUTPUTS, error_scale
+from surrogate.held_out import RESPONSE_OUTPUTS, error_scale
 from surrogate.network import Ensemble
 from surrogate.table import NeuralTable
 
@@ -25,18 +25,18 @@ STEPS, CORRECTION, ACCEPTED = 60, 2e-12, 1e-9
 RANGES = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
 
 
-class Robots(NamedTuple):
+class PositiveRobots(NamedTuple):
     """Numbers of M robots, seen with a positive motor."""
 
     own: tails.Robots
     R: Any  # (4, 5, M)
     drag: Any  # (4, 5, M), with straight tails
 
-    def at(self, rows: Any) -> Robots:
-        return Robots(self.own.at(rows), self.R[..., rows], self.drag[..., rows])
+    def at(self, rows: Any) -> PositiveRobots:
+        return PositiveRobots(self.own.at(rows), self.R[..., rows], self.drag[..., rows])
 
 
-def robots_of(values: dict[str, Any]) -> Robots:
+def robots_of(values: dict[str, Any]) -> PositiveRobots:
     own = tails.robots_of(values)
     R, straight, across = (
         own.resistance.transpose(1, 2, 0),
@@ -45,7 +45,7 @@ def robots_of(values: dict[str, Any]) -> Robots:
     )
     straight[0, 0], straight[1, 1], straight[2, 2] = across, own.number * own.parallel, across / 3
     straight[0, 2] = straight[2, 0] = -across / 2
-    return Robots(own, R, R + straight)
+    return PositiveRobots(own, R, R + straight)
 
 
 def members(network: Ensemble, x: Any) -> Any:
@@ -69,7 +69,7 @@ def side_speed(u: Any) -> Any:
     return np.sqrt(u[0] ** 2 + u[2] ** 2 + 1e-30)
 
 
-def tail_inputs(r: Robots, u: Any) -> Any:
+def tail_inputs(r: PositiveRobots, u: Any) -> Any:
     """Return the inputs of networks, (7, M), at motions u (5, M)."""
     t, S = r.own, r.own.perp * u[4]
     deflection = side_speed(u) / u[4] * S / (S + 12.0)
@@ -78,12 +78,12 @@ def tail_inputs(r: Robots, u: Any) -> Any:
     return np.array([np.log(S), np.log(t.offset), -np.log(t.radius), bent, np.arctan2(u[0], u[2]), ahead, own])
 
 
-def single_inputs(r: Robots, u: Any) -> Any:
+def single_inputs(r: PositiveRobots, u: Any) -> Any:
     """Return the inputs of the network of one tail, (13, M)."""
     return np.concatenate([tail_inputs(r, u)[[0, 1, 2, 6]], r.own.head.T])
 
 
-def residual(r: Robots, u: Any, y: Any) -> Any:
+def residual(r: PositiveRobots, u: Any, y: Any) -> Any:
     """Return the wrench of the tails less that on the head, (4, ..., M), at motions u (5, ..., M)."""
     t, S, side = r.own, r.own.perp * u[4], side_speed(u)
     force, couple, m2 = (
@@ -96,7 +96,7 @@ def residual(r: Robots, u: Any, y: Any) -> Any:
     return push - np.einsum("ijm,j...m->i...m", r.drag, u)
 
 
-def first_guess(r: Robots) -> Any:
+def first_guess(r: PositiveRobots) -> Any:
     """Return motions (5, M) of linear theory."""
     t, gain, speed, spin = r.own, r.own.gain, r.own.speed, 0.6 * r.own.speed
     for _ in range(3):
@@ -108,7 +108,7 @@ def first_guess(r: Robots) -> Any:
     return np.array([*np.linalg.solve(r.drag[:3, :3].transpose(2, 0, 1), push.T[..., None])[..., 0].T, head, spin])
 
 
-def solve(network: Ensemble, r: Robots) -> tuple[Any, Any]:
+def solve(network: Ensemble, r: PositiveRobots) -> tuple[Any, Any]:
     """Return motions (5, M) in balance, and which were found."""
     inputs = single_inputs if network.shape["inputs"] == 13 else tail_inputs
     u, rows = first_guess(r), np.arange(len(r.own.speed))
@@ -167,7 +167,7 @@ def answer(table: NeuralTable, columns: dict[str, Any]) -> dict[str, Any]:
     return {name: np.concatenate([part[name] for part in parts])[order] for name in parts[0]}
 
 
-def _part(table: NeuralTable, k: int, r: Robots, within: Any, dwells: Any) -> dict[str, Any]:
+def _part(table: NeuralTable, k: int, r: PositiveRobots, within: Any, dwells: Any) -> dict[str, Any]:
     """Answer for robots with one network."""
     network, support, sense = table.tails.wrench[k], table.support[k], r.own.sense
     assert network is not None
@@ -193,7 +193,7 @@ def _part(table: NeuralTable, k: int, r: Robots, within: Any, dwells: Any) -> di
     return {**result, **{f"{name}_half": half for name, half in widths.items()}, "outside": outside}
 
 
-def _response(table: NeuralTable, twist: Any, x: Any, r: Robots, T: Any) -> dict[str, Any]:
+def _response(table: NeuralTable, twist: Any, x: Any, r: PositiveRobots, T: Any) -> dict[str, Any]:
     """Return RESPONSE_OUTPUTS at equal dwells T (M,); the twist is (surge, sway, yaw rate), (3, M)."""
     own = np.array([*x, *r.own.head.T[[0, 1, 2, 3, 5, 6]], np.log(r.own.number), r.own.number == 2])
     lag, memory = (members(network, own).mean(0).T for network in table.curves.networks[:2])
@@ -210,7 +210,7 @@ def _response(table: NeuralTable, twist: Any, x: Any, r: Robots, T: Any) -> dict
     return dict(zip(RESPONSE_OUTPUTS, (speed, *z[::-1]), strict=True))
 
 
-def _half_widths(table: NeuralTable, features: Any, r: Robots, result: dict[str, Any]) -> dict[str, Any]:
+def _half_widths(table: NeuralTable, features: Any, r: PositiveRobots, result: dict[str, Any]) -> dict[str, Any]:
     """Return half of the widths of the intervals by output, (M,) each, from features (11, M)."""
     w, widths = table.intervals, {}
     assert w is not None

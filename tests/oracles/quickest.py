@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from common.arrays import Floats
-from planner.paths.dubins import TURNS, words
+from planner.paths.dubins import TURNS, segment_lengths
 from planner.vehicle.vehicle import Switches, Vehicle, flips_after
 from planner.vehicle.zigzag import QUICK
 
@@ -28,7 +28,7 @@ def brute_force(vehicle: Vehicle, goal: tuple[float, float, float]) -> float:
     start = np.array([-a, 0.0, 0.0])
     end = np.array([goal[0] - a * np.cos(goal[2]), goal[1] - a * np.sin(goal[2]), goal[2]])
     radius = vehicle.pivot_radius
-    pieces = words(start, end, radius)
+    pieces = segment_lengths(start, end, radius)
     length = pieces.sum(-1)
     best = np.inf
     for word, dwell in product(range(6), _DWELLS):

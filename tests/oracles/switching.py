@@ -35,7 +35,7 @@ from sim.effects import check_effects, effect_named
 from sim.mechanics import planar
 from sim.model.body import Body
 from sim.model.groups import DWELL, Groups
-from sim.motion.run import Resolution, Run
+from sim.motion.run import Resolution, SteppedRobot
 from sim.motion.settling import steady_state
 from sim.motion.steady import steady
 from sim.motion.steady_motion import Steady, twists
@@ -93,7 +93,7 @@ def _lag(body: Body, reverse: Body, tails: int, dwell: float, even: bool, resolu
     state = steady_state(body, tails, chosen)
     if state is None:
         return np.full(3, np.nan)
-    run = Run(body, tails, chosen, state, reverse=reverse)
+    run = SteppedRobot(body, tails, chosen, state, reverse=reverse)
     sense = np.sign(body.omega)
     twist, turn = steady_twist(run, tails, sense)
     if run.failed:
@@ -108,7 +108,7 @@ def _lag(body: Body, reverse: Body, tails: int, dwell: float, even: bool, resolu
     return planar.compose(np.mean(changes, 0), planar.inverse(planar.arc(twist, dwell)))
 
 
-def _change(run: Run, dwell: float, even: bool, sense: float) -> Floats:
+def _change(run: SteppedRobot, dwell: float, even: bool, sense: float) -> Floats:
     """Compute the pose change over a dwell, seen in the direction of a positive motor."""
     flips = 1 + MEMORY / dwell
     if not run.can_afford(MEMORY + dwell, flips=flips):

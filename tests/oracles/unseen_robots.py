@@ -9,8 +9,8 @@ import numpy as np
 
 from planner.jobs.plan import plan
 from planner.paths.path import Path2D, circle, polygon
-from planner.planning.errors import WOBBLE, plan_errors, predicted_error
 from planner.planning.plan import Plan
+from planner.planning.stated_error import WOBBLE, plan_errors, predicted_error
 from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.vehicle import roll_out
 from sim.model.presets import PRESETS

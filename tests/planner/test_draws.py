@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtri
 
-from planner.planning.errors import normals, quantile
+from planner.planning.stated_error import normals, quantile
 
 COUNT = 1_000_000
 FIRST_TEN = [

@@ -56,7 +56,7 @@ def _fill(
     fill_residual(body, rates, at_x, at_u, wanted, scratch, lanes(r), lanes(t))
 
 
-class Linear(NamedTuple):
+class NewtonEquations(NamedTuple):
     """Newton's equations of one robot."""
 
     chains: Chains
@@ -67,7 +67,7 @@ class Linear(NamedTuple):
     du: Floats
 
 
-def linear(body: Body, rates: Plain, x: Floats, u: Floats, dx: Floats, du: Floats) -> Linear:
+def linear(body: Body, rates: Plain, x: Floats, u: Floats, dx: Floats, du: Floats) -> NewtonEquations:
     """Linearise at x and u, and solve for the right-hand side dx, du."""
     n, columns, instants = x.shape[0], x.shape[1], len(u)
     blocks = [np.zeros((n, columns, 3, 3))] * 5
@@ -76,7 +76,7 @@ def linear(body: Body, rates: Plain, x: Floats, u: Floats, dx: Floats, du: Float
     parts = _stacked([rates.rate, rates.phase], rates.start, x, u, dx, du)
     _linear(robots_in_lanes(row(body)), rates.differentiation, *parts, chains, *equations)
     first = [np.ascontiguousarray(part[..., 0]) for part in (*chains, *equations, *parts[-2:])]
-    return Linear(Chains(*first[:9]), *first[9:])
+    return NewtonEquations(Chains(*first[:9]), *first[9:])
 
 
 @compiled

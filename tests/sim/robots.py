@@ -12,7 +12,7 @@ from sim.model.presets import PRESETS
 from sim.motion.stability import growths, growths_on_mesh
 from sim.solve.assembly import bodies, row
 from sim.solve.orbit import residuals_on_orbits, solve_orbits_in_place, straight_starts
-from sim.solve.refinement import MESHES, Orbit, extrapolate
+from sim.solve.refinement import MESHES, OrbitOnMeshes, extrapolate
 
 CONTROL_VALUES = PRESETS["paper-control"].group_values()
 
@@ -50,7 +50,7 @@ def growth(body: Body, tails: int, x: np.ndarray, u: np.ndarray) -> float:
     return float(growths_on_mesh(row(body), tails, x[None], u[None])[0])
 
 
-def growth_of_orbit(body: Body, tails: int, orbit: Orbit) -> float:
+def growth_of_orbit(body: Body, tails: int, orbit: OrbitOnMeshes) -> float:
     """Compute the growth of one robot."""
     return float(growths(row(body), tails, [orbit])[0])
 

@@ -19,7 +19,7 @@ from sim.motion.batches import steady_columns
 from sim.solve.assembly import bodies
 from sim.solve.refinement import orbit_on_mesh
 from surrogate.domain import INSIDE, ROBOT
-from surrogate.errors import certified_error
+from surrogate.held_out import certified_error
 from surrogate.interface import OutsideError
 from surrogate.intervals import GROUPS
 from surrogate.table import NeuralTable

@@ -16,7 +16,7 @@ from sim.model.presets import INDEPENDENT
 from sim.motion.batches import steady_columns
 from surrogate.__main__ import main
 from surrogate.domain import BOUNDS, DOMAIN, MOST_TAILS, WIDE
-from surrogate.errors import coverage, relative_errors
+from surrogate.held_out import coverage, relative_errors
 from surrogate.inverse import inverse
 from surrogate.table_file import SHIPPED, load
 from surrogate.training.simulated import draw_as_users, draw_robots

@@ -12,7 +12,7 @@ import pytest
 import surrogate.training.train as training
 from common.errors import InputError
 from dataset.build import build
-from surrogate.errors import relative_errors
+from surrogate.held_out import relative_errors
 from surrogate.training import fits
 from surrogate.training.fits import learnable, wrench_samples
 from surrogate.training.model_card import model_card

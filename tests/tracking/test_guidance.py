@@ -18,7 +18,7 @@ from planner.vehicle.zigzag import Objective
 from sim.model.presets import PRESETS
 from tests.planner.plans import CONTROL, planned
 from tests.planner.vehicles import PROMPT, root_mean_square
-from tracking.guidance import MOST_LEFT_OUT, TrackerGuidance, Way, shortest_way
+from tracking.guidance import MOST_LEFT_OUT, TrackerGuidance, WayBack, shortest_way
 from tracking.swim import Swim, swim
 from tracking.tracker import Tracker
 from tracking.tracks import check
@@ -142,7 +142,7 @@ def test_from_anywhere_it_is_back_in_little_more_than_the_least_time(seeds: rang
 def test_the_way_leads_to_the_target_and_is_short() -> None:
     targets = np.stack([np.linspace(0, 9, 901), np.zeros(901), np.zeros(901)], 1)
     track, target = shortest_way((4.0, 1.5, math.pi / 2), targets, np.linspace(0, 9, 901), 18, 0.4)
-    way = Way.of(track, target)
+    way = WayBack.of(track, target)
     last = way.segments[-1]
     x, y, _ = targets[way.target]
     ends = [last.project(x, y, last.length)]

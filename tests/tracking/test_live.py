@@ -24,7 +24,7 @@ from tests.planner.plans import planned
 from tests.processes import LIMIT
 from tracking import live
 from tracking.live import REPEAT, Clock, Motor, Pictures, Ride, Sight, steer
-from tracking.swim import Swimmer
+from tracking.swim import SteppedSwimmer
 from tracking.tracker import Tracker
 
 UNIT = planned().robot.time_scale
@@ -33,14 +33,14 @@ LOST = 3.0
 LINE = planned(((0.7, 1.0), (2.2, 1.0)))
 
 
-class Tank(Pictures, Motor):
+class FilmedTank(Pictures, Motor):
     """A simulated robot under a camera that sees it twice a second, and its motor; nothing waits for the time."""
 
     def __init__(self, blind: tuple[float, float] = (0.0, 0.0), held_up: float = np.inf, over: float = np.inf):
         self.blind, self.held_up, self.over = blind, held_up, over
         self.plan, self.time, self.next = planned(), 0.0, 0.5
         self.pose = np.add(self.plan.start, (0.1, -0.05, 0.2))
-        self.swimmer: Swimmer | None = None
+        self.swimmer: SteppedSwimmer | None = None
         self.direction, self.rng = 0, np.random.default_rng(0)
         self.sights: list[Sight] = []
         self.orders: list[tuple[float, int]] = []
@@ -75,7 +75,7 @@ class Tank(Pictures, Motor):
         if direction == 0:
             self.swimmer = None
         elif self.swimmer is None:
-            self.swimmer = Swimmer(self.plan.tracked.vehicle, self.plan, direction, self.pose, (0.0, 0.0))
+            self.swimmer = SteppedSwimmer(self.plan.tracked.vehicle, self.plan, direction, self.pose, (0.0, 0.0))
         elif direction != self.direction:
             self.swimmer.flip()
         self.direction = direction
@@ -91,7 +91,7 @@ def begin(pose: POSE | None, now: float) -> Tracker:
     return Tracker(planned(), begin=now, start=pose, noise=(0.005, 0.005))
 
 
-def steered(tank: Tank) -> tuple[Ride, list[str]]:
+def steered(tank: FilmedTank) -> tuple[Ride, list[str]]:
     ride, told = Ride(), list[str]()
     steer(ride, tank, tank, begin, UNIT, lost=LOST, row=lambda *row: None, tell=told.append)
     assert tank.orders[-1][1] == 0
@@ -100,7 +100,7 @@ def steered(tank: Tank) -> tuple[Ride, list[str]]:
 
 @pytest.mark.slow
 def test_the_robot_is_kept_on_the_path() -> None:
-    tank = Tank()
+    tank = FilmedTank()
     ride, told = steered(tank)
     assert ride.finished
     assert told == []
@@ -114,7 +114,7 @@ def test_the_robot_is_kept_on_the_path() -> None:
 
 
 def test_the_motor_rests_while_the_robot_is_not_seen() -> None:
-    tank = Tank(blind=(20.0, 40.0), over=60.0)
+    tank = FilmedTank(blind=(20.0, 40.0), over=60.0)
     ride, told = steered(tank)
     resting = [when for when, direction in tank.orders if direction == 0 and 1.0 < when < 60]
     assert 20 + LOST - 1 < min(resting) < 20 + LOST + 0.5
@@ -124,7 +124,7 @@ def test_the_motor_rests_while_the_robot_is_not_seen() -> None:
 
 
 def test_the_tracker_begins_anew_where_the_board_has_stopped_the_motor() -> None:
-    tank = Tank(held_up=30.0, over=60.0)
+    tank = FilmedTank(held_up=30.0, over=60.0)
     ride, told = steered(tank)
     assert ride.rests == 1
     assert {direction for when, direction in tank.orders if 40 < when < 60} == {1, -1}
@@ -132,7 +132,7 @@ def test_the_tracker_begins_anew_where_the_board_has_stopped_the_motor() -> None
 
 
 def test_the_motor_stops_where_the_film_ends() -> None:
-    tank = Tank(over=20.0)
+    tank = FilmedTank(over=20.0)
     ride, _ = steered(tank)
     assert not ride.finished
     assert tank.time < 21
@@ -140,7 +140,7 @@ def test_the_motor_stops_where_the_film_ends() -> None:
 
 def test_an_alarm_is_told_once_and_stands_in_the_track() -> None:
     """The robot hangs on something: it is seen, always in the same place."""
-    tank, told, rows = Tank(over=80.0), list[str](), list[tuple[object, ...]]()
+    tank, told, rows = FilmedTank(over=80.0), list[str](), list[tuple[object, ...]]()
     tank._swim_until = lambda end: setattr(tank, "time", max(end, tank.time))  # type: ignore[method-assign]
     ride = Ride()
     steer(ride, tank, tank, begin, UNIT, lost=LOST, row=lambda *row: rows.append(row), tell=told.append)
@@ -151,7 +151,7 @@ def test_an_alarm_is_told_once_and_stands_in_the_track() -> None:
 
 
 def test_a_robot_that_was_never_seen_is_said_to_be() -> None:
-    ride, told = steered(Tank(blind=(0.0, 99.0), over=20.0))
+    ride, told = steered(FilmedTank(blind=(0.0, 99.0), over=20.0))
     assert told == ["no robot for 3 s from the start (dark); the motor rests until it is seen"]
     assert re.fullmatch(r"the robot was never seen in \d+ pictures \(dark\); the motor rested", ride.line())
 
@@ -195,7 +195,7 @@ def test_what_a_camera_raises_comes_out_of_the_loop() -> None:
 
     ride, pictures = Ride(), Pictures(gone)
     with pytest.raises(InputError, match="no picture comes any more"):
-        steer(ride, pictures, Tank(), begin, UNIT, lost=LOST, row=print, tell=print)
+        steer(ride, pictures, FilmedTank(), begin, UNIT, lost=LOST, row=print, tell=print)
     assert ride.pictures == 1
 
 

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from calibration.laws.law_model import LEVER, SIZE, LawModel, with_law
-from calibration.laws.laws import UNDETERMINED, Law, Rejection
+from calibration.laws.laws import UNDETERMINED, FittedLaw, Rejection
 from calibration.laws.places import in_common, place_named, places
 from calibration.laws.readings import EXPONENTS, in_words, logarithms, motion_patterns, readings
 from calibration.report.corrected_robot import law_handed_on, robot_with_law
@@ -178,7 +178,7 @@ def test_what_the_runs_do_not_exclude_stays_in_the_set() -> None:
     worse = replace(best, place=place_named("Ct"), gain=best.gain - 1, gain_at_lever=best.gain - 1)
     far = replace(worse, gain=best.gain - 10, gain_at_lever=best.gain - 10)
 
-    def kept(*fitted: Law) -> list[str]:
+    def kept(*fitted: FittedLaw) -> list[str]:
         return [law.place.name for law in replace(laws, fitted=fitted).kept]
 
     assert kept(replace(best, reason=Rejection.NOT_PREDICTIVE), worse) == ["Ct", "Cyr"]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from calibration.laws.search import LinearModels
-from calibration.statistics.gls import SESSION_SHARE, Gls, Noise, repeat_covariance
+from calibration.statistics.gls import SESSION_SHARE, Noise, Regression, repeat_covariance
 from common.arrays import Floats
 
 SESSION = np.repeat([0, 1, 2, 3], [6, 8, 6, 4])
@@ -62,7 +62,7 @@ def test_gains_and_weights_are_those_of_dense_matrices() -> None:
         np.testing.assert_allclose(fits.weights[b], alone.weights[0], rtol=1e-7, atol=1e-12)
         without = dense(one, fits.base_share[b], absorbed)[0]
         shares = [
-            Gls(every, PRECISION, SESSION, None, CONDITION).products(one).solve(passes=3).share
+            Regression(every, PRECISION, SESSION, None, CONDITION).products(one).solve(passes=3).share
             for place in range(PLACES)
             for every in [np.concatenate([absorbed, models.columns[:, :, place]], -1)]
         ]

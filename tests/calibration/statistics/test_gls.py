@@ -7,7 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibration.statistics.gls import Gls, Noise, eliminated, inverse_root, repeat_covariance, solved
+from calibration.statistics.gls import (
+    Noise,
+    Regression,
+    inverse_root,
+    repeat_covariance,
+    schur_complement,
+    solve_normal,
+)
 from calibration.statistics.residual_tests import TESTABLE, Directions, _kernel, directions, examine_residual
 from calibration.statistics.statistical_model import features, precisions, prior_offsets
 from calibration.statistics.study import Study, middle_session
@@ -32,10 +39,10 @@ def test_steps_and_what_is_left_are_those_of_dense_matrices() -> None:
     columns, residual = rng.normal(size=(8, 2, 3)), rng.normal(size=(4, 8, 2))
     condition, precision, change = np.arange(8) // 2, np.array([0.0, 4.0]), np.array([0.0, 0.3])
     share = np.array([0.7, 0.2])
-    linear = Gls(columns, precision, SESSION, SCALE, condition)
+    linear = Regression(columns, precision, SESSION, SCALE, condition)
     together = linear.products(residual, change=change).at(np.tile(share, (4, 1)))
-    step, covariance = solved(together)
-    left = eliminated(together, 2)
+    step, covariance = solve_normal(together)
+    left = schur_complement(together, 2)
     for b, y in enumerate(residual):
         run = repeat_covariance(y, condition, SCALE)
         inverse = np.linalg.inv(dense(run, share))
@@ -55,7 +62,7 @@ def test_steps_and_what_is_left_are_those_of_dense_matrices() -> None:
 def test_draws_have_the_covariance_of_runs_sessions_and_priors() -> None:
     rng = np.random.default_rng(0)
     columns, run, share = rng.normal(size=(8, 2, 2)), np.array([[1.0, 0.4], [0.4, 0.8]]), np.array([0.5, 0.1])
-    drawn = Gls(columns, np.array([0.0, 4.0]), SESSION, SCALE).draw(rng, run, np.tile(share, (40_000, 1)))
+    drawn = Regression(columns, np.array([0.0, 4.0]), SESSION, SCALE).draw(rng, run, np.tile(share, (40_000, 1)))
     expected = dense(run, share) + np.outer(columns[..., 1], columns[..., 1]) / 4
     scatter = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     assert np.cov(drawn.reshape(len(drawn), -1).T) / scatter == pytest.approx(expected / scatter, abs=0.03)
@@ -87,7 +94,7 @@ def test_noise_is_recovered_from_repeats_and_sessions() -> None:
         shift = np.sqrt([0.3, 0.1]) * rng.normal(scale=[0.03, 0.05], size=(4, 2))[session]
         y = rng.normal(size=(60, 2))[condition] + scatter + shift
         covariances.append(repeat_covariance(y, condition, scale))
-        linear = Gls(J, np.zeros(1), session, scale)
+        linear = Regression(J, np.zeros(1), session, scale)
         shares.append(linear.products(scatter + shift, covariances[-1]).share(passes=3))
     assert np.sqrt(np.diag(np.mean(covariances, 0))) == pytest.approx([0.03, 0.05], rel=0.02)
     assert np.mean(shares, 0) == pytest.approx([0.25, 0.15], rel=0.12)

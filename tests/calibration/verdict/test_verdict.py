@@ -10,7 +10,7 @@ import pytest
 
 from calibration.attribution.claim_checks import NumberCheck
 from calibration.verdict import calibrate
-from calibration.verdict.findings import Explained, HeldOutErrors
+from calibration.verdict.findings import Attribution, HeldOutErrors
 from calibration.verdict.record import facts
 from calibration.verdict.verdict import Verdict
 from calibration.words.render import next_steps
@@ -37,7 +37,7 @@ def test_the_rule(p_value: float, effects: int, rival_numbers: int, number_expla
         misfit=SimpleNamespace(p_value=p_value), best=(None,) * effects, rival_numbers=(None,) * rival_numbers,
         number=number_explains, nearest=verdict == "partial",
     )  # fmt: skip
-    assert Explained.verdict(given, 0.04) == verdict
+    assert Attribution.verdict(given, 0.04) == verdict
 
 
 def unexplained(

@@ -11,7 +11,7 @@ import pytest
 from common.arrays import Floats
 from common.errors import InputError
 from planner.goal.route import COURSES, NoWayError, RouteLimits, route
-from planner.paths.dubins import TURNS, DubinsPaths, shortest_paths, words
+from planner.paths.dubins import TURNS, DubinsPaths, segment_lengths, shortest_paths
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.tractrix import STILL
 from planner.planning.plan import Plan
@@ -157,7 +157,7 @@ def poses(rng: np.random.Generator, count: int) -> Floats:
 def test_every_word_ends_at_its_goal(word: int) -> None:
     rng = np.random.default_rng(word)
     start, goal = poses(rng, 400), poses(rng, 400)
-    pieces = words(start, goal, RADIUS)[:, word]
+    pieces = segment_lengths(start, goal, RADIUS)[:, word]
     exists = np.isfinite(pieces.sum(-1))
     assert exists.sum() > 40
     tracks = DubinsPaths(start[exists], np.repeat(TURNS[word][None], exists.sum(), 0), pieces[exists], RADIUS)
@@ -204,9 +204,9 @@ def test_a_route_through_places_is_as_short_as_with_the_best_courses() -> None:
     found = route([ends[0], *free, ends[1]], limits, 0.0, {}, CONTROL)
     fine = 2 * np.pi * np.arange(720) / 720
     (one, other) = (np.stack([0 * fine + x, 0 * fine + y, fine], 1) for x, y in places)
-    first = words(ends[0], one, RADIUS).sum(-1).min(-1)
-    middle = words(one[:, None], other[None], RADIUS).sum(-1).min(-1)
-    last = words(other, ends[1], RADIUS).sum(-1).min(-1)
+    first = segment_lengths(ends[0], one, RADIUS).sum(-1).min(-1)
+    middle = segment_lengths(one[:, None], other[None], RADIUS).sum(-1).min(-1)
+    last = segment_lengths(other, ends[1], RADIUS).sum(-1).min(-1)
     assert found.total <= (first[:, None] + middle + last).min() + 1e-3
     for place in places:
         assert np.hypot(*(found.chain(0.005)[:, :2] - place).T).min() < 0.005

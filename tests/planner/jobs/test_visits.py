@@ -15,7 +15,7 @@ from planner.jobs.tour import tour
 from planner.jobs.travel import Travel
 from planner.paths.distance import distance_to
 from planner.paths.obstacles import Circle, FreeSpace
-from planner.planning.solve import Setting
+from planner.planning.solve import Trial
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import dwells_for
 from sim.motion.replay import replay
@@ -79,7 +79,7 @@ def test_what_cannot_be_ordered_is_refused() -> None:
 def legs(tracked: TrackedVehicle, places: np.ndarray) -> np.ndarray:
     """Compute the times (n, 72, n, 72) between places, with 72 directions of motion at each."""
     dwell = dwells_for(tracked.vehicle, "time", None)[0]
-    travel = Travel.of(Setting.of(tracked, dwell), FreeSpace(), 0.0)
+    travel = Travel.of(Trial.of(tracked, dwell), FreeSpace(), 0.0)
     course = 2 * np.pi * np.arange(72) / 72
     axis = np.stack([np.cos(course), np.sin(course)], 1)
     poses = np.concatenate([[np.c_[place - tracked.rod * axis, course] for place in places]]).reshape(-1, 3)

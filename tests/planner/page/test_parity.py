@@ -58,7 +58,7 @@ SQUARE, BEND = PATHS["square"], PATHS["bend"]
 SHORT = {"objective": "flips"}
 
 
-class Case(NamedTuple):
+class ParityCase(NamedTuple):
     """A path, who follows it and how; a robot, or the name of one of VEHICLES with the offset of its point."""
 
     path: Path2D
@@ -81,7 +81,7 @@ def text_of(name: str) -> str:
     return FILES[name] or json.dumps(planned(CORNER, objective="flips").to_dict())
 
 
-def opened_case(name: str) -> Case:
+def opened_case(name: str) -> ParityCase:
     """Open a file in Python and in the page, which must read the same, and plan what it has."""
     text = text_of(name)
     with open(name, "w", encoding="utf-8") as file:
@@ -91,7 +91,7 @@ def opened_case(name: str) -> Case:
         robot = load_robot(name)
         assert found["fields"]["tailLength"] == pytest.approx(robot.tail_length, rel=1e-15)
         assert found["fields"]["timeScale"] == pytest.approx(robot.time_scale, rel=1e-14)
-        return Case(circle(2.0), robot)
+        return ParityCase(circle(2.0), robot)
     (drawn,) = found["paths"]
     page = Path2D(np.array(drawn["points"]), drawn["closed"]).scaled(found["unit"] / 11)
     if name == "plan.json":
@@ -102,46 +102,46 @@ def opened_case(name: str) -> Case:
         wanted = drawing.path.scaled(drawing.unit / CONTROL.tail_length)
     assert page.closed == wanted.closed
     np.testing.assert_allclose(page.points, wanted.points, atol=1e-12)
-    return Case(page)
+    return ParityCase(page)
 
 
-def random_case(seed: int) -> Case:
+def random_case(seed: int) -> ParityCase:
     """Draw a path and a robot as labs have them."""
     rng = np.random.default_rng(seed)
     options = {"objective": ("error", "time", "flips")[seed % 3], "corner": ("nearest", "minimax")[seed % 2]}
-    return Case(lab_path(rng), lab_robot(rng), options)
+    return ParityCase(lab_path(rng), lab_robot(rng), options)
 
 
-CASES: dict[str, Callable[[], Case]] = {
-    "circle": lambda: Case(circle(2.0), CONTROL, {}),
-    "triangle, tip": lambda: Case(polygon(3, 4.0), TRIANGLE,
+CASES: dict[str, Callable[[], ParityCase]] = {
+    "circle": lambda: ParityCase(circle(2.0), CONTROL, {}),
+    "triangle, tip": lambda: ParityCase(polygon(3, 4.0), TRIANGLE,
                                   {"objective": "flips", "time_weight": 0.03, "point": "head_tip"}),
-    "hexagon, rounded": lambda: Case(polygon(6, 4.0), CONTROL, {**SHORT, "seed": 5, "corner": "fillet"}),
-    "biased": lambda: Case(SQUARE, ("biased", 0.27), {"objective": "time"}),
-    "in a current": lambda: Case(polygon(6, 4.0), ("in a current", 0.1), {**SHORT, "corner": "fillet"}),
-    "minimax": lambda: Case(SQUARE, ("symmetric", 0.0),
+    "hexagon, rounded": lambda: ParityCase(polygon(6, 4.0), CONTROL, {**SHORT, "seed": 5, "corner": "fillet"}),
+    "biased": lambda: ParityCase(SQUARE, ("biased", 0.27), {"objective": "time"}),
+    "in a current": lambda: ParityCase(polygon(6, 4.0), ("in a current", 0.1), {**SHORT, "corner": "fillet"}),
+    "minimax": lambda: ParityCase(SQUARE, ("symmetric", 0.0),
                             {"objective": "flips", "tolerance": 0.1, "corner": "minimax"}),
-    "own circle": lambda: Case(circle(0.95), CONTROL, SHORT),
-    "smaller than the rod": lambda: Case(circle(0.94), lab_robot(np.random.default_rng(56005)), SHORT),
+    "own circle": lambda: ParityCase(circle(0.95), CONTROL, SHORT),
+    "smaller than the rod": lambda: ParityCase(circle(0.94), lab_robot(np.random.default_rng(56005)), SHORT),
     "drawing.svg": lambda: opened_case("drawing.svg"),
     "table.csv": lambda: opened_case("table.csv"),
     "robot.toml": lambda: opened_case("robot.toml"),
     "plan.json": lambda: opened_case("plan.json"),
     **{f"random {seed}": lambda seed=seed: random_case(seed) for seed in (3, 11, 12, 26, 32, 53)},
-    "long memory": lambda: Case(BEND, ("with a long memory", -0.3), {"minimum_seconds": 2.0}),
-    "without lags": lambda: Case(PATHS["wave"], ("without lags", 0.0), {"dwell": 1.3}),
+    "long memory": lambda: ParityCase(BEND, ("with a long memory", -0.3), {"minimum_seconds": 2.0}),
+    "without lags": lambda: ParityCase(PATHS["wave"], ("without lags", 0.0), {"dwell": 1.3}),
     "camera.csv": lambda: opened_case("camera.csv"),
-    "circle, pivot": lambda: Case(circle(1.5), MEASURED, {"objective": "flips", "point": "pivot"}),
-    "circle, tip, time": lambda: Case(circle(3.0), TRIANGLE, {"objective": "time", "point": "head_tip"}),
-    "square": lambda: Case(SQUARE, CONTROL, {}),
-    "square, time": lambda: Case(SQUARE, MEASURED, {"objective": "time"}),
-    "eight": lambda: Case(PATHS["eight"], CONTROL, SHORT),
-    "wave": lambda: Case(PATHS["wave"], MEASURED, SHORT),
-    "stroke": lambda: Case(PATHS["stroke"], CONTROL, SHORT),
-    "bend, minimax": lambda: Case(BEND, CONTROL, {"objective": "flips", "corner": "minimax"}),
-    "line": lambda: Case(PATHS["line"], TRIANGLE, {"objective": "time"}),
-    "star": lambda: Case(PATHS["star"], MEASURED, {"objective": "flips", "time_weight": 0.05}),
-    "long dwells": lambda: Case(PATHS["eight"].scaled(2), TRIANGLE, {"minimum_seconds": 3.0}),
+    "circle, pivot": lambda: ParityCase(circle(1.5), MEASURED, {"objective": "flips", "point": "pivot"}),
+    "circle, tip, time": lambda: ParityCase(circle(3.0), TRIANGLE, {"objective": "time", "point": "head_tip"}),
+    "square": lambda: ParityCase(SQUARE, CONTROL, {}),
+    "square, time": lambda: ParityCase(SQUARE, MEASURED, {"objective": "time"}),
+    "eight": lambda: ParityCase(PATHS["eight"], CONTROL, SHORT),
+    "wave": lambda: ParityCase(PATHS["wave"], MEASURED, SHORT),
+    "stroke": lambda: ParityCase(PATHS["stroke"], CONTROL, SHORT),
+    "bend, minimax": lambda: ParityCase(BEND, CONTROL, {"objective": "flips", "corner": "minimax"}),
+    "line": lambda: ParityCase(PATHS["line"], TRIANGLE, {"objective": "time"}),
+    "star": lambda: ParityCase(PATHS["star"], MEASURED, {"objective": "flips", "time_weight": 0.05}),
+    "long dwells": lambda: ParityCase(PATHS["eight"].scaled(2), TRIANGLE, {"minimum_seconds": 3.0}),
 }  # fmt: skip
 QUICK = 12  # cases of `make test`; the others run with the rates
 CASE_MARKS = [pytest.param(name, marks=[] if i < QUICK else pytest.mark.rates) for i, name in enumerate(CASES)]
@@ -178,7 +178,7 @@ def difference(found: dict[str, Any], wanted: dict[str, Any]) -> float:
     return worst
 
 
-def plan_call(case: Case) -> tuple[Any, ...]:
+def plan_call(case: ParityCase) -> tuple[Any, ...]:
     path, robot, options = case
     request = call("plan.js", "planRequest", page_options(options))
     if isinstance(robot, Robot):
@@ -187,7 +187,7 @@ def plan_call(case: Case) -> tuple[Any, ...]:
     return "plan.js", "makePlan", path, tracked_of(VEHICLES[robot[0]], robot[1]), request
 
 
-def python_plan(case: Case) -> Plan:
+def python_plan(case: ParityCase) -> Plan:
     path, robot, options = case
     if isinstance(robot, Robot):
         return plan(path, robot, lookup=shipped(), **options)
@@ -227,7 +227,7 @@ REFUSED: list[tuple[Path2D, dict[str, Any]]] = [
 @pytest.mark.parametrize(("path", "options"), REFUSED)
 def test_refusals(path: Path2D, options: dict[str, Any]) -> None:
     """The page speaks of its options where one is wrong, in the words of the command."""
-    case = Case(path, ("symmetric", 0.0), options)
+    case = ParityCase(path, ("symmetric", 0.0), options)
     (found,) = answers([plan_call(case)], left_out=["vehicle"])
     assert isinstance(found, InputError)
     assert without_digits(found) == without_digits(refusal_of(python_plan, case))

@@ -15,9 +15,9 @@ from planner.jobs.plan import plan
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon, smoothed
 from planner.paths.tractrix import STILL, Drift, reference
-from planner.planning.declare import MOST_WORK, Feasibility, changed, cost, declare, feasible, remedy
+from planner.planning.declare import MOST_WORK, Feasibility, changed, cost, feasible, make_feasible, remedy
 from planner.planning.line_of_sight import follow, guaranteed, hysteresis, look_ahead
-from planner.planning.request import DECLARING, REMEDY, Corner, Share
+from planner.planning.request import DECLARING, REMEDY, Corner, Progress
 from planner.vehicle.vehicle import roll_out
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
@@ -185,7 +185,7 @@ def test_many_points_with_little_noise_are_the_same_path() -> None:
 @pytest.mark.parametrize(("outer", "inner"), [pytest.param(4.0, 1.8, marks=pytest.mark.rest), (2.0, 0.8)])
 def test_a_star_is_followed_by_a_robot_that_turns_on_the_spot(outer: float, inner: float) -> None:
     """The finest poses do not converge to a track that it can follow; coarser ones, with wider turns, do."""
-    declared = declare(star(outer, inner), five_tails())
+    declared = make_feasible(star(outer, inner), five_tails())
     assert max(declared.off_drawn, declared.missed) < 0.65
 
 
@@ -197,7 +197,7 @@ TIGHT = {"circle": circle(0.2), "star": star(0.7, 0.25), "spike": SPIKE}
 )
 def test_the_search_is_bounded_and_says_that_it_goes_on(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     work: list[float] = []
-    told: list[Share] = []
+    told: list[Progress] = []
 
     def counted(raw: Path2D, feasibility: Feasibility, way: float, *rest: Any) -> Any:
         if told and told[-1].stage == REMEDY:
@@ -206,7 +206,7 @@ def test_the_search_is_bounded_and_says_that_it_goes_on(name: str, monkeypatch: 
 
     monkeypatch.setattr("planner.planning.declare.changed", counted)
     with pytest.raises(InputError) as caught:
-        declare(TIGHT[name], five_tails(), lambda share: told.append(cast(Share, share)))
+        make_feasible(TIGHT[name], five_tails(), lambda share: told.append(cast(Progress, share)))
     assert "\n" not in str(caught.value)
     assert 0 < sum(work) <= MOST_WORK
     shares = [share.done for share in told if share.stage == REMEDY]

@@ -13,7 +13,9 @@ from common.errors import InputError
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Reference, reference
-from planner.planning.errors import (
+from planner.planning.line_of_sight import follow, look_ahead
+from planner.planning.request import Camera
+from planner.planning.stated_error import (
     WOBBLE,
     ErrorGrowth,
     Predicted,
@@ -23,8 +25,6 @@ from planner.planning.errors import (
     rms_in_time,
     stated_error,
 )
-from planner.planning.line_of_sight import follow, look_ahead
-from planner.planning.request import Camera
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Rollout, Switches, Vehicle, roll_out
 from sim.mechanics import planar
 from sim.motion.replay import replay

@@ -20,8 +20,8 @@ from sim.model.laws import (
     SCALED,
     TAILS,
     WRENCHES,
-    Law,
     Load,
+    PowerLawEffect,
     Powers,
     make_law,
 )
@@ -148,7 +148,7 @@ def test_a_law_is_mirror_symmetric_and_null_at_zero(name: str) -> None:
 def test_a_law_is_known_by_its_name_and_not_listed() -> None:
     for name in LAWS:
         law = effect_named(name)
-        assert isinstance(law, Law)
+        assert isinstance(law, PowerLawEffect)
         assert law == make_law(law.place, law.powers, lever=law.lever)
         assert (law.name, law.powers) == (name, STEEP)
         assert is_effect(name)

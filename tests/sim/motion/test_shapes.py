@@ -21,7 +21,7 @@ from sim.__main__ import main
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule
-from sim.motion.film import Film, _draw_scale_bar, fitting_speed, write_film
+from sim.motion.film import FilmSettings, _draw_scale_bar, fitting_speed, write_film
 from sim.motion.replay import replay
 from sim.motion.shape_files import equal_times, shape_arrays, write_shapes
 from sim.motion.shapes import nodes_in_body, scheduled_shapes, steady_shapes, steady_states
@@ -220,7 +220,7 @@ def test_poses_and_directions_are_those_of_a_replay() -> None:
 def test_no_frame_is_lost_where_rounded_dwells_end() -> None:
     for seed in (1, 8):  # sums of dwells that depend on the order
         wanted = schedule(*np.random.default_rng(seed).uniform(0.05, 0.1, 20))
-        times = Film(speed=wanted.time_scale).times(wanted)
+        times = FilmSettings(speed=wanted.time_scale).times(wanted)
         assert len(scheduled_shapes(wanted, times).heads) == len(times)
 
 
@@ -244,7 +244,7 @@ def resampled(tails: np.ndarray) -> np.ndarray:
 
 def test_a_film_has_a_picture_for_each_of_its_times(tmp_path: Path) -> None:
     wanted = schedule(1.0, 1.0)
-    film = Film(speed=2.0 * ROBOT.time_scale, width=200)
+    film = FilmSettings(speed=2.0 * ROBOT.time_scale, width=200)
     count = write_film(CONTENT, wanted, tmp_path / "swim.gif", film)
     with Image.open(tmp_path / "swim.gif") as image:
         assert count == 13
@@ -272,7 +272,7 @@ def test_the_scale_bar_is_as_long_as_it_says_and_the_speed_is_a_round_number() -
 def test_a_film_that_cannot_be_written_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    wanted, film = schedule(1.0), Film(speed=1.0)
+    wanted, film = schedule(1.0), FilmSettings(speed=1.0)
     with pytest.raises(InputError, match=r"ends in \.gif, \.webp, \.mp4"):
         write_film(CONTENT, wanted, tmp_path / "swim.avi", film)
     monkeypatch.setattr(shutil, "which", lambda name: None)
@@ -281,7 +281,7 @@ def test_a_film_that_cannot_be_written_leaves_nothing(
     with pytest.raises(InputError, match="pictures; give"):
         write_film(CONTENT, schedule(2000.0), tmp_path / "swim.gif", film)
     with pytest.raises(InputError, match="number above 0"):
-        write_film(CONTENT, wanted, tmp_path / "swim.gif", Film(speed=-1.0))
+        write_film(CONTENT, wanted, tmp_path / "swim.gif", FilmSettings(speed=-1.0))
     assert run_command(main, ["film", "plan.json", "--out", str(tmp_path / "no.gif"), "--width", "10"]) == 2
     assert capsys.readouterr().err == "error: --width 10; give 100 to 2000 pixels\n"
     assert list(tmp_path.iterdir()) == []

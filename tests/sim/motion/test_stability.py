@@ -18,7 +18,7 @@ from sim.motion.steady_motion import DIRECT, STABILITY_COLUMNS, STEPPING
 from sim.solve.assembly import row
 from sim.solve.orbit import mean_motion
 from sim.solve.rates import FIRST_PHASE
-from sim.solve.refinement import PHASES, SOLVED, Orbit, refined_orbit
+from sim.solve.refinement import PHASES, SOLVED, OrbitOnMeshes, refined_orbit
 from tests.oracles.stepped_growth import stepped_growth
 from tests.sim import lanes
 from tests.sim.robots import CONTROL_VALUES, control, first_body, growth, growth_of_orbit
@@ -40,7 +40,7 @@ SPURIOUS = {
 }  # fmt: skip
 
 
-def orbit_of(robot: dict[str, float]) -> Orbit:
+def orbit_of(robot: dict[str, float]) -> OrbitOnMeshes:
     orbit = refined_orbit(first_body(control(**robot)), int(robot["N"]), PHASES)
     assert orbit.status == SOLVED
     return orbit

@@ -22,7 +22,7 @@ from sim.motion.settling import settle
 from sim.motion.stability import QUICK
 from sim.motion.steady import orbits, steady
 from sim.motion.steady_motion import DIRECT, LAB_COLUMNS, STEPPING, describe_motion, lab_columns, lab_motion
-from sim.solve.refinement import LOST, REASONS, Orbit
+from sim.solve.refinement import LOST, REASONS, OrbitOnMeshes
 from tests.reference.cases import INDEPENDENT_HEAD_SHARE, MEASURED_HEAD_SHARE, STEADY_INPUTS, STEADY_POINTS
 from tests.sim.robots import control, sweep_points
 
@@ -94,7 +94,7 @@ def test_a_row_without_an_orbit_is_stepped_and_says_so(monkeypatch: pytest.Monke
     groups = control(2, omega_bar=[10.0, 14.0])
     plain = steady(groups)
 
-    def lose_the_first(rows: np.ndarray, tails: int, phases: int) -> list[Orbit]:
+    def lose_the_first(rows: np.ndarray, tails: int, phases: int) -> list[OrbitOnMeshes]:
         first, *others = refined_orbits(rows, tails, phases)
         return [first._replace(status=LOST, means=np.full(5, np.nan)), *others]
 

@@ -14,7 +14,7 @@ from sim.model.presets import PRESETS
 from sim.model.response import BEFORE, DWELLS
 from surrogate.domain import Support
 from surrogate.error_modes import STEADY, CurveErrors, error_modes
-from surrogate.errors import error_scale, shortcomings, summary
+from surrogate.held_out import error_scale, shortcomings, summary
 from surrogate.intervals import NOVELTY, Intervals
 from surrogate.response import Basis
 from surrogate.table_file import load

@@ -43,8 +43,8 @@ import numpy as np
 from common.arrays import Floats, Integers
 from planner.paths.distance import distance_to, nearest
 from planner.paths.path import Path2D
-from planner.planning.declare import Declared
-from planner.planning.request import ERRORS, Camera, Progress, tell
+from planner.planning.declare import FeasiblePath
+from planner.planning.request import ERRORS, Camera, ProgressCallback, tell
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Mode, Rollout, Switches, Vehicle, interpolated, roll_out
 from sim.mechanics import planar
@@ -120,12 +120,12 @@ class PlanErrors:
 def plan_errors(
     tracked: TrackedVehicle,
     drawn: Path2D,
-    declared: Declared,
+    declared: FeasiblePath,
     switches: Switches,
     *,
     guaranteed: float | None,
     seed: int,
-    progress: Progress | None = None,
+    progress: ProgressCallback | None = None,
 ) -> PlanErrors:
     """Compute the errors of a schedule.
 
@@ -174,7 +174,7 @@ class ErrorGrowth(NamedTuple):
 
 
 def error_growth(
-    vehicle: Vehicle, switches: Switches, rollout: Rollout, progress: Progress | None = None
+    vehicle: Vehicle, switches: Switches, rollout: Rollout, progress: ProgressCallback | None = None
 ) -> ErrorGrowth:
     """Propagate the modes of a vehicle, and those of its disc's phase, to some _BLOCKS flips of its rollout."""
     dwells, count = switches.dwells, len(switches.dwells)

@@ -10,10 +10,10 @@ import { distanceTo, nearest } from "./reference.js";
 import { BEFORE_KNOTS, COUNT, SHORTEST, STEP, lagAt, lagNoise, lagPlace, pivotRadius, rollOut } from "./vehicle.js";
 import { zigzagSpeed } from "./vehicle.js";
 
-const { WEYL, FIRST, SECOND, MIDDLE, TAIL } = CONSTANTS.errors;
-const { LEVEL, WOBBLE, DRAWS, BLOCKS } = CONSTANTS.errors;
+const { WEYL, FIRST, SECOND, MIDDLE, TAIL } = CONSTANTS.stated_error;
+const { LEVEL, WOBBLE, DRAWS, BLOCKS } = CONSTANTS.stated_error;
 const { TIGHTEST, PAIRS_AHEAD } = CONSTANTS.line_of_sight;
-const { WITHIN, KEPT, ZIGZAG, PLACE, COURSE, STRETCH, CAMERA } = CONSTANTS.errors;
+const { WITHIN, KEPT, ZIGZAG, PLACE, COURSE, STRETCH, CAMERA } = CONSTANTS.stated_error;
 const NOTHING = [0, 0, 0];
 const UNCHANGED = { twist: [NOTHING, NOTHING], current: [0, 0] };
 let drawn = { seed: null, numbers: [] }; // the last numbers: plans ask for the same again and again
