@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+ROOT = Path(__file__).parents[1]
 LIMIT = 1800.0  # s; far more than any wait takes on a busy machine
 
 

@@ -39,7 +39,7 @@ from tests.calibration.track import RADIUS, track
 from tests.camera.test_lens import POSES, boards
 from tests.dataset.sweeps import SMALL, design, invented
 from tests.oracles.tank import Tank, circling
-from tests.processes import LIMIT
+from tests.processes import LIMIT, ROOT
 from tests.shared import FOLDER, shared
 
 FILES = {"plan.json", "plan.csv", "plan.svg", "schedule.h"}
@@ -212,7 +212,7 @@ def tracking_track(made: Path, out: Path) -> str:
     answer = subprocess.run(
         [sys.executable, "-m", "softflagella", *map(str, words)],
         input="0\n0.5 0 0 0\n", capture_output=True, text=True, check=True, timeout=LIMIT,
-        cwd=Path(__file__).parents[1],
+        cwd=ROOT,
     )  # fmt: skip
     print(answer.stdout)
     direction, flip_at, error, alarm = answer.stdout.splitlines()[0].split()

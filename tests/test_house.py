@@ -1,4 +1,4 @@
-"""Imports run one way and load only what is used; targets of tests, the list of benchmarks, pinned packages."""
+"""Imports run one way and load only what is used; targets of tests; bars of progress."""
 
 from __future__ import annotations
 
@@ -15,9 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes import LIMIT
+from tests.processes import LIMIT, ROOT
 
-ROOT = Path(__file__).parents[1]
 ORDER = (
     "common",
     "sim",
@@ -63,6 +62,18 @@ def test_imports_run_one_way(package: str) -> None:
     for file in (ROOT / package).rglob("*.py"):
         assert {name.split(".")[0] for name in imported(file)} <= set(before), file
     assert tuple(TopologicalSorter(rooms_imported(package)).static_order())  # raises where there is a circle
+
+
+@pytest.mark.parametrize("package", [name for name in ORDER if name != "calibration"])
+def test_no_files_import_each_other(package: str) -> None:
+    """Not in a circle either, in functions and for types, too; packages run one way."""
+    files = {file.with_suffix("").relative_to(ROOT): file for file in (ROOT / package).rglob("*.py")}
+    modules = {".".join(path.parts).removesuffix(".__init__"): file for path, file in files.items()}
+    graph = {
+        module: {name if name in modules else name.rpartition(".")[0] for name in imported(file)} - {module}
+        for module, file in modules.items()
+    }
+    assert tuple(TopologicalSorter(graph).static_order())  # raises where there is a circle
 
 
 def test_statistics_and_networks_know_no_robot() -> None:
@@ -127,35 +138,6 @@ def test_each_test_belongs_to_one_target() -> None:
     for rest, rates in product((False, True), repeat=2):
         marks = {"rest": rest, "rates": rates}
         assert sum(eval(selection, marks) for selection in selections) == 1
-
-
-def benchmarks(*words: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "benchmarks", *words]
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=300)
-
-
-def test_the_list_names_each_benchmark() -> None:
-    listed = [line[2:].split()[0] for line in benchmarks().stdout.splitlines()[1:] if line[:2] in ("* ", "  ")]
-    files = (ROOT / "benchmarks").glob("*/*.py")
-    assert sorted(listed) == sorted(file.stem for file in files if "\ndef main(" in file.read_text())
-
-
-def test_an_unknown_name_is_refused() -> None:
-    done = benchmarks("accurracy")
-    assert (done.returncode, done.stderr) == (
-        2,
-        "error: no benchmark 'accurracy'; `python -m benchmarks` lists all\n",
-    )
-
-
-def test_each_package_has_a_version_and_hashes() -> None:
-    lines = (ROOT / "constraints.txt").read_text().splitlines()
-    blocks = re.split(r"\n(?=\S)", "\n".join(line for line in lines if line[:1] != "#").strip())
-    assert len(blocks) > 100
-    for block in blocks:
-        assert re.match(r"[\w.\[\]-]+==[0-9][\w.+!]*( ; [^\\]+)? \\\n {4}--hash=sha256:[0-9a-f]{64}\b", block), (
-            block
-        )
 
 
 def test_bars_are_for_terminals() -> None:

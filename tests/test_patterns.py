@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,9 +14,8 @@ import pytest
 from planner.page.constants import constants
 from tests.patterns import IDLE, SIZES, STEEP, texts
 from tests.planner.page.page_core import node
-from tests.processes import printed
+from tests.processes import ROOT, printed
 
-ROOT = Path(__file__).parents[1]
 OWN_TEXTS = {"__init__", "commands", "notebook", "pages", "words"}  # do not read what people bring
 READERS = [
     ".".join(file.relative_to(ROOT).with_suffix("").parts)

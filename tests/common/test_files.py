@@ -18,9 +18,8 @@ import pytest
 from common.errors import CLOSED_PIPE, INTERRUPTED, InputError, run_command
 from common.files import files_together, whole_file, write_csv, write_numbers, write_text
 from common.tables import read_table
-from tests.processes import LIMIT
+from tests.processes import LIMIT, ROOT
 
-ROOT = Path(__file__).parents[3]
 TABLE = pd.DataFrame({"a": [1.0, 2.5]})
 
 

@@ -37,7 +37,7 @@ N = { range = [2, 3], scale = "integer" }
 """
 DANGER = True  # of some rows that are made by `poisonous` or `raising`
 Rows = Callable[[dict[str, np.ndarray]], dict[str, Any]]
-ROOT = Path(__file__).parents[2]
+
 # Where workers of tests leave marks; set before any worker starts.
 MARKS = Path(os.environ.setdefault("SOFTFLAGELLA_TEST_MARKS", mkdtemp(dir=FOLDER)))
 

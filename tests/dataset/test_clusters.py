@@ -20,8 +20,8 @@ from dataset import build as engine
 from dataset.build import UnfinishedError, build
 from dataset.data_set import read
 from tests.dataset import sweeps
-from tests.dataset.sweeps import MARKS, ROOT, design, invented
-from tests.processes import LIMIT, printed, until
+from tests.dataset.sweeps import MARKS, design, invented
+from tests.processes import LIMIT, ROOT, printed, until
 from tests.shared import FOLDER
 
 pytestmark = [

@@ -13,8 +13,8 @@ from dataset.__main__ import main
 from dataset.data_set import read, read_manifest
 from dataset.design import load_design
 from dataset.verify import verify
-from tests.dataset.sweeps import ROOT, SMALL, write_rows
-from tests.processes import LIMIT
+from tests.dataset.sweeps import SMALL, write_rows
+from tests.processes import LIMIT, ROOT
 
 pytestmark = pytest.mark.slow
 

@@ -20,8 +20,8 @@ import pytest
 from dataset.build import build
 from dataset.data_set import read, read_manifest
 from tests.dataset import sweeps
-from tests.dataset.sweeps import MARKS, ROOT, SMALL, design, invented, without_cost
-from tests.processes import LIMIT, alive, printed, until
+from tests.dataset.sweeps import MARKS, SMALL, design, invented, without_cost
+from tests.processes import LIMIT, ROOT, alive, printed, until
 
 pytestmark = pytest.mark.slow
 

@@ -19,8 +19,8 @@ from dataset.build import build, mend
 from dataset.data_set import batches, read
 from dataset.folder import LOCK, Folder, StorageError
 from dataset.shards import ROWS
-from tests.dataset.sweeps import ROOT, InThisProcess, design, invented
-from tests.processes import LIMIT
+from tests.dataset.sweeps import InThisProcess, design, invented
+from tests.processes import LIMIT, ROOT
 
 
 def test_a_lock_does_not_change_another_file(tmp_path: Path) -> None:
@@ -100,7 +100,7 @@ def test_one_writer_behind_a_url(memory: str) -> None:
         build(design(9), memory, title="", simulate=invented)
     killed = {"host": "elsewhere", "pid": 1, "since": time.time() - 7200}
     folder.write(LOCK, json.dumps(killed).encode())
-    with pytest.raises(InputError, match=r"process 1 on elsewhere, for 120 min; .* take over with --force"):
+    with pytest.raises(InputError, match=r"process 1 on elsewhere, for 120 min; .*--force"):
         build(design(9), memory, title="", simulate=invented)
     assert json.loads(folder.read(LOCK)) == killed
     build(design(9), memory, title="", simulate=invented, force=True)

@@ -16,8 +16,8 @@ import pytest
 from common.errors import run_command
 from sim.inputs import load_robot
 from softflagella.__main__ import main
-from tests.docs.pages import DOCS, PAGES, ROOT, blocks, page_name
-from tests.processes import LIMIT
+from tests.docs.pages import DOCS, PAGES, blocks, page_name
+from tests.processes import LIMIT, ROOT
 
 RUN = ("sh", "python")
 LONG = {"tutorial/schedule.md", "howto/sweep.md", "howto/goal.md", "howto/jobs.md", "howto/page.md",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from functools import cache
 from pathlib import Path
@@ -12,7 +11,8 @@ import pytest
 
 import softflagella as sf
 from softflagella.shadowing import PACKAGES
-from tests.docs.pages import DOCS, PAGES, ROOT
+from tests.docs.pages import DOCS, PAGES
+from tests.processes import ROOT
 
 TOP = "|".join((*PACKAGES, "softflagella", "benchmarks", "tests"))
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
@@ -71,12 +71,3 @@ def test_the_page_of_python_has_each_public_name() -> None:
     page = (DOCS / "reference" / "api.md").read_text()
     documented = set(re.findall(r"^\.\. auto(?:function|class|exception):: (\w+)$", page, re.MULTILINE))
     assert documented == set(sf.__all__) - {"__version__"}
-
-
-@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda notebook: notebook.stem)
-def test_a_notebook_is_kept_without_outputs(notebook: Path) -> None:
-    """They are executed when the pages are built."""
-    for cell in json.loads(notebook.read_text())["cells"]:
-        assert cell["metadata"] == {}
-        if cell["cell_type"] == "code":
-            assert (cell["outputs"], cell["execution_count"]) == ([], None)

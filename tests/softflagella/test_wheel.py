@@ -12,9 +12,8 @@ from pathlib import Path
 import pytest
 
 from softflagella.shadowing import PACKAGES
-from tests.processes import LIMIT
+from tests.processes import LIMIT, ROOT
 
-ROOT = Path(__file__).parents[2]
 IN_WHEEL = ("softflagella", *PACKAGES)
 CODE = (".py", ".pyc", ".nbi", ".nbc")
 

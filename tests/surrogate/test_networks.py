@@ -35,7 +35,7 @@ from surrogate.training.networks import (
     remove_states,
 )
 from surrogate.training.train import learn
-from tests.processes import LIMIT
+from tests.processes import LIMIT, ROOT
 from tests.surrogate.small import flips, rows
 
 SMALL = Settings(width=8, depth=2, members=2, epochs=6, batch=16, iterations=12)
@@ -87,7 +87,7 @@ class OneDevice(TorchDispatchMode):
 
 def run(folder: Path, states: int) -> subprocess.CompletedProcess[str]:
     words = [sys.executable, "-c", KILLED, str(folder), str(states)]
-    return subprocess.run(words, capture_output=True, text=True, cwd=Path(__file__).parents[2], timeout=LIMIT)
+    return subprocess.run(words, capture_output=True, text=True, cwd=ROOT, timeout=LIMIT)
 
 
 def problem(count: int = 64) -> tuple[torch.Tensor, torch.Tensor]:
