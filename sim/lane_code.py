@@ -276,12 +276,14 @@ overload(plain.zeros, strict=False)(_allocated(np.zeros))
 overload(plain.empty, strict=False)(_allocated(np.empty))
 
 
-def _named(like: Any, values: Any) -> Any:
-    return types.NamedUniTuple(values.dtype, len(like), like.instance_class)(like, values)
+def _tuple(like: Any, values: Any) -> Any:
+    if isinstance(like, types.BaseNamedTuple):
+        return types.NamedUniTuple(values.dtype, len(like), like.instance_class)(like, values)
+    return types.UniTuple(values.dtype, len(like))(like, values)
 
 
-@_teach(plain.named_like, _named)
-def _named_like(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+@_teach(plain.tuple_like, _tuple)
+def _tuple_like(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     kind = sig.return_type
     first = make_array(sig.args[1])(context, builder, args[1]).data
     places = (builder.gep(first, [context.get_constant(types.intp, i)]) for i in range(len(kind)))

@@ -56,9 +56,9 @@ def with_lane(value: Any, i: int, number: Any) -> Any:
     return number
 
 
-def named_like(like: Any, values: Any) -> Any:
-    """Return the entries of an array (K,) under the names of a named tuple of K entries."""
-    return type(like)(*values)
+def tuple_like(like: Any, values: Any) -> Any:
+    """Return the first entries of an array as a tuple of as many as `like`, with its names if it has some."""
+    raise TypeError("tuples of entries are for compiled loops alone")
 
 
 def fma(a: Any, b: Any, c: Any) -> Any:

@@ -14,9 +14,8 @@ from common.arrays import Flags, Floats
 from sim.jit import compiled_fast
 from surrogate.network import BLOCK, Layers, evaluate
 from surrogate.tails import (
-    RESISTANCE,
+    PLACES,
     SINGLE_INPUTS,
-    TAILS,
     inputs_of_single,
     inputs_of_tail,
     linear_thrust,
@@ -34,35 +33,41 @@ _SINGLE = len(SINGLE_INPUTS)
 
 
 @compiled_fast
-def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
+def inputs_at(robot: Floats, motion: Floats, x: Floats) -> None:
     """Write `surrogate.tails.INPUTS` of one robot to x (7,)."""
     beta = np.arctan2(motion[0], motion[2])
-    for i, value in enumerate(inputs_of_tail(tail[0], tail[2], tail[3], tail[4], tail[5], motion, beta)):
+    perp, offset, radius = robot[PLACES.perp], robot[PLACES.offset], robot[PLACES.radius]
+    number, spin_drag = robot[PLACES.number], robot[PLACES.spin_drag]
+    for i, value in enumerate(inputs_of_tail(perp, offset, radius, number, spin_drag, motion, beta)):
         x[i] = value
 
 
 @compiled_fast
-def network_inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
+def network_inputs_at(robot: Floats, motion: Floats, x: Floats) -> None:
     """Write the inputs of the network of one robot to x: SINGLE_INPUTS to x (13,), else INPUTS to x (7,)."""
     if len(x) == _SINGLE:
-        x[0], x[1], x[2], x[3] = inputs_of_single(tail[0], tail[2], tail[3], tail[5], motion[4])
-        x[4:] = tail[6:]
+        perp, offset, radius = robot[PLACES.perp], robot[PLACES.offset], robot[PLACES.radius]
+        x[0], x[1], x[2], x[3] = inputs_of_single(perp, offset, radius, robot[PLACES.spin_drag], motion[4])
+        x[4:] = robot[PLACES.head]
     else:
-        inputs_at(tail, motion, x)
+        inputs_at(robot, motion, x)
 
 
 @compiled_fast
 def _residual(robot: Floats, motion: Floats, y: Floats, left: Floats) -> None:
     """Write what is left of the balance of forces for numbers y of the tails to left (4,)."""
-    tail = robot[TAILS:]
-    side, along, turn, force, thrust, torque, squared = wrench_terms(tail[0], tail[1], tail[2], tail[4], motion)
+    perp, parallel, offset = robot[PLACES.perp], robot[PLACES.parallel], robot[PLACES.offset]
+    side, along, turn, force, thrust, torque, squared = wrench_terms(
+        perp, parallel, offset, robot[PLACES.number], motion
+    )
+    resistance = robot[PLACES.resistance]
     left[0] = side + force * y[0]
     left[1] = along + thrust * (y[1] + squared * y[4])
     left[2] = turn + force * y[2]
     left[3] = torque * (y[3] + squared * y[5])
     for i in range(4):
         for j in range(5):
-            left[i] -= robot[RESISTANCE + 5 * i + j] * motion[j]
+            left[i] -= resistance[5 * i + j] * motion[j]
 
 
 @compiled_fast
@@ -89,9 +94,9 @@ def _eliminate(rows: Floats) -> None:
 @compiled_fast
 def _first_guess(robot: Floats, motion: Floats, rows: Floats) -> None:
     """Write the motion with the torque and thrust of linear theory and the side forces of straight tails."""
-    speed, gain, tail = robot[0], robot[1], robot[TAILS:]
-    resistance = robot[RESISTANCE : RESISTANCE + 20]  # four rows of five
-    perp, parallel, a, number = tail[0], tail[1], tail[2], tail[4]
+    speed, gain, resistance = robot[PLACES.speed], robot[PLACES.gain], robot[PLACES.resistance]
+    perp, parallel = robot[PLACES.perp], robot[PLACES.parallel]
+    a, number = robot[PLACES.offset], robot[PLACES.number]
     spin, own, disc = FIRST_SPIN * speed, resistance[18], resistance[19]
     for _ in range(3):
         spin = speed * own / (own + gain * (number * perp * a**2 * linear_torque(perp * spin) + disc))
@@ -121,7 +126,7 @@ def _first_inverse(robot: Floats, motion: Floats, y: Floats, left: Floats, inver
         width = DIFFERENCE * (abs(motion[j]) + MIN_SHARE * largest)
         moved[:] = motion
         moved[j] += width
-        moved[4] = robot[0] + robot[1] * moved[3]
+        moved[4] = robot[PLACES.speed] + robot[PLACES.gain] * moved[3]
         _residual(robot, moved, y, after)
         for i in range(4):
             rows[i, j] = (after[i] - left[i]) / width
@@ -155,12 +160,12 @@ def _take_step(robot: Floats, motion: Floats, left: Floats, inverse: Floats, ste
         step[i] = 0.0
         for j in range(4):
             step[i] -= inverse[i, j] * left[j]
-    turned = abs(robot[1] * step[3]) / motion[4]
+    turned = abs(robot[PLACES.gain] * step[3]) / motion[4]
     share = MAX_TURN / turned if turned > MAX_TURN else 1.0
     for i in range(4):
         step[i] *= share
         motion[i] += step[i]
-    motion[4] = robot[0] + robot[1] * motion[3]
+    motion[4] = robot[PLACES.speed] + robot[PLACES.gain] * motion[3]
     size = max(abs(step[0]), abs(step[1])) / (np.hypot(motion[0], motion[1]) + abs(motion[2]))
     size = max(size, max(abs(step[2] / motion[2]), abs(step[3] / motion[3])))
     return size if motion[4] > 0 else np.nan
@@ -180,7 +185,7 @@ def _solve(network: Layers, robots: Floats, motion: Floats, found: Flags) -> Non
         for begin in range(0, len(going), BLOCK):
             block = going[begin : begin + BLOCK]  # robots that go on are put in front, so not before they are read
             for k, row in enumerate(block):
-                network_inputs_at(robots[row, TAILS:], motion[row], x[k])
+                network_inputs_at(robots[row], motion[row], x[k])
             evaluate(network, x[: len(block)], y[: len(block)])
             for k, row in enumerate(block):
                 before[:] = left[row]
@@ -205,7 +210,7 @@ def solve(network: Layers, robots: Floats) -> tuple[Floats, Flags]:
 
     Args:
         network: of the tails.
-        robots: (M, 39), see `surrogate.tails.pack_robots`.
+        robots: (M, ROBOT_NUMBERS), see `surrogate.tails.pack_robots`.
     """
     motion, found = np.empty((len(robots), 5)), np.empty(len(robots), dtype=np.bool_)
     for begin in range(0, len(robots), _CHUNK):

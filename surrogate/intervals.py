@@ -26,7 +26,7 @@ from common.arrays import Floats, Integers
 from sim.jit import compiled_fast
 from surrogate.domain import MOST_TAILS
 from surrogate.held_out import ITSELF, ONE, OUTPUTS, SCALES, SPEED, SURGE
-from surrogate.tails import COUPLE, NUMBER, ROBOT_NUMBERS
+from surrogate.tails import COUPLE, PLACES, ROBOT_NUMBERS
 
 COVERAGE = 0.90
 _TINY = 1e-9  # of the scale of an output
@@ -71,7 +71,7 @@ class Intervals:
         Args:
             names: of the outputs.
             features: (M, F), see `surrogate.table`.
-            robots: (M, 39), see `surrogate.tails.pack_robots`; not needed where all robots have one q.
+            robots: (M, ROBOT_NUMBERS), see `surrogate.tails.pack_robots`; not needed where all robots have one q.
         """
         none = np.zeros(len(self.factor), dtype=np.int64)
         _, half, _ = self._ask(none + ONE, none, features, robots, np.zeros((1, len(features))))
@@ -139,12 +139,12 @@ class Intervals:
         Args:
             features: (M, F) of robots that s was not learned from.
             errors: relative errors by output, (M,); NaN where unknown.
-            robots: (M, 39), see `half_widths`; None for one q of all.
+            robots: (M, ROBOT_NUMBERS), see `half_widths`; None for one q of all.
         """
         found = replace(self, factor=dict.fromkeys(errors, np.ones(1)))
         cells = [np.zeros((1, len(features)), dtype=bool)]
         if robots is not None:
-            found = replace(found, speeds=np.quantile(robots[:, 0], [1 / 3, 2 / 3]))
+            found = replace(found, speeds=np.quantile(robots[:, PLACES.speed], [1 / 3, 2 / 3]))
             group, novelty = found.groups(features, robots), features[:, NOVELTY]
             thirds = [novelty[group // 2 == k] for k in range(THIRDS)]
             middle = np.array([np.median(third if len(third) else novelty) for third in thirds])
@@ -207,15 +207,16 @@ def intervals_of(
         kinds: what errors are relative to, (O,).
         places: of these among the outputs, (O,).
         features: (M, F).
-        robots: (M, 39).
+        robots: (M, ROBOT_NUMBERS).
         outputs: their intervals have no width where they are not finite.
     """
     count, size = features.shape
     low, high = np.empty((len(places), count)), np.empty((len(places), count))
     groups, design, x = np.empty(count, dtype=np.int64), np.empty(weights.shape[1]), np.empty(size)
     for row in range(count):
-        own, speed = features[row], robots[row, 0]
-        number = min(max(int(robots[row, NUMBER]), 1), MOST_TAILS) + MOST_TAILS * int(robots[row, COUPLE] != 0)
+        own, speed = features[row], robots[row, PLACES.speed]
+        number = min(max(int(robots[row, PLACES.number]), 1), MOST_TAILS)
+        number += MOST_TAILS * int(robots[row, COUPLE] != 0)
         third = 3 * (number - 1) + int(speed > speeds[0]) + int(speed > speeds[1])
         group = 2 * third + int(own[NOVELTY] > middle[third])
         groups[row] = group

@@ -1,7 +1,7 @@
 """The steady motion of robots from the networks of their tails: what is in balance, how novel it is, all outputs.
 
-Robots are packed as in `surrogate.tails.pack_robots`, (M, 39). Outputs are those of `surrogate.held_out.OUTPUTS`,
-(12, M): eight of the steady motion, then four of the response to a flip.
+Robots are packed as in `surrogate.tails.pack_robots`, (M, ROBOT_NUMBERS). Outputs are those of
+`surrogate.held_out.OUTPUTS`, (12, M): eight of the steady motion, then four of the response to a flip.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.balance import inputs_at, network_inputs_at, solve
 from surrogate.domain import FAST_YAW, INSIDE, MAX_YAW_SHARE, NO_MOTION, NOVEL, SupportNumbers, put_novelty
 from surrogate.network import BLOCK, Ensemble, Layers, evaluate
-from surrogate.tails import HEAD_LENGTH, INPUTS, SENSE, SINGLE_INPUTS, TAILS
+from surrogate.tails import INPUTS, PLACES, SINGLE_INPUTS
 
 CLASSES = (1, 2, 3)  # networks for N = 1, N = 2, and three or more tails
 INPUT_COUNTS = (len(SINGLE_INPUTS), len(INPUTS), len(INPUTS))  # of these networks
@@ -39,7 +39,7 @@ class WrenchTable:
 class Motions:
     """What a query works with, for M robots."""
 
-    robots: Floats  # (M, 39), see `surrogate.tails.pack_robots`
+    robots: Floats  # (M, ROBOT_NUMBERS), see `surrogate.tails.pack_robots`
     motion: Floats  # (M, 5): (v_x of J, v_z, ω_yr, ω_h, ω_t), for a positive motor
     inputs: Floats  # (M, 7) of the networks, see `surrogate.tails.network_inputs`
     features: Floats  # (M, 11): inputs, ln novelty, ln spread of the members, ln N, whether N = 1
@@ -96,10 +96,10 @@ def motions_of(
     for begin in range(0, count, BLOCK):
         end = min(begin + BLOCK, count)
         for k in range(end - begin):
-            tail = robots[begin + k, TAILS:]
-            network_inputs_at(tail, motion[begin + k], own[k])
-            inputs_at(tail, motion[begin + k], inputs[begin + k])
-            of_gap[k, :7], of_gap[k, 7] = inputs[begin + k], np.log(tail[4])
+            robot = robots[begin + k]
+            network_inputs_at(robot, motion[begin + k], own[k])
+            inputs_at(robot, motion[begin + k], inputs[begin + k])
+            of_gap[k, :7], of_gap[k, 7] = inputs[begin + k], np.log(robot[PLACES.number])
         put_novelty(support, own[: end - begin], novelty)
         evaluate(gap, of_gap[: end - begin], share[: end - begin])
         for k in range(end - begin):
@@ -126,9 +126,10 @@ def motions_of(
 @compiled_fast
 def _put_outputs(robot: Floats, motion: Floats, share: float, outputs: Floats) -> None:
     """Write STEADY_OUTPUTS for a gap that is this share of the distance of the clamps."""
-    sense, tail = robot[SENSE], robot[TAILS:]
-    sway, surge, yaw = motion[0] + motion[2] * robot[HEAD_LENGTH] / 2, motion[1], motion[2]
+    sense, number = robot[PLACES.sense], robot[PLACES.number]
+    sway, surge, yaw = motion[0] + motion[2] * robot[PLACES.head_length] / 2, motion[1], motion[2]
     outputs[0], outputs[1], outputs[_YAW_RATE] = sense * motion[4], sense * motion[3], sense * yaw
     outputs[_V_X], outputs[_V_Z], outputs[5] = sense * sway, surge, np.hypot(sway, surge) / abs(yaw)
     outputs[6] = np.degrees(np.arctan2(abs(sway), surge))
-    outputs[7] = share * tail[2] * np.sin(np.pi / tail[4]) / tail[3] if tail[4] > 1 else np.inf
+    gap = share * robot[PLACES.offset] * np.sin(np.pi / number) / robot[PLACES.radius]
+    outputs[7] = gap if number > 1 else np.inf

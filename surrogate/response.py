@@ -32,7 +32,7 @@ from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.domain import INSIDE, NO_RESPONSE
 from surrogate.motions import Motions
 from surrogate.network import BLOCK, Ensemble, Layers, evaluate
-from surrogate.tails import HEAD_LENGTH, INPUTS, NUMBER, TAILS
+from surrogate.tails import INPUTS, PLACES
 
 SHAPES = {
     "lag": (len(DWELLS), 3),
@@ -73,7 +73,7 @@ class ResponseTable:
                 end = first + len(basis.vectors)
                 curve = basis.mean + answer[:, first:end] @ basis.vectors
                 if name == "spread":  # its logarithm was learned, of robots with two tails
-                    curve = np.exp(np.where(robots[:, NUMBER, None] == 2, np.minimum(curve, 0.0), -np.inf))
+                    curve = np.exp(np.where(robots[:, PLACES.number, None] == 2, np.minimum(curve, 0.0), -np.inf))
                 curves[name], first = curve.reshape(-1, *SHAPES[name]) * along_axes(speeds, SHAPES[name]), end
         curves["spread"] = np.abs(curves["spread"])
         return curves
@@ -106,12 +106,12 @@ def along_axes(speeds: Floats, shape: tuple[int, ...]) -> Floats:
 @compiled_fast
 def _put_flip_inputs(robot: Floats, motion: Floats, inputs: Floats, x: Floats, speeds: Floats) -> None:
     """Write the inputs of the networks of a flip (15,), and what their curves are multiplied by (3,)."""
-    tail = robot[TAILS:]
+    head, number = robot[PLACES.head], robot[PLACES.number]
     x[:_INPUTS] = inputs
     for i, place in enumerate(OF_HEAD):
-        x[_INPUTS + i] = tail[6 + place]
-    x[FLIP_INPUTS - 2], x[FLIP_INPUTS - 1] = np.log(tail[4]), 1.0 if tail[4] == 2 else 0.0
-    sway = motion[0] + motion[2] * robot[HEAD_LENGTH] / 2
+        x[_INPUTS + i] = head[place]
+    x[FLIP_INPUTS - 2], x[FLIP_INPUTS - 1] = np.log(number), 1.0 if number == 2 else 0.0
+    sway = motion[0] + motion[2] * robot[PLACES.head_length] / 2
     speeds[0], speeds[1], speeds[2] = np.hypot(motion[1], SMALL_SURGE * sway), sway, motion[2]
 
 
@@ -120,7 +120,7 @@ def flip_inputs(robots: Floats, motion: Floats, inputs: Floats) -> tuple[Floats,
     """Return inputs of the networks (M, 15), and (w, v_x, ω_yr), what the curves are divided by, (M, 3).
 
     Args:
-        robots: (M, 39), see `surrogate.tails.pack_robots`.
+        robots: (M, ROBOT_NUMBERS), see `surrogate.tails.pack_robots`.
         motion: (M, 5).
         inputs: `surrogate.tails.INPUTS`, (M, 7).
     """

@@ -45,8 +45,7 @@ from surrogate.motions import (
 from surrogate.network import Ensemble
 from surrogate.response import ResponseTable, flip_inputs
 from surrogate.tails import (
-    NUMBER,
-    SENSE,
+    PLACES,
     motion_sensitivity,
     needs_no_learning,
     network_inputs,
@@ -143,7 +142,7 @@ class NeuralTable(Shown):
         unknown = ~np.isfinite(curves["lag"]).all((1, 2)) & (motions.outside == INSIDE)
         motions.outside[unknown] = NO_RESPONSE
         self._check_known(values, motions, flag=flag)
-        steady, sense = motions.steady, motions.robots[:, SENSE]
+        steady, sense = motions.steady, motions.robots[:, PLACES.sense]
         twist = twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], sense)
         speed = net_speeds(twist, curves["lag"], curves["memory"])
         none = np.zeros(len(speed), dtype=bool)
@@ -278,7 +277,7 @@ class NeuralTable(Shown):
     def width_features(self, motions: Motions) -> Floats:
         """Return what the width of an interval may depend on, (M, 11), with the spread of the members."""
         several = [network is not None and len(network.bypass) > 1 for network in self.tails.wrench]
-        for k, rows in rows_by_network(network_index(motions.robots[:, NUMBER])) if any(several) else ():
+        for k, rows in rows_by_network(network_index(motions.robots[:, PLACES.number])) if any(several) else ():
             network, motion = self.tails.wrench[k], motions.motion[rows]
             if network is not None and several[k]:
                 robots = unpack_robots(motions.robots[rows])

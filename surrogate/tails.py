@@ -42,6 +42,7 @@ paper's model (arXiv 2103.05712).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -52,7 +53,7 @@ from common.errors import InputError
 from sim.effects import effect_named
 from sim.jit import compiled_fast, formula
 from sim.mechanics.drag import tail_coefficients
-from sim.model.body import head_resistance
+from sim.model.body import head_resistance, places
 from sim.model.groups import Groups
 from sim.solve.assembly import assemble
 from surrogate.domain import ROBOT
@@ -72,10 +73,6 @@ TINY = 1e-30
 MIN_SURGE = 0.05  # of the speed: errors of v_z are relative to this at least
 THRUST, THRUST_SOFT, THRUST_POWER = 0.125, 8.0, 1.35  # of T
 TORQUE_SOFT, TORQUE_POWER = 6.0, -0.125  # of Q
-# Places of a robot's numbers for the compiled loops, see `pack_robots`.
-RESISTANCE, HEAD_LENGTH, SENSE, TAILS, NUMBER = 2, 22, 23, 24, 28
-COUPLE = RESISTANCE + 5 * 2 + 4  # in yaw, of the tails' spin
-ROBOT_NUMBERS = 39
 _ON_TAILS = ("tail_sag",)  # local, but on the tails
 _SENSES = np.array([-1.0, 1.0, -1.0, -1.0, -1.0])  # mirror image of (v_x, v_z, ω_yr, ω_h, ω_t)
 
@@ -101,19 +98,22 @@ class RobotColumns(NamedTuple):
         return RobotColumns(*[part[rows] for part in self])
 
 
+_SHAPES = [{"resistance": (4, 5), "head": (len(HEAD_INPUTS),)}.get(name, ()) for name in RobotColumns._fields]
+PLACES: Any = RobotColumns._make(places(_SHAPES))  # of a robot's numbers for the compiled loops
+ROBOT_NUMBERS = PLACES.head.stop
+COUPLE = PLACES.resistance.start + 5 * 2 + 4  # in yaw, of the tails' spin
+
+
 def pack_robots(robots: RobotColumns) -> Floats:
     """Return robots for the compiled loops, (M, ROBOT_NUMBERS), in the order of the fields."""
-    resistance = robots.resistance.reshape(-1, 20).T
-    rows = [*robots[:RESISTANCE], resistance, *robots[RESISTANCE + 1 : -1], robots.head.T]
-    return np.ascontiguousarray(np.vstack(rows).T)
+    parts = zip(_SHAPES, robots, strict=True)
+    return np.concatenate([part.reshape(len(part), math.prod(shape)) for shape, part in parts], 1)
 
 
 def unpack_robots(packed: Floats) -> RobotColumns:
     """Return packed robots (M, ROBOT_NUMBERS) by field, without copying them."""
-    columns = packed.T
-    resistance = packed[:, RESISTANCE:HEAD_LENGTH].reshape(-1, 4, 5)
-    parts: Any = (columns[0], columns[1], resistance, *columns[HEAD_LENGTH:30], packed[:, 30:])
-    return RobotColumns(*parts)
+    parts = zip(_SHAPES, PLACES, strict=True)
+    return RobotColumns._make(packed[:, place].reshape(len(packed), *shape) for shape, place in parts)
 
 
 def packed_robots(columns: Mapping[str, Floats]) -> tuple[Floats, Floats]:
@@ -165,7 +165,7 @@ def robots_of(columns: Mapping[str, Floats]) -> RobotColumns:
 
 @compiled_fast
 def robots_of_groups(groups: Floats) -> Floats:
-    """Return robots without effects as `pack_robots` packs them, (M, 39).
+    """Return robots without effects as `pack_robots` packs them, (M, ROBOT_NUMBERS).
 
     Args:
         groups: (M, 9), in the order of `surrogate.domain.ROBOT`.
@@ -176,26 +176,21 @@ def robots_of_groups(groups: Floats) -> Floats:
         radius, robot = 1 / l_over_R, robots[row]
         length, offset = L_over_R * radius, a_over_R * radius
         parallel, perp = tail_coefficients(l_over_r0)
-        resistance, tail = robot[RESISTANCE:HEAD_LENGTH], robot[TAILS:]
-        robot[0], robot[1] = abs(speed), 1.0
+        resistance, head = robot[PLACES.resistance], robot[PLACES.head]
+        robot[PLACES.speed], robot[PLACES.gain] = abs(speed), 1.0
         for i, numbers in enumerate(head_resistance(C_t, C_r, C_yr, radius, length)):
             for j, value in enumerate(numbers):
                 resistance[5 * i + j] = value
-        robot[HEAD_LENGTH], robot[SENSE] = length, 1.0 if speed > 0 else -1.0
-        tail[0], tail[1], tail[2], tail[3], tail[4], tail[5] = (
-            perp,
-            parallel,
-            offset,
-            1 / l_over_r0,
-            number,
-            resistance[18],
-        )
+        robot[PLACES.head_length], robot[PLACES.sense] = length, 1.0 if speed > 0 else -1.0
+        robot[PLACES.perp], robot[PLACES.parallel] = perp, parallel
+        robot[PLACES.offset], robot[PLACES.radius] = offset, 1 / l_over_r0
+        robot[PLACES.number], robot[PLACES.spin_drag] = number, resistance[18]
         around = inputs_of_head(
             resistance[0], resistance[6], resistance[12], resistance[18], resistance[2], resistance[3],
             resistance[19], resistance[14], length, 1.0, number * perp, offset,
         )  # fmt: skip
         for i, value in enumerate(around):
-            tail[6 + i] = value
+            head[i] = value
     return robots
 
 

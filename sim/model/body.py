@@ -2,7 +2,7 @@
 
 `Body` is the only list of these numbers. `sim.solve.assembly` fills it for a batch of robots as arrays, with
 effects. The compiled loops get it as numbers, one robot at a time. Packing, unpacking and derivatives follow from
-its fields.
+its fields and their shapes; `PLACES` tells where each is in a row of numbers.
 
 Some effects reach further than one node of a straight, untwisted, elastic tail. Their numbers are in
 `nonlocal_terms`, each under the name of its effect.
@@ -21,8 +21,9 @@ Source: Du, Miller, Jawed (arXiv 2103.05712), hydrodynamic model.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Annotated, Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from itertools import accumulate, pairwise
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
 
@@ -30,14 +31,18 @@ from sim.jit import formula
 
 
 class Meaning(NamedTuple):
-    """Unit and meaning of a number; μ0, l and EI/(μ0 l⁴) are 1 inside the simulator."""
+    """Unit, meaning and shape of an entry; μ0, l and EI/(μ0 l⁴) are 1 inside the simulator."""
 
     unit: str
     words: str
+    shape: tuple[int, ...] = ()
 
 
 class Body(NamedTuple):
-    """One robot, or a batch of B robots while effects are applied; then every entry ends with (B,)."""
+    """One robot, or a batch of B robots while effects are applied; then every entry ends with (B,).
+
+    Single numbers come first.
+    """
 
     omega: Annotated[Any, Meaning("EI/(μ0 l⁴)", "ω̄, motor speed, tails relative to head")]
     offset: Annotated[Any, Meaning("l", "a/l, distance of the clamps from the axis")]
@@ -48,10 +53,10 @@ class Body(NamedTuple):
     viscosity: Annotated[Any, Meaning("μ0", "viscosity of the fluid")]
     zeta_parallel: Annotated[Any, Meaning("μ0", "ζ∥, drag per length along a tail")]
     zeta_perp: Annotated[Any, Meaning("μ0", "ζ⊥, drag per length across a tail")]
-    resistance: Annotated[Any, Meaning("μ0, l", "(4, 5), R of head and disc about J")]
     droop: Annotated[Any, Meaning("1/(μ0 l³)", "speed that the motor loses per torque")]
-    tail_load: Annotated[Any, Meaning("EI/l³", "(3,), force per length on the tails along e_x, e_y, e_z")]
-    nonlocal_terms: Annotated[Any, Meaning("", "numbers of the effects that reach further than one node")]
+    resistance: Annotated[Any, Meaning("μ0, l", "R of head and disc about J", (4, 5))]
+    tail_load: Annotated[Any, Meaning("EI/l³", "force per length on the tails along e_x, e_y, e_z", (3,))]
+    nonlocal_terms: Annotated[Any, Meaning("", "numbers of the effects that reach further than one node", (-1,))]
 
     def plus(self, **parts: Any) -> Body:
         """Add `parts` to the fields of their names."""
@@ -63,6 +68,20 @@ class Body(NamedTuple):
         for place, value in entries.items():
             resistance[place] = resistance[place] + value
         return self._replace(resistance=resistance)
+
+
+def places(shapes: Sequence[tuple[int, ...]]) -> list[Any]:
+    """Tell where entries of these shapes are in a row of numbers: an index of a single number, else a slice."""
+    ends = accumulate(map(math.prod, shapes), initial=0)
+    return [
+        slice(start, None if -1 in shape else end) if shape else start
+        for shape, (start, end) in zip(shapes, pairwise(ends), strict=True)
+    ]
+
+
+SHAPES = Body._make(hint.__metadata__[0].shape for hint in get_type_hints(Body, include_extras=True).values())
+SINGLE = SHAPES.count(())
+PLACES = Body._make(places(SHAPES))
 
 
 @formula

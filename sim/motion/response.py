@@ -16,6 +16,7 @@ from common.arrays import Floats
 from sim.effects import check_effects, effect_named
 from sim.mechanics import planar
 from sim.mechanics.geometry import straight
+from sim.model.body import PLACES
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED, Responses
 from sim.motion.run import REVERSED
@@ -93,7 +94,7 @@ def responses(
             )
         by_robot.append(curves)
     lag, memory, rest, spread = (np.array(column) for column in zip(*by_robot, strict=True))
-    sense = np.sign(rows[:, 0])
+    sense = np.sign(rows[:, PLACES.omega])
     twist = twists(motion.v_z, motion.v_x, motion.omega_yr, sense)
     if not history:
         memory[:], rest[:] = np.nan, np.nan

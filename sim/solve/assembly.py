@@ -7,7 +7,6 @@ Source of the base model: Du, Miller, Jawed (arXiv 2103.05712).
 
 from __future__ import annotations
 
-import math
 from collections import namedtuple
 from typing import Any
 
@@ -16,7 +15,7 @@ import numpy as np
 from common.arrays import Flags, Floats
 from sim.effects import catalogue, effect_named
 from sim.mechanics.drag import tail_coefficients
-from sim.model.body import Body, head_resistance
+from sim.model.body import PLACES, SHAPES, Body, head_resistance
 from sim.model.groups import Groups
 from sim.model.laws import LOCAL_DRAG
 
@@ -24,7 +23,6 @@ from sim.model.laws import LOCAL_DRAG
 _NONLOCAL = {e.term: e for e in (*catalogue().values(), *LOCAL_DRAG.values()) if e.reach == "nonlocal"}
 Nonlocal = namedtuple("Nonlocal", list(_NONLOCAL))  # type: ignore[misc]
 CONTACT = Nonlocal._fields.index("tail_contact") - len(Nonlocal._fields)  # its place in a robot's numbers
-_SHAPES = {"resistance": (4, 5), "tail_load": (3,)}  # of the entries that are not single numbers
 
 
 def assemble(groups: Groups) -> Body:
@@ -92,27 +90,22 @@ def numbers(groups: Groups) -> Floats:
 
 def are_local(rows: Floats) -> Flags:
     """Tell which robots have no effect that reaches further than one node, from their `numbers` (B, K); (B,)."""
-    return np.asarray(~(rows[:, -len(Nonlocal._fields) :] != 0).any(1))
+    return np.asarray(~(rows[:, PLACES.nonlocal_terms] != 0).any(1))
 
 
 def without_further(rows: Floats) -> Floats:
     """Return the `numbers` (B, K) of the same robots with no other non-local effect than contact."""
     plain = rows.copy()
-    plain[:, -len(Nonlocal._fields) :] = 0.0
+    plain[:, PLACES.nonlocal_terms] = 0.0
     plain[:, CONTACT] = rows[:, CONTACT]
     return plain
 
 
 def batch(rows: Floats) -> Body:
     """Return B robots as one `Body` of arrays that end with (B,), from their `numbers` (B, K)."""
-    parts: list[Floats] = []
-    at = 0
-    for name in Body._fields[:-1]:
-        shape = _SHAPES.get(name, ())
-        part = np.ascontiguousarray(rows[:, at : at + math.prod(shape)].T)
-        at += len(part)
-        parts.append(part.reshape(*shape, len(rows)))
-    return Body._make([*parts, Nonlocal(*np.ascontiguousarray(rows[:, at:].T))])
+    parts = (np.ascontiguousarray(rows[:, place].T) for place in PLACES)
+    body = Body._make(part.reshape(*shape, len(rows)) for part, shape in zip(parts, SHAPES, strict=True))
+    return body._replace(nonlocal_terms=Nonlocal(*body.nonlocal_terms))
 
 
 def row(body: Body) -> Floats:

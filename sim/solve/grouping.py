@@ -13,13 +13,13 @@ import numpy as np
 
 from common.arrays import Flags, Floats
 from sim.jit import compiled
-from sim.lanes import lane, lanes, less, named_like, width, zeros
+from sim.lanes import lane, lanes, less, tuple_like, width
 from sim.linear.lane_arrays import take_lane
-from sim.model.body import Body
+from sim.model.body import PLACES, SHAPES, SINGLE, Body
 from sim.solve.assembly import Nonlocal
 
 NAMES = Nonlocal(*[0.0] * len(Nonlocal._fields))  # of the non-local effects, for compiled loops
-_LOCAL = 33  # numbers before those of the non-local effects
+_SINGLE, _LOAD = (0.0,) * SINGLE, (0.0,) * SHAPES.tail_load[0]  # of which only the lengths matter
 AT_ONCE = 128  # robots; their orbits take 40 MB, their flips 50 MB
 
 
@@ -52,7 +52,7 @@ def from_groups(array: Floats, count: int) -> Floats:
 class InLanes(NamedTuple):
     """Robots in groups, for compiled loops."""
 
-    numbers: Floats  # in the order of `sim.solve.assembly.numbers`, (G, K, W)
+    numbers: Floats  # in the order of `Body`, (G, K, W)
     wanted: Floats  # 1 in the lanes of robots that are wanted, else 0, (G, W)
     names: Any  # numbers of the non-local effects of any robot; only their names matter
 
@@ -67,51 +67,36 @@ def robots_in_lanes(rows: Floats, wanted: Flags | None = None) -> InLanes:
 @compiled
 def group_of(robots: InLanes, g: int) -> tuple[Body, Any]:
     """Return the robots of group g as one, and 1 in the lanes of those that are wanted."""
-    return body_in_lanes(lanes(robots.numbers)[g], robots.names), lanes(robots.wanted)[g]
+    return body_of_numbers(lanes(robots.numbers)[g], robots.names), lanes(robots.wanted)[g]
 
 
 @compiled
-def body_in_lanes(numbers: Floats, names: Any) -> Body:
-    """Return the robots of a group as one.
+def body_of_numbers(numbers: Floats, names: Any) -> Body:
+    """Return the robot, or the robots of a group as one.
 
     Args:
-        numbers: in the order of `sim.solve.assembly.numbers`, (K,).
+        numbers: in the order of `Body`, (K,).
         names: numbers of the non-local effects of any robot; only their names matter.
     """
-    v = numbers
-    resistance = zeros(v, (4, 5))
-    for a in range(4):
-        for c in range(5):
-            resistance[a, c] = v[9 + 5 * a + c]
-    terms = named_like(names, v[_LOCAL:])
-    return Body(
-        v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], resistance, v[29], (v[30], v[31], v[32]), terms
-    )
+    resistance = numbers[PLACES.resistance].reshape(SHAPES.resistance)
+    tail_load = tuple_like(_LOAD, numbers[PLACES.tail_load])
+    terms = tuple_like(names, numbers[PLACES.nonlocal_terms])
+    return Body(*tuple_like(_SINGLE, numbers), resistance, tail_load, terms)  # type: ignore[call-arg]
 
 
 @compiled
 def body_of_lane(body: Body, i: int) -> Body:
     """Return the robot in lane i, with plain numbers."""
-    resistance, terms = np.empty((4, 5)), np.empty(len(body.nonlocal_terms))
-    take_lane(resistance, body.resistance, i)
-    for j in range(len(terms)):
-        terms[j] = lane(body.nonlocal_terms[j], i)
-    x, y, z = body.tail_load
-    return Body(
-        lane(body.omega, i),
-        lane(body.offset, i),
-        lane(body.head_radius, i),
-        lane(body.head_length, i),
-        lane(body.tail_radius, i),
-        lane(body.axial_stiffness, i),
-        lane(body.viscosity, i),
-        lane(body.zeta_parallel, i),
-        lane(body.zeta_perp, i),
-        resistance,
-        lane(body.droop, i),
-        (lane(x, i), lane(y, i), lane(z, i)),
-        named_like(body.nonlocal_terms, terms),
-    )
+    terms = body.nonlocal_terms
+    numbers = np.empty(PLACES.nonlocal_terms.start + len(terms))
+    for j, value in enumerate(body[:SINGLE]):
+        numbers[j] = lane(value, i)
+    take_lane(numbers[PLACES.resistance], body.resistance, i)
+    for j, value in enumerate(body.tail_load):
+        numbers[PLACES.tail_load][j] = lane(value, i)
+    for j, value in enumerate(terms):
+        numbers[PLACES.nonlocal_terms][j] = lane(value, i)
+    return body_of_numbers(numbers, terms)
 
 
 @compiled

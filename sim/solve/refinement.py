@@ -22,7 +22,7 @@ import numpy as np
 
 from common.arrays import Flags, Floats, Integers
 from sim.linear.spectral import with_phases
-from sim.model.body import Body
+from sim.model.body import PLACES, Body
 from sim.solve.assembly import CONTACT, are_local, batch, row, without_further
 from sim.solve.grouping import by_kind
 from sim.solve.orbit import mean_motion, residuals_on_orbits, solve_orbits_in_place, straight_starts, turns_forward
@@ -197,7 +197,7 @@ def coarse_orbits(rows: Floats, tails: int, least: int = PHASES) -> list[Coarse]
     found = [Coarse(MANY_PHASES, np.nan, *none)] * len(rows)
     if tails > MOST_PHASES or not len(rows):
         return found
-    going = np.lexsort((np.abs(rows[:, 0]), ~are_local(rows)))  # similar robots share groups
+    going = np.lexsort((np.abs(rows[:, PLACES.omega]), ~are_local(rows)))  # similar robots share groups
     numbers = without_further(rows)
     x, u = straight_starts(numbers[going], MESHES[0], phases, tails)
     touching = numbers[going, CONTACT] != 0
@@ -242,17 +242,17 @@ def _from_a_slow_motor(rows: Floats, x: Floats, u: Floats, tails: int) -> tuple[
     Args:
         x, u: straight tails, (B, n, M, 3) and (B, P, 4).
     """
-    omega, soft = rows[:, 0], rows.copy()
+    omega, soft = rows[:, PLACES.omega], rows.copy()
     soft[:, CONTACT] *= _SOFT
     speed, factor = np.minimum(_SLOW / np.abs(omega), 1.0), np.full(len(rows), _FASTER)
-    soft[:, 0] = speed * omega
+    soft[:, PLACES.omega] = speed * omega
     x, u = x.copy(), u * speed[:, None, None]
     sizes = solve_orbits_in_place(soft, x, u, _START)
     going = np.flatnonzero((sizes < _START) & (speed < 1))
     while len(going):
         factor[going] = np.minimum(factor[going], 1 / speed[going])
         faster = soft[going]
-        faster[:, 0] = speed[going] * factor[going] * omega[going]
+        faster[:, PLACES.omega] = speed[going] * factor[going] * omega[going]
         new_x, new_u = x[going], factor[going, None, None] * u[going]
         solved = solve_orbits_in_place(faster, new_x, new_u, _START) < _START
         done, failed = going[solved], going[~solved]

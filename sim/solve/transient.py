@@ -32,7 +32,7 @@ from sim.linear.lane_arrays import add_chosen, choose_all, combine, copy, larges
 from sim.linear.spectral import differentiation
 from sim.model.body import Body
 from sim.solve.assembly import are_local
-from sim.solve.grouping import NAMES, body_in_lanes, by_kind
+from sim.solve.grouping import NAMES, body_of_numbers, by_kind
 from sim.solve.lag import advance_lag, between, turning
 from sim.solve.march import GAMMA
 from sim.solve.newton import Workspace, correct, largest_move, move, new_workspace
@@ -163,7 +163,7 @@ def _follow(flips: Flip, names: Any, marks: Floats, times: Floats, tolerance: fl
     for i in range(count):
         _load(flips, min(i, robots - 1), i, numbers, twist, at, progress)
     started = min(count, robots)
-    body = body_in_lanes(numbers, names)
+    body = body_of_numbers(numbers, names)
     work = new_workspace(in_transient(1.0, by_phase, at.x), at.x, at.u)
     now, dt = zeros(numbers, (1,))[0], _first_step(body)
     goal, going = now, now
@@ -198,7 +198,7 @@ def _follow(flips: Flip, names: Any, marks: Floats, times: Floats, tolerance: fl
                 else:
                     going = with_lane(going, i, 0.0)
         if started > before:
-            body = body_in_lanes(numbers, names)
+            body = body_of_numbers(numbers, names)
             dt, going = choose(less(going, 0.0), _first_step(body), dt), abs(going)
     return found
 

@@ -18,7 +18,7 @@ from surrogate.held_out import error_scale, shortcomings, summary
 from surrogate.intervals import NOVELTY, Intervals
 from surrogate.response import Basis
 from surrogate.table_file import load
-from surrogate.tails import COUPLE, NUMBER, ROBOT_NUMBERS
+from surrogate.tails import COUPLE, PLACES, ROBOT_NUMBERS
 from tests.surrogate.small import table
 
 ERRORS = {name: {"rms": 0.002} for name in (*STEADY, "lag_z", "lag_x", "lag_psi_rad")}
@@ -52,7 +52,7 @@ def sampled(
     """Draw features with values from 0 to 1, and packed robots, with errors of that size."""
     features, robots = random.uniform(size=(count, 11)), np.zeros((count, ROBOT_NUMBERS))
     robots[:, 0] = random.uniform(size=count)
-    robots[:, NUMBER], robots[:, COUPLE] = random.integers(1, 9, count), random.uniform(size=count) < 0.5
+    robots[:, PLACES.number], robots[:, COUPLE] = random.integers(1, 9, count), random.uniform(size=count) < 0.5
     return features, size(features, robots) * random.standard_normal(count), robots
 
 
@@ -75,7 +75,7 @@ def test_intervals_cover_as_they_say() -> None:
 
 
 GROUPED = {
-    "tails": lambda x, robots: 1 + 20 * (robots[:, NUMBER] == 2),
+    "tails": lambda x, robots: 1 + 20 * (robots[:, PLACES.number] == 2),
     "couple": lambda x, robots: 1 + 4 * robots[:, COUPLE],
     "speed": lambda x, robots: 1 + 8 * (robots[:, 0] > 2 / 3),
     "novelty": lambda x, robots: 1 + 8 * (np.abs(x[:, NOVELTY] - 0.4) < 0.1),
@@ -87,7 +87,7 @@ def test_intervals_cover_in_each_group(kind: str) -> None:
     """Errors that are large in some groups, which the local width does not know or cannot follow."""
     test, robots, inside = covered(GROUPED[kind])
     third = np.searchsorted([1 / 3, 2 / 3], robots[:, 0])
-    group = np.column_stack([robots[:, NUMBER], robots[:, COUPLE], third, test[:, NOVELTY] > 0.5])
+    group = np.column_stack([robots[:, PLACES.number], robots[:, COUPLE], third, test[:, NOVELTY] > 0.5])
     shares = [inside[(group == own).all(1)].mean() for own in np.unique(group, axis=0)]
     assert len(shares) == 96
     assert min(shares) > 0.8
@@ -97,9 +97,9 @@ def test_intervals_cover_in_each_group(kind: str) -> None:
 
 def test_a_group_of_few_robots_has_the_intervals_of_all_robots_with_as_many_tails() -> None:
     """Groups of 17 robots; with as many tails there are 200."""
-    _, robots, inside = covered(lambda x, robots: 1 + 20 * (robots[:, NUMBER] == 2), 1600)
+    _, robots, inside = covered(lambda x, robots: 1 + 20 * (robots[:, PLACES.number] == 2), 1600)
     for tails in range(1, 9):
-        assert 0.85 < inside[robots[:, NUMBER] == tails].mean() < 0.95
+        assert 0.85 < inside[robots[:, PLACES.number] == tails].mean() < 0.95
 
 
 def test_figures_of_errors_and_a_table_of_few_rows_that_says_that_it_is_poor() -> None:
