@@ -49,7 +49,7 @@ function declarations(text) {
 const MOST_NUMBERS = 50_000, DEEPEST = 100;
 const SVG = "{http://www.w3.org/2000/svg}", XLINK = "{http://www.w3.org/1999/xlink}href";
 const VISIBLE = new Map(Object.entries({ visible: true, hidden: false, collapse: false }));
-const TRANSPARENT = /^(?:0*\.?0+%?|-.*)$/;
+const TRANSPARENT = /^(?:(?:0+(?:\.0+)?|\.0+)%?|-.*)$/;
 
 /* The shapes of a drawing, and the lengths that it was read with, which tell whether its pixels have a size. */
 class Drawing {

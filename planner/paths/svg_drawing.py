@@ -77,7 +77,7 @@ _TRANSFORM = re.compile(
     re.IGNORECASE,
 )
 _ASPECT = re.compile(r"(?:none|x(Min|Mid|Max)Y(Min|Mid|Max))(?:\s+(?:meet|slice))?")
-_TRANSPARENT = re.compile(r"0*\.?0+%?|-.*")
+_TRANSPARENT = re.compile(r"(?:0+(?:\.0+)?|\.0+)%?|-.*")
 _COMMENT = re.compile(r"/\*.*?(?:\*/|\Z)|<!--|-->", re.DOTALL)
 _NO_RULE = re.compile(r"@(?:charset|namespace)[^;{}@]*;|@font-face\s*\{[^{}]*\}", re.IGNORECASE)
 _RULE = re.compile(r"(?<![^{}])([^{}]*)\{([^{}]*)\}")
