@@ -140,48 +140,32 @@ def test_a_place_that_cannot_be_written_is_refused_before_a_film_is_tracked(
     assert re.search("is a (file; give a folder|folder; give the name of a file)", capsys.readouterr().err)
 
 
-def test_frames_that_the_camera_dropped_are_gaps_in_the_time_stamps(tmp_path: Path) -> None:
-    """A GIF has a duration for each frame."""
-    from PIL import Image
-
-    pictures = [Image.fromarray(np.full((32, 48, 3), 10 * k, np.uint8)) for k in range(8)]
-    times = [100, 100, 300, 100, 100, 200, 100, 100]
-    pictures[0].save(tmp_path / "film.gif", save_all=True, append_images=pictures[1:], duration=times)
-    seen = [frame.time_s for frame in Film(tmp_path / "film.gif").frames()]
-    assert seen == pytest.approx([0, 0.1, 0.2, 0.5, 0.6, 0.7, 0.9, 1.0])
-
-
 def test_films_that_cannot_be_used_are_refused_with_what_to_change(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     bare = Tank(width=320, height=240, scale=0.001, colours=("", "", "", ""))
     view = setup_of(small(), tmp_path)
     nothing = bare.film(tmp_path / "bare.mp4", SWUM, 1.0, RATE)
-    with pytest.raises(InputError, match=r"no robot 1 in 12 frames \(no red\): give its markers as they look"):
+    with pytest.raises(InputError, match=r"no robot 1 in 12 frames \(no red\)"):
         track_film(nothing, view)
     good = small().film(tmp_path / "good.mp4", SWUM, 1.0, RATE)
-    with pytest.raises(
-        InputError, match=r"bands are 4.4 cm apart, and the head of the robot is 0.6 cm long: correct"
-    ):
-        track_film(good, view, head_length=LENGTH / 10)
-    with pytest.raises(InputError, match=r"bands are 4.4 cm apart, and the head of the robot is 60 cm long"):
-        track_film(good, view, head_length=10 * LENGTH)
+    for length, told in ((LENGTH / 10, "0.6 cm"), (10 * LENGTH, "60 cm")):
+        with pytest.raises(InputError, match=rf"bands are 4.4 cm apart, .* {told} long"):
+            track_film(good, view, head_length=length)
     stopped = Film(good)
     seen = stopped._open()
     frozen = SimpleNamespace(grab=seen.grab, retrieve=seen.retrieve, get=lambda key: 40.0)
     monkeypatch.setattr(stopped, "_open", lambda: frozen)
-    with pytest.raises(InputError, match=r"good\.mp4: the time stamp of frame 1 is not after the one before"):
+    with pytest.raises(InputError, match=r"good\.mp4: the time stamp of frame 1"):
         list(stopped.frames())
     failing = SimpleNamespace(grab=seen.grab, retrieve=lambda: 1 / 0, get=seen.get)
     monkeypatch.setattr(stopped, "_open", lambda: failing)
     with pytest.raises(ZeroDivisionError):  # what happens in the thread that decodes
         list(stopped.frames())
     apart = replace_robots(view, apart=0.06)
-    with pytest.raises(
-        InputError, match=r"\(red and green at a wrong distance\): correct \[scale\] in view\.toml, or"
-    ):
+    with pytest.raises(InputError, match=r"at a wrong distance\): correct \[scale\] in view\.toml"):
         track_film(good, apart)
-    with pytest.raises(InputError, match=r"no frame between 5 and 9 s; the film has 12 frames"):
+    with pytest.raises(InputError, match="no frame between 5 and 9 s"):
         track_film(good, view, start=5, end=9)
     (tmp_path / "text.mp4").write_text("no film")
     with pytest.raises(InputError, match=r"text\.mp4 is no film that can be read"):
@@ -312,7 +296,7 @@ def test_a_robot_whose_front_and_rear_are_exchanged_is_named_and_its_runs_are_re
         if front == "red":
             measure_tracks(tracked.tables["1"], RUNS)
             continue
-        with pytest.raises(InputError, match=r"all runs swim tail first, .*: front and rear are exchanged; of a"):
+        with pytest.raises(InputError, match=r"all runs swim tail first, .* front and rear"):
             measure_tracks(tracked.tables["1"], RUNS)
 
 
@@ -394,7 +378,7 @@ def test_mirrored_and_slow_films_are_named_when_runs_are_measured(
     assert turn_sense(tracked.tables["1"]) == (-1 if mirrored else 1)
     table, slow = tracked.tables["1"], [note for note in tracked.notes if "aliasing" in note]
     if mirrored:
-        with pytest.raises(InputError, match=r'all runs turn to the other side .* of a film looks = "up"'):
+        with pytest.raises(InputError, match=r'other side .* looks = "up"'):
             measure_tracks(table, runs)
         assert not slow
         return
@@ -443,7 +427,7 @@ def test_what_comes_after_a_hole_in_an_avi_is_refused_since_it_comes_too_early(t
     path.write_bytes(hole)
     (tmp_path / "film.mp4").write_bytes(hole)
     for name, start, end in (("film.avi", 0, math.inf), ("film.mp4", 0, math.inf), ("film.avi", 3.5, 4.5)):
-        with pytest.raises(InputError, match=r"states 60 frames, \d\d can be read: an AVI has no time stamps, so"):
+        with pytest.raises(InputError, match=r"states 60 frames, \d\d can be read"):
             track_film(tmp_path / name, setup, start=start, end=end)
     assert len(track_film(path, setup, end=2.0).tables["1"]) == 21
 

@@ -38,7 +38,7 @@ def test_bad_samples_and_short_tracks_are_named() -> None:
 
 
 def test_headings_in_radians_are_refused() -> None:
-    with pytest.raises(InputError, match=r"run 1: heading_deg turns by .* the headings seem to be in radians"):
+    with pytest.raises(InputError, match=r"run 1: heading_deg .* radians"):
         measure_tracks(track(0).assign(heading_deg=lambda t: np.radians(t["heading_deg"])), RUNS)
     straight = track(1, rate=0.002, wobble=0.0).assign(heading_deg=lambda t: 0.5 + 0.02 * t["time_s"])
     measure_tracks(straight, RUNS.assign(omega_rpm=150.0))
@@ -67,7 +67,7 @@ def test_tracks_in_other_units_are_converted() -> None:
     assert [note.split(" converted")[0].split(" read")[0] for note in seen.converted] == [
         "column t [ms]", "column X (mm)", "column Y (mm)", "column heading_rad", "column rpm",
     ]  # fmt: skip
-    with pytest.raises(InputError, match="column 'x' has no unit; name it one of x_m, x_cm"):
+    with pytest.raises(InputError, match=r"'x' has no unit; .* x_m, x_cm"):
         measure_tracks(given.rename(columns={"x_cm": "x"}), RUNS)
 
 
@@ -120,7 +120,7 @@ def test_tracks_are_compared_with_the_robot_as_given() -> None:
     ):
         with pytest.raises(InputError, match=words):
             measure_tracks(wrong, runs, robot=ROBOT)
-    with pytest.raises(InputError, match="no column 'l_cm'; the comparison with a robot needs it"):
+    with pytest.raises(InputError, match="no column 'l_cm'"):
         measure_tracks(samples, runs.drop(columns="l_cm"), robot=ROBOT)
 
 
@@ -183,7 +183,7 @@ def test_names_of_runs_are_compared_as_text_and_rows_without_are_named() -> None
         assert measure_tracks(named, RUNS).excluded == ["1 samples have no name of a run"]
         with pytest.raises(InputError, match="row 1 of the runs has no name of a run"):
             measure_tracks(track(0), RUNS.assign(run=pd.Series([blank], dtype=object)))
-    with pytest.raises(InputError, match="no run has a track: the runs are run 1; the tracks are 1"):
+    with pytest.raises(InputError, match=r"no run has a track: .* run 1; .* 1"):
         measure_tracks(track(0), RUNS.assign(run="run 1"))
     with pytest.raises(InputError, match="run 1 is there twice"):
         measure_tracks(track(0), pd.concat([RUNS, RUNS.assign(run="1.0")]))

@@ -134,6 +134,7 @@ BAD_TABLES = {
     "disc without radius": (table(a_over_R=0), "a_over_R = 0 in row 1; it must be above 0"),
     "no tails": (table(N=0), "N = 0"),
     "half a tail": (table(N=2.5), "N = 2.5"),
+    "too many tails": (table(N=65), "N = 65"),
     "nan": (table(C_t="nan"), "C_t = nan"),
     "text": (table(C_t="three"), "C_t"),
     "integer beyond floats": (table(C_t="1" * 400), "C_t = inf in row 1"),

@@ -1,4 +1,4 @@
-"""docs/reference/signs.md and the simulator agree: its table, slip angle, camera, header, the bench."""
+"""docs/reference/signs.md and the simulator agree: its table, slip angle, camera, the bench."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import pytest
 
 import softflagella as sf
 from camera.measured_runs import measure_tracks
-from planner.files.headers import schedule_template
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
@@ -103,11 +102,6 @@ def test_the_picture_of_a_camera(above: bool) -> None:
     assert measured["theta_deg"][0] == pytest.approx(67.1, abs=0.5)
     with pytest.raises(sf.InputError, match="turn to the other side"):
         measure_tracks(picture, runs, y_down=not above)
-
-
-def test_the_c_header_says_the_same() -> None:
-    said = " ".join(schedule_template().replace("*", "").split())
-    assert "turns the tails clockwise relative to the head, seen from behind. The robot then turns left" in said
 
 
 def test_five_seconds_at_plus_one_turn_left_on_the_bench() -> None:

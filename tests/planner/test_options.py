@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -41,17 +40,3 @@ def test_poses_places_and_times() -> None:
             places_of(bad, "cm", CONTROL)  # type: ignore[arg-type]
     assert seconds_of("1h20min", "--for") == seconds_of(4800.0, "--for") == 4800
     assert seconds_of(None, "--for") is None
-
-
-@pytest.mark.parametrize(
-    ("options", "expected"),
-    [
-        ({"walls": "circle:0,0,3l"}, "--walls 'circle:0,0,3l'; give a box or an outline"),
-        ({"tolerance": "5"}, "--tolerance: 5 has no unit"),
-        ({"camera": ("0.02l", "x", "1", "2", "0.1")}, "RAD, EVERY, LATE, LOST are numbers"),
-    ],
-)
-def test_words_that_cannot_be(options: dict[str, Any], expected: str) -> None:
-    with pytest.raises(InputError) as refusal:
-        request_of(options, CONTROL)
-    assert expected in str(refusal.value)

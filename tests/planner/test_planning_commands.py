@@ -74,6 +74,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("plan square:3l --keep-out circle:9cm,0,2 R", "circle:9cm,0,2: 2 has no unit"),
         ("plan square:3l --keep-out box:0,0,2l R", "write box"),
         ("plan square:3l --walls path.csv R", "path.csv: its lengths have no unit"),
+        ("plan square:3l --walls circle:0,0,3l R", "give a box or an outline"),
         ("track circle:1l --start 1 0 0 R", "--start: 1 has no unit"),
         ("track circle:1l --noise 1 R", "--noise: 1 has no unit"),
         ("goal --goal 300 200 0 R", "--goal: 300 has no unit"),

@@ -16,7 +16,7 @@ from common.errors import run_command
 from common.keywords import keywords_of
 from softflagella.__main__ import WORDS, command, further, main, packages, program_of
 from softflagella.shadowing import COMMANDED
-from tests.processes import LIMIT
+from tests.processes import LIMIT, ROOT
 
 LONG = {"Orbit", "Swim", "TrackingError", "Trip", "hold", "load_goal", "tabulate"}
 NAMES = [name for name in sf.__all__ if not name.startswith("_")]
@@ -39,9 +39,7 @@ def test_a_wrong_keyword_is_refused_with_a_proposal() -> None:
     assert len(functions) > 30
     for function in functions:
         *_, known = keywords_of(function)
-        with pytest.raises(
-            sf.InputError, match=rf"{function.__name__} has no keyword '{known}x'; is it {known}\?"
-        ):
+        with pytest.raises(sf.InputError, match=rf"{function.__name__} .*'{known}x'; is it {known}\?"):
             function(**{f"{known}x": 1})
     with pytest.raises(sf.InputError, match="plan has no keyword 'colour'; there are path, robot, "):
         sf.plan(sf.circle(2.0), "paper-control", colour="red")  # type: ignore[call-arg]
@@ -69,16 +67,13 @@ def test_one_command_has_those_of_all_packages(capsys: pytest.CaptureFixture[str
     assert len(named) == len(commands) + 2  # each has one name; calibrate and demo are of no package
 
 
-def test_words_are_commands_of_packages_and_stand_first(capsys: pytest.CaptureFixture[str]) -> None:
-    assert {"steady", "plan", "sweep", "train", "calibrate", "replay", "query"} <= set(WORDS)
+def test_words_are_commands_of_packages(capsys: pytest.CaptureFixture[str]) -> None:
     main([])
-    lines = capsys.readouterr().out.splitlines()
-    places = [next(i for i, line in enumerate(lines) if line.startswith(f"  {word} ")) for word in WORDS]
-    assert places == sorted(places)
-    assert max(places) < lines.index("further commands, by package (softflagella PACKAGE COMMAND …):")
+    listed = capsys.readouterr().out
     for word, (package, name) in WORDS.items():
         packaged = program_of(package).commands[name]
         assert command(word) is packaged
+        assert f"\n  {word} " in listed
         with pytest.raises(SystemExit) as ended:
             main([word, "--help"])
         assert ended.value.code == 0
@@ -158,7 +153,7 @@ def test_commands_and_answers_from_python_load_what_they_need(tmp_path: Path) ->
     """A replay writes a table; training looks at its files before it loads torch."""
     done = subprocess.run(
         [sys.executable, "-c", CODE, str(tmp_path)],
-        capture_output=True, text=True, timeout=LIMIT, cwd=Path(__file__).parents[2],
+        capture_output=True, text=True, timeout=LIMIT, cwd=ROOT,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "track.csv").exists()

@@ -208,9 +208,7 @@ def test_a_head_without_side_force_has_no_learned_response() -> None:
 
 REFUSED: list[tuple[dict[str, float], str]] = [
     ({"omega_bar": 2000.0}, "row 1 is outside the look-up table.*omega_bar = 2000, learned were"),
-    ({"C_yr": 900.0, "C_t": 0.01}, "outside the look-up table"), ({"omega_bar": 0.0}, "the motor must turn"),
-    ({"C_t": -1.0}, "must be above 0"), ({"C_r": float("nan")}, "must be a finite number"),
-    ({"N": 2.5}, "integer from 1 to 64"), ({"N": 65.0}, "integer from 1 to 64"), ({"l_over_r0": 4.0}, "slender"),
+    ({"C_yr": 900.0, "C_t": 0.01}, "outside the look-up table"), ({"N": 65.0}, "integer from 1 to 64"),
     ({"nonsense": 1.0}, "unknown column 'nonsense'"), ({"N": 1.0, DWELL: 1.0}, "the response of one tail"),
     ({DWELL: 0.1}, "give a dwell from 0.2 on"), ({DWELL: float("inf")}, "give a dwell from 0.2 on"),
     ({DWELL: 0.1, "omega_bar": 2000.0}, "outside the look-up table"),
@@ -233,19 +231,6 @@ def test_words_missing_columns_and_one_robot_of_several_are_refused() -> None:
     with pytest.raises(OutsideError) as refused:
         load().query({**three, "omega_bar": three["omega_bar"] * [1, 1, 300]})
     assert refused.value.row == 2
-
-
-def test_a_reversed_motor_mirrors_the_answer() -> None:
-    robots = robots_inside()
-    forward = table().query(robots)
-    backward = table().query({**robots, "omega_bar": -robots["omega_bar"]})
-    for name in ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x"):
-        assert np.allclose(backward[name], -forward[name])
-    for name in ("v_z", "R_yr_over_l", "theta_deg", "tail_gap"):
-        assert np.allclose(backward[name], forward[name])
-    robots["dwell_bar"] = np.full(len(robots["N"]), 1.0)
-    other = {**robots, "omega_bar": -robots["omega_bar"]}
-    assert np.allclose(table().query(robots)["net_speed_bar"], table().query(other)["net_speed_bar"])
 
 
 def test_derivatives_are_those_of_wider_differences() -> None:

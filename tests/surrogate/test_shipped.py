@@ -158,9 +158,7 @@ def test_a_drag_number_that_was_not_learned_is_outside(tails: float, count: int)
 
 
 REFUSED: list[tuple[dict[str, float], str]] = [
-    ({"omega_bar": 3000.0}, "omega_bar = 3000"), ({"N": 2.5}, "N = 2.5"), ({"C_t": -1.0}, "C_t = -1"),
-    ({"C_t": float("nan")}, "C_t = nan"), ({"colour": 1.0}, "unknown column"),
-    ({"dwell_bar": 0.001}, "dwell_bar = 0.001"), ({"tail_sag": 0.1}, "tail_sag changes more than head"),
+    ({"omega_bar": 3000.0}, "omega_bar = 3000"), ({"colour": 1.0}, "unknown column"),
     ({"law_tail_sag_speed100_length0_tails0": 0.1}, "law_tail_sag_speed100_length0_tails0 changes more than head"),
 ]  # fmt: skip
 

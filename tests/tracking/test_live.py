@@ -21,7 +21,7 @@ from planner.files.plan_files import write_plan
 from planner.paths.distance import distance_to
 from planner.planning.request import POSE
 from tests.planner.plans import planned
-from tests.processes import LIMIT
+from tests.processes import LIMIT, ROOT
 from tracking import live
 from tracking.live import REPEAT, Clock, Motor, Pictures, Ride, Sight, steer
 from tracking.swim import SteppedSwimmer
@@ -205,7 +205,7 @@ def test_the_program_ends_where_a_camera_hangs() -> None:
         "with Pictures(lambda now: iter(threading.Event().wait, 0)) as pictures:\n    pictures.get(0.01)\n"
     )
     words = [sys.executable, "-c", code]
-    ended = subprocess.run(words, capture_output=True, text=True, timeout=LIMIT, cwd=Path(__file__).parents[3])
+    ended = subprocess.run(words, capture_output=True, text=True, timeout=LIMIT, cwd=ROOT)
     assert ended.stderr.splitlines()[-1] == "TimeoutError"
 
 
@@ -238,13 +238,13 @@ def test_cameras_that_fail_and_robots_that_are_not_named(tmp_path: Path, monkeyp
     view = str(tmp_path / "view.toml")
     seen = list(live.watch("film.avi", view, "robot", 0.11, 0.25)(lambda: 1.0))
     assert seen == [Sight(0.75, None, "a damaged picture")] * 2
-    with pytest.raises(InputError, match="--camera /dev/video0: no picture comes any more; check its cable"):
+    with pytest.raises(InputError, match="--camera /dev/video0: no picture comes"):
         list(live.watch("/dev/video0", view, "robot", 0.11, 0.0)(lambda: 1.0))
     robots = "".join(f'[[robots]]\nname = "{n}"\nfront = "{f}"\nrear = "{r}"\n'
                      for n, f, r in (("one", "red", "blue"), ("two", "green", "magenta")))  # fmt: skip
     Path(view).write_text(tank.Tank().view_toml(robots=robots))
     assert len(list(live.watch("film.avi", view, "two", 0.11, 0.0)(lambda: 1.0))) == 2
-    with pytest.raises(InputError, match="several robots, one, two; call the one that swims 'robot'"):
+    with pytest.raises(InputError, match=r"several robots, one, two; .*'robot'"):
         live.watch("film.avi", view, "robot", 0.11, 0.0)
 
 
@@ -255,7 +255,7 @@ def test_a_camera_that_is_not_there_is_refused_in_one_line(
     from tests.oracles import tank
 
     (tmp_path / "view.toml").write_text(tank.Tank().view_toml())
-    with pytest.raises(InputError, match="--camera 77: no such camera, or another program has it"):
+    with pytest.raises(InputError, match="--camera 77: no such camera"):
         live.watch("77", str(tmp_path / "view.toml"), "robot", 0.11, 0.0)
     assert capfd.readouterr().err == ""
 
@@ -295,7 +295,7 @@ def tracking(folder: Path, port: str) -> subprocess.Popen[str]:
     words = ["--camera", str(folder / "film.avi"), "--view", str(folder / "view.toml"), "--serial", port]
     return subprocess.Popen(
         [sys.executable, "-m", "softflagella", "track", str(folder / "plan.json"), *words],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=Path(__file__).parents[3],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT,
         preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),  # ignored in the background of a shell
     )  # fmt: skip
 

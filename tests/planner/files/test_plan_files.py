@@ -185,7 +185,7 @@ def test_tracks_of_another_program_are_read_as_options_say(
         assert check(json_file, file, **options, origin=(900.0, 700.0)).rms == wanted.rms
     assert [each.filename for each in warned] == [__file__]
     file.write_bytes(two_robots())
-    with pytest.raises(InputError, match="there are 2 tracks, of swim one, swim two …; give that of one robot"):
+    with pytest.raises(InputError, match="2 tracks, of swim one, swim two"):
         check(tracks()[0], file, **options)
 
 
@@ -197,12 +197,12 @@ def test_the_track_of_another_robot_or_plan_is_refused() -> None:
         for size in (100 * CONTROL.tail_length, 15.0)
     )
     assert tracking_error(record, own).rms == tracking_error(record, track).rms
-    with pytest.raises(InputError, match=r"x_over_l and x_cm of the track disagree with .* tail length, 11 cm"):
+    with pytest.raises(InputError, match=r"x_over_l and x_cm .* disagree .* 11 cm"):
         tracking_error(record, other)
     own = track.assign(plan_id=record["id"]).astype({"plan_id": object})
     own.loc[3, "plan_id"] = None
     assert tracking_error(record, own).rms == tracking_error(record, track).rms
-    with pytest.raises(InputError, match=f"the track is of plan p0123456789a, not of {record['id']}"):
+    with pytest.raises(InputError, match=f"of plan p0123456789a, not of {record['id']}"):
         tracking_error(record, track.assign(plan_id="p0123456789a"))
 
 

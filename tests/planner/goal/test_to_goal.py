@@ -228,8 +228,5 @@ def test_a_wall_without_a_gap_leaves_no_way(gap: float) -> None:
 
 def test_a_goal_inside_a_region_is_refused_with_the_distance() -> None:
     limits = RouteLimits(RADIUS, BODY, FreeSpace((Circle(5, 0, 1),)), STILL)
-    pivot = r"at the goal, .* \(55\.00, 0\.00\) cm = \(.*\) l, "
-    with pytest.raises(
-        NoWayError, match=pivot + r".* cm \(.* l\) inside what it must keep out of; it needs 1\.1 cm \(0\.1 l\)"
-    ):
+    with pytest.raises(NoWayError, match=r"at the goal, .*55\.00, 0\.00.* inside .*; it needs 1\.1 cm"):
         route([stop(0, 0, 0), stop(5, 0, 0)], limits, 0.1, {}, CONTROL)

@@ -103,12 +103,6 @@ def test_paths_have_the_names_of_their_shapes_and_files(tmp_path: Path, monkeypa
 FILES = {file.stem: file for file in sorted(FOLDER.glob("*.js"))}
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_a_file_can_be_joined_and_says_what_it_is(name: str) -> None:
-    read_module(FILES[name])
-    assert FILES[name].read_text().startswith("/* ")
-
-
 def test_each_constant_of_python_is_used_and_each_that_is_used_is_pythons() -> None:
     text = "\n".join(file.read_text() for file in FILES.values())
     taken = {(group, word.split(":")[0].strip())

@@ -132,14 +132,6 @@ def test_a_replay_turns_at_the_rate_of_each_direction() -> None:
         assert turned[0] == pytest.approx(rate, rel=0.01)
 
 
-@pytest.mark.parametrize("tails", [2.0, 4.0])
-def test_a_replay_turns_as_fast_as_the_steady_motion(tails: float) -> None:
-    track = replay(Schedule({**CONTROL_VALUES, "N": tails}, 1, np.array([12.0]), (0.0, 0.0, 0.0), 1.0))
-    late = track[track["time_bar"] > 4]
-    rate = np.polyfit(late["time_bar"], late["heading_rad"], 1)[0]
-    assert rate == pytest.approx(steady(control(N=tails)).omega_yr[0], rel=1e-3)
-
-
 def test_a_replay_begins_at_the_start_and_ends_with_the_last_dwell() -> None:
     schedules = [
         Schedule(CONTROL_VALUES, 1, np.array([0.8, 1.2, 0.9]), (1.0, 2.0, 0.5), 2.0),

@@ -174,16 +174,6 @@ def test_lab_units_agree_with_each_other() -> None:
         assert lab[name][1] == pytest.approx(ratio * lab[name][0])
 
 
-def test_the_lines_say_what_the_columns_hold() -> None:
-    motion = motion_of()
-    lab = lab_motion([ROBOT], motion)
-    lines = describe_motion(ROBOT, motion).splitlines()
-    assert lines[0] == "paper-control: 2 tails of 11 cm, motor at 43.26 rpm, fluid of 1.49 Pa s"
-    assert f"{lab['v_cm_s'][0]:.4g} cm/s" in lines[6]
-    assert f"({motion['R_yr_over_l'][0]:.4g} l)" in lines[4]
-    assert lines[-1].endswith(f"{100 * motion['error'][0]:.2g} %")
-
-
 def test_numbers_with_a_large_error_are_not_written_like_others() -> None:
     motion = {**motion_of(), "error": np.array([0.35])}
     lines = describe_motion(ROBOT, motion).splitlines()

@@ -54,7 +54,7 @@ def test_a_path_in_any_form_has_its_unit(tmp_path: Path) -> None:
     ):  # fmt: skip
         assert sf.plan(path, CONTROL, unit=unit, objective="flips").drawn.length == pytest.approx(12.0)
     for path in (tmp_path / "l.csv", sf.read_path(tmp_path / "l.csv"), "square:3"):
-        with pytest.raises(sf.InputError, match="have no unit; write it behind them, 24cm or 3l"):
+        with pytest.raises(sf.InputError, match="have no unit"):
             sf.plan(path, CONTROL)
     with pytest.raises(sf.InputError, match=r"unit 'inch'; allowed are l, m, cm, mm"):
         sf.plan("square:3", CONTROL, unit="inch")
