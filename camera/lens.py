@@ -77,6 +77,7 @@ def calibrate_lens(pictures: Sequence[str | Path], *, squares: str = "10x7") -> 
                 )
         good, corners = cv2.findChessboardCornersSB(picture, (across, down), flags=flags)
         if good:
+            # The window of the refinement must not reach the next corner.
             steps = np.linalg.norm(np.diff(corners.reshape(down, across, 2), axis=1), axis=2)
             reach = max(int(steps.min() / 3), 2)
             corners = cv2.cornerSubPix(picture, corners, (reach, reach), (-1, -1), _REFINED)
@@ -90,6 +91,7 @@ def calibrate_lens(pictures: Sequence[str | Path], *, squares: str = "10x7") -> 
         )
     board = np.zeros((across * down, 3), np.float32)
     board[:, :2] = np.mgrid[:across, :down].T.reshape(-1, 2)
+    # The sixth-order term of the distortion is kept only where the pictures show it.
     for flags in (0, cv2.CALIB_FIX_K3):
         error, matrix, distortion, *_, sigmas, _, _ = cv2.calibrateCameraExtended(
             [board] * len(seen), seen, size, np.eye(3), np.zeros(5), flags=flags

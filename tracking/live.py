@@ -193,6 +193,7 @@ def steer(
     seen_at = ordered_at = pictures.now()
     nothing = Sight(0.0, None)
     while not ride.finished:
+        # Wait for a picture, but no longer than until the next flip, or until the board needs a sign of life.
         try:
             sight = pictures.get(max(min(ordered_at + REPEAT, flip_at) - pictures.now(), 0.0))
         except TimeoutError:
@@ -203,6 +204,7 @@ def steer(
         seen_at = seen_at if sight.pose is None else sight.time
         ride.missing = sight.why or ride.missing
         held_up = now - ordered_at >= WATCHDOG
+        # After a pause the pose is unknown: rest, and begin again at the first pose that is seen.
         if tracker is not None and (held_up or now - seen_at > lost):
             why = "the program was held up" if held_up else f"no robot for {lost:g} s ({ride.missing})"
             tell(f"{why}; the motor rests until the robot is seen")

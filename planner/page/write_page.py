@@ -133,6 +133,7 @@ def write_page(
     request = request_of(options, swims)
     tracked = tracked_vehicle(swims, table, request.point, known)
     why = _locked(swims, table, known)
+    # The page shows this plan until its own planner has made it.
     shapes = shapes_of(tracked.vehicle.turn_radius * swims.length_scale, named)
     first = named[0].path if named else circle(shapes[0]["size"] / 100)
     plan = first_plan(first.scaled(1 / swims.length_scale), tracked, request)

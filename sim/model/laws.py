@@ -217,6 +217,7 @@ def make_law(place: str | Effect, powers: Powers = Powers(), *, lever: float = 0
     name = f"law_{place}{at}_{exponents}"
     stated: dict[str, Any] = {"name": name, "source": _SOURCE, "place": place, "powers": powers, "lever": lever}
     formula, similar = powers.words.strip(), not powers.speed
+    # A load that the model lacks, with the power of R that makes its size ε a number.
     if load:
         (symbol, d_force), (driver, d_motion) = WRENCHES[load.wrench], MOTIONS[load.motion]
         d = d_force + d_motion
@@ -233,6 +234,7 @@ def make_law(place: str | Effect, powers: Powers = Powers(), *, lever: float = 0
             similar=similar,
             adds=partial(_add_force, load, powers, lever),
         )
+    # A coefficient, or a drag of the tails, that the model has: the size is an exponent, and 0 changes nothing.
     if place in _SYMBOLS:
         if place in COEFFICIENTS:
             stated["adds"] = partial(_scale_coefficient, place, powers)
@@ -248,6 +250,7 @@ def make_law(place: str | Effect, powers: Powers = Powers(), *, lever: float = 0
         )
     if effect is None:
         raise InputError(f"no place {place!r} of a law; such are {', '.join([*_SYMBOLS, *LOADS][:8])}")
+    # An effect of the catalogue whose size follows the power law; what it reaches and dissipates is its own.
     stated |= {way: partial(_scale_effect, way, effect, powers) for way in ("adds", "scales", "number")}
     return PowerLawEffect(
         **stated,

@@ -111,6 +111,7 @@ def _pictures(
     seen = np.concatenate([drawn, declared, shapes.heads[:, :2], tails.reshape(-1, 2)])
     low, high = seen.min(0) - _MARGIN, seen.max(0) + _MARGIN
     size = high - low
+    # An even number of pixels, which video codecs need.
     height = 2 * round(film.width * float(np.clip(size[1] / size[0], 0.3, 1.5)) / 2)
     figure = Figure(figsize=(film.width / 100, height / 100), dpi=100)
     canvas = FigureCanvasAgg(figure)
@@ -128,6 +129,7 @@ def _pictures(
     words = axes.text(0.02, 0.02, "", transform=axes.transAxes, fontsize=11, color=_INK)
     sense = axes.text(0.98, 0.02, "", transform=axes.transAxes, fontsize=11, ha="right")
     _draw_scale_bar(axes, cm * size[0], "cm" if schedule.tail_length else "l")
+    # All that moves is made once, and only changed from picture to picture.
     radius = 1 / schedule.robot["l_over_R"]
     length = radius * schedule.robot["L_over_R"]
     corners = np.array([[-length, -radius], [length, -radius], [length, radius], [-length, radius]]) * [0.5, 1]

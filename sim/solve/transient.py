@@ -158,6 +158,7 @@ def _follow(flips: Flip, names: Any, marks: Floats, times: Floats, tolerance: fl
         np.full(flips.x.shape, np.nan),
         np.zeros(robots, np.bool_),
     )
+    # Lanes without a robot of their own repeat the last one; their results are not recorded.
     waiting = np.full(count, -1)
     progress = _Progress(waiting, waiting.copy(), waiting.copy(), waiting.copy(), waiting.copy())
     for i in range(count):
@@ -171,6 +172,7 @@ def _follow(flips: Flip, names: Any, marks: Floats, times: Floats, tolerance: fl
         goal = with_lane(goal, i, _goal(flips, progress, i, marks))
         going = with_lane(going, i, 1.0 if i < started else 0.0)
     while somewhere(going):
+        # No step jumps over a mark or a robot's end, so a shape there is a shape that was solved for.
         dt = choose(going, _towards(goal - now, dt), dt)
         solved = _try_step(body, twist, at, new, now, dt, going, step, work)
         error = choose(solved, _embedded_error(step.slope, dt), np.inf)
@@ -187,6 +189,7 @@ def _follow(flips: Flip, names: Any, marks: Floats, times: Floats, tolerance: fl
         _accept(at, new, step, accepted)
         now = new_now
         dt = choose(accepted, _next_step(dt, error, tolerance), _shorter_step(dt, error, solved, tolerance))
+        # A robot that has ended leaves its lane to the next one, so no lane idles while robots wait.
         before = started
         for i in range(count):
             if lane(going, i) != 0 and _has_ended(flips, progress, i, at, lane(now, i), found):
@@ -194,7 +197,7 @@ def _follow(flips: Flip, names: Any, marks: Floats, times: Floats, tolerance: fl
                     _load(flips, started, i, numbers, twist, at, progress)
                     now, goal = with_lane(now, i, 0.0), with_lane(goal, i, _goal(flips, progress, i, marks))
                     started += 1
-                    going = with_lane(going, i, -1.0)
+                    going = with_lane(going, i, -1.0)  # new: its body and first step follow below
                 else:
                     going = with_lane(going, i, 0.0)
         if started > before:
