@@ -17,17 +17,8 @@ import pytest
 
 from tests.processes import LIMIT, ROOT
 
-ORDER = (
-    "common",
-    "sim",
-    "camera",
-    "dataset",
-    "surrogate",
-    "planner",
-    "tracking",
-    "calibration",
-    "softflagella",
-)  # each imports those before it
+# Each imports those before it.
+ORDER = ("common", "sim", "camera", "dataset", "surrogate", "planner", "tracking", "calibration", "softflagella")
 ROBOTS = {"model", "effects", "inputs", "mechanics", "solve", "motion"}  # rooms of `sim` that know robots
 
 

@@ -159,15 +159,9 @@ def test_effects_and_stated_standard_deviations_are_read_back(tmp_path: Path) ->
     assert found.sigma("tail_radius") == DEFAULTS["tail_radius"]
 
 
-def test_a_new_file_shows_units_optional_entries_and_what_the_coefficients_are() -> None:
+def test_a_new_file_shows_optional_entries_and_what_the_coefficients_are() -> None:
     lines = robot_toml(CONTROL).splitlines()
-    for start in (
-        "length_cm = 11",
-        "radius_mm = 3.2 ",
-        "# disc_offset_mm = 16 ",
-        "speed_rpm = 43.2",
-        "# [effects]",
-    ):
+    for start in ("# disc_offset_mm = 16 ", "# [effects]"):
         assert any(line.startswith(start) for line in lines), start
     assert {line.split("=")[0].strip() for line in lines if " = " in line and not line.startswith("#")} == {
         "name", *(entry.key for entry in ENTRIES if not entry.optional)
