@@ -111,17 +111,6 @@ def test_any_table_of_a_path(
     planned(tmp_path, tmp_path / "path.csv", "--unit", "l", *given_options, capsys=capsys)
 
 
-@pytest.mark.slow
-@few
-@given(shape=st.sampled_from(["circle", "square", "triangle", "star", ""]),
-       size=st.one_of(extremes.map(repr), st.sampled_from(WORDS)),
-       unit=st.sampled_from(["l", "m", "cm", "mm"]))  # fmt: skip
-def test_any_shape_by_name(
-    shape: str, size: str, unit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    planned(tmp_path, f"{shape}:{size}", "--unit", unit, capsys=capsys)
-
-
 @few
 @given(table=changed(pd.DataFrame([{**CONTROL, "dwell_bar": 1.0, "omega_bar": w} for w in (8.0, 10.0, 12.0)])))
 def test_any_question_to_the_look_up_table(
@@ -198,17 +187,6 @@ def test_the_look_up_table_answers_or_refuses(values: dict[str, float]) -> None:
         found = load().query(single_row(values))
         finite = all(np.isfinite(column).all() for column in found.values())
         assert finite or values["C_yr"] == 0  # such a robot does not turn, and the table has no lags for it
-
-
-def test_the_worst_robot_of_a_table_leaves_the_others_alone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    rows = pd.DataFrame([{**CONTROL, "omega_bar": speed} for speed in (10.0, 1e9, 12.0)])
-    rows.to_csv(tmp_path / "points.csv", index=False)
-    assert answered(["steady", tmp_path / "points.csv", "--out", tmp_path / "out.csv"], capsys)
-    found = pd.read_csv(tmp_path / "out.csv")
-    assert found["converged"].tolist() == [True, False, True]
-    assert "more time steps than a row may ask for" in found["note"][1]
 
 
 @st.composite

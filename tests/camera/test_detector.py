@@ -116,20 +116,6 @@ def test_a_hand_that_rests_on_the_robot_is_not_taken_for_a_band(tmp_path: Path) 
     assert seen > 60
 
 
-def test_a_hand_over_the_robot_loses_it_and_moves_no_pose(tmp_path: Path) -> None:
-    tank, motion = Tank(), circling(radius=0.05)
-    detector, lost = detector_of(tank, tmp_path), 0
-    for index in range(30):
-        tank.hand = (index - 5) / 20 if 5 <= index < 25 else -1.0
-        (pose,) = detector.poses(tank.frame(motion, 0.2 * index))
-        lost += isinstance(pose, Lost)
-        if isinstance(pose, Pose):
-            error = np.abs(off(pose, motion(0.2 * index)))
-            assert error[:2].max() < 0.02 * TAIL
-            assert error[2] < max(math.radians(1), 2.5 * pose.sigma_heading)
-    assert 3 < lost < 20
-
-
 def test_dots_are_seen_at_their_side_of_the_axis(tmp_path: Path) -> None:
     tank, motion = Tank(), circling(head=-1.0, tails=1.0)
     detector = detector_of(tank, tmp_path)
