@@ -23,7 +23,7 @@ from threading import RLock
 from typing import Any, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
-SOURCES = ("arrays.py", "jit.py", "lane*.py", "model/body.py", "linear/*.py", "mechanics/*.py", "solve/*.py")
+SOURCES = ("jit.py", "lane*.py", "model/body.py", "linear/*.py", "mechanics/*.py", "solve/*.py")
 _HERE = Path(__file__).parent
 _KEPT = 3  # folders of other versions
 _LEVEL = 1  # of optimisation: as fast as level 3, compiled in less than half the time

@@ -161,7 +161,7 @@ def test_the_version_is_named_by_all_files_that_loops_are_made_of() -> None:
         made_of |= left
         left = {path for file in left - {arguments} for path in imported(file)} - made_of
     assert made_of <= sources
-    assert not [path for path in sources if path.parent.name in ("effects", "motion", "io")]
+    assert not [path for path in sources if path.parent.name in ("effects", "motion")]
     assert jit.CACHE.name == f"compiled-{jit.digest(sources)}"
 
 
