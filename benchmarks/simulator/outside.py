@@ -5,7 +5,7 @@ the drag and the frames of `sim.mechanics` (`tests.oracles.clamped_rod`), on two
 load is no part of a robot: here it is added to the product's rod. Rigid helices have the drag of
 `sim.mechanics.drag`, node by node, and once the flow of each segment at each other. Measured tables of others are
 read if they are given: BALLS.csv of falling balls, and SPHERES.csv of beads in glycerine, as for
-`calibration.examples`.
+`tests.oracles`.
 
 Usage: python -m benchmarks outside [BALLS.csv] [SPHERES.csv]
 

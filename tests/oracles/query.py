@@ -28,7 +28,7 @@ RANGES = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
 class PositiveRobots(NamedTuple):
     """Numbers of M robots, seen with a positive motor."""
 
-    own: tails.Robots
+    own: tails.RobotColumns
     R: Any  # (4, 5, M)
     drag: Any  # (4, 5, M), with straight tails
 

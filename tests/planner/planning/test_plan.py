@@ -283,7 +283,7 @@ class Rungs:
         )
 
     def plan(self, *, longer: bool = True, **options: Any) -> Any:
-        task = solve.Task(source=lambda _: 1 / 0, longer=longer)
+        task = solve.PathTask(source=lambda _: 1 / 0, longer=longer)
         return solve.solve(task, tracked(), PlanRequest(objective="flips", **options))
 
 
