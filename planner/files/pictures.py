@@ -18,7 +18,7 @@ from planner.planning.plan import Plan
 
 _LONGER = 5.2  # inches, of the longer side of the frame
 _LEAST = np.array([4.2, 1.2])  # inches, width and height of the frame
-_MARGIN = 0.05  # of the drawing around what is drawn
+_MARGIN = 0.05  # of the longer side of what is drawn, around it
 _LEGEND = 32.0  # points, from the frame to the legend: the numbers and the label of the x axis are between
 
 
@@ -38,9 +38,11 @@ def draw_plan(plan: Plan) -> Figure:
     """Draw a plan with what belongs to its job, if it has one, on a frame that fits it."""
     figure = Figure()
     axes = replace(plan, job=None).plot(figure.add_axes((0, 0, 1, 1)))
-    axes.margins(_MARGIN)
     axes.set_aspect("equal", adjustable="datalim")
-    size = np.array(axes.dataLim.size)
+    margin = _MARGIN * max(axes.dataLim.size)  # the same on all sides, so that labels find room in a flat picture
+    size = np.array(axes.dataLim.size) + 2 * margin
+    axes.set_xlim(axes.dataLim.xmin - margin, axes.dataLim.xmax + margin)
+    axes.set_ylim(axes.dataLim.ymin - margin, axes.dataLim.ymax + margin)
     figure.set_size_inches(*np.maximum(_LONGER * size / size.max(), _LEAST))
     if plan.job is None:
         rms, stated = (in_lab(error, plan.robot) for error in (plan.predicted_rms, plan.stated_error))
