@@ -358,7 +358,7 @@ class Program:
         if words and words[0] in self.commands:
             self.commands[words[0]].main(f"{prog} {words[0]}", words[1:])
         else:
-            self.parser(prog).parse_args(words)
+            self.parser(prog).parse_args(words[:1])  # options behind an unknown command are not looked at
 
     def exit(self) -> None:
         """Run as a process: exit status 0; for bad input 2, with one line on stderr."""

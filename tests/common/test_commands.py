@@ -121,6 +121,7 @@ def test_help_is_the_docstring() -> None:
         ("paint hall --tin red --spot 1", "--spot: expected 2 arguments"),
         ("paint hall --tin red --told x", "no option --told"),
         ("mop", "invalid choice: 'mop'"),
+        ("mop --dry", "invalid choice: 'mop'"),
     ],
 )
 def test_wrong_words_are_refused(words: str, expected: str) -> None:
