@@ -166,6 +166,13 @@ def _suggestion(word: str) -> str:
     return f"is it {near[0]}?" if near else f"there are {', '.join(known)}"
 
 
+def _short_form(words: list[str]) -> str | None:
+    """Return the word for a command that was looked for in a package: that of the package, or of another one."""
+    package, name = [*words, ""][:2]
+    elsewhere = name in WORDS and name not in further(package).commands
+    return _WORD_OF.get((package, name)) or (name if elsewhere else None)
+
+
 def main(argv: list[str] | None = None) -> None:
     """Run the command that the words name."""
     words = sys.argv[1:] if argv is None else argv
@@ -177,8 +184,8 @@ def main(argv: list[str] | None = None) -> None:
         print(f"softflagella {__version__}")
     elif words[0] in WORDS:
         command(words[0]).main(f"softflagella {words[0]}", words[1:])
-    elif tuple(words[:2]) in _WORD_OF:
-        raise InputError(f"no command {' '.join(words[:2])!r}; it is softflagella {_WORD_OF[words[0], words[1]]}")
+    elif words[0] in COMMANDED and (word := _short_form(words)):
+        raise InputError(f"no command {' '.join(words[:2])!r}; it is softflagella {word}")
     elif words[0] in packages():
         further(words[0]).main(words[1:])
     else:

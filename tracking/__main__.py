@@ -37,7 +37,7 @@ def _track(
     serial: str | None = None,
     lost: float | None = None,
 ) -> None:
-    """Keep a robot on a path or a saved plan: poses come in on a pipe (tracking.pipe) or from a camera.
+    """Keep a robot on a path or a saved plan: poses come in on a pipe or from a camera.
 
     Args:
         path: a path to plan for, as for softflagella plan; or a plan.json, its folder, or a goal.json or tour.json

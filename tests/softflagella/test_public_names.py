@@ -89,6 +89,8 @@ def test_words_are_commands_of_packages(capsys: pytest.CaptureFixture[str]) -> N
         (["plan", "square:3l"], "required: --robot, --out; softflagella plan --help"),
         (["plan", "square:3l", "--robt", "x"], "no option --robt; is it --robot?"),
         (["planner", "goal"], "no command 'planner goal'; it is softflagella goal"),
+        (["planner", "replay", "--out", "x"], "no command 'planner replay'; it is softflagella replay"),
+        (["calibration", "calibrate"], "no command 'calibration calibrate'; it is softflagella calibrate"),
         (["dataset", "build"], "no command 'dataset build'; it is softflagella sweep"),
         (["dataset", "fly"], "invalid choice: 'fly'"),
         (["sim"], "required: COMMAND; softflagella sim --help"),
