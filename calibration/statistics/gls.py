@@ -34,6 +34,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -325,6 +326,12 @@ def _same_in_repeats(repeated: Integers | Floats, scale: Floats | None) -> Float
     """Return an orthonormal basis (n, r) of what is no noise, times the roots of the weights."""
     if repeated.ndim == 1:
         return averaging_rows(repeated.astype(np.int64), scale)[0].T
-    design = repeated if scale is None else repeated * scale[:, None]
-    left, values, _ = np.linalg.svd(design, full_matrices=False)
+    design = np.asarray(repeated if scale is None else repeated * scale[:, None], dtype=float)
+    return _span(design.tobytes(), design.shape)
+
+
+@lru_cache(maxsize=8)
+def _span(design: bytes, shape: tuple[int, ...]) -> Floats:
+    """Return an orthonormal basis of the columns of a design: a table has few, which are asked for often."""
+    left, values, _ = np.linalg.svd(np.frombuffer(design).reshape(shape), full_matrices=False)
     return np.asarray(left[:, values > 1e-9 * values[0]])

@@ -11,6 +11,7 @@ from calibration.statistics.gls import (
     Noise,
     Regression,
     inverse_root,
+    repeat_count,
     repeat_covariance,
     schur_complement,
     solve_normal,
@@ -31,6 +32,15 @@ def dense(run: Floats, share: Floats) -> Floats:
     assert axes @ axes.T == pytest.approx(run)
     same = SESSION[:, None] == SESSION
     return np.kron(np.diag(SCALE**-2), run) + np.kron(same, (axes * share) @ axes.T)
+
+
+def test_a_design_of_repeats_is_decomposed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(7)
+    y, design = rng.normal(size=(40, 2)), rng.normal(size=(40, 5))
+    first = repeat_covariance(y, design)
+    monkeypatch.setattr(np.linalg, "svd", None)
+    assert repeat_count(design) == 35
+    assert (repeat_covariance(y, design.copy()) == first).all()
 
 
 def test_steps_and_what_is_left_are_those_of_dense_matrices() -> None:
