@@ -21,6 +21,7 @@ import pandas as pd
 from benchmarks.calibration.law_truths import NULL, Design, Truth
 from benchmarks.calibration.planted import NOISE, ROBOT, SESSION
 from calibration.laws.places import places
+from calibration.statistics.forward import derivatives
 from calibration.swimmer.swimmer import SwimmerModel
 from common.arrays import Floats
 from sim.effects import catalogue
@@ -55,7 +56,7 @@ def foreign(setting: Design, seed: int) -> Truth:
         load = tail_load(powers[0])
         with patch.dict(catalogue(), {load.name: load}):
             model = SwimmerModel(ROBOT, setting.model.runs)
-            slope = model.derivatives({**setting.base.parameters, load.name: 0.0}, [load.name])[1][..., 0]
+            slope = derivatives(model, {**setting.base.parameters, load.name: 0.0}, [load.name])[1][..., 0]
             table = setting.table({load.name: sign[0] * score / setting.score(slope)}, seed)
         return Truth(kind, score, [place.name for place in terms if place.wrench == "Fz"], lambda: table)
     factor = _factor(kind, setting, rng)

@@ -14,10 +14,11 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.calibration.planted import ROBOT
-from calibration.laws.law_model import LEVER, lever_arms
+from calibration.laws.law_model import LEVER, lever_arms, moved_parameter
 from calibration.laws.places import Place, places
 from calibration.laws.readings import EXPONENTS
 from calibration.statistics.fit import Fit, fit
+from calibration.statistics.forward import derivatives
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import Study, middle_session
@@ -77,8 +78,8 @@ class Design:
 
     def slope(self, place: Place, lever: float = 0.0) -> Floats:
         """Compute the derivative (n, k) along the term, or the logarithm of the factor, of a place."""
-        moved = [name for name, _ in place.moves]
-        slopes = self.model.derivatives(self.base.parameters, moved)[1]
+        along = [moved_parameter(self.model.robot, name) for name, _ in place.moves]
+        slopes = derivatives(self.model, self.base.parameters, along)[1]
         if place.lever_unit:
             arms = lever_arms(self.model.robot, self.model.runs, place.lever_unit)
             return np.asarray(slopes[..., 0] + lever * arms[:, None] * slopes[..., 1])
@@ -86,9 +87,8 @@ class Design:
 
     def logarithm(self, powers: Powers) -> Floats:
         """Compute ln m of every run (n,), as `sim.model.laws` has it."""
-        robots, of_run = self.model.robots(self.base.parameters)
-        logs = [powers.logarithm(Groups.from_columns(group_columns([robot])))[0] for robot in robots]
-        return np.array(logs)[of_run]
+        robots = self.model.robots(self.base.parameters)
+        return np.array([powers.logarithm(Groups.from_columns(group_columns([robot])))[0] for robot in robots])
 
 
 def hidden_law(setting: Design, seed: int, *, nothing: bool) -> Truth:

@@ -16,10 +16,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from calibration.statistics.forward import derivatives, linear
 from calibration.statistics.gls import Noise
 from calibration.statistics.statistical_model import (
     Parameter,
     Parameters,
+    Predict,
     Runs,
     Value,
     precisions,
@@ -63,13 +65,13 @@ class LinearSwimmer:
         columns = list(zip(every, table, strict=True))
         return np.array([self.prediction + sum(d * _changed(q, p[q.name]) for q, d in columns) for p in sets])
 
-    def derivatives(
-        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
-    ) -> tuple[Floats, Floats]:
-        """Prediction (n, k) and derivatives (n, k, p)."""
+    def linearised(
+        self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
+    ) -> Predict:
+        """The same, in these parameters alone."""
         order = [p.name for p in (*self.coefficients, *self.nuisances, *self.effects)]
         table = np.concatenate([self.J, self.G, self.D], -1)
-        return self.predict([parameters])[0], table[..., [order.index(n) for n in names]]
+        return linear(at, along, self.predict([at])[0], table[..., [order.index(p.name) for p in along]])
 
     def check(self, prediction: Floats) -> None:
         """Nothing to check."""
@@ -118,7 +120,7 @@ def linearised(data: Measurements) -> LinearSwimmer:
     """Derivatives of the simulator at ROBOT and the runs of a table."""
     model = SwimmerModel(ROBOT, data)
     names = [p.name for p in (*model.coefficients, *model.nuisances, *model.effects)]
-    prediction, table = model.derivatives(start_values(model), names)
+    prediction, table = derivatives(model, start_values(model), names)
     J, G, D = np.split(table, np.cumsum([len(model.coefficients), len(model.nuisances)]), -1)
     effects = tuple(replace(e, second=None) for e in model.effects)  # it is linear in the sizes alone
     return LinearSwimmer(model.runs, model.coefficients, model.nuisances, effects, prediction, J, G, D, {})

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.calibration.planted import ROBOT, Signals, design, scatter
+from calibration.statistics.forward import derivatives
 from calibration.statistics.statistical_model import (
     Experiment,
     Parameter,
@@ -74,7 +75,7 @@ def _strength(outputs: Floats, model: SwimmerModel, signals: Signals) -> float:
     names, used = [p.name for p in fitted], signals.used
     parameters, unabsorbed = start_values(model), np.zeros(0)
     for _ in range(_PASSES):
-        prediction, J = model.derivatives(parameters, names)
+        prediction, J = derivatives(model, parameters, names)
         root = np.sqrt(precisions(fitted))
         columns = np.concatenate([signals.white(J[used]), np.diag(root)])
         pull = -root * prior_offsets(fitted, parameters)

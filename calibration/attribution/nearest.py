@@ -43,6 +43,7 @@ from scipy.stats import t as student
 from calibration.attribution.refits import FIRST, Candidate, left_out_residuals
 from calibration.statistics.budget import skipped, spent
 from calibration.statistics.fit import Fit, UnsolvedError, birge, fit
+from calibration.statistics.forward import derivatives
 from calibration.statistics.gls import solve_normal
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, examine_residual
 from calibration.statistics.shifted import Shift, Shifted
@@ -321,7 +322,7 @@ def _differs_from_null(study: Study, model: Shifted, fitted: Fit, seen: Integers
     own = {effect.name, *(s.parameter.name for s in model.shifts)}
     kept = [i for i, name in enumerate(fitted.names) if name not in own]
     sizes = sizes_of(model, fitted.parameters)[seen]
-    along = model.inner.derivatives(model.of_runs(fitted.parameters), [effect.name])[1]
+    along = derivatives(model.inner, model.of_runs(fitted.parameters), [effect.name])[1]
     along = along * (specimens(runs)[0][:, None] == seen)[:, None, :]
     others = [fitted.fitted[i] for i in kept]
     linear = regression(runs, used, np.concatenate([fitted.jacobian[..., kept], along], -1), others)

@@ -1,14 +1,11 @@
 """The swimming robot with a law at one place: its exponents, size and lever are fitted like effects.
 
-The factor m of a run depends on its inputs alone. So the derivatives along the size, the exponents and the lever
-follow from those along the term, or along the logarithm of the coefficient:
+The factor m = exp(p · x) of a run depends on its inputs alone: x = (ln ω/ω_m, ln l/l_m, ln N/N_m) and the noted
+inputs of the law less their means (`calibration.laws.readings`). With it
 
-    term F = ε m v:    ∂f/∂ε = m ∂f/∂F,   ∂f/∂p_i = ε m x_i ∂f/∂F,
-    factor C m:        ∂f/∂p_i = x_i ∂f/∂ln C,
-    side force with M_y = λ z F_x, z = l or L:   ∂f/∂F = ∂f/∂F_x + λ z ∂f/∂M_y,   ∂f/∂λ = ε m z ∂f/∂M_y,
+    a term is F = ε m v,   a coefficient C m,   a side force F_x = F with M_y = λ z F_x, z = l or L.
 
-with x = (ln ω/ω_m, ln l/l_m, ln N/N_m) and the noted inputs of the law less their means
-(`calibration.laws.readings`). The disc is at J.
+The disc is at J.
 """
 
 from __future__ import annotations
@@ -23,18 +20,16 @@ import numpy as np
 
 from calibration.laws.places import Place, place_named
 from calibration.laws.readings import EXPONENTS, INPUTS, NOTED, logarithms, noted_values, parameter_of
-from calibration.statistics.statistical_model import Parameter, Parameters, by_differences
-from calibration.swimmer.influences import robot_number
+from calibration.statistics.statistical_model import Parameter, Parameters
+from calibration.swimmer.influences import influence_of_law, robot_number
 from calibration.swimmer.measured_table import Measurements
-from calibration.swimmer.swimmer import SwimmerModel
-from common.arrays import Floats, Integers
+from calibration.swimmer.swimmer import Inputs, SwimmerModel
+from common.arrays import Floats
 from common.errors import InputError
-from sim.effects import effect_named
 from sim.inputs import group_columns
 from sim.model.groups import Groups
 from sim.model.laws import STEEPEST, PowerLawEffect, Powers
 from sim.model.robot import Robot
-from surrogate.table import NeuralTable
 
 SIZE, LEVER = "law_size", "law_lever"
 _LARGEST = 2000.0  # size of a term
@@ -48,6 +43,13 @@ def lever_arm(robot: Robot, unit: str) -> float:
 def lever_arms(robot: Robot, runs: Measurements, unit: str) -> Floats:
     """Compute it for every run, (n,)."""
     return np.array([lever_arm(replace(robot, tail_length=float(length)), unit) for length in runs.length])
+
+
+def moved_parameter(robot: Robot, name: str) -> Parameter:
+    """Return what a place moves as a parameter: a law's term, or a number of the robot, which may be exact."""
+    if law := influence_of_law(name):
+        return law.parameter
+    return Parameter(name, name, robot_number(robot, name), (0.0, math.inf), 1.0, logarithmic=True)
 
 
 @dataclass(frozen=True)
@@ -144,9 +146,9 @@ class LawModel(SwimmerModel):
 
     def to_control(self, powers: Powers, parameters: Parameters) -> float:
         """Compute the factor m, at the control example over that at the mean of the runs."""
-        robots, place = self.robots({**parameters, **dict.fromkeys(self.exponents, 0.0)})
-        logs = np.array([powers.logarithm(Groups.from_columns(group_columns([run])))[0] for run in robots])
-        return math.exp(-float(logs[place].mean()))
+        robots = self.robots({**parameters, **dict.fromkeys(self.exponents, 0.0)})
+        logs = [powers.logarithm(Groups.from_columns(group_columns([run])))[0] for run in robots]
+        return math.exp(-float(np.mean(logs)))
 
     def of_runs(self, parameters: Parameters) -> dict[str, Any]:
         """Return the parameters of the model without the law, with what it moves for every run, (n,)."""
@@ -157,48 +159,15 @@ class LawModel(SwimmerModel):
             if self.place.lever_unit:
                 loads.append(loads[0] * parameters.get(LEVER, 0.0) * self._arms)
             for (name, _), load in zip(self.place.moves, loads, strict=True):
-                inner[name] = np.clip(load, *effect_named(name).bounds)
+                inner[name] = load
         else:
             for name, power in self.place.moves:
                 inner[name] = inner.get(name, robot_number(self.robot, name)) * m**power
         return inner
 
-    def predict(self, sets: Sequence[Parameters], *, title: str = "", lookup: NeuralTable | None = None) -> Floats:
-        """Predict (P, n, k), see `SwimmerModel.predict`."""
-        return super().predict([self.of_runs(p) for p in sets], title=title, lookup=lookup)
-
-    def robots(self, parameters: Parameters) -> tuple[list[Robot], Integers]:
-        """Return the robots that are simulated, see `SwimmerModel.robots`."""
-        return super().robots(self.of_runs(parameters))
-
-    def derivatives(
-        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
-    ) -> tuple[Floats, Floats]:
-        """Compute the prediction (n, k) and derivatives (n, k, p), see `SwimmerModel.derivatives`."""
-        moved = [name for name, _ in self.place.moves]
-        others = [name for name in names if name not in (SIZE, LEVER, *self.exponents)]
-        wanted = list(dict.fromkeys([*others, *moved]))
-        seen, table = super().derivatives(self.of_runs(parameters), wanted, title=title, quick=True)
-        if not quick and not (np.isfinite(table).all() and np.isfinite(seen).all()):
-            return by_differences(self, parameters, names, title=title)
-        m = self.factor(parameters)
-        slopes = {name: table[..., j] for j, name in enumerate(wanted)}
-        along = self._along([slopes[name] for name in moved], parameters.get(LEVER, 0.0))
-        if self.place.is_term:
-            slopes[SIZE] = along * m[:, None]
-            along = slopes[SIZE] * parameters[SIZE]
-        if self.place.lever_unit:
-            slopes[LEVER] = parameters[SIZE] * (m * self._arms)[:, None] * slopes[moved[1]]
-        for i, name in enumerate(self.exponents):
-            slopes[name] = along * self._inputs[:, [i]]
-        return seen, np.stack([slopes[name] for name in names], -1) if names else np.empty((*seen.shape, 0))
-
-    def _along(self, slopes: Sequence[Floats], lever: float) -> Floats:
-        """Combine the derivatives along what the place moves, (n, k) each."""
-        if self.place.lever_unit:
-            force, couple = slopes
-            return np.asarray(force + lever * self._arms[:, None] * couple)
-        return np.asarray(sum(power * slope for (_, power), slope in zip(self.place.moves, slopes, strict=True)))
+    def inputs_of_runs(self, sets: Sequence[Parameters]) -> Inputs:
+        """Compute what is simulated, see `SwimmerModel.inputs_of_runs`."""
+        return super().inputs_of_runs([self.of_runs(p) for p in sets])
 
 
 def with_law(model: SwimmerModel, record: Mapping[str, Any]) -> LawModel:

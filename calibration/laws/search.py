@@ -34,10 +34,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.laws.law_model import LEVER, lever_arms
+from calibration.laws.law_model import LEVER, lever_arms, moved_parameter
 from calibration.laws.places import Place
 from calibration.laws.readings import EXPONENTS, logarithms, noted_values, parameter_of
 from calibration.statistics.fit import Fit
+from calibration.statistics.forward import derivatives
 from calibration.statistics.gls import Regression, schur_complement, solve_normal
 from calibration.statistics.statistical_model import precisions, prior_offsets
 from calibration.swimmer.swimmer import SwimmerModel
@@ -242,7 +243,8 @@ def _directions(
     slopes: dict[str, Floats] = {}
     # What is odd needs both directions simulated, and what is not local more phases: each on its own.
     for group in _by_cost(names):
-        table = model.derivatives(base.parameters, group, title=title)[1]
+        along = [moved_parameter(model.robot, name) for name in group]
+        table = derivatives(model, base.parameters, along, title=title)[1]
         slopes.update({name: table[..., j] for j, name in enumerate(group)})
     columns, variants = [], []
     for place in candidates:

@@ -170,7 +170,7 @@ def robot_with_law(given: Robot, law: FittedLaw, parameters: Parameters) -> Robo
         if not law.place.is_term:
             written[name] *= factor**power
     corrected = corrected_robot(given, written)
-    runs = law.model.robots({**written, **dict.fromkeys(law.model.exponents, 0.0)})[0]
+    runs = law.model.robots({**written, **dict.fromkeys(law.model.exponents, 0.0)})
     return replace(
         corrected,
         effects={**corrected.effects, **effects},

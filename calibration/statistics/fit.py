@@ -32,6 +32,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from calibration.statistics.budget import limited_as_one, skipped, spent
+from calibration.statistics.forward import derivatives
 from calibration.statistics.gls import Noise, NormalEquations, repeat_count, repeat_covariance, schur_complement
 from calibration.statistics.statistical_model import (
     ForwardModel,
@@ -259,11 +260,9 @@ class _Problem:
         """Run the model at `parameters`; its derivatives are computed if none are given."""
         title = f"{self.title}, step {count}" if self.title else ""
         if derivative is None:
-            prediction, derivative = self.model.derivatives(
-                parameters, [p.name for p in self.fitted], title=title, quick=quick
-            )
+            prediction, derivative = derivatives(self.model, parameters, self.fitted, title=title, quick=quick)
         else:
-            prediction = self.model.derivatives(parameters, [], title=title, quick=quick)[0]
+            prediction = derivatives(self.model, parameters, [], title=title, quick=quick)[0]
         linear = regression(self.model.runs, self.used, derivative, self.fitted)
         residual = (self.model.runs.y - prediction)[self.used]
         products = linear.products(residual, self.run, prior_offsets(self.fitted, parameters))

@@ -39,6 +39,7 @@ import numpy as np
 from scipy.stats import rankdata
 
 from calibration.statistics.fit import Fit
+from calibration.statistics.forward import derivatives
 from calibration.statistics.gls import NormalEquations, averaging_rows, inverse_root, schur_complement
 from calibration.statistics.statistical_model import (
     ForwardModel,
@@ -93,7 +94,7 @@ def directions(
 
     With `quick` a direction is zero, which no test notices, where it cannot be computed quickly.
     """
-    at_null = model.derivatives(parameters, [e.name for e in effects], title=title, quick=quick)[1]
+    at_null = derivatives(model, parameters, effects, title=title, quick=quick)[1]
     columns, owner, second = [], [], []
     for place, effect in enumerate(effects):
         values: dict[float, Floats] = {}
@@ -106,7 +107,7 @@ def directions(
                     values[value] = at_null[..., place]
                 else:
                     at = {**parameters, name: value}
-                    values[value] = model.derivatives(at, [effect.name], quick=quick)[1][..., 0]
+                    values[value] = derivatives(model, at, [effect], quick=quick)[1][..., 0]
         columns += list(values.values())
         owner += [place] * len(values)
         second += list(values)

@@ -4,7 +4,7 @@ With x_s the shift s of a parameter p, and 1_s the runs in which it is at work,
 
     p_i = p + Σ_s x_s 1_s(i),     or     p_i = p exp(Σ_s x_s 1_s(i))
 
-on the parameter's own scale. So ∂f/∂x_s = ∂f/∂p in the runs of s and 0 in the others, without a simulation.
+on the parameter's own scale. The linear model of the model within is enough for it: no shift is simulated.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from calibration.statistics.statistical_model import Experiment, Parameter, Parameters, Runs
+from calibration.statistics.statistical_model import Experiment, Parameter, Parameters, Predict, Runs, parameter
 from common.arrays import Flags, Floats
 
 _LARGEST = 2.0  # change of a logarithm without a prior
@@ -73,30 +73,35 @@ class Shifted:
         """Predict (P, n, k), see `ForwardModel`."""
         return self.inner.predict([self.of_runs(p) for p in sets], title=title)
 
-    def derivatives(
-        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
-    ) -> tuple[Floats, Floats]:
-        """Compute the prediction and the derivatives, see `ForwardModel`."""
-        own, at = {s.parameter.name: s for s in self.shifts}, self.of_runs(parameters)
-        inner = list(dict.fromkeys([own[n].of.name if n in own else n for n in names]))
-        seen, table = self.inner.derivatives(at, inner, title=title, quick=quick)
-        slopes = {name: table[..., i] for i, name in enumerate(inner)}
-        linear = {p.name for p in self.inner.effects if not p.logarithmic}
-        for name in {s.of.name for s in self.shifts if s.of.logarithmic and s.of.name in linear & set(inner)}:
-            slopes[name] = slopes[name] * np.reshape(at[name], (-1, 1))
-        slopes |= {n: slopes[own[n].of.name] * own[n].rows[:, None] for n in names if n in own}
-        return seen, np.stack([slopes[name] for name in names], -1) if names else np.empty((*seen.shape, 0))
+    def linearised(
+        self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
+    ) -> Predict:
+        """Return the linear model, see `ForwardModel`."""
+        own, centre = {s.parameter.name: s.of.name for s in self.shifts}, self.of_runs(at)
+        inner = [parameter(self.inner, name) for name in dict.fromkeys(own.get(p.name, p.name) for p in along)]
+        beyond = {of.name: self._unbounded(at)[of.name] - centre[of.name] for of in self._differing}
+        predict = self.inner.linearised(centre, inner, title=title, quick=quick)
+
+        def within(parameters: Parameters) -> dict[str, Any]:
+            free = self._unbounded(parameters)
+            return {**free, **{name: free[name] - excess for name, excess in beyond.items()}}
+
+        return lambda sets: predict([within(parameters) for parameters in sets])
 
     def of_runs(self, parameters: Parameters) -> dict[str, Any]:
         """Return the parameters of the model within, with what shifts for every run, (n,)."""
+        inner = self._unbounded(parameters)
+        return {**inner, **{of.name: np.clip(inner[of.name], *of.bounds) for of in self._differing}}
+
+    @property
+    def _differing(self) -> list[Parameter]:
+        """What shifts."""
+        return list({s.of.name: s.of for s in self.shifts}.values())
+
+    def _unbounded(self, parameters: Parameters) -> dict[str, Any]:
         inner = {**parameters}
-        shifts: dict[str, tuple[Parameter, Floats]] = {}
         for s in self.shifts:
-            change = inner.pop(s.parameter.name) * s.rows
-            shifts[s.of.name] = s.of, change + (shifts[s.of.name][1] if s.of.name in shifts else 0.0)
-        for name, (of, change) in shifts.items():
-            value = inner[name] * np.exp(change) if of.logarithmic else inner[name] + change
-            inner[name] = np.clip(value, *of.bounds)
+            inner[s.of.name] = s.of.changed(inner[s.of.name], inner.pop(s.parameter.name) * s.rows)
         return inner
 
     def check(self, prediction: Floats) -> None:

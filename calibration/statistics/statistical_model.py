@@ -14,8 +14,7 @@ its runs were whole.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -28,8 +27,8 @@ from common.arrays import Flags, Floats, Integers
 
 Value = float | Floats  # one number, or one for each run (n,)
 Parameters = Mapping[str, Any]  # name -> Value
+Predict = Callable[[Sequence[Parameters]], Floats]  # see `ForwardModel.predict`
 
-_LOG_STEP, _STEP = 0.01, 0.02  # finite-difference steps: in ln C, in units of a typical size
 _LARGEST = 100.0  # change of ln C, so that C stays a number
 _DIFFER = 0.001  # p-value below which repeats differ with sessions or notes
 FEWEST_REPEATS = 8  # runs, for a covariance from repeats alone
@@ -57,15 +56,22 @@ class Parameter:
     ] = ()  # of a second number: values at which the effect is looked for. Of a number: changes
     # from which one is fitted that differs in some runs
 
+    def changed(self, value: Any, by: Any) -> Any:
+        """Change a value by `by`, on the parameter's own scale."""
+        return value * np.exp(np.minimum(by, _LARGEST)) if self.logarithmic else value + by
+
     def moved(self, value: Any, by: Any) -> Any:
         """Change a value by `by`, on the parameter's own scale, within its bounds."""
-        new = value * np.exp(np.minimum(by, _LARGEST)) if self.logarithmic else value + by
-        within = np.clip(new, *self.bounds)
+        within = np.clip(self.changed(value, by), *self.bounds)
         return within if np.ndim(within) else float(within)
+
+    def change(self, before: Any, value: Any) -> Any:
+        """Return how far a value is from another one, on the parameter's own scale."""
+        return np.log(value / before) if self.logarithmic else value - before
 
     def offset(self, value: float) -> float:
         """Return how far a value is from that as given, on the parameter's own scale."""
-        return math.log(value / self.start) if self.logarithmic else value - self.start
+        return float(self.change(self.start, value))
 
     @property
     def words(self) -> str:
@@ -222,12 +228,12 @@ class ForwardModel(Protocol):
         """Predict (P, n, k) for P parameter sets, each with every coefficient and effect."""
         ...
 
-    def derivatives(
-        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
-    ) -> tuple[Floats, Floats]:
-        """Compute the prediction (n, k) and its derivatives (n, k, p) on the scales of the parameters `names`.
+    def linearised(
+        self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
+    ) -> Predict:
+        """Return a cheap `predict` that agrees with this one, near `at`, to first order in the parameters `along`.
 
-        With `quick` they may be NaN where they would take long; `names` may be empty.
+        It knows no bounds. With `quick` it may be NaN where it would take long; `along` may be empty.
         """
         ...
 
@@ -279,23 +285,6 @@ def apply_step(fitted: Sequence[Parameter], parameters: Parameters, step: Floats
     """Change those `parameters` that are in `fitted` (p,) by `step` (p,), see `Parameter.moved`."""
     changes = zip(fitted, step.tolist(), strict=True)
     return {**parameters, **{p.name: p.moved(parameters[p.name], by) for p, by in changes}}
-
-
-def by_differences(
-    model: ForwardModel, parameters: Parameters, names: Sequence[str], *, title: str = ""
-) -> tuple[Floats, Floats]:
-    """Compute `ForwardModel.derivatives` by finite differences; all changed models are computed together."""
-    sets, widths = [dict(parameters)], []
-    for name in names:
-        changed = parameter(model, name)
-        width = _LOG_STEP if changed.logarithmic else _STEP * abs(changed.typical)
-        if np.any(changed.moved(parameters[name], 2 * width) == changed.bounds[1]):  # downwards near the bound
-            width = -width
-        sets.append({**parameters, name: changed.moved(parameters[name], width)})
-        widths.append(width)
-    predictions = model.predict(sets, title=title)
-    slopes = (predictions[1:] - predictions[0]) / np.array(widths)[:, None, None]
-    return predictions[0], np.moveaxis(slopes, 0, -1)
 
 
 def precisions(fitted: Sequence[Parameter]) -> Floats:

@@ -4,9 +4,6 @@
 table: the camera's scale, the zeros of the heading and of the course, and the tachometer. Each is a parameter with
 a prior (`calibration.statistics.statistical_model`). The zero of the course shows only where a current is at work.
 
-A motion depends on the robot through its groups, and on the unit of time μ0 l⁴/EI. Both are products of powers of
-the numbers, so the derivative along a number is a sum over groups with these powers.
-
 **Influences.** Most change the robot of a run: an effect of `sim.effects` gets the size null + ε s. Here s is 1 or
 a column of the table (hours since the first run, kelvin above the mean). Others change the observation only: the
 true speed of the motor, the tracked point of the axis, a current in the lab. Some influences need a column. If the
@@ -35,23 +32,7 @@ COURSE = "course_zero"
 LENGTH = "tail_length_offset"
 TABLE_DEFAULTS = {CAMERA: 0.01, HEADING: math.radians(1.0), TACHOMETER: 0.005, COURSE: math.radians(2.0)}
 
-# Powers of the groups, and of "time", "length" (l) and "ahead" (L/l), in each number. The offset of the tail
-# length changes ln l by 1/l for each metre.
-POWERS: dict[str, dict[str, float]] = {
-    "youngs_modulus": {"omega_bar": -1, "time": -1},
-    "viscosity": {"omega_bar": 1, "time": 1},
-    "tail_radius": {"l_over_r0": -1, "omega_bar": -4, "time": -4},
-    LENGTH: {"l_over_R": 1, "l_over_r0": 1, "omega_bar": 4, "time": 4, "length": 1, "ahead": -1},
-    "head_radius": {"l_over_R": -1, "L_over_R": -1, "a_over_R": -1},
-    "head_length": {"L_over_R": 1, "ahead": 1},
-    "disc_offset": {"a_over_R": 1},
-    TACHOMETER: {"omega_bar": 1},
-    CAMERA: {},
-    HEADING: {},
-    COURSE: {},
-}
-GROUPS = ("omega_bar", "l_over_r0", "l_over_R", "L_over_R", "a_over_R", "C_t", "C_r", "C_yr")
-_TITLES = {
+FIELDS = {  # numbers of a robot that are not exact, but for the tail length
     "youngs_modulus": "E (Young's modulus)",
     "viscosity": "μ0 (viscosity)",
     "tail_radius": "r0 (radius of the tails' section)",
@@ -84,7 +65,7 @@ def nuisance_parameters(
         noted: names of what was noted of the runs.
     """
     parameters = []
-    for name, title in _TITLES.items():
+    for name, title in FIELDS.items():
         value = robot_number(robot, name)
         sigma = robot.sigma(name).of(value) / value
         bounds = (value / _FACTOR, value * _FACTOR)
@@ -180,17 +161,6 @@ def _parameter(effect: Effect) -> Parameter:
         effect.name, effect.title, effect.null, effect.bounds, effect.typical - effect.null, unit=effect.unit,
         plausible=effect.plausible, grid=effect.grid,
     )  # fmt: skip
-
-
-def is_odd(name: str, influence: Influence | None) -> bool:
-    """Tell whether left and right turns differ with a parameter of a model.
-
-    Args:
-        influence: of that name; None if it has none.
-    """
-    if influence is not None:
-        return influence.odd
-    return is_effect(name) and effect_named(name).symmetry == "odd"
 
 
 def reason_untestable(

@@ -16,23 +16,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from calibration.statistics.forward import either_side, secants, stacked
 from calibration.statistics.gls import Noise, repeat_covariance
-from calibration.statistics.statistical_model import Parameter, Parameters, Value, by_differences
+from calibration.statistics.statistical_model import Parameter, Parameters, Predict
 from calibration.swimmer.influences import (
     CAMERA,
     COURSE,
     CURRENT,
-    GROUPS,
+    FIELDS,
     HEADING,
     LENGTH,
-    POWERS,
     SLIP,
     TACHOMETER,
     TRACKED_POINT,
     Influence,
     influence_of_law,
     influences,
-    is_odd,
     nuisance_parameters,
     reason_untestable,
     robot_number,
@@ -40,11 +39,11 @@ from calibration.swimmer.influences import (
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.observation import Observation
 from calibration.swimmer.possible_runs import Owned, check_inputs, check_outputs, check_owned, possible_settings
+from calibration.swimmer.tangent import Tangent
 from common.arrays import Flags, Floats, Integers
 from common.errors import InputError
 from sim.effects import effect_named, is_effect
-from sim.inputs import group_columns
-from sim.model.robot import Robot
+from sim.model.robot import Robot, groups_of, time_scale
 from sim.motion.batches import sensitivity_columns, steady_columns
 from sim.motion.sensitivity import Sensitivities
 from sim.solve.refinement import PHASES, PHASES_FOR_SLOPES
@@ -60,14 +59,18 @@ _STARTS = (1.0, 0.6, 1.6)  # factors on the coefficients as given, for several s
 _FEWEST_COVERED = 24  # runs
 
 
-class _Run(NamedTuple):
-    """One run: the simulated robot, and how it is observed."""
+class Inputs(NamedTuple):
+    """What is simulated and how it is observed, in P parameter sets of n runs; numbers are (P, n) or broadcast."""
 
-    robot: Robot
-    sign: float  # direction of the motor
-    point: float  # tracked, head lengths ahead of the head's centre
-    current: float  # of the fluid along the path [m/s]
-    camera: float  # factor of its scale
+    numbers: dict[str, Floats]  # by field of `Robot`
+    effects: dict[str, Floats]  # sizes
+    view: Observation
+
+    @property
+    def columns(self) -> dict[str, Floats]:
+        """Columns of the simulator, (P, n), the motor turning forward."""
+        columns = {**groups_of(self.numbers), **self.effects}
+        return dict(zip(columns, np.broadcast_arrays(*columns.values()), strict=True))
 
 
 class Solver(NamedTuple):
@@ -139,107 +142,48 @@ class SwimmerModel:
         With `lookup` the look-up table is used, not the simulator. That is good for a first guess only, because
         the errors of the table would look like physics.
         """
-        parts = [self._conditions(parameters) for parameters in sets]
-        runs = [run for conditions, _ in parts for run in conditions]
-        columns, same = _distinct(self._columns(runs, sets))
+        inputs = self.inputs_of_runs(sets)
+        columns = inputs.columns
+        columns["omega_bar"] = columns["omega_bar"] * self._direction(columns)
+        distinct, same = self._simulated(columns)
         if lookup is not None:
-            found: Mapping[str, Floats] = lookup.query(columns)
+            found: Mapping[str, Floats] = lookup.query(distinct)
         else:
-            found = self.solver.steady(columns, jobs=self.jobs, title=title)
-        motion = {name: column[same] for name, column in found.items()}
-        table = self._observation(runs).see(motion)
+            found = self.solver.steady(distinct, jobs=self.jobs, title=title)
+        table = inputs.view.see({name: column[same] for name, column in found.items()})
         if not np.isfinite(table).all():
             raise InputError("the simulation of a run broke down; check the robot and the run's motor speed")
-        ends = np.cumsum([len(conditions) for conditions, _ in parts])
-        predictions = np.array(
-            [table[end - len(conditions) + place] for end, (conditions, place) in zip(ends, parts, strict=True)]
-        )
-        turned = np.array([self._turned(parameters.get(HEADING, 0.0)) for parameters in sets])
-        return self.runs.compared(predictions + turned)
+        return self.runs.compared(table)
 
-    def derivatives(
-        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
-    ) -> tuple[Floats, Floats]:
-        """Compute the prediction (n, k) and derivatives (n, k, p), by the simulator's own sensitivities.
+    def linearised(
+        self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
+    ) -> Predict:
+        """Return the linear model, by the simulator's own sensitivities, see `ForwardModel`.
 
         If a run has no direct solution: by differences of motions that are stepped in time, or NaN if `quick`.
         """
-        influences = {name: self._seconds.get(name) or self._influence(name) for name in names}
-        odd = any(is_odd(name, influence) for name, influence in influences.items())
-        runs, place = self._conditions(parameters, signed=odd)
-        columns = self._columns(runs, [parameters])
-        for second in (i.parameter.second for i in influences.values() if i and i.parameter.second):
-            value = parameters.get(second.name, second.start)
-            columns.setdefault(second.name, np.full(len(runs), float(np.ravel(value)[0])))
-        moves = {name: _moves(name, influence) for name, influence in influences.items()}
-        wanted = tuple(dict.fromkeys(move for group in moves.values() for move in group))
+        near = self.inputs_of_runs([at, *either_side(at, along)]).columns
+        columns = {name: column[:1] for name, column in near.items()}
+        moved = tuple(name for name, column in near.items() if (column != columns[name]).any())
+        direction = self._direction(columns, moved)
+        columns["omega_bar"] = columns["omega_bar"] * direction
+        distinct, same = self._simulated(columns, moved)
+        at_work = any(is_effect(k) and not effect_named(k).beside and _works(k, v) for k, v in distinct.items())
         # Non-local effects at their null may need more phases than the motion; with effects at work it has them.
-        at_null = any(is_effect(name) and effect_named(name).reach == "nonlocal" for name in wanted)
-        phases = PHASES_FOR_SLOPES if at_null and self._is_at_null(parameters) else PHASES
-        distinct, same = _distinct(columns)
-        found = self.solver.slopes(distinct, wanted, phases=phases, jobs=self.jobs, title=title)
-        values, slopes = (
-            {name: table[same] for name, table in of.items()} for of in (found.values, found.derivatives)
-        )
-        sensitivities = replace(found, values=values, derivatives=slopes)
-        view = self._observation(runs)
-        J = np.empty((*self.runs.y.shape, len(names)))
-        for j, (name, influence) in enumerate(influences.items()):
-            powers = _powers(name, influence)
-            if name == COURSE:
-                slope = view.slopes(sensitivities.values, {}, current=1.0)
-                J[..., j] = slope[place] * self._across(parameters)[:, None]
-                continue
-            if powers is not None:
-                by = np.array([1 / run.robot.tail_length if name == LENGTH else 1.0 for run in runs])
-                camera = float(name == CAMERA)
-                J[..., j] = self._slope_of_number(powers, by, columns, sensitivities, view, camera)[place]
-                if name not in POWERS:
-                    J[..., j] /= np.reshape(parameters[name] - self.runs.tails, (-1, 1))
-                if name == HEADING:
-                    J[..., j] += self._turned(1.0)
-                continue
-            at = wanted.index(moves[name][0]) if moves[name] else None
-            motion = {} if at is None else {key: table[:, at] for key, table in sensitivities.derivatives.items()}
-            slope = view.slopes(
-                sensitivities.values, motion, point=float(name == TRACKED_POINT), current=float(name in CURRENT)
-            )
-            needs = influence.needs if influence else None
-            scale = self._driver(needs, parameters) if needs else np.ones(len(place))
-            if name == SLIP:
-                scale = scale * -columns["omega_bar"][place] / (1 - parameters[SLIP])
-            J[..., j] = slope[place] * (scale if influence else parameters[name] * scale)[:, None]
-        seen = view.see(sensitivities.values)[place] + self._turned(parameters.get(HEADING, 0.0))
-        if not quick and not (np.isfinite(J).all() and np.isfinite(seen).all()):
-            return by_differences(self, parameters, names, title=title)
-        return self.runs.compared(seen), np.moveaxis(self.runs.completed(np.moveaxis(J, -1, 0)), 0, -1)
+        reaching = any(is_effect(name) and effect_named(name).reach == "nonlocal" for name in moved)
+        phases = PHASES_FOR_SLOPES if reaching and not at_work else PHASES
+        found = self.solver.slopes(distinct, moved, phases=phases, jobs=self.jobs, title=title)
+        tangent = Tangent.of_runs(columns, found, same[0])
+        if not (quick or tangent.is_known):
+            return secants(self, at, along, title=title)
 
-    def _slope_of_number(
-        self,
-        powers: Mapping[str, float],
-        by: Floats,
-        columns: dict[str, Floats],
-        sensitivities: Sensitivities,
-        view: Observation,
-        camera: float,
-    ) -> Floats:
-        """Compute the derivatives (m, k) along a number by its groups' powers; `by` (m,): of its ln."""
-        motion = {key: np.zeros(len(by)) for key in sensitivities.derivatives}
-        for group in (group for group in powers if group in GROUPS):
-            at = sensitivities.parameters.index(group)
-            for key, table in sensitivities.derivatives.items():
-                motion[key] += powers[group] * by * columns[group] * table[:, at]
-        scales: dict[str, Floats] = {k: powers[k] * by for k in ("time", "length", "ahead") if k in powers}
-        return view.slopes(sensitivities.values, motion, camera=camera, scales=scales)
+        def predict(sets: Sequence[Parameters]) -> Floats:
+            inputs = self.inputs_of_runs(sets)
+            near = inputs.columns
+            near["omega_bar"] = near["omega_bar"] * direction
+            return self.runs.compared(inputs.view.see(tangent.motions(near)))
 
-    def _turned(self, zero: Value) -> Floats:
-        """Change (n, k) of the outputs if the zero of the heading is off: θ grows in one direction of the
-        motor.
-        """
-        change = np.zeros(self.runs.y.shape)
-        if "theta" in self.runs.outputs:
-            change[:, self.runs.outputs.index("theta")] = zero * np.sign(self.runs.omega)
-        return change
+        return predict
 
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """Fit coefficients with the look-up table to the runs that it covers; `start` if those are too few.
@@ -296,27 +240,26 @@ class SwimmerModel:
         )  # fmt: skip
         return replace(self, runs=possible_runs), settings
 
-    def robots(self, parameters: Parameters) -> tuple[list[Robot], Integers]:
-        """Return the robots that are simulated for the runs at `parameters`, and each run's place among them."""
-        runs, place = self._conditions(parameters)
-        return [run.robot for run in runs], place
+    def robots(self, parameters: Parameters) -> list[Robot]:
+        """Return the robot of every run at `parameters`."""
+        numbers, effects, _ = self.inputs_of_runs([parameters])
+        shape = 1, len(self.runs)
+        whole = {name: np.broadcast_to(sizes, shape)[0] for name, sizes in {**numbers, **effects}.items()}
+        robots = []
+        for i, tails in enumerate(self.runs.tails.tolist()):
+            of_run: dict[str, Any] = {name: float(sizes[i]) for name, sizes in whole.items()}
+            present = {name: of_run.pop(name) for name in effects}
+            robots.append(replace(self.robot, **{**of_run, "tails": int(tails)}, effects=present))
+        return robots
 
     def _inside(self, lookup: NeuralTable, parameters: Parameters) -> Flags:
         """Tell which runs (n,) the look-up table covers at `parameters`."""
-        runs, place = self._conditions(parameters)
-        good = np.ones(len(runs), dtype=bool)
-        for i, run in enumerate(runs):
-            for name, value in run.robot.group_values().items():
-                low, high = lookup.domain.get(name, (0.0, 0.0))
-                good[i] &= low * (1 - 1e-9) <= abs(value) <= high * (1 + 1e-9)
-        return np.asarray(good[place])
-
-    def _at_work(self, parameters: Parameters) -> list[Influence]:
-        """List influences that are not at their null."""
-        known = ((value, self._influence(name)) for name, value in parameters.items())
-        return [
-            influence for value, influence in known if influence and np.any(value != influence.parameter.start)
-        ]
+        distinct, same = self._simulated(self.inputs_of_runs([parameters]).columns)
+        good = np.ones(same.shape, dtype=bool)
+        for name, column in distinct.items():
+            low, high = lookup.domain.get(name, (0.0, 0.0))
+            good &= ((low * (1 - 1e-9) <= np.abs(column)) & (np.abs(column) <= high * (1 + 1e-9)))[same]
+        return good[0]
 
     def _influence(self, name: str) -> Influence | None:
         return self._influences.get(name) or influence_of_law(name)
@@ -329,131 +272,85 @@ class SwimmerModel:
             drivers["head_over_tank"] = 2 * self.robot.head_radius / drivers["tank_diameter"]
         return drivers
 
-    def _driver(self, name: str, parameters: Parameters) -> Floats:
-        """Return what drives an influence, (n,), with the zero of the course where it is at `parameters`."""
+    def _driver(self, name: str, zero: Floats) -> Floats:
+        """Return what drives an influence, (P, n), where the zero of the course is off by `zero`."""
         if name not in ("course_x", "course_y"):
             return self._drivers[name]
-        x, y, zero = self._drivers["course_x"], self._drivers["course_y"], parameters.get(COURSE, 0.0)
-        turned = x * np.cos(zero) + y * np.sin(zero), y * np.cos(zero) - x * np.sin(zero)
-        return np.asarray(turned[0] if name == "course_x" else turned[1])
+        x, y = self._drivers["course_x"], self._drivers["course_y"]
+        turned = x * np.cos(zero) + y * np.sin(zero) if name == "course_x" else y * np.cos(zero) - x * np.sin(zero)
+        return np.asarray(turned)
 
-    def _across(self, parameters: Parameters) -> Floats:
-        """Compute the derivative of the current along each path by the zero of the course, (n,)."""
-        x, y = (parameters.get(name, 0.0) for name in CURRENT)
-        return np.asarray(x * self._driver("course_y", parameters) - y * self._driver("course_x", parameters))
-
-    def _conditions(self, parameters: Parameters, *, signed: bool = False) -> tuple[list[_Run], Integers]:
-        """List runs to simulate at `parameters`, without duplicates, and the place of each run among them.
-
-        The motor's direction matters if something odd is present, or if `signed`.
-        """
-        runs, work = self.runs, self._at_work(parameters)
-        drivers = {i.needs: self._driver(i.needs, parameters) for i in work if i.needs}
-        signed |= any(i.odd for i in work) or any(effect_named(e).symmetry == "odd" for e in self.robot.effects)
-        omega = runs.omega if signed else np.abs(runs.omega)
-        by_run = {name: value for name, value in parameters.items() if np.ndim(value)}
-        table = np.column_stack([runs.tails, runs.length, omega, *by_run.values(), *drivers.values()]).round(9)
-        _, first, place = np.unique(table, axis=0, return_index=True, return_inverse=True)
-        listed = []
-        for row in first.tolist():
-            here = {**parameters, **{name: float(value[row]) for name, value in by_run.items()}}
-            driven = {name: float(driver[row]) for name, driver in drivers.items()}
-            at_work = self._at_work(here) if by_run else work
-            listed.append(self._run(here, at_work, driven, row, float(omega[row])))
-        return listed, place.reshape(-1)
-
-    def _is_at_null(self, parameters: Parameters) -> bool:
-        """Tell whether no effect is at work."""
-        return not any(influence.effect for influence in self._at_work(parameters))
-
-    def _run(
-        self, parameters: Parameters, work: list[Influence], driven: Mapping[str, float], row: int, omega: float
-    ) -> _Run:
-        """Make the run of a row, from the influences at work in it and what drives them."""
-        effects, current = dict(self.robot.effects), 0.0
-        for influence in work:
-            by = parameters[influence.parameter.name] - influence.parameter.start
-            before = influence.parameter.start
-            if influence.needs is not None:
-                by *= driven[influence.needs]
-                before = self.robot.effects.get(influence.effect or "", before)
-            if influence.effect is not None:
-                effects[influence.effect] = before + by
-                if second := influence.parameter.second:
-                    effects[second.name] = parameters.get(second.name, second.start)
-            elif influence.parameter.name in CURRENT:
-                current += by
-        numbers = robot_numbers(self.robot, parameters)
-        numbers["tail_length"] = float(self.runs.length[row]) + parameters.get(LENGTH, 0.0)
-        tails = int(self.runs.tails[row])
-        for influence in work:
-            for name, power in influence.one_tail.items():
-                numbers[name] *= (1 - parameters[influence.parameter.name] / tails) ** power
-        robot = replace(
-            self.robot, **numbers, tails=tails,
-            motor_speed=abs(omega) * parameters.get(TACHOMETER, 1.0) * (1 - parameters.get(SLIP, 0.0)),
-            effects=effects,
+    def inputs_of_runs(self, sets: Sequence[Parameters]) -> Inputs:
+        """Compute the robots of all runs in P parameter sets, and how they are observed."""
+        runs, robot, of = self.runs, self.robot, partial(stacked, sets)
+        numbers = {name: of(name, robot_number(robot, name)) for name in (*COEFFICIENTS, *FIELDS)}
+        numbers |= {"tails": runs.tails[None], "tail_length": runs.length + of(LENGTH, 0.0)}
+        numbers["motor_speed"] = np.abs(runs.omega) * of(TACHOMETER, 1.0) * (1 - of(SLIP, 0.0))
+        effects, current = {name: np.full((1, 1), size) for name, size in robot.effects.items()}, np.zeros((1, 1))
+        for name in dict.fromkeys(name for parameters in sets for name in parameters):
+            if (influence := self._seconds.get(name) or self._influence(name)) is None:
+                continue
+            start, effect = influence.parameter.start, influence.effect
+            value = of(name, robot.effects.get(name, start))
+            by = (value - start) * (self._driver(influence.needs, of(COURSE, 0.0)) if influence.needs else 1.0)
+            if effect is not None:
+                effects[effect] = effects.get(effect, effect_named(effect).null) + by if influence.needs else value
+            elif name in CURRENT:
+                current = current + by
+            for number, power in influence.one_tail.items():
+                numbers[number] = numbers[number] * (1 - value / runs.tails) ** power
+        length = numbers["tail_length"]
+        view = Observation(
+            runs.outputs, time_scale(numbers), length, numbers["head_length"] / length, of(TRACKED_POINT, 0.0),
+            current, of(CAMERA, 1.0), of(HEADING, 0.0) * np.sign(runs.omega),
         )  # fmt: skip
-        camera = parameters.get(CAMERA, 1.0)
-        return _Run(robot, math.copysign(1.0, omega), parameters.get(TRACKED_POINT, 0.0), current, camera)
+        return Inputs(numbers, effects, view)
 
-    def _columns(self, runs: list[_Run], sets: Sequence[Parameters]) -> dict[str, Floats]:
-        """Write runs as columns for the simulator, with every effect that is present in any of the sets."""
-        work = [i for parameters in sets for i in self._at_work(parameters)]
-        names = {i.effect for i in work if i.effect} | {
-            i.parameter.second.name for i in work if i.parameter.second
-        }
-        nulls = {name: np.full(len(runs), effect_named(name).null) for name in sorted(names)}
-        columns = {**nulls, **group_columns([run.robot for run in runs])}
-        columns["omega_bar"] = columns["omega_bar"] * np.array([run.sign for run in runs])
-        return columns
+    def _direction(self, columns: Mapping[str, Floats], moved: Sequence[str] = ()) -> Floats:
+        """Return the sign of the motor's direction, (P, n): 1 unless something odd is at work or `moved`."""
+        odd = np.zeros((len(columns["N"]), 1), dtype=bool)
+        for name, column in columns.items():
+            if is_effect(name) and effect_named(name).symmetry == "odd":
+                odd |= (name in moved) | (column != effect_named(name).null).any(1, keepdims=True)
+        return np.where(odd, np.sign(self.runs.omega), 1.0)
 
-    def _observation(self, runs: list[_Run]) -> Observation:
-        return Observation(
-            self.runs.outputs,
-            time=np.array([run.robot.time_scale for run in runs]),
-            length=np.array([run.robot.tail_length for run in runs]),
-            ahead=np.array([run.robot.head_length / run.robot.tail_length for run in runs]),
-            point=np.array([run.point for run in runs]),
-            current=np.array([run.current for run in runs]),
-            camera=np.array([run.camera for run in runs]),
-        )
+    def _simulated(
+        self, columns: Mapping[str, Floats], moved: Sequence[str] = ()
+    ) -> tuple[dict[str, Floats], Integers]:
+        """Leave out effects at their null and runs (P, n) that are equal to others; with the place of each there.
 
-
-def _distinct(columns: dict[str, Floats]) -> tuple[dict[str, Floats], Integers]:
-    """Leave out rows of columns (m,) that are equal to others, and return the place of each among the rest."""
-    table = np.stack(list(columns.values()), 1)
-    _, first, place = np.unique(table, axis=0, return_index=True, return_inverse=True)
-    return {name: column[first] for name, column in columns.items()}, place.reshape(-1)
-
-
-def _powers(name: str, influence: Influence | None) -> Mapping[str, float] | None:
-    """Return the powers of the groups in a nuisance parameter, or in 1 − x/N for a fault of one tail."""
-    if influence is None or not influence.one_tail:
-        return POWERS.get(name)
-    return {
-        group: power * exponent
-        for number, power in influence.one_tail.items()
-        for group, exponent in POWERS.get(LENGTH if number == "tail_length" else number, {number: 1}).items()
-    }
+        Args:
+            moved: columns along which derivatives are wanted.
+        """
+        kept = {}
+        for name, column in columns.items():
+            if is_effect(name):
+                effect = effect_named(name)
+                shown_by = effect.beside or name
+                at_work = shown_by in columns and _works(shown_by, columns[shown_by])
+                if not (at_work or name in self.robot.effects or effect.beside in moved):
+                    continue
+                if influence_of_law(name):  # which may be steep
+                    column = np.clip(column, *effect.bounds)
+            kept[name] = column.ravel()
+        table = np.stack(list(kept.values()), 1)
+        alike = (table / np.maximum(np.abs(table).max(0), 1e-300)).round(12)
+        _, first, place = np.unique(alike, axis=0, return_index=True, return_inverse=True)
+        distinct = {name: column[first] for name, column in kept.items()}
+        if self.robot.learnt_from is not None:
+            for row in range(len(first)):
+                self.robot.learnt_from.check({name: float(column[row]) for name, column in distinct.items()})
+        return distinct, place.reshape(columns["N"].shape)
 
 
-def _moves(name: str, influence: Influence | None) -> tuple[str, ...]:
-    """Name the simulator's parameters that a parameter changes; none if it acts on what is seen."""
-    powers = _powers(name, influence)
-    if powers is not None:
-        return tuple(group for group in powers if group in GROUPS)
-    if influence is None:
-        return (name,)
-    if name == SLIP:
-        return ("omega_bar",)
-    return (influence.effect,) if influence.effect else ()
+def _works(name: str, column: Floats) -> bool:
+    """Tell whether an effect is at work in any run."""
+    return bool((column != effect_named(name).null).any())
 
 
 def robot_numbers(robot: Robot, parameters: Parameters) -> dict[str, Any]:
     """Collect fitted coefficients and numbers of the robot, by field; a is kept where R changes."""
     numbers: dict[str, Any] = {name: float(parameters[name]) for name in COEFFICIENTS}
-    for name in POWERS:
-        if hasattr(robot, name):
-            numbers[name] = float(parameters.get(name, robot_number(robot, name)))
+    for name in FIELDS:
+        numbers[name] = float(parameters.get(name, robot_number(robot, name)))
     return numbers

@@ -34,6 +34,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from calibration.attribution.refits import Rival
+from calibration.statistics.forward import derivatives
 from calibration.statistics.gls import Noise
 from calibration.statistics.statistical_model import ForwardModel, Runs, start_values
 from common.arrays import Flags, Floats
@@ -115,7 +116,7 @@ def next_runs(rivals: Sequence[Rival], *, count: int = 3, seed: int = 0) -> tupl
     fits = [rival.fit for rival in told_apart]
     possible = [rival.model.possible() for rival in told_apart]
     settings = possible[0][1]  # those of all of them
-    sides = [model.derivatives(fit.parameters, fit.names) for (model, _), fit in zip(possible, fits, strict=True)]
+    sides = [derivatives(model, fit.parameters, fit.names) for (model, _), fit in zip(possible, fits, strict=True)]
     pairs = [
         Pair(true[0] - wrong[0], wrong[1], again.covariance)
         for (_, true), (again, wrong) in itertools.permutations(zip(fits, sides, strict=True), 2)
@@ -301,7 +302,7 @@ def standings(
                 "table before"
             )
         parameters = {**known, **explanation.parameters}
-        prediction, J = subject.derivatives(parameters, list(explanation.parameters))
+        prediction, J = derivatives(subject, parameters, list(explanation.parameters))
         slopes = J[new].reshape(-1, J.shape[-1])
         spread = explanation.noise.covariance(data.session[new]) + slopes @ explanation.covariance @ slopes.T
         residual = (data.y - prediction)[new].ravel()

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from common.errors import InputError
 from common.notebook import Shown
@@ -18,6 +19,31 @@ from common.units import format_length, from_si
 from sim.model.groups import Groups, check_finite, check_positive, check_slenderness, check_tails
 from sim.model.learnt_range import LearntRange
 from sim.model.uncertainty import DEFAULTS, Sigma
+
+
+def bending_stiffness(numbers: Mapping[str, Any]) -> Any:
+    """Compute EI = E π r0⁴/4 [N m²] from numbers of robots, by field of `Robot`: one each, or arrays."""
+    return numbers["youngs_modulus"] * math.pi * numbers["tail_radius"] ** 4 / 4
+
+
+def time_scale(numbers: Mapping[str, Any]) -> Any:
+    """Compute the unit of time μ0 l⁴/EI [s] in the same way."""
+    return numbers["viscosity"] * numbers["tail_length"] ** 4 / bending_stiffness(numbers)
+
+
+def groups_of(numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """Compute the groups in the same way, by column name, for the positive direction of the motor."""
+    return {
+        "C_t": numbers["C_t"],
+        "C_r": numbers["C_r"],
+        "C_yr": numbers["C_yr"],
+        "l_over_R": numbers["tail_length"] / numbers["head_radius"],
+        "L_over_R": numbers["head_length"] / numbers["head_radius"],
+        "l_over_r0": numbers["tail_length"] / numbers["tail_radius"],
+        "omega_bar": numbers["motor_speed"] * time_scale(numbers),
+        "N": 1.0 * numbers["tails"],
+        "a_over_R": numbers["disc_offset"] / numbers["head_radius"],
+    }
 
 
 @dataclass(frozen=True, repr=False)
@@ -91,7 +117,7 @@ class Robot(Shown):
     @property
     def bending_stiffness(self) -> float:
         """EI = E π r0⁴/4 [N m²]."""
-        return self.youngs_modulus * math.pi * self.tail_radius**4 / 4
+        return float(bending_stiffness(vars(self)))
 
     @property
     def length_scale(self) -> float:
@@ -101,7 +127,7 @@ class Robot(Shown):
     @property
     def time_scale(self) -> float:
         """The unit of dimensionless time, μ0 l⁴/EI [s]."""
-        return self.viscosity * self.tail_length**4 / self.bending_stiffness
+        return float(time_scale(vars(self)))
 
     @property
     def omega_bar(self) -> float:
@@ -121,18 +147,8 @@ class Robot(Shown):
 
     def _given_groups(self) -> dict[str, float]:
         """Compute the groups of any robot, within the runs of its law or not."""
-        return {
-            "C_t": self.C_t,
-            "C_r": self.C_r,
-            "C_yr": self.C_yr,
-            "l_over_R": self.tail_length / self.head_radius,
-            "L_over_R": self.head_length / self.head_radius,
-            "l_over_r0": self.tail_length / self.tail_radius,
-            "omega_bar": self.omega_bar,
-            "N": float(self.tails),
-            "a_over_R": (self.disc_offset or self.head_radius) / self.head_radius,
-            **self.effects,
-        }
+        offset = self.head_radius if self.disc_offset is None else self.disc_offset
+        return {**groups_of({**vars(self), "disc_offset": offset}), **self.effects}
 
     def groups(self) -> Groups:
         """Return this robot as a batch of one."""

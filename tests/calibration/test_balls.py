@@ -11,7 +11,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from calibration.attribution.nearest import sizes_of, varying
-from calibration.statistics.statistical_model import by_differences, start_values
+from calibration.statistics.forward import by_differences, derivatives
+from calibration.statistics.shifted import Shift, Shifted
+from calibration.statistics.statistical_model import start_values
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import facts, verdict_record
 from calibration.verdict.verdict import Verdict
@@ -58,9 +60,19 @@ def test_a_varying_size_has_the_derivatives_of_differences(effect: str) -> None:
     at = {**start_values(model), effect: 0.3, **departures}
     names = ("gravity", effect, *departures)
     close = by_differences(differing, at, names)[1]
-    assert differing.derivatives(at, names)[1] == pytest.approx(close, abs=0.02 * np.abs(close).max())
+    assert derivatives(differing, at, names)[1] == pytest.approx(close, abs=0.02 * np.abs(close).max())
     one_sign = effect == "linear_drag"
     assert sizes_of(differing, at)[0] == pytest.approx(0.3 * np.exp(-0.4) if one_sign else 0.3 - 0.4)
+
+
+def test_a_size_at_its_bound_has_a_derivative() -> None:
+    model = read_balls(falls("nothing", 0))
+    drag = next(e for e in model.effects if e.name == "quadratic_drag")
+    differing = Shifted(model, (Shift(drag, np.arange(len(model.runs)) < 80, "here"),))
+    at = {**start_values(differing), drag.name: drag.bounds[0]}
+    _, J = derivatives(differing, at, [drag.name, differing.shifts[0].parameter.name])
+    assert J[:80, :, 1] == pytest.approx(J[:80, :, 0], rel=1e-6)
+    assert J[:80, :, 0] == pytest.approx(by_differences(model, at, [drag.name])[1][:80, :, 0], rel=1e-6)
 
 
 def test_a_form_whose_size_differs_is_adopted_and_not_claimed() -> None:

@@ -31,7 +31,8 @@ from scipy.special import lambertw
 
 from calibration.report.report import write_report
 from calibration.statistics.excluded import Excluded
-from calibration.statistics.statistical_model import Parameter, Parameters, Runs, Value, by_differences
+from calibration.statistics.forward import secants
+from calibration.statistics.statistical_model import Parameter, Parameters, Predict, Runs, Value
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record
 from common.arrays import Flags, Floats
@@ -79,11 +80,11 @@ class Balls:
         linear = _by_linear_drag(parameters.get("linear_drag", 0.0), fall)
         return np.asarray(gravity * fall * np.sqrt(2 * slower) * linear)
 
-    def derivatives(
-        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
-    ) -> tuple[Floats, Floats]:
-        """Compute the prediction and derivatives, by differences."""
-        return by_differences(self, parameters, names)
+    def linearised(
+        self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
+    ) -> Predict:
+        """Return the linear model, by differences."""
+        return secants(self, at, along)
 
     def check(self, prediction: Floats) -> None:
         """Accept any speed."""

@@ -23,7 +23,8 @@ import numpy as np
 import pandas as pd
 
 from calibration.statistics.excluded import Excluded
-from calibration.statistics.statistical_model import Parameter, Parameters, Runs, by_differences
+from calibration.statistics.forward import secants
+from calibration.statistics.statistical_model import Parameter, Parameters, Predict, Runs
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
 from common.arrays import Flags, Floats
@@ -66,11 +67,11 @@ class Spheres:
         slope = parameters.get("inertia", 0.0) * 3 / 16 * FLUID * d / viscosity  # of 1 + slope v
         return np.asarray(2 * stokes / (1 + np.sqrt(1 + 4 * slope * stokes)))
 
-    def derivatives(
-        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
-    ) -> tuple[Floats, Floats]:
-        """Compute the prediction and derivatives, by differences."""
-        return by_differences(self, parameters, names)
+    def linearised(
+        self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
+    ) -> Predict:
+        """Return the linear model, by differences."""
+        return secants(self, at, along)
 
     def check(self, prediction: Floats) -> None:
         """Accept any speed: the viscosity is not known beforehand."""

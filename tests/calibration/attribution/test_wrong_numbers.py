@@ -23,7 +23,8 @@ from calibration.attribution.refits import IMITABLE, SURE, Candidate, ebic
 from calibration.attribution.wrong_numbers import notable_pull, pulls
 from calibration.report.corrected_robot import corrected_robot
 from calibration.statistics.fit import Fit, fit
-from calibration.statistics.statistical_model import by_differences, parameter, start_values
+from calibration.statistics.forward import by_differences, derivatives
+from calibration.statistics.statistical_model import parameter, start_values
 from calibration.statistics.study import DRAWS, Study
 from calibration.swimmer.influences import CAMERA, HEADING, LENGTH, TACHOMETER
 from calibration.swimmer.measured_table import read_measurements
@@ -257,11 +258,19 @@ def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
     at = {**start_values(model), "tracked_point": 0.2, **off}
     names = [p.name for p in model.nuisances]
     assert len(names) == 10
-    ours, J = model.derivatives(at, names)
+    ours, J = derivatives(model, at, names)
     theirs, differences = by_differences(model, at, names)
     assert ours == pytest.approx(theirs, abs=1e-9)
     scale = np.maximum(np.abs(differences).max((0, 1)), 1e-9)
     assert (np.abs(J - differences).max((0, 1)) / scale).max() < 0.06
+
+
+def test_the_derivative_along_the_length_is_one_of_all_tails_where_one_is_shorter() -> None:
+    model = toy_swimmer(toy_table(6))
+    at = {**start_values(model), "one_tail_shorter": 0.4}
+    longer, shorter = model.predict([{**at, LENGTH: by} for by in (1e-6, -1e-6)])
+    slope = derivatives(model, at, [LENGTH])[1][..., 0]
+    assert slope == pytest.approx((longer - shorter) / 2e-6, abs=1e-3 * np.abs(slope).max())
 
 
 def test_pulls_are_those_of_the_textbook() -> None:

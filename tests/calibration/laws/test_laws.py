@@ -11,17 +11,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.laws.law_model import LEVER, SIZE, LawModel, with_law
+from calibration.laws.law_model import LEVER, SIZE, LawModel, moved_parameter, with_law
 from calibration.laws.laws import UNDETERMINED, FittedLaw, Rejection
 from calibration.laws.places import in_common, place_named, places
 from calibration.laws.readings import EXPONENTS, in_words, logarithms, motion_patterns, readings
 from calibration.report.corrected_robot import law_handed_on, robot_with_law
-from calibration.statistics.statistical_model import by_differences, start_values
+from calibration.statistics.forward import by_differences, derivatives
+from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import errors
 from calibration.swimmer.measured_table import read_measurements
 from common.arrays import Floats
 from sim.effects import effect_named
 from sim.inputs import group_columns
+from sim.model.uncertainty import Sigma
 from tests.calibration import toy
 from tests.calibration.toy_tables import (
     FEW_PLACES,
@@ -46,6 +48,16 @@ WARMER = 0.05  # of C_yr, per kelvin
 PLACES = ("Cyr", "Ct", "Fx_wt")
 
 
+def test_a_law_may_multiply_a_number_that_is_exact() -> None:
+    model = toy_swimmer(toy_table(1, lengths_cm=(8.0,)))
+    exact = replace(model, robot=replace(model.robot, sigmas={"viscosity": Sigma(0.0, True)}))
+    assert "viscosity" not in start_values(exact)
+    along = [moved_parameter(model.robot, "viscosity")]
+    slopes = [derivatives(m, start_values(m), along)[1] for m in (model, exact)]
+    assert np.abs(slopes[0]).max() > 0.01
+    np.testing.assert_allclose(slopes[0], slopes[1], atol=1e-9)
+
+
 @pytest.mark.slow
 def test_derivatives_are_those_by_differences() -> None:
     table = toy_table(1, lengths_cm=(5.0, 8.0), design={"tails": (2, 4)})
@@ -55,7 +67,7 @@ def test_derivatives_are_those_by_differences() -> None:
         law = {p.name: values[p.name] for p in model.effects}
         names = ["C_yr", *law]
         parameters = {**start_values(model), **law}
-        seen, slopes = model.derivatives(parameters, names)
+        seen, slopes = derivatives(model, parameters, names)
         other_seen, other = by_differences(model, parameters, names)
         np.testing.assert_allclose(seen, other_seen, atol=1e-9, err_msg=place.name)
         largest = np.abs(slopes).max()
@@ -87,9 +99,9 @@ def test_a_law_is_found_at_its_place_with_its_exponents(name: str, places: tuple
     speeds = toy_table(4)["omega_rpm"].abs()
     assert law.to_dict()["runs"]["omega_rpm"] == pytest.approx([speeds.min(), speeds.max()])
     robot = robot_with_law(START, law, law.fit.parameters)  # it moves as the fit says
-    runs, place_of_run = law.model.robots(law.fit.parameters)
+    runs = law.model.robots(law.fit.parameters)
     for row in (0, 17):
-        fitted = runs[place_of_run[row]]
+        fitted = runs[row]
         same = replace(robot, tails=fitted.tails, tail_length=fitted.tail_length, motor_speed=fitted.motor_speed)
         motions = (
             toy.steady_columns({key: np.array([a[0]]) for key, a in group_columns([same]).items()}),

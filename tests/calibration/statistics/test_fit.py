@@ -19,9 +19,10 @@ from calibration.attribution import refits
 from calibration.statistics.budget import limited, limited_as_one, skipped, spent, stopped_by_interrupt
 from calibration.statistics.excluded import Excluded, caveat_of_excluded, count_of_rows, summary_of_excluded
 from calibration.statistics.fit import Fit, fit
+from calibration.statistics.forward import derivatives
 from calibration.statistics.gls import repeat_covariance
 from calibration.statistics.residual_tests import Directions, examine_residual
-from calibration.statistics.statistical_model import Parameter, Parameters, Runs, start_values
+from calibration.statistics.statistical_model import Parameter, Parameters, Predict, Runs, start_values
 from calibration.statistics.study import (
     Study,
     error_interval,
@@ -68,15 +69,12 @@ class Line:
     effects: tuple[Parameter, ...] = ()
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
-        return np.array([self.derivatives(p, ["a", "b"])[0] for p in sets])
+        x = self.runs.inputs[:, 0]
+        a, b = np.stack([x, 1 - x, x], -1), np.stack([x**2] * 3, -1)
+        return np.array([p["a"] * a + p["b"] * b for p in sets])
 
-    def derivatives(
-        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
-    ) -> tuple[Floats, Floats]:
-        x = self.runs.inputs
-        slopes = {"a": np.stack([x[:, 0], 1 - x[:, 0], x[:, 0]], -1), "b": np.stack([x[:, 0] ** 2] * 3, -1)}
-        table = np.array([slopes[n] for n in names]).reshape(-1, *self.runs.y.shape)
-        return np.asarray(sum(parameters[n] * s for n, s in slopes.items())), np.moveaxis(table, 0, -1)
+    def linearised(self, at: Parameters, along: Sequence[Parameter], **_: Any) -> Predict:
+        return self.predict
 
 
 def line(seed: int, *, mistracked: float = 0.0) -> tuple[Line, Floats]:
@@ -96,11 +94,8 @@ def study_of(model: Line, seed: int = 0) -> Study:
 class LineWithGaps(Line):
     """The same where some runs lack outputs."""
 
-    def derivatives(
-        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
-    ) -> tuple[Floats, Floats]:
-        seen, J = super().derivatives(parameters, names)
-        return self.runs.compared(seen), np.moveaxis(self.runs.completed(np.moveaxis(J, -1, 0)), 0, -1)
+    def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
+        return self.runs.compared(super().predict(sets))
 
 
 def test_a_run_with_a_gap_counts_by_what_was_measured_alone() -> None:
@@ -120,7 +115,7 @@ def test_a_run_with_a_gap_counts_by_what_was_measured_alone() -> None:
         fits.append(fit(model, start_values(model), ("a", "b"), rows, title=""))
         assert fits[-1].noise.run_covariance == pytest.approx(S)  # of whole runs
         normal = fits[-1].products(model.runs, rows).at(0.0)
-        J = Line(runs).derivatives(TRUTH, ("a", "b"))[1]
+        J = derivatives(Line(runs), TRUTH, ("a", "b"))[1]
         measured = [(J[i][~g], np.linalg.inv(S[np.ix_(~g, ~g)])) for i, g in enumerate(gaps)]
         assert normal[:2, :2] == pytest.approx(sum(j.T @ inverse @ j for j, inverse in measured))
         assert model.runs.values(rows) == (~gaps).sum()
@@ -271,14 +266,12 @@ class Valley:
         y[:, 0] += offset * np.where(half % 2, 1.0, -1.0)
         self.runs = runs_of(y, session=half % 3)
 
-    def predict(self, sets: list[Parameters], *, title: str = "") -> Floats:
+    def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
         return np.array([np.tile([0.01 * p["a"] ** 2, 10 * (p["b"] - p["a"] ** 2)], (FEW, 1)) for p in sets])
 
-    def derivatives(self, parameters: Parameters, names: list[str], **_: Any) -> tuple[Floats, Floats]:
-        self.calls.append(a := parameters["a"])
-        slopes = {"a": [0.02 * a, -20 * a], "b": [0.0, 10.0]}
-        table = np.array([np.tile(slopes[name], (FEW, 1)) for name in names]).reshape(-1, FEW, 2)
-        return self.predict([parameters])[0], np.moveaxis(table, 0, -1)
+    def linearised(self, at: Parameters, along: Sequence[Parameter], **_: Any) -> Predict:
+        self.calls.append(at["a"])
+        return self.predict
 
 
 def valley_fit(model: Any, target: float = np.inf) -> Fit:

@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.statistics.statistical_model import by_differences, start_values
+from calibration.statistics.forward import by_differences, derivatives
+from calibration.statistics.statistical_model import start_values
 from calibration.swimmer.influences import influences
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.possible_runs import owned, possible_settings
@@ -53,7 +54,7 @@ def test_derivatives_are_those_of_the_prediction(table: pd.DataFrame) -> None:
     assert model.untestable == {}
     names = [p.name for p in (*model.coefficients, *model.effects)]
     at = {**start_values(model), "motor_slip": 0.03, "tracked_point": 0.2, "current_along_x": 0.002}
-    ours, J = model.derivatives(at, names)
+    ours, J = derivatives(model, at, names)
     theirs, differences = by_differences(model, at, names)
     assert ours == pytest.approx(theirs, abs=5e-4)  # more phases than the prediction needs
     scale = np.abs(differences).max((0, 1))
@@ -62,7 +63,7 @@ def test_derivatives_are_those_of_the_prediction(table: pd.DataFrame) -> None:
     # Differences are those of predictions on few phases, where an effect near its null may not show in full.
     tolerance = {name: 0.2 if name == "rate_dependent_modulus" else 0.06 for name in names}
     assert {name: o for name, o in zip(names, off.tolist(), strict=True) if o > tolerance[name]} == {}
-    alone, beside = (model.derivatives(at, [*others, "tracked_point"])[1] for others in ([], ["C_t"]))
+    alone, beside = (derivatives(model, at, [*others, "tracked_point"])[1] for others in ([], ["C_t"]))
     assert alone[..., -1] == pytest.approx(beside[..., -1], abs=1e-9)  # nothing of it moves the robot
 
 
@@ -98,7 +99,7 @@ def test_a_current_shows_in_the_speed_along_its_heading_and_in_the_radius(table:
     assert np.delete(moving - still, [speed, radius], 1) == pytest.approx(0)
     names = ("current_along_x", "camera_scale", "C_t", "tail_length_offset", "viscosity")
     at = {**at, "current_along_x": 0.001}
-    exact, difference = (f(at, names)[1] for f in (model.derivatives, partial(by_differences, model)))
+    exact, difference = (f(at, names)[1] for f in (partial(derivatives, model), partial(by_differences, model)))
     assert exact == pytest.approx(difference, rel=0.02, abs=0.02 * np.abs(difference).max())
     without = toy_swimmer(table.drop(columns="course_deg"))
     assert "current in the tank along x" in without.untestable
@@ -141,7 +142,7 @@ def test_derivatives_along_the_friction_of_the_contact_line_and_its_speed() -> N
     table = make_table(TRUTH, seed=2, tails=(2, 3), lengths_cm=(6.0, 9.0), title="")
     model = SwimmerModel(START, read_measurements(table))
     at = {**start_values(model), FRICTION: 0.3, SPEED: 6.0}
-    ours, J = model.derivatives(at, [FRICTION, SPEED])
+    ours, J = derivatives(model, at, [FRICTION, SPEED])
     theirs, differences = by_differences(model, at, [FRICTION, SPEED])
     assert ours == pytest.approx(theirs, abs=1e-3)
     scale = np.abs(differences).max((0, 1))

@@ -15,8 +15,9 @@ from calibration.attribution.refits import Judgement
 from calibration.report.corrected_robot import corrected_robot
 from calibration.report.report import write_report
 from calibration.statistics.fit import Fit, fit, least_determined
+from calibration.statistics.forward import by_differences
 from calibration.statistics.residual_tests import Directions, directions, examine_residual
-from calibration.statistics.statistical_model import by_differences, start_values
+from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import DRAWS, Study, middle_session
 from calibration.swimmer.influences import influences
 from calibration.swimmer.measured_table import read_measurements

@@ -15,6 +15,7 @@ import pytest
 from scipy.stats import binom
 
 from calibration.statistics.gls import Noise
+from calibration.statistics.statistical_model import Parameter
 from calibration.verdict.next_runs import (
     BATCH,
     GIVEN_UP,
@@ -74,11 +75,13 @@ def test_the_true_explanation_is_seldom_given_up() -> None:
 
     def model(y: np.ndarray, *outputs: str) -> Any:
         """Its parameter's name says which prediction is meant."""
-        known = tuple(SimpleNamespace(name=name, start=0.0) for name in predictions)
+        known = tuple(Parameter(name, name, 0.0, (-9.0, 9.0), 1.0) for name in predictions)
         runs = SimpleNamespace(y=y, session=np.zeros(n, int), outputs=outputs or ("a", "b"))
         return SimpleNamespace(
             runs=runs, coefficients=known, nuisances=(), effects=(),
-            derivatives=lambda parameters, names: (predictions[names[0]], slopes),
+            linearised=lambda at, along, **_: lambda sets: np.array(
+                [predictions[(name := along[0].name)] + slopes[..., 0] * (p[name] - at[name]) for p in sets]
+            ),
         )  # fmt: skip
 
     spread = np.kron(np.eye(n) + 0.4, run) + slopes.reshape(-1, 1) @ covariance @ slopes.reshape(1, -1)
@@ -101,12 +104,12 @@ def test_the_true_explanation_is_seldom_given_up() -> None:
 @pytest.mark.parametrize(("ratio", "given_up"), [(24.0, False), (26.0, True)])
 def test_an_explanation_is_given_up_where_another_is_25_times_as_likely(ratio: float, given_up: bool) -> None:
     """One run with an error of variance 1 where the first predicts 0, and is there: e^(d²/2) to one."""
-    known = tuple(SimpleNamespace(name=name, start=0.0) for name in "AB")
+    known = tuple(Parameter(name, name, 0.0, (-9.0, 9.0), 1.0) for name in "AB")
     predictions = {"A": 0.0, "B": math.sqrt(2 * math.log(ratio))}
     model: Any = SimpleNamespace(
         runs=SimpleNamespace(y=np.zeros((1, 1)), session=np.zeros(1, int), outputs=("y",)),
         coefficients=known, nuisances=(), effects=(),
-        derivatives=lambda _, names: (np.array([[predictions[names[0]]]]), np.zeros((1, 1, 1))),
+        linearised=lambda at, along, **_: lambda sets: np.full((len(sets), 1, 1), predictions[along[0].name]),
     )  # fmt: skip
     both = [Explanation(t, {t: 1.0}, np.eye(1), Noise(np.eye(1), 0.0), ("y",)) for t in predictions]
     first, second = standings(model, both, np.ones(1, bool))
