@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 MANY = 0.2  # share of the rows; if more are excluded, the rest may not be a fair sample
-_LISTED = 3  # rows of a reason
 
 
 class Excluded(NamedTuple):
@@ -43,10 +42,14 @@ def summary_of_excluded(excluded: Sequence[Excluded], total: int) -> list[str]:
 def _words(group: Sequence[Excluded], total: int) -> str:
     if len(group) == 1:
         return str(group[0])
-    numbers = ", ".join(each.row.removeprefix("row ") for each in group[:_LISTED])
-    more = f" and {len(group) - _LISTED} more" if len(group) > _LISTED else ""
-    reason = Excluded(group[0].reason)
-    return f"{len(group)} of {total} rows (rows {numbers}{more}): {reason}"
+    numbers = listed([each.row.removeprefix("row ") for each in group])
+    return f"{len(group)} of {total} rows (rows {numbers}): {Excluded(group[0].reason)}"
+
+
+def listed(names: Sequence[object], most: int = 3) -> str:
+    """List the first names, and count the others: 2, 3, 5 and 4 more."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(map(str, names[:most])) + more
 
 
 def count_of_rows(excluded: Sequence[Excluded]) -> int:

@@ -32,6 +32,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from calibration.statistics.excluded import listed
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.gls import Noise, inverse_root
 from calibration.statistics.statistical_model import FEWEST_REPEATS, ForwardModel, Runs
@@ -259,8 +260,7 @@ def caveat_of_weights(rows: Sequence[int], runs: int, alike: str = "") -> tuple[
     """Say which of so many runs have little weight, and what they have in common."""
     if not rows:
         return ()
-    said = ", ".join(map(str, rows[:_NAMED]))
-    said += f" and {len(rows) - _NAMED} more" if len(rows) > _NAMED else ""
+    said = listed(rows, _NAMED)
     if len(rows) == 1:
         return (f"1 of {runs} runs has a weight below one half (row {said}): {_FAR_OFF.format('it is', 'its')}",)
     return (

@@ -49,7 +49,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.excluded import Excluded
+from calibration.statistics.excluded import Excluded, listed
 from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs
 from calibration.statistics.study import divided, middle_session
@@ -75,7 +75,6 @@ _SIGMAS = dict(  # column -> nuisance parameter, factor
 _LARGEST = 1e9  # of a value
 _FEWEST_RUNS = 24
 _COPY = "a copy of an earlier row, equal in all inputs and outputs{}"
-_LISTED = 3  # rows without an output
 _GAPS = 0.1  # share of the usable rows that may lack a note
 _OWN = 1e-3  # share of an output's scatter that must be independent of the other outputs
 
@@ -261,9 +260,7 @@ def _gaps_in_words(table: pd.DataFrame, missing: pd.DataFrame) -> list[Excluded]
     lines = []
     for column in (name for name in missing if missing[name].any()):
         rows = [row_name(table, i) for i in np.flatnonzero(missing[column]).tolist()]
-        more = f" and {len(rows) - _LISTED} more" if len(rows) > _LISTED else ""
-        named = ", ".join(rows[:_LISTED]) + more
-        lines.append(Excluded(f"column {column}: no value in {named}; the other outputs there count"))
+        lines.append(Excluded(f"column {column}: no value in {listed(rows)}; the other outputs there count"))
     return lines
 
 
