@@ -97,10 +97,11 @@ def groups_that_may_differ(runs: Runs) -> list[tuple[str, Flags]]:
     found: list[tuple[str, Flags]] = []
     if runs.specimen is not None:
         found += [(f"on robot {name}", runs.specimen == i) for i, name in enumerate(runs.specimen_names)]
-    found += [(f"in session {name}", session == i) for i, name in enumerate(names)]
-    by_time = sorted(range(len(names)), key=lambda i: int(runs.rows[session == i].min()))
+    present = np.unique(session).tolist()  # a part of the runs may have none of a session
+    found += [(f"in session {names[i]}", session == i) for i in present]
+    by_time = sorted(present, key=lambda i: int(runs.rows[session == i].min()))
     found += [
-        (f"since session {names[by_time[k]]}", np.isin(session, by_time[k:])) for k in range(2, len(names) - 1)
+        (f"since session {names[by_time[k]]}", np.isin(session, by_time[k:])) for k in range(2, len(present) - 1)
     ]
     distinct: list[tuple[str, Flags]] = []
     for words, rows in found:

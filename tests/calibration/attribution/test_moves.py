@@ -72,6 +72,13 @@ def test_sessions_of_one_number_of_tails_each_are_no_groups() -> None:
     assert names == [*(f"in session day {d}" for d in range(1, 5)), "since session day 3"]
 
 
+def test_a_part_of_the_runs_may_lack_a_session() -> None:
+    runs = read_measurements(in_days(toy_table(3)))
+    part = runs.subset(runs.session != 1)
+    names = [words for words, _ in groups_that_may_differ(part)]
+    assert names == [f"in session day {d}" for d in (1, 3, 4)]
+
+
 def test_the_noise_of_repeats_in_several_sessions_is_without_the_shifts_of_sessions() -> None:
     rng = np.random.default_rng(0)
     condition, session = np.repeat(np.arange(60), 2), in_days(pd.DataFrame({"run": range(120)}))["session"]
