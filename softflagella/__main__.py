@@ -161,6 +161,8 @@ def _suggestion(word: str) -> str:
     for package in COMMANDED:
         if word in program_of(package).commands:
             return f"it is softflagella {_WORD_OF.get((package, word), f'{package} {word}')}"
+    if own := [name for name, (package, _) in WORDS.items() if package == word]:
+        return f"its commands are {', '.join(f'softflagella {name}' for name in own)}"
     known = (*WORDS, *packages())
     near = difflib.get_close_matches(word, known, 1)
     return f"is it {near[0]}?" if near else f"there are {', '.join(known)}"

@@ -86,6 +86,7 @@ def test_words_are_commands_of_packages(capsys: pytest.CaptureFixture[str]) -> N
         (["report"], "no command 'report'; it is softflagella dataset report"),
         (["calibrat"], "no command 'calibrat'; is it calibrate?"),
         (["qqq"], "no command 'qqq'; there are robot, steady"),
+        (["tracking"], "no command 'tracking'; its commands are softflagella track, softflagella replay"),
         (["plan", "square:3l"], "required: --robot, --out; softflagella plan --help"),
         (["plan", "square:3l", "--robt", "x"], "no option --robt; is it --robot?"),
         (["planner", "goal"], "no command 'planner goal'; it is softflagella goal"),
