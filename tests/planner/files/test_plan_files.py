@@ -111,7 +111,9 @@ def test_any_name_of_a_robot_can_be_drawn_and_compiled(name: str, tmp_path: Path
     compile_c(tmp_path / "main.c", tmp_path / "main", "-O0", "-Wno-unused")
 
 
-@pytest.mark.parametrize("path", ["circle:2l", ((0.0, 0.0), (12.0, 0.0)), ((0.0, 0.0), (0.3, 6.0))])
+@pytest.mark.parametrize(
+    "path", ["circle:2l", ((0.0, 0.0), (12.0, 0.0)), ((0.0, 0.0), (12.0, 4.0)), ((0.0, 0.0), (0.3, 6.0))]
+)
 def test_the_frame_holds_the_plan_at_one_scale(path: Any) -> None:
     """A flat or narrow plan, too, has a frame with room for numbers and labels."""
     (axes,) = draw_plan(planned(path, objective="flips")).axes
@@ -119,8 +121,9 @@ def test_the_frame_holds_the_plan_at_one_scale(path: Any) -> None:
     across, up = (axes.transData.transform((1.0, 1.0)) - axes.transData.transform((0.0, 0.0))).tolist()
     assert across == pytest.approx(up)
     drawn, shown = axes.dataLim, axes.viewLim
-    assert (shown.min < drawn.min).all()
-    assert (shown.max > drawn.max).all()
+    margin = 0.04 * max(drawn.size)  # on all sides, for the labels of places
+    assert (shown.min < drawn.min - margin).all()
+    assert (shown.max > drawn.max + margin).all()
     assert (axes.bbox.size / axes.figure.dpi >= (4.0, 1.0)).all()
     assert len(axes.get_xticks()) > 2
     assert len(axes.get_yticks()) > 2
