@@ -29,7 +29,7 @@ from calibration.attribution.refits import IMITABLE, SURE, Candidate
 from calibration.attribution.wrong_numbers import IMPLAUSIBLE, pulls
 from calibration.statistics.fit import Fit
 from calibration.statistics.gls import schur_complement
-from calibration.statistics.statistical_model import Runs, apply_step, regression
+from calibration.statistics.statistical_model import Runs, regression
 from calibration.statistics.study import Study, held_out_p_value
 from common.arrays import Flags, Floats
 
@@ -133,14 +133,7 @@ def transfer_p(study: Study, fitted: Fit) -> float:
     values = runs.values(near)
     if not others.any() or values < _ENOUGH * len(fitted.names):
         return 1.0
-    refit = fitted.products(runs, near).solve(passes=3)
-    moved = replace(
-        fitted,
-        parameters=apply_step(fitted.fitted, fitted.parameters, refit.step),
-        prediction=fitted.prediction + fitted.jacobian @ refit.step,
-        covariance=fitted.inflation * refit.covariance,
-    )
-    return held_out_p_value(moved, runs, others, seed=study.seed)
+    return held_out_p_value(fitted.refitted(runs, near, for_test=True), runs, others, seed=study.seed)
 
 
 def fitted_again(runs: Runs, used: Flags) -> Flags:

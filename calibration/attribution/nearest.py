@@ -17,16 +17,18 @@ What the form leaves counts as noise: variances are multiplied by b = max(1, χ�
 A form is adopted if
 
 1. nothing explains the residual, and its fit converged, inside the bounds;
-2. its gain on left-out groups of runs is more than twice its standard error, both in the noise b S. The size of a
-   specimen that is left out as a whole is the mean;
-3. on these left-out runs it removes at least half of what the model without it leaves beyond noise;
+2. its gain on left-out groups of runs, paired over conditions, has a 95 % interval above zero
+   (`calibration.attribution.forms`). The size of a specimen that is left out as a whole is the mean;
+3. on these left-out runs it removes at least half of what the model without it leaves beyond noise, if that is
+   known;
 4. its mean size differs from the null. With one size, its interval says so; with several, a t-test over the sizes
    that the specimens ask for on their own, either sign allowed, by one linear step without the spread. The
    interval of a size that varies in its logarithm must stay within a factor of 100.
 
 Sizes differ if the restricted likelihood gains by it: -2 ln of its ratio is above 2.71, the 95 % quantile where a
 variance is at its bound of zero (Self and Liang 1987). Of the forms adopted the one with the largest gain is
-taken. Others within one standard error of it are named.
+taken, or, if left-out runs cannot tell it from that one, a form at the size that theory gives. The others that
+they cannot tell from it are named.
 """
 
 from __future__ import annotations
@@ -40,6 +42,7 @@ import numpy as np
 from scipy.stats import norm as normal
 from scipy.stats import t as student
 
+from calibration.attribution.forms import Form, as_good, at_theory, paired_gain
 from calibration.attribution.refits import FIRST, Candidate, left_out_residuals
 from calibration.statistics.budget import skipped, spent
 from calibration.statistics.fit import Fit, UnsolvedError, birge, fit
@@ -60,7 +63,6 @@ from calibration.statistics.study import FinalRefit, Study
 from common.arrays import Floats, Integers
 
 _REMOVED = 0.5  # least share of what is beyond noise
-_CERTAIN = 2.0  # standard errors of the gain
 _DIFFERS = 2.71  # ½ χ²₁ at 5 %
 _FEWEST = 3  # specimens, for sizes that differ
 _DRAWS = 400  # of the bootstrap, for what the form leaves
@@ -84,7 +86,8 @@ class AdoptedForm:
     gain_error: float
     removed: float  # share of what is beyond noise that it removes there
     remainder: float  # relative rms that it leaves there beyond noise
-    as_well: tuple[str, ...] = ()  # titles of others within one standard error of its gain
+    at_theory: bool = False  # its size is that of theory, and not fitted
+    forms: tuple[Form, ...] = ()  # that left-out runs cannot tell from it, itself among them
     misfit: Misfit | None = None  # tests of what it leaves
 
     @property
@@ -129,7 +132,8 @@ class AdoptedForm:
             "remainder": self.remainder,
             "remainder_p": self.misfit.p_value,
             "largest_along": self.largest_along,
-            "as_well": list(self.as_well),
+            "as_well": [form.title for form in self.forms if form.fit is not self.fit],
+            "at_theory": self.at_theory,
         }
 
     def handed_on(self, refit: FinalRefit) -> FinalRefit:
@@ -138,6 +142,9 @@ class AdoptedForm:
         kept = [i for i, p in enumerate(refit.fitted) if p.name not in own]
         fitted = [refit.fitted[i] for i in kept]
         covariance = self.birge * refit.covariance[np.ix_(kept, kept)]
+        parameters = {name: value for name, value in refit.parameters.items() if name not in own}
+        if self.at_theory:
+            return FinalRefit(parameters, tuple(fitted), covariance)
         place = next(i for i, p in enumerate(fitted) if p.name == self.effect.name)
         covariance[place, place] += self.spread**2
         if fitted[place].logarithmic:  # corrected.toml states the size itself
@@ -145,7 +152,6 @@ class AdoptedForm:
             slope[place] = refit.parameters[self.effect.name]
             covariance *= np.outer(slope, slope)
             fitted[place] = self.effect
-        parameters = {name: value for name, value in refit.parameters.items() if name not in own}
         return FinalRefit(parameters, tuple(fitted), covariance)
 
 
@@ -191,12 +197,14 @@ def adopt_nearest(
         tangents: their directions.
     """
     adopted: list[AdoptedForm] = []
-    for candidate in _promising(base, misfit, candidates):
+    noise_known = study.model.runs.noise_known
+    for candidate in _promising(base, misfit.critical_z if noise_known else 0.0, candidates):
         if skipped(f"{candidate.title} as the nearest form"):
             continue
         try:
             constant = _converged(study, base, candidate)
-            forms = [(study.model, constant, 0.0)]
+            forms: list[tuple[ForwardModel, Fit, float]] = [(study.model, constant, 0.0)]
+            theory = at_theory(study, base, candidate.effect)
             if len(np.unique(specimens(study.model.runs)[0][study.split.fitted])) >= _FEWEST:
                 forms.append(_with_spread(study, constant, candidate.effect))
         except UnsolvedError:
@@ -204,24 +212,33 @@ def adopt_nearest(
         b = _birge(study, forms[-1][1])
         if len(forms) > 1 and _restricted(study, constant, b) - _restricted(study, forms[1][1], b) <= _DIFFERS:
             forms.pop()
-        judged = (_judged(study, base, candidate.effect, *form) for form in reversed(forms))
+        judged = [_judged(study, base, candidate.effect, *form) for form in reversed(forms)]
         adopted += [form for form in judged if form][:1]
+        if theory and (form := _judged(study, base, candidate.effect, study.model, theory.fit, 0.0)):
+            adopted.append(form)
     if not adopted:
         return None
-    best = max(adopted, key=lambda form: form.gain)
-    others = [f.effect.title for f in adopted if f is not best and f.gain > best.gain - best.gain_error]
-    place = next(i for i, e in enumerate(study.model.effects) if e.name == best.effect.name)
+    largest = max(adopted, key=lambda form: form.gain)
+    as_form = {id(a.fit): Form(a.effect, a.fit, a.at_theory) for a in adopted}
+    alike = as_good(study, as_form[id(largest.fit)], as_form.values())
+    alike.sort(key=lambda form: not form.at_theory)
+    best = next((a for a in adopted if alike[0].at_theory and a.fit is alike[0].fit), largest)
+    place = next(i for i, e in enumerate(study.effects) if e.name == best.effect.name)
     left = examine_residual(replace(study, seed=study.seed + 5), best.fit, tangents.without(place), draws=_DRAWS)
-    return replace(best, as_well=tuple(others), misfit=left)
+    return replace(best, forms=tuple(alike), misfit=left)
 
 
 def _birge(study: Study, fitted: Fit) -> float:
     return birge(study.model.runs, fitted, study.split.fitted)
 
 
-def _promising(base: Fit, misfit: Misfit, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Choose the effects that remove most by their refits, or by their scores where they have none."""
-    tested = [c for c in candidates if abs(c.z) > misfit.critical_z and c.survived >= TESTABLE]
+def _promising(base: Fit, least: float, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Choose the effects that remove most by their refits, or by their scores where they have none.
+
+    Args:
+        least: |z| that an effect needs.
+    """
+    tested = [c for c in candidates if abs(c.z) > least and c.survived >= TESTABLE]
     return sorted(tested, key=lambda c: c.refit.deviance if c.refit else base.deviance - c.z**2)[:FIRST]
 
 
@@ -282,18 +299,21 @@ def _judged(
     study: Study, base: Fit, effect: Parameter, model: ForwardModel, fitted: Fit, spread: float
 ) -> AdoptedForm | None:
     """Describe a form by its left-out runs; None if it is not adopted."""
-    size = fitted.parameters[effect.name]
-    if not fitted.converged or not effect.bounds[0] < size < effect.bounds[1]:
+    size, free = fitted.parameters[effect.name], effect.name in fitted.names
+    if not fitted.converged or (free and not effect.bounds[0] < size < effect.bounds[1]):
         return None
     b = _birge(study, fitted)
+    paired = paired_gain(study, fitted, base, b)
     before, after = left_out_residuals(study, base, fitted)
     values = len(after)
-    gain = float((before**2 - after**2).sum()) / (2 * b)
-    error = math.sqrt(float(((before - after) ** 2).sum()) / b)
     beyond = float((before**2).sum()) - values
     removed = float((before**2 - after**2).sum()) / max(beyond, 1e-9)
-    if gain <= _CERTAIN * error or removed < _REMOVED:
+    if not paired.certain or (removed < _REMOVED and study.model.runs.noise_known):
         return None
+    leaves = math.sqrt(max(float((after**2).sum()) / values - 1, 0.0))
+    left, gain = leaves * fitted.noise.rms, (paired.gain, paired.error, min(removed, 1.0))
+    if not free:
+        return AdoptedForm(effect, model, fitted, 0.0, b, (size, size), {}, *gain, left, at_theory=True)
     place = fitted.names.index(effect.name)
     sigma = math.sqrt(b * fitted.covariance[place, place])
     half = float(normal.ppf(0.975)) * sigma
@@ -310,9 +330,7 @@ def _judged(
     low, high = _ends(fitted.fitted[place], size, half)
     if not spread and low <= effect.start <= high:
         return None
-    leaves = math.sqrt(max(float((after**2).sum()) / values - 1, 0.0))
-    left = leaves * fitted.noise.rms
-    return AdoptedForm(effect, model, fitted, spread, b, (low, high), sizes, gain, error, min(removed, 1.0), left)
+    return AdoptedForm(effect, model, fitted, spread, b, (low, high), sizes, *gain, left)
 
 
 def _differs_from_null(study: Study, model: Shifted, fitted: Fit, seen: Integers) -> bool:

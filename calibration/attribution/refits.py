@@ -182,7 +182,7 @@ def examine(
         after_first: is told, after the first refit, how many there are, and the processor time of this one.
     """
     needed = misfit.critical_z if threshold is None else threshold
-    effects = [e for e in study.model.effects if e not in beside]
+    effects = [e for e in study.effects if e not in beside]
     local = coefficients_within_range(study.model, base.parameters)
     scored = unexamined(misfit, effects, needed, beside)
     reasons = reasons_not_to_refit(study, base, misfit, needed, beside)
@@ -220,7 +220,7 @@ def reasons_not_to_refit(
     study: Study, base: Fit, misfit: Misfit, needed: float, beside: tuple[Parameter, ...] = ()
 ) -> list[Judgement | None]:
     """Say for each effect why it is not worth a refit by its score; None if it is. See `examine`."""
-    effects = [e for e in study.model.effects if e not in beside]
+    effects = [e for e in study.effects if e not in beside]
     if not coefficients_within_range(study.model, base.parameters):
         return [None] * len(effects)
     most = study.noise_at_most(len(base.names))
@@ -269,7 +269,7 @@ def pairs(study: Study, candidates: Sequence[Candidate]) -> list[Candidate]:
         assert first.refit is not None
         if skipped(f"a second effect beside {first.title}"):
             continue
-        others = [e for e in study.model.effects if e.name != first.effect.name]
+        others = [e for e in study.effects if e.name != first.effect.name]
         tangents = directions(study.model, first.refit.parameters, others, title=title, quick=True)
         misfit = examine_residual(again, first.refit, tangents)
         second += examine(again, first.refit, misfit, tangents, beside=(first.effect,))
@@ -296,7 +296,7 @@ def ebic(study: Study, refit: Fit, count: int) -> float:
 
     Source: Chen and Chen (2008), γ = 1.
     """
-    sets = math.comb(len(study.model.effects), count)
+    sets = math.comb(len(study.effects), count)
     numbers = len(refit.names) + len(refit.wrong_numbers)
     return refit.deviance + numbers * math.log(study.values) + 2 * math.log(sets)
 
@@ -366,6 +366,6 @@ def left_out_residuals(study: Study, base: Fit, refit: Fit) -> tuple[Floats, Flo
 def _left_out_residual(study: Study, fitted: Fit, refit: Fit, learn: Flags, out: Flags) -> Floats:
     """Whiten the residuals of a left-out session, for a model fitted to the others, in the noise of `refit`."""
     data = study.model.runs
-    step = solve_normal(fitted.normal(data, learn, refit.noise))[0]
+    step = solve_normal(fitted.normal_of_fit(data, learn, refit.noise))[0]
     predicted = (data.y - fitted.prediction)[out] - fitted.jacobian[out] @ step
     return np.asarray(refit.noise.whitener(data.session[out], data.scale[out])(predicted))

@@ -50,8 +50,8 @@ def pulls(fitted: Fit, nuisances: Sequence[Parameter]) -> tuple[Pull, ...]:
         if nuisance.sigma is None or nuisance.grid or nuisance.name not in fitted.names:
             continue
         place = fitted.names.index(nuisance.name)
-        variance = fitted.covariance[place, place] / fitted.inflation
-        x, prior = nuisance.offset(fitted.parameters[nuisance.name]), nuisance.sigma**2
+        x, variance = (float(part[place]) for part in fitted.tested)
+        prior = nuisance.sigma**2
         if fitted.fitted[place].sigma is None:
             error = math.sqrt(variance)
             computed.append(Pull(nuisance, x, error, x, error, x / math.sqrt(prior + variance), True))
@@ -117,7 +117,7 @@ def beside_wrong_numbers(
     Args:
         directions: of the effects.
     """
-    names = [e.name for e in study.model.effects]
+    names = [e.name for e in study.effects]
     promising = []
     for candidate in candidates:
         if candidate.refit is not None and not candidate.refit.stopped:

@@ -379,6 +379,7 @@ def find_laws(study: Study, base: Fit, *, beside_claim: bool = False) -> Laws:
     model = study.model
     if not isinstance(model, SwimmerModel):
         raise TypeError("laws are looked for in a SwimmerModel")
+    base = fit(model, base.parameters, base.names, study.split.fitted, in_sigma=True, title="")
     both = len(np.unique(np.sign(model.runs.omega[study.split.fitted]))) == 2
     candidates = places(both_directions=both)
     searched = search(model, base, study.split.fitted, candidates, title="places" if study.progress else "")

@@ -33,7 +33,12 @@ from scipy.stats import t as student
 
 from calibration.statistics.budget import limited_as_one, skipped, spent
 from calibration.statistics.forward import derivatives
-from calibration.statistics.gls import Noise, NormalEquations, repeat_count, repeat_covariance, schur_complement
+from calibration.statistics.gls import (
+    Noise,
+    NormalEquations,
+    schur_complement,
+    solve_normal,
+)
 from calibration.statistics.statistical_model import (
     ForwardModel,
     Parameter,
@@ -47,7 +52,7 @@ from calibration.statistics.statistical_model import (
 from common.arrays import Flags, Floats
 
 WRONG = 3.0  # pull beyond which a nuisance parameter is taken to be wrong
-_LEARNT = 0.02  # share of the prior's variance that the runs must remove before a pull means anything
+LEARNT = 0.02  # share of the prior's variance that the runs must remove before a pull means anything
 _NOTHING = 0.01  # change in per cent, or in the unit in which it is shown, that is not stated
 _STATED = 100.0  # change of a logarithm that is stated
 _MOST_STEPS = 25
@@ -80,7 +85,7 @@ class Pull:
     def learnt(self) -> bool:
         """Whether the runs say anything about it."""
         assert self.parameter.sigma is not None
-        return self.freed or self.error**2 < (1 - _LEARNT) * self.parameter.sigma**2
+        return self.freed or self.error**2 < (1 - LEARNT) * self.parameter.sigma**2
 
     @property
     def wrong(self) -> bool:
@@ -133,6 +138,8 @@ class Fit:
     deviance: float  # rᵀ Σ⁻¹ r + ln |Σ|/|S ⊗ I| over the fitted runs
     converged: bool  # the fit is at a minimum, or at one within the bounds
     wrong_numbers: tuple[tuple[Pull, ...], ...] = ()  # the first of each has lost its prior; see `fit`
+    tested: tuple[Floats, Floats] = (np.empty(0), np.empty(0))  # changes of the nuisance parameters from their
+    # values as given, and variances, by least squares in Σ, as tests have them; (p,)
     stopped: bool = False  # the search ended because no time was left
 
     def half_width(self, place: int) -> float:
@@ -155,10 +162,28 @@ class Fit:
         run = self.noise.run_covariance if run is None else run
         return linear.products(residual, run, prior_offsets(self.fitted, self.parameters))
 
-    def normal(self, runs: Runs, rows: Flags, noise: Noise | None = None) -> Floats:
-        """Return them at ρ, (p + 1, p + 1); default: in the noise of the fit."""
+    def refitted(self, runs: Runs, rows: Flags, *, for_test: bool = False) -> Fit:
+        """Fit again to the runs in `rows` (n,), by one linear step; for a test, by least squares in Σ."""
+        products = self.products(runs, rows)
+        refit = products.solve(passes=_PASSES)
+        step, covariance = refit.step, refit.covariance
+        if for_test:
+            step, covariance = solve_normal(products.at(refit.share))
+        return replace(
+            self,
+            parameters=apply_step(self.fitted, self.parameters, step),
+            prediction=self.prediction + self.jacobian @ step,
+            covariance=self.inflation * covariance,
+        )
+
+    def normal(self, runs: Runs, rows: Flags) -> Floats:
+        """Return them in the noise of the fit, (p + 1, p + 1)."""
+        return self.products(runs, rows).at(self.noise.session_ratio)
+
+    def normal_of_fit(self, runs: Runs, rows: Flags, noise: Noise | None = None) -> Floats:
+        """Return them with the weights of a fit, (p + 1, p + 1); default: in the noise of this one."""
         noise = noise or self.noise
-        return self.products(runs, rows, noise.run_covariance).at(noise.session_ratio)
+        return self.products(runs, rows, noise.run_covariance).for_fit(noise.session_ratio)[0]
 
 
 def fit(
@@ -169,6 +194,7 @@ def fit(
     *,
     wrong_numbers: tuple[tuple[Pull, ...], ...] = (),
     target: float = math.inf,
+    in_sigma: bool = False,
     title: str = "fit",
 ) -> Fit:
     """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay.
@@ -177,6 +203,8 @@ def fit(
         target: of rᵀ Σ⁻¹ r. Where the steps that are left cannot reach it, the search ends before it converges.
         wrong_numbers: nuisance parameters that are wrong, each followed by those that may be wrong in its place;
             the first of each is fitted without its prior.
+        in_sigma: fit with the weights of tests, Σ⁻¹. A common misfit bends such a fit less, so what is missing is
+            found more easily near it.
 
     Raises:
         UnsolvedError: the model cannot be solved quickly with the effects among `names`, however small.
@@ -185,15 +213,17 @@ def fit(
     freed = {alike[0].parameter.name for alike in wrong_numbers}
     fitted = tuple(parameter(model, name) for name in names)
     fitted = tuple(replace(p, sigma=None) if p.name in freed else p for p in fitted)
-    repeats = data.repeats(used)
-    run = repeat_covariance(data.y[used], repeats, data.scale[used])
-    problem = _Problem(model, fitted, used, run, title)
+    run, repeats = data.noise(used)
+    problem = _Problem(model, fitted, used, run, in_sigma, title)
     with limited_as_one():
         point = _descend(problem, problem.first(dict(start)), target)
         stopped = spent()
     linear = point.products.solve(passes=_PASSES)
     normal = point.products.at(linear.share)
-    inflation = _inflation(repeat_count(repeats), len(run))
+    step, spread = solve_normal(normal)
+    nuisances = {p.name for p in model.nuisances}
+    offsets = [p.offset(point.parameters[p.name]) if p.name in nuisances else 0.0 for p in fitted]
+    inflation = _inflation(repeats, len(run))
     return Fit(
         parameters=point.parameters,
         fitted=fitted,
@@ -205,8 +235,9 @@ def fit(
         jacobian=point.derivative,
         noise=Noise(run, linear.share),
         deviance=float(normal[-1, -1] + point.products.determinant(linear.share)),
-        converged=_step(fitted, point.parameters, normal, 0).promise < _UNSETTLED,
+        converged=_step(fitted, point.parameters, problem.normal(point, linear.share), 0).promise < _UNSETTLED,
         wrong_numbers=wrong_numbers,
+        tested=(np.array(offsets) + step, np.diag(spread)),
         stopped=stopped,
     )
 
@@ -233,7 +264,12 @@ class _Problem:
     fitted: tuple[Parameter, ...]
     used: Flags
     run: Floats
+    in_sigma: bool
     title: str
+
+    def normal(self, point: _Point, share: Floats) -> Floats:
+        """Return the products of a point with the weights of the fit, (p + 1, p + 1)."""
+        return point.products.at(share) if self.in_sigma else point.products.for_fit(share)[0]
 
     def first(self, parameters: dict[str, float]) -> _Point:
         """Run the model at the start; effects move towards their null while it cannot be solved quickly there."""
@@ -288,16 +324,17 @@ def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
         # The scatter of the sessions comes from the residuals of the fit, but only near the solution. Far from it
         # every session looks shifted, and with a large ρ the search would stop there.
         share = point.products.share(passes=0 if count == 1 else _PASSES)
-        step = _step(fitted, point.parameters, point.products.at(share), least)
+        normal = problem.normal(point, share)
+        step = _step(fitted, point.parameters, normal, least)
         if step.promise < _SMALL and count > 1:
             break
-        above = float(point.products.at(share)[-1, -1]) - target
+        above = float(normal[-1, -1]) - target
         if count > _TRIED and (_MOST_STEPS - count) * step.promise < above:
             break
         if skipped("more steps of some fits"):
             break
         tried = problem.at(step.parameters, None if step.size > _SHORT else point.derivative, count + 1)
-        fall = float((point.products.at(share) - tried.products.at(share))[-1, -1])
+        fall = float(normal[-1, -1] - problem.normal(tried, share)[-1, -1])
         if tried.solved and fall > -_SMALL:
             # A step that keeps little of its promise overshoots, and the next one is damped (Marquardt 1963).
             least = step.damping + 1 if fall < _KEPT * step.promise else max(step.damping - 2, 0)
@@ -362,11 +399,13 @@ def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal:
     return change
 
 
-def _inflation(repeats: int, outputs: int) -> float:
+def _inflation(repeats: float, outputs: int) -> float:
     """Compute the factor by which the variance is larger because S is estimated from ν repeats of k outputs.
 
     ν/(ν − k − 1), because 1/S is overestimated, times 1 + (k − 1)/(ν − k), because its weights are not optimal.
     """
+    if math.isinf(repeats):
+        return 1.0
     if repeats <= outputs + 1:
         return 2.0 * repeats
     return repeats / (repeats - outputs - 1) * (1 + (outputs - 1) / (repeats - outputs))
@@ -377,8 +416,8 @@ def _freedom(products: NormalEquations, share: Floats, count: int) -> Floats:
     least = 1 / products.sizes.mean()
     steps = 0.01 * share + 1e-3 * least
     shares = np.vstack([share, share + np.diag(steps)])
-    inverse = np.linalg.pinv(np.stack([products.at(s) for s in shares])[:, :count, :count], hermitian=True)
-    V, *near = np.maximum(np.diagonal(inverse, axis1=-2, axis2=-1), 1e-100)
+    variances = [np.diag(products.covariance(s))[:count] for s in shares]
+    V, *near = np.maximum(variances, 1e-100)
     slopes = (np.array(near) - V) / steps[:, None]
     error = math.sqrt(2 / max(len(products.sizes) - 1, 1)) * (share + least)
     variance = (((slopes + slopes.mean(0)) / 2 * error[:, None]) ** 2).sum(0)
@@ -392,6 +431,7 @@ def profile_intervals(
     covariance.
     """
     data, count = model.runs, len(fitted.names)
+    along = solve_normal(fitted.normal_of_fit(data, used))[1]
     sets, ends = [], []
     for i, p in enumerate(fitted.fitted):
         if p.sigma is not None:
@@ -402,7 +442,7 @@ def profile_intervals(
             change = (
                 math.log(end / fitted.parameters[p.name]) if p.logarithmic else end - fitted.parameters[p.name]
             )
-            step = fitted.covariance[i] / fitted.covariance[i, i] * change  # how the others change with it
+            step = along[i] / along[i, i] * change  # how the others change with it
             sets.append(apply_step(fitted.fitted, fitted.parameters, step))
             ends.append((i, change))
     predictions = model.predict(sets, title=title)
@@ -412,7 +452,7 @@ def profile_intervals(
         others = [j for j in range(count) if j != i]
         end_of = replace(fitted, parameters=parameters, prediction=prediction)
         rise = _deviance(end_of, data, used, others) - least
-        expected = change**2 / (fitted.covariance[i, i] / fitted.inflation)
+        expected = change**2 / along[i, i]
         scale = math.sqrt(expected / rise) if _FLAT * expected < rise < _STEEP * expected else 1.0
         p = fitted.fitted[i]
         intervals[p.name].append(p.moved(fitted.parameters[p.name], change * scale))
@@ -422,7 +462,7 @@ def profile_intervals(
 
 def _deviance(fitted: Fit, data: Runs, used: Flags, others: list[int]) -> float:
     """Compute rᵀ Σ⁻¹ r with those parameters of `others` refitted (linearised), in the noise of the fit."""
-    normal = fitted.normal(data, used)[np.ix_([*others, -1], [*others, -1])]
+    normal = fitted.normal_of_fit(data, used)[np.ix_([*others, -1], [*others, -1])]
     return float(schur_complement(normal, len(others))[0, 0])
 
 

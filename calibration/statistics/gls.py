@@ -13,10 +13,19 @@ A zero of an angle that is set each morning shifts one output, the temperature a
 one output has two degrees of freedom, one of all of them about a dozen. So each is the mean of its own estimate
 and that of all outputs, as if as many sessions again had scattered as all outputs do (moderated variances, Smyth
 2004).
-ρ comes from the residuals of the fitted model, so a missing effect makes it larger. Therefore it is at most
-`SESSION_SHARE`: sessions are assumed to scatter no more than single runs do, and a larger shift of a whole session
-must be explained by the model. With a single session nothing is known about ρ. Then ρ is that limit, and a shift
-that is equal in all runs has almost no weight.
+ρ comes from how the residuals of the sessions scatter about their common mean: what all sessions share is a misfit
+of the model, and no scatter. It is at most `_MOST_SCATTER`; a larger shift of a whole session must be explained by
+the model. With a single session, and where each session has a number of its own in the fit, nothing is known about
+ρ. Then it is taken to be `UNKNOWN_SHARE`.
+
+**Fits and tests.** Σ⁻¹ gives almost no weight to a shift of all runs, so with a wrong model least squares buys a
+better slope with a wrong level. Therefore a fit has the weights W: Σ⁻¹, but the mean over all sessions has the
+weight that it has at ρ = 0. Where ρ is unknown, it is 0 in W. The covariance of such a fit contains the scatter,
+
+    V = A⁻¹ B A⁻¹ = A⁻¹ + A⁻¹ (B − A) A⁻¹,   A = JᵀWJ,   B = JᵀWΣWJ,
+
+where priors count in A and B alike; the second form is that of A⁻¹ for a column without any signal. With balanced
+sessions a fit loses nothing by it (McElroy 1967). The tests have Σ: a shift of all runs is no evidence.
 
 **Weights.** A run of weight w has the covariance S/w (`calibration.statistics.weights`):
 
@@ -34,13 +43,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from common.arrays import Floats, Integers
 
-SESSION_SHARE = 1.0  # largest ρ
+UNKNOWN_SHARE = 1.0  # ρ where nothing is known about it
+_MOST_SCATTER = 9.0  # largest ρ
+_LEAST_FREEDOM = 0.5  # degrees of freedom of the sessions' means below which ρ is unknown
 _RIDGE = 1e-11  # so that columns without any signal get a large variance
 
 
@@ -95,6 +106,7 @@ class Regression:
         scale: Floats | None = None,
         repeated: Integers | Floats | None = None,
         completion: Floats | None = None,
+        declared: Floats | None = None,
     ):
         """Multiply the columns with each other.
 
@@ -105,9 +117,10 @@ class Regression:
             scale: (n,) roots of the weights of the runs.
             repeated: what tells repeats, see `Runs.repeats`; needed for the residuals' own S.
             completion: (n, k, k) of runs with gaps, see `statistical_model`; acts on what is drawn.
+            declared: S, (k, k), where it need not be estimated.
         """
         n, k, m = columns.shape
-        self.precision, self.repeated, self.completion = precision, repeated, completion
+        self.precision, self.repeated, self.completion, self.declared = precision, repeated, completion, declared
         self.session = np.unique(session, return_inverse=True)[1].reshape(-1)
         self.scale = np.ones(n) if scale is None else scale
         self.picks, self.sizes = averaging_rows(session, self.scale)
@@ -128,6 +141,8 @@ class Regression:
 
     def noise(self, residual: Floats) -> Floats:
         """Estimate S (..., k, k) of residuals (..., n, k)."""
+        if self.declared is not None:
+            return np.broadcast_to(self.declared, (*residual.shape[:-2], *self.declared.shape))
         assert self.repeated is not None
         return repeat_covariance(residual, self.repeated, self.scale)
 
@@ -191,7 +206,7 @@ class LeastSquares:
     """Generalised least squares of the last column by the others; `...` stands for batches."""
 
     step: Floats  # (..., p)
-    covariance: Floats  # (..., p, p)
+    covariance: Floats  # (..., p, p) with the scatter of sessions in full
     share: Floats  # (..., k) ρ
 
 
@@ -215,6 +230,35 @@ class NormalEquations:
         weights = 1 / (1 + share[..., None, :] * self.sizes[:, None])
         return np.asarray(weights.reshape(*share.shape[:-1], len(self.sizes) * self.outputs))
 
+    def for_fit(self, share: Floats | float) -> tuple[Floats, Floats]:
+        """Compute columnᵀ W column, and columnᵀ W Σ W column, (..., m, m), for ρ (..., k)."""
+        share = np.asarray(share)
+        weights = self._weights(share)[..., None]
+        of_fit = self._weights(np.where(self._freedom > _LEAST_FREEDOM, share, 0.0))[..., None]
+        rest = self._about_common(self.means)
+        seen = self.means - rest + self._about_common(of_fit * rest)
+        transposed = np.swapaxes(seen, -1, -2)
+        return self.within + np.swapaxes(self.means, -1, -2) @ seen, self.within + transposed @ (seen / weights)
+
+    @cached_property
+    def _freedom(self) -> Floats:
+        """Degrees of freedom of the sessions' means about the common one that a fit at ρ = 0 leaves, (..., k)."""
+        columns = self._about_common(self.means)[..., :-1]
+        covariance = solve_normal(self.at(0.0))[1]
+        taken = ((columns @ covariance) * columns).sum(-1)
+        return len(self.sizes) - 1 - self._of_outputs(taken)
+
+    def _of_outputs(self, means: Floats) -> Floats:
+        """Add up what is stated for each session and output (..., s k), to (..., k)."""
+        return np.asarray(means.reshape(*means.shape[:-1], len(self.sizes), self.outputs).sum(-2))
+
+    def _about_common(self, means: Floats) -> Floats:
+        """Take the mean over all sessions from their means (..., s k, m), for each output."""
+        each = means.reshape(*means.shape[:-2], len(self.sizes), self.outputs, means.shape[-1])
+        along = np.sqrt(self.sizes / self.sizes.sum())
+        common = np.einsum("s,...skm->...km", along, each)
+        return np.asarray((each - along[:, None, None] * common[..., None, :, :]).reshape(means.shape))
+
     def determinant(self, share: Floats) -> Floats:
         """Compute ln |Σ|/|S ⊗ I|, (...), for ρ (..., k)."""
         return np.asarray(-np.log(self._weights(share)).sum(-1))
@@ -226,38 +270,45 @@ class NormalEquations:
         return NormalEquations(self.within[..., rows, cols], means, self.sizes, self.outputs)
 
     def solve(self, *, passes: int) -> LeastSquares:
-        """Fit the last of the columns, with ρ from its own residuals after `passes` iterations (0: ρ = 0)."""
+        """Fit the last of the columns with the weights W, and ρ of its residuals after `passes` iterations."""
         share = self.share(passes=passes)
-        return LeastSquares(*solve_normal(self.at(share)), share)
+        return LeastSquares(solve_normal(self.for_fit(share)[0])[0], self.covariance(share), share)
+
+    def covariance(self, share: Floats) -> Floats:
+        """Compute the covariance (..., p, p) of a fit of the last column with the weights W, for ρ (..., k)."""
+        weighted, scattered = self.for_fit(share)
+        inverse = solve_normal(weighted)[1]
+        return np.asarray(inverse + inverse @ (scattered - weighted)[..., :-1, :-1] @ inverse)
 
     def share(self, *, passes: int) -> Floats:
         """Estimate ρ (..., k) from the residuals of a fit of the last column, after `passes` iterations from 0.
 
-        The scatter of the sessions' means along an axis is expected to be
+        The scatter of the sessions' means along an axis about their common mean m is expected to be
 
-            Σ_s n_s m_s² = (1 − h/s) Σ_s (1 + ρ n_s),
+            Σ_s n_s (m_s − m)² = (1 − h/(s − 1)) (s − 1 + ρ (N − Σ_s n_s²/N)),   N = Σ_s n_s,
 
-        where h of their s degrees of freedom are used by the fit.
+        where h of their s − 1 degrees of freedom are used by the fit.
         """
-        count, k, batch = len(self.sizes), self.outputs, self.within.shape[:-2]
+        freedom, k, batch = len(self.sizes) - 1, self.outputs, self.within.shape[:-2]
         share = np.zeros((*batch, k))
-        if count == 1 and passes:
-            return np.full_like(share, SESSION_SHARE)
-        columns = self.means[..., :-1]
-        for _ in range(passes):
+        if not passes:
+            return share
+        means, total = self._about_common(self.means), self.sizes.sum()
+        columns = means[..., :-1]
+        for _ in range(passes if freedom else 0):
             step, covariance = solve_normal(self.at(share))
-            between = (self.means[..., -1] - (columns @ step[..., None])[..., 0]) ** 2
+            between = (means[..., -1] - (columns @ step[..., None])[..., 0]) ** 2
             used = ((columns @ covariance) * columns).sum(-1) * self._weights(share)
-            each, taken = (part.reshape(*batch, count, k).sum(-2) for part in (between, used))
+            each, taken = self._of_outputs(between), self._of_outputs(used)
             own, common = (
-                scatter / np.maximum(k_left, 0.1) - count
+                scatter / np.maximum(k_left, 0.1) - freedom
                 for scatter, k_left in (
-                    (each, 1 - taken / count),
-                    (each.mean(-1, keepdims=True), 1 - taken.mean(-1, keepdims=True) / count),
+                    (each, 1 - taken / freedom),
+                    (each.mean(-1, keepdims=True), 1 - taken.mean(-1, keepdims=True) / freedom),
                 )
             )
-            share = np.clip((own + common) / 2 / self.sizes.sum(), 0.0, SESSION_SHARE)
-        return share
+            share = np.clip((own + common) / 2 / (total - (self.sizes**2).sum() / total), 0.0, _MOST_SCATTER)
+        return np.where(self._freedom > _LEAST_FREEDOM, share, UNKNOWN_SHARE)
 
 
 def solve_normal(normal: Floats) -> tuple[Floats, Floats]:

@@ -4,11 +4,12 @@ With W = Σ^−½ and Q = orth(W ∂f/∂C), the part that the coefficients can 
 
     r = (I − QQᵀ) W (y − f),   d_j = (I − QQᵀ) W ∂f/∂ε_j,   z_j = d̂_jᵀ r.
 
-Four statistics:
+Five statistics:
 
     lack     χ² of the condition means: lack of fit against pure error;
     kernel   rᵀ K r: smooth structure over the runs' inputs;
     shape    max |z| over directions in which one output follows an input, a square or a product of two;
+    pull     max |x/√(σ² − V)| over nuisance parameters, x the change in the fit and V its variance;
     score    max |z_j| over the catalogue. The scatter of the sessions is estimated with effect j in the model,
              because otherwise a shift of all runs would look like scatter. An effect with a second number has
              one score at each of several values of it, and the largest counts.
@@ -38,9 +39,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import rankdata
 
-from calibration.statistics.fit import Fit
+from calibration.statistics.fit import LEARNT, Fit
 from calibration.statistics.forward import derivatives
-from calibration.statistics.gls import NormalEquations, averaging_rows, inverse_root, schur_complement
+from calibration.statistics.gls import (
+    NormalEquations,
+    averaging_rows,
+    inverse_root,
+    schur_complement,
+    solve_normal,
+)
 from calibration.statistics.statistical_model import (
     ForwardModel,
     Parameter,
@@ -54,7 +61,7 @@ from calibration.statistics.study import Study
 from common.arrays import Flags, Floats, Integers
 
 TESTABLE = 0.03  # an effect cannot be tested if less than this share of its signal survives the projection
-GENERAL = ("lack", "kernel", "shape")
+GENERAL = ("lack", "kernel", "shape", "pull")
 _PASSES = 3  # iterations for the scatter of the sessions
 _PASSES_OF_A_SCORE = 2
 _AT_ONCE = 50  # draws
@@ -120,7 +127,7 @@ def directions(
 class Scores:
     """Statistics of residuals; ... for batches of them."""
 
-    general: Floats  # (..., 3) GENERAL
+    general: Floats  # (..., 4) GENERAL
     z: Floats  # (..., e) projected score of each effect
     survived: Floats  # (..., e) |d_j| / |W ∂f/∂ε_j|
     length: Floats  # (..., e) |d_j|: signal per unit of the effect, in standard deviations
@@ -141,6 +148,12 @@ class Misfit:
     exact_length: Floats  # (e,) `Scores.length` if the nuisance parameters were exact
     second: Floats  # (e,) value of each effect's second number at its largest score; NaN where there is none
 
+    def without(self, place: int) -> Misfit:
+        """Leave one effect out."""
+        scores = {name: np.delete(getattr(self.scores, name), place) for name in ("z", "survived", "length")}
+        exact, second = (np.delete(each, place) for each in (self.exact_length, self.second))
+        return replace(self, scores=replace(self.scores, **scores), exact_length=exact, second=second)
+
 
 class _Tester:
     """The columns of the fitted runs, which stay the same, and the statistics of any residual.
@@ -150,6 +163,7 @@ class _Tester:
 
     def __init__(self, data: Runs, used: Flags, fitted: Fit, D: Floats):
         self.p = len(fitted.names)
+        self.pulled = np.array([p.sigma is not None and not p.grid for p in fitted.fitted], dtype=bool)
         repeated = data.repeats(used)
         self.design = regression(data, used, np.concatenate([fitted.jacobian, D], -1), fitted.fitted, repeated)
         self.J, scale = self.design.columns[..., : self.p], self.design.scale
@@ -172,17 +186,27 @@ class _Tester:
         """
         run = self.design.noise(residual)
         products, root = self.design.products(residual, run), inverse_root(run)  # (B, k, k)
-        base = products.take(np.array([[*range(self.p), -1]])).solve(passes=_PASSES)
+        base = products.take(np.array([[*range(self.p), -1]]))
         projected = projected_scores(products, self.p)
-        share, step = base.share[:, 0], base.step[:, 0]
+        shares = base.share(passes=_PASSES)
+        share, (step, covariance) = shares[:, 0], (part[:, 0] for part in solve_normal(base.at(shares)))
         white = residual * self.design.scale[:, None] - np.einsum("nkp,bp->bnk", self.J, step, optimize=True)
         white = self.design.shrink(white @ np.swapaxes(root, -1, -2), share)
         lack = ((self.means @ white) ** 2).sum((-1, -2))
         at_places = self.places @ white
         kernel = np.einsum("bik,ij,bjk->b", at_places, self.K, at_places, optimize=True)
-        shapes = self._shapes(base.covariance[:, 0], white, root, share)
+        shapes = self._shapes(covariance, white, root, share)
         largest = np.abs(shapes).max((-1, -2)) if shapes.size else np.zeros(len(share))
-        return Scores(np.stack([lack, kernel, largest], -1), *projected, shapes, share)
+        pull = self._largest_pull(step, covariance)
+        return Scores(np.stack([lack, kernel, largest, pull], -1), *projected, shapes, share)
+
+    def _largest_pull(self, step: Floats, covariance: Floats) -> Floats:
+        """Compute the largest pull of a nuisance parameter, (B,); of those of which the runs say something."""
+        known = self.pulled
+        prior = 1 / self.design.precision[known]
+        removed = prior - np.diagonal(covariance, axis1=-2, axis2=-1)[:, known]
+        pulls = np.abs(step[:, known]) / np.sqrt(np.maximum(removed, LEARNT * prior))
+        return np.asarray(np.where(removed > LEARNT * prior, pulls, 0.0).max(-1, initial=0.0))
 
     def _shapes(self, covariance: Floats, white: Floats, root: Floats, share: Floats) -> Floats:
         """Compute z of every output along every feature, (B, k, f).

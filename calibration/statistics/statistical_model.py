@@ -5,6 +5,9 @@ model; a sphere that settles in a vessel is another one (`tests/oracles/spheres.
 
 The noise, weights of runs and priors are those of `calibration.statistics.gls`.
 
+**Noise.** S comes from repeats, or is declared. Without both it is unknown: then a guess weighs the outputs
+against each other, and no p-value means anything.
+
 **Gaps.** A run may lack some of its outputs. Let T put S_mo S_oo⁻¹ r_o for what is missing (m) of a residual r,
 from what was measured (o) of the same run. Then (T r)ᵀ S⁻¹ (T r) = r_oᵀ S_oo⁻¹ r_o: where T acts on residuals,
 derivatives and drawn noise alike, least squares are those of the measured values alone, and nothing is filled in.
@@ -14,6 +17,7 @@ its runs were whole.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
@@ -50,6 +54,7 @@ class Parameter:
     plausible: tuple[float, float] | None = None  # sizes of an effect that its source allows; None: all. Of a
     # number: by how much it may differ in some runs
     shown: float = 1.0  # factor to that unit
+    theory: float | None = None  # size of an effect that theory gives
     second: Parameter | None = None  # of an effect: its second number, which shows only with the effect
     grid: tuple[
         float, ...
@@ -97,6 +102,8 @@ class Runs:
     completion: Floats | None = field(
         default=None, kw_only=True
     )  # T, (n, k, k); None: no gaps. y is arbitrary there
+    sigma: Floats | None = field(default=None, kw_only=True)  # (k,) declared standard deviation of a run
+    noise_known: bool = field(default=True, kw_only=True)  # not so if it was declared to be unknown
     specimen: Integers | None = field(default=None, kw_only=True)  # (n,) 0, 1, …: what was run; None: not noted
     specimen_names: tuple[str, ...] = field(default=(), kw_only=True)  # by number
 
@@ -107,6 +114,36 @@ class Runs:
 
     def __len__(self) -> int:
         return len(self.y)
+
+    def noise(self, rows: Flags) -> tuple[Floats, float]:
+        """Estimate S (k, k) from the runs in `rows`, with its degrees of freedom, unless it is declared."""
+        if self.sigma is not None:
+            return np.diag(self.sigma**2), math.inf
+        repeats = self.repeats(rows)
+        return repeat_covariance(self.y[rows], repeats, self.scale[rows]), repeat_count(repeats)
+
+    def with_noise(self, rows: Flags, residual: Floats) -> Runs:
+        """Return runs whose noise can be used: where it is unknown, with a guess from a residual (n, k).
+
+        Args:
+            rows: (n,) the runs that are fitted.
+        """
+        if self.noise_known and (self.sigma is not None or self.repeated(rows)):
+            return self
+        freedom = 0 if self.sigma is not None else repeat_count(self.repeats(rows))
+        if self.sigma is not None or freedom >= self.y.shape[1]:
+            return replace(self, noise_known=False)
+        spread = residual[rows].std(0)
+        return replace(self, noise_known=False, sigma=np.where(spread > 0, spread, 1.0))
+
+    def repeated(self, rows: Flags | slice) -> bool:
+        """Tell whether there are repeats, or mirror runs in their place, from which the noise can be estimated."""
+        mirrored = np.column_stack([self._mirror_design(rows), self._alone(rows)])
+        return max(repeat_count(self.apart[rows]), repeat_count(mirrored)) >= FEWEST_REPEATS
+
+    def _alone(self, rows: Flags | slice) -> Floats:
+        """Make a level for each run with a gap."""
+        return np.equal.outer(np.arange(len(self)), np.flatnonzero(self.gaps.any(1)))[rows].astype(float)
 
     @property
     def gaps(self) -> Flags:
@@ -143,11 +180,12 @@ class Runs:
         A design (n', m) is taken where repeats differ otherwise, too: levels of condition and session, and what
         was noted (`noted_of_repeats`). Repeats in several sessions differ by what changed between these, which is
         no noise of a run. Where fewer than `FEWEST_REPEATS` runs are repeated, mirror runs serve as repeats, but
-        for what is odd and linear in the inputs; without them what is smooth in the inputs is no noise.
+        for what is odd and linear in the inputs; without them the noise is unknown, and what is smooth in the
+        inputs is not counted with it.
         """
         session, noted = self.session[rows], self.noted_of_repeats[rows]
         condition = self.apart[rows]
-        alone = np.equal.outer(np.arange(len(self)), np.flatnonzero(self.gaps.any(1)))[rows]
+        alone = self._alone(rows)
         if (count := repeat_count(condition)) < FEWEST_REPEATS:
             designs = (
                 np.column_stack([self._mirror_design(rows), alone]),
@@ -199,7 +237,9 @@ class Runs:
 
     def subset(self, rows: Flags | Integers) -> Any:
         """Choose the runs in `rows`: flags (n,), or places."""
-        arrays: dict[str, Any] = {k: v[rows] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
+        arrays: dict[str, Any] = {
+            k: v[rows] for k, v in vars(self).items() if isinstance(v, np.ndarray) and k != "sigma"
+        }
         return replace(self, **arrays)
 
 
@@ -306,8 +346,9 @@ def regression(
 ) -> Regression:
     """Regress the runs in `rows` (n,) on columns (n, k, m) of all runs, the first those of `fitted`."""
     completion = None if runs.completion is None else runs.completion[rows]
+    declared = None if runs.sigma is None else np.diag(runs.sigma**2)
     return Regression(
-        columns[rows], precisions(fitted), runs.session[rows], runs.scale[rows], repeated, completion
+        columns[rows], precisions(fitted), runs.session[rows], runs.scale[rows], repeated, completion, declared
     )
 
 

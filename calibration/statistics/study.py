@@ -2,7 +2,7 @@
 
 **Groups.** Sessions, or blocks of conditions if sessions are few, are held out or left out together. Blocks are
 drawn from the conditions within a session; repeats stay together. The shift of a single session cannot be
-estimated. Its variance is taken to be `SESSION_SHARE`, so a shift of all its runs is no evidence.
+estimated. Its variance is taken to be `gls.UNKNOWN_SHARE`, so a shift of all its runs is no evidence.
 
 **Outliers** are runs that are far from their own repeats, for example because of a misplaced decimal point. If, in
 one output, the runs of a condition are more than `FAR` robust standard deviations apart, the run that is farthest
@@ -24,8 +24,8 @@ from scipy.stats import t as student
 
 from calibration.statistics.excluded import Excluded
 from calibration.statistics.fit import Fit
-from calibration.statistics.gls import inverse_root, repeat_count
-from calibration.statistics.statistical_model import ForwardModel, Parameter, Runs, apply_step, regression
+from calibration.statistics.gls import inverse_root
+from calibration.statistics.statistical_model import ForwardModel, Parameter, Runs, regression
 from common.arrays import Flags, Floats, Integers
 
 LEVEL = 0.04  # α of every claim; below 0.05, because the noise is estimated and false claims must stay below 5 %
@@ -36,6 +36,7 @@ _MAD = 1.4826  # median absolute deviation to standard deviation
 _FEWEST = 3  # sessions that are held out as a whole
 _BLOCKS = 4  # in all
 _HELD_OUT = 1 / 12  # least share of the runs that are held out
+_FEWEST_OF_A_QUARTER = 4  # conditions or specimens
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,12 @@ class Study:
     draws: int = DRAWS  # of the bootstrap
     progress: bool = False  # show progress bars
     variance_ratio: float = 1.0  # variance of any run over that of a run of S, where runs have weights
+    settled: frozenset[str] = frozenset()  # effects that are no candidates: in the base, or withdrawn
+
+    @property
+    def effects(self) -> tuple[Parameter, ...]:
+        """Effects that may be claimed."""
+        return tuple(e for e in self.model.effects if e.name not in self.settled)
 
     @property
     def values(self) -> int:
@@ -78,9 +85,12 @@ class Study:
         Args:
             parameters: fitted to the values.
         """
-        v, k = repeat_count(self.model.runs.repeats(self.split.fitted)), self.model.runs.y.shape[1]
-        if v <= k + 3:
+        v, k = self.model.runs.noise(self.split.fitted)[1], self.model.runs.y.shape[1]
+        if v <= k + 3 or not self.model.runs.noise_known:
             return math.inf
+        if math.isinf(v):
+            f = self.values - parameters
+            return f + _BEYOND * math.sqrt(2 * f)
         f, c = max(self.values - v * k - parameters, 0), v / (v - k - 1)
         variance = 2 * c * v * (v - 1) / ((v - k) * (v - k - 3)) * (f + f**2 / (k * (v - k - 1)))
         return v * k + f * c + _BEYOND * math.sqrt(variance)
@@ -208,6 +218,38 @@ def error_interval(data: Runs, prediction: Floats, rows: Flags, seed: int) -> tu
     return float(np.quantile(drawn, 0.025)), float(np.quantile(drawn, 0.975))
 
 
+def gain_interval(data: Runs, before: Floats, after: Floats, rows: Flags, seed: int) -> tuple[float, float]:
+    """Estimate the 95 % interval of by how much the relative rms falls, paired, by resampling conditions."""
+    squares = [np.nanmean(_scaled_square(data, prediction, rows), 1) for prediction in (before, after)]
+    kinds = data.condition[rows]
+    means = np.array([[square[kinds == c].mean() for c in np.unique(kinds)] for square in squares])
+    drawn = np.random.default_rng(seed).integers(0, means.shape[1], (_DRAWS, means.shape[1]))
+    falls = np.subtract(*np.sqrt(means[:, drawn].mean(-1)))
+    return float(np.quantile(falls, 0.025)), float(np.quantile(falls, 0.975))
+
+
+def quarter_of_conditions(data: Runs, used: Flags) -> tuple[Flags, str]:
+    """Choose a quarter of the specimens, or else of the conditions, among the runs in `used` (n,), and name them.
+
+    Half of a quarter of the conditions are those farthest from the mean of the inputs, the ends of the settings;
+    the others are drawn. There are none (n,) where there are fewer than `_FEWEST_OF_A_QUARTER`.
+    """
+    rng, none = np.random.default_rng(0), np.zeros_like(used)
+    if data.specimen is not None and len(kinds := np.unique(data.specimen[used])) >= _FEWEST_OF_A_QUARTER:
+        chosen = rng.permutation(kinds)[: len(kinds) // 4]
+        return used & np.isin(data.specimen, chosen), "a quarter of the specimens"
+    kinds, first = np.unique(data.condition[used], return_index=True)
+    if len(kinds) < _FEWEST_OF_A_QUARTER:
+        return none, ""
+    inputs = data.inputs[used][first]
+    spread = inputs.std(0)
+    distance = (((inputs - inputs.mean(0)) / np.where(spread > 0, spread, 1.0)) ** 2).sum(1)
+    by_distance = kinds[np.argsort(-distance, kind="stable")]
+    ends = max(len(kinds) // 8, 1)
+    drawn = rng.permutation(by_distance[ends:])[: len(kinds) // 4 - ends]
+    return used & np.isin(data.condition, [*by_distance[:ends], *drawn]), "a quarter of the conditions"
+
+
 def _scaled_square(data: Runs, prediction: Floats, rows: Flags) -> Floats:
     """Compute w r² of the runs in `rows`, (n', k); NaN for what was not measured."""
     square = ((data.y - prediction) * data.scale[:, None]) ** 2
@@ -226,7 +268,7 @@ def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> floa
         np.random.default_rng(seed),
     )
     residual = scale * (data.y - fitted.prediction)[rows] @ root.T
-    freedom = max(repeat_count(data.repeats(~rows)), len(root) + 1)
+    freedom = max(data.noise(~rows)[1], len(root) + 1)
     free = tuple(replace(p, sigma=None) for p in fitted.fitted)
     linear = regression(data, rows, fitted.jacobian, free)
     spread = np.asarray(np.linalg.cholesky(fitted.covariance + 1e-15 * np.diag(np.diag(fitted.covariance))))
@@ -235,9 +277,11 @@ def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> floa
         drawn = linear.draw(
             rng, fitted.noise.run_covariance, np.tile(fitted.noise.session_ratio, (_AT_ONCE, 1)), spread
         )
-        repeats = rng.normal(size=(_AT_ONCE, freedom, len(root)))
-        of_repeats = inverse_root(np.swapaxes(repeats, -1, -2) @ repeats / freedom)
-        white = scale * drawn @ root.T @ np.swapaxes(of_repeats, -1, -2)
+        white = scale * drawn @ root.T
+        if not math.isinf(freedom):
+            repeats = rng.normal(size=(_AT_ONCE, int(freedom), len(root)))
+            of_repeats = inverse_root(np.swapaxes(repeats, -1, -2) @ repeats / freedom)
+            white = white @ np.swapaxes(of_repeats, -1, -2)
         as_far += int(np.count_nonzero((white**2).sum((-1, -2)) >= (residual**2).sum()))
     return (1 + as_far) / (1 + _DRAWS)
 
@@ -256,13 +300,7 @@ def refit_to_all(model: ForwardModel, fitted: Fit, rows: Flags) -> FinalRefit:
 
     The covariance allows for the estimates of S and ρ, as the intervals of the fit do.
     """
-    refit = fitted.products(model.runs, rows).solve(passes=3)
-    at = replace(
-        fitted,
-        parameters=apply_step(fitted.fitted, fitted.parameters, refit.step),
-        covariance=fitted.inflation * refit.covariance,
-    )
-    return final_refit(at)
+    return final_refit(fitted.refitted(model.runs, rows))
 
 
 def final_refit(fitted: Fit) -> FinalRefit:

@@ -193,11 +193,11 @@ def _maximise(
     return ContaminatedNormal(run, lack, share, factor), bound
 
 
-def with_weights(model: Model, weight: Floats) -> Model:
-    """Return the same model of the same runs with weights (n,)."""
-    weighted = copy.copy(model)
-    object.__setattr__(weighted, "runs", replace(model.runs, weight=weight))
-    return weighted
+def with_runs(model: Model, runs: Runs) -> Model:
+    """Return the same model of other runs, with other weights, say."""
+    changed = copy.copy(model)
+    object.__setattr__(changed, "runs", runs)
+    return changed
 
 
 def fit_weighted(study: Study, start: Mapping[str, float]) -> tuple[Study, Fit]:
@@ -214,7 +214,7 @@ def fit_weighted(study: Study, start: Mapping[str, float]) -> tuple[Study, Fit]:
     names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
     title = "fit" if study.progress else ""
     fitted = fit(model, start, names, used, title=title)
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS if model.runs.sigma is None else 0):
         residual, condition = model.runs.y - fitted.prediction, model.runs.condition
         noise = estimate(residual[used], condition[used])
         if noise is None:
@@ -222,7 +222,9 @@ def fit_weighted(study: Study, start: Mapping[str, float]) -> tuple[Study, Fit]:
         weight = np.ones(len(used))
         for rows in filter(np.any, (used, study.split.test)):
             weight[rows] = noise.weights(residual[rows], condition[rows])
-        study = replace(study, model=with_weights(model, weight), variance_ratio=noise.spread)
+        study = replace(
+            study, model=with_runs(model, replace(model.runs, weight=weight)), variance_ratio=noise.spread
+        )
         fitted = fit(study.model, fitted.parameters, names, used, title=title)
     return study, fitted
 

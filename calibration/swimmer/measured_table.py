@@ -6,12 +6,11 @@ Needed: N, l_cm, omega_rpm (tails relative to head; docs/reference/signs.md has 
 
 Columns in other units (R_yr_mm, "theta [rad]") are converted, and `Measurements.converted` says which.
 
-The noise is estimated from repeated conditions. Without repeats mirror runs serve (ω and −ω), or all that is not
-smooth in the inputs counts as noise, and a caveat says so. `session` names the group of runs
-that were made together. Without it, all runs of one N are one session. `robot` names the specimen, where the table
-has several. Some effects need elapsed_min,
-temperature_C, tank_diameter_cm or course_deg (direction of the path in the lab, where a run is a part of a
-circle). Rows that cannot be used are excluded with number and reason, and so are copies of rows
+The noise is estimated from repeated conditions. Without repeats mirror runs serve (ω and −ω), and a caveat says
+so; without these the noise is unknown. `session` names the group of runs that were made together. Without it, all
+runs of one N are one session. `robot` names the specimen, where the table has several. Some effects need
+elapsed_min, temperature_C, tank_diameter_cm or course_deg (direction of the path in the lab, where a run is part
+of a circle). Rows that cannot be used are excluded with number and reason, and so are copies of rows
 (`find_copies`), and rows that lack a note which nearly all others have. A row that lacks some outputs counts
 with the others (`calibration.statistics.statistical_model`). Columns without any
 value are left out, notes that many rows lack, and columns of other names, unless the name looks like a misspelt
@@ -321,9 +320,9 @@ def _independent(data: Measurements, copies: int) -> Measurements:
             "runs with both directions of the motor"
         )
     caveats = data.caveats
-    if repeats < FEWEST_REPEATS:
-        caveat = f"{repeats} repeated runs: the noise is estimated from what is not smooth in the inputs"
-        caveats += (f"{caveat}, or differs between mirror runs ({count} degrees of freedom)",)
+    if repeats < FEWEST_REPEATS and data.repeated(slice(None)):
+        caveat = f"{repeats} repeated runs: the noise is estimated from what differs between mirror runs"
+        caveats += (f"{caveat} ({count} degrees of freedom)",)
     run = repeat_covariance(y, repeated)
     kept: list[int] = []
     follows = []

@@ -23,14 +23,15 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 from calibration.attribution.claim_checks import check_number, with_checks
+from calibration.attribution.forms import Form, envelope, forms_of_claim
 from calibration.attribution.moves import LocalShift, StatedMove, find_moves, groups_that_may_differ
-from calibration.attribution.nearest import adopt_nearest
+from calibration.attribution.nearest import adopt_nearest, largest_along
 from calibration.attribution.refits import (
     FIRST,
     INDISTINGUISHABLE,
@@ -53,7 +54,6 @@ from calibration.attribution.wrong_numbers import (
 from calibration.statistics.budget import Budget, limited, seconds_left
 from calibration.statistics.excluded import caveat_of_excluded
 from calibration.statistics.fit import Fit, fit, profile_intervals
-from calibration.statistics.gls import repeat_count
 from calibration.statistics.residual_tests import directions, examine_residual
 from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values
 from calibration.statistics.study import (
@@ -61,11 +61,9 @@ from calibration.statistics.study import (
     LEVEL,
     FinalRefit,
     Study,
-    error_interval,
     errors,
     final_refit,
     find_outliers,
-    held_out_p_value,
     refit_to_all,
     split_runs,
 )
@@ -75,8 +73,10 @@ from calibration.statistics.weights import (
     fit_weighted,
     noise_of_any_run,
     rows_of_little_weight,
+    with_runs,
 )
-from calibration.verdict.findings import Attribution, HeldOutErrors
+from calibration.verdict.findings import Attribution, LoopTurn
+from calibration.verdict.held_out import HeldOutErrors, Withdrawn, held_out_errors, refuted
 from calibration.verdict.next_runs import Explanation, next_runs
 from calibration.verdict.verdict import Verdict
 from common.arrays import Flags, Floats
@@ -87,6 +87,7 @@ if TYPE_CHECKING:
     from calibration.laws.laws import Laws
 
 _SEARCH, _DESCRIBED = 0.6, 0.85  # shares of the time after which effects and descriptions are no longer looked for
+_MOST_TURNS = 4  # of the loop
 _SHARE_OF_TEST = 0.2  # of the time of the first tests, for those of what an effect leaves, with fewer draws
 
 
@@ -120,17 +121,27 @@ def calibrate(
     model, split = cast(Experiment, study.model), study.split
     used = time.process_time() - began
     laws = None
+    turns: tuple[LoopTurn, ...] = ()
+    withdrawn: list[Withdrawn] = []
     # Explanations come first; what is left of the time is for descriptions of what nothing explains.
     with limited(_DESCRIBED * max_seconds - used) as budget:
         with limited(_SEARCH * max_seconds - used):
             study, found, moves = _explain_with_moves(study, base)
-        unexplained, uncertain = found.verdict(level) == "unexplained", any(c.uncertain for c in found.best)
-        if describe and study.model is model and (unexplained or uncertain):
+            while (refutation := _refuted_claim(study, found)) and not _fit_moves(study, model, found)[1]:
+                withdrawn.append(refutation)
+                given = replace(study, model=model, settled=study.settled | set(refutation.effects[-1:]))
+                study, found, moves = _explain_with_moves(given, base)
+        known = study.model.runs.noise_known
+        unexplained, uncertain = (
+            found.verdict(level) == "unexplained" or not known,
+            any(c.uncertain for c in found.best),
+        )
+        if describe and study.model is model and study.model.runs.noise_known and (unexplained or uncertain):
             laws = describe(study, found.base, beside_claim=uncertain)
         described = laws if laws and unexplained and laws.complete else None
         if unexplained and not described:
-            nearest = adopt_nearest(study, found.base, found.misfit, found.candidates, found.tangents)
-            found = replace(found, nearest=nearest)
+            found, turns, refuted_forms = _adopt_in_turns(study, found)
+            withdrawn += refuted_forms
         of_all, moves_of_all = _fit_moves(study, model, found)
     moves, with_moves = (moves_of_all, of_all) if of_all else (moves, found.base)
     errors = _errors(study, found, uncalibrated, laws)
@@ -140,6 +151,10 @@ def calibrate(
     # The next runs are not weighted, so they have the noise of any run.
     rivals = tuple(replace(r, fit=replace(r.fit, noise=noise_of_any_run(study, r.fit.noise))) for r in rivals)
     base_intervals, final_intervals = _both_intervals(study, found, progress=progress)
+    forms = _forms(study, found)
+    for name, (low, high) in envelope(study, found.base.names if forms else (), forms).items():
+        if name in final_intervals:
+            final_intervals[name] = (min(low, final_intervals[name][0]), max(high, final_intervals[name][1]))
     fixed = {"level": level, "seed": seed, "catalogue": [e.name for e in model.effects], "locked": split.names}
     verdict = Verdict(
         verdict=found.verdict(level),
@@ -160,6 +175,9 @@ def calibrate(
         fixed_before=fingerprint(fixed),
         little_weight=rows_of_little_weight(study),
         not_tried=tuple(budget.not_tried),
+        forms=forms,
+        turns=turns,
+        withdrawn=tuple(withdrawn),
         caveats=(),
     )
     return replace(verdict, caveats=_caveats(verdict, model, budget, max_seconds))
@@ -179,6 +197,27 @@ def _both_intervals(
     return base, final
 
 
+def _forms(study: Study, found: Attribution) -> tuple[Form, ...]:
+    """List the forms that left-out runs cannot tell from what is claimed or adopted; none if it stands alone."""
+    if found.nearest:
+        forms: Sequence[Form] = found.nearest.forms
+    else:
+        forms = forms_of_claim(study, found.base, found.best[0], found.candidates) if found.best else ()
+    return tuple(forms) if len(forms) > 1 else ()
+
+
+def _refuted_claim(study: Study, found: Attribution) -> Withdrawn | None:
+    """Return the claim that the held-out runs refute; None if there is none.
+
+    Where a number differs in them, they refute nothing: it is found in all runs.
+    """
+    if not found.best or found.best[0].refit is None:
+        return None
+    claim = found.best[0]
+    names = tuple(e.name for e in claim.claimed)
+    return refuted(study, found.base, found.best[0].refit, claim.title, names)
+
+
 def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any) -> tuple[Study, Fit, Floats]:
     """Divide and check the runs, and fit the model without effects.
 
@@ -188,19 +227,12 @@ def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any)
     Returns:
         The study, the fit, and the prediction of the model as given.
 
-    Raises:
-        InputError: there are too few repeats among the runs that are fitted.
     """
     start = start_values(model)
     given = model.predict([start], title="as given" if settings.get("progress") else "")[0]
     model.check(given)
     study = Study(model, split_runs(model.runs, held_out, find_outliers(model.runs, given)), **settings)
-    fitted, outputs = study.split.fitted, model.runs.y.shape[1]
-    if (repeats := repeat_count(model.runs.repeats(fitted))) < outputs:
-        raise InputError(
-            f"{repeats} repeated runs among the {int(fitted.sum())} that are fitted, too few to estimate the "
-            f"noise; {study.split.names} is held out: measure each condition twice"
-        )
+    study = replace(study, model=with_runs(model, model.runs.with_noise(study.split.fitted, model.runs.y - given)))
     return *fit_weighted(study, model.guess(start, study.split.fitted)), given
 
 
@@ -210,6 +242,8 @@ def _explain_with_moves(study: Study, base: Fit) -> tuple[Study, Attribution, tu
     Such numbers are looked for before the effects, and again beside those that are named, or, where nothing
     explains the residual, beside those that come nearest.
     """
+    if not study.model.runs.noise_known:  # a guess cannot tell what is beyond noise
+        return study, explain(study, base), ()
     moved, with_moves, moves = find_moves(study, base)
     beside_moves = explain(moved, with_moves) if moves else None
     explained = explain(study, base)
@@ -236,7 +270,7 @@ def _fit_moves(study: Study, plain: Experiment, found: Attribution) -> tuple[Fit
     Returns:
         The fit, and what differs; no fit if nothing does.
     """
-    if not groups_that_may_differ(plain.runs):
+    if not groups_that_may_differ(plain.runs) or not plain.runs.noise_known:
         return None, ()
     final = found.base if found.nearest else found.final
     known = {p.name for p in (*plain.coefficients, *plain.nuisances, *plain.effects)}
@@ -252,17 +286,16 @@ def explain(study: Study, base: Fit) -> Attribution:
     model, level = study.model, study.level
     began = time.process_time()
     title = "derivatives" if study.progress else ""
-    tangents = directions(model, base.parameters, model.effects, title=title)
+    tangents = directions(model, base.parameters, study.effects, title=title)
     derived = time.process_time()
     misfit = examine_residual(study, base, tangents)
     tested = time.process_time()
+    if misfit.p_value >= level or not model.runs.noise_known:
+        scored = tuple(unexamined(misfit, study.effects, misfit.critical_z))
+        return Attribution(base, misfit, tangents, scored, noise_known=model.runs.noise_known)
     freed = without_wrong_priors(study, base)
     number_is_wrong = freed is not base
-    number_explains = number_is_wrong and (
-        misfit.p_value >= level or examine_residual(study, freed, tangents).p_value >= level
-    )
-    if misfit.p_value >= level and not number_is_wrong:
-        return Attribution(base, misfit, tangents, tuple(unexamined(misfit, model.effects, misfit.critical_z)))
+    number_explains = number_is_wrong and examine_residual(study, freed, tangents).p_value >= level
     threshold = misfit.critical_z
     if number_is_wrong:  # every effect that may explain as much as the wrong number does
         gain = base.deviance - freed.deviance
@@ -275,7 +308,7 @@ def explain(study: Study, base: Fit) -> Attribution:
 
     candidates = examine(study, base, misfit, tangents, threshold=threshold, after_first=forecast)
     best = explaining(candidates)
-    if number_explains and (misfit.p_value >= level or not beats_number(best, freed)):
+    if number_explains and not beats_number(best, freed):
         return _explained_by_number(study, Attribution(base, misfit, tangents, tuple(candidates)), freed)
     # From the simplest on: one effect, one beside a wrong number, two effects.
     best = best or explaining(beside_wrong_numbers(study, base, candidates, tangents))
@@ -297,7 +330,7 @@ def _explained_by_number(study: Study, found: Attribution, freed: Fit) -> Attrib
     rival_effects = tuple(as_good_as_number(list(found.candidates), freed, study.level))
     claims = [c for c in rival_effects if c.kept]
     off = tuple(p for p in pulls(freed, study.model.nuisances) if p.freed)
-    if claims and found.misfit.p_value < study.level and implausible(off):
+    if claims and implausible(off):
         checked = tuple(with_checks(study, claims, found.base))
         return replace(found, best=checked, number=freed, rival_numbers=off)
     check = check_number(study, freed, found.base)
@@ -345,21 +378,49 @@ def _next_runs(rivals: tuple[Rival, ...], seed: int) -> dict[str, Any]:
 def _errors(study: Study, found: Attribution, uncalibrated: Floats, laws: Laws | None) -> HeldOutErrors:
     """State the errors of every model on the held-out runs."""
     base, final = found.base, found.final
-    runs, test = study.model.runs, study.split.test
     predictions = {"uncalibrated": uncalibrated, "before": base.prediction, "after": final.prediction}
     if laws is not None:
         predictions["law"] = laws.prediction
     if found.nearest and found.nearest.sizes:
         with suppress(InputError):  # the simulation may break down at the mean size
             predictions["new_specimen"] = found.nearest.of_new_specimen()
-    stated = {name: errors(runs, prediction, test) for name, prediction in predictions.items()}
-    return HeldOutErrors(
-        rms={name: rms for name, (rms, _) in stated.items()},
-        by_output={name: each for name, (_, each) in stated.items()},
-        after_interval=error_interval(runs, final.prediction, test, study.seed),
-        noise=base.noise.rms,
-        p_value=held_out_p_value(final, runs, test, seed=study.seed + 3),
-    )
+    return held_out_errors(study, predictions, base, final)
+
+
+def _adopt_in_turns(
+    study: Study, found: Attribution
+) -> tuple[Attribution, tuple[LoopTurn, ...], tuple[Withdrawn, ...]]:
+    """Adopt the nearest form, and, where something is still missing with it in the base, a further one beside it.
+
+    A form that the held-out runs refute is withdrawn, and another one is looked for.
+    """
+    runs, test, tangents, misfit = study.model.runs, study.split.test, found.tangents, found.misfit
+    base, candidates = found.base, found.candidates
+    turns = [LoopTurn(errors(runs, base.prediction, test)[0], "", largest_along(misfit, runs))]
+    withdrawn: list[Withdrawn] = []
+    while len(turns) <= _MOST_TURNS:
+        form = adopt_nearest(study, base, misfit, candidates, tangents)
+        if form is None:
+            break
+        place = next(i for i, e in enumerate(study.effects) if e.name == form.effect.name)
+        study = replace(study, settled=study.settled | {form.effect.name})
+        refutation = refuted(study, base, form.fit, form.effect.title, (form.effect.name,))
+        if refutation:
+            withdrawn.append(refutation)
+            tangents, candidates = tangents.without(place), tuple(c for c in candidates if c.effect != form.effect)
+            misfit = misfit.without(place)
+            continue
+        found = replace(found, nearest=form)
+        assert form.misfit is not None
+        beyond = form.misfit.p_value < study.level or not runs.noise_known
+        left = form.largest_along if beyond else ""
+        turns.append(LoopTurn(errors(runs, form.fit.prediction, test)[0], form.effect.title, left))
+        if form.sizes or not left:  # sizes that differ between specimens describe what is left by themselves
+            break
+        base, misfit = form.fit, form.misfit
+        tangents = directions(study.model, base.parameters, study.effects)
+        candidates = tuple(unexamined(misfit, study.effects, misfit.critical_z))
+    return found, tuple(turns) if found.nearest else (), tuple(withdrawn)
 
 
 def _caveats(verdict: Verdict, model: ForwardModel, budget: Budget, max_seconds: float) -> tuple[str, ...]:
@@ -375,7 +436,9 @@ def _caveats(verdict: Verdict, model: ForwardModel, budget: Budget, max_seconds:
         if p.logarithmic and p.sigma is None and final.half_width(place) > math.log(2) and p.name not in at_bounds
     ]
     outside = not coefficients_within_range(model, base.parameters)
+    unknown = "there are neither repeats nor a declared noise, so no residual can be told from noise"
     of_fits = (
+        (not verdict.runs.noise_known, unknown),
         (vague, f"these runs determine {' and '.join(vague)} to no better than a factor of two"),
         (outside, "without effects the coefficients run to the end of their range, so every effect was refitted "
          "from the model as given, and it is less sure which effect it is"),

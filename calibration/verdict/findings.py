@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from calibration.attribution.claim_checks import NumberCheck
+from calibration.attribution.forms import Form
 from calibration.attribution.moves import StatedMove
 from calibration.attribution.nearest import AdoptedForm
 from calibration.attribution.refits import Candidate, Rival
@@ -23,9 +25,9 @@ from calibration.statistics.fit import Fit, Pull
 from calibration.statistics.residual_tests import Directions, Misfit
 from calibration.statistics.statistical_model import Experiment, Runs
 from calibration.statistics.study import FinalRefit, Split
+from calibration.verdict.held_out import REJECTED, HeldOutErrors, Withdrawn
 from calibration.verdict.next_runs import Batch, Explanation, NextRun
 
-_DISAGREES = 0.01  # p of the held-out runs below which they do not agree with the final model
 _LAWS_TOLD_APART = 3  # beside a claim; the more there are, the fewer runs tell all of them apart
 
 
@@ -43,6 +45,7 @@ class Attribution:
     rival_numbers: tuple[Pull, ...] = ()  # the wrong numbers, where effects come ahead of them
     number_check: NumberCheck | None = None  # of the wrong number, where it comes ahead of effects
     nearest: AdoptedForm | None = None  # the form that is adopted where nothing explains the residual
+    noise_known: bool = True
     unkept: Fit | None = None  # the best fit with effects, where none explains the residual
 
     @property
@@ -59,7 +62,8 @@ class Attribution:
 
         A wrong nuisance parameter comes ahead of every effect that is not better, or it is one of several
         explanations. Without one, a residual within the noise is "none". Beyond it, the number of explanations
-        that the runs cannot tell apart decides. What new runs say about an "ambiguous" verdict is decided by
+        that the runs cannot tell apart decides. Where the noise is unknown nothing is claimed, but a form may be
+        adopted for its predictions. What new runs say about an "ambiguous" verdict is decided by
         `calibration.verdict.next_runs.standings`.
 
         Args:
@@ -67,6 +71,8 @@ class Attribution:
         """
         if self.number and not self.best:
             return "number"
+        if not self.noise_known:
+            return "partial" if self.nearest else "none"
         if self.misfit.p_value >= level:
             return "none"
         explanations = len(self.best) + bool(self.rival_numbers)
@@ -88,18 +94,16 @@ class Attribution:
 
 
 @dataclass(frozen=True)
-class HeldOutErrors:
-    """How far each model is from the held-out runs, relative rms, and how far noise alone would be.
+class LoopTurn:
+    """One turn of the loop: what was adopted, and what is left."""
 
-    The models are "uncalibrated", "before" (calibrated), "after" (with the effects of the verdict), and, if there
-    are such, "law" (with the best law) and "new_specimen" (the adopted form, of mean size for every specimen).
-    """
+    error: float  # relative rms on the held-out runs
+    named: str  # what was adopted; empty: nothing yet
+    left: str  # output and input along which most is left; empty: no more than noise
 
-    rms: dict[str, float]  # of each model, over all outputs
-    by_output: dict[str, dict[str, float]]  # model -> output -> relative rms
-    after_interval: tuple[float, float]  # 95 %
-    noise: float  # of a run, from the repeats
-    p_value: float  # agreement of the held-out runs with the final model
+    def record(self) -> dict[str, Any]:
+        """Return the record for verdict.json."""
+        return {"error": self.error, "named": self.named, "left": self.left}
 
 
 @dataclass(frozen=True, repr=False)
@@ -125,6 +129,9 @@ class Findings:
     fixed_before: str  # hash of what was fixed before the runs were looked at
     little_weight: tuple[int, ...]  # rows of the table whose runs have less than half of the usual weight
     not_tried: tuple[str, ...]  # because no time was left; such a verdict is provisional
+    forms: tuple[Form, ...]  # that left-out runs cannot tell apart, those at the size of theory first
+    turns: tuple[LoopTurn, ...]  # of the loop, where a form was adopted
+    withdrawn: tuple[Withdrawn, ...]  # claims that held-out runs refuted, in order
     caveats: tuple[str, ...]  # what weakens the conclusion, in words
 
     @property
@@ -213,9 +220,15 @@ class Findings:
         return None if self.verdict in ("none", "unexplained") else self.error_after < self.error_before
 
     @property
+    def gain_is_certain(self) -> bool | None:
+        """Whether the 95 % interval of that fall is above zero; None where nothing is claimed."""
+        interval = self.errors.gain_interval
+        return None if interval is None else interval[0] > 0
+
+    @property
     def held_out_runs_agree(self) -> bool:
         """Whether the held-out runs agree with the final model."""
-        return self.errors.p_value >= _DISAGREES
+        return self.errors.p_value >= REJECTED or not self.runs.noise_known
 
     @property
     def harmless(self) -> bool:
@@ -227,7 +240,7 @@ class Findings:
         """
         low, high = self.errors.after_interval
         small = low <= self.noise_ceiling and high < math.sqrt(2) * self.noise_ceiling
-        return self.verdict == "unexplained" and small and self.held_out_runs_agree
+        return self.verdict == "unexplained" and self.runs.noise_known and small and self.held_out_runs_agree
 
     @property
     def described(self) -> bool:

@@ -109,13 +109,16 @@ def _claims(result: Findings) -> dict[str, Any]:
         "in_form_only": list(result.in_form_only),
         "imitability": [c.imitable for c in result.explaining],
         "transfer_p": [c.transfer for c in result.explaining],
-        "imitable": any(c.uncertain for c in result.explaining),
+        "imitable": any(c.uncertain for c in result.explaining)
+        or bool(result.explaining and result.gain_is_certain is False),
         "effects_instead": [[e.name for e in c.claimed] for c in found.rival_effects],
         "claims_instead": [c.title for c in found.rival_effects],
         "nearest": {**shown(nearest.effect), **nearest.record()} if nearest else None,
         "nearest_candidate": _nearest_candidate(result),
         "candidates": [_candidate(c) for c in found.candidates],
         "untestable": result.untestable,
+        "forms": [form.record() for form in result.forms],
+        "turns": [turn.record() for turn in result.turns],
     }
 
 
@@ -190,7 +193,12 @@ def _errors(result: Findings) -> dict[str, Any]:
         "harmless": result.harmless,
         "held_out_error_falls": result.held_out_error_falls,
         "error_after_interval": list(errors.after_interval),
+        "gain_interval": errors.gain_interval and list(errors.gain_interval),
+        "gain_is_certain": result.gain_is_certain,
+        "errors_of_conditions": vars(errors.of_conditions) if errors.of_conditions else None,
+        "withdrawn": [claim.record() for claim in result.withdrawn],
         "noise_ceiling": errors.noise,
+        "noise_known": result.runs.noise_known,
         "errors_by_output": errors.by_output,
         "locked_test": result.split.names,
         "locked_p_value": errors.p_value,

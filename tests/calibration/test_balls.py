@@ -117,15 +117,15 @@ def test_its_error_before_and_after_stands_in_sentence_record_and_report(tmp_pat
     assert not any("corrected.toml" in step for step in record["next_steps"])
 
 
-def test_a_form_is_adopted_without_a_look_at_the_held_out_runs() -> None:
+def test_a_form_that_the_held_out_runs_refute_is_withdrawn() -> None:
     model = read_balls(falls("linear drag, differs", 3))
     test = differing().split.test
     ruined = replace(model, runs=replace(model.runs, y=np.where(test[:, None], model.runs.y + 0.9, model.runs.y)))
     result = calibrate(ruined, draws=200, progress=False)
-    before = differing().nearest
-    assert result.nearest.size == pytest.approx(before.size, rel=1e-6)
-    assert result.held_out_error_falls is False
-    assert "the error on the held-out runs does not fall with it" in result.sentence
+    assert (result.verdict, result.nearest) == ("unexplained", None)
+    assert [claim.effects for claim in result.withdrawn][0] == ("linear_drag",)
+    assert all(claim.after > claim.before for claim in result.withdrawn)
+    assert facts(result)["withdrawn"][0]["on"] == result.split.names
     assert "linear_drag" not in {p.name for p in result.final_refit.fitted}
     assert next_steps(facts(result)) != next_steps(facts(differing()))
 

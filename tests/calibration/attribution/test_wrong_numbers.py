@@ -87,7 +87,7 @@ def test_an_effect_carries_over_from_short_tails_and_few_and_a_mimic_does_not() 
     assert set(np.unique(runs.tails[near])) == {2, 3, 4}
     assert set(np.unique(runs.length[near].round(3))) == {0.05, 0.08}
     assert near.sum() == len(near) // 2
-    for further, carries in ((1.0, True), (3.0, False)):
+    for further, carries in ((1.0, True), (4.0, False)):
         model = planted(np.where(near, 1.0, further))
         assert (transferred(model, EVERY) >= SURE) == carries
     alike = (runs.length < 0.06) & (runs.tails <= 4)
@@ -211,7 +211,7 @@ def test_an_effect_beside_a_wrong_number_is_found_with_it() -> None:
 
 def test_a_number_far_beyond_its_tolerance_is_behind_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     """A head's length nine of its tolerances off explains as much as the effect that was there."""
-    table = toy_table(2, **{DRAG: 0.58})
+    table = toy_table(2, **{DRAG: 0.6})
     result = calibrated(table, few=True)
     assert result.verdict == "ambiguous"
     assert result.effects == ("end_over_end_drag",)

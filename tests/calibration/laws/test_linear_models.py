@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from calibration.laws.search import LinearModels
-from calibration.statistics.gls import SESSION_SHARE, Noise, Regression, repeat_covariance
+from calibration.statistics.gls import UNKNOWN_SHARE, Noise, Regression, repeat_covariance
 from common.arrays import Floats
 
 SESSION = np.repeat([0, 1, 2, 3], [6, 8, 6, 4])
@@ -54,7 +54,7 @@ def test_gains_and_weights_are_those_of_dense_matrices() -> None:
     models, residual = design(), residuals(60)
     fits = models.fit(residual)
     single = design(np.zeros_like(SESSION)).fit(residual[:2])  # of a single session ρ is the largest
-    assert single.base_share == pytest.approx(SESSION_SHARE)
+    assert single.base_share == pytest.approx(UNKNOWN_SHARE)
     absorbed = models.design.columns[..., : len(PRECISION)]
     for b, one in enumerate(residual[:2]):
         alone = models.fit(one[None])

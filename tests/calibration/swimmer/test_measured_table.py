@@ -130,7 +130,7 @@ def test_without_repeats_mirror_runs_give_the_noise() -> None:
     noise = [np.sqrt(np.trace(repeat_covariance(r.y, r.repeats())) / 5) for r in (runs, single)]
     assert repeat_count(single.repeats()) == 48 - 24 - 4
     assert noise[1] == pytest.approx(noise[0], rel=0.3)
-    assert "0 repeated runs: the noise is estimated from what is not smooth" in single.caveats[-1]
+    assert "0 repeated runs: the noise is estimated from what differs between mirror runs" in single.caveats[-1]
     result = calibrated(table[table["trial"] == 1], few=True)
     assert (result.verdict, result.effects) == ("effect", ("left_right_bias",))
 

@@ -35,7 +35,7 @@ from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, ambiguous, calibr
 def test_the_rule(p_value: float, effects: int, rival_numbers: int, number_explains: bool, verdict: str) -> None:
     given: Any = SimpleNamespace(
         misfit=SimpleNamespace(p_value=p_value), best=(None,) * effects, rival_numbers=(None,) * rival_numbers,
-        number=number_explains, nearest=verdict == "partial",
+        number=number_explains, nearest=verdict == "partial", noise_known=True,
     )  # fmt: skip
     assert Attribution.verdict(given, 0.04) == verdict
 

@@ -1,0 +1,132 @@
+"""Forms that left-out runs cannot tell apart, and the intervals of numbers over all of them.
+
+A form is the model with one effect, of fitted size or of the size that theory gives. Two forms are compared on the
+fitted runs, each run predicted from the other sessions (`refits.left_out_residuals`), by the difference of the log
+likelihoods, paired over conditions: two gains share the runs without either form, so their own standard errors say
+nothing about which one is larger. With C conditions of differences D_c,
+
+    D = Σ_c D_c,   σ_D² = C Var D_c,
+
+and the forms are as good as each other while D ≤ t σ_D, with the 97.5 % quantile t of Student's distribution of
+C − 1 degrees of freedom: a few conditions prove little.
+
+Each number of the model has the envelope of its intervals over the forms that are as good as the best one. What a
+form leaves counts as noise (Birge 1932). The envelope is right among the forms that were tried, and only there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.stats import t as student
+
+from calibration.attribution.refits import Candidate, left_out_residuals
+from calibration.statistics.fit import Fit, birge, fit
+from calibration.statistics.statistical_model import Parameter
+from calibration.statistics.study import Study, groups, leave_one_group_out
+
+_QUANTILE = 0.975
+
+
+class PairedGain(NamedTuple):
+    """By how much a model predicts left-out runs better than another one, in log likelihood."""
+
+    gain: float
+    error: float  # standard error, over conditions
+    conditions: int
+
+    @property
+    def certain(self) -> bool:
+        """Whether its 95 % interval is above zero."""
+        return self.gain > float(student.ppf(_QUANTILE, max(self.conditions - 1, 1))) * self.error
+
+
+def paired_gain(study: Study, one: Fit, other: Fit, b: float = 1.0) -> PairedGain:
+    """Compare the predictions of `one` with those of `other`, in the noise b S of `one`."""
+    runs, used = study.model.runs, study.split.fitted
+    of_other, of_one = left_out_residuals(study, other, one)
+    rows = np.concatenate([np.flatnonzero(out) for _, out in leave_one_group_out(groups(runs)[0], used)])
+    gains = ((of_other**2 - of_one**2) / (2 * b)).reshape(len(rows), -1).sum(1)
+    condition = np.unique(runs.condition[rows], return_inverse=True)[1].reshape(-1)
+    each = np.bincount(condition, weights=gains)
+    error = each.std(ddof=1) * math.sqrt(len(each)) if len(each) > 1 else math.inf
+    return PairedGain(float(each.sum()), float(error), len(each))
+
+
+@dataclass(frozen=True)
+class Form:
+    """The model with one effect."""
+
+    effect: Parameter
+    fit: Fit
+    at_theory: bool  # it has the size that theory gives, which is not fitted
+    error: float = math.nan  # relative rms on left-out runs
+
+    @property
+    def title(self) -> str:
+        """The effect in words, with its size if theory gives it."""
+        size = f" at the size of theory, {self.effect.theory:g}" if self.at_theory else ""
+        return f"{self.effect.title}{size}"
+
+    def record(self) -> dict[str, Any]:
+        """Return the record for verdict.json."""
+        return {
+            "effect": self.effect.name,
+            "title": self.title,
+            "size": self.fit.parameters[self.effect.name],
+            "theory": self.at_theory,
+            "error": self.error,
+        }
+
+
+def at_theory(study: Study, base: Fit, effect: Parameter) -> Form | None:
+    """Fit the model with an effect of the size that theory gives; None where theory gives none."""
+    if effect.theory is None:
+        return None
+    start = {**base.parameters, effect.name: effect.theory}
+    return Form(effect, fit(study.model, start, base.names, study.split.fitted, title=""), True)
+
+
+def forms_of_claim(study: Study, base: Fit, claim: Candidate, candidates: Sequence[Candidate]) -> list[Form]:
+    """List the forms that left-out runs cannot tell from a claim of a single effect, the claim among them.
+
+    Those at the size of theory come first. An effect that was refitted counts also where it was not kept.
+    """
+    if claim.refit is None or len(claim.claimed) > 1:
+        return []
+    own = Form(claim.effect, claim.refit, False)
+    fitted = [
+        Form(c.effect, c.refit, False) for c in candidates
+        if c.effect is not claim.effect and c.refit and c.refit.converged and len(c.claimed) == 1
+    ]  # fmt: skip
+    theory = (at_theory(study, base, form.effect) for form in (own, *fitted))
+    return as_good(study, own, [*(form for form in theory if form), own, *fitted])
+
+
+def as_good(study: Study, best: Form, forms: Iterable[Form]) -> list[Form]:
+    """Choose the forms that left-out runs cannot tell from the best one, and state their errors on these."""
+    alike = [f for f in forms if f is best or not paired_gain(study, best.fit, f.fit).certain]
+    return [replace(form, error=_error_left_out(study, form.fit)) for form in alike]
+
+
+def _error_left_out(study: Study, fitted: Fit) -> float:
+    white = left_out_residuals(study, fitted, fitted)[1]
+    return math.sqrt(float((white**2).mean())) * fitted.noise.rms
+
+
+def envelope(study: Study, names: Sequence[str], forms: Sequence[Form]) -> dict[str, tuple[float, float]]:
+    """Join the 95 % intervals of numbers over forms."""
+    joined = {}
+    for name in names:
+        ends = []
+        for form in forms:
+            place = form.fit.names.index(name)
+            half = form.fit.half_width(place) * math.sqrt(birge(study.model.runs, form.fit, study.split.fitted))
+            of, value = form.fit.fitted[place], form.fit.parameters[name]
+            ends += [of.changed(value, -half), of.changed(value, half)]
+        joined[name] = (min(ends), max(ends))
+    return joined

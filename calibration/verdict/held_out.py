@@ -1,0 +1,125 @@
+"""What the held-out runs say: the errors of each model on them, and which claims they refute.
+
+**Two sets.** The held-out sessions are opened once, with the final model. Beside them a quarter of the conditions,
+or of the specimens (`study.quarter_of_conditions`), tells whether a model predicts other settings: it is fitted
+again without them, by one linear step. The choice of the effect has seen them; its numbers have not.
+
+**Withdrawn claims.** A claim is withdrawn if with it the error on one of these sets rises, and these runs reject
+the model that has it (p < `REJECTED`). The search goes on as if the effect were not in the catalogue. Each
+withdrawal has looked at the held-out runs once more, which is stated. A form that fits also predicts the same
+conditions, so this works on extrapolation alone; `calibration.attribution.forms` compares forms elsewhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from calibration.statistics.fit import Fit
+from calibration.statistics.study import (
+    Study,
+    error_interval,
+    errors,
+    gain_interval,
+    held_out_p_value,
+    quarter_of_conditions,
+)
+from common.arrays import Floats
+
+REJECTED = 0.01  # p of held-out runs
+
+
+@dataclass(frozen=True)
+class ConditionErrors:
+    """Relative rms errors on conditions or specimens to which a model was not fitted."""
+
+    names: str
+    before: float
+    after: float
+    p_value: float  # agreement with the final model
+
+    @property
+    def refutes(self) -> bool:
+        """Whether what is claimed raises the error, and the runs reject the model."""
+        return self.after > self.before and self.p_value < REJECTED
+
+
+@dataclass(frozen=True)
+class Withdrawn:
+    """A claim that held-out runs refute."""
+
+    title: str
+    effects: tuple[str, ...]
+    set_names: str  # of the runs that refute it
+    before: float  # relative rms on these
+    after: float
+
+    def record(self) -> dict[str, Any]:
+        """Return the record for verdict.json."""
+        return {
+            "title": self.title,
+            "effects": list(self.effects),
+            "on": self.set_names,
+            "error_before": self.before,
+            "error_after": self.after,
+        }
+
+
+@dataclass(frozen=True)
+class HeldOutErrors:
+    """How far each model is from the held-out runs, relative rms, and how far noise alone would be.
+
+    The models are "uncalibrated", "before" (calibrated), "after" (with the effects of the verdict), and, if there
+    are such, "law" (with the best law) and "new_specimen" (the adopted form, of mean size for every specimen).
+    """
+
+    rms: dict[str, float]  # of each model, over all outputs
+    by_output: dict[str, dict[str, float]]  # model -> output -> relative rms
+    after_interval: tuple[float, float]  # 95 %
+    noise: float  # of a run, from the repeats
+    p_value: float  # agreement of the held-out runs with the final model
+    gain_interval: tuple[float, float] | None = None  # 95 %, before less after, paired over conditions
+    of_conditions: ConditionErrors | None = None  # None: too few
+
+
+def held_out_errors(study: Study, predictions: dict[str, Floats], before: Fit, final: Fit) -> HeldOutErrors:
+    """State the errors of models, by name, on the held-out runs."""
+    runs, test = study.model.runs, study.split.test
+    stated = {name: errors(runs, prediction, test) for name, prediction in predictions.items()}
+    claimed = final is not before
+    return HeldOutErrors(
+        rms={name: rms for name, (rms, _) in stated.items()},
+        by_output={name: each for name, (_, each) in stated.items()},
+        after_interval=error_interval(runs, final.prediction, test, study.seed),
+        noise=before.noise.rms,
+        p_value=held_out_p_value(final, runs, test, seed=study.seed + 3),
+        gain_interval=gain_interval(runs, before.prediction, final.prediction, test, study.seed)
+        if claimed
+        else None,
+        of_conditions=errors_of_conditions(study, before, final),
+    )
+
+
+def errors_of_conditions(study: Study, before: Fit, final: Fit) -> ConditionErrors | None:
+    """State the errors on a quarter of the conditions, of two models fitted without them; None if they are few."""
+    runs, used = study.model.runs, study.split.fitted
+    out, names = quarter_of_conditions(runs, used)
+    if not out.any():
+        return None
+    fits = [fitted.refitted(runs, used & ~out) for fitted in (before, final)]
+    rms_before, rms_after = (errors(runs, fitted.prediction, out)[0] for fitted in fits)
+    return ConditionErrors(names, rms_before, rms_after, held_out_p_value(fits[1], runs, out, seed=study.seed + 7))
+
+
+def refuted(study: Study, before: Fit, claim: Fit, title: str, effects: tuple[str, ...]) -> Withdrawn | None:
+    """Withdraw a claim that held-out runs refute; None if they do not."""
+    runs, test = study.model.runs, study.split.test
+    rms_before, rms_after = (errors(runs, fitted.prediction, test)[0] for fitted in (before, claim))
+    p = held_out_p_value(claim, runs, test, seed=study.seed + 3) if rms_after > rms_before else 1.0
+    if not runs.noise_known:  # their level is guessed; a rise decides
+        p = 0.0
+    on_sessions = ConditionErrors(study.split.names, rms_before, rms_after, p)
+    for one in filter(None, (on_sessions, errors_of_conditions(study, before, claim))):
+        if one.refutes:
+            return Withdrawn(title, effects, one.names, one.before, one.after)
+    return None
