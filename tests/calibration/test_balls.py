@@ -123,7 +123,7 @@ def test_a_form_that_the_held_out_runs_refute_is_withdrawn() -> None:
     ruined = replace(model, runs=replace(model.runs, y=np.where(test[:, None], model.runs.y + 0.9, model.runs.y)))
     result = calibrate(ruined, draws=200, progress=False)
     assert (result.verdict, result.nearest) == ("unexplained", None)
-    assert [claim.effects for claim in result.withdrawn][0] == ("linear_drag",)
+    assert next(claim.effects for claim in result.withdrawn) == ("linear_drag",)
     assert all(claim.after > claim.before for claim in result.withdrawn)
     assert facts(result)["withdrawn"][0]["on"] == result.split.names
     assert "linear_drag" not in {p.name for p in result.final_refit.fitted}
