@@ -57,6 +57,11 @@ def read_table(path: str | Path, *, names: bool = True) -> pd.DataFrame:
 
     Raises:
         InputError: the file is empty, too large, or it is not a table.
+
+    Example:
+        >>> import softflagella as sf
+        >>> sf.read_table("falls.xlsx")["time_s"].mean()  # doctest: +SKIP
+        8.93
     """
     kind = Path(path).suffix.lower()
     if kind in _PARQUET:

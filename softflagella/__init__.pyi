@@ -1,5 +1,10 @@
 # The public names of softflagella and their modules: the one list, for type checkers and for `__init__.py`.
 from calibration.api import decide as decide
+from calibration.own_model.declared import Model as Model
+from calibration.own_model.declared import ModelEffect
+from calibration.own_model.declared import Number as Number
+from calibration.own_model.declared import Output as Output
+from calibration.report.model_verdict import ModelVerdict as ModelVerdict
 from calibration.report.robot_verdict import RobotVerdict as RobotVerdict
 from calibration.swimmer.synthetic_table import make_table as make_table
 from calibration.verdict.next_runs import Decision as Decision
@@ -7,6 +12,7 @@ from calibration.verdict.verdict import Verdict as Verdict
 from camera.api import tracks as tracks
 from common.errors import InputError as InputError
 from common.provenance import __version__ as __version__
+from common.tables import read_table as read_table
 from dataset.api import sweep as sweep
 from dataset.data_set import read
 from planner.files.arduino import write_arduino as write_arduino
@@ -39,7 +45,6 @@ from sim.effects import catalogue
 from sim.inputs import load_robot as load_robot
 from sim.inputs import save_robot as save_robot
 from sim.knowledge import CalibrationKnowledge as CalibrationKnowledge
-from sim.model.effect import Effect as Effect
 from sim.model.robot import Robot as Robot
 from sim.model.schedule import Schedule as Schedule
 from sim.model.schedule import load_schedule as load_schedule
@@ -61,6 +66,7 @@ from tracking.tracks import check as check
 
 effects = catalogue
 read_sweep = read
+Effect = ModelEffect
 Vehicle = MeasuredVehicle
 __all__: list[str]
 

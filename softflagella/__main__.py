@@ -24,7 +24,7 @@ _IMPORTANT = (
     ("dataset", "sweep"),
     ("surrogate", "train"),
     ("camera", "tracks"),
-    ("softflagella", "calibrate"),
+    ("softflagella", "calibrate model"),
     ("tracking", "replay check"),
     ("sim", "film"),
     ("surrogate", "query"),
@@ -56,7 +56,8 @@ def _calibrate(
     calibrate: Call,
     table: str = "",
     *,
-    robot: str,
+    robot: str | None = None,
+    model: str | None = None,
     out: str,
     films: str | None = None,
     view: str | None = None,
@@ -67,6 +68,8 @@ def _calibrate(
 
     Args:
         table: CSV or Parquet of measured runs; or --films and --view.
+        robot: robot.toml or the name of a preset; or --model.
+        model: PY, a file with a model of your own (softflagella model writes one).
         films: TABLE, of runs with their films, in a column film; the measured table goes into the folder.
         view: TOML, scale, lens and markers of the films.
         paths: a path, as for softflagella plan, on which the error is stated before and after (default:
@@ -76,23 +79,26 @@ def _calibrate(
     """
     if bool(table) == bool(films) or bool(films) != bool(view):
         raise InputError("give a table of runs, or --films runs.csv with --view view.toml")
+    if bool(robot) == bool(model) or (model and films):
+        raise InputError("give --robot, or, for a table, --model with a model of your own")
     if no_path and paths:
         raise InputError("--path and --no-path exclude each other")
-    if table:
-        refuse_missing(table)
-    from calibration.report.robot_verdict import FILES  # loads SciPy
+    refuse_missing(*filter(None, (table, model)))
+    from calibration.report.saved_verdict import FILES  # loads SciPy
     from common.files import refuse_kept
 
     refuse_kept(out, ["table.csv", *FILES] if films else FILES)  # before hours of work
-    if films and view:
+    if films and view and robot:
         table = _filmed(films, view, robot, out)
+    from calibration.own_model.model_file import load_model
     from calibration.statistics.budget import stopped_by_interrupt
     from calibration.statistics.excluded import summary_of_excluded
     from softflagella.path_error import DEFAULT_PATHS
 
-    stated = () if no_path else paths or DEFAULT_PATHS
+    given, measured = load_model(model, table) if model else (robot, table)
+    stated = paths or () if no_path or model else paths or DEFAULT_PATHS
     with stopped_by_interrupt():
-        result = calibrate(table=table, robot=robot, paths=stated, tell=to_stderr)
+        result = calibrate(table=measured, robot=given, paths=stated, tell=to_stderr)
     files = result.save(out)
     print(result.sentence)
     print(result.errors_in_words)
@@ -103,6 +109,23 @@ def _calibrate(
     for line in summary_of_excluded(result.split.outliers, result.rows):
         print(f"excluded: {line}")
     print(f"-> {', '.join(map(str, files))}")
+
+
+@program.command("model")
+def _model(*, out: str = "falls.py") -> None:
+    """Write a model to start from, for softflagella calibrate --model.
+
+    Args:
+        out: PY.
+    """
+    from calibration.own_model.model_file import EXAMPLE
+    from common.files import write_text
+
+    if Path(out).exists():
+        raise InputError(f"{out} is there already; give another name")
+    write_text(out, EXAMPLE.read_text().replace("falls.py", out))
+    print(f"-> {out}; python {out} makes a table for it, falls.csv. Then:")
+    print(f"softflagella calibrate falls.csv --model {out} --session round --specimen ball --out falls")
 
 
 def _filmed(films: str, view: str, robot: str, out: str) -> str:

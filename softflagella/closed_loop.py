@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, overload
 
 import pandas as pd
 
 from calibration.laws.laws import find_laws
+from calibration.own_model.declared import Model
+from calibration.own_model.table_of_runs import Noise, Roles, read_runs_of
 from calibration.report.corrected_robot import check_given
+from calibration.report.model_verdict import ModelVerdict
 from calibration.report.robot_verdict import RobotVerdict, read_runs
+from calibration.statistics.statistical_model import lines_of_excluded
 from calibration.swimmer.possible_runs import Owned, owned
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate as find_what_is_missing
@@ -24,10 +28,18 @@ from softflagella.path_error import path_errors, wanted_paths
 MAX_SECONDS = 90.0  # of processor time for the search, without laws
 
 
+@overload
+def calibrate(table: str | Path | pd.DataFrame, robot: OneRobot, **options: Any) -> RobotVerdict: ...
+
+
+@overload
+def calibrate(table: str | Path | pd.DataFrame, robot: Model, **options: Any) -> ModelVerdict: ...
+
+
 @checks_keywords
 def calibrate(
     table: str | Path | pd.DataFrame,
-    robot: OneRobot,
+    robot: OneRobot | Model,
     *,
     protocol: Literal["session", "paper"] = "session",
     seed: int = 0,
@@ -35,17 +47,26 @@ def calibrate(
     laws: bool = True,
     paths: Sequence[str] = (),
     unit: LengthUnit | None = None,
+    session: str | None = None,
+    specimen: str | None = None,
+    held_out: str | Sequence[str] | None = None,
+    noise: Noise | None = None,
+    notes: Sequence[str] | None = None,
     max_seconds: float | None = None,
     jobs: int | None = None,
     progress: bool = True,
     tell: Callable[[str], object] = lambda line: None,
-) -> RobotVerdict:
-    """Fit a table of measured runs, find what the model lacks, and correct the robot.
+) -> RobotVerdict | ModelVerdict:
+    """Fit a table of measured runs, find what the model lacks, and correct the robot, or a model of your own.
+
+    `protocol`, `own`, `laws`, `paths` and `unit` are for a robot; `session`, `specimen`, `held_out`, `noise` and
+    `notes` are for a model of your own.
 
     Args:
         table: measured runs, one row for each run, or their file: `N`, `l_cm`, `omega_rpm` and two or more
             of `omega_h_rpm`, `omega_t_rpm`, `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s`; repeats.
-        robot: the robot as given, its robot.toml, or the name of a preset.
+        robot: the robot as given, its robot.toml, or the name of a preset. In Python also a `Model` of your own;
+            the columns of its table are those for which its function asks, and its outputs.
         protocol: what is fitted: all sessions but one ("session"), or N = 3 and 4 as in the paper ("paper").
         seed: of the bootstrap; the same seed gives the same result.
         own: what the lab can set in its next runs, `{"l_cm": (5, 7, 9)}` or `("l_cm=5,7,9",)`; for `N`, `l_cm`
@@ -55,6 +76,13 @@ def calibrate(
             corrected one is stated; `verdict.paths` has it.
         unit: of lengths that are given without one; l for tail lengths. 24cm and 3l, columns x_cm and y_cm, and
             drawings with a size have their own.
+        session: COL, the column that says which runs were made together (default: session, if there is one).
+        specimen: COL, the column that says what was run, where there are several.
+        held_out: NAME, of a session that is held out for the test, or of a column that says so of each run
+            (default: the middle session).
+        noise: unknown, where neither repeats nor stated errors tell it. In Python also the standard deviation of
+            one run for each output, {"v": 0.02}: relative where ratios are compared.
+        notes: COL, a column in which runs may differ without the model's knowledge (default: all others).
         max_seconds: of processor time for the search (default 90, with laws 180). The verdict then is provisional,
             and says what was not tried.
         jobs: threads; default all processors.
@@ -64,7 +92,7 @@ def calibrate(
     Returns:
         The verdict, with `verdict` ("none", "number", "effect", "ambiguous", "partial", "unexplained"),
         `sentence`, `effects`, `nearest`, `moves`, fits with intervals, errors on the held-out runs, the
-        `corrected` robot, and `save(folder)`.
+        `corrected` robot, or the numbers of the model, and `save(folder)`.
 
     Raises:
         InputError: the table cannot be used; the message says why.
@@ -75,22 +103,45 @@ def calibrate(
         >>> print(verdict.sentence)  # doctest: +SKIP
         >>> result = sf.plan(sf.circle(2.0), verdict.corrected, knowledge=verdict.knowledge)  # doctest: +SKIP
     """
+    if max_seconds is not None and not max_seconds > 0:
+        raise InputError(f"max_seconds: {max_seconds:g}; give a positive number of seconds")
+    roles = Roles(session, specimen, held_out, noise, notes)
+    if isinstance(robot, Model):
+        _refuse(
+            "a model of your own", own=own, laws=not laws, paths=paths, unit=unit, protocol=protocol != "session"
+        )
+        experiment, rows = read_runs_of(table, robot, roles)
+        for line in lines_of_excluded(experiment.runs):
+            tell(line)
+        limit = MAX_SECONDS if max_seconds is None else max_seconds
+        verdict = find_what_is_missing(experiment, held_out=rows, seed=seed, max_seconds=limit, progress=progress)
+        return ModelVerdict(**vars(verdict), model=robot, table=_name(table))
+    _refuse("a robot", **roles._asdict())
     robot = one_robot(robot)
     check_given(robot)
     limit = MAX_SECONDS * (1 + laws) if max_seconds is None else max_seconds
-    if not limit > 0:
-        raise InputError(f"max_seconds: {limit:g}; give a positive number of seconds")
     wanted = wanted_paths(paths, robot, unit)
     settings = own if isinstance(own, Mapping) else owned(own or ())
-    data, held_out, name = read_runs(table, protocol, tell)
+    data, rows = read_runs(table, protocol, tell)
     model = SwimmerModel(robot, data, jobs, own=settings)
     verdict = find_what_is_missing(
         model,
-        held_out=held_out,
+        held_out=rows,
         describe=find_laws if laws else None,
         seed=seed,
         max_seconds=limit,
         progress=progress,
     )
-    result = RobotVerdict(**vars(verdict), robot=robot, table=name)
+    result = RobotVerdict(**vars(verdict), robot=robot, table=_name(table))
     return replace(result, paths=path_errors(wanted, robot, result.corrected, result.knowledge))
+
+
+def _refuse(what: str, **keywords: object) -> None:
+    """Refuse keywords that are given and mean nothing for what is calibrated."""
+    if given := [name for name, value in keywords.items() if value]:
+        raise InputError(f"calibrate: {', '.join(given)} is not for {what}; leave it out")
+
+
+def _name(table: str | Path | pd.DataFrame) -> str:
+    """Name a table by its file."""
+    return str(table.attrs.get("name", "table")) if isinstance(table, pd.DataFrame) else Path(table).name

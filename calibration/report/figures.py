@@ -19,7 +19,7 @@ from calibration.report.path_error import WORDS, Model, PathError
 from calibration.statistics.residual_tests import Misfit
 from calibration.statistics.statistical_model import Runs
 from calibration.verdict.verdict import Verdict
-from calibration.words.quantities import feature_in_words, final_model, output_label, output_scale
+from calibration.words.quantities import feature_in_words, final_model
 from common.arrays import Flags, Floats
 from common.pages import BLUE, GREEN, INK, ORANGE, PALE, RED, VIOLET
 from sim.model.robot import Robot
@@ -66,7 +66,7 @@ def plot_summary(axes: Axes, result: Verdict) -> None:
             place + height * ((len(models) - 1) / 2 - i), rms, height=0.9 * height, color=colour, label=label
         )
     axes.axvline(1.0, color=INK, lw=1.4, label="noise of a run")
-    axes.set_yticks(place, [output_label(o) for o in data.outputs], fontsize=9)
+    axes.set_yticks(place, [data.title_of(o) for o in data.outputs], fontsize=9)
     axes.set_xlabel("measured − model, rms, over the noise of a run", fontsize=9)
     axes.tick_params(axis="x", labelsize=8)
 
@@ -89,13 +89,13 @@ def _draw_residual(residual: Floats, limits: Floats, used: Flags, data: Runs) ->
     jitter *= 0.1 * max(float(np.ptp(values)) / 6, 0.02 * float(np.abs(values).max()))
     panels = figure.subplots(len(data.outputs), 1, sharex=True, squeeze=False)[:, 0]
     for i, (name, axes) in enumerate(zip(data.outputs, panels, strict=True)):
-        scale, unit = output_scale(name)
+        scale, unit = data.scale_of(name)
         for place in range(len(kinds)):
             some, colour = kind == place, _KINDS[place % len(_KINDS)]
             axes.plot(values[some] + jitter[some], scale * residual[some, i], ".", ms=4, color=colour)
         axes.axhline(0, color=INK, lw=0.6)
         axes.set_ylim(-scale * limits[i], scale * limits[i])
-        axes.set_ylabel(f"{output_label(name)} [{unit}]", fontsize=8)
+        axes.set_ylabel(f"{data.title_of(name)} [{unit}]", fontsize=8)
         axes.tick_params(labelsize=8)
     levels = np.unique(values)
     if len(levels) <= 8:
@@ -121,10 +121,10 @@ def draw_maps(result: Verdict) -> list[tuple[Figure, str]]:
         final = final_model(result.verdict, result.nearest, result.effects)
         maps.append((final, result.explaining[0].refit_misfit))
     limit = max(4.0, float(np.abs(result.found.misfit.scores.shapes).max(initial=0.0)))
-    return [(_draw_map(misfit, result.runs.outputs, limit), label) for label, misfit in maps]
+    return [(_draw_map(misfit, result.runs, limit), label) for label, misfit in maps]
 
 
-def _draw_map(misfit: Misfit, outputs: Sequence[str], limit: float) -> Figure:
+def _draw_map(misfit: Misfit, data: Runs, limit: float) -> Figure:
     z = misfit.scores.shapes.T  # (features, outputs)
     figure = Figure(figsize=(_WIDTH, 0.27 * len(z) + 1.0))
     axes = figure.add_subplot()
@@ -134,7 +134,8 @@ def _draw_map(misfit: Misfit, outputs: Sequence[str], limit: float) -> Figure:
         colour = "white" if abs(z[i, j]) > 0.4 * limit else _ON_CELLS
         axes.text(j, i, f"{z[i, j]:+.0f}", ha="center", va="center", fontsize=8, color=colour)
     axes.set_yticks(range(len(z)), [feature_in_words(name) for name in misfit.features], fontsize=8)
-    axes.set_xticks(range(len(outputs)), [output_label(o).replace(" ", "\n") for o in outputs], fontsize=8)
+    titles = [data.title_of(output).replace(" ", "\n") for output in data.outputs]
+    axes.set_xticks(range(len(titles)), titles, fontsize=8)
     axes.tick_params(length=0)
     figure.tight_layout()
     return figure

@@ -1,7 +1,7 @@
 """The statistical model of a table: its runs, a forward model with parameters and priors, and the noise.
 
 **Forward model.** Nothing in this room knows robots. The swimmer (`calibration.swimmer.swimmer`) is one forward
-model; a sphere that settles in a vessel is another one (`tests/oracles/spheres.py`).
+model; a function of one's own is another one (`calibration.own_model`).
 
 The noise, weights of runs and priors are those of `calibration.statistics.gls`.
 
@@ -25,7 +25,7 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.special import fdtrc
 
-from calibration.statistics.excluded import Excluded
+from calibration.statistics.excluded import Excluded, count_of_rows, summary_of_excluded
 from calibration.statistics.gls import Regression, repeat_count, repeat_covariance
 from common.arrays import Flags, Floats, Integers
 
@@ -60,6 +60,7 @@ class Parameter:
         float, ...
     ] = ()  # of a second number: values at which the effect is looked for. Of a number: changes
     # from which one is fitted that differs in some runs
+    theory: float | None = None  # size of an effect that theory gives
 
     def changed(self, value: Any, by: Any) -> Any:
         """Change a value by `by`, on the parameter's own scale."""
@@ -106,6 +107,12 @@ class Runs:
     noise_known: bool = field(default=True, kw_only=True)  # not so if it was declared to be unknown
     specimen: Integers | None = field(default=None, kw_only=True)  # (n,) 0, 1, …: what was run; None: not noted
     specimen_names: tuple[str, ...] = field(default=(), kw_only=True)  # by number
+    notes: Mapping[str, Any] = field(default_factory=dict, kw_only=True)  # column -> (n,), not of the model
+    lines: Integers | None = field(default=None, kw_only=True)  # (n,) of the rows in the file; None: it has none
+    output_titles: Mapping[str, str] = field(default_factory=dict, kw_only=True)  # in words; default: the name
+    output_scales: Mapping[str, tuple[float, str]] = field(
+        default_factory=dict, kw_only=True
+    )  # factor and unit in which residuals are shown; default: per cent
 
     @property
     def scale(self) -> Floats:
@@ -170,9 +177,17 @@ class Runs:
         """Change a prediction (..., n, k) at gaps so that y less it is T times what it was."""
         return prediction if self.completion is None else self.y + self.completed(prediction - self.y)
 
+    def title_of(self, output: str) -> str:
+        """Return the words for an output."""
+        return self.output_titles.get(output, output)
+
+    def scale_of(self, output: str) -> tuple[float, str]:
+        """Return the factor and the unit in which residuals of an output are shown."""
+        return self.output_scales.get(output, (100.0, "%"))
+
     def row_name(self, place: int) -> str:
-        """Name the row of a run, from 0, in the table."""
-        return f"row {self.rows[place]}"
+        """Name the row of a run, from 0, in the table, and its line in the file if it has one."""
+        return f"row {self.rows[place]}" + (f" (line {self.lines[place]})" if self.lines is not None else "")
 
     def repeats(self, rows: Flags | slice = slice(None)) -> Integers | Floats:
         """Tell what is the same in repeats among some rows, by these alone: the condition (n',), or a design.
@@ -233,14 +248,19 @@ class Runs:
     @property
     def drawn(self) -> tuple[str, tuple[str, Integers, tuple[str, ...]]]:
         """What residuals are drawn against: a setting; and the kinds in colour: a name, (n,), and their names."""
-        return self.input_names[0], ("session", self.session, self.session_names)
+        return next(iter(self.settings)), ("session", self.session, self.session_names)
 
     def subset(self, rows: Flags | Integers) -> Any:
         """Choose the runs in `rows`: flags (n,), or places."""
-        arrays: dict[str, Any] = {
-            k: v[rows] for k, v in vars(self).items() if isinstance(v, np.ndarray) and k != "sigma"
-        }
-        return replace(self, **arrays)
+        of_runs = {k: v for k, v in vars(self).items() if isinstance(v, np.ndarray) and k != "sigma"}
+        arrays: dict[str, Any] = {k: v[rows] for k, v in of_runs.items()}
+        return replace(self, **arrays, notes={name: values[rows] for name, values in self.notes.items()})
+
+
+def lines_of_excluded(runs: Runs) -> list[str]:
+    """Say what of the table is not used, a line for each reason."""
+    total = len(runs) + count_of_rows(runs.excluded)
+    return [f"excluded: {line}" for line in summary_of_excluded(runs.excluded, total)]
 
 
 class ForwardModel(Protocol):

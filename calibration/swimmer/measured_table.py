@@ -11,10 +11,9 @@ so; without these the noise is unknown. `session` names the group of runs that w
 runs of one N are one session. `robot` names the specimen, where the table has several. Some effects need
 elapsed_min, temperature_C, tank_diameter_cm or course_deg (direction of the path in the lab, where a run is part
 of a circle). Rows that cannot be used are excluded with number and reason, and so are copies of rows
-(`find_copies`), and rows that lack a note which nearly all others have. A row that lacks some outputs counts
-with the others (`calibration.statistics.statistical_model`). Columns without any
-value are left out, notes that many rows lack, and columns of other names, unless the name looks like a misspelt
-one.
+(`calibration.statistics.copies`), and rows that lack a note which nearly all others have. A row that lacks some outputs counts
+with the others (`calibration.statistics.gaps`). Columns without any value are left out, notes that many rows lack,
+and columns of other names, unless the name looks like a misspelt one.
 
 Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians. A
 row with a wrong sign is a bad row, because the direction of the motor determines all signs
@@ -25,16 +24,6 @@ Which runs are fitted and which are held out for the test is fixed before the da
 session   one whole session is held out, the middle one by name, so that no extrapolation is needed;
 paper     as in the paper: C_t, C_r, C_yr from ω_h and ω_yr of the robots with 3 and 4 tails, prediction for 2 and
           5 tails. The errors of the paper's predictions are 14.8 % and 10 %.
-
-**Copies.** A copied row is no repeat, and makes the noise look smaller than it is. Two measurements under one
-condition differ by noise. An output that is recorded in steps d, with standard deviation s between repeats, is
-equal in two of them with probability
-
-    p = d / (2 √π s),   at most 1,
-
-the density of their difference at 0, times d. A row whose outputs all equal those of an earlier row of the same
-condition is a copy if less than `_CHANCE` such pairs are expected in the whole table: (pairs of repeats) × ∏ p.
-Outputs in coarse steps may agree by chance, and their rows are kept. Outputs are taken as independent.
 """
 
 from __future__ import annotations
@@ -48,7 +37,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.excluded import Excluded, listed
+from calibration.statistics.copies import COPY, find_copies
+from calibration.statistics.excluded import Excluded
+from calibration.statistics.gaps import filled, gaps_in_words, not_finite, with_outputs, without_gaps
 from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs
 from calibration.statistics.study import divided, middle_session
@@ -71,9 +62,16 @@ from common.units import to_si
 _SIGMAS = dict(  # column -> nuisance parameter, factor
     zip(RUN_SIGMAS, ((CAMERA, 0.01), (HEADING, math.pi / 180), (TACHOMETER, 0.01)), strict=True)
 )
+_TITLES = {
+    "omega_h": "head spin",
+    "omega_t": "tail spin",
+    "omega_yr": "yaw rate",
+    "R_yr": "turn radius",
+    "theta": "slip angle",
+    "v": "speed",
+}
 _LARGEST = 1e9  # of a value
 _FEWEST_RUNS = 24
-_COPY = "a copy of an earlier row, equal in all inputs and outputs{}"
 _GAPS = 0.1  # share of the usable rows that may lack a note
 _OWN = 1e-3  # share of an output's scatter that must be independent of the other outputs
 
@@ -89,11 +87,6 @@ class Measurements(Runs):
     sigmas: Mapping[str, float]  # σ of camera scale, zero of the heading [rad] and tachometer, where stated
     noted_names: tuple[str, ...]  # elapsed_h, temperature_K (above the mean), tank_diameter, course_x, course_y
     converted: tuple[str, ...]  # columns that were renamed or converted, in words
-    lines: Integers | None = None  # (n,) of the rows in the file; None: it has none
-
-    def row_name(self, place: int) -> str:
-        """Name the row of a run, from 0, and its line in the file if it has one."""
-        return super().row_name(place) + (f" (line {self.lines[place]})" if self.lines is not None else "")
 
     @property
     def noted_of_repeats(self) -> Floats:
@@ -165,7 +158,7 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
     inputs = [tails, np.log(length), np.log(np.abs(omega)), np.sign(omega), *noted.values()]
     data = Measurements(
         outputs=outputs,
-        y=_outputs_to_fit(good, outputs, condition),
+        y=filled(_outputs_to_fit(good, outputs), condition),
         condition=condition,
         session=session,
         session_names=tuple(str(n) for n in session_names),
@@ -174,11 +167,11 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         rows=np.flatnonzero(keep) + 1,
         excluded=(
             *aside,
-            *_gaps_in_words(table, missing & keep[:, None]),
+            *gaps_in_words(table, missing & keep[:, None]),
             *_unused_columns(empty, sparse, unknown),
         ),
         caveats=_caveats(tails, length, omega),
-        completion=_without_gaps(missing.to_numpy()[keep]),
+        completion=without_gaps(missing.to_numpy()[keep]),
         specimen=robot if "robot" in table else None,
         specimen_names=tuple(map(str, robot_names)) if "robot" in table else (),
         tails=tails,
@@ -187,10 +180,12 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         noted=np.stack(list(noted.values()), 1) if noted else np.empty((len(good), 0)),
         sigmas=_sigmas(good),
         noted_names=tuple(noted),
+        output_titles=_TITLES,
+        output_scales={"theta": (math.degrees(1.0), "°")},
         converted=converted,
         lines=good.index.to_numpy() if good.index.name == LINE else None,
     )
-    return _independent(data, sum(fault.reason == _COPY for fault in aside))
+    return _independent(data, sum(fault.reason == COPY for fault in aside))
 
 
 def _unused_columns(empty: Sequence[str], sparse: Sequence[str], unknown: Sequence[str]) -> list[Excluded]:
@@ -223,51 +218,10 @@ def _sessions(table: pd.DataFrame, numbers: pd.DataFrame) -> Any:
     return ("N = " + numbers["N"].astype(int).astype(str)).to_numpy(dtype=str)
 
 
-def _outputs_to_fit(numbers: pd.DataFrame, outputs: Sequence[str], condition: Integers) -> Floats:
-    """Return the outputs as they are fitted, (n, k): θ in rad, logarithms of all others in SI units.
-
-    At a gap stands the mean of the repeats, or of all runs, so that all arithmetic is finite.
-    """
-    columns = []
-    for name in outputs:
-        column, factor, _ = OUTPUTS[name]
-        value = numbers[column].to_numpy(dtype=float) * factor
-        scaled = pd.Series(value if name == "theta" else np.log(np.abs(value)))
-        columns.append(scaled.fillna(scaled.groupby(condition).transform("mean")).fillna(scaled.mean()))
-    return np.stack(columns, 1)
-
-
-def _without_gaps(gaps: Flags) -> Floats:
-    """Make `Runs.completion` of gaps (n, k) for which nothing stands."""
-    return np.eye(gaps.shape[1]) * ~gaps[:, :, None]
-
-
-def _with_outputs(data: Measurements, kept: Sequence[int]) -> Measurements:
-    """Keep some outputs, and let those of a run stand for the one that it lacks (`Runs.completion`)."""
-    gaps = data.gaps[:, kept]
-    names, completion = tuple(data.outputs[i] for i in kept), _without_gaps(gaps)
-    data = replace(data, outputs=names, y=data.y[:, kept], completion=completion if gaps.any() else None)
-    if gaps.any():
-        run = repeat_covariance(data.y, data.repeats())
-        for T, gap in zip(completion, gaps, strict=True):
-            T[np.ix_(gap, ~gap)] = np.linalg.solve(run[np.ix_(~gap, ~gap)], run[np.ix_(~gap, gap)]).T
-    return data
-
-
-def _gaps_in_words(table: pd.DataFrame, missing: pd.DataFrame) -> list[Excluded]:
-    """Name the rows that lack an output, a line for each output."""
-    lines = []
-    for column in (name for name in missing if missing[name].any()):
-        rows = [row_name(table, i) for i in np.flatnonzero(missing[column]).tolist()]
-        lines.append(Excluded(f"column {column}: no value in {listed(rows)}; the other outputs there count"))
-    return lines
-
-
-def _not_finite(table: pd.DataFrame, row: int, column: str) -> Excluded:
-    value = table[column].iloc[row]
-    if pd.isna(value):
-        return Excluded(f"{column} has no value", row_name(table, row))
-    return Excluded(f"{column}{{}} is not a finite number", row_name(table, row), f" = {value}")
+def _outputs_to_fit(numbers: pd.DataFrame, outputs: Sequence[str]) -> pd.DataFrame:
+    """Return the outputs as they are fitted, (n, k): θ in rad, logarithms of all others in SI units."""
+    values = {name: numbers[OUTPUTS[name][0]] * OUTPUTS[name][1] for name in outputs}
+    return pd.DataFrame({name: v if name == "theta" else np.log(np.abs(v)) for name, v in values.items()})
 
 
 def _is_empty(column: pd.Series) -> bool:
@@ -285,7 +239,7 @@ def _add_gaps(faults: dict[int, Excluded], table: pd.DataFrame, numbers: pd.Data
             sparse.append(column)
             continue
         for i in gaps.tolist():
-            faults.setdefault(i, _not_finite(table, i, column))
+            faults.setdefault(i, not_finite(table, i, column))
     return sparse
 
 
@@ -299,7 +253,7 @@ def _add_copies(
     used = numbers.iloc[usable]
     for place, earlier in find_copies(used[list(RUN)].to_numpy(), used[columns].to_numpy()).items():
         original = f" ({row_name(table, usable[earlier])})"
-        faults[usable[place]] = Excluded(_COPY, row_name(table, usable[place]), original)
+        faults[usable[place]] = Excluded(COPY, row_name(table, usable[place]), original)
 
 
 def _independent(data: Measurements, copies: int) -> Measurements:
@@ -340,7 +294,7 @@ def _independent(data: Measurements, copies: int) -> Measurements:
         else:
             kept.append(i)
     excluded = (*data.excluded, *follows)
-    return _with_outputs(replace(data, excluded=excluded, caveats=caveats), kept)
+    return with_outputs(replace(data, excluded=excluded, caveats=caveats), kept)
 
 
 def _sigmas(good: pd.DataFrame) -> dict[str, float]:
@@ -415,7 +369,7 @@ def _faults(
     values = {column: numbers[column].where(numbers[column].abs() < _LARGEST).to_numpy() for column in used}
     for column, value in values.items():
         for i in np.flatnonzero(~(np.isfinite(value) | missing.get(column, False))).tolist():
-            faults.setdefault(i, _not_finite(table, i, column))
+            faults.setdefault(i, not_finite(table, i, column))
     add(values["N"] % 1 != 0, "N{} is not a whole number", table["N"].tolist())
     for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s"):
         if column in values:
@@ -439,7 +393,7 @@ def _paper(data: Measurements) -> tuple[Measurements, Flags]:
     missing = [n for n in outputs if n not in data.outputs]
     if missing or not {2.0, 3.0, 4.0, 5.0} <= set(data.tails.tolist()):
         raise InputError("the paper's protocol needs omega_h_rpm, omega_yr_rad_s and runs with N = 2, 3, 4 and 5")
-    data = _with_outputs(data, [data.outputs.index(n) for n in outputs])
+    data = with_outputs(data, [data.outputs.index(n) for n in outputs])
     held_out = ~np.isin(data.tails, (3, 4))
     if divided(data, held_out):
         raise InputError(
@@ -449,48 +403,3 @@ def _paper(data: Measurements) -> tuple[Measurements, Flags]:
 
 
 PROTOCOLS: dict[str, Callable[[Measurements], tuple[Measurements, Flags]]] = {"session": _session, "paper": _paper}
-
-
-_CHANCE = 0.01  # equal pairs that are expected by chance
-_ROUNDING = 1e-9  # relative difference below which two numbers are one, converted from another unit
-_TYPICAL = 0.01  # relative standard deviation that is assumed where no repeats but copies are left
-
-
-def find_copies(inputs: Floats, outputs: Floats) -> dict[int, int]:
-    """Find copied rows: place -> place of the row that it repeats.
-
-    Args:
-        inputs: (n, q) what was set.
-        outputs: (n, k) what was measured.
-    """
-    first: dict[tuple[float, ...], int] = {}
-    copies = {}
-    for place, row in enumerate(np.column_stack([inputs, outputs]).tolist()):
-        earlier = first.setdefault(tuple(row), place)
-        if earlier != place:
-            copies[place] = earlier
-    if not copies:
-        return {}
-    condition = np.unique(inputs, axis=0, return_inverse=True)[1].reshape(-1)
-    sizes = np.bincount(condition)
-    pairs = float((sizes * (sizes - 1) / 2).sum())
-    kept = np.ones(len(inputs), dtype=bool)
-    kept[list(copies)] = False
-    chance = math.prod(_equal(outputs[kept, i], condition[kept].tolist()) for i in range(outputs.shape[1]))
-    return copies if pairs * chance < _CHANCE else {}
-
-
-def _equal(values: Floats, condition: Sequence[int]) -> float:
-    """Estimate the probability that two repeats of an output (n,) are equal."""
-    distinct = np.unique(values)
-    gaps = np.diff(distinct)
-    gaps = gaps[gaps > _ROUNDING * np.abs(distinct[1:])]
-    if not len(gaps):
-        return 1.0
-    groups: dict[int, list[float]] = {}
-    for place, value in zip(condition, values.tolist(), strict=True):
-        groups.setdefault(place, []).append(value)
-    square = sum(((np.array(group) - np.mean(group)) ** 2).sum() for group in groups.values())
-    repeats = len(values) - len(groups)
-    scatter = math.sqrt(square / repeats) if repeats else _TYPICAL * float(np.median(np.abs(values)))
-    return min(1.0, float(gaps.min()) / (2 * math.sqrt(math.pi) * scatter)) if scatter else 1.0

@@ -52,6 +52,7 @@ from calibration.attribution.wrong_numbers import (
     without_wrong_priors,
 )
 from calibration.statistics.budget import Budget, limited, seconds_left
+from calibration.statistics.checks import predict_as_given
 from calibration.statistics.excluded import caveat_of_excluded
 from calibration.statistics.fit import Fit, fit, profile_intervals
 from calibration.statistics.residual_tests import directions, examine_residual
@@ -229,7 +230,7 @@ def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any)
 
     """
     start = start_values(model)
-    given = model.predict([start], title="as given" if settings.get("progress") else "")[0]
+    given = predict_as_given(model, title="as given" if settings.get("progress") else "")
     model.check(given)
     study = Study(model, split_runs(model.runs, held_out, find_outliers(model.runs, given)), **settings)
     study = replace(study, model=with_runs(model, model.runs.with_noise(study.split.fitted, model.runs.y - given)))

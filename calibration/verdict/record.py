@@ -260,6 +260,8 @@ def _data(result: Findings) -> dict[str, Any]:
     settings = runs.settings.items()
     return {
         "outputs": list(runs.outputs),
+        "output_titles": {name: runs.title_of(name) for name in runs.outputs},
+        "output_scales": {name: list(runs.scale_of(name)) for name in runs.outputs},
         "number_of_runs": len(runs),
         "number_of_held_out_runs": int(result.split.test.sum()),
         "settings": {name: [float(v.min()), float(v.max()), unit] for name, (v, unit) in settings},

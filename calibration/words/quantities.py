@@ -1,8 +1,8 @@
 """Numbers of a calibration as people read them: outputs, nuisance parameters and sizes, in the lab's units.
 
-Inside a calibration outputs are logarithms, so their residuals are relative; θ is in rad, so its residuals are
-shown in degrees. The record of a nuisance parameter or of an effect has the `unit` in which it is shown, and the
-factor to it, `shown` (`calibration.verdict.record`).
+Outputs that are compared as ratios are logarithms inside a calibration: their residuals are relative. The record
+(`calibration.verdict.record`) has titles of outputs, and factors and units of their residuals. That of a nuisance
+parameter or of an effect has the `unit` in which it is shown, and the factor to it, `shown`.
 """
 
 from __future__ import annotations
@@ -17,36 +17,23 @@ from calibration.attribution.refits import UNSEEN
 
 Record = Mapping[str, Any]  # a part of verdict.json, or all of it
 
-_OUTPUTS = {
-    "omega_h": "head spin",
-    "omega_t": "tail spin",
-    "omega_yr": "yaw rate",
-    "R_yr": "turn radius",
-    "theta": "slip angle",
-    "v": "speed",
-}
 _FEATURES = {  # what words of a feature's name read as
     "omega": "ω", "direction": "motor's direction", "elapsed_h": "time", "temperature_K": "temperature",
     "tank_diameter": "diameter of the tank", "course_x": "x of the course", "course_y": "y of the course",
 }  # fmt: skip
-_IN_DEGREES = "theta"
 _RESOLVED = 2.01  # over the number of draws and one more: the bootstrap resolves no smaller p
 
 
-def output_label(output: str) -> str:
+def output_label(record: Record, output: str) -> str:
     """Return the words for an output; its name where there are none."""
-    return _OUTPUTS.get(output, output)
+    return str(record.get("output_titles", {}).get(output, output))
 
 
-def output_scale(output: str) -> tuple[float, str]:
-    """Return the factor and the unit in which residuals of an output are shown."""
-    return (math.degrees(1.0), "°") if output == _IN_DEGREES else (100.0, "%")
-
-
-def output_error(error: float, output: str) -> str:
-    """Write an error of an output: in per cent, of the slip angle in degrees."""
-    scale, unit = output_scale(output)
-    return f"{scale * error:.1f}{_after_number(unit)}"
+def output_error(record: Record, error: float, output: str) -> str:
+    """Write an error of an output in the unit in which it is shown; default: in per cent."""
+    scale, unit = record.get("output_scales", {}).get(output, (100.0, "%"))
+    number = f"{scale * error:.1f}" if unit in ("%", "°") else plain(scale * error)
+    return f"{number}{_after_number(unit)}"
 
 
 def feature_in_words(name: str) -> str:
@@ -56,10 +43,10 @@ def feature_in_words(name: str) -> str:
     return name
 
 
-def along_in_words(largest: str) -> str:
+def along_in_words(record: Record, largest: str) -> str:
     """Write along which output and feature a residual is largest."""
     output, _, feature = largest.partition(" along ")
-    return f"{output_label(output)} along {feature_in_words(feature)}" if feature else largest
+    return f"{output_label(record, output)} along {feature_in_words(feature)}" if feature else largest
 
 
 def plain(value: float, digits: int = 3) -> str:

@@ -76,7 +76,7 @@ def _one_line(text: str) -> str:
 @cache
 def _environment() -> Environment:
     """Make the environment of the templates; jinja2 is loaded where something is said."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_context
 
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
@@ -85,14 +85,18 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         autoescape=lambda name: name == "report.j2",
     )
-    environment.filters |= _FILTERS
+    environment.filters |= _FILTERS | {name: pass_context(words) for name, words in _OF_OUTPUTS.items()}
     environment.globals["final_model"] = final_model
     return environment
 
 
 _FILTERS: dict[str, Callable[..., str]] = {
     "percent": percent, "digits": digits, "p": p_in_words, "plain": plain, "size": size, "detectable": detectable,
-    "given": given, "tolerance": tolerance, "fitted_value": fitted_value, "output": output_label,
-    "output_error": output_error, "direction": direction_in_words,
-    "along": along_in_words, "ranges": ranges_in_words, "in_lab": length_in_lab,
+    "given": given, "tolerance": tolerance, "fitted_value": fitted_value, "direction": direction_in_words,
+    "ranges": ranges_in_words, "in_lab": length_in_lab,
 }  # fmt: skip
+_OF_OUTPUTS: dict[str, Callable[..., str]] = {  # their first argument is the whole record
+    "output": output_label,
+    "output_error": output_error,
+    "along": along_in_words,
+}

@@ -1,0 +1,90 @@
+"""Faults of a function, its parameters and its units, which are named before anything is fitted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calibration.own_model.function_model import NOT_ABOVE_0, FunctionModel
+from calibration.statistics.statistical_model import Parameter, start_values
+from common.arrays import Floats
+from common.errors import InputError
+
+_FAR = 100.0  # factor between what was measured and the model with its start values
+_OTHER_UNITS = (  # factor, units of an output in which it is a mistake, what the table then has
+    (100.0, ("1", "%"), "per cent"),
+    (180 / np.pi, ("1", "rad", "deg", "°"), "degrees"),
+)
+_NEAR = 1.1  # factor between another unit and what is found
+_TOGETHER = 0.9  # least correlation, about 0, of what is compared as a difference
+
+
+def check_function(model: FunctionModel) -> None:
+    """Check the function with its start values, and with each parameter changed.
+
+    Raises:
+        InputError: there are fewer values than numbers, a prediction cannot be compared, a parameter changes
+            nothing, or an output is far from what was measured.
+    """
+    parameters, start, runs = model.model.parameters, start_values(model), model.runs
+    if runs.values(np.ones(len(runs), dtype=bool)) <= len(model.coefficients):
+        raise InputError(f"{len(runs)} usable rows for {len(model.coefficients)} numbers to fit; give more rows")
+    given, *changed = model.predict([start, *({**start, p.name: _changed(p)} for p in parameters)])
+    _check_values(model, given, changed)
+    for parameter, prediction in zip(parameters, changed, strict=True):
+        if np.array_equal(prediction, given):
+            raise InputError(
+                f"{parameter.words} changes nothing in these runs, whether it is {parameter.start:g} or "
+                f"{_changed(parameter):g}: use p[{parameter.name!r}] in the function, or leave it out of the model"
+            )
+    for place, (name, output) in enumerate(model.model.outputs.items()):
+        measured, predicted = runs.y[:, place], given[:, place]
+        ratio = output.kind == "ratio"
+        factor = float(np.exp(np.median(measured - predicted))) if ratio else _slope(measured, predicted)
+        for other, units, words in _OTHER_UNITS:
+            if output.unit in units and 1 / _NEAR < factor / other < _NEAR:
+                raise InputError(
+                    f"{name} is {factor:.3g} times what the model gives: the table seems to have {words}; convert "
+                    "the column or what the function returns, or give other start values"
+                )
+        if ratio and not 1 / _FAR < factor < _FAR:
+            raise InputError(
+                f"{name} is {factor:.3g} times what the model gives with its start values "
+                f"({', '.join(f'{n.name} = {n.start:g}' for n in model.model.numbers)}): check the units of both, "
+                f"and give start values that come within a factor of {_FAR:g}"
+            )
+
+
+def _changed(parameter: Parameter) -> float:
+    """Return a number changed by a tenth of its size, or an effect of typical size, within its bounds."""
+    step = 0.1 if parameter.logarithmic else parameter.typical
+    up, down = (float(parameter.moved(parameter.start, by)) for by in (step, -step))
+    return up if up != parameter.start else down
+
+
+def _check_values(model: FunctionModel, given: Floats, changed: list[Floats]) -> None:
+    """Refuse a value with which none can be compared, and name the effect that makes it."""
+    bad = ~np.isfinite(given) | (given == NOT_ABOVE_0)
+    for row, place in np.argwhere(bad & ~model.runs.gaps)[:1].tolist():
+        at, name = model.runs.row_name(row), model.runs.outputs[place]
+        value = "not above 0" if given[row, place] == NOT_ABOVE_0 else f"{given[row, place]:g}"
+        mended = [
+            p for p, prediction in zip(model.model.parameters, changed, strict=True)
+            if p.name in {e.name for e in model.effects} and np.isfinite(prediction[row, place])
+            and prediction[row, place] != NOT_ABOVE_0
+        ]  # fmt: skip
+        if mended:
+            raise InputError(
+                f"{mended[0].words} does not vanish at its null, {mended[0].start:g}: there {name} is {value} in "
+                f"{at}; write the function so that it is the model without the effect there"
+            )
+        raise InputError(
+            f"the model's {name} is {value} in {at}; return finite numbers"
+            + (", above 0 as it is compared as a ratio (or declare kind='difference')" if value[0] == "n" else "")
+        )
+
+
+def _slope(measured: Floats, predicted: Floats) -> float:
+    """Return how much measured values rise with predicted ones; 1 where they do not go together."""
+    square = float(predicted @ predicted)
+    alike = abs(float(measured @ predicted)) > _TOGETHER * np.sqrt(square * float(measured @ measured))
+    return float(measured @ predicted) / square if square and alike else 1.0

@@ -1,0 +1,141 @@
+"""A function of one's own as a model of the calibration. It never sees an array in place of a parameter."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from calibration.own_model.columns import AskedColumns
+from calibration.own_model.declared import Model
+from calibration.statistics.forward import secants
+from calibration.statistics.statistical_model import Parameter, Parameters, Predict, Runs
+from common.arrays import Flags, Floats
+from common.errors import InputError
+
+NOT_ABOVE_0 = np.log(1e-300)  # stands for the logarithm of what is not above 0
+
+
+@dataclass(frozen=True)
+class TableRuns(Runs):
+    """Runs of a table of any columns; what was set is their inputs."""
+
+    words: frozenset[str] = field(default=frozenset(), kw_only=True)  # inputs that number words
+
+    @property
+    def settings(self) -> dict[str, tuple[Floats, str]]:
+        """What was set, as numbers of the table; words only if nothing else was set."""
+        names = [name for name in self.input_names if name not in self.words] or self.input_names
+        values = {name: self.inputs[:, self.input_names.index(name)] for name in names}
+        return {
+            name.removeprefix("ln "): (np.exp(column) if name.startswith("ln ") else column, "")
+            for name, column in values.items()
+        }
+
+
+@dataclass(frozen=True)
+class FunctionModel:
+    """A model of one's own with its runs: an `Experiment`."""
+
+    model: Model
+    runs: TableRuns
+    columns: AskedColumns  # of the runs
+    untestable: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def coefficients(self) -> tuple[Parameter, ...]:
+        return tuple(number.parameter for number in self.model.numbers if number.sigma is None)
+
+    @property
+    def nuisances(self) -> tuple[Parameter, ...]:
+        return tuple(number.parameter for number in self.model.numbers if number.sigma is not None)
+
+    @property
+    def effects(self) -> tuple[Parameter, ...]:
+        return tuple(effect.parameter for effect in self.model.effects)
+
+    def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
+        """Predict (P, n, k), see `ForwardModel`."""
+        return np.array([self._predict(parameters) for parameters in sets])
+
+    def _predict(self, parameters: Parameters) -> Floats:
+        """Call the function, once for each distinct combination of values where some differ between runs."""
+        values = {p.name: parameters.get(p.name, p.start) for p in self.model.parameters}
+        differing = [name for name, value in values.items() if np.ndim(value)]
+        if not differing:
+            return evaluate(self.model, self.columns, values)
+        every = np.stack([values[name] for name in differing], 1)
+        kinds, kind = np.unique(every, axis=0, return_inverse=True)
+        prediction = np.empty(self.runs.y.shape)
+        for place, combination in enumerate(kinds.tolist()):
+            rows = kind.reshape(-1) == place
+            one = values | dict(zip(differing, combination, strict=True))
+            prediction[rows] = evaluate(self.model, self.columns.rows(rows), one)
+        return prediction
+
+    def linearised(
+        self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
+    ) -> Predict:
+        """Return the linear model, by differences."""
+        return secants(self, at, along)
+
+    def check(self, prediction: Floats) -> None:
+        """Accept any prediction: `calibration.own_model.checks` has looked at it."""
+
+    def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
+        """Return the start as it is."""
+        return start
+
+    def possible(self) -> tuple[FunctionModel, list[dict[str, Any]]]:
+        """Return a run for each of the table's conditions, named by its columns."""
+        first = np.unique(self.runs.condition, return_index=True)[1]
+        session = np.zeros(len(first), dtype=np.int64)
+        runs = replace(self.runs.subset(first), session=session, session_names=("next",))
+        names = [name.removeprefix("ln ") for name in self.runs.input_names]
+        settings = [{name: self.columns[name][row].item() for name in names} for row in first]
+        return replace(self, runs=runs, columns=self.columns.rows(first)), settings
+
+
+def evaluate(model: Model, columns: AskedColumns, parameters: Mapping[str, Any]) -> Floats:
+    """Call a model's function once, and scale its outputs, (n, k): ratios as logarithms, differences as they are.
+
+    Raises:
+        InputError: the function fails, or an output is missing, is no number, or has another shape.
+    """
+    count, values = len(next(iter(columns.values()))), {name: float(value) for name, value in parameters.items()}
+    try:
+        with np.errstate(all="ignore"):
+            returned = model.function(columns, values)
+    except InputError:
+        raise
+    except Exception as error:
+        at = traceback.extract_tb(error.__traceback__)[-1]
+        raise InputError(
+            f"the model's function fails with {_in_words(values)}: {type(error).__name__}, {error} "
+            f"({at.filename}, line {at.lineno})"
+        ) from error
+    if not isinstance(returned, Mapping):
+        raise InputError(f"the model's function returns {type(returned).__name__}; return {{output: array (n,)}}")
+    scaled = []
+    for name, output in model.outputs.items():
+        if name not in returned:
+            raise InputError(f"the model's function returns no output {name!r}; it has {', '.join(returned)}")
+        try:
+            value = np.asarray(returned[name], dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"the model's function returns {name!r} that is no array of numbers") from None
+        if value.shape not in ((), (count,)):
+            raise InputError(f"the model's function returns {name!r} of shape {value.shape} for {count} rows; "
+                             f"return one number for each row, ({count},)")  # fmt: skip
+        value = np.broadcast_to(value, count)
+        with np.errstate(all="ignore"):
+            logarithm = np.where(value <= 0, NOT_ABOVE_0, np.log(value))
+        scaled.append(logarithm if output.kind == "ratio" else value)
+    return np.stack(scaled, 1)
+
+
+def _in_words(parameters: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} = {value:g}" for name, value in parameters.items())

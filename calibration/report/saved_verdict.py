@@ -1,0 +1,71 @@
+"""A verdict with its table: drawn, tabulated and saved. What is corrected differs between a robot and a model."""
+
+from __future__ import annotations
+
+import json
+from abc import abstractmethod
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from calibration.report.path_error import PathError
+from calibration.report.report import write_report
+from calibration.verdict.record import verdict_record
+from calibration.verdict.verdict import Verdict
+from common.files import files_together, write_text
+from common.notebook import Shown, given_axes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FILES = ("verdict.json", "report.html", "corrected.toml", "corrected.json")  # a folder has one of the last two
+
+
+@dataclass(frozen=True, repr=False)
+class SavedVerdict(Shown, Verdict):
+    """A `Verdict` with its table, and with what it corrects."""
+
+    table: str  # name of the table
+    paths: tuple[PathError, ...] = field(default=(), kw_only=True)  # the error on paths, where it was asked for
+
+    @abstractmethod
+    def _corrected_file(self) -> tuple[str, str]:
+        """Return the name and the text of the file with what is corrected."""
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the residual of each output, before and after, over the noise of a run.
+
+        Args:
+            ax: default: axes of a new figure.
+        """
+        from calibration.report.figures import plot_summary  # loads matplotlib
+
+        ax = given_axes(ax)
+        plot_summary(ax, self)
+        ax.legend(frameon=False, fontsize=8)
+        return ax
+
+    def to_frame(self) -> pd.DataFrame:
+        """Tabulate the relative errors on the held-out runs: a row for each model, all outputs and each output."""
+        rows = {name: {"all": rms, **self.errors.by_output[name]} for name, rms in self.errors.rms.items()}
+        return pd.DataFrame.from_dict(rows, orient="index")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of verdict.json."""
+        paths = {error.words: error.record() for error in self.paths}
+        return verdict_record(self, table=self.table, path=paths or None)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write verdict.json, report.html and what is corrected, all or none, and return their paths.
+
+        Raises:
+            InputError: the files cannot be written.
+        """
+        (name, corrected), record = self._corrected_file(), self.to_dict()
+        with files_together(folder, FILES) as temporary:
+            write_report(self, record, temporary / "report.html", paths=self.paths)
+            write_text(temporary / name, corrected)
+            write_text(temporary / "verdict.json", json.dumps(record, indent=1) + "\n")
+        return [Path(folder, each) for each in (*FILES[:2], name)]
