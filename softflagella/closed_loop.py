@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, overload
+from typing import Literal
 
 import pandas as pd
 
@@ -26,14 +26,6 @@ from sim.robot_rows import OneRobot, one_robot
 from softflagella.path_error import path_errors, wanted_paths
 
 MAX_SECONDS = 90.0  # of processor time for the search, without laws
-
-
-@overload
-def calibrate(table: str | Path | pd.DataFrame, robot: OneRobot, **options: Any) -> RobotVerdict: ...
-
-
-@overload
-def calibrate(table: str | Path | pd.DataFrame, robot: Model, **options: Any) -> ModelVerdict: ...
 
 
 @checks_keywords

@@ -46,8 +46,7 @@ from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
 from common.arrays import Floats
-from tests.oracles.balls import read_balls
-from tests.oracles.falling_balls import DRAGS, NULLS, OUTSIDE, falls
+from tests.oracles.falling_balls import DRAGS, NULLS, OUTSIDE, balls, falls
 
 _DAYS, _MOVING = 4, ("C_t", "C_r", "C_yr", "youngs_modulus", "camera_scale")
 _AT_ONCE = 10  # tables of a case in one call
@@ -131,7 +130,7 @@ def drawn_tables(model: LinearSwimmer, truth: LinearSwimmer, seeds: list[int]) -
 
 def falling(truth: str, withheld: tuple[str, ...], seeds: list[int]) -> list[Experiment]:
     """Tables of falling balls."""
-    return [read_balls(falls(truth, seed), withheld) for seed in seeds]
+    return [balls(falls(truth, seed), withheld) for seed in seeds]
 
 
 def falling_cases() -> list[RateCase]:

@@ -5,7 +5,7 @@ the drag and the frames of `sim.mechanics` (`tests.oracles.clamped_rod`), on two
 load is no part of a robot: here it is added to the product's rod. Rigid helices have the drag of
 `sim.mechanics.drag`, node by node, and once the flow of each segment at each other. Measured tables of others are
 read if they are given: BALLS.csv of falling balls, and SPHERES.csv of beads in glycerine, as for
-`tests.oracles`.
+docs/models.
 
 Usage: python -m benchmarks outside [BALLS.csv] [SPHERES.csv]
 
@@ -25,9 +25,8 @@ from common.arrays import Floats
 from sim.linear.vectors import Vector
 from sim.mechanics.drag import node_resistance, tail_coefficients
 from sim.mechanics.flow import stokeslets
-from tests.oracles.balls import read_balls
+from tests.oracles import falling_balls
 from tests.oracles.clamped_rod import ClampedRod, dead_load
-from tests.oracles.spheres import read_spheres
 from tests.oracles.twirled_rod import whirling
 
 _MESHES = (24, 48)  # edges; errors go as the square of an edge
@@ -160,11 +159,10 @@ def helices() -> Iterator[Compared]:
 def falling(balls: str, spheres: str) -> Iterator[Compared]:
     """Compare drag coefficients that measured falls give with those of textbooks."""
     if balls:
-        falls: Any = read_balls(balls)
-        drag = _fitted(falls, {"gravity": 9.81, "quadratic_drag": 0.4})[1]
+        drag = _fitted(falling_balls.balls(balls), {"gravity": 9.81, "quadratic_drag": 0.4})[1]
         yield Compared("C_D of falling balls, one for all", "sphere at 10⁴ < Re < 10⁵, 0.47", (0.47,), (drag,))
     for name in ("KW2023", "ZK2026") if spheres else ():
-        size = _fitted(read_spheres(spheres, name), {"viscosity": 1.0, "wall": 1.0})[1]
+        size = _fitted(falling_balls.spheres(spheres, name), {"viscosity": 1.0, "wall": 1.0})[1]
         yield Compared(f"beads in glycerine, {name}: size of the wall's correction", "Faxén, 1", (1.0,), (size,))
 
 

@@ -14,7 +14,7 @@ _OTHER_UNITS = (  # factor, units of an output in which it is a mistake, what th
     (100.0, ("1", "%"), "per cent"),
     (180 / np.pi, ("1", "rad", "deg", "°"), "degrees"),
 )
-_NEAR = 1.1  # factor between another unit and what is found
+_NEAR = 1.3  # factor between another unit and what is found
 _TOGETHER = 0.9  # least correlation, about 0, of what is compared as a difference
 
 

@@ -16,12 +16,12 @@ from common.quantities import numbers_of
 class AskedColumns(dict[str, Any]):
     """Columns (n,), floats or words, that note for which of them a function asks."""
 
-    def __init__(self, columns: Mapping[str, Any], asked: set[str] | None = None):
+    def __init__(self, columns: Mapping[str, Any], asked: dict[str, None] | None = None):
         super().__init__(columns)
-        self.asked: set[str] = set() if asked is None else asked
+        self.asked = dict[str, None]() if asked is None else asked  # in order
 
     def __getitem__(self, name: str) -> Any:
-        self.asked.add(name)
+        self.asked[name] = None
         return super().__getitem__(name)
 
     def __missing__(self, name: str) -> Any:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Literal
 
 from calibration.statistics.checks import names_once
 from calibration.statistics.statistical_model import Parameter
 from common.errors import InputError
 
+Function = Callable[[Mapping[str, Any], Mapping[str, float]], Mapping[str, Any]]  # columns, parameters -> outputs
 _WIDE = 1000.0  # factor to the ends of the range of a number for which none is given
 
 
@@ -127,7 +129,7 @@ class Model:
         {'viscosity': 0.19, 'wall': 1.04}
     """
 
-    function: Callable[[Mapping[str, Any], Mapping[str, float]], Mapping[str, Any]]
+    function: Function
     outputs: Mapping[str, Output]  # by their columns
     numbers: Sequence[Number]
     effects: Sequence[ModelEffect] = field(default=())
@@ -142,10 +144,24 @@ class Model:
                 raise InputError(f"{what} of a model are each an sf.{name}; given: {given!r}")
         names_once(parameter.name for parameter in self.parameters)
 
+    def without(self, *names: str) -> Model:
+        """Return the model without some of its effects, which stay at their null."""
+        nulls = {effect.name: effect.null for effect in self.effects if effect.name in names}
+        if unknown := [name for name in names if name not in nulls]:
+            known = ", ".join(effect.name for effect in self.effects)
+            raise InputError(f"the model has no effect {unknown[0]!r}; it has {known}")
+        rest = [effect for effect in self.effects if effect.name not in nulls]
+        return replace(self, function=partial(_with_nulls, self.function, nulls), effects=rest)
+
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Numbers and effects as the calibration has them."""
         return (*(number.parameter for number in self.numbers), *(effect.parameter for effect in self.effects))
+
+
+def _with_nulls(function: Function, nulls: Mapping[str, float], columns: Any, p: Any) -> Mapping[str, Any]:
+    """Call a function with effects at their null."""
+    return function(columns, {**nulls, **p})
 
 
 def _refuse_outside(name: str, what: str, value: float, bounds: tuple[float, float]) -> None:

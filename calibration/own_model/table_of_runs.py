@@ -21,6 +21,8 @@ from calibration.own_model.function_model import FunctionModel, TableRuns, evalu
 from calibration.statistics.copies import COPY, find_copies
 from calibration.statistics.excluded import MANY, Excluded
 from calibration.statistics.gaps import filled, gaps_in_words, not_finite, with_outputs, without_gaps
+from calibration.statistics.gls import repeat_count
+from calibration.statistics.statistical_model import FEWEST_REPEATS
 from common.arrays import Flags, Floats, Integers, Words
 from common.errors import InputError, naming
 from common.quantities import numbers_of
@@ -29,8 +31,8 @@ from common.tables import LINE, read_table, row_name
 Noise = Mapping[str, float] | Literal["unknown"]
 
 
-_FOLLOWS = 0.98  # correlation with an output beyond which a column was used to compute it
-_TRUE = ("true", "yes", "1")
+_FOLLOWS = 0.98  # correlation of ranks among repeats with an output that was computed from a column
+_TRUE = ("true", "yes", "1", "1.0")
 
 
 class Roles(NamedTuple):
@@ -55,8 +57,12 @@ def read_runs_of(
         InputError: the table lacks a column, or the model or what was measured has a fault.
     """
     with naming(source):
-        table = source if isinstance(source, pd.DataFrame) else read_table(source)
-        return _read(table.rename(columns=str), model, roles)
+        table = (source if isinstance(source, pd.DataFrame) else read_table(source)).rename(columns=str)
+        if table.columns.has_duplicates:
+            raise InputError(
+                f"the table has two columns {table.columns[table.columns.duplicated()][0]!r}; drop one"
+            )
+        return _read(table, model, roles)
 
 
 def _read(table: pd.DataFrame, model: Model, roles: Roles) -> tuple[FunctionModel, Flags | None]:
@@ -67,14 +73,12 @@ def _read(table: pd.DataFrame, model: Model, roles: Roles) -> tuple[FunctionMode
     for what, names in (("output", model.outputs), ("setting", model.settings or ()), ("column", own),
                         ("note", roles.notes or ())):  # fmt: skip
         _refuse_unknown(what, names, table)
-    outputs = table[list(model.outputs)].apply(numbers_of)
-    columns = AskedColumns({name: values_of_column(table[name]) for name in table if name not in outputs})
+    outputs, titles = table[list(model.outputs)].apply(numbers_of), map(str, table)
+    columns = AskedColumns({name: values_of_column(table[name]) for name in titles if name not in outputs})
     faults = _faults_of_outputs(table, outputs, model)
-    settings = _settings(model, columns, outputs, faults)
-    needed = dict.fromkeys([*columns.asked, *settings, *own])
-    for name in needed:
-        for row in np.flatnonzero(is_missing(columns[name])).tolist():
-            faults.setdefault(row, not_finite(table, row, name))
+    settings = _settings(model, columns, table, faults)
+    needed = list(dict.fromkeys([*columns.asked, *settings, *own]))
+    _add_missing(faults, columns, needed, table)
     specimen = [roles.specimen] if roles.specimen else []
     set_values = np.column_stack([_as_numbers(columns[name]) for name in (*settings, *specimen)])
     _add_copies(faults, table, set_values, outputs)
@@ -93,7 +97,7 @@ def _read(table: pd.DataFrame, model: Model, roles: Roles) -> tuple[FunctionMode
     }
     missing = table[list(outputs)].isna()
     runs = TableRuns(
-        outputs=tuple(outputs),
+        outputs=tuple(model.outputs),
         y=filled(_as_compared(good, model), condition),
         condition=condition,
         session=session,
@@ -122,7 +126,7 @@ def _read(table: pd.DataFrame, model: Model, roles: Roles) -> tuple[FunctionMode
 def _refuse_unknown(what: str, names: Iterable[str], table: pd.DataFrame) -> None:
     for name in names:
         if name not in table:
-            raise InputError(f"the table has no column {name!r} ({what}); it has {', '.join(table)}")
+            raise InputError(f"the table has no column {name!r} ({what}); it has {', '.join(map(str, table))}")
 
 
 def _faults_of_outputs(table: pd.DataFrame, outputs: pd.DataFrame, model: Model) -> dict[int, Excluded]:
@@ -150,32 +154,40 @@ def _faults_of_outputs(table: pd.DataFrame, outputs: pd.DataFrame, model: Model)
     return faults
 
 
-def _settings(model: Model, columns: AskedColumns, outputs: pd.DataFrame, faults: Container[int]) -> list[str]:
-    """Find out for which columns the function asks, from rows without gaps in them, and return the settings."""
-    start = {p.name: p.start for p in model.parameters}
+def _settings(model: Model, columns: AskedColumns, table: pd.DataFrame, faults: dict[int, Excluded]) -> list[str]:
+    """Return the settings; default: the columns for which the function asks, found from rows that have them."""
     while True:
         before = len(columns.asked)
-        usable = np.array([row not in faults for row in range(len(outputs))])
-        for name in columns.asked:
-            usable &= ~is_missing(columns[name])
+        _add_missing(faults, columns, columns.asked, table)
+        usable = np.array([row not in faults for row in range(len(table))])
         if not usable.any():
-            break
+            raise InputError(f"the table has no usable row: {faults.get(0, 'it is empty')}")
         try:
-            evaluate(model, columns.rows(usable), start)
+            evaluate(model, columns.rows(usable), {p.name: p.start for p in model.parameters})
         except InputError:
-            if len(columns.asked) == before:
+            if len(columns.asked) == before:  # otherwise it may be due to what is missing
                 raise
         if len(columns.asked) == before:
             break
-    settings = list(columns.asked if model.settings is None else model.settings)
-    if not settings:
-        raise InputError("the function asks for no column; name the model's settings, columns that repeats share")
-    return sorted(settings, key=list(columns).index) if model.settings is None else settings
+    if model.settings or columns.asked:
+        return list(model.settings or [name for name in columns if name in columns.asked])
+    raise InputError("the function asks for no column; name the model's settings, columns that repeats share")
+
+
+def _add_missing(
+    faults: dict[int, Excluded], columns: AskedColumns, names: Iterable[str], table: pd.DataFrame
+) -> None:
+    """Add every row that lacks a value of a column."""
+    for name in names:
+        for row in np.flatnonzero(is_missing(columns[name])).tolist():
+            faults.setdefault(row, not_finite(table, row, name))
 
 
 def _as_numbers(values: Floats | Words) -> Floats:
     """Return a column as numbers, those of its words where it has words."""
-    return values if values.dtype.kind == "f" else np.unique(values, return_inverse=True)[1].astype(float)
+    return np.asarray(
+        values if values.dtype.kind == "f" else np.unique(values, return_inverse=True)[1], dtype=float
+    )
 
 
 def _add_copies(
@@ -209,8 +221,9 @@ def _follows(values: Floats | Words, outputs: pd.DataFrame, condition: Integers)
     """Tell whether a column goes with an output among repeats, as a time from which a speed was computed."""
     if values.dtype.kind != "f":
         return False
-    table = outputs.assign(**{"": values}).groupby(condition).transform(lambda repeats: repeats - repeats.mean())
-    return bool((table.corr()[""].drop("").abs() > _FOLLOWS).any())
+    ranks = outputs.assign(**{"": values}).groupby(condition).rank()
+    correlation = (ranks - ranks.groupby(condition).transform("mean")).corr()[""].drop("").abs()
+    return bool((correlation > _FOLLOWS).any()) and repeat_count(condition) >= FEWEST_REPEATS
 
 
 def _as_compared(outputs: pd.DataFrame, model: Model) -> pd.DataFrame:
@@ -242,7 +255,7 @@ def _held_out(given: str | Sequence[str] | None, column: Floats | Words | None, 
     if given is None:
         return None
     if column is not None:
-        held = column == 1 if column.dtype.kind == "f" else np.isin(np.char.lower(column), _TRUE)
+        held = np.array([str(value).lower() in _TRUE for value in column])
     else:
         wanted = [given] if isinstance(given, str) else list(map(str, given))
         known = [{name, name.rpartition(" ")[2]} for name in runs.session_names]

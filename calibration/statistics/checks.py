@@ -61,10 +61,8 @@ def _refuse_not_finite(what: str, runs: Runs, values: Floats, gaps: Flags) -> No
 
 def _refuse_logarithm(output: str, measured: Floats, predicted: Floats) -> None:
     """Refuse an output of which one is the logarithm and the other is not: only then do the two go together."""
-    for logarithm, other, words in (
-        (measured, predicted, "the measured values"),
-        (predicted, measured, "the model"),
-    ):
+    both = ((measured, predicted, "the measured values"), (predicted, measured, "the predictions"))
+    for logarithm, other, words in both:
         if (other > 0).all():
             left = (logarithm - np.log(other)).std()
             if left < _ALIKE * min(logarithm.std(), (measured - predicted).std()):

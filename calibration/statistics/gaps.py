@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from calibration.statistics.excluded import Excluded, listed
-from calibration.statistics.gls import repeat_covariance
-from calibration.statistics.statistical_model import Runs
+from calibration.statistics.gls import repeat_count, repeat_covariance
+from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs
 from common.arrays import Flags, Floats, Integers
 from common.tables import row_name
 
@@ -37,7 +37,7 @@ def with_outputs(data: Measured, kept: Sequence[int]) -> Measured:
     gaps = data.gaps[:, kept]
     names, completion = tuple(data.outputs[i] for i in kept), without_gaps(gaps)
     data = replace(data, outputs=names, y=data.y[:, kept], completion=completion if gaps.any() else None)
-    if gaps.any():
+    if gaps.any() and repeat_count(data.repeats()) >= FEWEST_REPEATS:
         run = repeat_covariance(data.y, data.repeats())
         for T, gap in zip(completion, gaps, strict=True):
             T[np.ix_(gap, ~gap)] = np.linalg.solve(run[np.ix_(~gap, ~gap)], run[np.ix_(~gap, gap)]).T

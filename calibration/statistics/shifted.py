@@ -10,7 +10,8 @@ on the parameter's own scale. The linear model of the model within is enough for
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -19,6 +20,7 @@ import numpy as np
 
 from calibration.statistics.statistical_model import Experiment, Parameter, Parameters, Predict, Runs, parameter
 from common.arrays import Flags, Floats
+from common.errors import InputError
 
 _LARGEST = 2.0  # change of a logarithm without a prior
 
@@ -71,7 +73,8 @@ class Shifted:
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
         """Predict (P, n, k), see `ForwardModel`."""
-        return self.inner.predict([self.of_runs(p) for p in sets], title=title)
+        with self._arrays_taken():
+            return self.inner.predict([self.of_runs(p) for p in sets], title=title)
 
     def linearised(
         self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
@@ -80,13 +83,28 @@ class Shifted:
         own, centre = {s.parameter.name: s.of.name for s in self.shifts}, self.of_runs(at)
         inner = [parameter(self.inner, name) for name in dict.fromkeys(own.get(p.name, p.name) for p in along)]
         beyond = {of.name: self._unbounded(at)[of.name] - centre[of.name] for of in self._differing}
-        predict = self.inner.linearised(centre, inner, title=title, quick=quick)
+        with self._arrays_taken():
+            predict = self.inner.linearised(centre, inner, title=title, quick=quick)
 
         def within(parameters: Parameters) -> dict[str, Any]:
             free = self._unbounded(parameters)
             return {**free, **{name: free[name] - excess for name, excess in beyond.items()}}
 
         return lambda sets: predict([within(parameters) for parameters in sets])
+
+    @contextmanager
+    def _arrays_taken(self) -> Iterator[None]:
+        """Say so where the model within fails because parameters are arrays."""
+        try:
+            yield
+        except (TypeError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            names = ", ".join(of.name for of in self._differing)
+            raise InputError(
+                f"the model fails where {names} differs between runs: its predict must take one value for each "
+                f"run, an array (n,), in place of a number ({type(error).__name__}: {error})"
+            ) from error
 
     def of_runs(self, parameters: Parameters) -> dict[str, Any]:
         """Return the parameters of the model within, with what shifts for every run, (n,)."""

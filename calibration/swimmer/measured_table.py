@@ -11,9 +11,9 @@ so; without these the noise is unknown. `session` names the group of runs that w
 runs of one N are one session. `robot` names the specimen, where the table has several. Some effects need
 elapsed_min, temperature_C, tank_diameter_cm or course_deg (direction of the path in the lab, where a run is part
 of a circle). Rows that cannot be used are excluded with number and reason, and so are copies of rows
-(`calibration.statistics.copies`), and rows that lack a note which nearly all others have. A row that lacks some outputs counts
-with the others (`calibration.statistics.gaps`). Columns without any value are left out, notes that many rows lack,
-and columns of other names, unless the name looks like a misspelt one.
+(`calibration.statistics.copies`), and rows that lack a note which nearly all others have. A row that lacks some
+outputs counts with the others (`calibration.statistics.gaps`). Columns without any value are left out, notes that
+many rows lack, and columns of other names, unless the name looks like a misspelt one.
 
 Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians. A
 row with a wrong sign is a bad row, because the direction of the motor determines all signs

@@ -18,18 +18,18 @@ from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import facts, verdict_record
 from calibration.verdict.verdict import Verdict
 from calibration.words.render import next_steps
-from common.errors import InputError
-from tests.oracles.balls import AIR, GRAVITY, main, read_balls
-from tests.oracles.falling_balls import DRAGS, NULLS, OUTSIDE, falls
+from softflagella.__main__ import main
+from tests.oracles.falling_balls import AIR, DRAGS, GRAVITY, NULLS, OUTSIDE, balls, falls
 from tests.shared import shared
 
-MEASURED = Path(__file__).parents[4] / "shared/measured/published/falling_balls.csv"
+MODELS = Path(__file__).parents[2] / "docs/models"
+MEASURED = Path(__file__).parents[3] / "shared/measured/published/falling_balls.csv"
 
 
 @shared
 def verdict(truth: str, seed: int, *, without: tuple[str, ...] = ()) -> Verdict:
     """The verdict on a table with a hidden truth."""
-    return calibrate(read_balls(falls(truth, seed), without), draws=200, progress=False)
+    return calibrate(balls(falls(truth, seed), without), draws=200, progress=False)
 
 
 def differing(seed: int = 3) -> Verdict:
@@ -40,21 +40,23 @@ def differing(seed: int = 3) -> Verdict:
     ("effect", "size"), [("linear_drag", 0.4), ("linear_drag", 1e-4), ("quadratic_drag", 0.45)]
 )
 def test_speeds_are_those_of_the_equation_of_motion(effect: str, size: float) -> None:
-    model = read_balls(falls("nothing", 0))
-    row = int(np.argmax(model.depth))
-    c = size * AIR * model.area[row] / 2 if effect == "quadratic_drag" else 0.0
+    model = balls(falls("nothing", 0))
+    depth = model.columns["depth_m"]
+    row = int(np.argmax(depth))
+    area = np.pi * model.columns["radius_m"][row] ** 2 / model.columns["mass_kg"][row]
+    c = size * AIR * area / 2 if effect == "quadratic_drag" else 0.0
     k = size if effect == "linear_drag" else 0.0
     fall = solve_ivp(
         lambda _, y: (y[1], GRAVITY - k * y[1] - c * y[1] ** 2), (0, 20), (0, 0),
-        events=lambda _, y: y[0] - model.depth[row], rtol=1e-10, atol=1e-10,
+        events=lambda _, y: y[0] - depth[row], rtol=1e-10, atol=1e-10,
     )  # fmt: skip
-    speed = model.speed({**start_values(model), effect: size})[row]
+    speed = np.exp(model.predict([{**start_values(model), effect: size}])[0, row, 0])
     assert speed == pytest.approx(fall.y_events[0][0][1], rel=1e-6)
 
 
 @pytest.mark.parametrize("effect", ["linear_drag", "release"])
 def test_a_varying_size_has_the_derivatives_of_differences(effect: str) -> None:
-    model = read_balls(falls("nothing", 0))
+    model = balls(falls("nothing", 0))
     differing = varying(model, next(e for e in model.effects if e.name == effect), 0.5)
     departures = {s.parameter.name: 0.1 * (i - 4) for i, s in enumerate(differing.shifts)}
     at = {**start_values(model), effect: 0.3, **departures}
@@ -66,7 +68,7 @@ def test_a_varying_size_has_the_derivatives_of_differences(effect: str) -> None:
 
 
 def test_a_size_at_its_bound_has_a_derivative() -> None:
-    model = read_balls(falls("nothing", 0))
+    model = balls(falls("nothing", 0))
     drag = next(e for e in model.effects if e.name == "quadratic_drag")
     differing = Shifted(model, (Shift(drag, np.arange(len(model.runs)) < 80, "here"),))
     at = {**start_values(differing), drag.name: drag.bounds[0]}
@@ -102,7 +104,8 @@ def hidden_normals(seed: int) -> np.ndarray:
 def test_its_error_before_and_after_stands_in_sentence_record_and_report(tmp_path: Path) -> None:
     table = tmp_path / "falls.csv"
     falls("linear drag, differs", 3).to_csv(table, index=False)
-    main(str(table), out=str(tmp_path / "out"))
+    words = ["calibrate", str(table), "--model", str(MODELS / "balls.py"), "--session", "drop"]
+    main([*words, "--specimen", "ball", "--out", str(tmp_path / "out")])
     record = json.loads((tmp_path / "out" / "verdict.json").read_text())
     page = (tmp_path / "out" / "report.html").read_text()
     before, after = (f"{100 * record[f'error_{name}']:.2f} %" for name in ("before", "after"))
@@ -118,7 +121,7 @@ def test_its_error_before_and_after_stands_in_sentence_record_and_report(tmp_pat
 
 
 def test_a_form_that_the_held_out_runs_refute_is_withdrawn() -> None:
-    model = read_balls(falls("linear drag, differs", 3))
+    model = balls(falls("linear drag, differs", 3))
     test = differing().split.test
     ruined = replace(model, runs=replace(model.runs, y=np.where(test[:, None], model.runs.y + 0.9, model.runs.y)))
     result = calibrate(ruined, draws=200, progress=False)
@@ -160,30 +163,7 @@ def test_adoptions_are_right_or_rare(truth: str) -> None:
 @pytest.mark.parametrize("without", [(), ("quadratic_drag",)])
 def test_of_real_balls_drag_is_adopted(without: tuple[str, ...]) -> None:
     """Falls from a bridge (de Silva, Higdon, Brunton, Kutz 2020)."""
-    result = calibrate(read_balls(MEASURED, without), progress=False)
+    result = calibrate(balls(MEASURED, without), progress=False)
     assert result.verdict == "partial"
     assert result.error_before > 0.2
     assert result.error_after < 0.06
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (lambda t: t.drop(columns="mass_kg"), "no column 'mass_kg'"),
-        (lambda t: t[t["drop"] == 1], "10 balls in 1 drops"),
-        (lambda t: t[t["ball"] == "ball 0"], "1 balls in 2 drops"),
-    ],
-)
-def test_tables_that_cannot_be_used_are_refused(change, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        read_balls(change(falls("nothing", 0)))
-
-
-def test_a_row_with_a_gap_is_left_out_by_its_number_and_an_effect_that_is_not_there_refused() -> None:
-    table = falls("nothing", 0)
-    with pytest.raises(InputError, match="no effect 'drag'"):
-        read_balls(table, ["drag"])
-    table.loc[4, "speed_m_s"] = np.nan
-    runs = read_balls(table).runs
-    assert tuple(map(str, runs.excluded)) == ("row 5: a number is missing or not above 0",)
-    assert 5 not in runs.rows

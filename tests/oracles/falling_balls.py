@@ -1,13 +1,22 @@
-"""Tables of falling balls, integrated over the depth, each with a hidden truth."""
+"""Falls of balls and of beads for the models of docs/models: tables with a hidden truth, and their reader."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from tests.oracles.balls import AIR, COLUMNS, GRAVITY
+from calibration.own_model.function_model import FunctionModel
+from calibration.own_model.table_of_runs import Roles, read_runs_of
+
+BALLS_MODEL: Any = import_module("docs.models.balls")
+SPHERES_MODEL: Any = import_module("docs.models.spheres")
+GRAVITY, AIR = 9.81, 1.19  # m/s², kg/m³
+COLUMNS = ["ball", "drop", "mass_kg", "radius_m", "depth_m", "speed_m_s"]
 
 BALLS, DROPS, DEPTHS, NOISE, STEPS = 10, 2, 8, 0.06, 600
 NULLS = ("nothing", "shifts of whole drops, 5 %")
@@ -52,4 +61,18 @@ def falls(truth: str, seed: int) -> pd.DataFrame:
                 (f"ball {ball}", drop + 1, mass[ball], radius[ball], h, speed)
                 for h, speed in zip(depths.tolist(), v.tolist(), strict=True)
             ]
-    return pd.DataFrame(rows, columns=list(COLUMNS))
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def balls(table: str | Path | pd.DataFrame, without: Sequence[str] = ()) -> FunctionModel:
+    """Make the model of falling balls with its runs, without the effects that are withheld."""
+    frame = pd.read_csv(table, comment="#") if isinstance(table, str | Path) else table
+    roles = Roles(session="drop", specimen="ball")
+    return read_runs_of(BALLS_MODEL.at_marks(frame), BALLS_MODEL.MODEL.without(*without), roles)[0]
+
+
+def spheres(table: str | Path | pd.DataFrame, name: str = "") -> FunctionModel:
+    """Make the model of beads with its runs, or with those of one set of a table."""
+    frame = pd.read_csv(table, comment="#") if isinstance(table, str | Path) else table
+    part = frame[frame["set"] == name] if name else frame
+    return read_runs_of(part, SPHERES_MODEL.MODEL, Roles(session="trial", specimen="bead"))[0]

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from calibration.report.corrected_robot import calibration_knowledge, corrected_robot, corrected_toml, handed_on
 from calibration.report.report import write_report
-from calibration.report.robot_verdict import FILES, RobotVerdict
+from calibration.report.robot_verdict import RobotVerdict
 from calibration.statistics.fit import Pull
 from calibration.swimmer.influences import CURRENT, nuisance_parameters
 from calibration.swimmer.synthetic_table import make_table
@@ -79,7 +79,7 @@ def test_a_verdict_has_the_corrected_robot_and_writes_its_files_and_errors(tmp_p
     assert verdict.corrected == handed_on(START, verdict.final_refit)[0]
     assert verdict.corrected.effects[DRAG] == pytest.approx(5.0, rel=0.3)
     paths = verdict.save(tmp_path / "calibrated")
-    assert [path.name for path in paths] == list(FILES)
+    assert [path.name for path in paths] == ["verdict.json", "report.html", "corrected.toml"]
     assert load_robot(paths[2]) == verdict.corrected
     assert read_knowledge(paths[2]).names == verdict.knowledge.names
     assert json.loads(paths[0].read_text())["effects"] == [DRAG]

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.own_model.function_model import FunctionModel
 from calibration.report.report import write_report
 from calibration.statistics.gls import repeat_covariance
 from calibration.swimmer.measured_table import read_measurements
@@ -23,7 +24,7 @@ from sim.inputs import load_robot
 from sim.model.uncertainty import DEFAULTS, Sigma
 from softflagella.__main__ import main
 from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, FEW_DRAWS, START, install_few_candidates
-from tests.oracles.spheres import median_error, read_spheres
+from tests.oracles.falling_balls import spheres
 from tests.reference.make import GIVEN, HERE, TABLES
 
 
@@ -131,17 +132,24 @@ def test_measured_tables_are_read_whole(name: str) -> None:
     assert ((spread > 0.01) & (spread < 0.05)).all()
 
 
+def median_error(model: FunctionModel, verdict: Verdict, effects: dict[str, float]) -> float:
+    """The relative rms of the beads' median speeds, the viscosity fitted to them, with given `effects`."""
+    residual = (model.runs.y - model.predict([{**verdict.base.parameters, **effects}])[0])[:, 0]
+    medians = np.array([np.median(residual[model.runs.condition == c]) for c in np.unique(model.runs.condition)])
+    return float(medians.std())
+
+
 @measured
 def test_spheres_in_glycerine_need_the_wall() -> None:
     """5.1 % to 1.3 %; inertia does as well, so the verdict names both. One bead of ZK2026 is odd."""
     source = MEASURED / "published" / "falling_sphere_glycerine.csv"
-    model = read_spheres(source, "KW2023")
+    model = spheres(source, "KW2023")
     result = calibrate(model, progress=False)
     assert set(result.effects) >= {"wall"}
     assert result.verdict == "ambiguous"
     assert median_error(model, result, {}) == pytest.approx(0.051, abs=0.002)
     assert median_error(model, result, {"wall": 1.0}) == pytest.approx(0.0135, abs=0.002)
-    assert calibrate(read_spheres(source, "ZK2026"), progress=False).verdict == "unexplained"
+    assert calibrate(spheres(source, "ZK2026"), progress=False).verdict == "unexplained"
 
 
 @measured

@@ -1,0 +1,202 @@
+"""Faults of a model or of its table: each is one line that names it, before anything is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import softflagella as sf
+from calibration.statistics.forward import secants
+from calibration.statistics.statistical_model import Parameter, Runs
+from calibration.verdict.calibrate import calibrate
+from common.errors import InputError
+
+DIAMETERS, ROUNDS = np.linspace(0.02, 0.12, 9), 5
+rng = np.random.default_rng(2)
+DIAMETER, ROUND = np.tile(DIAMETERS, ROUNDS), np.repeat(np.arange(ROUNDS), 9)
+TABLE = pd.DataFrame({"d": DIAMETER, "round": ROUND + 1, "day": "Monday"})
+TABLE["v"] = 300 * DIAMETER**2 / (1 + 2.1 * DIAMETER) * np.exp(0.02 * rng.standard_normal(45))
+
+
+def fall(columns: Any, p: Any) -> Any:
+    d = columns["d"]
+    return {"v": p["v1"] * d**2 / (1 + 2.1 * p["wall"] * d)}
+
+
+MODEL = sf.Model(
+    fall,
+    outputs={"v": sf.Output("speed", "m/s")},
+    numbers=[sf.Number("v1", 100.0, "1/m s", low=0.1, high=1e5)],
+    effects=[sf.Effect("wall", "wall", low=0, high=4, theory=1.0)],
+)
+
+
+def said(model: sf.Model, table: pd.DataFrame = TABLE, **options: Any) -> str:
+    """What is said of a model; nothing is fitted."""
+    with pytest.raises(InputError) as refusal:
+        sf.calibrate(table, model, session="round", progress=False, **options)
+    message = str(refusal.value)
+    assert "\n" not in message
+    return message
+
+
+def of(value: Callable[[Any, Any], Any]) -> sf.Model:
+    """The model with another function for its output."""
+    return replace(MODEL, function=lambda columns, p: {"v": value(fall(columns, p)["v"], p)})
+
+
+def test_as_it_should_be_the_wall_is_named() -> None:
+    result = sf.calibrate(TABLE, MODEL, session="round", progress=False)
+    assert result.effects == ("wall",)
+    assert result.corrected["wall"] == pytest.approx(1.0, abs=0.35)
+    assert result.corrected["v1"] == pytest.approx(300, rel=0.05)
+    assert result.runs.session_names == tuple(f"round {i}" for i in range(1, 6))
+
+
+@pytest.mark.parametrize(
+    ("model", "words"),
+    [
+        (replace(MODEL, function=lambda c, p: {"w": c["d"]}), "returns no output 'v'; it has w"),
+        (replace(MODEL, function=lambda c, p: c["d"]), "returns ndarray; return {output: array (n,)}"),
+        (of(lambda v, p: v[:5]), "'v' of shape (5,) for 45 rows"),
+        (of(lambda v, p: v[None]), "'v' of shape (1, 45) for 45 rows"),
+        (of(lambda v, p: ["fast"] * len(v)), "'v' that is no array of numbers"),
+        (of(lambda v, p: np.where(np.arange(len(v)) == 3, np.nan, v)), "v is nan in row 4"),
+        (of(lambda v, p: v - 0.1), "v is not above 0 in row 1; return finite numbers, above 0"),
+        (of(lambda v, p: v * p["wall"]), "wall (wall) does not vanish at its null, 0: there v is not above 0"),
+        (of(lambda v, p: v / p["wall"]), "wall (wall) does not vanish at its null, 0: there v is inf in row 1"),
+        (replace(MODEL, function=lambda c, p: {"v": p["v1"] * c["d"] ** 2}), "wall (wall) changes nothing"),
+        (replace(MODEL, function=lambda c, p: {"v": c["d"] ** 2 / (1 + p["wall"] * c["d"])}), "v1 (v1) changes"),
+        (of(lambda v, p: 1e4 * v), "v is 0.000"),
+        (of(lambda v, p: float("fast")), "ValueError, could not convert string to float: 'fast' ("),
+        (of(lambda v, p: v * p["odd"]), "fails with v1 = 100, wall = 0: KeyError, 'odd' ("),
+        (
+            replace(MODEL, function=lambda c, p: {"v": c["diameter"]}),
+            "asks for column 'diameter'; the table has d,",
+        ),
+        (replace(MODEL, settings=["diameter"]), "no column 'diameter' (setting); it has d, round, day, v"),
+        (replace(MODEL, outputs={"w": sf.Output("speed")}), "no column 'w' (output)"),
+    ],
+)
+def test_a_fault_of_a_model_is_named(model: sf.Model, words: str) -> None:
+    assert words in said(model)
+
+
+def test_a_model_without_sense_cannot_be_declared() -> None:
+    for make, words in {
+        lambda: replace(MODEL, effects=[*MODEL.effects, *MODEL.effects]): "the name 'wall'; rename or drop one",
+        lambda: replace(MODEL, outputs={}): "outputs of a model",
+        lambda: replace(MODEL, numbers=["v1"]): "numbers of a model are each an sf.Number",
+        lambda: sf.Number("v1", 5.0, low=10, high=20): "start 5 with low 10 and high 20",
+        lambda: sf.Effect("wall", "wall", low=1, high=2): "null 0 with low 1 and high 2",
+        lambda: sf.Output("speed", sigma=-1.0): "sigma -1",
+        lambda: sf.Output("speed", kind="share"): "'ratio' or 'difference'",
+        lambda: MODEL.without("wind"): "no effect 'wind'; it has wall",
+    }.items():
+        with pytest.raises(InputError) as refusal:
+            make()
+        assert words in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "words"), [("1", 100.0, "seems to have per cent"), ("rad", 180 / np.pi, "to have degrees")]
+)
+@pytest.mark.parametrize("kind", ["ratio", "difference"])
+def test_another_unit_is_guessed(unit: str, factor: float, words: str, kind: Any) -> None:
+    model = replace(MODEL, outputs={"v": sf.Output("angle", unit, kind)}, numbers=[sf.Number("v1", 300.0)])
+    assert words in said(model, TABLE.assign(v=factor * TABLE["v"]))
+
+
+def test_a_fault_of_a_table_is_named() -> None:
+    some_low = TABLE.assign(v=TABLE["v"] - TABLE["v"].median())
+    assert "v is not above 0 in 23 of 45 rows, first in row 1" in said(MODEL, some_low)
+    assert "no usable row: row 1: no output has a value" in said(MODEL, TABLE.assign(v=np.nan))
+    assert "no usable row: row 1: d has no value" in said(MODEL, TABLE.assign(d=np.nan))
+    assert "two columns 'd'" in said(MODEL, pd.concat([TABLE, TABLE[["d"]]], axis=1))
+    assert "no session and no column; there are round 1, round 2" in said(MODEL, held_out=["round 9"])
+    assert "45 of 45 runs are held out" in said(MODEL, TABLE.assign(test=True), held_out="test")
+    assert "noise of 'w': 1" in said(MODEL, noise={"w": 1.0})
+    assert "give 'unknown'" in said(MODEL, noise="large")
+    assert "2 usable rows for 2 numbers" in said(
+        replace(MODEL, numbers=[*MODEL.numbers, sf.Number("power", 2.0)]), TABLE[:2]
+    )
+
+
+def test_what_is_for_robots_is_refused_for_a_model_and_the_other_way_round() -> None:
+    assert "own, laws, paths is not for a model" in said(MODEL, own=("N=2",), laws=False, paths=("square:3l",))
+    with pytest.raises(InputError, match="session, noise is not for a robot"):
+        sf.calibrate(TABLE, "paper-control", session="round", noise="unknown")
+
+
+@dataclass(frozen=True)
+class HandMade:
+    """A model of falls that is made by hand, y = ln v."""
+
+    runs: Runs
+    coefficients: tuple[Parameter, ...] = (Parameter("v1", "v1", 100.0, (0.1, 1e5), 1.0, logarithmic=True),)
+    effects: tuple[Parameter, ...] = (Parameter("wall", "wall", 0.0, (0.0, 4.0), 1.0),)
+    nuisances: tuple[Parameter, ...] = ()
+    untestable: dict[str, str] = field(default_factory=dict)
+    change: Callable[[Any, Any], Any] = lambda y, p: y
+
+    def predict(self, sets: Sequence[Any], *, title: str = "") -> Any:
+        falls = [np.log(fall({"d": DIAMETER}, {"wall": 0.0, **p})["v"])[:, None] for p in sets]
+        return self.change(np.array(falls), sets)
+
+    def linearised(self, at: Any, along: Any, *, title: str = "", quick: bool = False) -> Any:
+        return secants(self, at, along)
+
+    def check(self, prediction: Any) -> None: ...
+
+    def guess(self, start: Any, used: Any) -> Any:
+        return start
+
+    def possible(self) -> Any:
+        return self, [{"d": d} for d in DIAMETER.tolist()]
+
+
+def hand_made(**changes: Any) -> HandMade:
+    y, names = np.log(TABLE["v"].to_numpy())[:, None], tuple(f"round {k + 1}" for k in range(ROUNDS))
+    condition, inputs = np.tile(np.arange(9), ROUNDS), np.log(DIAMETER)[:, None]
+    runs = Runs(("v",), y, condition, ROUND, names, inputs, ("ln d",), np.arange(1, 46), (), ())
+    of_runs = {name: changes.pop(name) for name in ("y", "session") if name in changes}
+    return HandMade(replace(runs, **of_runs), **changes)
+
+
+def numbers_only(y: Any, sets: Any) -> Any:
+    return y + 10 * DIAMETER[:, None] * np.log([float(p["odd"]) for p in sets])[:, None, None]
+
+
+HOLE = np.where(np.arange(45) == 7, np.nan, np.log(TABLE["v"]))[:, None]
+ROUND_3_DIFFERS = np.log(TABLE["v"].to_numpy() * np.exp(3 * np.where(ROUND == 2, DIAMETER, 0)))[:, None]
+ODD = Parameter(
+    "odd", "a number that may differ", 1.0, (0.1, 10.0), 1.0, logarithmic=True, sigma=0.02, plausible=(0.5, 2.0)
+)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"y": HOLE}, "v as measured is nan in row 8"),
+        ({"change": lambda y, _: np.where(np.arange(45)[:, None] == 3, np.nan, y)}, "given is nan in row 4"),
+        ({"change": lambda y, _: np.exp(y)}, "the measured values seem to be logarithms, and the others not"),
+        ({"y": TABLE["v"].to_numpy()[:, None]}, "the predictions seem to be logarithms"),
+        ({"change": lambda y, _: y[:, :, 0]}, "has the shape (1, 45); return (1, 45, 1): sets, runs, outputs"),
+        ({"session": 10 * ROUND + 5}, "a run is in session 5; number the 5 sessions from 0 to 4"),
+        ({"effects": 2 * HandMade.effects}, "the name 'wall'; rename or drop one"),
+        ({"nuisances": (ODD,), "change": numbers_only, "y": ROUND_3_DIFFERS}, "fails where odd differs between"),
+    ],
+)
+def test_a_fault_of_a_hand_made_model_is_named(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError) as refusal:
+        calibrate(hand_made(**changes), progress=False, draws=200)
+    assert words in str(refusal.value)
+
+
+def test_as_it_should_be_a_hand_made_model_is_calibrated() -> None:
+    assert calibrate(hand_made(), progress=False, draws=200).effects == ("wall",)

@@ -1,0 +1,200 @@
+"""A model of one's own: its table, from any file; the command; and what is saved."""
+
+from __future__ import annotations
+
+import json
+import runpy
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import softflagella as sf
+from calibration.own_model.table_of_runs import Roles, read_runs_of
+from calibration.verdict.calibrate import calibrate
+from common.errors import run_command
+from softflagella.__main__ import main
+from tests.calibration.own_model.test_faults import MODEL, TABLE, fall
+
+REAL = Path(__file__).parents[4] / "shared/measured/real"
+NAMES = {"rho_ball_kg_m3": "rho_ball", "rho_fluid_kg_m3": "rho_oil"}
+measured = pytest.mark.skipif(not REAL.exists(), reason="measured tables are not here")
+
+
+def runs_of(table: Any, model: sf.Model = MODEL, **roles: Any) -> Any:
+    return read_runs_of(table, model, Roles(**({"session": "round"} | roles)))[0].runs
+
+
+def test_tables_are_read_as_all_tables_are(tmp_path: Path) -> None:
+    """Decimal commas, a spreadsheet, lines of comments: the same runs."""
+    TABLE.to_excel(tmp_path / "falls.xlsx", index=False)
+    text = TABLE.to_csv(index=False, sep=";", decimal=",")
+    (tmp_path / "falls.csv").write_text(f"# falls\n{text}")
+    expected = runs_of(TABLE)
+    for name in ("falls.xlsx", "falls.csv"):
+        runs = runs_of(tmp_path / name)
+        np.testing.assert_allclose(runs.y, expected.y)
+        assert runs.session_names == expected.session_names
+    assert runs.row_name(0) == "row 1 (line 3)"
+    assert expected.input_names == ("ln d",)
+    assert expected.settings["d"][0] == pytest.approx(TABLE["d"])
+
+
+def test_rows_that_lack_what_is_needed_are_excluded_and_said() -> None:
+    table = TABLE.astype({"d": object, "round": object, "v": object})
+    table.loc[3, "d"], table.loc[5, "v"], table.loc[7, "round"], table.loc[9, "v"] = "wide", None, None, -1.0
+    assert [str(each) for each in runs_of(table).excluded] == [
+        "row 4: d = wide is not a finite number",
+        "row 6: no output has a value",
+        "row 8: round has no value",
+        "row 10: v = -1 is not above 0",
+    ]
+
+
+def test_an_output_that_is_missing_in_some_rows_is_a_gap() -> None:
+    def both(columns: Any, p: Any) -> Any:
+        v = fall(columns, p)["v"]
+        return {"v": v, "tilt": 0.1 * v}
+
+    outputs = {"v": sf.Output("speed", "m/s"), "tilt": sf.Output("tilt", "rad", "difference")}
+    model, noise = replace(MODEL, function=both, outputs=outputs), np.random.default_rng(5).normal(size=45)
+    table = TABLE.assign(tilt=0.1 * TABLE["v"] + 0.01 * noise)
+    table.loc[[4, 30], "tilt"] = np.nan
+    runs = runs_of(table, model)
+    assert runs.gaps.sum() == 2
+    assert [str(each) for each in runs.excluded] == [
+        "column tilt: no value in row 5, row 31; the other outputs there count"
+    ]
+    result = sf.calibrate(table, model, session="round", progress=False)
+    assert result.effects == ("wall",)
+    record = result.to_dict()
+    assert record["output_titles"] == {"v": "speed", "tilt": "tilt"}
+    assert record["output_scales"] == {"v": [100.0, "%"], "tilt": [1.0, "rad"]}
+
+
+def test_each_column_has_its_role() -> None:
+    table = TABLE.assign(
+        ball=[f"d{d:g}" for d in TABLE["d"]], operator=["A", "B", "A"] * 15, bath_C=20.0, time_s=1 / TABLE["v"],
+        test=TABLE["round"] > 4,
+    )  # fmt: skip
+    model, held_out = read_runs_of(table, MODEL, Roles(session="round", specimen="ball", held_out="test"))
+    assert set(model.runs.notes) == {"day", "operator", "bath_C"}  # time_s follows from v
+    assert model.runs.specimen_names[0] == "d0.02"
+    np.testing.assert_array_equal(held_out, table["round"] > 4)
+    part = model.runs.subset(table["round"].to_numpy() == 2)
+    assert len(part.notes["operator"]) == len(part) == 9
+    assert list(runs_of(table, notes=["operator"]).notes) == ["operator"]
+    by_name = read_runs_of(table, MODEL, Roles(session="round", held_out=["2", "round 4"]))[1]
+    np.testing.assert_array_equal(by_name, table["round"].isin([2, 4]))
+    assert (runs_of(table).sigma, runs_of(table).noise_known) == (None, True)
+    assert runs_of(table, noise={"v": 0.03}).sigma == pytest.approx([0.03])
+    assert not runs_of(table, noise="unknown").noise_known
+    declared = replace(MODEL, outputs={"v": sf.Output("speed", "m/s", sigma=0.02)})
+    assert runs_of(table, declared).subset(np.arange(5)).sigma == pytest.approx([0.02])
+
+
+def test_the_function_gets_one_number_where_a_parameter_differs_between_runs() -> None:
+    seen = []
+
+    def strict(columns: Any, p: Any) -> Any:
+        seen.append((len(columns["d"]), {type(value) for value in p.values()}))
+        return fall(columns, p)
+
+    model = read_runs_of(TABLE, replace(MODEL, function=strict), Roles(session="round"))[0]
+    seen.clear()
+    speeds = np.where(TABLE["round"] == 2, 330.0, 300.0)
+    prediction = model.predict([{"v1": speeds, "wall": 1.0}])[0, :, 0]
+    assert seen == [(36, {float}), (9, {float})]
+    np.testing.assert_allclose(np.exp(prediction), fall(TABLE, {"v1": speeds, "wall": 1.0})["v"])
+
+
+def test_the_next_runs_are_named_by_the_columns_of_the_table() -> None:
+    model = read_runs_of(TABLE, MODEL, Roles(session="round"))[0]
+    others, settings = model.possible()
+    assert settings == [{"d": d} for d in TABLE["d"][:9]]
+    assert len(others.runs) == 9
+
+
+def test_a_model_is_saved_with_its_numbers(tmp_path: Path) -> None:
+    result = sf.calibrate(TABLE, MODEL, session="round", progress=False)
+    assert [path.name for path in result.save(tmp_path)] == ["verdict.json", "report.html", "corrected.json"]
+    saved = json.loads((tmp_path / "corrected.json").read_text())
+    assert saved["numbers"]["v1"]["value"] == result.corrected["v1"]
+    low, high = saved["effects"]["wall"]["interval"]
+    assert low < result.corrected["wall"] < high
+    assert saved["covariance"]["names"] == ["v1", "wall"]
+    assert np.linalg.eigvalsh(saved["covariance"]["on_their_scales"]).min() > 0
+    page = (tmp_path / "report.html").read_text()
+    assert "softflagella plan" not in page
+    assert not json.loads((tmp_path / "verdict.json").read_text())["hands_on_a_robot"]
+    assert "wall" in repr(result)
+    assert "<svg" in page
+
+
+def test_the_example_runs_from_the_command_to_the_report(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run_command(main, ["model"]) == 0
+    next_command = capsys.readouterr().out.splitlines()[-1]
+    runpy.run_path("falls.py", run_name="__main__")
+    assert run_command(main, next_command.split()[1:]) == 0
+    assert "wall of the tube" in capsys.readouterr().out
+    assert json.loads(Path("falls/corrected.json").read_text())["effects"]["wall"]["value"] == pytest.approx(
+        1, abs=0.1
+    )
+    assert json.loads(Path("falls/verdict.json").read_text())["table"] == "falls.csv"
+    assert run_command(main, ["model"]) == 2
+    assert "is there already" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("MODEL = 1\n", "model.py defines no MODEL"),
+        ("import numpy\n\nMODEL = (\n", "model.py, line 3: '(' was never closed"),
+        ("x = 1\ny = x / 0\n", "model.py, line 2: ZeroDivisionError: division by zero"),
+        ("import sys\nsys.exit(3)\n", "model.py, line 2: SystemExit: 3"),
+        ("import no_such_package\n", "model.py, line 1: ModuleNotFoundError"),
+        ("from TEST import MODEL\ndef read(path):\n    return 3\n", "returns int; return a DataFrame"),
+        ("from TEST import MODEL\ndef read(path):\n    return path.no\n", "model.py, line 3: AttributeError"),
+        (
+            "from TEST import MODEL\ndef read(path):\n    raise ValueError('old file')\n",
+            "line 3: ValueError: old file",
+        ),
+    ],
+)
+def test_a_fault_of_a_file_is_one_line(
+    text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, table = tmp_path / "model.py", tmp_path / "falls.csv"
+    file.write_text(text.replace("TEST", "tests.calibration.own_model.test_faults"))
+    TABLE.to_csv(table, index=False)
+    assert run_command(main, ["calibrate", str(table), "--model", str(file), "--out", str(tmp_path / "out")]) == 2
+    line = capsys.readouterr().err
+    assert words in line
+    assert line.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_either_a_robot_or_a_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for given in ([], ["--robot", "paper-control", "--model", "falls.py"]):
+        assert run_command(main, ["calibrate", "falls.csv", *given, "--out", str(tmp_path)]) == 2
+        assert "give --robot, or, for a table, --model" in capsys.readouterr().err
+
+
+@measured
+def test_the_viscosity_is_that_of_the_capillary() -> None:
+    """0.1946 Pa s in the same session, within the spread of the forms that the balls cannot tell apart."""
+    model = runpy.run_path(str(Path(__file__).parents[3] / "calibration/own_model/falls.txt"))["MODEL"]
+    table = pd.read_csv(REAL / "falls_heidelberg-2019.csv").rename(
+        columns=lambda name: name.removesuffix("_kg_m3")
+    )
+    table = table.rename(columns={"rho_fluid": "rho_oil"}).assign(v=table["distance_mm"] / 1e3 / table["time_s"])
+    experiment = read_runs_of(table, model, Roles(session="repeat", specimen="ball"))[0]
+    result = calibrate(experiment, progress=False)
+    assert result.error_after < 0.3 * result.error_before
+    assert result.final.parameters["viscosity"] == pytest.approx(0.1946, rel=0.05)
