@@ -60,7 +60,6 @@ class Parameter:
         float, ...
     ] = ()  # of a second number: values at which the effect is looked for. Of a number: changes
     # from which one is fitted that differs in some runs
-    theory: float | None = None  # size of an effect that theory gives
 
     def changed(self, value: Any, by: Any) -> Any:
         """Change a value by `by`, on the parameter's own scale."""
