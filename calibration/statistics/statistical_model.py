@@ -60,6 +60,7 @@ class Parameter:
         float, ...
     ] = ()  # of a second number: values at which the effect is looked for. Of a number: changes
     # from which one is fitted that differs in some runs
+    of_these_runs: bool = False  # no run that is made next has it
 
     def changed(self, value: Any, by: Any) -> Any:
         """Change a value by `by`, on the parameter's own scale."""
@@ -248,6 +249,11 @@ class Runs:
     def drawn(self) -> tuple[str, tuple[str, Integers, tuple[str, ...]]]:
         """What residuals are drawn against: a setting; and the kinds in colour: a name, (n,), and their names."""
         return next(iter(self.settings)), ("session", self.session, self.session_names)
+
+    @property
+    def identities(self) -> Mapping[str, Floats]:
+        """What is 1 for true columns, in words -> its logarithm in each run, (n,); NaN where it is unknown."""
+        return {}
 
     def subset(self, rows: Flags | Integers) -> Any:
         """Choose the runs in `rows`: flags (n,), or places."""

@@ -195,8 +195,9 @@ def _maximise(
 
 def with_runs(model: Model, runs: Runs) -> Model:
     """Return the same model of other runs, with other weights, say."""
-    changed = copy.copy(model)
-    object.__setattr__(changed, "runs", runs)
+    changed, inner = copy.copy(model), getattr(model, "inner", None)
+    name, value = ("inner", with_runs(inner, runs)) if inner else ("runs", runs)
+    object.__setattr__(changed, name, value)
     return changed
 
 

@@ -12,8 +12,9 @@ runs of one N are one session. `robot` names the specimen, where the table has s
 elapsed_min, temperature_C, tank_diameter_cm or course_deg (direction of the path in the lab, where a run is part
 of a circle). Rows that cannot be used are excluded with number and reason, and so are copies of rows
 (`calibration.statistics.copies`), and rows that lack a note which nearly all others have. A row that lacks some
-outputs counts with the others (`calibration.statistics.gaps`). Columns without any value are left out, notes that
-many rows lack, and columns of other names, unless the name looks like a misspelt one.
+outputs counts with the others (`calibration.statistics.gaps`). Columns without any value are left out, and notes
+that many rows lack. Columns of other names are tested as groupings (`calibration.statistics.between_repeats`) or left
+out; a name that looks like a misspelt one is refused.
 
 Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians. A
 row with a wrong sign is a bad row, because the direction of the motor determines all signs
@@ -37,6 +38,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from calibration.statistics.between_repeats import usable
 from calibration.statistics.copies import COPY, find_copies
 from calibration.statistics.excluded import Excluded
 from calibration.statistics.gaps import filled, gaps_in_words, not_finite, with_outputs, without_gaps
@@ -86,13 +88,26 @@ class Measurements(Runs):
     noted: Floats  # (n, c) what was noted and differs between the runs, by `noted_names`
     sigmas: Mapping[str, float]  # σ of camera scale, zero of the heading [rad] and tachometer, where stated
     noted_names: tuple[str, ...]  # elapsed_h, temperature_K (above the mean), tank_diameter, course_x, course_y
-    converted: tuple[str, ...]  # columns that were renamed or converted, in words
+    converted: tuple[str, ...]  # columns that were renamed, converted, or are tested as groupings, in words
 
     @property
     def noted_of_repeats(self) -> Floats:
         """Temperature and course."""
         kept = [i for i, name in enumerate(self.noted_names) if name in ("temperature_K", "course_x", "course_y")]
         return self.noted[:, kept]
+
+    @property
+    def identities(self) -> dict[str, Floats]:
+        """The tails turn relative to the head as the motor does; speed is radius times yaw rate."""
+        known = np.where(self.gaps, np.nan, self.y)
+        of = dict(zip(self.outputs, known.T, strict=True))
+        found = {}
+        if {"omega_h", "omega_t"} <= set(of):
+            relative = np.logaddexp(of["omega_t"], of["omega_h"]) - np.log(np.abs(self.omega))
+            found["(ω_t − ω_h)/ω"] = relative
+        if {"v", "R_yr", "omega_yr"} <= set(of):
+            found["v/(R ω_yr)"] = of["v"] - of["R_yr"] - of["omega_yr"]
+        return found
 
     @property
     def mirrored(self) -> tuple[Integers, Floats]:
@@ -155,6 +170,9 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
     factors = (1, to_si(1.0, "cm"), to_si(1.0, "rpm"))
     tails, length, omega = (good[c].to_numpy(dtype=float) * f for c, f in zip(RUN, factors, strict=True))
     noted = _noted(good)
+    notes = _notes(table.loc[keep, unknown])
+    tested = tuple(f"column {name}: not known, tested as a grouping" for name in notes)
+    unknown = [name for name in unknown if name not in notes]
     inputs = [tails, np.log(length), np.log(np.abs(omega)), np.sign(omega), *noted.values()]
     data = Measurements(
         outputs=outputs,
@@ -182,7 +200,8 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         noted_names=tuple(noted),
         output_titles=_TITLES,
         output_scales={"theta": (math.degrees(1.0), "°")},
-        converted=converted,
+        converted=(*converted, *tested),
+        notes=notes,
         lines=good.index.to_numpy() if good.index.name == LINE else None,
     )
     return _independent(data, sum(fault.reason == COPY for fault in aside))
@@ -341,6 +360,18 @@ def _noted(good: pd.DataFrame) -> dict[str, Floats]:
         value = np.radians(good["course_deg"].to_numpy(dtype=float))
         if np.ptp(value) > 0:
             notes["course_x"], notes["course_y"] = np.cos(value), np.sin(value)
+    return notes
+
+
+def _notes(unknown: pd.DataFrame) -> dict[str, Any]:
+    """Read the columns that no model knows and that can be tested: as numbers where all their values are such."""
+    notes: dict[str, Any] = {}
+    for name, column in unknown.items():
+        words = column.where(column.notna(), "").astype(str).str.strip()
+        numbers = numbers_of(column)
+        values = numbers if np.isfinite(numbers[words != ""]).all() else words
+        if usable(values.to_numpy()):
+            notes[str(name)] = values.to_numpy()
     return notes
 
 

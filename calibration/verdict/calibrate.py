@@ -1,6 +1,8 @@
 """The whole calibration: split, fit, test, attribute, refit, and open the held-out test once.
 
-1. Whole sessions are held out before anything is looked at (by default the middle one).
+0. Repeats are compared by what the model does not know, and columns with each other
+   (`calibration.statistics.between_repeats`). What differs becomes a number of every fit.
+1. Whole sessions are held out before any run is compared with the model (by default the middle one).
    Outliers are excluded (`calibration.statistics.study`).
 2. The coefficients and the nuisance parameters are fitted to the other sessions, with weights of the runs if
    some were tracked worse than others (`calibration.statistics.weights`), and the residual is tested.
@@ -55,6 +57,7 @@ from calibration.statistics.budget import Budget, limited, seconds_left
 from calibration.statistics.checks import predict_as_given
 from calibration.statistics.excluded import caveat_of_excluded
 from calibration.statistics.fit import Fit, fit, profile_intervals
+from calibration.statistics.offsets import Offsets, with_differences
 from calibration.statistics.residual_tests import directions, examine_residual
 from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values
 from calibration.statistics.study import (
@@ -118,6 +121,7 @@ def calibrate(
         progress: show progress bars.
     """
     began = time.process_time()
+    model, differences = with_differences(model, held_out, level=level, seed=seed)
     study, base, uncalibrated = first_fit(model, held_out, level=level, seed=seed, draws=draws, progress=progress)
     model, split = cast(Experiment, study.model), study.split
     used = time.process_time() - began
@@ -132,12 +136,10 @@ def calibrate(
                 withdrawn.append(refutation)
                 given = replace(study, model=model, settled=study.settled | set(refutation.effects[-1:]))
                 study, found, moves = _explain_with_moves(given, base)
-        known = study.model.runs.noise_known
-        unexplained, uncertain = (
-            found.verdict(level) == "unexplained" or not known,
-            any(c.uncertain for c in found.best),
-        )
-        if describe and study.model is model and study.model.runs.noise_known and (unexplained or uncertain):
+        unexplained = found.verdict(level) == "unexplained" or not study.model.runs.noise_known
+        uncertain = any(c.uncertain for c in found.best)
+        describes = describe and study.model is model and not isinstance(model, Offsets)
+        if describe and describes and study.model.runs.noise_known and (unexplained or uncertain):
             laws = describe(study, found.base, beside_claim=uncertain)
         described = laws if laws and unexplained and laws.complete else None
         if unexplained and not described:
@@ -162,6 +164,7 @@ def calibrate(
         runs=model.runs,
         split=split,
         found=found,
+        differences=differences,
         moves=tuple(StatedMove(move.words(with_moves), move.record(with_moves)) for move in moves),
         errors=errors,
         base_intervals=base_intervals,

@@ -20,6 +20,7 @@ from calibration.attribution.nearest import AdoptedForm
 from calibration.attribution.refits import Candidate, Rival
 from calibration.attribution.wrong_numbers import wrong_number
 from calibration.laws.laws import Laws
+from calibration.statistics.between_repeats import Difference
 from calibration.statistics.excluded import Excluded, count_of_rows, summary_of_excluded
 from calibration.statistics.fit import Fit, Pull
 from calibration.statistics.residual_tests import Directions, Misfit
@@ -114,6 +115,7 @@ class Findings:
     runs: Runs  # that were calibrated with
     split: Split  # fitted and held-out runs
     found: Attribution  # the residual, and what explains it
+    differences: tuple[Difference, ...]  # what repeats and identities say without the model
     moves: tuple[StatedMove, ...]  # numbers that differ in some runs
     errors: HeldOutErrors  # on the held-out runs
     base_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance

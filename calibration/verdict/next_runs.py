@@ -175,7 +175,7 @@ class Explanation:
     """A fitted model that explains a table, as verdict.json keeps it."""
 
     title: str  # in words
-    parameters: dict[str, float]  # all that are fitted
+    parameters: dict[str, float]  # all that are fitted and that new runs have
     covariance: Floats  # (p, p) of them
     noise: Noise  # of runs and sessions
     outputs: tuple[str, ...]  # (k,) that were fitted
@@ -185,9 +185,10 @@ class Explanation:
     def from_rival(rival: Rival) -> Explanation:
         """Keep of a rival what a decision needs."""
         fitted = rival.fit
-        parameters = {name: fitted.parameters[name] for name in fitted.names}
-        outputs = tuple(rival.model.runs.outputs)
-        return Explanation(rival.title, parameters, fitted.covariance, fitted.noise, outputs, rival.law)
+        kept = [place for place, p in enumerate(fitted.fitted) if not p.of_these_runs]
+        parameters = {fitted.names[place]: fitted.parameters[fitted.names[place]] for place in kept}
+        covariance, outputs = fitted.covariance[np.ix_(kept, kept)], tuple(rival.model.runs.outputs)
+        return Explanation(rival.title, parameters, covariance, fitted.noise, outputs, rival.law)
 
     def record(self) -> dict[str, Any]:
         """Write it for verdict.json."""

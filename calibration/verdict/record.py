@@ -13,11 +13,13 @@ import numpy as np
 from calibration.attribution.nearest import largest_along
 from calibration.attribution.refits import UNSEEN, Candidate
 from calibration.attribution.wrong_numbers import notable_pull
+from calibration.statistics.between_repeats import Difference
 from calibration.statistics.excluded import count_of_rows
 from calibration.statistics.fit import Fit, Pull, least_determined
 from calibration.statistics.gls import inverse_root
 from calibration.statistics.statistical_model import Parameter
 from calibration.verdict.findings import Findings
+from calibration.words.quantities import difference_in_words
 from calibration.words.render import next_steps, sentence
 from common.provenance import provenance
 from surrogate.domain import COEFFICIENTS
@@ -163,8 +165,15 @@ def _numbers(result: Findings) -> dict[str, Any]:
         "wrong_number_records": [[_number(p) for p in alike] for alike in result.wrong_numbers],
         "notable_number": learnt[0].words if notable else None,
         "numbers_as_given": [_number(p) for p in pulls],
+        "differences": [_difference(d) for d in result.differences],
         "moves": [{"words": move.words, **move.record} for move in result.moves],
     }
+
+
+def _difference(d: Difference) -> dict[str, Any]:
+    names = ("output", "column", "where", "against", "size", "z", "p")
+    record = {name: getattr(d, name) for name in names} | {"instead": list(d.instead), "numbers": list(d.numbers)}
+    return {"words": difference_in_words(record), **record}
 
 
 def _number(pull: Pull) -> dict[str, Any]:

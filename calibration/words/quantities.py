@@ -49,6 +49,27 @@ def along_in_words(record: Record, largest: str) -> str:
     return f"{output_label(record, output)} along {feature_in_words(feature)}" if feature else largest
 
 
+def offset(size: float, output: str, *, signed: bool = True) -> str:
+    """Write by how much an output is off, on the scale on which it is fitted: "-12 %", "+3.1°"."""
+    scale, unit = output_scale(output)
+    number = plain(scale * (size if output == _IN_DEGREES else math.expm1(size)), 2)
+    return f"{'+' if size > 0 else ''}{number}{_after_number(unit)}".lstrip("" if signed else "+-")
+
+
+def difference_in_words(difference: Record) -> str:
+    """Say a difference, as in "the yaw rate of operator B is 12 % below that of operator A (6.8 σ)"."""
+    output, size, where, against = (difference[key] for key in ("output", "size", "where", "against"))
+    by, side = offset(size, output, signed=False), "below" if size < 0 else "above"
+    if not difference["numbers"]:
+        words = f"{output} is {by} {side} 1 {where}"
+    elif against:
+        words = f"the {output_label(output)} of {where} is {by} {side} that of {against}"
+    else:
+        changes = "changes by ±" if where.startswith("over ") else "falls by" if size < 0 else "rises by"
+        words = f"the {output_label(output)} {changes} {by} {where}"
+    return f"{words} ({difference['z']:.1f} σ)"
+
+
 def plain(value: float, digits: int = 3) -> str:
     """Write a number with so many significant digits and without an exponent."""
     if value == 0 or not math.isfinite(value):

@@ -21,6 +21,7 @@ from calibration.words.quantities import (
     final_model,
     fitted_value,
     given,
+    offset,
     output_error,
     output_label,
     p_in_words,
@@ -92,7 +93,7 @@ def _environment() -> Environment:
 
 _FILTERS: dict[str, Callable[..., str]] = {
     "percent": percent, "digits": digits, "p": p_in_words, "plain": plain, "size": size, "detectable": detectable,
-    "given": given, "tolerance": tolerance, "fitted_value": fitted_value, "direction": direction_in_words,
+    "given": given, "tolerance": tolerance, "fitted_value": fitted_value, "offset": offset, "direction": direction_in_words,
     "ranges": ranges_in_words, "in_lab": length_in_lab,
 }  # fmt: skip
 _OF_OUTPUTS: dict[str, Callable[..., str]] = {  # their first argument is the whole record

@@ -1,0 +1,292 @@
+"""What the runs say without a model: columns that contradict each other, and what repeats differ with.
+
+**Identities.** Some outputs follow from others (`Runs.identities`). What is left of an identity is tested along
+each setting, within sessions, and in the mean of the sessions, beyond `_TOLERANCE`, since a number of the model
+may be off by so much in all runs.
+
+**Between repeats.** A note of which the model knows nothing (an operator, a humidity, the angle of a camera by its
+sine and cosine and by those of its double, the order of the runs) should not matter to a run. Let M take away what
+repeats share, what sessions differ by, and what the model knows of the runs (course, temperature, time). Then M y
+is regressed on M c, c being the columns of the note:
+
+    F = (|P M y|²/a) / (|(1 − P) M y|²/b),   P onto the a columns M c, b degrees of freedom left.
+
+The null distribution comes from M y permuted within repeats, then through M again (Freedman and Lane 1983). All
+tests of a table are compared by p of an F-distribution, which resolves more than the draws do, and the least of
+them is judged by the draws, which are the same for all outputs (Westfall and Young 1993). What is found joins M,
+and the others are tested again. A note that M takes away with it is named in its place, too. No run is compared
+with the model, so all runs take part, those too that are held out.
+
+A session is no such note: numbers that differ in one are looked for with the model
+(`calibration.attribution.moves`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import fdtrc, ndtri
+
+from calibration.statistics.gls import repeat_count
+from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs
+from common.arrays import Flags, Floats, Integers
+
+SHARE_OF_LEVEL = 0.25  # of the level of a claim: 1 % beside the 4 % of all tests with the model
+ORDER = "order of the runs"
+_DRAWS = 999
+_TOLERANCE = 0.02  # of an identity in all runs, and least break along a setting
+_MOST_KINDS = 12  # of a note in words
+_FREE = 0.05  # share of a note that M must leave
+_FEWEST = 5  # degrees of freedom of what is left
+_FAR, _MAD = 4.0, 1.4826  # residuals are clipped at so many robust standard deviations
+_TINY = 1e-300
+
+
+class Column(NamedTuple):
+    """A note as numbers (n, a), each with a name; NaN where it was not noted."""
+
+    note: str
+    names: tuple[str, ...]  # (a,) of what its columns are for: "operator B", "humidity", "cos camera_deg"
+    table: Floats
+    against: str = ""  # the kind to which those in words are compared
+
+
+@dataclass(frozen=True)
+class Difference:
+    """An identity that breaks, or an output that differs with a note between repeats."""
+
+    output: str  # its name, or the identity in words
+    column: str  # the note, or the setting along which an identity breaks; "" in all runs
+    where: str  # in which runs it has the stated size
+    size: float  # on the scale of y: from one kind to another, or from end to end; the amplitude over an angle
+    z: float
+    p: float  # of the whole table
+    against: str = ""  # to what it is compared there
+    numbers: Mapping[str, Floats] = field(default_factory=dict)  # name of a number of the fit -> its column (n,)
+    instead: tuple[str, ...] = ()  # notes that cannot be told from it
+
+
+class _Test(NamedTuple):
+    p: float  # of an F-distribution
+    null: Floats  # (D,) the same of the draws
+    free: bool  # whether M leaves enough of the column
+
+
+def usable(values: Sequence[object] | Floats | Integers) -> bool:
+    """Tell whether a note can be tested: it differs, is no running number, and has few kinds if it is in words."""
+    kinds = np.unique(known := np.asarray(values)[_noted(values)])
+    if known.dtype.kind in "fiu":
+        steps = np.diff(known.astype(float))
+        return len(kinds) > 1 and not (steps > 0).all() and not (steps < 0).all()
+    return 1 < len(kinds) <= _MOST_KINDS
+
+
+def _noted(values: Sequence[object] | Floats | Integers) -> Flags:
+    known = np.asarray(values)
+    return np.isfinite(known.astype(float)) if known.dtype.kind in "fiu" else known.astype(str) != ""
+
+
+def columns_of(runs: Runs) -> list[Column]:
+    """Make columns of every note, and of the order of the runs."""
+    columns = []
+    for note, noted in {**runs.notes, ORDER: runs.rows}.items():
+        values, there = np.asarray(noted), _noted(noted)
+        if note != ORDER and not usable(values):
+            continue
+        if values.dtype.kind not in "fiu":
+            kinds, count = np.unique(values[there].astype(str), return_counts=True)
+            common = kinds[np.argmax(count)]
+            others = [kind for kind in kinds if kind != common]
+            table = np.where(there[:, None], values.astype(str)[:, None] == others, np.nan)
+            columns.append(Column(note, tuple(f"{note} {kind}" for kind in others), table, f"{note} {common}"))
+        elif note.endswith(("_deg", "_rad")):
+            angle = np.asarray(np.radians(values) if note.endswith("_deg") else values, dtype=float)
+            for turns, of in ((1, note), (2, f"2 {note}")):
+                table = np.column_stack([np.cos(turns * angle), np.sin(turns * angle)])
+                columns.append(Column(note, (f"cos {of}", f"sin {of}"), table))
+        else:
+            values = values.astype(float)
+            low, high = np.nanmin(values), np.nanmax(values)
+            columns.append(Column(note, (note,), (values - (low + high) / 2)[:, None] / max(high - low, _TINY)))
+    return columns
+
+
+def find_differences(runs: Runs, *, level: float, seed: int = 0) -> tuple[Difference, ...]:
+    """Find what differs between repeats, and identities that break, at the level of a claim of the model."""
+    rng = np.random.default_rng(seed)
+    keys = rng.random((_DRAWS, len(runs)))
+    columns, found, broken = columns_of(runs), [], []
+    taken: dict[int, list[Column]] = {k: [] for k in range(len(runs.outputs))}
+    identities = {name: _breaks(runs, d, keys, rng) for name, d in runs.identities.items()}
+    tests = {k: _of_output(runs, k, columns, [], keys) for k in taken}
+    while True:
+        named = {(k, c): test for k, of in tests.items() for c, test in enumerate(of) if test.free}
+        every = {**named, **{(name, along): test for name, of in identities.items() for along, test in of.items()}}
+        if not every:
+            break
+        least = np.min([test.null for test in every.values()], axis=0)
+        best = min(every, key=lambda each: every[each].p)
+        p = (1 + np.count_nonzero(least <= every[best].p)) / (1 + _DRAWS)
+        if p > level * SHARE_OF_LEVEL:
+            break
+        z, (subject, place) = float(-ndtri(max(every[best].p, _TINY) / 2)), best
+        if isinstance(subject, str):
+            del identities[subject]
+            broken.append(_broken(runs, subject, str(place), z, p))
+            continue
+        column, before = columns[int(place)], tests[subject]
+        taken[subject].append(column)
+        tests[subject] = _of_output(runs, subject, columns, taken[subject], keys)
+        compared = zip(columns, before, tests[subject], strict=True)
+        alike = dict.fromkeys(c.note for c, was, now in compared if was.free and not now.free)
+        alike.pop(column.note)
+        found.append(_between(runs, subject, column, taken[subject][:-1], z, p, tuple(alike)))
+    return (*broken, *found)
+
+
+def _repeats(runs: Runs, taken: Sequence[Column]) -> tuple[Integers, Floats]:
+    """Number the repeats (n,), and make columns (n, c) of what they may differ by: sessions, and what is known."""
+    known = [runs.session[:, None] == np.unique(runs.session), runs.inputs]
+    known += [np.nan_to_num(column.table) for column in taken]
+    if repeat_count(runs.condition) >= FEWEST_REPEATS:
+        return runs.condition, np.column_stack(known)
+    mirrored, direction = runs.mirrored
+    specimen = np.zeros_like(mirrored) if runs.specimen is None else runs.specimen
+    group = np.unique(np.column_stack([mirrored, specimen]), axis=0, return_inverse=True)[1].reshape(-1)
+    return group, np.column_stack([*known, direction[:, None] * runs.inputs])
+
+
+def _centred(table: Floats, group: Integers) -> Floats:
+    """Take the mean of each group (n,) from columns (n, c)."""
+    levels = (group[:, None] == np.unique(group)).astype(float)
+    return np.asarray(table - levels @ ((levels.T @ table) / levels.sum(0)[:, None]))
+
+
+def _span(table: Floats) -> Floats:
+    """Return an orthonormal basis of columns (n, c)."""
+    lengths = np.sqrt((table**2).sum(0))
+    scaled = np.where(lengths > 1e-9, table / np.maximum(lengths, 1e-9), 0.0)
+    left, values, _ = np.linalg.svd(scaled, full_matrices=False)
+    return np.asarray(left[:, values > 1e-6])
+
+
+class _Left(NamedTuple):
+    """What is left of an output in some rows, and in the draws, when M is done."""
+
+    rows: Integers
+    group: Integers
+    basis: Floats  # of what M takes beside the groups
+    residual: Floats  # (m,)
+    drawn: Floats  # (D, m)
+
+    @classmethod
+    def of(cls, y: Floats, there: Flags, group: Integers, known: Floats, keys: Floats) -> _Left:
+        rows = np.flatnonzero(there)
+        group = np.unique(group[rows], return_inverse=True)[1].reshape(-1)
+        repeated = np.bincount(group)[group] > 1
+        rows, group = rows[repeated], group[repeated]
+        basis = _span(_centred(known[rows], group))
+        residual = _centred(y[rows, None], group)[:, 0]
+        residual = residual - basis @ (basis.T @ residual)
+        far = _FAR * _MAD * float(np.median(np.abs(residual))) if len(rows) else 0.0
+        residual = np.clip(residual, -far, far) if far else residual
+        order = np.argsort(group, kind="stable")
+        places = np.empty((len(keys), len(rows)), dtype=np.int64)
+        places[:, order] = np.argsort(keys[:, rows] + group, axis=1)
+        drawn = residual[places]
+        return cls(rows, group, basis, residual, drawn - (drawn @ basis) @ basis.T)
+
+    def column(self, table: Floats) -> Floats:
+        """Do to columns (n, a) what was done to the output."""
+        centred = _centred(table[self.rows], self.group)
+        return np.asarray(centred - self.basis @ (self.basis.T @ centred))
+
+    def test(self, table: Floats) -> _Test:
+        """Test what is left along columns (n, a)."""
+        column = self.column(table)
+        along = _span(column)
+        a = along.shape[1]
+        b = len(self.rows) - len(np.unique(self.group)) - self.basis.shape[1] - a
+        whole = ((table[self.rows] - table[self.rows].mean(0)) ** 2).sum() if len(self.rows) else 0.0
+        if not a or b < _FEWEST or (column**2).sum() <= _FREE * whole:
+            return _Test(1.0, np.ones(len(self.drawn)), False)
+        residuals = np.vstack([self.residual, self.drawn])
+        taken = ((residuals @ along) ** 2).sum(1)
+        rest = np.maximum((residuals**2).sum(1) - taken, _TINY)
+        p = fdtrc(a, b, taken / a / (rest / b))
+        return _Test(float(p[0]), p[1:], True)
+
+
+def _of_output(runs: Runs, k: int, columns: list[Column], taken: list[Column], keys: Floats) -> list[_Test]:
+    """Test an output along every column, beside those that are taken."""
+    group, known = _repeats(runs, taken)
+    left: dict[bytes, _Left] = {}
+    tests = []
+    for column in columns:
+        there = ~runs.gaps[:, k] & np.isfinite(column.table).all(1)
+        key = there.tobytes()
+        if key not in left:
+            left[key] = _Left.of(runs.y[:, k], there, group, known, keys)
+        tests.append(left[key].test(column.table))
+    return tests
+
+
+def _between(
+    runs: Runs, k: int, column: Column, taken: list[Column], z: float, p: float, instead: tuple[str, ...]
+) -> Difference:
+    """Measure how an output differs with a note, beside the notes in `taken`."""
+    there, none = ~runs.gaps[:, k] & np.isfinite(column.table).all(1), np.empty((0, len(runs)))
+    left = _Left.of(runs.y[:, k], there, *_repeats(runs, taken), none)
+    y = left.column(runs.y[:, [k]])[:, 0]
+    sizes = np.linalg.lstsq(left.column(column.table), y, rcond=None)[0]
+    size = sizes[np.argmax(np.abs(sizes))]
+    if column.against:
+        where = column.names[np.argmax(np.abs(sizes))]
+    elif len(sizes) > 1:
+        size, where = np.hypot(*sizes), f"over {column.names[0].removeprefix('cos ')}"
+    else:
+        ends = "the first to the last run" if column.note == ORDER else f"the least to the largest {column.note}"
+        where = f"from {ends}"
+    columns = zip(column.names, np.nan_to_num(column.table).T, strict=True)
+    numbers = {f"{runs.outputs[k]}, {name}": values for name, values in columns}
+    return Difference(runs.outputs[k], column.note, where, float(size), z, p, column.against, numbers, instead)
+
+
+def _breaks(runs: Runs, left: Floats, keys: Floats, rng: np.random.Generator) -> dict[str, _Test]:
+    """Test what is left of an identity (n,): along each setting, and "" in the mean of the sessions."""
+    there = np.isfinite(left)
+    found = {}
+    of_runs = _Left.of(left, there, runs.session, np.zeros((len(left), 1)), keys)
+    for name, (values, _) in runs.settings.items():
+        if np.ptp(values) > 0 and abs(_broken(runs, "", name, 0.0, 0.0, left).size) > _TOLERANCE:
+            x = (values - values.mean()) / values.std()
+            found[name] = of_runs.test(np.column_stack([x, x**2]))
+    means = np.array([left[there & (runs.session == s)].mean() for s in np.unique(runs.session[there])])
+    if len(means) > 2:
+        beyond = max(abs(means.mean()) - _TOLERANCE, 0.0)
+        f = beyond**2 * len(means) / max(means.var(ddof=1), _TINY)
+        found[""] = _Test(float(fdtrc(1, len(means) - 1, f)), rng.random(len(keys)), True)
+    return {name: test for name, test in found.items() if test.free}
+
+
+def _broken(runs: Runs, identity: str, along: str, z: float, p: float, left: Floats | None = None) -> Difference:
+    """Say where an identity breaks along a setting: beyond the value at which a step or a bend fits best."""
+    left = runs.identities[identity] if left is None else left
+    there = np.isfinite(left)
+    d = left[there]
+    if not along:
+        return Difference(identity, "", "in all runs", float(d.mean()), z, p)
+    values, unit = runs.settings[along]
+    x, ends = values[there], np.unique(values[there])[:-1]
+    beyond = x[:, None] > ends
+    bends = np.maximum(x[:, None] - ends, 0), np.maximum(np.unique(x)[1:] - x[:, None], 0)
+    shapes = _centred(np.hstack([beyond.astype(float), *bends]), runs.session[there])
+    gain = (shapes.T @ d) ** 2 / np.maximum((shapes**2).sum(0), _TINY)
+    at = int(np.argmax(gain)) % len(ends)
+    above, below = float(d[beyond[:, at]].mean()), float(d[~beyond[:, at]].mean())
+    if abs(above) >= abs(below):
+        return Difference(identity, along, f"where {along} is above {ends[at]:.3g}{unit}", above, z, p)
+    return Difference(identity, along, f"where {along} is at most {ends[at]:.3g}{unit}", below, z, p)
