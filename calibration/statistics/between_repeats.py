@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import fdtrc, ndtri
@@ -52,6 +52,7 @@ class Column(NamedTuple):
     names: tuple[str, ...]  # (a,) of what its columns are for: "operator B", "humidity", "cos camera_deg"
     table: Floats
     against: str = ""  # the kind to which those in words are compared
+    of_reading: bool = False  # whether it is times what is read
 
 
 @dataclass(frozen=True)
@@ -65,17 +66,19 @@ class Difference:
     z: float
     p: float  # of the whole table
     against: str = ""  # to what it is compared there
+    of_reading: bool = False  # whether it is how such an offset follows what is read
     numbers: Mapping[str, Floats] = field(default_factory=dict)  # name of a number of the fit -> its column (n,)
     instead: tuple[str, ...] = ()  # notes that cannot be told from it
 
 
 class _Test(NamedTuple):
+    column: Column
     p: float  # of an F-distribution
     null: Floats  # (D,) the same of the draws
     free: bool  # whether M leaves enough of the column
 
 
-def usable(values: Sequence[object] | Floats | Integers) -> bool:
+def usable(values: Any) -> bool:
     """Tell whether a note can be tested: it differs, is no running number, and has few kinds if it is in words."""
     kinds = np.unique(known := np.asarray(values)[_noted(values)])
     if known.dtype.kind in "fiu":
@@ -84,7 +87,7 @@ def usable(values: Sequence[object] | Floats | Integers) -> bool:
     return 1 < len(kinds) <= _MOST_KINDS
 
 
-def _noted(values: Sequence[object] | Floats | Integers) -> Flags:
+def _noted(values: Any) -> Flags:
     known = np.asarray(values)
     return np.isfinite(known.astype(float)) if known.dtype.kind in "fiu" else known.astype(str) != ""
 
@@ -118,33 +121,40 @@ def find_differences(runs: Runs, *, level: float, seed: int = 0) -> tuple[Differ
     """Find what differs between repeats, and identities that break, at the level of a claim of the model."""
     rng = np.random.default_rng(seed)
     keys = rng.random((_DRAWS, len(runs)))
-    columns, found, broken = columns_of(runs), [], []
-    taken: dict[int, list[Column]] = {k: [] for k in range(len(runs.outputs))}
-    identities = {name: _breaks(runs, d, keys, rng) for name, d in runs.identities.items()}
-    tests = {k: _of_output(runs, k, columns, [], keys) for k in taken}
-    while True:
-        named = {(k, c): test for k, of in tests.items() for c, test in enumerate(of) if test.free}
-        every = {**named, **{(name, along): test for name, of in identities.items() for along, test in of.items()}}
-        if not every:
-            break
-        least = np.min([test.null for test in every.values()], axis=0)
-        best = min(every, key=lambda each: every[each].p)
-        p = (1 + np.count_nonzero(least <= every[best].p)) / (1 + _DRAWS)
+    outputs, found, broken = range(len(runs.outputs)), [], []
+    columns, taken = [columns_of(runs) for _ in outputs], [list[Column]() for _ in outputs]
+    tests: dict[int | str, list[_Test]] = {n: _breaks(runs, d, keys, rng) for n, d in runs.identities.items()}
+    tests |= {k: _of_output(runs, k, columns[k], [], keys) for k in outputs}
+    while every := [(subject, test) for subject, of in tests.items() for test in of if test.free]:
+        least = np.min([test.null for _, test in every], axis=0)
+        subject, best = min(every, key=lambda each: each[1].p)
+        p = (1 + np.count_nonzero(least <= best.p)) / (1 + _DRAWS)
         if p > level * SHARE_OF_LEVEL:
             break
-        z, (subject, place) = float(-ndtri(max(every[best].p, _TINY) / 2)), best
+        z = float(-ndtri(max(best.p, _TINY) / 2))
         if isinstance(subject, str):
-            del identities[subject]
-            broken.append(_broken(runs, subject, str(place), z, p))
+            del tests[subject]
+            where, size = _broken(runs, runs.identities[subject], best.column.note)
+            broken.append(Difference(subject, best.column.note, where, size, z, p))
             continue
-        column, before = columns[int(place)], tests[subject]
-        taken[subject].append(column)
-        tests[subject] = _of_output(runs, subject, columns, taken[subject], keys)
-        compared = zip(columns, before, tests[subject], strict=True)
-        alike = dict.fromkeys(c.note for c, was, now in compared if was.free and not now.free)
-        alike.pop(column.note)
-        found.append(_between(runs, subject, column, taken[subject][:-1], z, p, tuple(alike)))
+        alone = {test.column.note for test in tests[subject] if test.free}
+        columns[subject] += _of_reading(runs, subject, best.column)
+        again = _of_output(runs, subject, columns[subject], [*taken[subject], best.column], keys)
+        lost = {test.column.note for test in again if not test.free} & alone - {best.column.note}
+        found.append(_between(runs, subject, best.column, taken[subject], z, p, tuple(sorted(lost))))
+        taken[subject].append(best.column)
+        tests[subject] = again
     return (*broken, *found)
+
+
+def _of_reading(runs: Runs, k: int, column: Column) -> list[Column]:
+    """Let the offset of one kind follow what is read: make the column times the mean of the repeats' output."""
+    if column.of_reading:
+        return []
+    group = _repeats(runs, [])[0]
+    mean = runs.y[:, [k]] - _centred(runs.y[:, [k]], group)
+    scaled = (mean - (mean.min() + mean.max()) / 2) / max(float(np.ptp(mean)), _TINY)
+    return [column._replace(table=column.table * scaled, of_reading=True)]
 
 
 def _repeats(runs: Runs, taken: Sequence[Column]) -> tuple[Integers, Floats]:
@@ -204,20 +214,20 @@ class _Left(NamedTuple):
         centred = _centred(table[self.rows], self.group)
         return np.asarray(centred - self.basis @ (self.basis.T @ centred))
 
-    def test(self, table: Floats) -> _Test:
-        """Test what is left along columns (n, a)."""
-        column = self.column(table)
+    def test(self, of: Column) -> _Test:
+        """Test what is left along a column."""
+        table, column = of.table, self.column(of.table)
         along = _span(column)
         a = along.shape[1]
         b = len(self.rows) - len(np.unique(self.group)) - self.basis.shape[1] - a
         whole = ((table[self.rows] - table[self.rows].mean(0)) ** 2).sum() if len(self.rows) else 0.0
         if not a or b < _FEWEST or (column**2).sum() <= _FREE * whole:
-            return _Test(1.0, np.ones(len(self.drawn)), False)
+            return _Test(of, 1.0, np.ones(len(self.drawn)), False)
         residuals = np.vstack([self.residual, self.drawn])
         taken = ((residuals @ along) ** 2).sum(1)
         rest = np.maximum((residuals**2).sum(1) - taken, _TINY)
         p = fdtrc(a, b, taken / a / (rest / b))
-        return _Test(float(p[0]), p[1:], True)
+        return _Test(of, float(p[0]), p[1:], True)
 
 
 def _of_output(runs: Runs, k: int, columns: list[Column], taken: list[Column], keys: Floats) -> list[_Test]:
@@ -230,7 +240,7 @@ def _of_output(runs: Runs, k: int, columns: list[Column], taken: list[Column], k
         key = there.tobytes()
         if key not in left:
             left[key] = _Left.of(runs.y[:, k], there, group, known, keys)
-        tests.append(left[key].test(column.table))
+        tests.append(left[key].test(column))
     return tests
 
 
@@ -242,43 +252,52 @@ def _between(
     left = _Left.of(runs.y[:, k], there, *_repeats(runs, taken), none)
     y = left.column(runs.y[:, [k]])[:, 0]
     sizes = np.linalg.lstsq(left.column(column.table), y, rcond=None)[0]
-    size = sizes[np.argmax(np.abs(sizes))]
-    if column.against:
-        where = column.names[np.argmax(np.abs(sizes))]
-    elif len(sizes) > 1:
-        size, where = np.hypot(*sizes), f"over {column.names[0].removeprefix('cos ')}"
-    else:
-        ends = "the first to the last run" if column.note == ORDER else f"the least to the largest {column.note}"
-        where = f"from {ends}"
+    largest = int(np.argmax(np.abs(sizes)))
+    size, where = float(sizes[largest]), column.names[largest]
+    if column.of_reading:
+        where = f"more with {where} from its smallest to its largest value"
+    elif column.note == ORDER:
+        where = "from the first to the last run"
+    elif not column.against and len(sizes) > 1:
+        size, where = float(np.hypot(*sizes)), f"over {column.names[0].removeprefix('cos ')}"
+    elif not column.against:
+        where = f"from the least to the largest {column.note}"
+    against = "" if column.of_reading else column.against
+    times = " × reading" * column.of_reading
     columns = zip(column.names, np.nan_to_num(column.table).T, strict=True)
-    numbers = {f"{runs.outputs[k]}, {name}": values for name, values in columns}
-    return Difference(runs.outputs[k], column.note, where, float(size), z, p, column.against, numbers, instead)
+    numbers = {f"{runs.outputs[k]}, {name}{times}": values for name, values in columns}
+    return Difference(
+        runs.outputs[k], column.note, where, size, z, p, against, column.of_reading, numbers, instead
+    )
 
 
-def _breaks(runs: Runs, left: Floats, keys: Floats, rng: np.random.Generator) -> dict[str, _Test]:
-    """Test what is left of an identity (n,): along each setting, and "" in the mean of the sessions."""
+def _breaks(runs: Runs, left: Floats, keys: Floats, rng: np.random.Generator) -> list[_Test]:
+    """Test what is left of an identity (n,): along each setting, and in the mean of the sessions."""
     there = np.isfinite(left)
-    found = {}
     of_runs = _Left.of(left, there, runs.session, np.zeros((len(left), 1)), keys)
+    tests = []
     for name, (values, _) in runs.settings.items():
-        if np.ptp(values) > 0 and abs(_broken(runs, "", name, 0.0, 0.0, left).size) > _TOLERANCE:
+        if np.ptp(values) > 0 and abs(_broken(runs, left, name)[1]) > _TOLERANCE:
             x = (values - values.mean()) / values.std()
-            found[name] = of_runs.test(np.column_stack([x, x**2]))
+            tests.append(of_runs.test(Column(name, (), np.column_stack([x, x**2]))))
     means = np.array([left[there & (runs.session == s)].mean() for s in np.unique(runs.session[there])])
     if len(means) > 2:
-        beyond = max(abs(means.mean()) - _TOLERANCE, 0.0)
-        f = beyond**2 * len(means) / max(means.var(ddof=1), _TINY)
-        found[""] = _Test(float(fdtrc(1, len(means) - 1, f)), rng.random(len(keys)), True)
-    return {name: test for name, test in found.items() if test.free}
+        beyond = max(abs(float(means.mean())) - _TOLERANCE, 0.0)
+        f = beyond**2 * len(means) / max(float(means.var(ddof=1)), _TINY)
+        p = float(fdtrc(1, len(means) - 1, f))
+        tests.append(_Test(Column("", (), left), p, rng.random(len(keys)), True))
+    return tests
 
 
-def _broken(runs: Runs, identity: str, along: str, z: float, p: float, left: Floats | None = None) -> Difference:
-    """Say where an identity breaks along a setting: beyond the value at which a step or a bend fits best."""
-    left = runs.identities[identity] if left is None else left
+def _broken(runs: Runs, left: Floats, along: str) -> tuple[str, float]:
+    """Say where what is left of an identity is large, and its mean there; see `Difference`.
+
+    Along a setting it is beyond the value at which a step or a bend fits best.
+    """
     there = np.isfinite(left)
     d = left[there]
     if not along:
-        return Difference(identity, "", "in all runs", float(d.mean()), z, p)
+        return "in all runs", float(d.mean())
     values, unit = runs.settings[along]
     x, ends = values[there], np.unique(values[there])[:-1]
     beyond = x[:, None] > ends
@@ -287,6 +306,5 @@ def _broken(runs: Runs, identity: str, along: str, z: float, p: float, left: Flo
     gain = (shapes.T @ d) ** 2 / np.maximum((shapes**2).sum(0), _TINY)
     at = int(np.argmax(gain)) % len(ends)
     above, below = float(d[beyond[:, at]].mean()), float(d[~beyond[:, at]].mean())
-    if abs(above) >= abs(below):
-        return Difference(identity, along, f"where {along} is above {ends[at]:.3g}{unit}", above, z, p)
-    return Difference(identity, along, f"where {along} is at most {ends[at]:.3g}{unit}", below, z, p)
+    side, size = ("above", above) if abs(above) >= abs(below) else ("at most", below)
+    return f"where {along} is {side} {ends[at]:.3g}{unit}", size

@@ -19,7 +19,7 @@ import numpy as np
 
 from calibration.statistics.between_repeats import Difference, find_differences
 from calibration.statistics.forward import stacked
-from calibration.statistics.statistical_model import Experiment, Parameter, Parameters, Predict, Runs
+from calibration.statistics.statistical_model import Experiment, Parameter, Parameters, Predict, Runs, with_runs
 from calibration.statistics.study import middle_session
 from common.arrays import Flags, Floats
 
@@ -106,4 +106,7 @@ def with_differences(
     found = find_differences(model.runs, **settings)
     used = ~(middle_session(model.runs) if held_out is None else held_out)
     numbers = {name: (d.output, c) for d in found for name, c in d.numbers.items() if np.ptp(c[used]) > 0}
-    return Offsets(model, numbers) if numbers else model, found
+    if not numbers:
+        return model, found
+    differing = np.column_stack([column for _, column in numbers.values()])
+    return Offsets(with_runs(model, differing=differing), numbers), found

@@ -17,10 +17,11 @@ its runs were whole.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from scipy.special import fdtrc
@@ -113,6 +114,7 @@ class Runs:
     output_scales: Mapping[str, tuple[float, str]] = field(
         default_factory=dict, kw_only=True
     )  # factor and unit in which residuals are shown; default: per cent
+    differing: Floats | None = field(default=None, kw_only=True)  # (n, c) by which repeats were found to differ
 
     @property
     def scale(self) -> Floats:
@@ -129,19 +131,19 @@ class Runs:
         repeats = self.repeats(rows)
         return repeat_covariance(self.y[rows], repeats, self.scale[rows]), repeat_count(repeats)
 
-    def with_noise(self, rows: Flags, residual: Floats) -> Runs:
-        """Return runs whose noise can be used: where it is unknown, with a guess from a residual (n, k).
+    def guessed_noise(self, rows: Flags, residual: Floats) -> dict[str, Any]:
+        """Return what to change in runs whose noise is unknown: a guess from a residual (n, k); else nothing.
 
         Args:
             rows: (n,) the runs that are fitted.
         """
         if self.noise_known and (self.sigma is not None or self.repeated(rows)):
-            return self
+            return {}
         freedom = 0 if self.sigma is not None else repeat_count(self.repeats(rows))
         if self.sigma is not None or freedom >= self.y.shape[1]:
-            return replace(self, noise_known=False)
+            return {"noise_known": False}
         spread = residual[rows].std(0)
-        return replace(self, noise_known=False, sigma=np.where(spread > 0, spread, 1.0))
+        return {"noise_known": False, "sigma": np.where(spread > 0, spread, 1.0)}
 
     def repeated(self, rows: Flags | slice) -> bool:
         """Tell whether there are repeats, or mirror runs in their place, from which the noise can be estimated."""
@@ -193,26 +195,27 @@ class Runs:
         """Tell what is the same in repeats among some rows, by these alone: the condition (n',), or a design.
 
         A design (n', m) is taken where repeats differ otherwise, too: levels of condition and session, and what
-        was noted (`noted_of_repeats`). Repeats in several sessions differ by what changed between these, which is
-        no noise of a run. Where fewer than `FEWEST_REPEATS` runs are repeated, mirror runs serve as repeats, but
+        was noted (`noted_of_repeats`) or found (`differing`). Repeats in several sessions differ by what changed
+        between these, which is no noise of a run. Where fewer than `FEWEST_REPEATS` runs are repeated, mirror runs serve as repeats, but
         for what is odd and linear in the inputs; without them the noise is unknown, and what is smooth in the
         inputs is not counted with it.
         """
         session, noted = self.session[rows], self.noted_of_repeats[rows]
         condition = self.apart[rows]
         alone = self._alone(rows)
+        differing = np.empty((len(condition), 0)) if self.differing is None else self.differing[rows]
         if (count := repeat_count(condition)) < FEWEST_REPEATS:
             designs = (
-                np.column_stack([self._mirror_design(rows), alone]),
-                np.column_stack([_levels(session), features(self, rows)[1][rows], alone]),
+                np.column_stack([self._mirror_design(rows), alone, differing]),
+                np.column_stack([_levels(session), features(self, rows)[1][rows], alone, differing]),
             )
             return next((d for d in designs if repeat_count(d) >= max(FEWEST_REPEATS, count)), condition)
         crossed = len(np.unique(np.stack([condition, session]), axis=1).T) > len(np.unique(condition))
-        if not crossed and not noted.size:
-            return condition
         levels = [_levels(f) for f in ((condition, session) if crossed else (condition,))]
-        plain: Integers | Floats = condition
-        design = np.column_stack([*levels, noted])
+        plain = np.column_stack([levels[0], differing]) if differing.size else condition
+        if not crossed and not noted.size:
+            return plain
+        design = np.column_stack([*levels, noted, differing])
         each = [np.where(level[:, None], noted, 0.0) for level in levels[-1].T.astype(bool)] if crossed else []
         for further in (design, np.column_stack([design, *each])):  # what is noted may act otherwise in a session
             if _differ_more(self.y[rows], plain, further):
@@ -331,6 +334,9 @@ class Experiment(ForwardModel, Protocol):
         ...
 
 
+Model = TypeVar("Model", bound=ForwardModel)
+
+
 def start_values(model: ForwardModel) -> dict[str, float]:
     """Return every parameter as given: effects at their null."""
     return {p.name: p.start for p in _every(model)}
@@ -344,6 +350,15 @@ def parameter(model: ForwardModel, name: str) -> Parameter:
 def _every(model: ForwardModel) -> tuple[Parameter, ...]:
     seconds = (e.second for e in model.effects if e.second)
     return (*model.coefficients, *model.nuisances, *model.effects, *seconds)
+
+
+def with_runs(model: Model, **changes: Any) -> Model:
+    """Return the same model with something else in its runs."""
+    changed, inner = copy.copy(model), getattr(model, "inner", None)
+    new = {"inner": with_runs(inner, **changes)} if inner else {"runs": replace(model.runs, **changes)}
+    for name, value in new.items():
+        object.__setattr__(changed, name, value)
+    return changed
 
 
 def apply_step(fitted: Sequence[Parameter], parameters: Parameters, step: Floats) -> dict[str, float]:

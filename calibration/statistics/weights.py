@@ -24,18 +24,17 @@ Sources: Tukey (1960), Dempster, Laird and Rubin (1977); the bound, e.g. Bishop 
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
 from calibration.statistics.excluded import listed
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.gls import Noise, inverse_root
-from calibration.statistics.statistical_model import FEWEST_REPEATS, ForwardModel, Runs
+from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs, with_runs
 from calibration.statistics.study import Study
 from common.arrays import Floats, Integers
 
@@ -51,8 +50,6 @@ _ROUNDS = 2
 _NAMED = 10  # runs
 _FEWEST = 3  # runs that can agree by more than chance
 _FAR_OFF = "{} farther from {} repeats than the noise of the others allows"
-
-Model = TypeVar("Model", bound=ForwardModel)
 
 
 @dataclass(frozen=True)
@@ -193,14 +190,6 @@ def _maximise(
     return ContaminatedNormal(run, lack, share, factor), bound
 
 
-def with_runs(model: Model, runs: Runs) -> Model:
-    """Return the same model of other runs, with other weights, say."""
-    changed, inner = copy.copy(model), getattr(model, "inner", None)
-    name, value = ("inner", with_runs(inner, runs)) if inner else ("runs", runs)
-    object.__setattr__(changed, name, value)
-    return changed
-
-
 def fit_weighted(study: Study, start: Mapping[str, float]) -> tuple[Study, Fit]:
     """Fit coefficients and nuisance parameters to the runs that a study uses, and weigh the runs if need be.
 
@@ -223,9 +212,7 @@ def fit_weighted(study: Study, start: Mapping[str, float]) -> tuple[Study, Fit]:
         weight = np.ones(len(used))
         for rows in filter(np.any, (used, study.split.test)):
             weight[rows] = noise.weights(residual[rows], condition[rows])
-        study = replace(
-            study, model=with_runs(model, replace(model.runs, weight=weight)), variance_ratio=noise.spread
-        )
+        study = replace(study, model=with_runs(model, weight=weight), variance_ratio=noise.spread)
         fitted = fit(study.model, fitted.parameters, names, used, title=title)
     return study, fitted
 

@@ -232,7 +232,8 @@ class SwimmerModel:
         noted = np.tile(runs.noted.mean(0), (count, 1))
         settings = [{"N": int(n), "l_cm": length, "omega_rpm": speed} for n, length, speed in grid.tolist()]
         possible_runs = replace(
-            runs, y=np.zeros((count, len(runs.outputs))), weight=None, completion=None, specimen=None, notes={},
+            runs, y=np.zeros((count, len(runs.outputs))), weight=None, completion=None, specimen=None,
+            notes={}, differing=None,
             condition=np.arange(count), session=np.zeros(count, int),
             session_names=("next",), inputs=np.zeros((count, runs.inputs.shape[1])), excluded=(),
             rows=np.arange(count), caveats=(), tails=grid[:, 0], length=grid[:, 1] / 100,

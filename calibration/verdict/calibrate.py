@@ -59,7 +59,7 @@ from calibration.statistics.excluded import caveat_of_excluded
 from calibration.statistics.fit import Fit, fit, profile_intervals
 from calibration.statistics.offsets import Offsets, with_differences
 from calibration.statistics.residual_tests import directions, examine_residual
-from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values
+from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values, with_runs
 from calibration.statistics.study import (
     DRAWS,
     LEVEL,
@@ -77,7 +77,6 @@ from calibration.statistics.weights import (
     fit_weighted,
     noise_of_any_run,
     rows_of_little_weight,
-    with_runs,
 )
 from calibration.verdict.findings import Attribution, LoopTurn
 from calibration.verdict.held_out import HeldOutErrors, Withdrawn, held_out_errors, refuted
@@ -236,7 +235,8 @@ def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any)
     given = predict_as_given(model, title="as given" if settings.get("progress") else "")
     model.check(given)
     study = Study(model, split_runs(model.runs, held_out, find_outliers(model.runs, given)), **settings)
-    study = replace(study, model=with_runs(model, model.runs.with_noise(study.split.fitted, model.runs.y - given)))
+    guess = model.runs.guessed_noise(study.split.fitted, model.runs.y - given)
+    study = replace(study, model=with_runs(model, **guess))
     return *fit_weighted(study, model.guess(start, study.split.fitted)), given
 
 

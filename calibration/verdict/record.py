@@ -171,7 +171,7 @@ def _numbers(result: Findings) -> dict[str, Any]:
 
 
 def _difference(d: Difference) -> dict[str, Any]:
-    names = ("output", "column", "where", "against", "size", "z", "p")
+    names = ("output", "column", "where", "against", "of_reading", "size", "z", "p")
     record = {name: getattr(d, name) for name in names} | {"instead": list(d.instead), "numbers": list(d.numbers)}
     return {"words": difference_in_words(record), **record}
 
