@@ -39,17 +39,17 @@ ORDER = "order of the runs"
 _DRAWS = 999
 _TOLERANCE = 0.02  # of an identity in all runs, and least break along a setting
 _MOST_KINDS = 12  # of a note in words
-_FREE = 0.05  # share of a note that M must leave
+_FREE = 0.05  # share of what a note differs by within sessions that M must leave
 _FEWEST = 5  # degrees of freedom of what is left
 _FAR, _MAD = 4.0, 1.4826  # residuals are clipped at so many robust standard deviations
-_TINY = 1e-300
+_NONE, _TINY = 1e-9, 1e-300
 
 
 class Column(NamedTuple):
     """A note as numbers (n, a), each with a name; NaN where it was not noted."""
 
     note: str
-    names: tuple[str, ...]  # (a,) of what its columns are for: "operator B", "humidity", "cos camera_deg"
+    names: tuple[str, ...]  # (a,) of what its columns are for: "operator B", "humidity", "cos view_deg"
     table: Floats
     against: str = ""  # the kind to which those in words are compared
     of_reading: bool = False  # whether it is times what is read
@@ -188,12 +188,13 @@ class _Left(NamedTuple):
 
     rows: Integers
     group: Integers
+    session: Integers
     basis: Floats  # of what M takes beside the groups
     residual: Floats  # (m,)
     drawn: Floats  # (D, m)
 
     @classmethod
-    def of(cls, y: Floats, there: Flags, group: Integers, known: Floats, keys: Floats) -> _Left:
+    def of(cls, y: Floats, there: Flags, session: Integers, group: Integers, known: Floats, keys: Floats) -> _Left:
         rows = np.flatnonzero(there)
         group = np.unique(group[rows], return_inverse=True)[1].reshape(-1)
         repeated = np.bincount(group)[group] > 1
@@ -207,7 +208,7 @@ class _Left(NamedTuple):
         places = np.empty((len(keys), len(rows)), dtype=np.int64)
         places[:, order] = np.argsort(keys[:, rows] + group, axis=1)
         drawn = residual[places]
-        return cls(rows, group, basis, residual, drawn - (drawn @ basis) @ basis.T)
+        return cls(rows, group, session[rows], basis, residual, drawn - (drawn @ basis) @ basis.T)
 
     def column(self, table: Floats) -> Floats:
         """Do to columns (n, a) what was done to the output."""
@@ -220,8 +221,8 @@ class _Left(NamedTuple):
         along = _span(column)
         a = along.shape[1]
         b = len(self.rows) - len(np.unique(self.group)) - self.basis.shape[1] - a
-        whole = ((table[self.rows] - table[self.rows].mean(0)) ** 2).sum() if len(self.rows) else 0.0
-        if not a or b < _FEWEST or (column**2).sum() <= _FREE * whole:
+        whole = float((_centred(table[self.rows], self.session) ** 2).sum())
+        if not a or b < _FEWEST or (column**2).sum() <= max(_FREE * whole, _NONE):
             return _Test(of, 1.0, np.ones(len(self.drawn)), False)
         residuals = np.vstack([self.residual, self.drawn])
         taken = ((residuals @ along) ** 2).sum(1)
@@ -239,7 +240,7 @@ def _of_output(runs: Runs, k: int, columns: list[Column], taken: list[Column], k
         there = ~runs.gaps[:, k] & np.isfinite(column.table).all(1)
         key = there.tobytes()
         if key not in left:
-            left[key] = _Left.of(runs.y[:, k], there, group, known, keys)
+            left[key] = _Left.of(runs.y[:, k], there, runs.session, group, known, keys)
         tests.append(left[key].test(column))
     return tests
 
@@ -249,7 +250,7 @@ def _between(
 ) -> Difference:
     """Measure how an output differs with a note, beside the notes in `taken`."""
     there, none = ~runs.gaps[:, k] & np.isfinite(column.table).all(1), np.empty((0, len(runs)))
-    left = _Left.of(runs.y[:, k], there, *_repeats(runs, taken), none)
+    left = _Left.of(runs.y[:, k], there, runs.session, *_repeats(runs, taken), none)
     y = left.column(runs.y[:, [k]])[:, 0]
     sizes = np.linalg.lstsq(left.column(column.table), y, rcond=None)[0]
     largest = int(np.argmax(np.abs(sizes)))
@@ -274,7 +275,7 @@ def _between(
 def _breaks(runs: Runs, left: Floats, keys: Floats, rng: np.random.Generator) -> list[_Test]:
     """Test what is left of an identity (n,): along each setting, and in the mean of the sessions."""
     there = np.isfinite(left)
-    of_runs = _Left.of(left, there, runs.session, np.zeros((len(left), 1)), keys)
+    of_runs = _Left.of(left, there, np.zeros_like(runs.session), runs.session, np.zeros((len(left), 1)), keys)
     tests = []
     for name, (values, _) in runs.settings.items():
         if np.ptp(values) > 0 and abs(_broken(runs, left, name)[1]) > _TOLERANCE:

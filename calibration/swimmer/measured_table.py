@@ -103,8 +103,8 @@ class Measurements(Runs):
         of = dict(zip(self.outputs, known.T, strict=True))
         found = {}
         if {"omega_h", "omega_t"} <= set(of):
-            relative = np.logaddexp(of["omega_t"], of["omega_h"]) - np.log(np.abs(self.omega))
-            found["(ω_t − ω_h)/ω"] = relative
+            relative = np.exp(of["omega_t"]) + np.exp(of["omega_h"])
+            found["(ω_t − ω_h)/ω"] = np.log(relative / np.abs(self.omega))
         if {"v", "R_yr", "omega_yr"} <= set(of):
             found["v/(R ω_yr)"] = of["v"] - of["R_yr"] - of["omega_yr"]
         return found
