@@ -196,9 +196,9 @@ class Runs:
 
         A design (n', m) is taken where repeats differ otherwise, too: levels of condition and session, and what
         was noted (`noted_of_repeats`) or found (`differing`). Repeats in several sessions differ by what changed
-        between these, which is no noise of a run. Where fewer than `FEWEST_REPEATS` runs are repeated, mirror runs serve as repeats, but
-        for what is odd and linear in the inputs; without them the noise is unknown, and what is smooth in the
-        inputs is not counted with it.
+        between these, which is no noise of a run. Where fewer than `FEWEST_REPEATS` runs are repeated, mirror runs
+        serve as repeats, but for what is odd and linear in the inputs; without them the noise is unknown, and
+        what is smooth in the inputs is not counted with it.
         """
         session, noted = self.session[rows], self.noted_of_repeats[rows]
         condition = self.apart[rows]

@@ -13,8 +13,8 @@ elapsed_min, temperature_C, tank_diameter_cm or course_deg (direction of the pat
 of a circle). Rows that cannot be used are excluded with number and reason, and so are copies of rows
 (`calibration.statistics.copies`), and rows that lack a note which nearly all others have. A row that lacks some
 outputs counts with the others (`calibration.statistics.gaps`). Columns without any value are left out, and notes
-that many rows lack. Columns of other names are tested as groupings (`calibration.statistics.between_repeats`) or left
-out; a name that looks like a misspelt one is refused.
+that many rows lack. Columns of other names are tested as groupings (`calibration.statistics.between_repeats`) or
+left out; a name that looks like a misspelt one is refused.
 
 Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians. A
 row with a wrong sign is a bad row, because the direction of the motor determines all signs

@@ -17,7 +17,7 @@ from calibration.statistics.between_repeats import Difference
 from calibration.statistics.excluded import count_of_rows
 from calibration.statistics.fit import Fit, Pull, least_determined
 from calibration.statistics.gls import inverse_root
-from calibration.statistics.statistical_model import Parameter
+from calibration.statistics.statistical_model import Parameter, Runs
 from calibration.verdict.findings import Findings
 from calibration.words.quantities import difference_in_words
 from calibration.words.render import next_steps, sentence
@@ -165,15 +165,15 @@ def _numbers(result: Findings) -> dict[str, Any]:
         "wrong_number_records": [[_number(p) for p in alike] for alike in result.wrong_numbers],
         "notable_number": learnt[0].words if notable else None,
         "numbers_as_given": [_number(p) for p in pulls],
-        "differences": [_difference(d) for d in result.differences],
+        "differences": [_difference(d, result.runs) for d in result.differences],
         "moves": [{"words": move.words, **move.record} for move in result.moves],
     }
 
 
-def _difference(d: Difference) -> dict[str, Any]:
+def _difference(d: Difference, runs: Runs) -> dict[str, Any]:
     names = ("output", "column", "where", "against", "of_reading", "size", "z", "p")
     record = {name: getattr(d, name) for name in names} | {"instead": list(d.instead), "numbers": list(d.numbers)}
-    return {"words": difference_in_words(record), **record}
+    return {"words": difference_in_words(_outputs(runs), record), **record}
 
 
 def _number(pull: Pull) -> dict[str, Any]:
@@ -263,14 +263,20 @@ def _next(result: Findings) -> dict[str, Any]:
     }
 
 
+def _outputs(runs: Runs) -> dict[str, Any]:
+    return {
+        "output_titles": {name: runs.title_of(name) for name in runs.outputs},
+        "output_scales": {name: list(runs.scale_of(name)) for name in runs.outputs},
+    }
+
+
 def _data(result: Findings) -> dict[str, Any]:
     runs = result.runs
     scatter = np.sqrt(np.diag(result.base.noise.run_covariance)).tolist()
     settings = runs.settings.items()
     return {
         "outputs": list(runs.outputs),
-        "output_titles": {name: runs.title_of(name) for name in runs.outputs},
-        "output_scales": {name: list(runs.scale_of(name)) for name in runs.outputs},
+        **_outputs(runs),
         "number_of_runs": len(runs),
         "number_of_held_out_runs": int(result.split.test.sum()),
         "settings": {name: [float(v.min()), float(v.max()), unit] for name, (v, unit) in settings},

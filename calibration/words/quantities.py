@@ -49,24 +49,28 @@ def along_in_words(record: Record, largest: str) -> str:
     return f"{output_label(record, output)} along {feature_in_words(feature)}" if feature else largest
 
 
-def offset(size: float, output: str, *, signed: bool = True) -> str:
+def offset(record: Record, size: float, output: str, *, signed: bool = True) -> str:
     """Write by how much an output is off, on the scale on which it is fitted: "-12 %", "+3.1°"."""
-    scale, unit = output_scale(output)
-    number = plain(scale * (size if output == _IN_DEGREES else math.expm1(size)), 2)
+    scale, unit = record.get("output_scales", {}).get(output, (100.0, "%"))
+    number = plain(scale * (math.expm1(size) if unit == "%" else size), 2)
     return f"{'+' if size > 0 else ''}{number}{_after_number(unit)}".lstrip("" if signed else "+-")
 
 
-def difference_in_words(difference: Record) -> str:
-    """Say a difference, as in "the yaw rate of operator B is 12 % below that of operator A (6.8 σ)"."""
+def difference_in_words(record: Record, difference: Record) -> str:
+    """Say a difference, as in "the yaw rate of operator B is 12 % below that of operator A (6.8 σ)".
+
+    Args:
+        record: of the outputs, their titles and scales.
+    """
     output, size, where, against = (difference[key] for key in ("output", "size", "where", "against"))
-    by, side = offset(size, output, signed=False), "below" if size < 0 else "above"
+    by, side = offset(record, size, output, signed=False), "below" if size < 0 else "above"
     if not difference["numbers"]:
         words = f"{output} is {by} {side} 1 {where}"
     elif against:
-        words = f"the {output_label(output)} of {where} is {by} {side} that of {against}"
+        words = f"the {output_label(record, output)} of {where} is {by} {side} that of {against}"
     else:
         changes = "changes by ±" if where.startswith("over ") else "falls by" if size < 0 else "rises by"
-        words = f"the {output_label(output)} {changes} {by} {where}"
+        words = f"the {output_label(record, output)} {changes} {by} {where}"
     return f"{words} ({difference['z']:.1f} σ)"
 
 

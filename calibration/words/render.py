@@ -93,11 +93,12 @@ def _environment() -> Environment:
 
 _FILTERS: dict[str, Callable[..., str]] = {
     "percent": percent, "digits": digits, "p": p_in_words, "plain": plain, "size": size, "detectable": detectable,
-    "given": given, "tolerance": tolerance, "fitted_value": fitted_value, "offset": offset, "direction": direction_in_words,
+    "given": given, "tolerance": tolerance, "fitted_value": fitted_value, "direction": direction_in_words,
     "ranges": ranges_in_words, "in_lab": length_in_lab,
 }  # fmt: skip
 _OF_OUTPUTS: dict[str, Callable[..., str]] = {  # their first argument is the whole record
     "output": output_label,
+    "offset": offset,
     "output_error": output_error,
     "along": along_in_words,
 }
