@@ -92,9 +92,14 @@ class Measurements(Runs):
 
     @property
     def noted_of_repeats(self) -> Floats:
-        """Temperature and course."""
-        kept = [i for i, name in enumerate(self.noted_names) if name in ("temperature_K", "course_x", "course_y")]
-        return self.noted[:, kept]
+        """Temperature and course, by which a current acts as its share of the speed and the square of that."""
+        noted = dict(zip(self.noted_names, self.noted.T, strict=True))
+        columns = [noted["temperature_K"]] if "temperature_K" in noted else []
+        if "course_x" in noted:
+            slow, side = np.abs(self.omega).mean() / np.abs(self.omega), np.sign(self.omega)
+            x, y = noted["course_x"] * slow, noted["course_y"] * slow
+            columns += [x, y, x * side, y * side, x**2 - y**2, x * y]
+        return np.stack(columns, 1) if columns else np.empty((len(self), 0))
 
     @property
     def identities(self) -> dict[str, Floats]:

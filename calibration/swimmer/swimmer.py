@@ -287,7 +287,8 @@ class SwimmerModel:
         numbers = {name: of(name, robot_number(robot, name)) for name in (*COEFFICIENTS, *FIELDS)}
         numbers |= {"tails": runs.tails[None], "tail_length": runs.length + of(LENGTH, 0.0)}
         numbers["motor_speed"] = np.abs(runs.omega) * of(TACHOMETER, 1.0) * (1 - of(SLIP, 0.0))
-        effects, current = {name: np.full((1, 1), size) for name, size in robot.effects.items()}, np.zeros((1, 1))
+        effects = {name: np.full((1, 1), size) for name, size in robot.effects.items()}
+        current: dict[str, Floats] = {}
         for name in dict.fromkeys(name for parameters in sets for name in parameters):
             if (influence := self._seconds.get(name) or self._influence(name)) is None:
                 continue
@@ -297,15 +298,22 @@ class SwimmerModel:
             if effect is not None:
                 effects[effect] = effects.get(effect, effect_named(effect).null) + by if influence.needs else value
             elif name in CURRENT:
-                current = current + by
+                current[name] = value
             for number, power in influence.one_tail.items():
                 numbers[number] = numbers[number] * (1 - value / runs.tails) ** power
-        length = numbers["tail_length"]
+        length, side = numbers["tail_length"], np.sign(runs.omega)
+        along, across = self._current(current, of(COURSE, 0.0)) if current else (np.zeros((1, 1)),) * 2
         view = Observation(
             runs.outputs, time_scale(numbers), length, numbers["head_length"] / length, of(TRACKED_POINT, 0.0),
-            current, of(CAMERA, 1.0), of(HEADING, 0.0) * np.sign(runs.omega),
+            along, across * side, of(CAMERA, 1.0), of(HEADING, 0.0) * side,
         )  # fmt: skip
         return Inputs(numbers, effects, view)
+
+    def _current(self, current: Mapping[str, Floats], zero: Floats) -> tuple[Floats, Floats]:
+        """Return a current along the paths and to their left, (P, n)."""
+        x, y = (self._driver(name, zero) for name in ("course_x", "course_y"))
+        u, v = (current.get(name, np.zeros((1, 1))) for name in CURRENT)
+        return u * x + v * y, v * x - u * y
 
     def _direction(self, columns: Mapping[str, Floats], moved: Sequence[str] = ()) -> Floats:
         """Return the sign of the motor's direction, (P, n): 1 unless something odd is at work or `moved`."""

@@ -94,9 +94,13 @@ def test_a_current_shows_in_the_speed_along_its_heading_and_in_the_radius(table:
     still, moving = model.predict([at, {**at, "current_along_x": 0.001}])
     speed, radius = (model.runs.outputs.index(name) for name in ("v", "R_yr"))
     gained = np.exp(moving[:, speed]) - np.exp(still[:, speed])
-    assert gained == pytest.approx(0.001 * np.cos(np.radians(table["course_deg"])))
+    course, own = np.radians(table["course_deg"]), np.exp(still[:, speed])
+    across = -0.001 * np.sin(course) / own
+    assert gained == pytest.approx(0.001 * np.cos(course) + own * (np.sqrt(1 - across**2) - 1))
+    slip, side = model.runs.outputs.index("theta"), np.sign(table["omega_rpm"])
+    assert (moving - still)[:, slip] == pytest.approx(side * np.arcsin(across))
     assert (moving - still)[:, radius] == pytest.approx((moving - still)[:, speed])  # R = v/|ω_yr|, as seen
-    assert np.delete(moving - still, [speed, radius], 1) == pytest.approx(0)
+    assert np.delete(moving - still, [speed, radius, slip], 1) == pytest.approx(0)
     names = ("current_along_x", "camera_scale", "C_t", "tail_length_offset", "viscosity")
     at = {**at, "current_along_x": 0.001}
     exact, difference = (f(at, names)[1] for f in (partial(derivatives, model), partial(by_differences, model)))
