@@ -35,11 +35,18 @@ def test_a_stored_verdict_says_again_what_it_said(name: str) -> None:
     assert next_steps(record) == record["next_steps"] != []
 
 
-NEAREST = {"title": "a wall", "removed_share": 0.999, "reason": "its interval includes the null"}
+NEAREST = {
+    "unit": "1",
+    "shown": 1.0,
+    "title": "a wall",
+    "removed_share": 0.999,
+    "reason": "its interval includes the null",
+}
 HEAD = {"title": "L (head length)", "departure": "9 % above what was given", "tolerances": 9.4}
 UNEXPLAINED = {"verdict": "unexplained", "p_value": 0.001, "held_out_error_falls": None}
 SPREAD = {
     "effect": "wall", "title": "a wall", "mean": 2.0, "interval": [1.0, 3.0],
+    "unit": "1", "shown": 1.0,
     "sizes": {"A": [1.5, 1.0, 2.0], "B": [9.0, 8.0, 10.0]}, "removed_share": 0.999, "remainder": 0.0,
     "largest_along": "", "as_well": ["drag", "a current"],
 }  # fmt: skip
