@@ -59,25 +59,24 @@ def paired_gain(study: Study, one: Fit, other: Fit, b: float = 1.0) -> PairedGai
 
 @dataclass(frozen=True)
 class Form:
-    """The model with one effect."""
+    """The model with an effect, or with several."""
 
-    effect: Parameter
+    effects: tuple[Parameter, ...]
     fit: Fit
     at_theory: bool  # it has the size that theory gives, which is not fitted
     error: float = math.nan  # relative rms on left-out runs
 
     @property
     def title(self) -> str:
-        """The effect in words, with its size if theory gives it."""
-        size = f" at the size of theory, {self.effect.theory:g}" if self.at_theory else ""
-        return f"{self.effect.title}{size}"
+        """The effects in words, with the size if theory gives it."""
+        size = f" at the size of theory, {self.effects[0].theory:g}" if self.at_theory else ""
+        return " and ".join(e.title for e in self.effects) + size
 
     def record(self) -> dict[str, Any]:
         """Return the record for verdict.json."""
         return {
-            "effect": self.effect.name,
             "title": self.title,
-            "size": self.fit.parameters[self.effect.name],
+            "sizes": {e.name: self.fit.parameters[e.name] for e in self.effects},
             "theory": self.at_theory,
             "error": self.error,
         }
@@ -88,23 +87,26 @@ def at_theory(study: Study, base: Fit, effect: Parameter) -> Form | None:
     if effect.theory is None:
         return None
     start = {**base.parameters, effect.name: effect.theory}
-    return Form(effect, fit(study.model, start, base.names, study.split.fitted, title=""), True)
+    return Form((effect,), fit(study.model, start, base.names, study.split.fitted, title=""), True)
 
 
-def forms_of_claim(study: Study, base: Fit, claim: Candidate, candidates: Sequence[Candidate]) -> list[Form]:
-    """List the forms that left-out runs cannot tell from a claim of a single effect, the claim among them.
+def forms_of_claims(
+    study: Study, base: Fit, claims: Sequence[Candidate], candidates: Sequence[Candidate]
+) -> list[Form]:
+    """List claims that explain the runs, and the forms that left-out runs cannot tell from the best one.
 
     Those at the size of theory come first. An effect that was refitted counts also where it was not kept.
     """
-    if claim.refit is None or len(claim.claimed) > 1:
-        return []
-    own = Form(claim.effect, claim.refit, False)
+    claimed = [Form(c.claimed, c.refit, False) for c in claims if c.refit]
+    known = {form.effects for form in claimed}
     fitted = [
-        Form(c.effect, c.refit, False) for c in candidates
-        if c.effect is not claim.effect and c.refit and c.refit.converged and len(c.claimed) == 1
+        Form(c.claimed, c.refit, False) for c in candidates
+        if c.claimed not in known and c.refit and c.refit.converged
     ]  # fmt: skip
-    theory = (at_theory(study, base, form.effect) for form in (own, *fitted))
-    return as_good(study, own, [*(form for form in theory if form), own, *fitted])
+    theory = (at_theory(study, base, form.effects[0]) for form in (*claimed, *fitted) if len(form.effects) == 1)
+    near = as_good(study, claimed[0], [*(form for form in theory if form), *fitted])
+    alike = [replace(form, error=_error_left_out(study, form.fit)) for form in claimed]
+    return [*(f for f in near if f.at_theory), *alike, *(f for f in near if not f.at_theory)]
 
 
 def as_good(study: Study, best: Form, forms: Iterable[Form]) -> list[Form]:

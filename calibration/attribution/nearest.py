@@ -219,7 +219,7 @@ def adopt_nearest(
     if not adopted:
         return None
     largest = max(adopted, key=lambda form: form.gain)
-    as_form = {id(a.fit): Form(a.effect, a.fit, a.at_theory) for a in adopted}
+    as_form = {id(a.fit): Form((a.effect,), a.fit, a.at_theory) for a in adopted}
     alike = as_good(study, as_form[id(largest.fit)], as_form.values())
     alike.sort(key=lambda form: not form.at_theory)
     best = next((a for a in adopted if alike[0].at_theory and a.fit is alike[0].fit), largest)

@@ -45,7 +45,7 @@ _FAR, _MAD = 4.0, 1.4826  # residuals are clipped at so many robust standard dev
 _NONE, _TINY = 1e-9, 1e-300
 
 
-class Column(NamedTuple):
+class NotedColumn(NamedTuple):
     """A note as numbers (n, a), each with a name; NaN where it was not noted."""
 
     note: str
@@ -72,7 +72,7 @@ class Difference:
 
 
 class _Test(NamedTuple):
-    column: Column
+    column: NotedColumn
     p: float  # of an F-distribution
     null: Floats  # (D,) the same of the draws
     free: bool  # whether M leaves enough of the column
@@ -92,7 +92,7 @@ def _noted(values: Any) -> Flags:
     return np.isfinite(known.astype(float)) if known.dtype.kind in "fiu" else known.astype(str) != ""
 
 
-def columns_of(runs: Runs) -> list[Column]:
+def columns_of(runs: Runs) -> list[NotedColumn]:
     """Make columns of every note, and of the order of the runs."""
     columns = []
     for note, noted in {**runs.notes, ORDER: runs.rows}.items():
@@ -104,16 +104,20 @@ def columns_of(runs: Runs) -> list[Column]:
             common = kinds[np.argmax(count)]
             others = [kind for kind in kinds if kind != common]
             table = np.where(there[:, None], values.astype(str)[:, None] == others, np.nan)
-            columns.append(Column(note, tuple(f"{note} {kind}" for kind in others), table, f"{note} {common}"))
+            columns.append(
+                NotedColumn(note, tuple(f"{note} {kind}" for kind in others), table, f"{note} {common}")
+            )
         elif note.endswith(("_deg", "_rad")):
             angle = np.asarray(np.radians(values) if note.endswith("_deg") else values, dtype=float)
             for turns, of in ((1, note), (2, f"2 {note}")):
                 table = np.column_stack([np.cos(turns * angle), np.sin(turns * angle)])
-                columns.append(Column(note, (f"cos {of}", f"sin {of}"), table))
+                columns.append(NotedColumn(note, (f"cos {of}", f"sin {of}"), table))
         else:
             values = values.astype(float)
             low, high = np.nanmin(values), np.nanmax(values)
-            columns.append(Column(note, (note,), (values - (low + high) / 2)[:, None] / max(high - low, _TINY)))
+            columns.append(
+                NotedColumn(note, (note,), (values - (low + high) / 2)[:, None] / max(high - low, _TINY))
+            )
     return columns
 
 
@@ -122,7 +126,7 @@ def find_differences(runs: Runs, *, level: float, seed: int = 0) -> tuple[Differ
     rng = np.random.default_rng(seed)
     keys = rng.random((_DRAWS, len(runs)))
     outputs, found, broken = range(len(runs.outputs)), [], []
-    columns, taken = [columns_of(runs) for _ in outputs], [list[Column]() for _ in outputs]
+    columns, taken = [columns_of(runs) for _ in outputs], [list[NotedColumn]() for _ in outputs]
     tests: dict[int | str, list[_Test]] = {n: _breaks(runs, d, keys, rng) for n, d in runs.identities.items()}
     tests |= {k: _of_output(runs, k, columns[k], [], keys) for k in outputs}
     while every := [(subject, test) for subject, of in tests.items() for test in of if test.free]:
@@ -147,7 +151,7 @@ def find_differences(runs: Runs, *, level: float, seed: int = 0) -> tuple[Differ
     return (*broken, *found)
 
 
-def _of_reading(runs: Runs, k: int, column: Column) -> list[Column]:
+def _of_reading(runs: Runs, k: int, column: NotedColumn) -> list[NotedColumn]:
     """Let the offset of one kind follow what is read: make the column times the mean of the repeats' output."""
     if column.of_reading:
         return []
@@ -157,7 +161,7 @@ def _of_reading(runs: Runs, k: int, column: Column) -> list[Column]:
     return [column._replace(table=column.table * scaled, of_reading=True)]
 
 
-def _repeats(runs: Runs, taken: Sequence[Column]) -> tuple[Integers, Floats]:
+def _repeats(runs: Runs, taken: Sequence[NotedColumn]) -> tuple[Integers, Floats]:
     """Number the repeats (n,), and make columns (n, c) of what they may differ by: sessions, and what is known."""
     known = [runs.session[:, None] == np.unique(runs.session), runs.inputs]
     known += [np.nan_to_num(column.table) for column in taken]
@@ -215,7 +219,7 @@ class _Left(NamedTuple):
         centred = _centred(table[self.rows], self.group)
         return np.asarray(centred - self.basis @ (self.basis.T @ centred))
 
-    def test(self, of: Column) -> _Test:
+    def test(self, of: NotedColumn) -> _Test:
         """Test what is left along a column."""
         table, column = of.table, self.column(of.table)
         along = _span(column)
@@ -231,7 +235,9 @@ class _Left(NamedTuple):
         return _Test(of, float(p[0]), p[1:], True)
 
 
-def _of_output(runs: Runs, k: int, columns: list[Column], taken: list[Column], keys: Floats) -> list[_Test]:
+def _of_output(
+    runs: Runs, k: int, columns: list[NotedColumn], taken: list[NotedColumn], keys: Floats
+) -> list[_Test]:
     """Test an output along every column, beside those that are taken."""
     group, known = _repeats(runs, taken)
     left: dict[bytes, _Left] = {}
@@ -246,7 +252,7 @@ def _of_output(runs: Runs, k: int, columns: list[Column], taken: list[Column], k
 
 
 def _between(
-    runs: Runs, k: int, column: Column, taken: list[Column], z: float, p: float, instead: tuple[str, ...]
+    runs: Runs, k: int, column: NotedColumn, taken: list[NotedColumn], z: float, p: float, instead: tuple[str, ...]
 ) -> Difference:
     """Measure how an output differs with a note, beside the notes in `taken`."""
     there, none = ~runs.gaps[:, k] & np.isfinite(column.table).all(1), np.empty((0, len(runs)))
@@ -280,13 +286,13 @@ def _breaks(runs: Runs, left: Floats, keys: Floats, rng: np.random.Generator) ->
     for name, (values, _) in runs.settings.items():
         if np.ptp(values) > 0 and abs(_broken(runs, left, name)[1]) > _TOLERANCE:
             x = (values - values.mean()) / values.std()
-            tests.append(of_runs.test(Column(name, (), np.column_stack([x, x**2]))))
+            tests.append(of_runs.test(NotedColumn(name, (), np.column_stack([x, x**2]))))
     means = np.array([left[there & (runs.session == s)].mean() for s in np.unique(runs.session[there])])
     if len(means) > 2:
         beyond = max(abs(float(means.mean())) - _TOLERANCE, 0.0)
         f = beyond**2 * len(means) / max(float(means.var(ddof=1)), _TINY)
         p = float(fdtrc(1, len(means) - 1, f))
-        tests.append(_Test(Column("", (), left), p, rng.random(len(keys)), True))
+        tests.append(_Test(NotedColumn("", (), left), p, rng.random(len(keys)), True))
     return tests
 
 

@@ -31,7 +31,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 from calibration.attribution.claim_checks import check_number, with_checks
-from calibration.attribution.forms import Form, envelope, forms_of_claim
+from calibration.attribution.forms import Form, envelope, forms_of_claims
 from calibration.attribution.moves import LocalShift, StatedMove, find_moves, groups_that_may_differ
 from calibration.attribution.nearest import adopt_nearest, largest_along
 from calibration.attribution.refits import (
@@ -205,7 +205,7 @@ def _forms(study: Study, found: Attribution) -> tuple[Form, ...]:
     if found.nearest:
         forms: Sequence[Form] = found.nearest.forms
     else:
-        forms = forms_of_claim(study, found.base, found.best[0], found.candidates) if found.best else ()
+        forms = forms_of_claims(study, found.base, found.best, found.candidates) if found.best else ()
     return tuple(forms) if len(forms) > 1 else ()
 
 
