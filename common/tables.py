@@ -31,6 +31,7 @@ from typing import Any
 import pandas as pd
 
 from common.errors import InputError
+from common.keywords import checks_keywords
 from common.number_words import check_marks, is_missing, is_number, plain_text, values_of
 from common.reading import MOST_BYTES, decode, read_bytes
 from common.units import find_unit
@@ -46,6 +47,7 @@ _SEPARATORS = (";", "\t", ",")
 Row = tuple[int, list[str]]  # the number of a line, and its words
 
 
+@checks_keywords
 def read_table(path: str | Path, *, names: bool = True) -> pd.DataFrame:
     """Read a table: Parquet or a spreadsheet if the name ends so, otherwise text.
 

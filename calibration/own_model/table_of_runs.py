@@ -80,7 +80,7 @@ def _read(table: pd.DataFrame, model: Model, roles: Roles) -> tuple[FunctionMode
     needed = list(dict.fromkeys([*columns.asked, *settings, *own]))
     _add_missing(faults, columns, needed, table)
     specimen = [roles.specimen] if roles.specimen else []
-    set_values = np.column_stack([_as_numbers(columns[name]) for name in (*settings, *specimen)])
+    set_values = np.column_stack([_as_numbers(columns[name]) for name in (*specimen, *settings)])
     _add_copies(faults, table, set_values, outputs)
     keep = np.array([row not in faults for row in range(len(table))])
     if not keep.any():
@@ -93,7 +93,7 @@ def _read(table: pd.DataFrame, model: Model, roles: Roles) -> tuple[FunctionMode
     logarithmic = [name for name in settings if columns[name].dtype.kind == "f" and (columns[name] > 0).all()]
     inputs = {
         f"ln {name}" if name in logarithmic else name: np.log(value) if name in logarithmic else value
-        for name, value in zip(settings, set_values[keep].T, strict=False)
+        for name, value in zip(settings, set_values[keep, len(specimen) :].T, strict=True)
     }
     missing = table[list(outputs)].isna()
     runs = TableRuns(
@@ -114,7 +114,11 @@ def _read(table: pd.DataFrame, model: Model, roles: Roles) -> tuple[FunctionMode
         noise_known=roles.noise != "unknown",
         notes=_notes(columns, needed, roles.notes, good, condition),
         output_titles={name: output.title for name, output in model.outputs.items()},
-        output_scales={name: (1.0, o.unit) for name, o in model.outputs.items() if o.kind == "difference"},
+        output_scales={
+            name: (1.0, output.unit.removeprefix("1"))
+            for name, output in model.outputs.items()
+            if output.kind == "difference"
+        },
         lines=table.index.to_numpy()[keep] if table.index.name == LINE else None,
         words=frozenset(name for name in settings if columns[name].dtype.kind != "f"),
     )

@@ -95,7 +95,7 @@ def _draw_residual(residual: Floats, limits: Floats, used: Flags, data: Runs) ->
             axes.plot(values[some] + jitter[some], scale * residual[some, i], ".", ms=4, color=colour)
         axes.axhline(0, color=INK, lw=0.6)
         axes.set_ylim(-scale * limits[i], scale * limits[i])
-        axes.set_ylabel(f"{data.title_of(name)} [{unit}]", fontsize=8)
+        axes.set_ylabel(f"{data.title_of(name)} [{unit}]".removesuffix(" []"), fontsize=8)
         axes.tick_params(labelsize=8)
     levels = np.unique(values)
     if len(levels) <= 8:

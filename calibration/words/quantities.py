@@ -33,7 +33,7 @@ def output_error(record: Record, error: float, output: str) -> str:
     """Write an error of an output in the unit in which it is shown; default: in per cent."""
     scale, unit = record.get("output_scales", {}).get(output, (100.0, "%"))
     number = f"{scale * error:.1f}" if unit in ("%", "°") else plain(scale * error)
-    return f"{number}{_after_number(unit)}"
+    return f"{number}{_after_number(unit)}".rstrip()
 
 
 def feature_in_words(name: str) -> str:

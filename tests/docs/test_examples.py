@@ -35,10 +35,11 @@ def marked() -> list[Any]:
 
 
 def environment(folder: Path) -> dict[str, str]:
-    """Make an environment in which `softflagella` is the command of this source tree."""
-    command = folder / "softflagella"
-    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m softflagella "$@"\n')
-    command.chmod(0o755)
+    """Make an environment in which `softflagella` is the command of this source tree, and `python` this Python."""
+    for name, words in (("softflagella", " -m softflagella"), ("python", "")):
+        command = folder / name
+        command.write_text(f'#!/bin/sh\nexec "{sys.executable}"{words} "$@"\n')
+        command.chmod(0o755)
     path = os.pathsep.join([str(folder), os.environ.get("PATH", "")])
     return {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT)}
 
