@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from calibration.own_model.function_model import NOT_ABOVE_0, FunctionModel
-from calibration.statistics.statistical_model import Parameter, start_values
-from common.arrays import Floats
+from calibration.statistics.gls import repeat_count, repeat_covariance
+from calibration.statistics.statistical_model import FEWEST_REPEATS, Parameter, start_values
+from common.arrays import Flags, Floats
 from common.errors import InputError
 
 _FAR = 100.0  # factor between what was measured and the model with its start values
@@ -15,6 +16,7 @@ _OTHER_UNITS = (  # factor, units of an output in which it is a mistake, what th
     (180 / np.pi, ("1", "rad", "deg", "°"), "degrees"),
 )
 _NEAR = 1.3  # factor between another unit and what is found
+_ROUNDING = 1e-24  # variance of repeats that are equal, over the mean square
 _TOGETHER = 0.9  # least correlation, about 0, of what is compared as a difference
 
 
@@ -25,11 +27,20 @@ def check_function(model: FunctionModel) -> None:
         InputError: there are fewer values than numbers, a prediction cannot be compared, a parameter changes
             nothing, or an output is far from what was measured.
     """
-    parameters, start, runs = model.model.parameters, start_values(model), model.runs
+    runs = model.runs
+    if runs.sigma is None and repeat_count(runs.apart) >= FEWEST_REPEATS:
+        variances = np.diag(repeat_covariance(runs.y, runs.apart))
+        for place in np.flatnonzero(variances <= _ROUNDING * np.mean(runs.y**2, 0))[:1].tolist():
+            raise InputError(
+                f"{runs.outputs[place]} is the same in all repeats; drop copies of rows, or give measured values, unrounded"
+            )
+    parameters, start = model.model.parameters, start_values(model)
     if runs.values(np.ones(len(runs), dtype=bool)) <= len(model.coefficients):
         raise InputError(f"{len(runs)} usable rows for {len(model.coefficients)} numbers to fit; give more rows")
-    given, *changed = model.predict([start, *({**start, p.name: _changed(p)} for p in parameters)])
+    given, again, *changed = model.predict([start, start, *({**start, p.name: _changed(p)} for p in parameters)])
     _check_values(model, given, changed)
+    if not np.array_equal(given, again):
+        raise InputError("the model's function gives other values when it is called again; let it draw no numbers")
     for parameter, prediction in zip(parameters, changed, strict=True):
         if np.array_equal(prediction, given):
             raise InputError(
@@ -63,24 +74,23 @@ def _changed(parameter: Parameter) -> float:
 
 def _check_values(model: FunctionModel, given: Floats, changed: list[Floats]) -> None:
     """Refuse a value with which none can be compared, and name the effect that makes it."""
-    bad = ~np.isfinite(given) | (given == NOT_ABOVE_0)
-    for row, place in np.argwhere(bad & ~model.runs.gaps)[:1].tolist():
-        at, name = model.runs.row_name(row), model.runs.outputs[place]
-        value = "not above 0" if given[row, place] == NOT_ABOVE_0 else f"{given[row, place]:g}"
-        mended = [
-            p for p, prediction in zip(model.model.parameters, changed, strict=True)
-            if p.name in {e.name for e in model.effects} and np.isfinite(prediction[row, place])
-            and prediction[row, place] != NOT_ABOVE_0
-        ]  # fmt: skip
-        if mended:
-            raise InputError(
-                f"{mended[0].words} does not vanish at its null, {mended[0].start:g}: there {name} is {value} in "
-                f"{at}; write the function so that it is the model without the effect there"
-            )
-        raise InputError(
-            f"the model's {name} is {value} in {at}; return finite numbers"
-            + (", above 0 as it is compared as a ratio (or declare kind='difference')" if value[0] == "n" else "")
-        )
+    for row, place in np.argwhere(_unusable(given))[:1].tolist():
+        low = bool(given[row, place] == NOT_ABOVE_0)
+        value = "not above 0" if low else f"{given[row, place]:g}"
+        what = f"{model.runs.outputs[place]} is {value} in {model.runs.row_name(row)}"
+        names = {effect.name for effect in model.effects}
+        for parameter, prediction in zip(model.model.parameters, changed, strict=True):
+            if parameter.name in names and not _unusable(prediction)[row, place]:
+                raise InputError(
+                    f"{parameter.words} does not vanish at its null, {parameter.start:g}: there {what}; "
+                    "make the function the model without the effect there"
+                )
+        positive = ", above 0 as ratios are compared, or declare kind='difference'" * low
+        raise InputError(f"the model's {what}; return finite numbers{positive}")
+
+
+def _unusable(prediction: Floats) -> Flags:
+    return ~np.isfinite(prediction) | (prediction == NOT_ABOVE_0)
 
 
 def _slope(measured: Floats, predicted: Floats) -> float:

@@ -139,9 +139,9 @@ class Model:
         for what, kind in (("outputs", Output), ("numbers", Number), ("effects", ModelEffect)):
             given = getattr(self, what)
             each = list(given.values() if what == "outputs" and isinstance(given, Mapping) else given)
-            if not all(isinstance(one, kind) for one in each) or (what == "outputs" and not each):
+            if not all(isinstance(one, kind) for one in each) or not (each or what == "effects"):
                 name = kind.__name__.removeprefix("Model")
-                raise InputError(f"{what} of a model are each an sf.{name}; given: {given!r}")
+                raise InputError(f"{what} of a model are each an sf.{name}, one at least; given: {given!r}")
         names_once(parameter.name for parameter in self.parameters)
 
     def without(self, *names: str) -> Model:

@@ -9,14 +9,37 @@ from typing import Any
 
 import numpy as np
 
-from calibration.own_model.columns import AskedColumns
 from calibration.own_model.declared import Model
 from calibration.statistics.forward import secants
 from calibration.statistics.statistical_model import Parameter, Parameters, Predict, Runs
-from common.arrays import Flags, Floats
+from common.arrays import Flags, Floats, Integers
 from common.errors import InputError
 
 NOT_ABOVE_0 = np.log(1e-300)  # stands for the logarithm of what is not above 0
+
+
+class AskedColumns(dict[str, Any]):
+    """Columns (n,), floats or words, that cannot be changed, and note for which of them a function asks."""
+
+    def __init__(self, columns: Mapping[str, Any], asked: dict[str, None] | None = None):
+        super().__init__(columns)
+        self.asked = dict[str, None]() if asked is None else asked  # in order
+        for values in columns.values():
+            values.setflags(write=False)
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self:
+            raise InputError(f"the model's function asks for column {name!r}; the table has {', '.join(self)}")
+        self.asked[name] = None
+        return super().__getitem__(name)
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """Return a column if it is there."""
+        return self[name] if name in self else default  # noqa: SIM401 (it is this)
+
+    def rows(self, rows: Flags | Integers) -> AskedColumns:
+        """Choose rows."""
+        return AskedColumns({name: values[rows] for name, values in self.items()}, self.asked)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """A table of runs of any columns, for a model of one's own: one run a row.
 
 Rows that lack what the function asks for are excluded, and copies of rows; a row that lacks some of the outputs
-counts with the others. Columns that nobody asks for are notes.
+counts with the others. Columns that nobody asks for are notes, unless an output was computed from them.
 """
 
 from __future__ import annotations
@@ -15,9 +15,8 @@ import numpy as np
 import pandas as pd
 
 from calibration.own_model.checks import check_function
-from calibration.own_model.columns import AskedColumns, is_missing, levels, values_of_column
 from calibration.own_model.declared import Model
-from calibration.own_model.function_model import FunctionModel, TableRuns, evaluate
+from calibration.own_model.function_model import AskedColumns, FunctionModel, TableRuns, evaluate
 from calibration.statistics.copies import COPY, find_copies
 from calibration.statistics.excluded import MANY, Excluded
 from calibration.statistics.gaps import filled, gaps_in_words, not_finite, with_outputs, without_gaps
@@ -29,14 +28,12 @@ from common.quantities import numbers_of
 from common.tables import LINE, read_table, row_name
 
 Noise = Mapping[str, float] | Literal["unknown"]
-
-
 _FOLLOWS = 0.98  # correlation of ranks among repeats with an output that was computed from a column
 _TRUE = ("true", "yes", "1", "1.0")
 
 
 class Roles(NamedTuple):
-    """What columns of a table are, beside outputs and what the function asks for."""
+    """What columns of a table are, beside outputs and what the function asks for; see `softflagella.calibrate`."""
 
     session: str | None = None
     specimen: str | None = None
@@ -45,11 +42,8 @@ class Roles(NamedTuple):
     notes: Sequence[str] | None = None
 
 
-_NONE = Roles()
-
-
 def read_runs_of(
-    source: str | Path | pd.DataFrame, model: Model, roles: Roles = _NONE
+    source: str | Path | pd.DataFrame, model: Model, roles: Roles
 ) -> tuple[FunctionModel, Flags | None]:
     """Read the runs of a model from a file or a table, check both, and say which are held out, (n,).
 
@@ -59,46 +53,48 @@ def read_runs_of(
     with naming(source):
         table = (source if isinstance(source, pd.DataFrame) else read_table(source)).rename(columns=str)
         if table.columns.has_duplicates:
-            raise InputError(
-                f"the table has two columns {table.columns[table.columns.duplicated()][0]!r}; drop one"
-            )
-        return _read(table, model, roles)
+            raise InputError(f"the table has a column {table.columns[table.columns.duplicated()][0]!r} twice")
+        result = _read(
+            table, model, roles._replace(session=roles.session or ("session" in table and "session") or None)
+        )
+        check_function(result)
+        return result, _held_out(roles.held_out, result)
 
 
-def _read(table: pd.DataFrame, model: Model, roles: Roles) -> tuple[FunctionModel, Flags | None]:
-    if roles.session is None and "session" in table:
-        roles = roles._replace(session="session")
-    split = [roles.held_out] if isinstance(roles.held_out, str) and roles.held_out in table else []
-    own = [name for name in (roles.session, roles.specimen, *split) if name]
-    for what, names in (("output", model.outputs), ("setting", model.settings or ()), ("column", own),
-                        ("note", roles.notes or ())):  # fmt: skip
-        _refuse_unknown(what, names, table)
-    outputs, titles = table[list(model.outputs)].apply(numbers_of), map(str, table)
-    columns = AskedColumns({name: values_of_column(table[name]) for name in titles if name not in outputs})
+def _read(table: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
+    own = [name for name in (roles.session, roles.specimen) if name]
+    for name in (*model.outputs, *(model.settings or ()), *own, *(roles.notes or ())):
+        if name not in table:
+            raise InputError(f"the table has no column {name!r}; it has {', '.join(table.columns)}")
+    outputs = table[list(model.outputs)].apply(numbers_of)
+    columns = AskedColumns({name: _values(table[name]) for name in table.columns if name not in outputs})
     faults = _faults_of_outputs(table, outputs, model)
     settings = _settings(model, columns, table, faults)
     needed = list(dict.fromkeys([*columns.asked, *settings, *own]))
     _add_missing(faults, columns, needed, table)
-    specimen = [roles.specimen] if roles.specimen else []
-    set_values = np.column_stack([_as_numbers(columns[name]) for name in (*specimen, *settings)])
-    _add_copies(faults, table, set_values, outputs)
+    specimens = own[-1:] if roles.specimen else []
+    was_set = np.column_stack([_as_numbers(columns[name]) for name in (*specimens, *settings)])
+    whole = [row for row in np.flatnonzero(outputs.notna().all(axis=1)).tolist() if row not in faults]
+    for place, earlier in find_copies(was_set[whole], outputs.to_numpy()[whole]).items():
+        original = f" ({row_name(table, whole[earlier])})"
+        faults[whole[place]] = Excluded(COPY, row_name(table, whole[place]), original)
     keep = np.array([row not in faults for row in range(len(table))])
     if not keep.any():
         raise InputError(f"the table has no usable row: {faults[0]}")
-    columns, good = columns.rows(keep), outputs[keep]
-    condition = np.unique(set_values[keep], axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
-    one_session = np.zeros(len(good), dtype=np.int64), ("all runs",)
-    session, session_names = levels(roles.session, columns[roles.session]) if roles.session else one_session
-    kind, kinds = levels(roles.specimen, columns[roles.specimen]) if roles.specimen else (None, ())
-    logarithmic = [name for name in settings if columns[name].dtype.kind == "f" and (columns[name] > 0).all()]
-    inputs = {
-        f"ln {name}" if name in logarithmic else name: np.log(value) if name in logarithmic else value
-        for name, value in zip(settings, set_values[keep, len(specimen) :].T, strict=True)
-    }
-    missing = table[list(outputs)].isna()
+    columns, was_set, good, missing = columns.rows(keep), was_set[keep], outputs[keep], table[list(outputs)].isna()
+    condition = np.unique(was_set, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
+    inputs, words = {}, []
+    for name, values in zip(settings, was_set[:, len(specimens) :].T, strict=True):
+        logarithmic = columns[name].dtype.kind == "f" and bool((values > 0).all())
+        inputs[f"ln {name}" if logarithmic else name] = np.log(values) if logarithmic else values
+        words += [name] if columns[name].dtype.kind != "f" else []
+    session, session_names = _levels(roles.session, columns)
+    specimen, specimen_names = _levels(roles.specimen, columns)
+    kinds = model.outputs.items()
+    compared = {name: np.log(good[name]) if o.kind == "ratio" else good[name] for name, o in kinds}
     runs = TableRuns(
         outputs=tuple(model.outputs),
-        y=filled(_as_compared(good, model), condition),
+        y=filled(pd.DataFrame(compared), condition),
         condition=condition,
         session=session,
         session_names=session_names,
@@ -108,29 +104,45 @@ def _read(table: pd.DataFrame, model: Model, roles: Roles) -> tuple[FunctionMode
         excluded=(*(faults[row] for row in sorted(faults)), *gaps_in_words(table, missing & keep[:, None])),
         caveats=(),
         completion=without_gaps(missing.to_numpy()[keep]),
-        specimen=kind,
-        specimen_names=kinds,
+        specimen=specimen if roles.specimen else None,
+        specimen_names=specimen_names if roles.specimen else (),
         sigma=_sigma(model, roles.noise),
         noise_known=roles.noise != "unknown",
-        notes=_notes(columns, needed, roles.notes, good, condition),
-        output_titles={name: output.title for name, output in model.outputs.items()},
-        output_scales={
-            name: (1.0, output.unit.removeprefix("1"))
-            for name, output in model.outputs.items()
-            if output.kind == "difference"
-        },
+        notes=_notes(columns, [*needed, *_names(roles.held_out)], roles.notes, good, condition),
+        output_titles={name: o.title for name, o in kinds},
+        output_scales={name: (1.0, o.unit.removeprefix("1")) for name, o in kinds if o.kind == "difference"},
         lines=table.index.to_numpy()[keep] if table.index.name == LINE else None,
-        words=frozenset(name for name in settings if columns[name].dtype.kind != "f"),
+        words=frozenset(words),
     )
-    result = FunctionModel(model, with_outputs(runs, range(len(runs.outputs))), columns)
-    check_function(result)
-    return result, _held_out(roles.held_out, columns[split[0]] if split else None, runs)
+    return FunctionModel(model, with_outputs(runs, range(len(runs.outputs))), columns)
 
 
-def _refuse_unknown(what: str, names: Iterable[str], table: pd.DataFrame) -> None:
-    for name in names:
-        if name not in table:
-            raise InputError(f"the table has no column {name!r} ({what}); it has {', '.join(map(str, table))}")
+def _values(column: pd.Series) -> Floats | Words:
+    """Return a column as numbers, NaN for what is none; if most values are words as words, "" for a gap."""
+    numbers, given = numbers_of(column).to_numpy(dtype=float), column.notna().to_numpy()
+    if np.isfinite(numbers).sum() * 2 < given.sum():
+        return np.where(given, column.astype(str).str.strip(), "").astype(str)
+    return numbers
+
+
+def _is_missing(values: Floats | Words) -> Flags:
+    """Say where a column has no finite number, or no word, (n,)."""
+    return np.asarray(~np.isfinite(values) if values.dtype.kind == "f" else values == "")
+
+
+def _as_numbers(values: Floats | Words) -> Floats:
+    """Return a column as numbers, those of its words where it has words."""
+    numbers = values if values.dtype.kind == "f" else np.unique(values, return_inverse=True)[1]
+    return np.asarray(numbers, dtype=float)
+
+
+def _levels(name: str | None, columns: AskedColumns) -> tuple[Integers, tuple[str, ...]]:
+    """Number the distinct values of a column, (n,), and name each; a number goes with the name of the column."""
+    if name is None:
+        return np.zeros(len(next(iter(columns.values()))), dtype=np.int64), ("all runs",)
+    distinct, number = np.unique(columns[name], return_inverse=True)
+    names = [f"{name} {value:g}" if distinct.dtype.kind == "f" else str(value) for value in distinct]
+    return number.reshape(-1).astype(np.int64), tuple(names)
 
 
 def _faults_of_outputs(table: pd.DataFrame, outputs: pd.DataFrame, model: Model) -> dict[int, Excluded]:
@@ -142,26 +154,25 @@ def _faults_of_outputs(table: pd.DataFrame, outputs: pd.DataFrame, model: Model)
     missing = table[list(outputs)].isna()
     lacking = np.flatnonzero(missing.all(axis=1)).tolist()
     faults = {row: Excluded("no output has a value", row_name(table, row)) for row in lacking}
-    for name, values in outputs.items():
-        for row in np.flatnonzero(~np.isfinite(values) & ~missing[name]).tolist():
-            faults.setdefault(row, not_finite(table, row, str(name)))
-        low = np.flatnonzero(values <= 0).tolist() if model.outputs[str(name)].kind == "ratio" else []
+    for name, output in model.outputs.items():
+        for row in np.flatnonzero(~np.isfinite(outputs[name]) & ~missing[name]).tolist():
+            faults.setdefault(row, not_finite(table, row, name))
+        low = np.flatnonzero(outputs[name] <= 0).tolist() if output.kind == "ratio" else []
         if len(low) > MANY * len(table):
             raise InputError(
                 f"{name} is not above 0 in {len(low)} of {len(table)} rows, first in {row_name(table, low[0])}, "
                 "and cannot be compared as a ratio; declare its Output with kind='difference'"
             )
         for row in low:
-            faults.setdefault(
-                row, Excluded(f"{name}{{}} is not above 0", row_name(table, row), f" = {values.iloc[row]:g}")
-            )
+            value = f" = {outputs[name].iloc[row]:g}"
+            faults.setdefault(row, Excluded(f"{name}{{}} is not above 0", row_name(table, row), value))
     return faults
 
 
 def _settings(model: Model, columns: AskedColumns, table: pd.DataFrame, faults: dict[int, Excluded]) -> list[str]:
     """Return the settings; default: the columns for which the function asks, found from rows that have them."""
-    while True:
-        before = len(columns.asked)
+    before = -1
+    while before < (before := len(columns.asked)):
         _add_missing(faults, columns, columns.asked, table)
         usable = np.array([row not in faults for row in range(len(table))])
         if not usable.any():
@@ -171,10 +182,8 @@ def _settings(model: Model, columns: AskedColumns, table: pd.DataFrame, faults: 
         except InputError:
             if len(columns.asked) == before:  # otherwise it may be due to what is missing
                 raise
-        if len(columns.asked) == before:
-            break
     if model.settings or columns.asked:
-        return list(model.settings or [name for name in columns if name in columns.asked])
+        return list(model.settings or columns.asked)
     raise InputError("the function asks for no column; name the model's settings, columns that repeats share")
 
 
@@ -183,92 +192,66 @@ def _add_missing(
 ) -> None:
     """Add every row that lacks a value of a column."""
     for name in names:
-        for row in np.flatnonzero(is_missing(columns[name])).tolist():
+        for row in np.flatnonzero(_is_missing(columns[name])).tolist():
             faults.setdefault(row, not_finite(table, row, name))
-
-
-def _as_numbers(values: Floats | Words) -> Floats:
-    """Return a column as numbers, those of its words where it has words."""
-    return np.asarray(
-        values if values.dtype.kind == "f" else np.unique(values, return_inverse=True)[1], dtype=float
-    )
-
-
-def _add_copies(
-    faults: dict[int, Excluded], table: pd.DataFrame, set_values: Floats, outputs: pd.DataFrame
-) -> None:
-    """Add every usable row that is a copy of an earlier one."""
-    usable = [row for row in np.flatnonzero(outputs.notna().all(axis=1)).tolist() if row not in faults]
-    for place, earlier in find_copies(set_values[usable], outputs.to_numpy()[usable]).items():
-        row = usable[place]
-        faults[row] = Excluded(COPY, row_name(table, row), f" ({row_name(table, usable[earlier])})")
 
 
 def _notes(
     columns: AskedColumns,
-    needed: Container[str],
+    known: Container[str],
     wanted: Sequence[str] | None,
     outputs: pd.DataFrame,
     condition: Integers,
 ) -> dict[str, Floats | Words]:
-    """Return the columns that are wanted as notes; default: all others that do not follow from an output."""
+    """Return the columns that are wanted as notes; default: all others from which no output was computed."""
     if wanted is not None:
         return {name: columns[name] for name in wanted}
-    return {
-        name: values
-        for name, values in columns.items()
-        if name not in needed and not is_missing(values).all() and not _follows(values, outputs, condition)
-    }
-
-
-def _follows(values: Floats | Words, outputs: pd.DataFrame, condition: Integers) -> bool:
-    """Tell whether a column goes with an output among repeats, as a time from which a speed was computed."""
-    if values.dtype.kind != "f":
-        return False
-    ranks = outputs.assign(**{"": values}).groupby(condition).rank()
-    correlation = (ranks - ranks.groupby(condition).transform("mean")).corr()[""].drop("").abs()
-    return bool((correlation > _FOLLOWS).any()) and repeat_count(condition) >= FEWEST_REPEATS
-
-
-def _as_compared(outputs: pd.DataFrame, model: Model) -> pd.DataFrame:
-    """Return outputs as they are compared: logarithms of what is compared as a ratio."""
-    kinds = {name: output.kind for name, output in model.outputs.items()}
-    return pd.DataFrame({name: np.log(v) if kinds[str(name)] == "ratio" else v for name, v in outputs.items()})
+    notes = {name: v for name, v in columns.items() if name not in known and not _is_missing(v).all()}
+    if repeat_count(condition) < FEWEST_REPEATS:
+        return notes
+    numbers = {name: values for name, values in notes.items() if values.dtype.kind == "f"}
+    ranks = outputs.assign(**numbers).groupby(condition).rank()
+    correlation = (ranks - ranks.groupby(condition).transform("mean")).corr()[list(outputs)].abs()
+    computed = {name for name in numbers if (correlation.loc[name] > _FOLLOWS).any()}
+    return {name: values for name, values in notes.items() if name not in computed}
 
 
 def _sigma(model: Model, noise: Noise | None) -> Floats | None:
     """Return the declared standard deviation of each output, (k,), if there is one."""
-    declared = {name: output.sigma for name, output in model.outputs.items() if output.sigma is not None}
-    if noise is not None and not isinstance(noise, str):
-        declared |= noise
-    elif noise not in (None, "unknown"):
-        raise InputError(f"noise {noise!r}; give 'unknown', or a standard deviation for each output by its name")
-    for name, sigma in declared.items():
-        if name not in model.outputs or not 0 < float(sigma) < math.inf:
-            raise InputError(f"noise of {name!r}: {sigma}; give numbers above 0 for {', '.join(model.outputs)}")
-    lacking = [name for name in model.outputs if name not in declared]
-    if declared and lacking:
+    given = dict(noise) if isinstance(noise, Mapping) else {}
+    declared = {name: output.sigma for name, output in model.outputs.items() if output.sigma is not None} | given
+    known = given or noise in (None, "unknown")
+    if (
+        not known
+        or (declared and set(declared) != set(model.outputs))
+        or not all(0 < s < math.inf for s in declared.values())
+    ):
         raise InputError(
-            f"noise is given for {', '.join(declared)} and not for {', '.join(lacking)}; give all or none"
+            f"noise {noise or declared}; give 'unknown', or a standard deviation above 0 for each output, "
+            f"{', '.join(model.outputs)}"
         )
     return np.array([float(declared[name]) for name in model.outputs]) if declared else None
 
 
-def _held_out(given: str | Sequence[str] | None, column: Floats | Words | None, runs: TableRuns) -> Flags | None:
-    """Say which runs are held out, (n,): where a column says so, or those of sessions."""
-    if given is None:
+def _names(given: str | Sequence[str] | None) -> list[str]:
+    return [given] if isinstance(given, str) else list(map(str, given or ()))
+
+
+def _held_out(given: str | Sequence[str] | None, model: FunctionModel) -> Flags | None:
+    """Say which runs are held out, (n,): those of sessions, or where a column says so."""
+    wanted, runs = _names(given), model.runs
+    if not wanted:
         return None
-    if column is not None:
-        held = np.array([str(value).lower() in _TRUE for value in column])
+    known = [{name, name.rpartition(" ")[2]} for name in runs.session_names]
+    if len(wanted) == 1 and wanted[0] in model.columns:
+        held = np.array([str(value).lower() in _TRUE for value in model.columns[wanted[0]]])
+    elif unknown := set(wanted).difference(*known):
+        sessions = ", ".join(runs.session_names)
+        raise InputError(f"held_out {min(unknown)!r} is no session and no column; there are {sessions}")
     else:
-        wanted = [given] if isinstance(given, str) else list(map(str, given))
-        known = [{name, name.rpartition(" ")[2]} for name in runs.session_names]
-        for name in wanted:
-            if not any(name in each for each in known):
-                raise InputError(
-                    f"held_out {name!r} is no session and no column; there are {', '.join(runs.session_names)}"
-                )
         held = np.isin(runs.session, [place for place, each in enumerate(known) if each & set(wanted)])
     if held.all() or not held.any():
-        raise InputError(f"{int(held.sum())} of {len(runs)} runs are held out ({given}); hold out some, not all")
+        raise InputError(
+            f"{int(held.sum())} of {len(runs)} runs are held out ({', '.join(wanted)}); hold out some"
+        )
     return np.asarray(held)

@@ -76,8 +76,9 @@ def _figures(result: Verdict, paths: Sequence[PathError]) -> dict[str, list[Draw
                       for figure, model in draw_residuals(result)],
         "maps": [(figure, f"map of the residual over the runs' inputs, {model}", model)
                  for figure, model in draw_maps(result)],
-        "evidence": [(draw_evidence(result), "score of each effect against what a claim needs", "")],
     }  # fmt: skip
+    if result.found.candidates:
+        figures["evidence"] = [(draw_evidence(result), "score of each effect against what a claim needs", "")]
     if drawn:
         words = "the wanted path, and the tracks of both schedules on the corrected robot"
         figures["paths"] = [(draw_paths(drawn), words, "")]

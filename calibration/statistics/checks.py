@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from calibration.statistics.statistical_model import ForwardModel, Runs, start_values
-from common.arrays import Flags, Floats
+from common.arrays import Floats
 from common.errors import InputError
 
 _ALIKE = 0.2  # share of the scatter that is left where a logarithm was forgotten
@@ -38,21 +38,21 @@ def predict_as_given(model: ForwardModel, *, title: str = "") -> Floats:
     if not np.isin(runs.session, np.arange(count)).all():
         wrong = runs.session[~np.isin(runs.session, np.arange(count))][0]
         raise InputError(f"a run is in session {wrong}; number the {count} sessions from 0 to {count - 1}")
-    _refuse_not_finite("measured", runs, runs.y, np.zeros_like(runs.gaps))
+    _refuse_not_finite("measured", runs, runs.y)
     prediction = np.asarray(model.predict([start_values(model)], title=title))
     if prediction.shape != (1, *runs.y.shape):
         raise InputError(
             f"the model's prediction of one parameter set has the shape {prediction.shape}; return "
             f"{(1, *runs.y.shape)}: sets, runs, outputs"
         )
-    _refuse_not_finite("predicted by the model as given", runs, prediction[0], runs.gaps)
+    _refuse_not_finite("predicted by the model as given", runs, prediction[0])
     for place, output in enumerate(runs.outputs):
         _refuse_logarithm(output, runs.y[:, place], prediction[0, :, place])
     return np.asarray(prediction[0])
 
 
-def _refuse_not_finite(what: str, runs: Runs, values: Floats, gaps: Flags) -> None:
-    for row, place in np.argwhere(~(np.isfinite(values) | gaps))[:1].tolist():
+def _refuse_not_finite(what: str, runs: Runs, values: Floats) -> None:
+    for row, place in np.argwhere(~np.isfinite(values))[:1].tolist():
         name, value = runs.outputs[place], values[row, place]
         raise InputError(
             f"{name} as {what} is {value} in {runs.row_name(row)}; every value must be a finite number"

@@ -98,7 +98,7 @@ class Shifted:
         try:
             yield
         except (TypeError, ValueError) as error:
-            if isinstance(error, InputError):
+            if isinstance(error, InputError | np.linalg.LinAlgError):
                 raise
             names = ", ".join(of.name for of in self._differing)
             raise InputError(

@@ -50,6 +50,12 @@ def of(value: Callable[[Any, Any], Any]) -> sf.Model:
     return replace(MODEL, function=lambda columns, p: {"v": value(fall(columns, p)["v"], p)})
 
 
+def changes_a_column(columns: Any, p: Any) -> Any:
+    d = columns["d"]
+    d /= 1000
+    return fall(columns, p)
+
+
 def test_as_it_should_be_the_wall_is_named() -> None:
     result = sf.calibrate(TABLE, MODEL, session="round", progress=False)
     assert result.effects == ("wall",)
@@ -68,10 +74,18 @@ def test_as_it_should_be_the_wall_is_named() -> None:
         (of(lambda v, p: ["fast"] * len(v)), "'v' that is no array of numbers"),
         (of(lambda v, p: np.where(np.arange(len(v)) == 3, np.nan, v)), "v is nan in row 4"),
         (of(lambda v, p: v - 0.1), "v is not above 0 in row 1; return finite numbers, above 0"),
-        (of(lambda v, p: v * p["wall"]), "wall (wall) does not vanish at its null, 0: there v is not above 0"),
-        (of(lambda v, p: v / p["wall"]), "wall (wall) does not vanish at its null, 0: there v is inf in row 1"),
+        (
+            of(lambda v, p: v * p["wall"]),
+            "wall (wall) does not vanish at its null, 0: there v is not above 0",
+        ),
+        (
+            of(lambda v, p: v / p["wall"]),
+            "wall (wall) does not vanish at its null, 0: there v is inf in row 1",
+        ),
         (replace(MODEL, function=lambda c, p: {"v": p["v1"] * c["d"] ** 2}), "wall (wall) changes nothing"),
         (replace(MODEL, function=lambda c, p: {"v": c["d"] ** 2 / (1 + p["wall"] * c["d"])}), "v1 (v1) changes"),
+        (of(lambda v, p: v * np.exp(rng.normal())), "other values when it is called again"),
+        (replace(MODEL, function=changes_a_column), "output array is read-only"),
         (of(lambda v, p: 1e4 * v), "v is 0.000"),
         (of(lambda v, p: float("fast")), "ValueError, could not convert string to float: 'fast' ("),
         (of(lambda v, p: v * p["odd"]), "fails with v1 = 100, wall = 0: KeyError, 'odd' ("),
@@ -79,8 +93,8 @@ def test_as_it_should_be_the_wall_is_named() -> None:
             replace(MODEL, function=lambda c, p: {"v": c["diameter"]}),
             "asks for column 'diameter'; the table has d,",
         ),
-        (replace(MODEL, settings=["diameter"]), "no column 'diameter' (setting); it has d, round, day, v"),
-        (replace(MODEL, outputs={"w": sf.Output("speed")}), "no column 'w' (output)"),
+        (replace(MODEL, settings=["diameter"]), "no column 'diameter'; it has d, round, day, v"),
+        (replace(MODEL, outputs={"w": sf.Output("speed")}), "no column 'w'; it has d,"),
     ],
 )
 def test_a_fault_of_a_model_is_named(model: sf.Model, words: str) -> None:
@@ -91,7 +105,8 @@ def test_a_model_without_sense_cannot_be_declared() -> None:
     for make, words in {
         lambda: replace(MODEL, effects=[*MODEL.effects, *MODEL.effects]): "the name 'wall'; rename or drop one",
         lambda: replace(MODEL, outputs={}): "outputs of a model",
-        lambda: replace(MODEL, numbers=["v1"]): "numbers of a model are each an sf.Number",
+        lambda: replace(MODEL, numbers=[]): "given: []",
+        lambda: replace(MODEL, numbers=["v1"]): "numbers of a model are each an sf.Number, one at least",
         lambda: sf.Number("v1", 5.0, low=10, high=20): "start 5 with low 10 and high 20",
         lambda: sf.Effect("wall", "wall", low=1, high=2): "null 0 with low 1 and high 2",
         lambda: sf.Output("speed", sigma=-1.0): "sigma -1",
@@ -117,10 +132,11 @@ def test_a_fault_of_a_table_is_named() -> None:
     assert "v is not above 0 in 23 of 45 rows, first in row 1" in said(MODEL, some_low)
     assert "no usable row: row 1: no output has a value" in said(MODEL, TABLE.assign(v=np.nan))
     assert "no usable row: row 1: d has no value" in said(MODEL, TABLE.assign(d=np.nan))
-    assert "two columns 'd'" in said(MODEL, pd.concat([TABLE, TABLE[["d"]]], axis=1))
+    assert "column 'd' twice" in said(MODEL, pd.concat([TABLE, TABLE[["d"]]], axis=1))
     assert "no session and no column; there are round 1, round 2" in said(MODEL, held_out=["round 9"])
+    assert "v is the same in all repeats" in said(MODEL, TABLE.assign(v=1 + TABLE["d"]))
     assert "45 of 45 runs are held out" in said(MODEL, TABLE.assign(test=True), held_out="test")
-    assert "noise of 'w': 1" in said(MODEL, noise={"w": 1.0})
+    assert "above 0 for each output, v" in said(MODEL, noise={"w": 1.0})
     assert "give 'unknown'" in said(MODEL, noise="large")
     assert "2 usable rows for 2 numbers" in said(
         replace(MODEL, numbers=[*MODEL.numbers, sf.Number("power", 2.0)]), TABLE[:2]

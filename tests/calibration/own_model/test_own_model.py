@@ -134,6 +134,13 @@ def test_a_model_is_saved_with_its_numbers(tmp_path: Path) -> None:
     assert "<svg" in page
 
 
+def test_a_model_without_effects_has_a_report(tmp_path: Path) -> None:
+    result = sf.calibrate(TABLE, MODEL.without("wall"), session="round", progress=False)
+    assert result.verdict == "unexplained"
+    result.save(tmp_path)
+    assert list(result.corrected) == ["v1"]
+
+
 def test_the_example_runs_from_the_command_to_the_report(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
