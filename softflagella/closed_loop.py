@@ -70,9 +70,9 @@ def calibrate(
             drawings with a size have their own.
         session: COL, the column that says which runs were made together (default: session, if there is one).
         specimen: COL, the column that says what was run, where there are several.
-        held_out: NAME, of a session that is held out for the test, or of a column that says so of each run
-            (default: the middle session).
-        noise: unknown, where neither repeats nor stated errors tell it. In Python also the standard deviation of
+        held_out: NAME, a session that is held out for the test, or a column that says so of each run (default: the
+            middle session).
+        noise: say that neither repeats nor stated errors tell it. In Python also the standard deviation of
             one run for each output, {"v": 0.02}: relative where ratios are compared.
         notes: COL, a column in which runs may differ without the model's knowledge (default: all others).
         max_seconds: of processor time for the search (default 90, with laws 180). The verdict then is provisional,

@@ -32,7 +32,7 @@ def check_function(model: FunctionModel) -> None:
         variances = np.diag(repeat_covariance(runs.y, runs.apart))
         for place in np.flatnonzero(variances <= _ROUNDING * np.mean(runs.y**2, 0))[:1].tolist():
             raise InputError(
-                f"{runs.outputs[place]} is the same in all repeats; drop copies of rows, or give measured values, unrounded"
+                f"{runs.outputs[place]} is the same in all repeats; drop copies of rows, or give unrounded values"
             )
     parameters, start = model.model.parameters, start_values(model)
     if runs.values(np.ones(len(runs), dtype=bool)) <= len(model.coefficients):
