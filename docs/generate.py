@@ -68,7 +68,8 @@ def columns_page() -> Iterator[str]:
 def objects_page() -> Iterator[str]:
     """List the fields of the public classes, then those of the classes of which their fields are made."""
     yield "Lengths are in tail lengths l, times in μ0 l⁴/EI, unless a field says its unit."
-    records = [record for name in softflagella.__all__ for record in _records(getattr(softflagella, name))]
+    public = [*(getattr(softflagella, name) for name in softflagella.__all__), Effect]
+    records = [record for each in public for record in _records(each)]
     for record in records:  # which grows
         parts = [part for hint in get_type_hints(record).values() for part in _records(hint)]
         records += [part for part in dict.fromkeys(parts) if part not in records]

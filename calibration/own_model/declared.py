@@ -73,7 +73,7 @@ class Number:
 
 @dataclass(frozen=True)
 class ModelEffect:
-    """What a model may lack; at its null the function is the model without it.
+    """What a model may lack, `sf.Effect`; at its null the function is the model without it.
 
     Example:
         >>> import softflagella as sf
