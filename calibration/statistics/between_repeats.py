@@ -75,50 +75,50 @@ class _Test(NamedTuple):
     column: NotedColumn
     p: float  # of an F-distribution
     null: Floats  # (D,) the same of the draws
-    free: bool  # whether M leaves enough of the column
 
 
 def usable(values: Any) -> bool:
     """Tell whether a note can be tested: it differs, is no running number, and has few kinds if it is in words."""
-    kinds = np.unique(known := np.asarray(values)[_noted(values)])
-    if known.dtype.kind in "fiu":
-        steps = np.diff(known.astype(float))
-        return len(kinds) > 1 and not (steps > 0).all() and not (steps < 0).all()
-    return 1 < len(kinds) <= _MOST_KINDS
+    noted, there = _noted(values)
+    kinds = np.unique(noted[there])
+    if noted.dtype.kind == "U":
+        return 1 < len(kinds) <= _MOST_KINDS
+    steps = np.diff(noted[there])
+    return len(kinds) > 1 and not (steps > 0).all() and not (steps < 0).all()
 
 
-def _noted(values: Any) -> Flags:
-    known = np.asarray(values)
-    return np.isfinite(known.astype(float)) if known.dtype.kind in "fiu" else known.astype(str) != ""
+def _noted(values: Any) -> tuple[Any, Flags]:
+    """Return a note as numbers or as words, (n,), and where there is one."""
+    if np.asarray(values).dtype.kind in "fiu":
+        return (numbers := np.asarray(values, dtype=float)), np.isfinite(numbers)
+    return (words := np.asarray(values).astype(str)), words != ""
 
 
 def columns_of(runs: Runs) -> list[NotedColumn]:
     """Make columns of every note, and of the order of the runs."""
     columns = []
-    for note, noted in {**runs.notes, ORDER: runs.rows}.items():
-        values, there = np.asarray(noted), _noted(noted)
-        if note != ORDER and not usable(values):
-            continue
-        if values.dtype.kind not in "fiu":
-            kinds, count = np.unique(values[there].astype(str), return_counts=True)
-            common = kinds[np.argmax(count)]
-            others = [kind for kind in kinds if kind != common]
-            table = np.where(there[:, None], values.astype(str)[:, None] == others, np.nan)
-            columns.append(
-                NotedColumn(note, tuple(f"{note} {kind}" for kind in others), table, f"{note} {common}")
-            )
+    for note, values in {**{k: v for k, v in runs.notes.items() if usable(v)}, ORDER: runs.rows}.items():
+        noted, there = _noted(values)
+        if noted.dtype.kind == "U":
+            kinds, count = np.unique(noted[there], return_counts=True)
+            others = np.delete(kinds, np.argmax(count))
+            table = np.where(there[:, None], noted[:, None] == others, np.nan)
+            common = f"{note} {kinds[np.argmax(count)]}"
+            columns.append(NotedColumn(note, tuple(f"{note} {kind}" for kind in others), table, common))
         elif note.endswith(("_deg", "_rad")):
-            angle = np.asarray(np.radians(values) if note.endswith("_deg") else values, dtype=float)
             for turns, of in ((1, note), (2, f"2 {note}")):
-                table = np.column_stack([np.cos(turns * angle), np.sin(turns * angle)])
+                angle = turns * (np.radians(noted) if note.endswith("_deg") else noted)
+                table = np.column_stack([np.cos(angle), np.sin(angle)])
                 columns.append(NotedColumn(note, (f"cos {of}", f"sin {of}"), table))
         else:
-            values = values.astype(float)
-            low, high = np.nanmin(values), np.nanmax(values)
-            columns.append(
-                NotedColumn(note, (note,), (values - (low + high) / 2)[:, None] / max(high - low, _TINY))
-            )
+            columns.append(NotedColumn(note, (note,), _from_end_to_end(noted[:, None])))
     return columns
+
+
+def _from_end_to_end(values: Floats) -> Floats:
+    """Scale values to −½ at the least and ½ at the largest."""
+    low, high = np.nanmin(values), np.nanmax(values)
+    return np.asarray((values - (low + high) / 2) / max(high - low, _TINY))
 
 
 def find_differences(runs: Runs, *, level: float, seed: int = 0) -> tuple[Difference, ...]:
@@ -129,10 +129,10 @@ def find_differences(runs: Runs, *, level: float, seed: int = 0) -> tuple[Differ
     columns, taken = [columns_of(runs) for _ in outputs], [list[NotedColumn]() for _ in outputs]
     tests: dict[int | str, list[_Test]] = {n: _breaks(runs, d, keys, rng) for n, d in runs.identities.items()}
     tests |= {k: _of_output(runs, k, columns[k], [], keys) for k in outputs}
-    while every := [(subject, test) for subject, of in tests.items() for test in of if test.free]:
+    while every := [(subject, test) for subject, of in tests.items() for test in of]:
         least = np.min([test.null for _, test in every], axis=0)
         subject, best = min(every, key=lambda each: each[1].p)
-        p = (1 + np.count_nonzero(least <= best.p)) / (1 + _DRAWS)
+        p = float(1 + np.count_nonzero(least <= best.p)) / (1 + _DRAWS)
         if p > level * SHARE_OF_LEVEL:
             break
         z = float(-ndtri(max(best.p, _TINY) / 2))
@@ -141,11 +141,11 @@ def find_differences(runs: Runs, *, level: float, seed: int = 0) -> tuple[Differ
             where, size = _broken(runs, runs.identities[subject], best.column.note)
             broken.append(Difference(subject, best.column.note, where, size, z, p))
             continue
-        alone = {test.column.note for test in tests[subject] if test.free}
         columns[subject] += _of_reading(runs, subject, best.column)
         again = _of_output(runs, subject, columns[subject], [*taken[subject], best.column], keys)
-        lost = {test.column.note for test in again if not test.free} & alone - {best.column.note}
-        found.append(_between(runs, subject, best.column, taken[subject], z, p, tuple(sorted(lost))))
+        before, left = ({test.column.note for test in of} for of in (tests[subject], again))
+        lost = sorted(before - left - {best.column.note})
+        found.append(_between(runs, subject, best.column, taken[subject], z, p, tuple(lost)))
         taken[subject].append(best.column)
         tests[subject] = again
     return (*broken, *found)
@@ -155,10 +155,8 @@ def _of_reading(runs: Runs, k: int, column: NotedColumn) -> list[NotedColumn]:
     """Let the offset of one kind follow what is read: make the column times the mean of the repeats' output."""
     if column.of_reading:
         return []
-    group = _repeats(runs, [])[0]
-    mean = runs.y[:, [k]] - _centred(runs.y[:, [k]], group)
-    scaled = (mean - (mean.min() + mean.max()) / 2) / max(float(np.ptp(mean)), _TINY)
-    return [column._replace(table=column.table * scaled, of_reading=True)]
+    read = runs.y[:, [k]] - _centred(runs.y[:, [k]], _repeats(runs, [])[0])  # means of repeats
+    return [column._replace(table=column.table * _from_end_to_end(read), of_reading=True)]
 
 
 def _repeats(runs: Runs, taken: Sequence[NotedColumn]) -> tuple[Integers, Floats]:
@@ -219,20 +217,20 @@ class _Left(NamedTuple):
         centred = _centred(table[self.rows], self.group)
         return np.asarray(centred - self.basis @ (self.basis.T @ centred))
 
-    def test(self, of: NotedColumn) -> _Test:
-        """Test what is left along a column."""
+    def test(self, of: NotedColumn) -> list[_Test]:
+        """Test what is left along a column; nothing if too little of the column is left."""
         table, column = of.table, self.column(of.table)
         along = _span(column)
         a = along.shape[1]
         b = len(self.rows) - len(np.unique(self.group)) - self.basis.shape[1] - a
         whole = float((_centred(table[self.rows], self.session) ** 2).sum())
         if not a or b < _FEWEST or (column**2).sum() <= max(_FREE * whole, _NONE):
-            return _Test(of, 1.0, np.ones(len(self.drawn)), False)
+            return []
         residuals = np.vstack([self.residual, self.drawn])
         taken = ((residuals @ along) ** 2).sum(1)
         rest = np.maximum((residuals**2).sum(1) - taken, _TINY)
         p = fdtrc(a, b, taken / a / (rest / b))
-        return _Test(of, float(p[0]), p[1:], True)
+        return [_Test(of, float(p[0]), p[1:])]
 
 
 def _of_output(
@@ -247,7 +245,7 @@ def _of_output(
         key = there.tobytes()
         if key not in left:
             left[key] = _Left.of(runs.y[:, k], there, runs.session, group, known, keys)
-        tests.append(left[key].test(column))
+        tests += left[key].test(column)
     return tests
 
 
@@ -286,13 +284,13 @@ def _breaks(runs: Runs, left: Floats, keys: Floats, rng: np.random.Generator) ->
     for name, (values, _) in runs.settings.items():
         if np.ptp(values) > 0 and abs(_broken(runs, left, name)[1]) > _TOLERANCE:
             x = (values - values.mean()) / values.std()
-            tests.append(of_runs.test(NotedColumn(name, (), np.column_stack([x, x**2]))))
+            tests += of_runs.test(NotedColumn(name, (), np.column_stack([x, x**2])))
     means = np.array([left[there & (runs.session == s)].mean() for s in np.unique(runs.session[there])])
     if len(means) > 2:
         beyond = max(abs(float(means.mean())) - _TOLERANCE, 0.0)
         f = beyond**2 * len(means) / max(float(means.var(ddof=1)), _TINY)
         p = float(fdtrc(1, len(means) - 1, f))
-        tests.append(_Test(NotedColumn("", (), left), p, rng.random(len(keys)), True))
+        tests.append(_Test(NotedColumn("", (), left), p, rng.random(len(keys))))
     return tests
 
 

@@ -8,12 +8,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.attribution.refits import Rival
+from calibration.report.report import sections
 from calibration.statistics.between_repeats import Difference, find_differences, usable
 from calibration.statistics.offsets import Offsets, with_differences
 from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import LEVEL
 from calibration.swimmer.measured_table import Measurements, read_measurements
-from calibration.verdict.record import facts
+from calibration.verdict.next_runs import Explanation
+from calibration.verdict.record import facts, verdict_record
 from calibration.words.render import next_steps
 from tests.calibration.toy_tables import calibrated, fit_all, toy_swimmer, toy_table, verdict_of
 from tests.oracles.misread_tables import CASES, Case, make_table
@@ -130,6 +133,9 @@ def test_the_verdict_begins_with_the_difference_and_hands_on_no_offset():
     assert next_steps(record)[0].startswith("Check operator: the yaw rate of operator B is")
     assert set(record["differences"][0]) >= {"words", "output", "column", "size", "z", "p"}
     assert record["differences"][0]["numbers"] == ["omega_yr, operator B"]
+    report = sections(verdict_record(verdict, table="runs.csv"), {})
+    assert "<h2>Without any model</h2>" in report
+    assert "<td>yaw rate</td><td>operator</td>" in report
     robot = verdict_of(verdict)
     assert verdict.verdict == "none"
     assert "operator" not in "".join(robot.knowledge.names)
@@ -138,8 +144,9 @@ def test_the_verdict_begins_with_the_difference_and_hands_on_no_offset():
 
 def test_runs_that_decide_need_no_offset():
     model, _ = with_differences(toy_swimmer(_misread(3)), None, level=LEVEL)
-    own = [p for p in model.coefficients if p.of_these_runs]
-    assert [p.name for p in own] == ["omega_yr, operator B"]
+    explanation = Explanation.from_rival(Rival("drag", fitted := fit_all(model), model))
+    assert set(fitted.names) - set(explanation.parameters) == {"omega_yr, operator B"}
+    assert explanation.covariance.shape == (len(fitted.names) - 1,) * 2
 
 
 def test_measured_tables_are_quiet():
