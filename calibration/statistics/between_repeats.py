@@ -45,7 +45,7 @@ _FAR, _MAD = 4.0, 1.4826  # residuals are clipped at so many robust standard dev
 _NONE, _TINY = 1e-9, 1e-300
 
 
-class NotedColumn(NamedTuple):
+class NoteColumn(NamedTuple):
     """A note as numbers (n, a), each with a name; NaN where it was not noted."""
 
     note: str
@@ -72,7 +72,7 @@ class Difference:
 
 
 class _Test(NamedTuple):
-    column: NotedColumn
+    column: NoteColumn
     p: float  # of an F-distribution
     null: Floats  # (D,) the same of the draws
 
@@ -94,7 +94,7 @@ def _noted(values: Any) -> tuple[Any, Flags]:
     return (words := np.asarray(values).astype(str)), words != ""
 
 
-def columns_of(runs: Runs) -> list[NotedColumn]:
+def columns_of(runs: Runs) -> list[NoteColumn]:
     """Make columns of every note, and of the order of the runs."""
     columns = []
     for note, values in {**{k: v for k, v in runs.notes.items() if usable(v)}, ORDER: runs.rows}.items():
@@ -104,14 +104,14 @@ def columns_of(runs: Runs) -> list[NotedColumn]:
             others = np.delete(kinds, np.argmax(count))
             table = np.where(there[:, None], noted[:, None] == others, np.nan)
             common = f"{note} {kinds[np.argmax(count)]}"
-            columns.append(NotedColumn(note, tuple(f"{note} {kind}" for kind in others), table, common))
+            columns.append(NoteColumn(note, tuple(f"{note} {kind}" for kind in others), table, common))
         elif note.endswith(("_deg", "_rad")):
             for turns, of in ((1, note), (2, f"2 {note}")):
                 angle = turns * (np.radians(noted) if note.endswith("_deg") else noted)
                 table = np.column_stack([np.cos(angle), np.sin(angle)])
-                columns.append(NotedColumn(note, (f"cos {of}", f"sin {of}"), table))
+                columns.append(NoteColumn(note, (f"cos {of}", f"sin {of}"), table))
         else:
-            columns.append(NotedColumn(note, (note,), _from_end_to_end(noted[:, None])))
+            columns.append(NoteColumn(note, (note,), _from_end_to_end(noted[:, None])))
     return columns
 
 
@@ -126,7 +126,7 @@ def find_differences(runs: Runs, *, level: float, seed: int = 0) -> tuple[Differ
     rng = np.random.default_rng(seed)
     keys = rng.random((_DRAWS, len(runs)))
     outputs, found, broken = range(len(runs.outputs)), [], []
-    columns, taken = [columns_of(runs) for _ in outputs], [list[NotedColumn]() for _ in outputs]
+    columns, taken = [columns_of(runs) for _ in outputs], [list[NoteColumn]() for _ in outputs]
     tests: dict[int | str, list[_Test]] = {n: _breaks(runs, d, keys, rng) for n, d in runs.identities.items()}
     tests |= {k: _of_output(runs, k, columns[k], [], keys) for k in outputs}
     while every := [(subject, test) for subject, of in tests.items() for test in of]:
@@ -151,7 +151,7 @@ def find_differences(runs: Runs, *, level: float, seed: int = 0) -> tuple[Differ
     return (*broken, *found)
 
 
-def _of_reading(runs: Runs, k: int, column: NotedColumn) -> list[NotedColumn]:
+def _of_reading(runs: Runs, k: int, column: NoteColumn) -> list[NoteColumn]:
     """Let the offset of one kind follow what is read: make the column times the mean of the repeats' output."""
     if column.of_reading:
         return []
@@ -159,7 +159,7 @@ def _of_reading(runs: Runs, k: int, column: NotedColumn) -> list[NotedColumn]:
     return [column._replace(table=column.table * _from_end_to_end(read), of_reading=True)]
 
 
-def _repeats(runs: Runs, taken: Sequence[NotedColumn]) -> tuple[Integers, Floats]:
+def _repeats(runs: Runs, taken: Sequence[NoteColumn]) -> tuple[Integers, Floats]:
     """Number the repeats (n,), and make columns (n, c) of what they may differ by: sessions, and what is known."""
     known = [runs.session[:, None] == np.unique(runs.session), runs.inputs]
     known += [np.nan_to_num(column.table) for column in taken]
@@ -217,7 +217,7 @@ class _Left(NamedTuple):
         centred = _centred(table[self.rows], self.group)
         return np.asarray(centred - self.basis @ (self.basis.T @ centred))
 
-    def test(self, of: NotedColumn) -> list[_Test]:
+    def test(self, of: NoteColumn) -> list[_Test]:
         """Test what is left along a column; nothing if too little of the column is left."""
         table, column = of.table, self.column(of.table)
         along = _span(column)
@@ -234,7 +234,7 @@ class _Left(NamedTuple):
 
 
 def _of_output(
-    runs: Runs, k: int, columns: list[NotedColumn], taken: list[NotedColumn], keys: Floats
+    runs: Runs, k: int, columns: list[NoteColumn], taken: list[NoteColumn], keys: Floats
 ) -> list[_Test]:
     """Test an output along every column, beside those that are taken."""
     group, known = _repeats(runs, taken)
@@ -250,7 +250,7 @@ def _of_output(
 
 
 def _between(
-    runs: Runs, k: int, column: NotedColumn, taken: list[NotedColumn], z: float, p: float, instead: tuple[str, ...]
+    runs: Runs, k: int, column: NoteColumn, taken: list[NoteColumn], z: float, p: float, instead: tuple[str, ...]
 ) -> Difference:
     """Measure how an output differs with a note, beside the notes in `taken`."""
     there, none = ~runs.gaps[:, k] & np.isfinite(column.table).all(1), np.empty((0, len(runs)))
@@ -284,13 +284,13 @@ def _breaks(runs: Runs, left: Floats, keys: Floats, rng: np.random.Generator) ->
     for name, (values, _) in runs.settings.items():
         if np.ptp(values) > 0 and abs(_broken(runs, left, name)[1]) > _TOLERANCE:
             x = (values - values.mean()) / values.std()
-            tests += of_runs.test(NotedColumn(name, (), np.column_stack([x, x**2])))
+            tests += of_runs.test(NoteColumn(name, (), np.column_stack([x, x**2])))
     means = np.array([left[there & (runs.session == s)].mean() for s in np.unique(runs.session[there])])
     if len(means) > 2:
         beyond = max(abs(float(means.mean())) - _TOLERANCE, 0.0)
         f = beyond**2 * len(means) / max(float(means.var(ddof=1)), _TINY)
         p = float(fdtrc(1, len(means) - 1, f))
-        tests.append(_Test(NotedColumn("", (), left), p, rng.random(len(keys))))
+        tests.append(_Test(NoteColumn("", (), left), p, rng.random(len(keys))))
     return tests
 
 
