@@ -96,7 +96,7 @@ def groups_that_may_differ(runs: Runs) -> list[tuple[str, Flags]]:
     names, session = runs.session_names, runs.session
     found: list[tuple[str, Flags]] = []
     if runs.specimen is not None:
-        found += [(f"on robot {name}", runs.specimen == i) for i, name in enumerate(runs.specimen_names)]
+        found += [(f"on specimen {name}", runs.specimen == i) for i, name in enumerate(runs.specimen_names)]
     present = np.unique(session).tolist()  # a part of the runs may have none of a session
     found += [(f"in session {names[i]}", session == i) for i in present]
     by_time = sorted(present, key=lambda i: int(runs.rows[session == i].min()))

@@ -228,6 +228,22 @@ class Findings:
         return None if interval is None else interval[0] > 0
 
     @property
+    def advice(self) -> str:
+        """Which model to use: "as given", "corrected", or "wait" for new runs, with neither until then.
+
+        Where numbers differ in some runs, these may be the reason why held-out runs depart from the model.
+        """
+        corrected_is_without = self.nearest is not None and not self.held_out_error_falls
+        claimed = self.held_out_error_falls is not None and not corrected_is_without
+        no_gain = self.held_out_error_falls is False or self.gain_is_certain is False
+        described = self.verdict in ("partial", "unexplained")  # more than noise is left anyway
+        if not self.moves and self.error_corrected >= self.error_uncalibrated:
+            return "as given"
+        if (claimed and no_gain) or not (self.held_out_runs_agree or described or self.moves):
+            return "wait"
+        return "corrected"
+
+    @property
     def held_out_runs_agree(self) -> bool:
         """Whether the held-out runs agree with the final model."""
         return self.errors.p_value >= REJECTED or not self.runs.noise_known

@@ -90,7 +90,7 @@ def _fitted(result: Findings) -> dict[str, Any]:
             for name, interval in result.base_intervals.items()
         },
         "least_determined": _least_determined(final),
-        "hands_on_a_robot": set(COEFFICIENTS) <= set(result.base.names),
+        "subject": "robot" if set(COEFFICIENTS) <= set(result.base.names) else "model",
     }
 
 
@@ -201,6 +201,7 @@ def _errors(result: Findings) -> dict[str, Any]:
         "error_corrected": result.error_corrected,
         "harmless": result.harmless,
         "held_out_error_falls": result.held_out_error_falls,
+        "advice": result.advice,
         "error_after_interval": list(errors.after_interval),
         "gain_interval": errors.gain_interval and list(errors.gain_interval),
         "gain_is_certain": result.gain_is_certain,

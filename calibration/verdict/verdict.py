@@ -18,7 +18,7 @@ class Verdict(Findings):
     Example:
         >>> from softflagella import calibrate
         >>> calibrate("runs.csv", "robot.toml").sentence  # doctest: +SKIP
-        'No effect is missing that these runs can show (p = 0.43).'
+        'No effect is missing that these runs can show (p = 0.43 under the model, with noise as estimated).'
     """
 
     def __repr__(self) -> str:
@@ -29,7 +29,7 @@ class Verdict(Findings):
 
     @property
     def sentence(self) -> str:
-        """The verdict in one sentence with its certainty; a second one for a nuisance parameter that is wrong."""
+        """The verdict in a sentence with its certainty, and what goes before it or beside it."""
         return sentence(facts(self))
 
     @property

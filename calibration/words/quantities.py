@@ -22,6 +22,7 @@ _FEATURES = {  # what words of a feature's name read as
     "tank_diameter": "diameter of the tank", "course_x": "x of the course", "course_y": "y of the course",
 }  # fmt: skip
 _RESOLVED = 2.01  # over the number of draws and one more: the bootstrap resolves no smaller p
+_NEARLY_ALL = 0.995
 
 
 def output_label(record: Record, output: str) -> str:
@@ -95,6 +96,33 @@ def percent(value: float, decimals: int = 2) -> str:
     return f"{100 * value:.{decimals}f} %"
 
 
+def interval_in_words(interval: Sequence[float]) -> str:
+    """Write a 95 % interval of shares in per cent."""
+    low, high = (f"{100 * end:.2f}" for end in interval)
+    return f"95 % interval {low} to {high} %"
+
+
+def gain_in_words(before: float, after: float, interval: Sequence[float] | None) -> str:
+    """Say whether the error on the held-out runs falls with what is claimed; an interval with zero is no gain."""
+    both = f"{percent(before)} without, {percent(after)} with it"
+    if after >= before:
+        return f"the error on the held-out runs does not fall with it ({both})"
+    if interval is None:
+        return f"the error on the held-out runs falls from {percent(before)} to {percent(after)}"
+    if interval[0] <= 0:
+        words = interval_in_words(interval)
+        return f"there is no gain that these runs can show (error on the held-out ones {both}; gain, {words})"
+    return (
+        f"the error on the held-out runs falls from {percent(before)} to {percent(after)} "
+        f"(by {percent(before - after)}, {interval_in_words(interval)})"
+    )
+
+
+def removed(share: float) -> str:
+    """Write which share of a residual is removed."""
+    return "nearly all" if share > _NEARLY_ALL else percent(share, 0)
+
+
 def digits(value: float, count: int = 3) -> str:
     """Write a number with so many significant digits, large ones with an exponent."""
     return f"{value:.{count}g}"
@@ -148,6 +176,12 @@ def size(value: float, of: Record, count: int = 3) -> str:
     return f"{number} × {unit}" if is_product else f"{number} {unit}"
 
 
+def sized(value: float, interval: Sequence[float], of: Record, count: int = 3) -> str:
+    """Write the size of an effect with its interval."""
+    low, high = (plain(end * of["shown"], count) for end in interval)
+    return f"{size(value, of, count)} ({low} to {high})"
+
+
 def detectable(value: float, of: Record) -> str:
     """Write a smallest detectable size; a dash where no size shows in these runs."""
     if value >= UNSEEN:
@@ -175,7 +209,7 @@ def ranges_in_words(settings: Mapping[str, tuple[float, float, str]]) -> str:
 def final_model(verdict: str, nearest: object, effects: Sequence[str]) -> str:
     """Name the final model of a verdict, in words for a column or a caption; empty if it is the calibrated one."""
     if verdict == "number":
-        return "with the wrong value corrected"
+        return "with the fitted value"
     if nearest:
         return "with the adopted form"
     return "with the verdict's effects" if effects else ""

@@ -20,7 +20,9 @@ from calibration.words.quantities import (
     direction_in_words,
     final_model,
     fitted_value,
+    gain_in_words,
     given,
+    interval_in_words,
     offset,
     output_error,
     output_label,
@@ -28,7 +30,9 @@ from calibration.words.quantities import (
     percent,
     plain,
     ranges_in_words,
+    removed,
     size,
+    sized,
     tolerance,
 )
 from common.units import length_in_lab
@@ -38,9 +42,9 @@ if TYPE_CHECKING:
 
 
 def sentence(record: Record) -> str:
-    """Say the verdict in one sentence with its certainty; a second one for a nuisance parameter that is wrong.
+    """Say the verdict in a sentence with its certainty, and whether the held-out runs bear it out.
 
-    The first sentence says so if the claim does not lower the error on the held-out runs.
+    Further sentences say what goes before it or beside it, such as another value of a nuisance parameter.
     """
     return _one_line(rendered("sentence.j2", record))
 
@@ -56,10 +60,9 @@ def say_laws(laws: Record) -> str:
 
 
 def next_steps(record: Record) -> list[str]:
-    """List what a lab does next, the most urgent first; code is between backticks.
+    """List what a lab does next; code is between backticks.
 
-    A verdict that the held-out runs contradict comes before all others: more runs, and no use of it until then. A
-    corrected robot that does not lower their error is not advised.
+    The first step is the only one that says which model to use; the others are experiments, the most urgent first.
     """
     steps = re.split(r"^\* ", rendered("next_steps.j2", record), flags=re.MULTILINE)
     return [_one_line(step) for step in steps[1:]]
@@ -87,14 +90,16 @@ def _environment() -> Environment:
         autoescape=lambda name: name == "report.j2",
     )
     environment.filters |= _FILTERS | {name: pass_context(words) for name, words in _OF_OUTPUTS.items()}
-    environment.globals["final_model"] = final_model
+    environment.globals |= {"final_model": final_model, "gain_in_words": gain_in_words}
     return environment
 
 
 _FILTERS: dict[str, Callable[..., str]] = {
-    "percent": percent, "digits": digits, "p": p_in_words, "plain": plain, "size": size, "detectable": detectable,
-    "given": given, "tolerance": tolerance, "fitted_value": fitted_value, "direction": direction_in_words,
-    "ranges": ranges_in_words, "in_lab": length_in_lab,
+    "percent": percent, "digits": digits, "p": p_in_words, "plain": plain, "size": size, "sized": sized,
+    "detectable": detectable, "given": given, "tolerance": tolerance, "fitted_value": fitted_value,
+    "direction": direction_in_words,
+    "ranges": ranges_in_words, "interval": interval_in_words, "removed": removed,
+    "in_lab": length_in_lab,
 }  # fmt: skip
 _OF_OUTPUTS: dict[str, Callable[..., str]] = {  # their first argument is the whole record
     "output": output_label,

@@ -118,9 +118,9 @@ def test_a_coefficient_that_differs_on_a_day_is_named(day: int) -> None:
     held_out = "The held-out runs (day 3) do not agree with the model"
     assert result.sentence.startswith(held_out if day == 3 else "C_r in session day 2 is ")
     assert f"C_r in session day {day} is" in result.sentence
-    first, second, *_ = next_steps(facts(result))
+    advice, first, *_ = next_steps(facts(result))
     assert first.startswith(f"Find out what changed in session day {day}")
-    assert second.startswith("Plan with the corrected robot")
+    assert advice.startswith("Plan with the corrected robot")
     assert verdict_record(result, table="t")["moves"] == [{"words": result.moves[0].words, **record}]
 
 
@@ -157,8 +157,8 @@ def test_another_robot_is_named() -> None:
         result = calibrate(turned, KNOWN, laws=False, progress=False)
     assert result.effects == ()
     (move,) = result.moves
-    assert re.search(r"on robot [AB] is 1", move.words)
-    assert "C_yr on robot" in move.words
+    assert re.search(r"on specimen [AB] is 1", move.words)
+    assert "C_yr on specimen" in move.words
 
 
 @pytest.mark.parametrize(("day", "turn"), [(3, 90), (2, 90), pytest.param(1, 180, marks=pytest.mark.rest)])

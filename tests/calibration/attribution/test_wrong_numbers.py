@@ -192,7 +192,7 @@ def test_a_number_beyond_its_tolerance_is_a_finding_of_its_own() -> None:
     assert result.verdict == "number"
     assert result.effects == ()
     assert CAMERA in {p.parameter.name for p in result.wrong_numbers[0]}
-    assert result.sentence.startswith("A nuisance parameter is wrong: ")
+    assert result.sentence.startswith("The runs ask for another value of a nuisance parameter: ")
     assert "No effect is claimed." in result.sentence
     record = verdict_record(result, table="t")
     assert record["wrong_numbers"][0] == [p.parameter.name for p in result.wrong_numbers[0]]

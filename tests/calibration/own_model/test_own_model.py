@@ -129,7 +129,7 @@ def test_a_model_is_saved_with_its_numbers(tmp_path: Path) -> None:
     assert np.linalg.eigvalsh(saved["covariance"]["on_their_scales"]).min() > 0
     page = (tmp_path / "report.html").read_text()
     assert "softflagella plan" not in page
-    assert not json.loads((tmp_path / "verdict.json").read_text())["hands_on_a_robot"]
+    assert json.loads((tmp_path / "verdict.json").read_text())["subject"] == "model"
     assert "wall" in repr(result)
     assert "<svg" in page
 
@@ -203,5 +203,8 @@ def test_the_viscosity_is_that_of_the_capillary() -> None:
     table = table.rename(columns={"rho_fluid": "rho_oil"}).assign(v=table["distance_mm"] / 1e3 / table["time_s"])
     experiment = read_runs_of(table, model, Roles(session="repeat", specimen="ball"))[0]
     result = calibrate(experiment, progress=False)
-    assert result.error_after < 0.3 * result.error_before
-    assert result.final.parameters["viscosity"] == pytest.approx(0.1946, rel=0.05)
+    assert result.error_after < 0.5 * result.error_before
+    assert result.errors.of_conditions is not None
+    assert result.errors.of_conditions.after < result.errors.of_conditions.before
+    low, high = result.final_intervals["viscosity"]
+    assert low < 0.1946 < high

@@ -61,7 +61,8 @@ def test_a_verdict_says_what_it_found_in_a_few_lines() -> None:
         assert text.startswith(f"Verdict {verdict.verdict!r}")
         assert all(name in text for name in verdict.effects)
         assert verdict.sentence[:200] in text
-        shares = [float(share) for share in re.findall(r"([\d.]+) %", text.splitlines()[-1])]
+        on_sessions = re.sub(r"\(.*?\)", "", text.splitlines()[-1].partition("; on conditions")[0])
+        shares = [float(share) for share in re.findall(r"([\d.]+) %", on_sessions)]
         errors = [verdict.error_uncalibrated, verdict.error_before]
         errors += [verdict.error_after] if verdict.effects else []
         assert shares == pytest.approx([100 * error for error in (*errors, verdict.noise_ceiling)], abs=0.006)

@@ -63,13 +63,31 @@ def test_a_residual_that_the_held_out_runs_do_not_show_is_harmless() -> None:
     ):
         assert not shown.harmless
         assert "harmless" not in shown.sentence
-        assert "Look where the residual is large" in next_steps(facts(shown))[0]
+        assert "Look where the residual is large" in next_steps(facts(shown))[1]
 
 
 def test_what_is_claimed_must_lower_the_error() -> None:
     for verdict, after, falls in (("none", 0.02, None), ("number", 0.02, True), ("effect", 0.031, False)):
         errors = HeldOutErrors({"uncalibrated": 0.2, "before": 0.03, "after": after}, {}, (0.0, 1.0), 0.02, 0.5)
         assert replace(none(), verdict=verdict, errors=errors).held_out_error_falls is falls
+
+
+@pytest.mark.parametrize(
+    ("given", "after", "gain", "p_value", "advice"),
+    [
+        (0.2, 0.02, (0.005, 0.015), 0.5, "corrected"),
+        (0.2, 0.029, (-0.001, 0.003), 0.5, "wait"),
+        (0.2, 0.031, None, 0.5, "wait"),
+        (0.2, 0.02, (0.005, 0.015), 0.001, "wait"),
+        (0.02, 0.021, (0.005, 0.013), 0.5, "as given"),
+    ],
+)
+def test_the_model_to_use_is_better_on_the_held_out_runs(
+    given: float, after: float, gain: tuple[float, float] | None, p_value: float, advice: str
+) -> None:
+    rms = {"uncalibrated": given, "before": 0.03, "after": after}
+    errors = HeldOutErrors(rms, {}, (0.0, 1.0), 0.02, p_value, gain)
+    assert replace(none(), verdict="effect", errors=errors).advice == advice
 
 
 @pytest.mark.parametrize(("tolerances", "hedged"), [(8.3, True), (4.0, False)])

@@ -1,0 +1,217 @@
+"""What is said in all combinations of a verdict and its flags: one advice, and no word of a robot without one."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from itertools import product
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from calibration.report.report import sections
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.findings import Findings
+from calibration.verdict.record import verdict_record
+from calibration.words.render import errors_in_words, next_steps, say_laws, sentence
+from tests.calibration.words.test_words import in_report, laws_of_five_places
+from tests.oracles.falling_balls import balls, falls
+from tests.shared import shared
+
+Record = dict[str, Any]
+
+OF_A_ROBOT = re.compile(
+    r"robot|\btails?\b|tank|camera|motor|swim|--own|softflagella|corrected\.toml|slip angle|heading", re.IGNORECASE
+)
+P_VALUE = re.compile(r"\bp [=≤]")
+SPOILT = re.compile(r"\bNone\b|\bnan\b|Undefined|  |\.\.|[.,;:] [.,;]|\(\)| [.,;)]|\( ")
+MODEL_TO_USE = re.compile(r"^(Plan with|Use) (the|neither) (corrected )?(robot|model)")
+
+WALL = {"title": "wall of the tube", "words": "wall of the tube (wall)", "effects": ["wall"]}
+LAG = {"title": "inertia", "words": "inertia (inertia)", "effects": ["inertia"]}
+SHOWN = {"unit": "1", "shown": 1.0, "given": 0.0, "scale": "as it is"}
+SIZE = {"title": "wall of the tube", **SHOWN, "value": 0.9, "interval": [0.8, 1.0], "value_all_runs": 0.9}
+NEAREST = {
+    "effect": "wall", "title": "wall of the tube", **SHOWN, "mean": 0.9, "interval": [0.8, 1.0], "spread": 0.1,
+    "sizes": {}, "removed_share": 0.9, "session_gain": [30.0, 4.0], "birge": 2.0, "remainder": 0.01,
+    "remainder_p": 0.002, "largest_along": "speed along depth", "as_well": ["inertia"],
+}  # fmt: skip
+SIZES = {"A": [0.7, 0.6, 0.8], "B": [1.1, 1.0, 1.2]}
+OFF = {"title": "viscosity", "words": "viscosity is 9 % above what was given (9.1 σ)", "departure": "9 % above",
+       "tolerances": 9.4}  # fmt: skip
+MOVE = {"words": "viscosity is 9 % above that of the other runs", "where": "in session 2"}
+FORMS = [
+    {"title": "inertia", "error": 0.033, "theory": False, "as_well": True},
+    {"title": "wall of the tube at the size of theory, 1", "error": 0.032, "theory": True, "as_well": True},
+    {"title": "decoy", "error": 0.09, "theory": False, "as_well": False},
+]
+FORBIDDEN = {"title": "decoy", "error_before": 0.12, "error_after": 0.17}
+CONDITIONS = {"names": "balls 2 and 5", "before": 0.12, "after": 0.04, "p_value": 0.2}
+BATCH = {"runs": 4 * [{"depth": 4.0}], "decides": 0.9, "worth_making": True}
+GAINS: dict[str, Record] = {
+    "certain": {"error_after": 0.04, "gain_interval": [0.05, 0.11], "gain_is_certain": True},
+    "uncertain": {"error_after": 0.119, "gain_interval": [-0.01, 0.02], "gain_is_certain": False},
+    "of no interval": {"error_after": 0.04},
+    "none": {"error_after": 0.13, "gain_interval": [-0.02, -0.001], "gain_is_certain": False},
+}
+EITHER = (False, True)
+
+
+@shared
+def falling_balls() -> Record:
+    """The record of a verdict on a model that is no robot."""
+    result = calibrate(balls(falls("nothing", 0)), draws=200, progress=False)
+    record: Record = json.loads(json.dumps(verdict_record(result, table="falls.csv")))
+    return record
+
+
+def found_laws() -> Record:
+    """A record of laws as it is in a verdict."""
+    laws, fitted = (
+        laws_of_five_places(),
+        {"gain": 9.0, "error": 0.05, "error_interval": [0.04, 0.06], "leaves_noise": True},
+    )
+    return {**laws, "sentence": say_laws(laws), "beside": "", "laws": [{**law, **fitted} for law in laws["laws"]]}
+
+
+def with_flags(verdict: str, changes: Record) -> Record:
+    """A verdict with some of its entries changed, which is consistent in those that depend on others."""
+    record = {**falling_balls(), "verdict": verdict, "error_uncalibrated": 0.2, "error_before": 0.12, **changes}
+    claimed, adopted = record["claims"], record["nearest"]
+    record["effects"] = [name for claim in claimed for name in claim["effects"]]
+    record["imitability"], record["transfer_p"] = len(claimed) * [0.1], len(claimed) * [1.0]
+    falls_with_it = None if verdict in ("none", "unexplained") else record["error_after"] < record["error_before"]
+    record["held_out_error_falls"] = falls_with_it
+    of_base = (adopted and not falls_with_it) or verdict in ("none", "unexplained")
+    of_law = record["error_law"] if record["described"] else record["error_before"]
+    record.setdefault("error_corrected", 0.0)
+    record["error_corrected"] = of_law if of_base else record["error_after"]
+    if changes.get("given_is_best"):
+        record["error_uncalibrated"] = 0.03
+    advice = Findings.advice.fget  # type: ignore[attr-defined]
+    return {**record, "advice": advice(SimpleNamespace(**record))}
+
+
+def combinations(verdict: str) -> Iterator[Record]:
+    """All combinations of the flags of a verdict."""
+    flags: dict[str, tuple[Record, ...]] = {
+        "subject": ({"subject": "model"}, {"subject": "robot"}),
+        "agree": ({"held_out_runs_agree": True, "locked_p_value": 0.4}, {"held_out_runs_agree": False}),
+        "moves": ({}, {"moves": [MOVE]}),
+        "given": ({}, {"given_is_best": True}),
+        "provisional": (
+            {},
+            {"not_tried": ["a wall"], "withdrawn": [FORBIDDEN], "errors_of_conditions": CONDITIONS},
+        ),
+    }
+    batches: tuple[Record, ...] = ({}, {"next_batch": BATCH}, {"next_batch": {**BATCH, "worth_making": False}})
+    gains = tuple(GAINS.values())
+    imitable: tuple[Record, ...] = ({}, {"imitable": True})
+    claim = {"claims": [WALL], "parameters": {**falling_balls()["parameters"], "wall": SIZE}}
+    match verdict:
+        case "none":
+            flags |= {"number": ({}, {"notable_number": OFF["words"]})}
+        case "number":
+            check = {"number_check": {"uncertain": True, "implausible": True, "tolerances": 9.0}}
+            flags |= {
+                "number": ({"wrong_number_records": [[OFF]]}, {"wrong_number_records": [[OFF, OFF]], **check}),
+                "gain": gains, "batch": batches, "instead": ({}, {"claims_instead": ["inertia"]}),
+            }  # fmt: skip
+        case "effect":
+            flags |= {
+                "claim": (claim, {**claim, "in_form_only": ["wall"]}, {**claim, "wrong_number_records": [[OFF]]}),
+                "gain": gains, "imitable": imitable, "batch": batches[1:], "forms": ({}, {"forms": FORMS}),
+            }  # fmt: skip
+        case "ambiguous":
+            several = {**claim, "claims": [WALL, LAG]}
+            flags |= {
+                "claim": (several, {**claim, "rival_numbers": [OFF]}), "gain": gains, "imitable": imitable,
+                "batch": batches, "number": ({}, {"notable_number": OFF["words"]}),
+            }  # fmt: skip
+        case "partial":
+            turns = [{"error": 0.12, "named": "", "left": "speed along depth"},
+                     {"error": 0.04, "named": "wall of the tube", "left": ""}]  # fmt: skip
+            flags |= {
+                "nearest": ({"nearest": NEAREST}, {"nearest": {**NEAREST, "sizes": SIZES, "as_well": []}},
+                            {"nearest": {**NEAREST, "remainder": 0.0, "largest_along": ""}, "turns": turns}),
+                "gain": gains, "forms": ({}, {"forms": FORMS, "error_new_specimen": 0.05}),
+            }  # fmt: skip
+        case "unexplained":
+            laws = {"laws": found_laws(), "error_law": 0.05}
+            laws["errors_by_output"] = {**falling_balls()["errors_by_output"], "law": {}}
+            near = {"title": "inertia", "removed_share": 0.6, "reason": "its interval includes the null"}
+            flags |= {
+                "what": ({}, {"harmless": True}, {"largest_along": "speed along depth", "nearest_candidate": near},
+                         {"largest_departures": [{"at": ["depth = 4"], "departure": 3.0}], "largest_along": ""}),
+                "untestable": ({}, {"untestable": {"drift": "needs a time"}}),
+            }  # fmt: skip
+    for chosen in product(*flags.values()):
+        record = {key: value for change in chosen for key, value in change.items()}
+        yield with_flags(verdict, record)
+        if verdict in ("none", "partial") and record["held_out_runs_agree"] and "moves" not in record:
+            scored = [{**c, "verdict": "not needed"} for c in falling_balls()["candidates"]]
+            yield with_flags(verdict, {**record, "noise_known": False, "candidates": scored})
+        if verdict == "unexplained" and record["subject"] == "robot":  # laws are a robot's
+            for batch in batches:
+                yield with_flags(verdict, {**record, **laws, **batch, "described": "harmless" not in record})
+
+
+@pytest.mark.parametrize("verdict", ["none", "number", "effect", "ambiguous", "partial", "unexplained"])
+def test_every_combination_is_said_in_whole_sentences_with_one_advice(verdict: str) -> None:
+    advised = set()
+    for record in combinations(verdict):
+        advice, steps = record["advice"], next_steps(record)
+        advised.add(advice)
+        said, errors = sentence(record), errors_in_words(record)
+        seen = in_report({**record, "sentence": said, "next_steps": steps})
+        first, *experiments = steps
+        assert MODEL_TO_USE.match(first), first
+        for text in (said, errors, *steps):
+            assert not SPOILT.search(text), text
+        assert all(text and text.endswith(".") for text in (said, *steps)), steps
+        for step in experiments:
+            assert not MODEL_TO_USE.match(step), steps
+            assert "corrected" not in step, steps
+        assert ("plan/plan.json" in " ".join(steps)) <= (advice == "corrected"), steps
+        assert ("--robot corrected.toml" in first) == (advice == "corrected" and record["subject"] == "robot")
+        bears_out = record["held_out_error_falls"] and record["gain_is_certain"] is not False
+        if verdict in ("number", "effect", "ambiguous"):
+            assert ("does not fall" in said or "no gain that these runs can show" in said) == (not bears_out), said
+            assert bears_out or advice != "corrected", steps
+        assert not re.search(r"\bNone\b|\bnan\b|Undefined|\.\.", seen), seen
+        if record["subject"] == "model":
+            for text in (said, errors, *steps, seen):
+                assert not OF_A_ROBOT.search(text), text
+        if not record["noise_known"]:
+            for text in (said, errors, *steps, seen):
+                assert not P_VALUE.search(text), text
+                assert "noise of a run" not in text
+    assert advised == {"as given", "corrected"} | ({"wait"} if verdict != "unexplained" else set())
+
+
+def test_what_the_loop_found_has_its_sections() -> None:
+    loop = [{"error": 0.12, "named": "", "left": "speed along depth"}]
+    changes = {
+        "nearest": NEAREST,
+        "forms": FORMS,
+        "turns": loop,
+        "errors_of_conditions": CONDITIONS,
+        **GAINS["certain"],
+    }
+    record = with_flags("partial", {**changes, "withdrawn": [FORBIDDEN]})
+    said, seen = sentence(record), in_report(record)
+    assert (
+        "Decoy was claimed first and withdrawn: with it the error on held-out runs rises from 12.00 % to 17.00 %"
+        in said
+    )
+    assert "These runs have been looked at 2 times." in said
+    assert "falls from 12.00 % to 4.00 % (by 8.00 %, 95 % interval 5.00 to 11.00 %)" in said
+    forms = "tell these forms apart: wall of the tube at the size of theory, 1 (3.20 %); inertia (3.30 %)."
+    assert forms in said
+    assert "The loop" in seen
+    assert "1 – 12.00 % speed along depth" in seen
+    assert "decoy 9.00 % no" in seen
+    assert "on conditions that were not fitted (balls 2 and 5): calibrated 12.00 %" in errors_in_words(record)
+    assert "<td>4.00 %</td>" in sections(record, {})
