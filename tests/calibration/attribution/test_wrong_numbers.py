@@ -225,7 +225,7 @@ def test_a_number_far_beyond_its_tolerance_is_behind_an_effect(monkeypatch: pyte
     record = verdict_record(result, table="t")
     assert record["numbers_instead"] == ["head_length"]
     assert record["wrong_numbers"] == []
-    assert record["next_steps"][1].startswith("Measure L (head length) again")
+    assert record["next_steps"][2].startswith("Measure L (head length) again")
     monkeypatch.setattr(wrong_numbers, "IMPLAUSIBLE", 2 * rival.tolerances)
     ahead = calibrated(table, few=True)
     assert ahead.verdict == "number"
