@@ -52,6 +52,15 @@ def test_sizes_are_those_of_the_fault():
     assert driver.size == pytest.approx(-np.log(1.15), abs=0.02)
 
 
+def test_an_offset_follows_what_is_read():
+    """A watch that is stopped late reads fast turns lower than slow ones."""
+    found = _found(read_measurements(make_table(_case("watch"), 56)))
+    assert [(d.output, d.of_reading, d.size < 0) for d in found] == [
+        ("omega_yr", False, True),
+        ("omega_yr", True, True),
+    ]
+
+
 def test_what_the_model_knows_is_left_to_it():
     """Drift with the time of the runs, and sessions that differ, are no differences with an unknown column."""
     table = make_table(CASES[0], 5).assign(elapsed_min=lambda t: 4.0 * np.arange(len(t)))
