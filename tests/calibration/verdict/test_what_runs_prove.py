@@ -19,47 +19,7 @@ from calibration.statistics.study import quarter_of_conditions
 from calibration.verdict.calibrate import calibrate, first_fit
 from calibration.verdict.record import facts
 from calibration.verdict.verdict import Verdict
-
-DIAMETERS = np.array([2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 7.5, 8.0, 9.0])
-NOISE = 0.02
-
-
-def fall(columns: Mapping[str, Any], p: Mapping[str, float]) -> dict[str, Any]:
-    """Compute the speed of a ball in a tube, as ratios of a scale."""
-    d = columns["d"]
-    v = d**2 / p["viscosity"] * (1 - p["wall"] * 2.104 * d / 75)
-    return {"v": v * np.exp(p["surface"] / d) / (1 + p["late"] * d**2 / 100)}
-
-
-MODEL = sf.Model(
-    fall,
-    outputs={"v": sf.Output("speed", "mm/s")},
-    numbers=[sf.Number("viscosity", 1.0, "Pa s", low=0.01, high=100)],
-    effects=[
-        sf.Effect("wall", "wall of the tube", low=-1, high=3, theory=1.0),
-        sf.Effect("surface", "drag of the surface", low=-2, high=2, typical=0.2),
-        sf.Effect("late", "stop-watch late", low=-0.5, high=2, typical=0.1),
-    ],
-    settings=["d"],
-)
-
-
-def falls(
-    seed: int, *, rounds: int = 5, repeats: int = 2, scatter: float = 0.0, bump: float = 0.0, **truth: float
-) -> pd.DataFrame:
-    """Draw a table: rounds of all balls, each shifted by `scatter`, with a bump at middle diameters."""
-    rng = np.random.default_rng(seed)
-    rows = [(f"round {k}", d) for k in range(rounds) for _ in range(repeats) for d in DIAMETERS]
-    table = pd.DataFrame(rows, columns=["round", "d"])
-    values = {"viscosity": 1.0, "wall": 0.0, "surface": 0.0, "late": 0.0} | truth
-    v = fall({"d": table["d"].to_numpy()}, values)["v"] * np.exp(bump * np.sin(table["d"].to_numpy()))
-    shift = scatter * rng.standard_normal(rounds)
-    place = table["round"].str[-1].astype(int).to_numpy()
-    return table.assign(v=v * np.exp(shift[place] + NOISE * rng.standard_normal(len(table))))
-
-
-def model_of(table: pd.DataFrame, **roles: Any) -> Any:
-    return read_runs_of(table, MODEL, Roles(**({"session": "round"} | roles)))[0]
+from tests.oracles.drawn_falls import DIAMETERS, NOISE, fall, falls, model_of
 
 
 def verdict(table: pd.DataFrame, **roles: Any) -> Verdict:
@@ -177,7 +137,9 @@ def test_a_noise_that_is_declared_needs_no_repeats() -> None:
     table = table[table["round"].isin(["round 0", "round 1", "round 2"])].assign(
         d=lambda t: t["d"] + t.index / 100
     )
-    table["v"] = fall({"d": table["d"].to_numpy()}, {"viscosity": 1.0, "wall": 1.5, "surface": 0, "late": 0})["v"]
+    table["v"] = fall({name: table[name].to_numpy() for name in ("d", "round")}, {"viscosity": 1.0, "wall": 1.5})[
+        "v"
+    ]
     table["v"] *= np.exp(NOISE * np.random.default_rng(0).standard_normal(len(table)))
     unknown = verdict(table)
     assert (unknown.runs.noise_known, unknown.verdict, unknown.effects) == (False, "partial", ())
@@ -212,7 +174,7 @@ def test_a_pull_without_a_residual_is_no_wrong_number() -> None:
     ]
 
     def scaled(columns: Mapping[str, Any], p: Mapping[str, float]) -> dict[str, Any]:
-        return {"v": fall(columns, {**p, "surface": 0.0, "late": 0.0})["v"] * p["scale"] ** columns["d"]}
+        return {"v": fall(columns, p)["v"] * p["scale"] ** columns["d"]}
 
     effects = [sf.Effect("wall", "wall of the tube", low=-1, high=3)]
     given = sf.Model(scaled, outputs={"v": sf.Output("speed")}, numbers=numbers, effects=effects, settings=["d"])
