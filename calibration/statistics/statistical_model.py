@@ -37,6 +37,7 @@ Predict = Callable[[Sequence[Parameters]], Floats]  # see `ForwardModel.predict`
 _LARGEST = 100.0  # change of ln C, so that C stays a number
 _DIFFER = 0.001  # p-value below which repeats differ with sessions or notes
 FEWEST_REPEATS = 8  # runs, for a covariance from repeats alone
+_LEAST_OF_A_DESIGN = 1.5  # degrees of freedom, per output, that a design of repeats must leave
 _CUBIC = 0.2  # share of a cube that lower powers must leave
 
 
@@ -218,7 +219,9 @@ class Runs:
         design = np.column_stack([*levels, noted, differing])
         each = [np.where(level[:, None], noted, 0.0) for level in levels[-1].T.astype(bool)] if crossed else []
         for further in (design, np.column_stack([design, *each])):  # what is noted may act otherwise in a session
-            if _differ_more(self.y[rows], plain, further):
+            # An S of few degrees of freedom would make the null distribution of every test too wide.
+            enough = repeat_count(further) >= _LEAST_OF_A_DESIGN * self.y.shape[1]
+            if enough and _differ_more(self.y[rows], plain, further):
                 plain = further
         return plain
 

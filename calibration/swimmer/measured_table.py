@@ -92,13 +92,13 @@ class Measurements(Runs):
 
     @property
     def noted_of_repeats(self) -> Floats:
-        """Temperature and course, by which a current acts as its share of the speed and the square of that."""
+        """Temperature and course, by which a current acts on the speed as its share of it, and on the slip angle."""
         noted = dict(zip(self.noted_names, self.noted.T, strict=True))
         columns = [noted["temperature_K"]] if "temperature_K" in noted else []
         if "course_x" in noted:
             slow, side = np.abs(self.omega).mean() / np.abs(self.omega), np.sign(self.omega)
             x, y = noted["course_x"] * slow, noted["course_y"] * slow
-            columns += [x, y, x * side, y * side, x**2 - y**2, x * y]
+            columns += [x, y, x * side, y * side]
         return np.stack(columns, 1) if columns else np.empty((len(self), 0))
 
     @property
