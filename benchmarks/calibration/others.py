@@ -1,8 +1,8 @@
 """Measurements that others published, calibrated with the models of docs/models: what is named, errors held out.
 
 One table in Markdown, for docs/explanation/found.md: what was withheld, what is named, and the error on runs that
-were held out, before and after, by sessions and by conditions. SHIP.csv, which has no licence, is read if it is
-given. With a PICTURE.png the errors are drawn.
+were held out, before and after, by sessions and by conditions. Then the falls of 2019 with other laws of wall and
+inertia. SHIP.csv, which has no licence, is read if it is given. With a PICTURE.png the errors are drawn.
 
 Usage: python -m benchmarks others [PICTURE.png] [SHIP.csv]
 
@@ -11,57 +11,56 @@ Takes 30 seconds.
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 import softflagella as sf
-from benchmarks.common import ROOT, heading, row
+from benchmarks.common import heading, row
 from calibration.own_model.model_file import load_model
 from calibration.verdict.record import facts
+from tests.oracles.others import MODELS, SETS, calibrated, named
 
-MODELS = ROOT / "docs/models"
 _ERRORS = ("error_before", "error_after")
 
 
-class Measured(NamedTuple):
-    """A published table, its model, and what is known about it from elsewhere."""
+def by_fits(columns: Mapping[str, Any], p: Mapping[str, float]) -> dict[str, Any]:
+    """Compute speeds of falls in a tube [m/s], (n,), with laws fitted to experiments.
 
-    title: str
-    table: str
-    model: str
-    session: str | None
-    withheld: str
-    known: str
-
-
-SETS = {
-    "tube-2017": Measured("balls in a tube, 2017", "tube-2017.csv", "tube.py", "repeat", "wall, inertia", "theory: 1"),
-    "tube-2019": Measured(
-        "balls in a tube, 2019", "tube-2019.csv", "tube.py", "repeat", "wall, inertia", "capillary: 0.1946 Pa s"
-    ),
-    "tower": Measured("falls from a tower", "tower.csv", "tower.py", "ball_kg_m3", "drag", "C_D 0.4 to 0.5"),
-    "propellers": Measured("thrust of propellers", "propellers.csv", "propeller.py", "test", "square", "theory: 1"),
-    "motors": Measured("speed of motors", "propellers.csv", "motor.py", "test", "dead zone, resistance", ""),
-    "ship": Measured("side force on a ship", "", "ship.py", None, "cross-flow drag", "v abs(v), or v³"),
-}
+    Source: wall, Ladenburg (1907); inertia, Schiller and Naumann (1935).
+    """
+    d, fluid = columns["diameter_mm"] / 1e3, columns["rho_fluid_kg_m3"]
+    stokes = (columns["rho_ball_kg_m3"] - fluid) * 9.81 * d**2 / (18 * p["viscosity"])
+    v = slow = stokes / (1 + p["wall"] * 2.1 * columns["diameter_mm"] / columns["tube_mm"])
+    for _ in range(60):
+        reynolds = fluid * v * d / p["viscosity"]
+        v = (v + slow / (1 + p["inertia"] * 0.15 * reynolds**0.687)) / 2
+    return {"v": v / (1 + p["late"] * v / columns["distance_mm"] * 1e3)}
 
 
-def calibrated(name: str, table: str | Path | None = None) -> sf.ModelVerdict:
-    """Calibrate one of SETS; a table that is not in the project is given."""
-    measured = SETS[name]
-    model, rows = load_model(MODELS / measured.model, table or MODELS / "data" / measured.table)
-    return sf.calibrate(rows, model, session=measured.session, progress=False)
+def of_theory(laws: Callable[..., Mapping[str, Any]], rows: Any) -> tuple[float, float]:
+    """Fit the viscosity of falls whose wall and inertia have the sizes of theory; return it and the rms error."""
+
+    def rms(log_viscosity: float) -> float:
+        p = {"viscosity": float(np.exp(log_viscosity)), "wall": 1.0, "inertia": 1.0, "late": 0.0}
+        return float(np.sqrt(np.mean(np.log(laws(rows, p)["v"] / rows["v"]) ** 2)))
+
+    best = minimize_scalar(rms, bounds=np.log((0.05, 1.0)), method="bounded")
+    return float(np.exp(best.x)), float(best.fun)
 
 
-def named(record: dict[str, Any]) -> str:
-    """Say what a verdict names, in the order in which it was found, and what would do as well."""
-    found = [turn["named"] for turn in record["turns"] if turn["named"]] or [c["title"] for c in record["claims"]]
-    size = " at the size of theory" if (record["nearest"] or {}).get("at_theory") else ""
-    others = [f["title"] for f in record["forms"] if (f["title"] != found[-1] or size) and not f["title"].startswith(found[-1] + size)]
-    return ", then ".join(found) + size + (f"; as well: {', '.join(others)}" if others else "")
+def compare_laws() -> None:
+    """Print what the falls of 2019 say with series and with laws fitted to experiments."""
+    model, rows = load_model(MODELS / "tube.py", MODELS / "data/tube-2019.csv")
+    for title, laws in (("Faxén, Oseen", model.function), ("Ladenburg, Schiller and Naumann", by_fits)):
+        viscosity, rms = of_theory(laws, rows)
+        record = facts(sf.calibrate(rows, replace(model, function=laws), session="repeat", progress=False))
+        print(f"{title}: both at theory {viscosity:.4f} Pa s, {100 * rms:.1f} %; named {named(record)}")
+        print({name: (number["value"], *number["interval"]) for name, number in record["parameters"].items()})
 
 
 def percent(verdict: sf.ModelVerdict, *errors: float) -> list[float]:
@@ -75,16 +74,24 @@ def main(picture: str = "", ship: str = "") -> None:
     """Print the table; draw the picture."""
     names = [name for name in SETS if ship or SETS[name].table]
     verdicts = {name: calibrated(name, None if SETS[name].table else ship) for name in names}
-    print(heading("set", "withheld", "named", "held-out sessions, %", "conditions, %", "noise, %", "known"))
+    print(heading("set", "withheld", "named", "sessions, %", "conditions, %", "noise, %", "number", "known"))
     drawn = {}
     for name, verdict in verdicts.items():
         record, measured = facts(verdict), SETS[name]
         of_conditions = record["errors_of_conditions"]
         errors = (*(record[e] for e in _ERRORS), of_conditions["before"], of_conditions["after"])
-        drawn[name] = percent(verdict, *errors, record["noise_ceiling"] if verdict.runs.noise_known else np.nan)
-        before, after, b, a, noise = (f"{value:.1f}" for value in drawn[name])
-        print(row(measured.title, measured.withheld, named(record), f"{before} → {after}", f"{b} → {a}",
-                  noise if verdict.runs.noise_known else "unknown", measured.known))  # fmt: skip
+        noise = record["noise_ceiling"] if verdict.runs.noise_known else np.nan
+        drawn[name] = percent(verdict, *errors, noise)
+        numbers = [
+            f"{number['title']} {number['value']:.4g} ({number['interval'][0]:.4g} to {number['interval'][1]:.4g})"
+            for number in record["parameters"].values()
+        ]
+        before, after, b, a, left = (f"{value:.1f}" for value in drawn[name])
+        print(row(
+            measured.title, measured.withheld, named(record), f"{before} → {after}", f"{b} → {a}",
+            left if verdict.runs.noise_known else "unknown", ", ".join(numbers), measured.known,
+        ))  # fmt: skip
+    compare_laws()
     if picture:
         draw(drawn, picture)
 
@@ -98,7 +105,9 @@ def draw(drawn: dict[str, list[float]], picture: str) -> None:
             y = -place + shift
             axes.annotate("", (other, y), (one, y), arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.5})
             axes.plot(one, y, "o", color=colour, ms=5, label=f"held-out {what}" if not place else None)
-        axes.plot([noise] * 2, [-place - 0.32, -place + 0.32], "k", lw=1.5, label=None if place else "noise of a run")
+        axes.plot(
+            [noise] * 2, [-place - 0.32, -place + 0.32], "k", lw=1.5, label=None if place else "noise of a run"
+        )
     axes.set_xscale("log")
     axes.set_xticks([1, 2, 5, 10, 20, 50], ["1", "2", "5", "10", "20", "50"])
     axes.minorticks_off()

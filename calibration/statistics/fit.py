@@ -375,7 +375,7 @@ def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: F
             break
     new = apply_step(fitted, parameters, change)
     promise = 2 * change @ normal[:-1, -1] - change @ normal[:-1, :-1] @ change
-    return _FitStep(new, float(np.abs(change).max(initial=0.0)), float(promise), place)
+    return _FitStep(new, float(np.abs(change).max()), float(promise), place)
 
 
 def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, damping: float) -> Floats:

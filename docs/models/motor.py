@@ -1,11 +1,12 @@
-"""Speed of a motor against throttle and voltage: proportional, or with a dead zone of the throttle, a resistance.
+"""Speed of a motor against throttle and voltage: proportional, or with a dead zone, or a resistance.
 
     n = K (V δ − R I/δ),   δ = s + δ_0,   s = (signal − 1000 µs)/1000 µs
 
-s is the throttle, which the controller turns into the share δ of the time in which the motor has the voltage V; I is
-the current of the supply, I/δ that of the motor, R the resistance of winding and controller, K the motor's constant.
+s is the throttle, which the controller turns into the share δ of the time in which the motor has the voltage V;
+I is the current of the supply, I/δ that of the motor, R the resistance, K the constant of the motor.
 
-Eight motors with propellers at two voltages each, by StrawsonDesign (MIT licence, see data/LICENCES.md).
+One motor (EMAX RS2205S, 2600 rpm/V by its maker) with eight propellers at two voltages, by P. Cao and J. Strawson
+(MIT licence, see data/LICENCES.md).
 
     softflagella calibrate docs/models/data/propellers.csv --model docs/models/motor.py --session test --out DIR
 """

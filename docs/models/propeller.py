@@ -1,13 +1,14 @@
-"""Thrust of a propeller on a stand: in proportion to the speed of rotation, which may lack the square.
+r"""Thrust of a propeller on a stand: in proportion to the speed of rotation, which may lack the square.
 
     T = c n^(1 + ε),   n in units of 10,000 rpm; by the theory of airscrews T = C_T ρ n² D⁴, ε = 1
 
 or with a zero error of the load cell, or a loss near the speed of sound at the tips.
 
-Eight motors with propellers at two voltages each, by StrawsonDesign (MIT licence, see data/LICENCES.md). The speed
-is that of the electric field, which the controller reports; it is 0 before the controller has found it.
+Eight propellers on one motor at two voltages, by P. Cao and J. Strawson (MIT licence, see data/LICENCES.md). The
+speed is that of the electric field, which the stand measures; rows in which it found none are left out.
 
-    softflagella calibrate docs/models/data/propellers.csv --model docs/models/propeller.py --session test --out DIR
+    softflagella calibrate docs/models/data/propellers.csv --model docs/models/propeller.py --session test \
+        --out DIR
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Side force on a ship that is towed at an angle of drift: linear in the angle, which may lack the cross-flow drag.
+"""Side force on a ship that is towed at an angle of drift: linear, which may lack the cross-flow drag.
 
     Y′ = a v (1 + ε_c |v| + ε_3 v²),   v = sin(β + ε_β)
 

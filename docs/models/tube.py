@@ -1,4 +1,4 @@
-"""Balls that sink in a tube of oil: Stokes's law, which may lack the wall of the tube and the inertia of the oil.
+r"""Balls that sink in a tube of oil: Stokes's law, which may lack the wall of the tube and the inertia of the oil.
 
     v = v_S (1 − ε_w (2.104 x − 2.089 x³ + 0.948 x⁵)) / (1 + ε_i 3/16 Re),   v_S = Δρ g d²/(18 μ)
 

@@ -1,0 +1,90 @@
+"""What is named in the measurements of others: docs/explanation/found.md."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from calibration.verdict.record import facts
+from tests.oracles.others import MODELS, SETS, calibrated, named
+from tests.shared import shared
+
+SHIP = Path(__file__).parents[4] / "shared/measured/real/ship_captive.csv"
+CAPILLARY = 0.1946  # Pa s, of the oil of 2019
+
+
+@shared
+def record(name: str) -> dict[str, Any]:
+    return facts(calibrated(name, SHIP if name == "ship" else None))
+
+
+def falls(name: str) -> tuple[float, float]:
+    """Return by which factor the error falls, on sessions and on conditions."""
+    found = record(name)
+    conditions = found["errors_of_conditions"]
+    return found["error_before"] / found["error_after"], conditions["before"] / conditions["after"]
+
+
+def interval(name: str, number: str) -> tuple[float, float]:
+    low, high = record(name)["parameters"][number]["interval"]
+    return low, high
+
+
+@pytest.mark.parametrize("name", ["tube-2017", "tube-2019"])
+def test_the_wall_of_the_tube_is_named_at_the_size_of_theory(name: str) -> None:
+    assert named(record(name)).startswith("wall of the tube at the size of theory")
+    assert "watch" not in named(record(name))
+    assert min(falls(name)) > 1.5
+    assert record(name)["gain_interval"][0] > 0
+
+
+def test_a_time_that_does_not_fit_its_repeats_is_left_out() -> None:
+    """9.98 s among 8.80 to 9.01 s."""
+    (outlier,) = calibrated("tube-2017").split.outliers
+    assert str(outlier).startswith("row 3 (line 4)")
+
+
+def test_the_viscosity_of_the_capillary_is_in_the_envelope() -> None:
+    low, high = interval("tube-2019", "viscosity")
+    assert low < CAPILLARY < high < 1.5 * low
+    given = record("tube-2019")["parameters_without_effects"]["viscosity"]["interval"]
+    assert not given[0] < CAPILLARY < given[1]
+    assert min(falls("tube-2019")) > 2
+
+
+def test_thrust_goes_as_the_square_of_the_speed() -> None:
+    assert named(record("propellers")).startswith("square of the speed at the size of theory")
+    assert not {"zero", "tips"} & set(record("propellers")["parameters"])
+    sessions, conditions = falls("propellers")
+    assert sessions > 1.5  # the propeller that is held out has another coefficient
+    assert conditions > 4
+
+
+def test_a_dead_zone_then_a_resistance_are_named_in_the_speed_of_a_motor() -> None:
+    assert named(record("motor")) == "dead zone of the throttle, then resistance"
+    assert min(falls("motor")) > 5
+    low, high = interval("motor", "resistance")
+    assert 0 < low < high < 0.3
+
+
+@pytest.mark.skipif(not SHIP.exists(), reason="the table of the ship has no licence and is not here")
+def test_the_cross_flow_of_a_ship_is_named_and_an_angle_is_not() -> None:
+    assert "cross-flow drag" in named(record("ship"))
+    assert "angle" not in named(record("ship"))
+    assert min(falls("ship")) > 2
+
+
+def test_the_drag_of_a_sphere_has_its_coefficient() -> None:
+    assert record("tower")["effects"] == ["quadratic_drag"]
+    low, high = interval("tower", "quadratic_drag")
+    assert 0.3 < low < 0.5 < high < 0.75
+    assert falls("tower")[1] > 2
+
+
+def test_every_table_has_its_source_and_licence() -> None:
+    licences = (MODELS / "data/LICENCES.md").read_text()
+    tables = {file.name for file in (MODELS / "data").glob("*.csv")}
+    assert tables == {measured.table for measured in SETS.values() if measured.table}
+    assert all(f"| {table} |" in licences for table in tables)

@@ -1,0 +1,61 @@
+"""Tables that others published, their models in docs/models, and what is known about them from elsewhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import softflagella as sf
+from calibration.own_model.model_file import load_model
+
+MODELS = Path(__file__).parents[2] / "docs/models"
+
+
+class Published(NamedTuple):
+    """A published table, its model, and what is known about it from elsewhere."""
+
+    title: str
+    table: str
+    model: str
+    session: str | None
+    withheld: str
+    known: str  # from theory, or from another instrument
+
+
+SETS = {
+    "tube-2017": Published(
+        "balls in a tube, 2017", "tube-2017.csv", "tube.py", "repeat", "wall, inertia", "both: 1"
+    ),
+    "tube-2019": Published(
+        "balls in a tube, 2019", "tube-2019.csv", "tube.py", "repeat", "wall, inertia", "capillary: 0.1946 Pa s"
+    ),
+    "propellers": Published("thrust of propellers", "propellers.csv", "propeller.py", "test", "square", "1"),
+    "motor": Published(
+        "speed of a motor", "propellers.csv", "motor.py", "test", "dead zone, resistance", "2600 rpm/V"
+    ),
+    "ship": Published("side force on a ship", "", "ship.py", None, "cross-flow drag", ""),
+    "tower": Published(
+        "falls from a tower, simulated",
+        "tower.csv",
+        "tower.py",
+        "ball_kg_m3",
+        "drag of a sphere",
+        "C_D 0.4 to 0.5",
+    ),
+}
+
+
+def calibrated(name: str, table: str | Path | None = None) -> sf.ModelVerdict:
+    """Calibrate one of SETS; a table that is not in the project is given."""
+    measured = SETS[name]
+    model, rows = load_model(MODELS / measured.model, table or MODELS / "data" / measured.table)
+    return sf.calibrate(rows, model, session=measured.session, progress=False)
+
+
+def named(record: dict[str, Any]) -> str:
+    """Say what a verdict names, in the order in which it was found, and the forms that would do as well."""
+    found = [turn["named"] for turn in record["turns"] if turn["named"]] or [c["title"] for c in record["claims"]]
+    forms = [form["title"] for form in record["forms"]]
+    best = next((title for title in forms if record["nearest"]["at_theory"] and "theory" in title), found[-1])
+    others = [title for title in forms if title != best]
+    return ", then ".join((*found[:-1], best)) + (f" (or {', '.join(others)})" if others else "")
