@@ -11,6 +11,7 @@ Takes 30 seconds.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -46,11 +47,11 @@ def of_theory(laws: Callable[..., Mapping[str, Any]], rows: Any) -> tuple[float,
     """Fit the viscosity of falls whose wall and inertia have the sizes of theory; return it and the rms error."""
 
     def rms(log_viscosity: float) -> float:
-        p = {"viscosity": float(np.exp(log_viscosity)), "wall": 1.0, "inertia": 1.0, "late": 0.0}
+        p = {"viscosity": math.exp(log_viscosity), "wall": 1.0, "inertia": 1.0, "late": 0.0}
         return float(np.sqrt(np.mean(np.log(laws(rows, p)["v"] / rows["v"]) ** 2)))
 
-    best = minimize_scalar(rms, bounds=np.log((0.05, 1.0)), method="bounded")
-    return float(np.exp(best.x)), float(best.fun)
+    best = minimize_scalar(rms, bounds=(math.log(0.05), math.log(1.0)), method="bounded")
+    return math.exp(best.x), float(best.fun)
 
 
 def compare_laws() -> None:
@@ -99,15 +100,14 @@ def main(picture: str = "", ship: str = "") -> None:
 def draw(drawn: dict[str, list[float]], picture: str) -> None:
     """Draw errors before and after, by sessions and by conditions, and the noise."""
     figure, axes = plt.subplots(figsize=(7.2, 0.55 * len(drawn) + 1.1), layout="constrained")
-    for place, (before, after, *of_conditions, noise) in enumerate(drawn.values()):
-        pairs = ((0.16, "C0", "sessions", before, after), (-0.16, "C1", "conditions", *of_conditions))
-        for shift, colour, what, one, other in pairs:
-            y = -place + shift
-            axes.annotate("", (other, y), (one, y), arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.5})
-            axes.plot(one, y, "o", color=colour, ms=5, label=f"held-out {what}" if not place else None)
-        axes.plot(
-            [noise] * 2, [-place - 0.32, -place + 0.32], "k", lw=1.5, label=None if place else "noise of a run"
-        )
+    arrow = {"arrowstyle": "-|>", "lw": 1.5, "shrinkA": 0, "shrinkB": 0}
+    for place, errors in enumerate(drawn.values()):
+        for side, what in enumerate(("sessions", "conditions")):
+            (before, after), y = errors[2 * side : 2 * side + 2], -place + (0.16, -0.16)[side]
+            axes.annotate("", (after, y), (before, y), arrowprops={**arrow, "color": f"C{side}"})
+            axes.plot(before, y, "o", color=f"C{side}", ms=5, label=None if place else f"held-out {what}")
+        noise, label = errors[-1], None if place else "noise of a run, if known"
+        axes.plot([noise] * 2, [-place - 0.32, -place + 0.32], "k", lw=1.5, label=label)
     axes.set_xscale("log")
     axes.set_xticks([1, 2, 5, 10, 20, 50], ["1", "2", "5", "10", "20", "50"])
     axes.minorticks_off()
