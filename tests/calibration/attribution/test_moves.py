@@ -164,7 +164,7 @@ def test_another_robot_is_named() -> None:
 @pytest.mark.parametrize(("day", "turn"), [(3, 90), (2, 90), pytest.param(1, 180, marks=pytest.mark.rest)])
 def test_a_camera_that_turns_on_a_day_is_named_whether_that_day_is_held_out_or_fitted(day: int, turn: int) -> None:
     """On day 3 it is in the held-out session."""
-    table = in_days(toy_table(3, lengths_cm=(5.0, 9.0)))
+    table = in_days(toy_table(3, lengths_cm=(5.0, 7.0, 9.0)))
     course = np.random.default_rng(0).uniform(0, 360, len(table))
     side = np.sign(table["omega_yr_rad_s"])  # to which the robot turns
     along, across = (0.6 * np.cos(np.radians(course + turned - 30)) for turned in (0, 90 * side))  # [cm/s]
