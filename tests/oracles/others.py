@@ -34,6 +34,9 @@ SETS = {
         "speed of a motor", "propellers.csv", "motor.py", "test", "dead zone, resistance", "2600 rpm/V"
     ),
     "ship": Published("side force on a ship", "", "ship.py", None, "cross-flow drag", ""),
+    "coil": Published(
+        "current in a coil", "coil.csv", "coil.py", None, "resistance, zero", "1.2 Ω; zero 0 ± 0.02 A"
+    ),
     "tower": Published(
         "falls from a tower, simulated",
         "tower.csv",

@@ -69,6 +69,11 @@ def test_a_dead_zone_then_a_resistance_are_named_in_the_speed_of_a_motor() -> No
     assert 0 < low < high < 0.3
 
 
+def test_the_zero_of_an_ammeter_is_named_and_its_gain_is_not_certain() -> None:
+    assert named(record("coil")).startswith("zero of the coarse ammeter")
+    assert record("coil")["gain_is_certain"] is False
+
+
 @pytest.mark.skipif(not SHIP.exists(), reason="the table of the ship has no licence and is not here")
 def test_the_cross_flow_of_a_ship_is_named_and_an_angle_is_not() -> None:
     assert "cross-flow drag" in named(record("ship"))
