@@ -1,8 +1,8 @@
 """Claims and intervals for a model of one's own, where forms resemble each other: balls in a tube.
 
 Tables by `tests.oracles.drawn_falls`: nine balls, twice in each of three or five rounds, 2 % of noise. Planted
-effects have the size λ in standard deviations of their score. The interval is that of the viscosity, whose truth is
-known: of the fitted form alone, and over all forms that left-out runs cannot tell apart.
+effects have the size λ in standard deviations of their score. The interval is that of the viscosity, whose truth
+is known: of the fitted form alone, and over all forms that left-out runs cannot tell apart.
 
 Usage: python -m benchmarks forms [TABLES] [FIRST_SEED]
 

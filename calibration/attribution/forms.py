@@ -23,11 +23,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.stats import t as student
+from scipy.stats import wilcoxon
 
 from calibration.attribution.refits import Candidate, left_out_residuals
 from calibration.statistics.fit import Fit, birge, fit
 from calibration.statistics.statistical_model import Parameter
 from calibration.statistics.study import Study, groups, leave_one_group_out
+from common.arrays import Floats
 
 _QUANTILE = 0.975
 
@@ -35,14 +37,28 @@ _QUANTILE = 0.975
 class PairedGain(NamedTuple):
     """By how much a model predicts left-out runs better than another one, in log likelihood."""
 
-    gain: float
-    error: float  # standard error, over conditions
-    conditions: int
+    of_conditions: Floats  # (c,)
+
+    @property
+    def gain(self) -> float:
+        return float(self.of_conditions.sum())
+
+    @property
+    def error(self) -> float:
+        """Standard error, over conditions."""
+        count = len(self.of_conditions)
+        return float(self.of_conditions.std(ddof=1)) * math.sqrt(count) if count > 1 else math.inf
 
     @property
     def certain(self) -> bool:
         """Whether its 95 % interval is above zero."""
-        return self.gain > float(student.ppf(_QUANTILE, max(self.conditions - 1, 1))) * self.error
+        return self.gain > float(student.ppf(_QUANTILE, max(len(self.of_conditions) - 1, 1))) * self.error
+
+    @property
+    def consistent(self) -> bool:
+        """Whether conditions gain, by a signed-rank test: one that gains far more than others proves no less."""
+        some = self.of_conditions[self.of_conditions != 0]
+        return len(some) > 1 and bool(wilcoxon(some, alternative="greater").pvalue < 1 - _QUANTILE)
 
 
 def paired_gain(study: Study, one: Fit, other: Fit, b: float = 1.0) -> PairedGain:
@@ -52,9 +68,7 @@ def paired_gain(study: Study, one: Fit, other: Fit, b: float = 1.0) -> PairedGai
     rows = np.concatenate([np.flatnonzero(out) for _, out in leave_one_group_out(groups(runs)[0], used)])
     gains = ((of_other**2 - of_one**2) / (2 * b)).reshape(len(rows), -1).sum(1)
     condition = np.unique(runs.condition[rows], return_inverse=True)[1].reshape(-1)
-    each = np.bincount(condition, weights=gains)
-    error = each.std(ddof=1) * math.sqrt(len(each)) if len(each) > 1 else math.inf
-    return PairedGain(float(each.sum()), float(error), len(each))
+    return PairedGain(np.bincount(condition, weights=gains))
 
 
 @dataclass(frozen=True)
@@ -69,8 +83,8 @@ class Form:
     @property
     def title(self) -> str:
         """The effects in words, with the size if theory gives it."""
-        size = f" at the size of theory, {self.effects[0].theory:g}" if self.at_theory else ""
-        return " and ".join(e.title for e in self.effects) + size
+        title = " and ".join(e.title for e in self.effects)
+        return f"{title} at the size of theory, {self.effects[0].theory:g}" if self.at_theory else title
 
     def record(self) -> dict[str, Any]:
         """Return the record for verdict.json."""
@@ -82,12 +96,15 @@ class Form:
         }
 
 
-def at_theory(study: Study, base: Fit, effect: Parameter) -> Form | None:
-    """Fit the model with an effect of the size that theory gives; None where theory gives none."""
-    if effect.theory is None:
-        return None
-    start = {**base.parameters, effect.name: effect.theory}
-    return Form((effect,), fit(study.model, start, base.names, study.split.fitted, title=""), True)
+def at_theory(study: Study, base: Fit, effects: Sequence[Parameter]) -> list[Form]:
+    """Fit the model with each effect of the size that theory gives, if it gives one, and with all of them."""
+    known = [(e,) for e in effects if e.theory is not None]
+    together = [sum(known, ())] if len(known) > 1 else []
+    forms = []
+    for some in (*known, *together):
+        start = {**base.parameters, **{e.name: e.theory for e in some}}
+        forms.append(Form(some, fit(study.model, start, base.names, study.split.fitted, title=""), True))
+    return forms
 
 
 def forms_of_claims(
@@ -103,8 +120,7 @@ def forms_of_claims(
         Form(c.claimed, c.refit, False) for c in candidates
         if c.claimed not in known and c.refit and c.refit.converged
     ]  # fmt: skip
-    theory = (at_theory(study, base, form.effects[0]) for form in (*claimed, *fitted) if len(form.effects) == 1)
-    near = as_good(study, claimed[0], [*(form for form in theory if form), *fitted])
+    near = as_good(study, claimed[0], [*at_theory(study, base, study.effects), *fitted])
     alike = [replace(form, error=_error_left_out(study, form.fit)) for form in claimed]
     return [*(f for f in near if f.at_theory), *alike, *(f for f in near if not f.at_theory)]
 

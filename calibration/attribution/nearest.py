@@ -17,8 +17,8 @@ What the form leaves counts as noise: variances are multiplied by b = max(1, Ï‡Â
 A form is adopted if
 
 1. nothing explains the residual, and its fit converged, inside the bounds;
-2. its gain on left-out groups of runs, paired over conditions, has a 95 % interval above zero
-   (`calibration.attribution.forms`). The size of a specimen that is left out as a whole is the mean;
+2. its gain on left-out groups of runs, paired over conditions, has a 95 % interval above zero, or is consistent
+   over them (`calibration.attribution.forms`). The size of a specimen that is left out as a whole is the mean;
 3. on these left-out runs it removes at least half of what the model without it leaves beyond noise, if that is
    known;
 4. its mean size differs from the null. With one size, its interval says so; with several, a t-test over the sizes
@@ -204,7 +204,6 @@ def adopt_nearest(
         try:
             constant = _converged(study, base, candidate)
             forms: list[tuple[ForwardModel, Fit, float]] = [(study.model, constant, 0.0)]
-            theory = at_theory(study, base, candidate.effect)
             if len(np.unique(specimens(study.model.runs)[0][study.split.fitted])) >= _FEWEST:
                 forms.append(_with_spread(study, constant, candidate.effect))
         except UnsolvedError:
@@ -214,15 +213,18 @@ def adopt_nearest(
             forms.pop()
         judged = [_judged(study, base, candidate.effect, *form) for form in reversed(forms)]
         adopted += [form for form in judged if form][:1]
-        if theory and (form := _judged(study, base, candidate.effect, study.model, theory.fit, 0.0)):
-            adopted.append(form)
+    of_theory = at_theory(study, base, study.effects)
+    single = (form for form in of_theory if len(form.effects) == 1)
+    adopted += [a for f in single if (a := _judged(study, base, f.effects[0], study.model, f.fit, 0.0))]
     if not adopted:
         return None
     largest = max(adopted, key=lambda form: form.gain)
     as_form = {id(a.fit): Form((a.effect,), a.fit, a.at_theory) for a in adopted}
-    alike = as_good(study, as_form[id(largest.fit)], as_form.values())
+    together = [form for form in of_theory if len(form.effects) > 1]
+    alike = as_good(study, as_form[id(largest.fit)], [*as_form.values(), *together])
     alike.sort(key=lambda form: not form.at_theory)
-    best = next((a for a in adopted if alike[0].at_theory and a.fit is alike[0].fit), largest)
+    named = {id(form.fit) for form in alike}
+    best = next((a for a in adopted if a.at_theory and id(a.fit) in named), largest)
     place = next(i for i, e in enumerate(study.effects) if e.name == best.effect.name)
     left = examine_residual(replace(study, seed=study.seed + 5), best.fit, tangents.without(place), draws=_DRAWS)
     return replace(best, forms=tuple(alike), misfit=left)
@@ -308,7 +310,7 @@ def _judged(
     values = len(after)
     beyond = float((before**2).sum()) - values
     removed = float((before**2 - after**2).sum()) / max(beyond, 1e-9)
-    if not paired.certain or (removed < _REMOVED and study.model.runs.noise_known):
+    if not (paired.certain or paired.consistent) or (removed < _REMOVED and study.model.runs.noise_known):
         return None
     leaves = math.sqrt(max(float((after**2).sum()) / values - 1, 0.0))
     left, gain = leaves * fitted.noise.rms, (paired.gain, paired.error, min(removed, 1.0))

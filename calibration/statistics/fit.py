@@ -419,7 +419,7 @@ def _freedom(products: NormalEquations, share: Floats, count: int) -> Floats:
     variances = [np.diag(products.covariance(s))[:count] for s in shares]
     V, *near = np.maximum(variances, 1e-100)
     slopes = (np.array(near) - V) / steps[:, None]
-    error = math.sqrt(2 / max(len(products.sizes) - 1, 1)) * (share + least)
+    error = math.sqrt(2 / max(len(products.sizes) - 1, 1)) * np.where(products.estimated, share + least, 0.0)
     variance = (((slopes + slopes.mean(0)) / 2 * error[:, None]) ** 2).sum(0)
     return np.asarray(np.clip(2 * V**2 / np.maximum(variance, 1e-12 * V**2), 1.0, 1e6))
 

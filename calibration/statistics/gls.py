@@ -47,7 +47,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from common.arrays import Floats, Integers
+from common.arrays import Flags, Floats, Integers
 
 UNKNOWN_SHARE = 1.0  # ρ where nothing is known about it
 _MOST_SCATTER = 9.0  # largest ρ
@@ -234,7 +234,7 @@ class NormalEquations:
         """Compute columnᵀ W column, and columnᵀ W Σ W column, (..., m, m), for ρ (..., k)."""
         share = np.asarray(share)
         weights = self._weights(share)[..., None]
-        of_fit = self._weights(np.where(self._freedom > _LEAST_FREEDOM, share, 0.0))[..., None]
+        of_fit = self._weights(np.where(self.estimated, share, 0.0))[..., None]
         rest = self._about_common(self.means)
         seen = self.means - rest + self._about_common(of_fit * rest)
         transposed = np.swapaxes(seen, -1, -2)
@@ -247,6 +247,11 @@ class NormalEquations:
         covariance = solve_normal(self.at(0.0))[1]
         taken = ((columns @ covariance) * columns).sum(-1)
         return len(self.sizes) - 1 - self._of_outputs(taken)
+
+    @property
+    def estimated(self) -> Flags:
+        """Axes of which ρ is estimated, and not assumed, (..., k)."""
+        return np.asarray(self._freedom > _LEAST_FREEDOM)
 
     def _of_outputs(self, means: Floats) -> Floats:
         """Add up what is stated for each session and output (..., s k), to (..., k)."""
@@ -308,7 +313,7 @@ class NormalEquations:
                 )
             )
             share = np.clip((own + common) / 2 / (total - (self.sizes**2).sum() / total), 0.0, _MOST_SCATTER)
-        return np.where(self._freedom > _LEAST_FREEDOM, share, UNKNOWN_SHARE)
+        return np.where(self.estimated, share, UNKNOWN_SHARE)
 
 
 def solve_normal(normal: Floats) -> tuple[Floats, Floats]:

@@ -92,7 +92,7 @@ class Measurements(Runs):
 
     @property
     def noted_of_repeats(self) -> Floats:
-        """Temperature and course, by which a current acts on the speed as its share of it, and on the slip angle."""
+        """Temperature and course, by which a current acts on the speed, as its share, and on the slip angle."""
         noted = dict(zip(self.noted_names, self.noted.T, strict=True))
         columns = [noted["temperature_K"]] if "temperature_K" in noted else []
         if "course_x" in noted:

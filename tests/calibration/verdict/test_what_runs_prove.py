@@ -98,7 +98,7 @@ def test_a_gain_is_paired_over_conditions() -> None:
     study, base, _ = first_fit(model, draws=20)
     wall = fit(study.model, {**base.parameters, "wall": 0.5}, ("viscosity", "wall"), study.split.fitted, title="")
     gain = paired_gain(study, wall, base)
-    assert gain.conditions == len(DIAMETERS)
+    assert len(gain.of_conditions) == len(DIAMETERS)
     assert gain.certain
     assert gain.gain == pytest.approx(-paired_gain(study, base, wall).gain, rel=0.5)
     same = paired_gain(study, wall, wall)
