@@ -68,7 +68,7 @@ def paired_gain(study: Study, one: Fit, other: Fit, b: float = 1.0) -> PairedGai
     rows = np.concatenate([np.flatnonzero(out) for _, out in leave_one_group_out(groups(runs)[0], used)])
     gains = ((of_other**2 - of_one**2) / (2 * b)).reshape(len(rows), -1).sum(1)
     condition = np.unique(runs.condition[rows], return_inverse=True)[1].reshape(-1)
-    return PairedGain(np.bincount(condition, weights=gains))
+    return PairedGain(np.asarray(np.bincount(condition, weights=gains), dtype=float))
 
 
 @dataclass(frozen=True)
