@@ -1,59 +1,150 @@
-"""Sessions in which one output is in another unit than in the others.
+"""A session in which one output is in another unit, or has the other sign, than in the rest of the table.
 
-The runs of a session are compared with the repeats in other sessions, or where few are shared, with the model as
-given. A column in another unit differs by the factor between two units, and the sessions differ by far less in all
-else: a change of `_NEAR` in a factor is taken for no slip.
+The runs y of a session are compared with x, the mean of the other sessions' means under the same conditions; where
+few runs have such, both are compared with the prediction of the model as given. Of two sessions that one is named
+which is farther from this prediction. The factor of a session is
+
+    exp of the median of y − x       of a ratio, whose y is a logarithm,
+    the median of y/x, weighted |x|  of a difference, such as an angle, which may cross zero,
+
+and the latter is the regression through zero that leaves the least sum of |y − f x|. A factor between two units is
+a slip where
+
+- the runs of the session agree on it: its standard error is at most half of `_NEAR`;
+- it is that between the units, to three standard deviations of a session, which scatters as a single run does
+  (`calibration.statistics.gls`), but not beyond `_NEAR`;
+- no other output of the session has the same factor or its inverse, as a robot that moves ten times as fast would.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from calibration.statistics.statistical_model import Runs
-from common.arrays import Floats
+from common.arrays import Flags, Floats
+from common.errors import InputError
 
-_SCALES = (10.0, 60.0, 2 * math.pi, 180 / math.pi, 30 / math.pi, 100.0, 1000.0)
-_NEAR = 1.15  # factor between a slip and the ratio of a session to the others
+_SCALES = {  # factor -> what a larger number is in, and what the smaller one is in
+    6.0: ("deg/s", "rpm"),
+    2 * math.pi: ("rad", "turns"),
+    30 / math.pi: ("rpm", "rad/s"),
+    10.0: ("mm", "cm"),
+    180 / math.pi: ("degrees", "radians"),
+    60.0: ("s or 1/min", "min or 1/s"),
+    100.0: ("cm or per cent", "m or 1"),
+    360.0: ("degrees", "turns"),
+    1000.0: ("mm", "m"),
+}
+_NEAR = math.log(1.08)  # distance of a factor from that between two units, as logarithms
+_LIKEWISE = math.log(1.5)  # distance within which two outputs have the same factor
 _FEWEST = 3  # runs of a session that are compared
+_LEAST = 0.01  # standard deviation of a session
 
 
-class Slip(NamedTuple):
-    """An output that is `factor` times in one session what it is in the others."""
+class Factor(NamedTuple):
+    """By what an output of a session must be divided to agree with the others."""
 
-    output: int
-    session: str
-    factor: float
+    negative: bool
+    logarithm: float
+    scatter: float  # standard deviation of a run, relative
+    error: float  # standard error of the logarithm
+
+    @property
+    def size(self) -> tuple[bool, float]:
+        """How far it is from 1."""
+        return self.negative, abs(self.logarithm)
+
+    def less(self, other: Factor) -> Factor:
+        """Divide by the factor of the others."""
+        error, scatter = math.hypot(self.error, other.error), max(self.scatter, other.scatter)
+        return Factor(self.negative != other.negative, self.logarithm - other.logarithm, scatter, error)
+
+    def same(self, other: Factor) -> bool:
+        """Tell whether another output has this factor, or its inverse."""
+        return self.negative == other.negative and abs(self.size[1] - other.size[1]) < _LIKEWISE
+
+    def scale(self) -> float | None:
+        """Return the factor between two units that this may be, as a positive number."""
+        scales = sorted((*([1.0] if self.negative else []), *_SCALES), key=lambda s: self._off(math.log(s)))
+        near = min(_NEAR, 3 * math.hypot(max(self.scatter, _LEAST), self.error))
+        return scales[0] if self._off(math.log(scales[0])) < near else None
+
+    def _off(self, logarithm: float) -> float:
+        return abs(abs(self.logarithm) - logarithm)
 
 
-def unit_slips(runs: Runs, given: Floats, differences: tuple[str, ...] = ()) -> Iterator[Slip]:
-    """Find slips, at most one in an output.
+def refuse_unit_slips(runs: Runs, given: Floats) -> None:
+    """Refuse runs among which a session has an output in another unit.
 
     Args:
         given: (n, k) prediction of the model as given.
-        differences: outputs that are no logarithms, such as angles.
+
+    Raises:
+        InputError: there is one.
     """
-    sessions = [np.flatnonzero(runs.session == s) for s in range(len(runs.session_names))]
+    sessions = range(len(runs.session_names))
+    factors = [[_compared(runs, given, i, s) for s in sessions] for i in range(len(runs.outputs))]
     for i, name in enumerate(runs.outputs):
-        measured = ~runs.gaps[:, i]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            y, model = (np.log(np.abs(c[:, i])) if name in differences else c[:, i] for c in (runs.y, given))
-        measured &= np.isfinite(y) & np.isfinite(model)
-        offsets = []
-        for s, rows in enumerate(sessions):
-            here, others = rows[measured[rows]], measured & (runs.session != s)
-            if len(here) < _FEWEST or others.sum() < _FEWEST:
-                continue
-            same = [(r, others & (runs.condition == runs.condition[r])) for r in here]
-            shared = [y[r] - np.median(y[alike]) for r, alike in same if alike.any()]
-            residual = y - model
-            alone = float(np.median(residual[here]))
-            apart = np.median(shared) if len(shared) >= _FEWEST else alone - np.median(residual[others])
-            offsets.append((abs(alone) if len(sessions) == 2 else abs(float(apart)), s, float(apart)))
-        if offsets:
-            _, s, apart = max(offsets)  # of two sessions, that which the model as given does not agree with
-            if any(abs(abs(apart) - math.log(scale)) < math.log(_NEAR) for scale in _SCALES):
-                yield Slip(i, runs.session_names[s], math.exp(apart))
+        known = {s: f for s, f in enumerate(factors[i]) if f and f.error <= _NEAR / 2}
+        if not known:
+            continue
+        blame = {s: _by_model(runs, given, i, runs.session == s) for s in known} if len(sessions) == 2 else known
+        session = max(known, key=lambda s: (blame[s] or known[s]).size)
+        found = known[session]
+        others = (of[session] for of in factors if of is not factors[i])
+        if (scale := found.scale()) is None or any(other and found.same(other) for other in others):
+            continue
+        larger, smaller = _SCALES.get(scale, ("", ""))
+        there, elsewhere = (larger, smaller) if found.logarithm > 0 else (smaller, larger)
+        units = f", as if it were in {there} there and in {elsewhere} in those; convert it" * (scale != 1)
+        sign = "; check its sign" if found.negative else ""
+        factor = math.exp(found.logarithm) * (-1 if found.negative else 1)
+        raise InputError(
+            f"{name} of session {runs.session_names[session]} is {factor:.3g} times that of the other sessions"
+            f"{units}{sign}"
+        )
+
+
+def _compared(runs: Runs, given: Floats, output: int, session: int) -> Factor | None:
+    """Compare an output of a session with the others; None if too few runs can be compared."""
+    y, measured, here = runs.y[:, output], ~runs.gaps[:, output], runs.session == session
+    sums, counts = (np.zeros((runs.condition.max() + 1, len(runs.session_names))) for _ in range(2))
+    others = measured & ~here
+    np.add.at(sums, (runs.condition[others], runs.session[others]), y[others])
+    np.add.at(counts, (runs.condition[others], runs.session[others]), 1)
+    with np.errstate(invalid="ignore"):
+        means = np.where((counts > 0).any(1), np.nansum(sums / counts, 1) / (counts > 0).sum(1), np.nan)
+    x, logarithmic = means[runs.condition], runs.outputs[output] not in runs.output_scales
+    shared = here & measured & np.isfinite(x)
+    if shared.sum() >= _FEWEST:
+        return _factor(y[shared], x[shared], logarithmic=logarithmic)
+    both = _by_model(runs, given, output, here), _by_model(runs, given, output, ~here)
+    return both[0].less(both[1]) if both[0] and both[1] else None
+
+
+def _by_model(runs: Runs, given: Floats, output: int, rows: Flags) -> Factor | None:
+    rows = rows & ~runs.gaps[:, output]
+    logarithmic = runs.outputs[output] not in runs.output_scales
+    return _factor(runs.y[rows, output], given[rows, output], logarithmic=logarithmic)
+
+
+def _factor(y: Floats, x: Floats, *, logarithmic: bool) -> Factor | None:
+    """Return the factor that y (n,) has against x; None if there are too few values."""
+    used = np.isfinite(x) if logarithmic else x != 0
+    y, x = y[used], x[used]
+    if len(y) < _FEWEST:
+        return None
+    ratios, weights = (y - x, np.ones(len(y))) if logarithmic else (y / x, np.abs(x))
+    order = np.argsort(ratios)
+    along = np.cumsum(weights[order])
+    middle = float(ratios[order][np.searchsorted(along, along[-1] / 2)])
+    deviation = 1.4826 * float(np.median(np.abs(ratios - middle) * weights))
+    if logarithmic:
+        return Factor(False, middle, deviation, 1.2533 * deviation / math.sqrt(len(y)))
+    if middle == 0:
+        return None
+    scatter = deviation / abs(middle) / math.sqrt(float(np.mean(x**2)))
+    return Factor(middle < 0, math.log(abs(middle)), scatter, 1.2533 * scatter / math.sqrt(len(y)))

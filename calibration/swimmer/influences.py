@@ -167,8 +167,8 @@ def reason_untestable(
     influence: Influence, columns: Mapping[str, object], both_directions: bool, outputs: Sequence[str]
 ) -> str:
     """Say why a table cannot test an influence; empty if it can."""
-    if influence.parameter.name in CURRENT and not {"v", "R_yr"} & set(outputs):
-        return "needs v_cm_s or R_yr_cm"
+    if influence.parameter.name in CURRENT and not {"v", "R_yr", "theta"} & set(outputs):
+        return "needs v_cm_s, R_yr_cm or theta_deg"
     if influence.needs is not None and influence.needs not in columns:
         return f"needs {_COLUMNS[influence.needs]}"
     if influence.odd and not both_directions:

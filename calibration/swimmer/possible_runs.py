@@ -16,11 +16,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.statistics.unit_slips import unit_slips
 from calibration.swimmer.measured_table import Measurements
 from common.arrays import Floats
 from common.errors import InputError
-from common.run_columns import OTHER_UNITS, OUTPUTS, check_factor
+from common.run_columns import check_factor
 from sim.model.groups import MOST_TAILS
 from sim.model.robot import Robot
 
@@ -62,15 +61,8 @@ def check_outputs(runs: Measurements, prediction: Floats) -> None:
     """Compare outputs with the prediction (n, k) of the model as given.
 
     Raises:
-        InputError: an output seems to be in another unit, in all sessions or in one.
+        InputError: an output seems to be in another unit.
     """
-    for slip in unit_slips(runs, prediction, ("theta",)):
-        output = runs.outputs[slip.output]
-        units = [unit for unit, wrong in OTHER_UNITS[output].items() if abs(math.log(slip.factor / wrong)) < 0.15]
-        raise InputError(
-            f"{OUTPUTS[output][0]} of session {slip.session} is {slip.factor:.3g} times that of the other sessions"
-            + (f": in {' or '.join(units)}? Convert it" if units else "; check its unit")
-        )
     y = {name: runs.y[:, i] for i, name in enumerate(runs.outputs)}
     if "omega_h" in y and "omega_t" in y:
         share = float(np.median((np.exp(y["omega_h"]) + np.exp(y["omega_t"])) / np.abs(runs.omega)))

@@ -71,6 +71,7 @@ from calibration.statistics.study import (
     refit_to_all,
     split_runs,
 )
+from calibration.statistics.unit_slips import refuse_unit_slips
 from calibration.statistics.weights import (
     alike,
     caveat_of_weights,
@@ -234,6 +235,7 @@ def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any)
     start = start_values(model)
     given = predict_as_given(model, title="as given" if settings.get("progress") else "")
     model.check(given)
+    refuse_unit_slips(model.runs, given)
     study = Study(model, split_runs(model.runs, held_out, find_outliers(model.runs, given)), **settings)
     guess = model.runs.guessed_noise(study.split.fitted, model.runs.y - given)
     study = replace(study, model=with_runs(model, **guess))

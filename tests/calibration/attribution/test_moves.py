@@ -22,6 +22,7 @@ from calibration.swimmer.influences import CURRENT
 from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.record import facts, verdict_record
 from calibration.words.render import next_steps
+from common.arrays import Floats
 from sim.inputs import load_robot
 from sim.model.uncertainty import DEFAULTS, Sigma
 from softflagella.closed_loop import calibrate
@@ -161,16 +162,20 @@ def test_another_robot_is_named() -> None:
     assert "C_yr on specimen" in move.words
 
 
+def _along_and_left(course: Floats) -> Floats:
+    """Return the parts of a unit vector along x that are along a path and to its left, (2, n)."""
+    return np.stack([np.cos(np.radians(course)), -np.sin(np.radians(course))])
+
+
 @pytest.mark.parametrize(("day", "turn"), [(3, 90), (2, 90), pytest.param(1, 180, marks=pytest.mark.rest)])
 def test_a_camera_that_turns_on_a_day_is_named_whether_that_day_is_held_out_or_fitted(day: int, turn: int) -> None:
     """On day 3 it is in the held-out session."""
     table = in_days(toy_table(3, lengths_cm=(5.0, 7.0, 9.0)))
     course = np.random.default_rng(0).uniform(0, 360, len(table))
-    side = np.sign(table["omega_yr_rad_s"])  # to which the robot turns
-    along, across = (0.6 * np.cos(np.radians(course + turned - 30)) for turned in (0, 90 * side))  # [cm/s]
-    tilt = np.arcsin(across / (table["R_yr_cm"] * table["omega_yr_rad_s"].abs()))
-    table["R_yr_cm"] = table["R_yr_cm"] * np.cos(tilt) + along / table["omega_yr_rad_s"].abs()
-    table["theta_deg"] += np.degrees(tilt)
+    yaw, side = table["omega_yr_rad_s"].abs(), np.sign(table["omega_rpm"])
+    own, (along, left) = table["R_yr_cm"] * yaw, 0.6 * _along_and_left(course - 30)  # [cm/s]
+    table["R_yr_cm"] = (along + np.sqrt(own**2 - left**2)) / yaw
+    table["theta_deg"] += side * np.degrees(np.arcsin(left / own))
     table["course_deg"] = course + turn * (table["session"] == f"day {day}")
     result = calibrated(table, few=(*CURRENT, DRAG))
     assert set(result.effects) == set(CURRENT)

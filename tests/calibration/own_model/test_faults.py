@@ -56,6 +56,13 @@ def changes_a_column(columns: Any, p: Any) -> Any:
     return fall(columns, p)
 
 
+def test_a_round_in_another_unit_is_named() -> None:
+    """Millimetres per second among metres per second, in a round of five."""
+    table = TABLE.assign(v=TABLE["v"] * np.where(TABLE["round"] == 2, 1000, 1))
+    assert "v of session round 2 is 1" in said(MODEL, table)
+    assert "in mm there and in m in those" in said(MODEL, table)
+
+
 def test_as_it_should_be_the_wall_is_named() -> None:
     result = sf.calibrate(TABLE, MODEL, session="round", progress=False)
     assert result.effects == ("wall",)

@@ -107,6 +107,9 @@ def test_a_current_shows_in_the_speed_along_its_heading_and_in_the_radius(table:
     assert exact == pytest.approx(difference, rel=0.02, abs=0.02 * np.abs(difference).max())
     without = toy_swimmer(table.drop(columns="course_deg"))
     assert "current in the tank along x" in without.untestable
+    assert "current in the tank along x" not in toy_swimmer(table.drop(columns=["v_cm_s", "R_yr_cm"])).untestable
+    spins = toy_swimmer(table.drop(columns=["v_cm_s", "R_yr_cm", "theta_deg"]))
+    assert spins.untestable["current in the tank along x"] == "needs v_cm_s, R_yr_cm or theta_deg"
 
 
 @pytest.mark.parametrize(
