@@ -8,7 +8,8 @@ nothing about which one is larger. With C conditions of differences D_c,
     D = Σ_c D_c,   σ_D² = C Var D_c,
 
 and the forms are as good as each other while D ≤ t σ_D, with the 97.5 % quantile t of Student's distribution of
-C − 1 degrees of freedom: a few conditions prove little.
+C − 1 degrees of freedom: a few conditions prove little. Beside a claim, which leaves no more than noise, a form
+whose error on left-out runs is `_FARTHER` times as large is none, however much it owes to one condition.
 
 Each number of the model has the envelope of its intervals over the forms that are as good as the best one. What a
 form leaves counts as noise (Birge 1932). The envelope is right among the forms that were tried, and only there.
@@ -32,6 +33,7 @@ from calibration.statistics.study import Study, groups, leave_one_group_out
 from common.arrays import Floats
 
 _QUANTILE = 0.975
+_FARTHER = 1.5  # error of a form over that of a claim, which leaves no more than noise
 
 
 class PairedGain(NamedTuple):
@@ -120,8 +122,9 @@ def forms_of_claims(
         Form(c.claimed, c.refit, False) for c in candidates
         if c.claimed not in known and c.refit and c.refit.converged
     ]  # fmt: skip
-    near = as_good(study, claimed[0], [*at_theory(study, base, study.effects), *fitted])
     alike = [replace(form, error=_error_left_out(study, form.fit)) for form in claimed]
+    near = as_good(study, claimed[0], [*at_theory(study, base, study.effects), *fitted])
+    near = [form for form in near if form.error < _FARTHER * alike[0].error]
     return [*(f for f in near if f.at_theory), *alike, *(f for f in near if not f.at_theory)]
 
 
