@@ -26,10 +26,10 @@ import numpy as np
 from scipy.stats import t as student
 from scipy.stats import wilcoxon
 
-from calibration.attribution.refits import Candidate, left_out_residuals
+from calibration.attribution.refits import Candidate, left_out_residual, left_out_residuals, left_out_rows
 from calibration.statistics.fit import Fit, birge, fit
 from calibration.statistics.statistical_model import Parameter
-from calibration.statistics.study import Study, groups, leave_one_group_out
+from calibration.statistics.study import Study
 from common.arrays import Floats
 
 _QUANTILE = 0.975
@@ -63,13 +63,16 @@ class PairedGain(NamedTuple):
         return len(some) > 1 and bool(wilcoxon(some, alternative="greater").pvalue < 1 - _QUANTILE)
 
 
-def paired_gain(study: Study, one: Fit, other: Fit, b: float = 1.0) -> PairedGain:
-    """Compare the predictions of `one` with those of `other`, in the noise b S of `one`."""
-    runs, used = study.model.runs, study.split.fitted
-    of_other, of_one = left_out_residuals(study, other, one)
-    rows = np.concatenate([np.flatnonzero(out) for _, out in leave_one_group_out(groups(runs)[0], used)])
-    gains = ((of_other**2 - of_one**2) / (2 * b)).reshape(len(rows), -1).sum(1)
-    condition = np.unique(runs.condition[rows], return_inverse=True)[1].reshape(-1)
+def paired_gain(study: Study, one: Fit, other: Fit) -> PairedGain:
+    """Compare the predictions of `one` with those of `other`, in the noise of `one`."""
+    return gain_of_residuals(study, *left_out_residuals(study, other, one))
+
+
+def gain_of_residuals(study: Study, before: Floats, after: Floats, b: float = 1.0) -> PairedGain:
+    """Compare two left-out residuals, in the noise b S."""
+    rows = left_out_rows(study)
+    gains = ((before**2 - after**2) / (2 * b)).reshape(len(rows), -1).sum(1)
+    condition = np.unique(study.model.runs.condition[rows], return_inverse=True)[1].reshape(-1)
     return PairedGain(np.asarray(np.bincount(condition, weights=gains), dtype=float))
 
 
@@ -86,7 +89,10 @@ class Form:
     def title(self) -> str:
         """The effects in words, with the size if theory gives it."""
         title = " and ".join(e.title for e in self.effects)
-        return f"{title} at the size of theory, {self.effects[0].theory:g}" if self.at_theory else title
+        if not self.at_theory:
+            return title
+        sizes = " and ".join(f"{e.theory:g}" for e in self.effects)
+        return f"{title} at the size{'s' * (len(self.effects) > 1)} of theory, {sizes}"
 
     def record(self) -> dict[str, Any]:
         """Return the record for verdict.json."""
@@ -130,24 +136,22 @@ def forms_of_claims(
 
 def as_good(study: Study, best: Form, forms: Iterable[Form]) -> list[Form]:
     """Choose the forms that left-out runs cannot tell from the best one, and state their errors on these."""
-    alike = [f for f in forms if f is best or not paired_gain(study, best.fit, f.fit).certain]
+    alike = [f for f in forms if f.fit is best.fit or not paired_gain(study, best.fit, f.fit).certain]
     return [replace(form, error=_error_left_out(study, form.fit)) for form in alike]
 
 
 def _error_left_out(study: Study, fitted: Fit) -> float:
-    white = left_out_residuals(study, fitted, fitted)[1]
+    white = left_out_residual(study, fitted, fitted.noise)
     return math.sqrt(float((white**2).mean())) * fitted.noise.rms
 
 
 def envelope(study: Study, names: Sequence[str], forms: Sequence[Form]) -> dict[str, tuple[float, float]]:
-    """Join the 95 % intervals of numbers over forms."""
-    joined = {}
-    for name in names:
-        ends = []
-        for form in forms:
-            place = form.fit.names.index(name)
-            half = form.fit.half_width(place) * math.sqrt(birge(study.model.runs, form.fit, study.split.fitted))
-            of, value = form.fit.fitted[place], form.fit.parameters[name]
-            ends += [of.changed(value, -half), of.changed(value, half)]
-        joined[name] = (min(ends), max(ends))
-    return joined
+    """Join the 95 % intervals of numbers over forms; nothing without forms."""
+    ends: dict[str, list[float]] = {name: [] for name in names if forms}
+    for form in forms:
+        wider = math.sqrt(birge(study.model.runs, form.fit, study.split.fitted))
+        for name, of_name in ends.items():
+            place, value = form.fit.names.index(name), form.fit.parameters[name]
+            of, half = form.fit.fitted[place], wider * form.fit.half_width(place)
+            of_name += [of.changed(value, -half), of.changed(value, half)]
+    return {name: (min(of_name), max(of_name)) for name, of_name in ends.items()}

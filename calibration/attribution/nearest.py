@@ -42,7 +42,7 @@ import numpy as np
 from scipy.stats import norm as normal
 from scipy.stats import t as student
 
-from calibration.attribution.forms import Form, as_good, at_theory, paired_gain
+from calibration.attribution.forms import Form, as_good, at_theory, gain_of_residuals
 from calibration.attribution.refits import FIRST, Candidate, left_out_residuals
 from calibration.statistics.budget import skipped, spent
 from calibration.statistics.fit import Fit, UnsolvedError, birge, fit
@@ -89,6 +89,11 @@ class AdoptedForm:
     at_theory: bool = False  # its size is that of theory, and not fitted
     forms: tuple[Form, ...] = ()  # that left-out runs cannot tell from it, itself among them
     misfit: Misfit | None = None  # tests of what it leaves
+
+    @property
+    def form(self) -> Form:
+        """It as one of several forms."""
+        return Form((self.effect,), self.fit, self.at_theory)
 
     @property
     def size(self) -> float:
@@ -219,12 +224,10 @@ def adopt_nearest(
     if not adopted:
         return None
     largest = max(adopted, key=lambda form: form.gain)
-    as_form = {id(a.fit): Form((a.effect,), a.fit, a.at_theory) for a in adopted}
     together = [form for form in of_theory if len(form.effects) > 1]
-    alike = as_good(study, as_form[id(largest.fit)], [*as_form.values(), *together])
+    alike = as_good(study, largest.form, [*(a.form for a in adopted), *together])
     alike.sort(key=lambda form: not form.at_theory)
-    named = {id(form.fit) for form in alike}
-    best = next((a for a in adopted if a.at_theory and id(a.fit) in named), largest)
+    best = next((a for a in adopted if a.at_theory and any(a.fit is form.fit for form in alike)), largest)
     place = next(i for i, e in enumerate(study.effects) if e.name == best.effect.name)
     left = examine_residual(replace(study, seed=study.seed + 5), best.fit, tangents.without(place), draws=_DRAWS)
     return replace(best, forms=tuple(alike), misfit=left)
@@ -305,8 +308,8 @@ def _judged(
     if not fitted.converged or (free and not effect.bounds[0] < size < effect.bounds[1]):
         return None
     b = _birge(study, fitted)
-    paired = paired_gain(study, fitted, base, b)
     before, after = left_out_residuals(study, base, fitted)
+    paired = gain_of_residuals(study, before, after, b)
     values = len(after)
     beyond = float((before**2).sum()) - values
     removed = float((before**2 - after**2).sum()) / max(beyond, 1e-9)

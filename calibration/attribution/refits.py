@@ -31,11 +31,11 @@ from tqdm import tqdm
 
 from calibration.statistics.budget import skipped
 from calibration.statistics.fit import Fit, UnsolvedError, fit
-from calibration.statistics.gls import solve_normal
+from calibration.statistics.gls import Noise, solve_normal
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
 from calibration.statistics.statistical_model import Experiment, ForwardModel, Parameter, Parameters, start_values
 from calibration.statistics.study import Study, groups, leave_one_group_out
-from common.arrays import Flags, Floats
+from common.arrays import Floats, Integers
 
 IMITABLE = 0.05  # imitability index above which a claim needs a reservation
 SURE = 0.01  # p-value of the transfer test below which it is
@@ -351,21 +351,21 @@ def session_gain(study: Study, base: Fit, refit: Fit) -> tuple[float, float]:
 
 
 def left_out_residuals(study: Study, base: Fit, refit: Fit) -> tuple[Floats, Floats]:
-    """Whiten the residuals of all fitted runs, each from fits to the other sessions: of the base and of the refit.
-
-    Both are white in the noise of the refit.
-    """
-    pairs = [
-        [_left_out_residual(study, fitted, refit, learn, out) for fitted in (base, refit)]
-        for learn, out in leave_one_group_out(groups(study.model.runs)[0], study.split.fitted)
-    ]
-    before, after = (np.concatenate(residuals) for residuals in zip(*pairs, strict=True))
-    return before, after
+    """Compute `left_out_residual` of the base and of the refit, both in the noise of the refit."""
+    return left_out_residual(study, base, refit.noise), left_out_residual(study, refit, refit.noise)
 
 
-def _left_out_residual(study: Study, fitted: Fit, refit: Fit, learn: Flags, out: Flags) -> Floats:
-    """Whiten the residuals of a left-out session, for a model fitted to the others, in the noise of `refit`."""
-    data = study.model.runs
-    step = solve_normal(fitted.normal_of_fit(data, learn, refit.noise))[0]
-    predicted = (data.y - fitted.prediction)[out] - fitted.jacobian[out] @ step
-    return np.asarray(refit.noise.whitener(data.session[out], data.scale[out])(predicted))
+def left_out_residual(study: Study, fitted: Fit, noise: Noise) -> Floats:
+    """Whiten the residual of all fitted runs, in the order of `left_out_rows`, each from the other sessions."""
+    data, parts = study.model.runs, []
+    for learn, out in leave_one_group_out(groups(data)[0], study.split.fitted):
+        step = solve_normal(fitted.normal_of_fit(data, learn, noise))[0]
+        predicted = (data.y - fitted.prediction)[out] - fitted.jacobian[out] @ step
+        parts.append(noise.whitener(data.session[out], data.scale[out])(predicted))
+    return np.concatenate(parts)
+
+
+def left_out_rows(study: Study) -> Integers:
+    """Return the places of the runs of a left-out residual."""
+    left_out = leave_one_group_out(groups(study.model.runs)[0], study.split.fitted)
+    return np.concatenate([np.flatnonzero(out) for _, out in left_out])

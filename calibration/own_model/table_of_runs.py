@@ -19,7 +19,7 @@ from calibration.own_model.declared import Model
 from calibration.own_model.function_model import AskedColumns, FunctionModel, TableRuns, evaluate
 from calibration.statistics.copies import COPY, find_copies
 from calibration.statistics.excluded import MANY, Excluded
-from calibration.statistics.gaps import filled, gaps_in_words, not_finite, with_outputs, without_gaps
+from calibration.statistics.gaps import filled, gaps_in_words, is_missing, not_finite, with_outputs, without_gaps
 from calibration.statistics.gls import repeat_count
 from calibration.statistics.statistical_model import FEWEST_REPEATS
 from common.arrays import Flags, Floats, Integers, Words
@@ -125,11 +125,6 @@ def _values(column: pd.Series) -> Floats | Words:
     return numbers
 
 
-def _is_missing(values: Floats | Words) -> Flags:
-    """Say where a column has no finite number, or no word, (n,)."""
-    return np.asarray(~np.isfinite(values) if values.dtype.kind == "f" else values == "")
-
-
 def _as_numbers(values: Floats | Words) -> Floats:
     """Return a column as numbers, those of its words where it has words."""
     numbers = values if values.dtype.kind == "f" else np.unique(values, return_inverse=True)[1]
@@ -192,7 +187,7 @@ def _add_missing(
 ) -> None:
     """Add every row that lacks a value of a column."""
     for name in names:
-        for row in np.flatnonzero(_is_missing(columns[name])).tolist():
+        for row in np.flatnonzero(is_missing(columns[name])).tolist():
             faults.setdefault(row, not_finite(table, row, name))
 
 
@@ -206,7 +201,7 @@ def _notes(
     """Return the columns that are wanted as notes; default: all others from which no output was computed."""
     if wanted is not None:
         return {name: columns[name] for name in wanted}
-    notes = {name: v for name, v in columns.items() if name not in known and not _is_missing(v).all()}
+    notes = {name: v for name, v in columns.items() if name not in known and not is_missing(v).all()}
     if repeat_count(condition) < FEWEST_REPEATS:
         return notes
     numbers = {name: values for name, values in notes.items() if values.dtype.kind == "f"}

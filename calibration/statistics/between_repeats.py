@@ -30,6 +30,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.special import fdtrc, ndtri
 
+from calibration.statistics.gaps import is_missing
 from calibration.statistics.gls import repeat_count
 from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs
 from common.arrays import Flags, Floats, Integers
@@ -89,9 +90,8 @@ def usable(values: Any) -> bool:
 
 def _noted(values: Any) -> tuple[Any, Flags]:
     """Return a note as numbers or as words, (n,), and where there is one."""
-    if np.asarray(values).dtype.kind in "fiu":
-        return (numbers := np.asarray(values, dtype=float)), np.isfinite(numbers)
-    return (words := np.asarray(values).astype(str)), words != ""
+    noted = np.asarray(values).astype(float if np.asarray(values).dtype.kind in "fiu" else str)
+    return noted, ~is_missing(noted)
 
 
 def columns_of(runs: Runs) -> list[NoteColumn]:

@@ -12,10 +12,15 @@ import pandas as pd
 from calibration.statistics.excluded import Excluded, listed
 from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs
-from common.arrays import Flags, Floats, Integers
+from common.arrays import Flags, Floats, Integers, Words
 from common.tables import row_name
 
 Measured = TypeVar("Measured", bound=Runs)
+
+
+def is_missing(values: Floats | Words) -> Flags:
+    """Say where a column has no finite number, or no word, (n,)."""
+    return np.asarray(~np.isfinite(values) if values.dtype.kind == "f" else values == "")
 
 
 def filled(outputs: pd.DataFrame, condition: Integers) -> Floats:

@@ -132,6 +132,7 @@ def calibrate(
     with limited(_DESCRIBED * max_seconds - used) as budget:
         with limited(_SEARCH * max_seconds - used):
             study, found, moves = _explain_with_moves(study, base)
+            # Where a number differs in the held-out runs, they refute nothing: it is found in all runs.
             while (refutation := _refuted_claim(study, found)) and not _fit_moves(study, model, found)[1]:
                 withdrawn.append(refutation)
                 given = replace(study, model=model, settled=study.settled | set(refutation.effects[-1:]))
@@ -155,7 +156,7 @@ def calibrate(
     rivals = tuple(replace(r, fit=replace(r.fit, noise=noise_of_any_run(study, r.fit.noise))) for r in rivals)
     base_intervals, final_intervals = _both_intervals(study, found, progress=progress)
     forms = _forms(study, found)
-    for name, (low, high) in envelope(study, found.base.names if forms else (), forms).items():
+    for name, (low, high) in envelope(study, found.base.names, forms).items():
         if name in final_intervals:
             final_intervals[name] = (min(low, final_intervals[name][0]), max(high, final_intervals[name][1]))
     fixed = {"level": level, "seed": seed, "catalogue": [e.name for e in model.effects], "locked": split.names}
@@ -211,15 +212,11 @@ def _forms(study: Study, found: Attribution) -> tuple[Form, ...]:
 
 
 def _refuted_claim(study: Study, found: Attribution) -> Withdrawn | None:
-    """Return the claim that the held-out runs refute; None if there is none.
-
-    Where a number differs in them, they refute nothing: it is found in all runs.
-    """
-    if not found.best or found.best[0].refit is None:
+    """Return the claim that the held-out runs refute; None if there is none."""
+    claim = found.best[0] if found.best else None
+    if claim is None or claim.refit is None:
         return None
-    claim = found.best[0]
-    names = tuple(e.name for e in claim.claimed)
-    return refuted(study, found.base, found.best[0].refit, claim.title, names)
+    return refuted(study, found.base, claim.refit, claim.title, tuple(e.name for e in claim.claimed))
 
 
 def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any) -> tuple[Study, Fit, Floats]:
@@ -230,7 +227,6 @@ def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any)
 
     Returns:
         The study, the fit, and the prediction of the model as given.
-
     """
     start = start_values(model)
     given = predict_as_given(model, title="as given" if settings.get("progress") else "")
