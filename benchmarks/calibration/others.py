@@ -61,7 +61,6 @@ def compare_laws() -> None:
         viscosity, rms = of_theory(laws, rows)
         record = facts(sf.calibrate(rows, replace(model, function=laws), session="repeat", progress=False))
         print(f"{title}: both at theory {viscosity:.4f} Pa s, {100 * rms:.1f} %; named {named(record)}")
-        print({name: (number["value"], *number["interval"]) for name, number in record["parameters"].items()})
 
 
 def percent(verdict: sf.ModelVerdict, *errors: float) -> list[float]:

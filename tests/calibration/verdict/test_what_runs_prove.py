@@ -34,17 +34,51 @@ def test_the_error_before_is_that_of_least_squares(rounds: int, missing: dict[st
         model = model_of(falls(seed, rounds=rounds, **missing))
         study, base, given = first_fit(model, draws=20)
         runs, used = model.runs, study.split.fitted
-        start = start_values(model)
-
-        def residual(x: Any, model: Any = model, start: Any = start) -> Any:
-            return (model.runs.y - model.predict([{**start, "viscosity": float(np.exp(x[0]))}])[0])[:, 0]
-
-        least = least_squares(lambda x: residual(x)[used], [0.0]).x  # noqa: B023
+        least = least_squares_of(model, used)
         for rows in (used, study.split.test):
             before = np.sqrt(np.mean((runs.y - base.prediction)[rows] ** 2))
-            assert before == pytest.approx(np.sqrt(np.mean(residual(least)[rows] ** 2)), rel=0.05)
+            assert before == pytest.approx(np.sqrt(np.mean(least[rows] ** 2)), rel=0.05)
         of_given = np.mean((runs.y - given)[used] ** 2)
         assert np.mean((runs.y - base.prediction)[used] ** 2) < 1.001 * of_given
+
+
+def least_squares_of(model: Any, used: Any) -> Any:
+    """Residuals of the numbers that least squares gives."""
+    names, start = [p.name for p in model.coefficients], start_values(model)
+
+    def residual(x: Any) -> Any:
+        at = {**start, **dict(zip(names, np.exp(x).tolist(), strict=True))}
+        return (model.runs.y - model.predict([at])[0])[:, 0]
+
+    return residual(least_squares(lambda x: residual(x)[used], [np.log(start[n]) for n in names]).x)
+
+
+@pytest.mark.parametrize(("levels", "days"), [(1, 1), (1, 4), (4, 4)])
+@pytest.mark.parametrize("bend", [0.1, 0.3])
+def test_a_level_that_bends_the_slope_is_not_pushed_off(levels: int, days: int, bend: float) -> None:
+    """A common misfit, or a level for each day, does not buy a better slope with wrong levels."""
+
+    def curve(columns: Mapping[str, Any], p: Mapping[str, float]) -> dict[str, Any]:
+        a = np.array([p[f"a{day % levels}"] for day in columns["day"].astype(int)])
+        return {"y": a * (1 + np.exp(-a) * columns["x"]) * np.exp(p["square"] * columns["x"] ** 2)}
+
+    model = sf.Model(
+        curve,
+        outputs={"y": sf.Output("level")},
+        numbers=[sf.Number(f"a{k}", 1.0, low=0.1, high=10) for k in range(levels)],
+        effects=[sf.Effect("square", "a square", low=-3, high=3, typical=0.1)],
+        settings=["x"],
+    )
+    rng = np.random.default_rng(1)
+    table = pd.DataFrame({"x": np.tile(np.linspace(0, 1, 12), 8), "day": np.repeat(np.arange(4), 24) % days})
+    shape = (1 + bend * table["x"] ** 2) * np.exp(0.5 * table["x"] + 0.01 * rng.standard_normal(96))
+    shape *= np.exp(np.array([0.05, -0.05, 0.02, -0.02])[table["day"]])
+    experiment = read_runs_of(table.assign(y=shape), model, Roles(session="day"))[0]
+    held_out = np.arange(96) % 12 == 5
+    study, base, _ = first_fit(experiment, held_out=held_out, draws=20)
+    least = least_squares_of(study.model, study.split.fitted)[study.split.fitted]
+    residual = (experiment.runs.y - base.prediction)[study.split.fitted]
+    assert np.sqrt(np.mean(residual**2)) < 1.02 * np.sqrt(np.mean(least**2))
 
 
 def test_a_number_for_each_session_leaves_nothing_known_of_their_scatter() -> None:
