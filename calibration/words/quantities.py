@@ -37,6 +37,23 @@ def output_error(record: Record, error: float, output: str) -> str:
     return f"{number}{_after_number(unit)}".rstrip()
 
 
+def error_in_words(record: Record, error: float) -> str:
+    """Write an error over all outputs in the unit that they share; in per cent where all are relative or angles.
+
+    Over outputs in several units it has none.
+    """
+    scale, unit = _shared_scale(record)
+    return percent(error) if unit == "%" else f"{plain(scale * error)}{_after_number(unit)}".rstrip()
+
+
+def _shared_scale(record: Record) -> tuple[float, str]:
+    """Return the factor and the unit of an error over all outputs."""
+    scales = {(scale, unit) for scale, unit in record.get("output_scales", {}).values()} or {(100.0, "%")}
+    if len(scales) == 1:
+        return scales.pop()
+    return (100.0, "%") if all(scale != 1 or unit in ("", "rad") for scale, unit in scales) else (1.0, "")
+
+
 def feature_in_words(name: str) -> str:
     """Write the name of a feature of the inputs."""
     for word, read in _FEATURES.items():
@@ -96,26 +113,28 @@ def percent(value: float, decimals: int = 2) -> str:
     return f"{100 * value:.{decimals}f} %"
 
 
-def interval_in_words(interval: Sequence[float]) -> str:
-    """Write a 95 % interval of shares in per cent."""
-    low, high = (f"{100 * end:.2f}" for end in interval)
-    return f"95 % interval {low} to {high} %"
+def interval_in_words(record: Record, interval: Sequence[float]) -> str:
+    """Write the 95 % interval of an error over all outputs, or of a gain, as `error_in_words` does."""
+    scale, unit = _shared_scale(record)
+    low, high = (f"{scale * end:.2f}" if unit == "%" else plain(scale * end) for end in interval)
+    return f"95 % interval {low} to {high}{_after_number(unit)}".rstrip()
 
 
-def gain_in_words(before: float, after: float, interval: Sequence[float] | None) -> str:
+def gain_in_words(record: Record, before: float, after: float, interval: Sequence[float] | None) -> str:
     """Say whether the error on the held-out runs falls with what is claimed; an interval with zero is no gain."""
-    both = f"{percent(before)} without, {percent(after)} with it"
+    without, with_it = error_in_words(record, before), error_in_words(record, after)
     if after >= before:
-        return f"the error on the held-out runs does not fall with it ({both})"
+        return f"the error on the held-out runs does not fall with it ({without} without, {with_it} with it)"
+    falls = f"the error on the held-out runs falls from {without} to {with_it}"
     if interval is None:
-        return f"the error on the held-out runs falls from {percent(before)} to {percent(after)}"
+        return falls
+    words = interval_in_words(record, interval)
     if interval[0] <= 0:
-        words = interval_in_words(interval)
-        return f"there is no gain that these runs can show (error on the held-out ones {both}; gain, {words})"
-    return (
-        f"the error on the held-out runs falls from {percent(before)} to {percent(after)} "
-        f"(by {percent(before - after)}, {interval_in_words(interval)})"
-    )
+        return (
+            "there is no gain that these runs can show "
+            f"(error on the held-out ones {without} without, {with_it} with it; gain, {words})"
+        )
+    return f"{falls} (by {error_in_words(record, before - after)}, {words})"
 
 
 def removed(share: float) -> str:

@@ -18,6 +18,7 @@ from calibration.words.quantities import (
     detectable,
     digits,
     direction_in_words,
+    error_in_words,
     final_model,
     fitted_value,
     gain_in_words,
@@ -90,20 +91,20 @@ def _environment() -> Environment:
         autoescape=lambda name: name == "report.j2",
     )
     environment.filters |= _FILTERS | {name: pass_context(words) for name, words in _OF_OUTPUTS.items()}
-    environment.globals |= {"final_model": final_model, "gain_in_words": gain_in_words}
+    environment.globals |= {"final_model": final_model, "gain_in_words": pass_context(gain_in_words)}
     return environment
 
 
 _FILTERS: dict[str, Callable[..., str]] = {
     "percent": percent, "digits": digits, "p": p_in_words, "plain": plain, "size": size, "sized": sized,
     "detectable": detectable, "given": given, "tolerance": tolerance, "fitted_value": fitted_value,
-    "direction": direction_in_words,
-    "ranges": ranges_in_words, "interval": interval_in_words, "removed": removed,
-    "in_lab": length_in_lab,
+    "direction": direction_in_words, "ranges": ranges_in_words, "removed": removed, "in_lab": length_in_lab,
 }  # fmt: skip
 _OF_OUTPUTS: dict[str, Callable[..., str]] = {  # their first argument is the whole record
     "output": output_label,
     "offset": offset,
     "output_error": output_error,
+    "error": error_in_words,
+    "interval": interval_in_words,
     "along": along_in_words,
 }

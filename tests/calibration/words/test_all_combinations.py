@@ -215,3 +215,34 @@ def test_what_the_loop_found_has_its_sections() -> None:
     assert "decoy 9.00 % no" in seen
     assert "on conditions that were not fitted (balls 2 and 5): calibrated 12.00 %" in errors_in_words(record)
     assert "<td>4.00 %</td>" in sections(record, {})
+
+
+@pytest.mark.parametrize(
+    ("scales", "unit"),
+    [
+        ({"time": [1.0, "s"]}, " s"),
+        ({"time": [1.0, "s"], "lag": [1.0, "s"]}, " s"),
+        ({"angle": [1.0, "°"]}, "°"),
+        ({"time": [1.0, "s"], "speed": [100.0, "%"]}, ""),
+    ],
+)
+def test_errors_of_differences_are_in_the_unit_that_they_share(scales: Record, unit: str) -> None:
+    loop = [{"error": 0.12, "named": "", "left": ""}]
+    changes = {
+        "nearest": NEAREST, "forms": FORMS, "turns": loop, "errors_of_conditions": CONDITIONS,
+        "withdrawn": [FORBIDDEN], "output_scales": scales, **GAINS["certain"],
+    }  # fmt: skip
+    record = with_flags("partial", changes)
+    said, errors, seen = sentence(record), errors_in_words(record), in_report(record)
+    assert f"falls from 0.12{unit} to 0.04{unit} (by 0.08{unit}, 95 % interval 0.05 to 0.11{unit})" in said
+    assert f"as given 0.2{unit}, calibrated 0.12{unit}, with the adopted form 0.04{unit}" in errors
+    assert not re.search(r"\b(12|4)\.00 %", seen)
+    for text in (said, errors, *next_steps({**record, "advice": "as given"})):
+        assert not re.search(r"\b\d+\.\d+ %", text), text
+
+
+def test_errors_of_ratios_and_angles_in_radians_are_in_per_cent() -> None:
+    """As a robot's: the slip angle is shown in degrees, and compared in radians."""
+    for theta in ([57.3, "°"], [1.0, "rad"]):
+        record = with_flags("none", {"output_scales": {"speed": [100.0, "%"], "theta": theta}})
+        assert "as given 20.00 %, calibrated 12.00 %" in errors_in_words(record)
