@@ -11,9 +11,9 @@ Else a shift is no different from an effect of N or l. A number that differs by 
 (`calibration.statistics.residual_tests`), and costs no simulation. The largest is taken to be real if it is beyond
 what a bootstrap of all scores gives at a quarter of the level, beyond `CERTAIN` standard deviations of what the
 fit with it leaves (its Birge factor counts), and credible: at most `CREDIBLE` tolerances of the number, or any
-angle for the zero of the course. Of pairs that cannot be told apart the one comes first that is off by the fewest
-of its tolerances, a coefficient before a number; the others are named with it. With it in the fit, a second one is
-looked for.
+angle for the zero of the course. Its fit must gain more than one parameter can by chance. Of pairs that cannot be
+told apart the one comes first that is off by the fewest of its tolerances, a coefficient before a number; the
+others are named with it. With it in the fit, a second one is looked for.
 
 The zero of the course shows only with a current, and a score is its derivative at the same zero in all runs. So a
 number with a grid is fitted in each group where another number has a large score, from all values of the grid.
@@ -138,6 +138,8 @@ def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[LocalShift, .
     while groups and len(moves) < _MOST:
         fits: list[tuple[LocalShift, Study, Fit]] = []
         for move in _clearest(study, base, groups, numbers):
+            if move.name in base.names:  # with a grid it has the score of another number
+                continue
             shifts = (*(m.shift for m in moves), move.shift)
             moved, names = replace(study, model=Shifted(plain, shifts)), (*base.names, move.name)
             for change in move.shift.of.grid or (0.0,):
@@ -148,7 +150,7 @@ def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[LocalShift, .
                     fits.append((move, moved, fit(moved.model, start, names, used, title="")))
                 except UnsolvedError:  # with an effect at work
                     continue
-        fits = [each for each in fits if _is_real(plain.runs, used, each[0], each[2])]
+        fits = [each for each in fits if _is_real(plain.runs, used, each[0], base, each[2])]
         if not fits:
             break
         least = min(fitted.deviance for _, _, fitted in fits)
@@ -160,10 +162,14 @@ def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[LocalShift, .
     return study, base, moves
 
 
-def _is_real(runs: Runs, used: Flags, move: LocalShift, fitted: Fit) -> bool:
-    """Tell whether a number that differs is beyond what the fit with it leaves, and credible."""
+def _is_real(runs: Runs, used: Flags, move: LocalShift, base: Fit, fitted: Fit) -> bool:
+    """Tell whether a number that differs is beyond what the fit with it leaves, gains by itself, and is credible.
+
+    One with a grid has the score of another number, so its own gain counts.
+    """
     certain = abs(move.z) >= CERTAIN * math.sqrt(birge(runs, fitted, used))
-    return fitted.converged and certain and _credible(move.shift.of, fitted.parameters[move.name])
+    gains = base.deviance - fitted.deviance >= INDISTINGUISHABLE
+    return fitted.converged and certain and gains and _credible(move.shift.of, fitted.parameters[move.name])
 
 
 def _credible(number: Parameter, change: float) -> bool:

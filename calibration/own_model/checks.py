@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from calibration.own_model.function_model import NOT_ABOVE_0, FunctionModel
-from calibration.statistics.gls import repeat_count, repeat_covariance
+from calibration.statistics.checks import refuse_equal_repeats
+from calibration.statistics.gls import repeat_count
 from calibration.statistics.statistical_model import FEWEST_REPEATS, Parameter, start_values
 from common.arrays import Flags, Floats
 from common.errors import InputError
@@ -16,7 +17,6 @@ _OTHER_UNITS = (  # factor, units of an output in which it is a mistake, what th
     (180 / np.pi, ("1", "rad", "deg", "°"), "degrees"),
 )
 _NEAR = 1.3  # factor between another unit and what is found
-_ROUNDING = 1e-24  # variance of repeats that are equal, over the mean square
 _TOGETHER = 0.9  # least correlation, about 0, of what is compared as a difference
 
 
@@ -29,11 +29,7 @@ def check_function(model: FunctionModel) -> None:
     """
     runs = model.runs
     if runs.sigma is None and repeat_count(runs.apart) >= FEWEST_REPEATS:
-        variances = np.diag(repeat_covariance(runs.y, runs.apart))
-        for place in np.flatnonzero(variances <= _ROUNDING * np.mean(runs.y**2, 0))[:1].tolist():
-            raise InputError(
-                f"{runs.outputs[place]} is the same in all repeats; drop copies of rows, or give unrounded values"
-            )
+        refuse_equal_repeats(runs, runs.apart, runs.outputs)
     parameters, start = model.model.parameters, start_values(model)
     if runs.values(np.ones(len(runs), dtype=bool)) <= len(model.coefficients):
         raise InputError(f"{len(runs)} usable rows for {len(model.coefficients)} numbers to fit; give more rows")

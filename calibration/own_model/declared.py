@@ -30,6 +30,7 @@ class Output:
     unit: str = "1"
     kind: Literal["ratio", "difference"] = "ratio"  # "difference" for angles and for values that change sign
     sigma: float | None = None  # standard deviation of one run, if it is known: relative for a ratio
+    unit_checked: bool = False  # a session that reads 10, 60, … times as much as others is right
 
     def __post_init__(self) -> None:
         if self.kind not in ("ratio", "difference"):

@@ -111,6 +111,7 @@ def _read(table: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
         notes=_notes(columns, [*needed, *_names(roles.held_out)], roles.notes, good, condition),
         output_titles={name: o.title for name, o in kinds},
         output_scales={name: (1.0, o.unit.removeprefix("1")) for name, o in kinds if o.kind == "difference"},
+        unit_checked={name: o.unit_checked for name, o in kinds},
         lines=table.index.to_numpy()[keep] if table.index.name == LINE else None,
         words=frozenset(words),
     )

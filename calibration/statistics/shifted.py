@@ -22,7 +22,7 @@ from calibration.statistics.statistical_model import Experiment, Parameter, Para
 from common.arrays import Flags, Floats
 from common.errors import InputError
 
-_LARGEST = 2.0  # change of a logarithm without a prior
+_LARGEST = 7.0  # change of a logarithm without a prior
 
 
 @dataclass(frozen=True)

@@ -115,6 +115,9 @@ class Runs:
     output_scales: Mapping[str, tuple[float, str]] = field(
         default_factory=dict, kw_only=True
     )  # factor and unit in which residuals are shown; default: per cent
+    unit_checked: Mapping[str, bool] = field(
+        default_factory=dict, kw_only=True
+    )  # outputs of which it may be declared, and whether it is
     differing: Floats | None = field(default=None, kw_only=True)  # (n, c) by which repeats were found to differ
 
     @property

@@ -169,19 +169,22 @@ def find_outliers(data: Runs, prediction: Floats) -> tuple[Flags, tuple[Excluded
     """Find the runs (n,) to exclude, and say why; `prediction` (n, k) of the model as given."""
     bad = np.zeros(len(data.y), dtype=bool)
     residual = data.y - prediction
+    y, checked = data.y.copy(), [data.unit_checked.get(name, False) for name in data.outputs]
+    for rows in (data.session == session for session in np.unique(data.session)):
+        y[rows] -= np.where(checked, np.median(residual[rows], 0), 0.0)  # such a session may differ as a whole
     residual -= np.median(residual, 0)
     groups = [np.flatnonzero(data.condition == c) for c in np.unique(data.condition)]
     groups = [g for g in groups if len(g) > 1]
     if not groups:
         return bad, ()
-    centred = np.concatenate([data.y[g] - np.median(data.y[g], 0) for g in groups])
+    centred = np.concatenate([y[g] - np.median(y[g], 0) for g in groups])
     # The deviation of two repeats from their median is half their difference.
     pairs = np.sqrt(np.mean([(len(g) - 1) / len(g) for g in groups]))
     scatter = _MAD * np.median(np.abs(centred), 0) / pairs
     excluded = []
     for group in groups:
         while len(group) > 1:
-            spread = np.ptp(data.y[group], axis=0) / np.maximum(scatter, 1e-300)
+            spread = np.ptp(y[group], axis=0) / np.maximum(scatter, 1e-300)
             worst = int(np.argmax(spread))
             if spread[worst] < FAR or scatter[worst] == 0:
                 break

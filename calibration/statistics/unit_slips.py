@@ -88,6 +88,8 @@ def refuse_unit_slips(runs: Runs, given: Floats) -> None:
     sessions = range(len(runs.session_names))
     factors = [[_compared(runs, given, i, s) for s in sessions] for i in range(len(runs.outputs))]
     for i, name in enumerate(runs.outputs):
+        if runs.unit_checked.get(name):
+            continue
         known = {s: f for s, f in enumerate(factors[i]) if f and f.error <= _NEAR / 2}
         if not known:
             continue
@@ -101,10 +103,11 @@ def refuse_unit_slips(runs: Runs, given: Floats) -> None:
         there, elsewhere = (larger, smaller) if found.logarithm > 0 else (smaller, larger)
         units = f", as if it were in {there} there and in {elsewhere} in those; convert it" * (scale != 1)
         sign = "; check its sign" if found.negative else ""
+        override = "; if it is right, declare its Output with unit_checked=True" * (name in runs.unit_checked)
         factor = math.exp(found.logarithm) * (-1 if found.negative else 1)
         raise InputError(
             f"{name} of session {runs.session_names[session]} is {factor:.3g} times that of the other sessions"
-            f"{units}{sign}"
+            f"{units}{sign}{override}"
         )
 
 

@@ -39,6 +39,7 @@ import numpy as np
 import pandas as pd
 
 from calibration.statistics.between_repeats import usable
+from calibration.statistics.checks import refuse_equal_repeats
 from calibration.statistics.copies import COPY, find_copies
 from calibration.statistics.excluded import Excluded
 from calibration.statistics.gaps import filled, gaps_in_words, not_finite, with_outputs, without_gaps
@@ -289,7 +290,7 @@ def _independent(data: Measurements, copies: int) -> Measurements:
     Raises:
         InputError: there are too few repeats, or an output is the same in all of them.
     """
-    y, outputs, repeats = data.y, data.outputs, repeat_count(data.apart)
+    columns, repeats = [OUTPUTS[name][0] for name in data.outputs], repeat_count(data.apart)
     repeated = data.apart if repeats >= FEWEST_REPEATS else data.repeats()
     if (count := repeat_count(repeated)) < FEWEST_REPEATS:
         without = f", without {copies} copies of rows" if copies else ""
@@ -301,20 +302,16 @@ def _independent(data: Measurements, copies: int) -> Measurements:
     if repeats < FEWEST_REPEATS and data.repeated(slice(None)):
         caveat = f"{repeats} repeated runs: the noise is estimated from what differs between mirror runs"
         caveats += (f"{caveat} ({count} degrees of freedom)",)
-    run = repeat_covariance(y, repeated)
+    refuse_equal_repeats(data, repeated, columns)
+    run = repeat_covariance(data.y, repeated)
     kept: list[int] = []
     follows = []
-    for i, name in enumerate(outputs):
-        column = OUTPUTS[name][0]
-        if not run[i, i] > 1e-12:
-            raise InputError(
-                f"{column} does not differ between repeats; give measured values, unrounded, or leave it out"
-            )
+    for i in range(len(columns)):
         covariance = run[np.ix_(kept, kept)]
         remainder = run[i, i] - run[i, kept] @ np.linalg.solve(covariance, run[kept, i]) if kept else run[i, i]
         if remainder < _OWN * run[i, i]:
-            others = ", ".join(OUTPUTS[outputs[j]][0] for j in kept)
-            follows.append(Excluded(f"column {column}: follows from {others}, so it is not counted twice"))
+            others = ", ".join(columns[j] for j in kept)
+            follows.append(Excluded(f"column {columns[i]}: follows from {others}, so it is not counted twice"))
         else:
             kept.append(i)
     excluded = (*data.excluded, *follows)

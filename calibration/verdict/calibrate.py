@@ -139,8 +139,9 @@ def calibrate(
                 study, found, moves = _explain_with_moves(given, base)
         unexplained = found.verdict(level) == "unexplained" or not study.model.runs.noise_known
         uncertain = any(c.uncertain for c in found.best)
-        describes = describe and study.model is model and not isinstance(model, Offsets)
-        if describe and describes and study.model.runs.noise_known and (unexplained or uncertain):
+        wanted = study.model.runs.noise_known and (unexplained or uncertain)
+        beside = _beside_what_no_law_is_sought(study, model) if describe and wanted else ""
+        if describe and wanted and not beside:
             laws = describe(study, found.base, beside_claim=uncertain)
         described = laws if laws and unexplained and laws.complete else None
         if unexplained and not described:
@@ -185,7 +186,14 @@ def calibrate(
         withdrawn=tuple(withdrawn),
         caveats=(),
     )
-    return replace(verdict, caveats=_caveats(verdict, model, budget, max_seconds))
+    return replace(verdict, caveats=_caveats(verdict, model, budget, max_seconds, beside))
+
+
+def _beside_what_no_law_is_sought(study: Study, model: Experiment) -> str:
+    """Say what the model has that a law is not fitted beside; empty if there is nothing."""
+    if isinstance(model, Offsets):
+        return "what differs between repeats"
+    return "" if study.model is model else "a number that differs in some runs"
 
 
 def _both_intervals(
@@ -425,7 +433,9 @@ def _adopt_in_turns(
     return found, tuple(turns) if found.nearest else (), tuple(withdrawn)
 
 
-def _caveats(verdict: Verdict, model: ForwardModel, budget: Budget, max_seconds: float) -> tuple[str, ...]:
+def _caveats(
+    verdict: Verdict, model: ForwardModel, budget: Budget, max_seconds: float, beside: str
+) -> tuple[str, ...]:
     """Say what weakens the conclusion: what was left out or not tried, and why a fit may not be the best one."""
     runs, split, base, final = verdict.runs, verdict.split, verdict.base, verdict.final
     ended = f"after {max_seconds:.0f} s of processor time" if budget.left > -math.inf else "at Ctrl-C"
@@ -441,6 +451,7 @@ def _caveats(verdict: Verdict, model: ForwardModel, budget: Budget, max_seconds:
     unknown = "there are neither repeats nor a declared noise, so no residual can be told from noise"
     of_fits = (
         (not verdict.runs.noise_known, unknown),
+        (beside, f"no law was looked for: laws are not fitted beside {beside}"),
         (vague, f"these runs determine {' and '.join(vague)} to no better than a factor of two"),
         (outside, "without effects the coefficients run to the end of their range, so every effect was refitted "
          "from the model as given, and it is less sure which effect it is"),

@@ -167,3 +167,17 @@ def test_of_real_balls_drag_is_adopted(without: tuple[str, ...]) -> None:
     assert result.verdict == "partial"
     assert result.error_before > 0.2
     assert result.error_after < 0.06
+
+
+def test_a_law_that_is_not_looked_for_is_said() -> None:
+    """Beside what differs between repeats none is."""
+    table = falls("a bump in depth", 0)
+    table["watch"] = np.where(np.random.default_rng(0).random(len(table)) < 0.4, "B", "A")
+    table["speed_m_s"] *= np.where(table["watch"] == "B", 1.3, 1.0)
+
+    def describe(*_: object, **__: object) -> None:
+        pytest.fail("a law was looked for")
+
+    result = calibrate(balls(table), describe=describe, draws=200, progress=False)
+    assert "the speed of watch B is" in result.sentence
+    assert "no law was looked for: laws are not fitted beside what differs between repeats" in result.caveats

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.attribution.moves import groups_that_may_differ
+from calibration.attribution.moves import find_moves, groups_that_may_differ
 from calibration.report.robot_verdict import RobotVerdict
+from calibration.statistics.fit import fit
 from calibration.statistics.forward import by_differences, derivatives
 from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.statistics.shifted import Shift, Shifted
-from calibration.statistics.statistical_model import start_values
+from calibration.statistics.statistical_model import Parameter, start_values
+from calibration.statistics.study import Study
 from calibration.statistics.weights import alike
 from calibration.swimmer.influences import CURRENT
 from calibration.swimmer.measured_table import read_measurements
@@ -26,6 +30,7 @@ from common.arrays import Floats
 from sim.inputs import load_robot
 from sim.model.uncertainty import DEFAULTS, Sigma
 from softflagella.closed_loop import calibrate
+from tests.calibration.own_model.test_faults import DIAMETER, ROUND, TABLE, hand_made
 from tests.calibration.toy_tables import (
     DRAG,
     LENGTHS_CM,
@@ -205,3 +210,22 @@ def test_what_moved_on_a_bench_is_named(name: str, effects: tuple[str, ...], sai
     result = calibrate(MEASURED / name, robot, laws=False, progress=False)
     assert set(result.effects) == set(effects)
     assert all(words in result.sentence for words in said)
+
+
+@pytest.mark.parametrize(("size", "moved"), [(1e-4, []), (0.3, ["zero since session round 4"])])
+def test_a_number_with_a_grid_is_no_move_by_the_score_of_another(size: float, moved: list[str]) -> None:
+    """A slope that differs since round 4 would be off by 100 tolerances; a zero there gains by itself or not."""
+    tilt = (DIAMETER - DIAMETER.mean())[:, None]
+    bend = size * ((tilt / tilt.std()) ** 2 - 1)
+
+    def change(y: Floats, sets: Sequence[Any]) -> Floats:
+        return y + np.array([p["slope"] * tilt.T + p["zero"] * bend.T for p in sets]).reshape(y.shape)
+
+    slope = Parameter("slope", "slope", 0.0, (-9.0, 9.0), 1.0, sigma=0.02)
+    zero = Parameter("zero", "zero", 0.0, (-9.0, 9.0), 1.0, sigma=1.0, grid=(0.5,), plausible=(-999.0, 999.0))
+    y = np.log(TABLE["v"] * (1 + 2.1 * DIAMETER)).to_numpy()[:, None] + (2.0 * tilt + bend) * (ROUND > 2)[:, None]
+    plain = hand_made(nuisances=(slope, zero), change=change, y=y)
+    model = replace(plain, runs=replace(plain.runs, sigma=np.array([0.02])))
+    study = Study.fitted_to(model, np.ones(len(ROUND), dtype=bool))
+    base = fit(model, start_values(model), ("v1", "slope", "zero"), study.split.fitted, title="")
+    assert [move.name for move in find_moves(study, base)[2]] == moved

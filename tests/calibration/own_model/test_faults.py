@@ -63,6 +63,17 @@ def test_a_round_in_another_unit_is_named() -> None:
     assert "in mm there and in m in those" in said(MODEL, table)
 
 
+def test_a_round_that_is_ten_times_as_fast_can_be_declared_right() -> None:
+    """No other output could bear it out."""
+    table = TABLE.assign(v=TABLE["v"] * np.where(TABLE["round"] == 2, 10, 1))
+    assert said(MODEL, table).endswith("; if it is right, declare its Output with unit_checked=True")
+    checked = replace(MODEL, outputs={"v": sf.Output("speed", "m/s", unit_checked=True)})
+    result = sf.calibrate(table, checked, session="round", progress=False)
+    assert [(move.record["number"], move.record["where"]) for move in result.moves] == [
+        ("v1", "in session round 2")
+    ]
+
+
 def test_as_it_should_be_the_wall_is_named() -> None:
     result = sf.calibrate(TABLE, MODEL, session="round", progress=False)
     assert result.effects == ("wall",)

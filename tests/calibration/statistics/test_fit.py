@@ -330,7 +330,10 @@ def test_runs_that_were_mistracked_are_excluded_and_clean_ones_are_not() -> None
         y = np.random.default_rng(seed).normal(size=(400, 2))
         condition = np.repeat(np.arange(200), 2)
         outputs = ("R_yr", "theta")
-        return SimpleNamespace(y=y, condition=condition, row_name="row {}".format, outputs=outputs)
+        return SimpleNamespace(
+            y=y, condition=condition, session=0 * condition, row_name="row {}".format, outputs=outputs,
+            unit_checked={},
+        )  # fmt: skip
 
     runs, effect = pairs(0), pairs(1)
     mistracked = np.arange(0, 400, 40)

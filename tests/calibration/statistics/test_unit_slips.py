@@ -101,3 +101,11 @@ def test_days_that_differ_by_a_third_are_no_slip() -> None:
     for seed in range(100):
         for sessions in (2, 4):
             refuse_unit_slips(*_runs(seed, 1.3, sessions))
+
+
+def test_a_factor_that_was_checked_is_no_slip() -> None:
+    runs, given = _runs(1, 1.02)
+    slipped = replace(_slipped(runs, 0, 10.0), unit_checked={"v": False})
+    with pytest.raises(InputError, match="; if it is right, declare its Output with unit_checked=True"):
+        refuse_unit_slips(slipped, given)
+    refuse_unit_slips(replace(slipped, unit_checked={"v": True}), given)

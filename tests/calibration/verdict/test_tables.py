@@ -39,7 +39,7 @@ def commanded(table: pd.DataFrame, folder: Path) -> int:
         (lambda t: t[t["trial"] == 1].assign(session=range(48)), "0 repeated runs, too few"),
         (lambda t: t.assign(omega_h_rpm=-t["omega_h_rpm"]), "wrong sign .*: the head turns against the motor"),
         (lambda t: t.assign(omega_yr_rad_s=-t["omega_yr_rad_s"]), "wrong sign .* to the left"),
-        (lambda t: t.assign(omega_yr_rad_s=0.05 * np.sign(t["omega_rpm"])), "does not differ between repeats"),
+        (lambda t: t.assign(omega_yr_rad_s=0.05 * np.sign(t["omega_rpm"])), "rad_s is the same in all repeats"),
         (lambda t: t.assign(R_yr_cm=1000 * t["R_yr_cm"]), "check its unit"),
         (lambda t: t.head(3), "3 usable runs"),
         (lambda t: t.assign(R_yr_cm="far"), "0 usable runs"),
