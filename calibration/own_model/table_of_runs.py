@@ -17,9 +17,8 @@ import pandas as pd
 from calibration.own_model.checks import check_function
 from calibration.own_model.declared import Model
 from calibration.own_model.function_model import AskedColumns, FunctionModel, TableRuns, evaluate
-from calibration.statistics.copies import COPY, find_copies
-from calibration.statistics.excluded import MANY, Excluded
-from calibration.statistics.gaps import filled, gaps_in_words, is_missing, not_finite, with_outputs, without_gaps
+from calibration.statistics.excluded import MANY, Faults
+from calibration.statistics.gaps import filled, gaps_in_words, is_missing, with_outputs, without_gaps
 from calibration.statistics.gls import repeat_count
 from calibration.statistics.statistical_model import FEWEST_REPEATS
 from common.arrays import Flags, Floats, Integers, Words
@@ -69,17 +68,13 @@ def _read(table: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
     outputs = table[list(model.outputs)].apply(numbers_of)
     columns = AskedColumns({name: _values(table[name]) for name in table.columns if name not in outputs})
     faults = _faults_of_outputs(table, outputs, model)
-    settings = _settings(model, columns, table, faults)
+    settings = _settings(model, columns, faults)
     needed = list(dict.fromkeys([*columns.asked, *settings, *own]))
-    _add_missing(faults, columns, needed, table)
+    _add_missing(faults, columns, needed)
     specimens = own[-1:] if roles.specimen else []
     was_set = np.column_stack([_as_numbers(columns[name]) for name in (*specimens, *settings)])
-    whole = [row for row in np.flatnonzero(outputs.notna().all(axis=1)).tolist() if row not in faults]
-    for place, earlier in find_copies(was_set[whole], outputs.to_numpy()[whole]).items():
-        original = f" ({row_name(table, whole[earlier])})"
-        faults[whole[place]] = Excluded(COPY, row_name(table, whole[place]), original)
-    keep = np.array([row not in faults for row in range(len(table))])
-    if not keep.any():
+    faults.add_copies(was_set, outputs.to_numpy())
+    if not (keep := faults.usable).any():
         raise InputError(f"the table has no usable row: {faults[0]}")
     columns, was_set, good, missing = columns.rows(keep), was_set[keep], outputs[keep], table[list(outputs)].isna()
     condition = np.unique(was_set, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
@@ -101,7 +96,7 @@ def _read(table: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
         inputs=np.column_stack(list(inputs.values())),
         input_names=tuple(inputs),
         rows=np.flatnonzero(keep) + 1,
-        excluded=(*(faults[row] for row in sorted(faults)), *gaps_in_words(table, missing & keep[:, None])),
+        excluded=(*faults.in_order, *gaps_in_words(table, missing & keep[:, None])),
         caveats=(),
         completion=without_gaps(missing.to_numpy()[keep]),
         specimen=specimen if roles.specimen else None,
@@ -141,37 +136,33 @@ def _levels(name: str | None, columns: AskedColumns) -> tuple[Integers, tuple[st
     return number.reshape(-1).astype(np.int64), tuple(names)
 
 
-def _faults_of_outputs(table: pd.DataFrame, outputs: pd.DataFrame, model: Model) -> dict[int, Excluded]:
-    """Say of which rows the outputs cannot be used, by their place.
+def _faults_of_outputs(table: pd.DataFrame, outputs: pd.DataFrame, model: Model) -> Faults:
+    """Say of which rows the outputs cannot be used.
 
     Raises:
         InputError: many values are not above 0 that are to be compared as ratios.
     """
-    missing = table[list(outputs)].isna()
-    lacking = np.flatnonzero(missing.all(axis=1)).tolist()
-    faults = {row: Excluded("no output has a value", row_name(table, row)) for row in lacking}
+    missing, faults = table[list(outputs)].isna(), Faults(table)
+    faults.add(missing.all(axis=1), "no output has a value")
     for name, output in model.outputs.items():
-        for row in np.flatnonzero(~np.isfinite(outputs[name]) & ~missing[name]).tolist():
-            faults.setdefault(row, not_finite(table, row, name))
-        low = np.flatnonzero(outputs[name] <= 0).tolist() if output.kind == "ratio" else []
-        if len(low) > MANY * len(table):
+        faults.add_not_finite(name, ~np.isfinite(outputs[name]) & ~missing[name])
+        low = (outputs[name] <= 0) & (output.kind == "ratio")
+        if low.mean() > MANY:
+            first = row_name(table, int(np.argmax(low)))
             raise InputError(
-                f"{name} is not above 0 in {len(low)} of {len(table)} rows, first in {row_name(table, low[0])}, "
+                f"{name} is not above 0 in {low.sum()} of {len(table)} rows, first in {first}, "
                 "and cannot be compared as a ratio; declare its Output with kind='difference'"
             )
-        for row in low:
-            value = f" = {outputs[name].iloc[row]:g}"
-            faults.setdefault(row, Excluded(f"{name}{{}} is not above 0", row_name(table, row), value))
+        faults.add(low, f"{name}{{}} is not above 0", [f"{value:g}" for value in outputs[name]])
     return faults
 
 
-def _settings(model: Model, columns: AskedColumns, table: pd.DataFrame, faults: dict[int, Excluded]) -> list[str]:
+def _settings(model: Model, columns: AskedColumns, faults: Faults) -> list[str]:
     """Return the settings; default: the columns for which the function asks, found from rows that have them."""
     before = -1
     while before < (before := len(columns.asked)):
-        _add_missing(faults, columns, columns.asked, table)
-        usable = np.array([row not in faults for row in range(len(table))])
-        if not usable.any():
+        _add_missing(faults, columns, columns.asked)
+        if not (usable := faults.usable).any():
             raise InputError(f"the table has no usable row: {faults.get(0, 'it is empty')}")
         try:
             evaluate(model, columns.rows(usable), {p.name: p.start for p in model.parameters})
@@ -183,13 +174,10 @@ def _settings(model: Model, columns: AskedColumns, table: pd.DataFrame, faults: 
     raise InputError("the function asks for no column; name the model's settings, columns that repeats share")
 
 
-def _add_missing(
-    faults: dict[int, Excluded], columns: AskedColumns, names: Iterable[str], table: pd.DataFrame
-) -> None:
+def _add_missing(faults: Faults, columns: AskedColumns, names: Iterable[str]) -> None:
     """Add every row that lacks a value of a column."""
     for name in names:
-        for row in np.flatnonzero(is_missing(columns[name])).tolist():
-            faults.setdefault(row, not_finite(table, row, name))
+        faults.add_not_finite(name, is_missing(columns[name]))
 
 
 def _notes(

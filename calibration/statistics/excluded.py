@@ -7,7 +7,14 @@ together; what is particular to a row, its value, is told of a single row alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from calibration.statistics.copies import COPY, find_copies
+from common.arrays import Flags, Floats
+from common.tables import row_name
 
 MANY = 0.2  # share of the rows; if more are excluded, the rest may not be a fair sample
 
@@ -22,6 +29,43 @@ class Excluded(NamedTuple):
     def __str__(self) -> str:
         words = self.reason.replace("{}", self.value)
         return f"{self.row}: {words}" if self.row else words
+
+
+class Faults(dict[int, Excluded]):
+    """Rows of a table that cannot be used, by their place, from 0; the first fault of a row counts."""
+
+    def __init__(self, table: pd.DataFrame):
+        super().__init__()
+        self.table = table
+
+    def add(self, bad: Any, reason: str, values: Any = ()) -> None:
+        """Add the rows where `bad` (n,), with their values (n,) if these are told."""
+        for row in np.flatnonzero(bad).tolist():
+            value = f" = {values[row]}" if len(values) else ""
+            self.setdefault(row, Excluded(reason, row_name(self.table, row), value))
+
+    def add_not_finite(self, column: str, bad: Any) -> None:
+        """Add the rows where `bad` (n,): their value of a column is missing, or no number."""
+        missing = self.table[column].isna()
+        self.add(bad & missing, f"{column} has no value")
+        self.add(bad & ~missing, f"{column}{{}} is not a finite number", self.table[column].tolist())
+
+    def add_copies(self, inputs: Floats, outputs: Floats) -> None:
+        """Add the usable rows with all outputs (n, k) that are copies of an earlier one."""
+        whole = np.flatnonzero(self.usable & np.isfinite(outputs).all(axis=1))
+        for place, earlier in find_copies(inputs[whole], outputs[whole]).items():
+            name, original = (row_name(self.table, int(whole[at])) for at in (place, earlier))
+            self[int(whole[place])] = Excluded(COPY, name, f" ({original})")
+
+    @property
+    def usable(self) -> Flags:
+        """The rows without a fault, (n,)."""
+        return ~np.isin(np.arange(len(self.table)), list(self))
+
+    @property
+    def in_order(self) -> list[Excluded]:
+        """The faults by their rows."""
+        return [self[row] for row in sorted(self)]
 
 
 def summary_of_excluded(excluded: Sequence[Excluded], total: int) -> list[str]:

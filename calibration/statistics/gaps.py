@@ -56,11 +56,3 @@ def gaps_in_words(table: pd.DataFrame, missing: pd.DataFrame) -> list[Excluded]:
         rows = [row_name(table, i) for i in np.flatnonzero(missing[column]).tolist()]
         lines.append(Excluded(f"column {column}: no value in {listed(rows)}; the other outputs there count"))
     return lines
-
-
-def not_finite(table: pd.DataFrame, row: int, column: str) -> Excluded:
-    """Say why the value of a column cannot be used in a row, from 0."""
-    value = table[column].iloc[row]
-    if pd.isna(value):
-        return Excluded(f"{column} has no value", row_name(table, row))
-    return Excluded(f"{column}{{}} is not a finite number", row_name(table, row), f" = {value}")

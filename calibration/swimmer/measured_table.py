@@ -40,9 +40,9 @@ import pandas as pd
 
 from calibration.statistics.between_repeats import usable
 from calibration.statistics.checks import refuse_equal_repeats
-from calibration.statistics.copies import COPY, find_copies
-from calibration.statistics.excluded import Excluded
-from calibration.statistics.gaps import filled, gaps_in_words, not_finite, with_outputs, without_gaps
+from calibration.statistics.copies import COPY
+from calibration.statistics.excluded import Excluded, Faults
+from calibration.statistics.gaps import filled, gaps_in_words, with_outputs, without_gaps
 from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs
 from calibration.statistics.study import divided, middle_session
@@ -59,7 +59,7 @@ from common.run_columns import (
     RUN_SIGMAS,
     convert_measured,
 )
-from common.tables import LINE, read_table, row_name
+from common.tables import LINE, read_table
 from common.units import to_si
 
 _SIGMAS = dict(  # column -> nuisance parameter, factor
@@ -160,10 +160,9 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
     numbers = table.drop(columns=["session", "robot"], errors="ignore").apply(numbers_of)
     missing = table[[OUTPUTS[name][0] for name in outputs]].isna()
     faults = _faults(table, numbers, outputs, header, missing)
-    sparse = _add_gaps(faults, table, numbers)
-    _add_copies(faults, numbers, outputs, table)
-    keep = np.array([i not in faults for i in range(len(table))])
-    aside = [faults[i] for i in sorted(faults)]
+    sparse = _add_gaps(faults, numbers)
+    faults.add_copies(numbers[list(RUN)].to_numpy(), numbers[[*missing]].to_numpy())
+    keep, aside = faults.usable, faults.in_order
     good = numbers[keep].drop(columns=sparse)
     if len(good) < _FEWEST_RUNS:
         first = f" ({aside[0]})" if aside else ""
@@ -254,31 +253,16 @@ def _is_empty(column: pd.Series) -> bool:
     return bool((column.isna() | (column.astype(str).str.strip() == "")).all())
 
 
-def _add_gaps(faults: dict[int, Excluded], table: pd.DataFrame, numbers: pd.DataFrame) -> list[str]:
+def _add_gaps(faults: Faults, numbers: pd.DataFrame) -> list[str]:
     """Add every usable row that lacks a note, and return the notes that many rows lack."""
-    sparse = []
-    usable = np.array([i not in faults for i in range(len(table))])
+    sparse, usable = [], faults.usable
     for column in (name for name in RUN_NOTES if name in numbers):
-        gaps = np.flatnonzero(usable & ~np.isfinite(numbers[column].to_numpy()))
-        if len(gaps) > _GAPS * usable.sum():
+        gaps = usable & ~np.isfinite(numbers[column].to_numpy())
+        if gaps.sum() > _GAPS * usable.sum():
             sparse.append(column)
-            continue
-        for i in gaps.tolist():
-            faults.setdefault(i, not_finite(table, i, column))
+        else:
+            faults.add_not_finite(column, gaps)
     return sparse
-
-
-def _add_copies(
-    faults: dict[int, Excluded], numbers: pd.DataFrame, outputs: tuple[str, ...], table: pd.DataFrame
-) -> None:
-    """Add every usable row that is a copy of an earlier one."""
-    columns = [OUTPUTS[name][0] for name in outputs]
-    whole = numbers[columns].notna().all(axis=1)
-    usable = [i for i in range(len(table)) if i not in faults and whole.iloc[i]]
-    used = numbers.iloc[usable]
-    for place, earlier in find_copies(used[list(RUN)].to_numpy(), used[columns].to_numpy()).items():
-        original = f" ({row_name(table, usable[earlier])})"
-        faults[usable[place]] = Excluded(COPY, row_name(table, usable[place]), original)
 
 
 def _independent(data: Measurements, copies: int) -> Measurements:
@@ -379,8 +363,8 @@ def _notes(unknown: pd.DataFrame) -> dict[str, Any]:
 
 def _faults(
     table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...], header: Flags, missing: pd.DataFrame
-) -> dict[int, Excluded]:
-    """Say why rows cannot be used, by their place; the first fault of a row counts.
+) -> Faults:
+    """Say why rows cannot be used.
 
     Args:
         table: as given.
@@ -389,31 +373,24 @@ def _faults(
         header: (n,) rows that are the header again.
         missing: outputs without a value.
     """
-    faults: dict[int, Excluded] = {}
-
-    def add(bad: Flags, reason: str, values: Any = ()) -> None:
-        for i in np.flatnonzero(bad).tolist():
-            value = f" = {values[i]}" if len(values) else ""
-            faults.setdefault(i, Excluded(reason, row_name(table, i), value))
-
-    add(header, "the header again")
-    add(missing.all(axis=1).to_numpy(), "no output has a value")
+    faults = Faults(table)
+    faults.add(header, "the header again")
+    faults.add(missing.all(axis=1), "no output has a value")
     used = (*RUN, *missing)
     values = {column: numbers[column].where(numbers[column].abs() < _LARGEST).to_numpy() for column in used}
     for column, value in values.items():
-        for i in np.flatnonzero(~(np.isfinite(value) | missing.get(column, False))).tolist():
-            faults.setdefault(i, not_finite(table, i, column))
-    add(values["N"] % 1 != 0, "N{} is not a whole number", table["N"].tolist())
+        faults.add_not_finite(column, ~(np.isfinite(value) | missing.get(column, False)))
+    faults.add(values["N"] % 1 != 0, "N{} is not a whole number", table["N"].tolist())
     for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s"):
         if column in values:
-            add(values[column] <= 0, f"{column}{{}} is not above 0", table[column].tolist())
+            faults.add(values[column] <= 0, f"{column}{{}} is not above 0", table[column].tolist())
     sign = np.sign(values["omega_rpm"])
-    add(sign == 0, "omega_rpm = 0")
+    faults.add(sign == 0, "omega_rpm = 0")
     for name in outputs:
         column, _, expected = OUTPUTS[name]
         if expected:
             wrong = f"{column}{{}} has the wrong sign for its omega_rpm: {MEASURED[name].sense}"
-            add(values[column] * sign * expected <= 0, wrong, [f"{value:g}" for value in values[column]])
+            faults.add(values[column] * sign * expected <= 0, wrong, [f"{value:g}" for value in values[column]])
     return faults
 
 
