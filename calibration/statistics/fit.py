@@ -320,6 +320,7 @@ def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
     """
     fitted = problem.fitted
     least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
+    refused = False  # whether the step before did not improve the fit
     for count in range(1, _MOST_STEPS + 1):
         # The scatter of the sessions comes from the residuals of the fit, but only near the solution. Far from it
         # every session looks shifted, and with a large ρ the search would stop there.
@@ -339,14 +340,14 @@ def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
             # A step that keeps little of its promise overshoots, and the next one is damped (Marquardt 1963).
             least = step.damping + 1 if fall < _KEPT * step.promise else max(step.damping - 2, 0)
             least = min(least, len(_DAMPING) - 1)
-            point, kept = tried, step.size <= _SHORT
+            point, kept, refused = tried, step.size <= _SHORT, False
         elif kept:
             again = problem.at(point.parameters, None, count + 1, quick=bool(problem.effects))
             if not again.solved:
                 break
             point, kept = again, False
         else:
-            least = max(step.damping + 1, 2)
+            least, refused = max(step.damping + 1 + refused, 2), True  # each costs as much as one that does
             if least >= len(_DAMPING):
                 break
     return point

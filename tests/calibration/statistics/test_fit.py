@@ -40,6 +40,7 @@ from calibration.statistics.weights import (
 from calibration.verdict.record import facts
 from calibration.words.render import next_steps
 from common.arrays import Flags, Floats, Integers
+from tests.calibration.own_model.test_faults import hand_made
 from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, calibrated, effect, toy_table
 
 COUNT, NOISE = 192, 0.025
@@ -415,3 +416,17 @@ def test_further_interrupts_and_those_outside_a_search_end_the_program() -> None
             with pytest.raises(KeyboardInterrupt):
                 os.kill(os.getpid(), signal.SIGINT)
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_steps_that_are_refused_one_after_another_get_shorter_faster() -> None:
+    """Not far beyond its start the model cannot be solved quickly."""
+    tried = []
+
+    def change(y: Any, sets: Any) -> Any:
+        tried.append(float(sets[0]["v1"]))
+        return np.where(tried[-1] > 102.5, np.nan, y)
+
+    model = hand_made(change=change)
+    fitted = fit(model, {"v1": 100.0, "wall": 0.0}, ("v1",), np.ones(len(model.runs.y), dtype=bool), title="")
+    assert 100.0 <= fitted.parameters["v1"] <= 102.5
+    assert len(set(tried)) < 20
