@@ -26,13 +26,14 @@ from planner.vehicle.from_table import table_for
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import Point, TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import Objective
-from sim.knowledge import CalibrationKnowledge, read_knowledge
+from sim.knowledge import CalibratedRobot, CalibrationKnowledge, read_knowledge
 from sim.model.robot import Robot
 from sim.robot_rows import OneRobot, one_robot
 from surrogate.interface import LookupTable
 from surrogate.table_file import load_table
 
-AnyVehicle = OneRobot | MeasuredVehicle | TrackedVehicle  # the last one as a plan has it: no table is asked again
+# a `TrackedVehicle` is that of a plan: no table is asked again
+AnyVehicle = OneRobot | MeasuredVehicle | TrackedVehicle | CalibratedRobot
 Length = float | str
 AnyRegion = Circle | Polygon | Path2D | ArrayLike | str
 _REQUEST = tuple(field.name for field in fields(PlanRequest))
@@ -162,14 +163,27 @@ def asked(robot: AnyVehicle, options: Mapping[str, Any], **own: Any) -> tuple[Tr
         if any(options.get(name) for name in ("lookup", "own_table", "knowledge")):
             raise InputError(f"{swims.name!r} is a measured vehicle; it needs no look-up table and no calibration")
         return tracked_vehicle(swims, None, request.point, None), request
+    if not isinstance(robot, CalibratedRobot):
+        return _vehicle(robot, swims, options, request), request
+    tracked, *others = [
+        _vehicle(each, each, {**options, "knowledge": known}, request)
+        for each, known in ((robot.corrected, robot.knowledge), *robot.alternatives)
+    ]
+    return tracked._replace(alternatives=tuple(others)), request
+
+
+def _vehicle(robot: OneRobot, swims: Robot, options: Mapping[str, Any], request: PlanRequest) -> TrackedVehicle:
+    """Return the vehicle of a robot that a look-up table knows."""
     table, knowledge = table_of(robot, swims, options)
-    return tracked_vehicle(swims, table, request.point, knowledge), request
+    return tracked_vehicle(swims, table, request.point, knowledge)
 
 
 def swimmer_of(robot: AnyVehicle) -> Robot | MeasuredVehicle:
     """Return a robot or a measured vehicle, read from its file where a path or a preset's name is given."""
     if isinstance(robot, TrackedVehicle):
         return robot.robot
+    if isinstance(robot, CalibratedRobot):
+        return robot.corrected
     if isinstance(robot, str | Path) and MeasuredVehicle.is_in(robot):
         return MeasuredVehicle.load(robot)
     return robot if isinstance(robot, MeasuredVehicle) else one_robot(robot)

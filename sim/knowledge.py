@@ -16,9 +16,10 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from common.arrays import Floats
 from common.errors import InputError, naming
 from common.reading import read_toml
 from sim.effects import is_effect
+from sim.model.robot import Robot
 from sim.model.uncertainty import DEFAULTS
 
 COEFFICIENTS = ("C_t", "C_r", "C_yr")
@@ -95,6 +97,23 @@ class CalibrationKnowledge:
             raise InputError(f"{source}: [calibration] cannot be read: {broken}") from None
         with naming(source):
             return CalibrationKnowledge(names, covariance, current, error)
+
+
+@runtime_checkable
+class CalibratedRobot(Protocol):
+    """What a calibration makes of a robot."""
+
+    @property
+    def corrected(self) -> Robot:
+        """The robot, corrected."""
+
+    @property
+    def knowledge(self) -> CalibrationKnowledge:
+        """How sure that is."""
+
+    @property
+    def alternatives(self) -> Sequence[tuple[Robot, CalibrationKnowledge]]:
+        """Robots that the measured runs cannot tell from the corrected one."""
 
 
 UNMEASURED = CalibrationKnowledge(COEFFICIENTS, np.diag(np.square([0.35, 0.22, 0.48])))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,8 @@ from calibration.laws.group_factors import GroupFactors
 from calibration.laws.places import Place
 from calibration.report.path_error import WORDS, Model, PathError
 from calibration.statistics.residual_tests import Misfit
-from calibration.statistics.statistical_model import Runs
+from calibration.statistics.statistical_model import Parameter, Runs
+from calibration.verdict.samples import FORM, draw_samples, open_forms
 from calibration.verdict.verdict import Verdict
 from calibration.words.quantities import feature_in_words, final_model
 from common.arrays import Flags, Floats
@@ -31,6 +33,8 @@ _ON_CELLS = "#101010"  # of numbers on pale cells, whatever the colours of the p
 _COLOURS: dict[Model, str] = {"as_given": ORANGE, "corrected": GREEN}
 _SCALES = {"ω": (30 / math.pi, "motor speed ω [rpm]"), "l": (100.0, "tail length l [cm]"), "N": (1.0, "tails N")}
 _LONG = 0.45  # of an arrow, in l
+_LINE = 24  # letters in a line of a label
+_SAMPLES, _CORNER = 1500, 6  # rows, and numbers that are drawn in pairs
 _TICKS = (3.0, 10.0, 30.0, 100.0, 300.0)
 
 
@@ -154,12 +158,59 @@ def draw_sizes(nearest: AdoptedForm) -> Figure:
     if nearest.logarithmic:
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    unit = "" if nearest.effect.unit == "1" else f" [{nearest.effect.unit}]"
-    axes.set_xlabel(f"{nearest.effect.title}{unit}", fontsize=9)
+    axes.set_xlabel(_with_unit(nearest.effect), fontsize=9)
     axes.tick_params(axis="x", labelsize=8)
     axes.legend(fontsize=8, frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     figure.tight_layout()
     return figure
+
+
+def draw_corner(result: Verdict) -> Figure | None:
+    """Draw samples of numbers and effects in pairs, and alone on the diagonal; None where fewer than two are free.
+
+    Numbers that were given to a tolerance are left out, and of the others all but the first _CORNER.
+    """
+    samples = draw_samples(result, _SAMPLES, seed=0)
+    fitted = {p.name: p for refit in open_forms(result).values() for p in refit.fitted if p.sigma is None}
+    free = [p for p in fitted.values() if samples[p.name].nunique() > 1][:_CORNER]
+    if len(free) < 2:
+        return None
+    figure = Figure(figsize=(_WIDTH, _WIDTH))
+    panels = figure.subplots(len(free), len(free), squeeze=False)
+    of_form = [
+        (values, _KINDS[i % len(_KINDS)]) for i, (_, values) in enumerate(samples.groupby(FORM, sort=False))
+    ]
+    for (row, column), axes in np.ndenumerate(panels):
+        below, beside = free[column], free[row]
+        axes.set_visible(column <= row)
+        for values, colour in of_form:
+            x = below.shown * values[below.name]
+            if column == row:
+                axes.hist(x, bins=np.histogram_bin_edges(below.shown * samples[below.name], 30), color=colour,
+                          histtype="stepfilled", alpha=0.6)  # fmt: skip
+            else:
+                axes.plot(x, beside.shown * values[beside.name], ".", ms=1.5, color=colour, alpha=0.4)
+        axes.tick_params(labelsize=7, labelbottom=row == len(free) - 1, labelleft=column == 0 and row > 0)
+        axes.xaxis.set_major_locator(MaxNLocator(2))
+        axes.yaxis.set_major_locator(MaxNLocator(2))
+        if column == row:
+            axes.set_yticks([])
+        if row == len(free) - 1:
+            axes.set_xlabel(_with_unit(below), fontsize=8)
+        if column == 0 and row:
+            axes.set_ylabel(_with_unit(beside), fontsize=8)
+    if len(of_form) > 1:
+        for title, (_, colour) in zip(samples[FORM].unique(), of_form, strict=True):
+            panels[0, 0].plot([], [], "o", color=colour, label=title)
+        figure.legend(fontsize=8, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    figure.tight_layout(h_pad=0.2, w_pad=0.2)
+    return figure
+
+
+def _with_unit(number: Parameter) -> str:
+    """Label an axis with a number and its unit, in lines that are short enough for a panel."""
+    unit = "" if number.unit == "1" else f" [{number.unit}]"
+    return fill(f"{number.title}{unit}", _LINE)
 
 
 def draw_evidence(result: Verdict) -> Figure:

@@ -15,6 +15,7 @@ from calibration.laws.group_factors import group_factors
 from calibration.laws.law_model import LEVER
 from calibration.laws.laws import FittedLaw
 from calibration.report.figures import (
+    draw_corner,
     draw_evidence,
     draw_factors,
     draw_maps,
@@ -79,6 +80,8 @@ def _figures(result: Verdict, paths: Sequence[PathError]) -> dict[str, list[Draw
     }  # fmt: skip
     if result.found.candidates:
         figures["evidence"] = [(draw_evidence(result), "score of each effect against what a claim needs", "")]
+    if corner := draw_corner(result):
+        figures["corner"] = [(corner, "samples of the fitted numbers and effects in pairs, by form", "")]
     if drawn:
         words = "the wanted path, and the tracks of both schedules on the corrected robot"
         figures["paths"] = [(draw_paths(drawn), words, "")]

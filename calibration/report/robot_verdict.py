@@ -14,6 +14,7 @@ from calibration.report.corrected_robot import as_toml, handed_on, law_handed_on
 from calibration.report.saved_verdict import SavedVerdict
 from calibration.statistics.statistical_model import lines_of_excluded
 from calibration.swimmer.measured_table import PROTOCOLS, Measurements, read_measurements
+from calibration.verdict.samples import open_forms
 from common.arrays import Flags
 from sim.knowledge import CalibrationKnowledge
 from sim.model.robot import Robot
@@ -47,6 +48,13 @@ class RobotVerdict(SavedVerdict):
         if self.law and self.described:
             return law_handed_on(self.robot, self.law.kept[0], self.split.kept)
         return handed_on(self.robot, self.final_refit)
+
+    @cached_property
+    def alternatives(self) -> tuple[tuple[Robot, CalibrationKnowledge], ...]:
+        """The robot with each further form that the runs cannot tell from that of `corrected`."""
+        if self.law and self.described:
+            return ()
+        return tuple(handed_on(self.robot, refit) for refit in [*open_forms(self).values()][1:])
 
     def _corrected_file(self) -> tuple[str, str]:
         return "corrected.toml", as_toml(*self._handed_on)

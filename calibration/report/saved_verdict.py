@@ -13,6 +13,7 @@ import pandas as pd
 from calibration.report.path_error import PathError
 from calibration.report.report import write_report
 from calibration.verdict.record import verdict_record
+from calibration.verdict.samples import draw_samples
 from calibration.verdict.verdict import Verdict
 from common.files import files_together, write_text
 from common.notebook import Shown, given_axes
@@ -51,6 +52,27 @@ class SavedVerdict(Shown, Verdict):
         """Tabulate the relative errors on the held-out runs: a row for each model, all outputs and each output."""
         rows = {name: {"all": rms, **self.errors.by_output[name]} for name, rms in self.errors.rms.items()}
         return pd.DataFrame.from_dict(rows, orient="index")
+
+    def samples(self, count: int = 1000, *, seed: int = 0) -> pd.DataFrame:
+        """Draw numbers and effects that the runs allow, see `calibration.verdict.samples`.
+
+        Args:
+            count: rows.
+            seed: of the draws.
+
+        Returns:
+            A column for each number and effect that was fitted, and `form`: of forms that the runs cannot tell
+            apart, each has its share of the rows.
+
+        Raises:
+            InputError: the count is below 1.
+
+        Example:
+            >>> import softflagella as sf
+            >>> verdict = sf.calibrate("falls.csv", MODEL)  # doctest: +SKIP
+            >>> verdict.samples(4000)["viscosity"].quantile([0.025, 0.975])  # doctest: +SKIP
+        """
+        return draw_samples(self, count, seed)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of verdict.json."""

@@ -51,7 +51,8 @@ def plan(
             polygon:6:2l). In Python also what `read_path` reads, a Path2D, or points (n, 2), in tail lengths l or
             in `unit`.
         robot: robot.toml or the name of a preset, with its motor speed in both directions; or the vehicle.toml of
-            a measured vehicle. In Python also the robot or the vehicle.
+            a measured vehicle. In Python also the robot, the vehicle, or the verdict of a calibration: its
+            corrected robot, with an error that holds for each robot that the runs cannot tell from it.
         scale: multiply the path's coordinates.
         shape: which path of an SVG with several.
         closed: join the path's end to its start.

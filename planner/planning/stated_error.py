@@ -1,7 +1,8 @@
 """The errors of a plan: distances of the predicted track from declared and drawn path, stated errors.
 
 *Stated error*: 95 % of vehicles drawn at random within the uncertainty stay within this distance of the declared
-path when they carry out the schedule open-loop. Uncertain are the modes of the vehicle (held-out errors of the
+path when they carry out the schedule open-loop. Where a calibration could not tell several robots apart, that
+holds for each of them. Uncertain are the modes of the vehicle (held-out errors of the
 look-up table, covariance of a calibration, current) and the phase of the disc at the first flip. Deviations from
 the predicted poses are of first order in all of them: a mode changes twists, lags or the current, so in each dwell
 it changes the move and the turn, and a turn tilts everything that comes later. The motion within a revolution of
@@ -142,17 +143,41 @@ def plan_errors(
     rollout = roll_out(tracked.vehicle, switches, tracked.offset)
     predicted = predicted_error(path, rollout.track, closed=drawn.closed)
     growth = error_growth(tracked.vehicle, switches, rollout, progress)
+    stated = stated_error(growth, predicted, seed=seed)
+    for other in tracked.alternatives:
+        stated = max(stated, stated_error_of(other, tracked, path, switches, closed=drawn.closed, seed=seed))
     return PlanErrors(
         track=rollout.track,
         distance=predicted.distance,
         dwells=switches.dwells,
         declared=path,
         drawn=drawn,
-        stated=stated_error(growth, predicted, seed=seed),
+        stated=stated,
         guaranteed=guaranteed,
         closure=float(np.linalg.norm(rollout.track[-1] - path[0])) if drawn.closed else None,
         table_share=_table_share(tracked.vehicle, growth),
     )
+
+
+def stated_error_of(
+    other: TrackedVehicle, tracked: TrackedVehicle, path: Floats, switches: Switches, *, closed: bool, seed: int
+) -> float:
+    """Compute the stated error [l] of another robot that carries out a schedule, in seconds as it is.
+
+    Args:
+        other: the robot.
+        tracked: the robot for which the schedule was made, in whose units path, schedule and result are.
+        path: declared, (m, 2).
+        switches: the schedule.
+        closed: the path ends at its start.
+        seed: of the random robots.
+    """
+    length = tracked.robot.length_scale / other.robot.length_scale
+    time, places = tracked.robot.time_scale / other.robot.time_scale, np.array([length, length, 1.0])
+    theirs = Switches(switches.first_direction, time * switches.dwells, switches.poses * places)
+    rollout = roll_out(other.vehicle, theirs, other.offset)
+    predicted = predicted_error(length * path, rollout.track, closed=closed)
+    return stated_error(error_growth(other.vehicle, theirs, rollout), predicted, seed=seed) / length
 
 
 def _table_share(vehicle: Vehicle, growth: ErrorGrowth) -> float:

@@ -32,6 +32,7 @@ class TrackedVehicle(NamedTuple):
     own_table: bool = True  # whether the table is of this robot alone
     knowledge: CalibrationKnowledge = CalibrationKnowledge()  # what a calibration found besides the robot
     unmeasured: tuple[Mode, ...] = ()  # of a robot whose coefficients are those of another; calibrated: none
+    alternatives: tuple[TrackedVehicle, ...] = ()  # that a calibration could not tell from it
 
     @property
     def rod(self) -> float:

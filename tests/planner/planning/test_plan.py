@@ -25,11 +25,13 @@ from planner.planning.conditions import BlockedError
 from planner.planning.line_of_sight import LineOfSight
 from planner.planning.request import ERRORS, PlanRequest
 from planner.vehicle.from_table import table_vehicle
+from planner.vehicle.tracked_point import tracked_vehicle
 from planner.vehicle.vehicle import roll_out
 from planner.vehicle.zigzag import dwells_for, longer_dwells, longest_dwell
 from sim.knowledge import COEFFICIENTS, CalibrationKnowledge
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
+from softflagella.path_error import carry_out
 from surrogate.table_file import load
 from tests.oracles.unseen_robots import lab_robot
 from tests.planner.plans import CONTROL, planned, tracked
@@ -231,6 +233,20 @@ def test_errors_that_are_not_calibrated_say_so() -> None:
     assert found.to_dict()["stated_error_unmeasured_over_l"] is None
     assert "if its coefficients are exact" in schedule_header(guessed, "p1")
     assert "exact" not in schedule_header(found, "p1")
+
+
+def test_the_stated_error_of_a_verdict_holds_for_every_robot_that_the_runs_allow() -> None:
+    """The alternative is 2 % longer, in units of its own, and turns less quickly."""
+    known = CalibrationKnowledge(COEFFICIENTS, 1e-4 * np.eye(3))
+    other = replace(CONTROL, tail_length=1.02 * CONTROL.tail_length, C_yr=1.15 * CONTROL.C_yr)
+    verdict = SimpleNamespace(corrected=CONTROL, knowledge=known, alternatives=((other, known),))
+    alone, joined = plan(circle(2.0), CONTROL, knowledge=known), plan(circle(2.0), verdict)
+    np.testing.assert_array_equal(joined.dwells, alone.dwells)
+    theirs = tracked_vehicle(other, load(), "head_centre", known)
+    far = carry_out(alone, theirs).largest / CONTROL.tail_length
+    assert joined.stated_error > far > alone.stated_error
+    same = SimpleNamespace(corrected=CONTROL, knowledge=known, alternatives=((CONTROL, known),))
+    assert plan(circle(2.0), same).stated_error == pytest.approx(alone.stated_error)
 
 
 def test_an_error_larger_than_the_path_is_no_error_of_the_path() -> None:
