@@ -93,7 +93,8 @@ def calibrate(
         >>> import softflagella as sf
         >>> verdict = sf.calibrate("runs.csv", "robot.toml")  # doctest: +SKIP
         >>> print(verdict.sentence)  # doctest: +SKIP
-        >>> result = sf.plan(sf.circle(2.0), verdict.corrected, knowledge=verdict.knowledge)  # doctest: +SKIP
+        >>> result = sf.plan(sf.circle(2.0), verdict)  # doctest: +SKIP
+        >>> verdict.samples(1000)["C_t"].quantile([0.025, 0.975])  # doctest: +SKIP
     """
     if max_seconds is not None and not max_seconds > 0:
         raise InputError(f"max_seconds: {max_seconds:g}; give a positive number of seconds")
