@@ -210,6 +210,11 @@ def _somewhere(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 
 
+@_teach(plain.lane_count, lambda value: types.int64(_numbers(value)))
+def _lane_count(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return context.get_constant(types.int64, getattr(sig.args[0], "width", 1))
+
+
 @_teach(plain.lane, lambda value, i: types.float64(_numbers(value), types.int64))
 def _lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     if not isinstance(sig.args[0], Lanes):
@@ -229,13 +234,15 @@ def _width(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return context.get_constant(types.int64, plain.width())
 
 
-def _vectors(array: Any) -> Any:
-    return types.Array(Lanes(plain.width()), array.ndim - 1, "C", aligned=False)(array)
+def _vectors(array: Any, width: Any = None) -> Any:
+    count = plain.width() if width is None else len(width)
+    kind = types.float64 if count == 1 else Lanes(count)
+    return types.Array(kind, array.ndim - 1, "C", aligned=count == 1)(*[a for a in (array, width) if a])
 
 
 @_teach(plain.lanes, _vectors)
 def _view(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    """View numbers (…, W) as vectors (…)."""
+    """View numbers (…, W) as vectors (…), or as numbers if W = 1."""
     kind = sig.return_type
     numbers = make_array(sig.args[0])(context, builder, args[0])
     vectors = make_array(kind)(context, builder)
@@ -244,7 +251,7 @@ def _view(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         data=builder.bitcast(numbers.data, context.get_data_type(kind.dtype).as_pointer()),
         shape=unpack_tuple(builder, numbers.shape)[:-1],
         strides=unpack_tuple(builder, numbers.strides)[:-1],
-        itemsize=context.get_constant(types.intp, 8 * kind.dtype.width),
+        itemsize=context.get_constant(types.intp, 8 * getattr(kind.dtype, "width", 1)),
         meminfo=numbers.meminfo,
         parent=numbers.parent,
     )
@@ -297,12 +304,54 @@ def _place(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.gep(matrix.data, [builder.add(builder.mul(args[1], columns), args[2])])
 
 
-@_teach(plain.load, lambda matrix, i, j: matrix.dtype(matrix, types.intp, types.intp))
+def _columns_kind(matrix: Any) -> Any:
+    return matrix.dtype if isinstance(matrix.dtype, Lanes) else Lanes(plain.width())
+
+
+@_teach(plain.columns, lambda matrix: _columns_kind(matrix)(matrix))
+def _columns(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return constant(sig.return_type, 0.0)
+
+
+def _some_columns(context: Any, builder: Any, sig: Any, args: Any, kind: Any) -> Any:
+    """Return the address of columns of a matrix, and which of them are there; None if the value is an entry."""
+    place = _place(context, builder, sig, args)
+    if kind == sig.args[0].dtype:
+        return place, None
+    numbers = ir.VectorType(ir.IntType(64), kind.width)
+    count = builder.insert_element(ir.Constant(numbers, ir.Undefined), args[3], ir.Constant(ir.IntType(32), 0))
+    order = ir.Constant(ir.VectorType(ir.IntType(32), kind.width), [0] * kind.width)
+    counts = builder.shuffle_vector(count, count, order)
+    there = builder.icmp_signed("<", ir.Constant(numbers, list(range(kind.width))), counts)
+    return builder.bitcast(place, context.get_data_type(kind).as_pointer()), there
+
+
+def _masked(builder: Any, name: str, result: Any, arguments: Any) -> Any:
+    """Call LLVM's function that reads or writes some entries of a vector, which are not aligned to more than 8."""
+    kind = ir.FunctionType(result, [argument.type for argument in arguments])
+    return builder.call(get_or_insert_function(builder.module, kind, name), arguments)
+
+
+_ALIGNED = ir.Constant(ir.IntType(32), 8)
+_PLACE = types.intp, types.intp, types.int64
+
+
+@_teach(plain.load, lambda matrix, i, j, count, like: like(matrix, *_PLACE, like))
 def _load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.load(_place(context, builder, sig, args), align=8)
+    place, there = _some_columns(context, builder, sig, args, sig.return_type)
+    if there is None:
+        return builder.load(place, align=8)
+    name, zero = f"v{sig.return_type.width}f64", constant(sig.return_type, 0.0)
+    return _masked(builder, f"llvm.masked.load.{name}.p0{name}", zero.type, [place, _ALIGNED, there, zero])
 
 
-@_teach(plain.store, lambda matrix, i, j, value: types.void(matrix, types.intp, types.intp, matrix.dtype))
+@_teach(plain.store, lambda matrix, i, j, count, value: types.void(matrix, *_PLACE, value))
 def _store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    builder.store(args[3], _place(context, builder, sig, args), align=8)
+    place, there = _some_columns(context, builder, sig, args, sig.args[4])
+    if there is None:
+        builder.store(args[4], place, align=8)
+    else:
+        name = f"v{sig.args[4].width}f64"
+        nothing = ir.VoidType()
+        _masked(builder, f"llvm.masked.store.{name}.p0{name}", nothing, [args[4], place, _ALIGNED, there])
     return context.get_dummy_value()

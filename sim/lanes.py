@@ -31,8 +31,16 @@ def width() -> int:
     return 8 if wide else 4
 
 
-def lanes(array: Any) -> Any:
-    """View an array of numbers (…, W) as an array (…) of vectors."""
+def width_for(robots: int) -> tuple[int, ...]:
+    """Return a tuple of length W for a number of robots: a robot alone is computed with plain numbers, W = 1."""
+    return (0,) * (1 if robots == 1 else width())
+
+
+def lanes(array: Any, width: Any = None) -> Any:
+    """View an array of numbers (…, W) as an array (…) of vectors, or of plain numbers if W = 1.
+
+    `width` is a tuple of length W, which is then part of its type; W is that of this processor by default.
+    """
     raise TypeError("lanes are for compiled loops alone")
 
 
@@ -44,6 +52,11 @@ def zeros(like: Any, shape: Any) -> Any:
 def empty(like: Any, shape: Any) -> Any:
     """Allocate an array of the kind of number that the array `like` holds."""
     return np.empty(shape, like.dtype)
+
+
+def lane_count(value: Any) -> int:
+    """Return W of a vector; 1 for a number."""
+    return 1
 
 
 def lane(value: Any, i: int) -> Any:
@@ -91,11 +104,16 @@ def somewhere(condition: Any) -> bool:
     return bool(condition != 0)
 
 
-def load(matrix: Any, i: int, j: int) -> Any:
-    """Return entry (i, j) of a matrix in C order; i and j are not negative."""
+def columns(matrix: Any) -> Any:
+    """Return zero in as many columns of a matrix as a vector holds: W of plain numbers, one of vectors."""
+    return 0.0
+
+
+def load(matrix: Any, i: int, j: int, count: int, like: Any) -> Any:
+    """Return entry (i, j) of a matrix in C order and the columns after it that `like` has, `count` at most."""
     return matrix[i, j]
 
 
-def store(matrix: Any, i: int, j: int, value: Any) -> None:
-    """Set entry (i, j) of a matrix in C order; i and j are not negative."""
+def store(matrix: Any, i: int, j: int, count: int, value: Any) -> None:
+    """Set entry (i, j) of a matrix in C order and the columns after it that the value has, `count` at most."""
     matrix[i, j] = value

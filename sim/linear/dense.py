@@ -12,7 +12,7 @@ from typing import Any
 
 from common.arrays import Floats
 from sim.jit import compiled, formula
-from sim.lanes import choose, fma, less, load, somewhere, store
+from sim.lanes import choose, columns, fma, lane_count, less, load, somewhere, store
 from sim.linear.blocks import block_at
 from sim.linear.vectors import Matrix, Vector, inverse, negative
 
@@ -33,19 +33,31 @@ def subtract_product(a: Floats, b: Floats, from_b: int, c: Floats, from_c: int, 
 
 @compiled
 def _multiply(a: Floats, b: Floats, from_b: int, c: Floats, from_c: int, count: int, subtract: bool) -> None:
-    whole = count - count % 4
-    for j in range(0, whole, 4):
+    zero = columns(a)
+    step = columns_in(zero, a)
+    whole = count - count % (4 * step)
+    for j in range(0, whole, 4 * step):
         for i in range(0, a.shape[0], 3):
-            _four_columns(a, b, from_b + j, c, from_c + j, i, subtract)
-    for j in range(whole, count):
+            _four_columns(a, b, from_b + j, c, from_c + j, i, zero, subtract)
+    for j in range(whole, count, step):
         for i in range(0, a.shape[0], 3):
-            _one_column(a, b, from_b + j, c, from_c + j, i, subtract)
+            _one_column(a, b, from_b + j, c, from_c + j, i, count - j, zero, subtract)
 
 
 @formula
-def _four(c: Any, i: Any, at: Any) -> _Four:
-    """Return four columns of a row."""
-    return load(c, i, at), load(c, i, at + 1), load(c, i, at + 2), load(c, i, at + 3)
+def columns_in(value: Any, matrix: Any) -> Any:
+    """Count the columns of a matrix that a value has: W columns of plain numbers, one of vectors."""
+    return lane_count(value) // lane_count(matrix[0, 0])
+
+
+@formula
+def _four(c: Any, i: Any, at: Any, like: Any) -> _Four:
+    """Return four times the columns that `like` has, of a row."""
+    n = columns_in(like, c)
+    return (
+        load(c, i, at, n, like), load(c, i, at + n, n, like), load(c, i, at + 2 * n, n, like),
+        load(c, i, at + 3 * n, n, like),
+    )  # fmt: skip
 
 
 @formula
@@ -56,22 +68,22 @@ def _add_four(x: Any, w: _Four, p: _Four) -> _Four:
 
 @formula
 def _put_four(c: Any, i: Any, at: Any, p: _Four) -> None:
-    """Set four columns of a row."""
-    store(c, i, at, p[0])
-    store(c, i, at + 1, p[1])
-    store(c, i, at + 2, p[2])
-    store(c, i, at + 3, p[3])
+    """Set what `_four` returns."""
+    n = columns_in(p[0], c)
+    store(c, i, at, n, p[0])
+    store(c, i, at + n, n, p[1])
+    store(c, i, at + 2 * n, n, p[2])
+    store(c, i, at + 3 * n, n, p[3])
 
 
 @formula
-def _four_columns(a: Any, b: Any, from_b: Any, c: Any, from_c: Any, i: Any, subtract: Any) -> None:
-    """Compute four columns in three rows."""
-    zero = 0.0 * a[i, 0]
+def _four_columns(a: Any, b: Any, from_b: Any, c: Any, from_c: Any, i: Any, zero: Any, subtract: Any) -> None:
+    """Compute four times the columns that `zero` has, in three rows."""
     p = q = r = (zero, zero, zero, zero)
     if subtract:
-        p, q, r = _four(c, i, from_c), _four(c, i + 1, from_c), _four(c, i + 2, from_c)
+        p, q, r = _four(c, i, from_c, zero), _four(c, i + 1, from_c, zero), _four(c, i + 2, from_c, zero)
     for k in range(a.shape[1]):
-        w = _four(b, k, from_b)
+        w = _four(b, k, from_b, zero)
         p = _add_four(_signed(a[i, k], subtract), w, p)
         q = _add_four(_signed(a[i + 1, k], subtract), w, q)
         r = _add_four(_signed(a[i + 2, k], subtract), w, r)
@@ -87,31 +99,33 @@ def _signed(x: Any, subtract: Any) -> Any:
 
 
 @formula
-def _one_column(a: Any, b: Any, from_b: Any, c: Any, from_c: Any, i: Any, subtract: Any) -> None:
-    """Compute a column in three rows."""
-    p = q = r = 0.0 * a[i, 0]
+def _one_column(
+    a: Any, b: Any, from_b: Any, c: Any, from_c: Any, i: Any, count: Any, zero: Any, subtract: Any
+) -> None:
+    """Compute the columns that `zero` has, `count` at most, in three rows."""
+    p = q = r = zero
     if subtract:
-        p, q, r = _three(c, i, from_c)
+        p, q, r = _three(c, i, from_c, count, zero)
     for k in range(a.shape[1]):
-        w = load(b, k, from_b)
+        w = load(b, k, from_b, count, zero)
         p = fma(_signed(a[i, k], subtract), w, p)
         q = fma(_signed(a[i + 1, k], subtract), w, q)
         r = fma(_signed(a[i + 2, k], subtract), w, r)
-    _put_three(c, i, from_c, (p, q, r))
+    _put_three(c, i, from_c, count, (p, q, r))
 
 
 @formula
-def _three(c: Any, row: Any, at: Any) -> Vector:
-    """Return three rows of a column."""
-    return load(c, row, at), load(c, row + 1, at), load(c, row + 2, at)
+def _three(c: Any, row: Any, at: Any, count: Any, like: Any) -> Vector:
+    """Return three rows of the columns that `like` has, `count` at most."""
+    return load(c, row, at, count, like), load(c, row + 1, at, count, like), load(c, row + 2, at, count, like)
 
 
 @formula
-def _put_three(c: Any, row: Any, at: Any, v: Vector) -> None:
-    """Set three rows of a column."""
-    store(c, row, at, v[0])
-    store(c, row + 1, at, v[1])
-    store(c, row + 2, at, v[2])
+def _put_three(c: Any, row: Any, at: Any, count: Any, v: Vector) -> None:
+    """Set three rows of the columns that the values have, `count` at most."""
+    store(c, row, at, count, v[0])
+    store(c, row + 1, at, count, v[1])
+    store(c, row + 2, at, count, v[2])
 
 
 @compiled
@@ -119,12 +133,14 @@ def multiply_block(
     a: Matrix, b: Floats, row_b: int, from_b: int, c: Floats, row_c: int, from_c: int, count: int
 ) -> None:
     """Set `count` columns of three rows of c to a 3×3 block times those of three rows of b; c may be b."""
-    for j in range(count):
-        v = _three(b, row_b, from_b + j)
+    zero = columns(b)
+    for j in range(0, count, columns_in(zero, b)):
+        v = _three(b, row_b, from_b + j, count - j, zero)
         _put_three(
             c,
             row_c,
             from_c + j,
+            count - j,
             (
                 fma(a[0][0], v[0], fma(a[0][1], v[1], a[0][2] * v[2])),
                 fma(a[1][0], v[0], fma(a[1][1], v[1], a[1][2] * v[2])),
@@ -138,12 +154,14 @@ def add_block_product(
     a: Matrix, b: Floats, row_b: int, from_b: int, c: Floats, row_c: int, from_c: int, count: int
 ) -> None:
     """Add a 3×3 block times `count` columns of three rows of b to those of three rows of c."""
-    for j in range(count):
-        v, p = _three(b, row_b, from_b + j), _three(c, row_c, from_c + j)
+    zero = columns(b)
+    for j in range(0, count, columns_in(zero, b)):
+        v, p = _three(b, row_b, from_b + j, count - j, zero), _three(c, row_c, from_c + j, count - j, zero)
         _put_three(
             c,
             row_c,
             from_c + j,
+            count - j,
             (
                 fma(a[0][0], v[0], fma(a[0][1], v[1], fma(a[0][2], v[2], p[0]))),
                 fma(a[1][0], v[0], fma(a[1][1], v[1], fma(a[1][2], v[2], p[1]))),
@@ -231,8 +249,10 @@ def _exchange(a: Floats, k: int, i: int, first: int, where: Any) -> None:
 @compiled
 def _subtract(a: Floats, k: int, i: int, first: int, factor: Any) -> None:
     """Subtract a multiple of row k from row i, from column `first` on."""
-    for j in range(first, a.shape[1]):
-        a[i, j] = fma(-factor, a[k, j], a[i, j])
+    zero, count = columns(a), a.shape[1]
+    for j in range(first, count, columns_in(zero, a)):
+        left = count - j
+        store(a, i, j, left, fma(-factor, load(a, k, j, left, zero), load(a, i, j, left, zero)))
 
 
 @compiled

@@ -15,7 +15,7 @@ import numpy as np
 from common.arrays import Flags, Floats
 from sim.effects import catalogue, effect_named
 from sim.mechanics.drag import tail_coefficients
-from sim.model.body import PLACES, SHAPES, Body, head_resistance
+from sim.model.body import PLACES, SHAPES, SINGLE, Body, head_resistance
 from sim.model.groups import Groups
 from sim.model.laws import LOCAL_DRAG
 
@@ -103,9 +103,10 @@ def without_further(rows: Floats) -> Floats:
 
 def batch(rows: Floats) -> Body:
     """Return B robots as one `Body` of arrays that end with (B,), from their `numbers` (B, K)."""
-    parts = (np.ascontiguousarray(rows[:, place].T) for place in PLACES)
-    body = Body._make(part.reshape(*shape, len(rows)) for part, shape in zip(parts, SHAPES, strict=True))
-    return body._replace(nonlocal_terms=Nonlocal(*body.nonlocal_terms))
+    columns = np.ascontiguousarray(rows.T)
+    resistance = columns[PLACES.resistance].reshape(*SHAPES.resistance, len(rows))
+    terms = Nonlocal(*columns[PLACES.nonlocal_terms])
+    return Body(*columns[:SINGLE], resistance, columns[PLACES.tail_load], terms)  # type: ignore[call-arg]
 
 
 def row(body: Body) -> Floats:

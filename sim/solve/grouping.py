@@ -13,7 +13,7 @@ import numpy as np
 
 from common.arrays import Flags, Floats
 from sim.jit import compiled
-from sim.lanes import lane, lanes, less, tuple_like, width
+from sim.lanes import lane, lanes, less, tuple_like, width_for
 from sim.linear.lane_arrays import take_lane
 from sim.model.body import PLACES, SHAPES, SINGLE, Body
 from sim.solve.assembly import Nonlocal
@@ -38,13 +38,18 @@ def by_kind(robots: Iterable[int], kind: Callable[[int], object]) -> list[list[i
 
 def in_groups(array: Floats) -> Floats:
     """Lay out an array (B, …) of B ≥ 1 robots as (G, …, W)."""
-    groups, count = -(-len(array) // width()), len(array)
-    places = np.minimum(np.arange(groups * width()), count - 1)
-    return np.ascontiguousarray(np.moveaxis(array[places].reshape(groups, width(), *array.shape[1:]), 1, -1))
+    count, width = len(array), len(width_for(len(array)))
+    if width == 1:
+        return np.array(array[..., None], order="C")
+    groups = -(-count // width)
+    places = np.minimum(np.arange(groups * width), count - 1)
+    return np.ascontiguousarray(np.moveaxis(array[places].reshape(groups, width, *array.shape[1:]), 1, -1))
 
 
 def from_groups(array: Floats, count: int) -> Floats:
     """Lay out an array (G, …, W) as (B, …), for B robots."""
+    if array.shape[-1] == 1:
+        return array[..., 0]
     robots = np.moveaxis(array, -1, 1)
     return np.ascontiguousarray(robots.reshape(-1, *robots.shape[2:])[:count])
 
@@ -55,19 +60,21 @@ class InLanes(NamedTuple):
     numbers: Floats  # in the order of `Body`, (G, K, W)
     wanted: Floats  # 1 in the lanes of robots that are wanted, else 0, (G, W)
     names: Any  # numbers of the non-local effects of any robot; only their names matter
+    width: tuple[int, ...]  # of length W
 
 
 def robots_in_lanes(rows: Floats, wanted: Flags | None = None) -> InLanes:
     """Lay out robots with numbers (B, K) in groups; flags (B,) tell which are wanted, all by default."""
     flags = in_groups(np.ones(len(rows)) if wanted is None else wanted.astype(float))
     flags.reshape(-1)[len(rows) :] = 0.0
-    return InLanes(in_groups(rows), flags, NAMES)
+    return InLanes(in_groups(rows), flags, NAMES, width_for(len(rows)))
 
 
 @compiled
 def group_of(robots: InLanes, g: int) -> tuple[Body, Any]:
     """Return the robots of group g as one, and 1 in the lanes of those that are wanted."""
-    return body_of_numbers(lanes(robots.numbers)[g], robots.names), lanes(robots.wanted)[g]
+    numbers, wanted = lanes(robots.numbers, robots.width), lanes(robots.wanted, robots.width)
+    return body_of_numbers(numbers[g], robots.names), wanted[g]
 
 
 @compiled

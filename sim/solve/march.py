@@ -54,8 +54,9 @@ def _march(
 ) -> bool:
     """Step the robots of one group until one of those that are wanted fails; arrays end with (W,)."""
     body, going = group_of(robots, 0)
-    state = State(lanes(given.x), lanes(given.x_dot), lanes(given.pose), lanes(given.u))
-    all_poses, all_shapes = lanes(poses), lanes(shapes)
+    width = robots.width
+    state = State(lanes(given.x, width), lanes(given.x_dot, width), lanes(given.pose, width), lanes(given.u, width))
+    all_poses, all_shapes = lanes(poses, width), lanes(shapes, width)
     star, now, before = _new_like(state), _new_like(state), _new_like(state)
     u = state.u.reshape((1, 4))
     work = new_workspace(in_stage(1.0, 0.0, star.x), state.x, u)

@@ -31,8 +31,7 @@ from sim.linear.spectral import with_phases
 from sim.mechanics import tail_contact
 from sim.mechanics.balance import tail_spin
 from sim.mechanics.geometry import measure, straight
-from sim.model.body import Body
-from sim.solve.assembly import batch
+from sim.model.body import PLACES, Body
 from sim.solve.grouping import InLanes, from_groups, group_of, in_groups, robots_in_lanes
 from sim.solve.linearise import linearise
 from sim.solve.newton import new_workspace, newton, solve_linear
@@ -46,8 +45,8 @@ _TOLERANCE = 1e-6  # of GMRES, for right-hand sides
 def straight_starts(rows: Floats, n: int, phases: int, tails: int) -> tuple[Floats, Floats]:
     """Guess x (B, n, M, 3) and u (B, P, 4): straight tails, with a part of the motor's speed in the head."""
     u = np.zeros((len(rows), phases // tails, 4))
-    u[:, :, 3] = -HEAD_SHARE * batch(rows).omega[:, None]
-    return straight(n, phases, batch(rows).offset), u
+    u[:, :, 3] = -HEAD_SHARE * rows[:, PLACES.omega, None]
+    return straight(n, phases, rows[:, PLACES.offset]), u
 
 
 def solve_orbits_in_place(
@@ -107,17 +106,17 @@ def mean_motion(body: Body, u: Floats) -> Floats:
     Returns:
         (5,), or (B, 5).
     """
-    v_x, v_z, omega_yr, omega_h = velocities = np.moveaxis(u, (-1, -2), (0, 1))
-    time = 1 / tail_spin(body, velocities)
+    v_x, v_z, omega_yr, omega_h = u.T
+    time = 1 / tail_spin(body, u.T)
     sway = v_x + omega_yr * (body.head_length / 2)
-    parts = np.stack([np.ones_like(time), omega_h * time, omega_yr * time, sway * time, v_z * time, time])
-    *sums, whole = parts.cumsum(1)[:, -1]  # in the same order for one robot and for many
-    return np.stack(sums, -1) / np.expand_dims(whole, -1)
+    parts = np.array([np.ones_like(time), omega_h * time, omega_yr * time, sway * time, v_z * time, time])
+    sums = parts.cumsum(1)[:, -1]  # in the same order for one robot and for many
+    return np.ascontiguousarray((sums[:-1] / sums[-1]).T)
 
 
 def turns_forward(body: Body, u: Floats) -> Any:
     """Tell whether the tails turn with the motor at all phases; arguments as in `mean_motion`."""
-    return (tail_spin(body, np.moveaxis(u, (-1, -2), (0, 1))) * body.omega > 0).all(0)
+    return (tail_spin(body, u.T) * body.omega > 0).all(0)
 
 
 def smallest_gaps(rows: Floats, x: Floats, tails: int) -> Floats:
@@ -125,14 +124,14 @@ def smallest_gaps(rows: Floats, x: Floats, tails: int) -> Floats:
     fine = with_phases(x, 2 * x.shape[-2])
     count, n, phases, _ = fine.shape
     shapes = np.ascontiguousarray(np.moveaxis(fine.reshape(count, n, tails, phases // tails, 3), 3, 1))
-    body = batch(rows)
-    return tail_contact.smallest_gaps(shapes, body.offset, body.tail_radius)
+    return tail_contact.smallest_gaps(shapes, rows[:, PLACES.offset], rows[:, PLACES.tail_radius])
 
 
 @compiled
 def _solve_groups(robots: InLanes, x: Floats, u: Floats, tolerance: float, sizes: Floats) -> None:
     """Improve x (G, n, M, 3, W) and u (G, P, 4, W) in place; `sizes` (G, W) of the last corrections are filled."""
-    shapes, velocities, size = lanes(x), lanes(u), lanes(sizes)
+    width = robots.width
+    shapes, velocities, size = lanes(x, width), lanes(u, width), lanes(sizes, width)
     rates = on_orbit(shapes[0])
     work = new_workspace(rates, shapes[0], velocities[0])
     for g in range(len(size)):
@@ -143,7 +142,8 @@ def _solve_groups(robots: InLanes, x: Floats, u: Floats, tolerance: float, sizes
 @compiled
 def _fill_residuals(robots: InLanes, x: Floats, u: Floats, r: Floats, t: Floats, force: Floats) -> None:
     """Fill r (G, n, M, 3, W), t (G, P, 4, W) and force (G, W) at x and u, see `residuals_on_orbits`."""
-    shapes, velocities, on_nodes, on_robots, largest = lanes(x), lanes(u), lanes(r), lanes(t), lanes(force)
+    shapes, velocities = lanes(x, robots.width), lanes(u, robots.width)
+    on_nodes, on_robots, largest = lanes(r, robots.width), lanes(t, robots.width), lanes(force, robots.width)
     rates, scratch = on_orbit(shapes[0]), new_scratch(shapes[0], velocities[0])
     for g in range(len(largest)):
         body, where = group_of(robots, g)
@@ -155,7 +155,8 @@ def _fill_residuals(robots: InLanes, x: Floats, u: Floats, r: Floats, t: Floats,
 @compiled
 def _solve_linear_in_groups(robots: InLanes, x: Floats, u: Floats, dx: Floats, du: Floats) -> None:
     """Solve in place for the right-hand sides dx (G, K, n, M, 3, W), du (G, K, P, 4, W) at x and u."""
-    shapes, velocities, changes, changes_of_robot = lanes(x), lanes(u), lanes(dx), lanes(du)
+    shapes, velocities = lanes(x, robots.width), lanes(u, robots.width)
+    changes, changes_of_robot = lanes(dx, robots.width), lanes(du, robots.width)
     rates = on_orbit(shapes[0])
     work = new_workspace(rates, shapes[0], velocities[0])
     for g in range(len(shapes)):

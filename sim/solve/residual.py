@@ -21,7 +21,7 @@ import numpy as np
 
 from common.arrays import Floats
 from sim.jit import compiled, inlined
-from sim.lanes import lane, somewhere, width, zeros
+from sim.lanes import lane, lane_count, somewhere, zeros
 from sim.linear.blocks import add, put, vector, vector_at
 from sim.linear.lane_arrays import put_lane, take_lane
 from sim.linear.vectors import ZERO, Vector, cross, dot, minus, plus
@@ -115,7 +115,7 @@ def _surround_lanes(body: Body, base: Any, x: Floats, u: Floats, where: Any, scr
     """Add up all non-local effects of the robots in the lanes where `where` is 1, one robot after the other."""
     columns, instants = x.shape[1], u.shape[0]
     shape, velocities = np.empty(x.shape), np.empty(u.shape)
-    for i in range(width()):
+    for i in range(lane_count(where)):
         if lane(where, i) == 0:
             continue
         robot, first = body_of_lane(body, i), lane(base, i)
