@@ -1,7 +1,8 @@
 """Numbers of several robots at once: each number of a formula is a vector with one lane for each robot.
 
-A compiled loop works on arrays of vectors with W lanes, a group of W robots. Vectors are added, multiplied and
-compared like numbers; so a formula for one robot is one for a group as well. A lane never sees another lane. So
+A compiled loop works on arrays of vectors with W lanes, a group of W robots, or of plain numbers, a robot alone
+(W = 1). Vectors are added, multiplied and compared like numbers; so a formula for one robot is one for a group as
+well. A robot alone fills the lanes with the columns of its matrices (`columns`). A lane never sees another lane. So
 the result of a robot depends neither on its neighbours in a group nor on W: operations are those of IEEE 754, in
 the order of the source, and products are only fused where the source says so (`fma`). Such loops are compiled by
 `sim.jit.compiled`.
@@ -9,7 +10,7 @@ the order of the source, and products are only fused where the source says so (`
 A condition on lanes is a vector of 1 (true) and 0 (false), by which `choose` picks.
 
 The functions of this file are for compiled loops. `sim.lane_code` gives their machine code; what stands here is
-what they do to plain numbers. W is that of this processor (`width`).
+what they do to plain numbers. `width_for` chooses W.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""Implicit time steps at constant motor speed, in the disc frame, for a robot in each lane (`sim.lanes`);
-a robot alone fills one.
+"""Implicit time steps at constant motor speed, in the disc frame, for a robot in each lane (`sim.lanes`)
+or for one alone.
 
 Positions are in the disc frame, in which the shape is almost steady at constant motor speed. Every stage solves
 the balance with x = x* + τ ẋ, φ = φ* + τ ω_t by Newton's method (`sim.solve.newton`). One or two corrections are
@@ -54,9 +54,9 @@ def _march(
 ) -> bool:
     """Step the robots of one group until one of those that are wanted fails; arrays end with (W,)."""
     body, going = group_of(robots, 0)
-    width = robots.width
-    state = State(lanes(given.x, width), lanes(given.x_dot, width), lanes(given.pose, width), lanes(given.u, width))
-    all_poses, all_shapes = lanes(poses, width), lanes(shapes, width)
+    w = robots.width
+    state = State(lanes(given.x, w), lanes(given.x_dot, w), lanes(given.pose, w), lanes(given.u, w))
+    all_poses, all_shapes = lanes(poses, w), lanes(shapes, w)
     star, now, before = _new_like(state), _new_like(state), _new_like(state)
     u = state.u.reshape((1, 4))
     work = new_workspace(in_stage(1.0, 0.0, star.x), state.x, u)

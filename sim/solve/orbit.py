@@ -106,12 +106,11 @@ def mean_motion(body: Body, u: Floats) -> Floats:
     Returns:
         (5,), or (B, 5).
     """
-    v_x, v_z, omega_yr, omega_h = u.T
     time = 1 / tail_spin(body, u.T)
+    whole = time.cumsum(0)[-1]  # in the same order for one robot and for many
+    v_x, v_z, omega_yr, omega_h = (u.T * time).cumsum(1)[:, -1] / whole
     sway = v_x + omega_yr * (body.head_length / 2)
-    parts = np.array([np.ones_like(time), omega_h * time, omega_yr * time, sway * time, v_z * time, time])
-    sums = parts.cumsum(1)[:, -1]  # in the same order for one robot and for many
-    return np.ascontiguousarray((sums[:-1] / sums[-1]).T)
+    return np.ascontiguousarray(np.array([len(time) / whole, omega_h, omega_yr, sway, v_z]).T)
 
 
 def turns_forward(body: Body, u: Floats) -> Any:

@@ -106,7 +106,7 @@ def refined_orbits(rows: Floats, tails: int, least: int) -> list[OrbitOnMeshes]:
 def stacked(orbits: Iterable[OrbitOnMeshes], mesh: int) -> tuple[Floats, Floats]:
     """Stack the shapes (B, n, M, 3) and velocities (B, P, 4) of B orbits with equal phases on a mesh, 0 to 2."""
     x, u = zip(*((orbit.x[mesh], orbit.u[mesh]) for orbit in orbits), strict=True)
-    return np.stack(x), np.stack(u)
+    return np.array(x), np.array(u)
 
 
 def refined_orbit(body: Body, tails: int, least: int) -> OrbitOnMeshes:
@@ -282,7 +282,7 @@ def _next_change(last: Floats, change: Floats) -> Floats:
 def _on_finer_meshes(rows: Floats, coarse: Sequence[Coarse]) -> list[OrbitOnMeshes]:
     """Solve on all MESHES for robots with the same number of phases, and extrapolate."""
     body, (_, b, c) = batch(rows), MESHES
-    x0, u0 = np.stack([one.x for one in coarse]), np.stack([one.u for one in coarse])
+    x0, u0 = np.array([one.x for one in coarse]), np.array([one.u for one in coarse])
     x1, u1 = with_edges(x0, body.offset, b), u0.copy()
     lost = ~(solve_orbits_in_place(rows, x1, u1, ROUGH) < ROUGH)
     x2, u2 = with_edges(x1, body.offset, c), u1 + NEXT_CHANGE * (u1 - u0)
@@ -310,7 +310,7 @@ def _on_finer_meshes(rows: Floats, coarse: Sequence[Coarse]) -> list[OrbitOnMesh
 
 def _limit_and_error(robots: Body, velocities: Sequence[Floats]) -> tuple[Floats, Floats]:
     """Extrapolate the means of orbits with velocities (B, P, 4) on each of MESHES, and estimate the error (B,)."""
-    means = np.stack([mean_motion(robots, u) for u in velocities])
+    means = np.array([mean_motion(robots, u) for u in velocities])
     limit, limit_of_two = extrapolate(means), means[2] + _MORE * (means[2] - means[1])
     return limit, difference(limit_of_two, limit) + DOUBT * difference(means[2], limit)
 
