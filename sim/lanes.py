@@ -2,7 +2,7 @@
 
 A compiled loop works on arrays of vectors with W lanes, a group of W robots, or of plain numbers, a robot alone
 (W = 1). Vectors are added, multiplied and compared like numbers; so a formula for one robot is one for a group as
-well. A robot alone fills the lanes with the columns of its matrices (`columns`). A lane never sees another lane. So
+well. In the products of one robot's matrices the lanes are columns (`columns`). A lane never sees another lane. So
 the result of a robot depends neither on its neighbours in a group nor on W: operations are those of IEEE 754, in
 the order of the source, and products are only fused where the source says so (`fma`). Such loops are compiled by
 `sim.jit.compiled`.

@@ -1,6 +1,7 @@
 """Small dense matrices in compiled loops: products, inverse, and elimination with row exchanges.
 
-They are made of vectors with a lane for each robot (`sim.lanes`). Each entry of a product is summed in the same
+They are made of vectors with a lane for each robot (`sim.lanes`), or of plain numbers, of which products then take
+as many columns at a time as a vector has lanes. Each entry of a product is summed in the same
 order by fused operations. Three rows and four columns are in registers at a time; four columns go through all rows
 before the next ones, so that they stay in the nearest cache. Matrices have 3 K rows. Inverses are Gauss-Jordan
 with 3×3 pivots.

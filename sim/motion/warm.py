@@ -1,6 +1,7 @@
 """Compile all kernels of the simulator, with progress, so that the first use need not wait for it.
 
-Two processes compile, where there are two processors: one what orbits need, the other what time steps need.
+Orbits have loops for groups of robots and for one alone. Two processes compile, where there are two processors: one
+what groups need, the other what one robot needs and flips.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from sim import jit
+from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.motion.response import responses
 from sim.motion.sensitivity import sensitivities
@@ -35,12 +37,17 @@ def _flip() -> None:
     follow_flips([Flip(rows[0], x, u, np.zeros(3), 1e-3)], np.array([1e-3]), 1e-3)
 
 
-_OF_ORBITS: tuple[Stage, ...] = (
-    ("orbits", lambda: steady(_ROBOT, stability=False)),
-    ("stability", lambda: steady(_ROBOT)),
-    ("derivatives", lambda: sensitivities(_ROBOT, ("C_t",))),
-)
-_OF_TIME: tuple[Stage, ...] = (("flips", _flip), ("time steps", lambda: settle(_ROBOT)))
+def _of_orbits(groups: Groups, whose: str) -> tuple[Stage, ...]:
+    """Return what compiles the loops of orbits."""
+    return (
+        (f"orbits of {whose}", lambda: steady(groups, stability=False)),
+        (f"stability of {whose}", lambda: steady(groups)),
+        (f"derivatives of {whose}", lambda: sensitivities(groups, ("C_t",))),
+    )
+
+
+_OF_GROUPS = _of_orbits(_ROBOT.select(np.array([0, 0])), "groups")
+_OF_ONE = (("flips", _flip), ("time steps", lambda: settle(_ROBOT)), *_of_orbits(_ROBOT, "one robot"))
 
 
 @cache
@@ -64,9 +71,9 @@ def _compile(stages: tuple[Stage, ...]) -> None:
         print(f"compiled {stage[0]}, {time.perf_counter() - began:.0f} s", file=sys.stderr, flush=True)
 
 
-def compile_for_time_steps() -> None:
-    """Compile what time steps need, in a process of its own."""
-    _compile(_OF_TIME)
+def compile_for_one() -> None:
+    """Compile what one robot needs, and flips, in a process of its own."""
+    _compile(_OF_ONE)
 
 
 def compile_all() -> float:
@@ -79,17 +86,17 @@ def compile_all() -> float:
 
     began = time.perf_counter()
     if available_jobs() > 1 and not all_compiled():
-        code = f"import sys; sys.path[:] = {sys.path!r}; import {__name__} as warm; warm.compile_for_time_steps()"
+        code = f"import sys; sys.path[:] = {sys.path!r}; import {__name__} as warm; warm.compile_for_one()"
         other = subprocess.Popen([sys.executable, "-c", code])
         try:
-            _compile(_OF_ORBITS)
+            _compile(_OF_GROUPS)
             other.wait()
         finally:
             other.kill()
-        for _, call in _OF_TIME:  # what the other process has compiled is read here
+        for _, call in _OF_ONE:  # what the other process has compiled is read here
             call()
     else:
-        _compile(_OF_ORBITS + _OF_TIME)
+        _compile(_OF_GROUPS + _OF_ONE)
     responses(_ROBOT)
     _mark().touch()
     return time.perf_counter() - began

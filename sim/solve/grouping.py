@@ -1,7 +1,7 @@
 """How robots share groups with a robot in each lane (`sim.lanes`): arrays (B, …) of B robots, (G, …, W) in lanes.
 
 A group is W robots, one in each lane; a robot alone is a group of its own, with W = 1. Empty lanes repeat the last
-robot, and nothing is asked of them. In compiled loops the numbers of a group are one `Body`, with a robot in each lane.
+robot, and nothing is asked of them. In compiled loops the numbers of a group are one `Body`.
 """
 
 from __future__ import annotations
