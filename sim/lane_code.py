@@ -72,11 +72,14 @@ def _from_mask(builder: Any, mask: Any, kind: Any) -> Any:
 @lower_cast(types.Float, Lanes)
 def from_number(context: Any, builder: Any, fromty: Any, toty: Lanes, value: Any) -> Any:
     """Make a vector of a number."""
-    number = context.cast(builder, value, fromty, types.float64)
-    vector: Any = ir.Constant(ir.VectorType(ir.DoubleType(), toty.width), ir.Undefined)
+    return _in_all(builder, context.cast(builder, value, fromty, types.float64), toty.width)
+
+
+def _in_all(builder: Any, number: Any, width: int) -> Any:
+    """Return a vector with a number in all lanes."""
+    vector: Any = ir.Constant(ir.VectorType(number.type, width), ir.Undefined)
     first = builder.insert_element(vector, number, ir.Constant(ir.IntType(32), 0))
-    order = ir.Constant(ir.VectorType(ir.IntType(32), toty.width), [0] * toty.width)
-    return builder.shuffle_vector(first, vector, order)
+    return builder.shuffle_vector(first, vector, ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width))
 
 
 _BINARY = {
@@ -237,7 +240,9 @@ def _width(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 def _vectors(array: Any, width: Any = None) -> Any:
     count = plain.width() if width is None else len(width)
     kind = types.float64 if count == 1 else Lanes(count)
-    return types.Array(kind, array.ndim - 1, "C", aligned=count == 1)(*[a for a in (array, width) if a])
+    return types.Array(kind, array.ndim - 1, "C", aligned=count == 1)(
+        *([array] if width is None else [array, width])
+    )
 
 
 @_teach(plain.lanes, _vectors)
@@ -318,11 +323,8 @@ def _some_columns(context: Any, builder: Any, sig: Any, args: Any, kind: Any) ->
     place = _place(context, builder, sig, args)
     if kind == sig.args[0].dtype:
         return place, None
-    numbers = ir.VectorType(ir.IntType(64), kind.width)
-    count = builder.insert_element(ir.Constant(numbers, ir.Undefined), args[3], ir.Constant(ir.IntType(32), 0))
-    order = ir.Constant(ir.VectorType(ir.IntType(32), kind.width), [0] * kind.width)
-    counts = builder.shuffle_vector(count, count, order)
-    there = builder.icmp_signed("<", ir.Constant(numbers, list(range(kind.width))), counts)
+    counts = _in_all(builder, args[3], kind.width)
+    there = builder.icmp_signed("<", ir.Constant(counts.type, list(range(kind.width))), counts)
     return builder.bitcast(place, context.get_data_type(kind).as_pointer()), there
 
 
@@ -351,7 +353,6 @@ def _store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     if there is None:
         builder.store(args[4], place, align=8)
     else:
-        name = f"v{sig.args[4].width}f64"
-        nothing = ir.VoidType()
-        _masked(builder, f"llvm.masked.store.{name}.p0{name}", nothing, [args[4], place, _ALIGNED, there])
+        name, arguments = f"v{sig.args[4].width}f64", [args[4], place, _ALIGNED, there]
+        _masked(builder, f"llvm.masked.store.{name}.p0{name}", ir.VoidType(), arguments)
     return context.get_dummy_value()

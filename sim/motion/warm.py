@@ -1,7 +1,7 @@
 """Compile all kernels of the simulator, with progress, so that the first use need not wait for it.
 
-Orbits have loops for groups of robots and for one alone. Two processes compile, where there are two processors: one
-what groups need, the other what one robot needs and flips.
+Orbits have loops for groups of robots and for one alone. Two processes compile, where there are two processors:
+one what groups need, the other what one robot needs and flips.
 """
 
 from __future__ import annotations

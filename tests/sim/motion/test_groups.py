@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from common.arrays import Floats
 from common.errors import InputError
-from sim.effects import catalogue
+from sim.effects import catalogue, effect_named
 from sim.model.groups import SLOPE_INPUTS, SLOPE_OUTPUTS, Groups
 from sim.motion.batches import in_batches, sensitivity_columns, split
 from sim.motion.response import mirrored, orbits_with_phases, responses
@@ -21,7 +21,9 @@ from sim.motion.sensitivity import sensitivities, slopes_of_orbits
 from sim.motion.stability import growths
 from sim.motion.steady import orbits
 from sim.solve import grouping, refinement
-from sim.solve.assembly import Nonlocal, numbers
+from sim.solve.assembly import Nonlocal, bodies, numbers
+from sim.solve.grouping import in_groups, robots_in_lanes
+from sim.solve.march import TOLERANCE, State, _march, advance, new_state
 from sim.solve.refinement import NO_START, PHASES, PHASES_FOR_SLOPES, refined_orbits
 from sim.solve.transient import Flip, follow_flips
 from tests.sim.motion.test_stability import UNSTABLE
@@ -193,13 +195,31 @@ def test_a_group_may_hold_local_and_nonlocal_robots(monkeypatch: pytest.MonkeyPa
     assert all(map(agree, wanted, orbits_of(rows, 2)))
 
 
-def test_robots_with_nonlocal_effects_have_the_same_numbers_in_a_group_and_alone() -> None:
+@pytest.mark.parametrize("effect", ["tail_interaction", "natural_curvature", "tail_contact", "root_compliance"])
+def test_robots_with_nonlocal_effects_have_the_same_numbers_in_a_group_and_alone(effect: str) -> None:
     """Their lanes take different numbers of products in GMRES, which leaves 1e-3 of a correction."""
-    rows = numbers(control(5, omega_bar=np.linspace(8, 40, 5), tail_interaction=np.linspace(0.1, 1.0, 5)))
+    sizes = effect_named(effect).typical * np.linspace(0.1, 1.0, 5)
+    rows = numbers(control(5, omega_bar=np.linspace(8, 40, 5), **{effect: sizes}))
     together = refined_orbits(rows, 2, PHASES)
+    assert sum(bool(np.isfinite(orbit.means).all()) for orbit in together) > 3
     for i, orbit in enumerate(together):
         alone = refined_orbits(rows[[i]], 2, PHASES)[0]
-        assert orbit.means == pytest.approx(alone.means, rel=1e-6)
+        assert orbit.means == pytest.approx(alone.means, rel=1e-6, nan_ok=True)
+
+
+@pytest.mark.parametrize("tails", [1, 4])
+@pytest.mark.parametrize("effect", ["", "tail_interaction", "natural_curvature", "tail_contact", "motor_droop"])
+def test_time_steps_of_a_robot_alone_have_the_numbers_of_a_lane(tails: int, effect: str) -> None:
+    sizes = {effect: np.array([effect_named(effect).typical])} if effect else {}
+    robot, count = control(1, **sizes), 12
+    alone = new_state(tails, 8, bodies(robot)[0].offset)
+    state = State(*(in_groups(np.array([part, part]))[0] for part in alone))
+    poses = advance(bodies(robot)[0], alone, 0.02, count, TOLERANCE).poses
+    in_lanes, no_shapes = (in_groups(np.empty((2, *shape)))[0] for shape in ((count, 6), (0, *alone.x.shape)))
+    two = robots_in_lanes(numbers(robot)[[0, 0]])
+    assert _march(two, state, 0.02, count, TOLERANCE, in_lanes, no_shapes)
+    for plain, lanes in ((poses, in_lanes), *zip(alone, state, strict=True)):
+        assert lanes[..., 1] == pytest.approx(plain, rel=1e-9, abs=1e-12)
 
 
 def test_batches_hold_every_row_once_and_one_n_each() -> None:
