@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 _DESCRIPTOR = re.compile(r"/(?:dev|proc/self)/(?:stdout|stderr|fd/(\d+))")
+_MISSING = {"nan", "None", "NaT", "<NA>"}  # values that are no words
+_QUOTED = re.compile('[,"\r\n]')
 _kept: set[Path] = set()
 
 
@@ -146,23 +148,37 @@ def make_folder(folder: str | Path) -> None:
         raise InputError(f"cannot make the folder {folder}: {blocked.strerror}") from None
 
 
-def write_csv(table: DataFrame, path: str | Path, *, digits: int = 8) -> None:
-    """Write a table as CSV with so many digits, completely or not at all; no text becomes a formula."""
+def write_csv(columns: Mapping[Any, Any] | DataFrame, path: str | Path, *, digits: int = 8) -> None:
+    """Write columns as CSV with so many digits, completely or not at all; no text becomes a formula."""
+    write_text(path, "".join(csv_lines(columns, digits=digits)))
+
+
+def csv_lines(columns: Mapping[Any, Any] | DataFrame, *, digits: int = 8) -> Iterator[str]:
+    """Yield the lines of columns as CSV, the names first; what is missing is left empty."""
+    import numpy as np  # a text needs none
+
     from common.number_words import safe_text
 
-    texts = {str(name): table[name].map(safe_text) for name in table.select_dtypes(exclude="number")}
-    with whole_file(path) as part:
-        table.assign(**texts).rename(columns=safe_text).to_csv(part, index=False, float_format=f"%.{digits}g")
+    def word(value: object) -> str:
+        text = str(safe_text(value))
+        if text in _MISSING and not isinstance(value, str):
+            return ""
+        return '"' + text.replace('"', '""') + '"' if _QUOTED.search(text) else text
 
-
-def write_numbers(columns: Mapping[str, Any], path: str | Path, *, digits: int = 8) -> None:
-    """Write columns of finite numbers and plain words as `write_csv` would, without loading pandas."""
-    texts = [
-        [f"{value:.{digits}g}" if isinstance(value, float) else str(value) for value in values]
-        for values in columns.values()
-    ]
-    rows = [",".join(columns), *map(",".join, zip(*texts, strict=True))]
-    write_text(path, "\n".join(rows) + "\n")
+    number, forms, cells = f"%.{digits}g", [], []
+    for _, values in columns.items():
+        kind = (array := np.asarray(values)).dtype.kind
+        gaps = kind == "f" and bool(np.isnan(array).any())
+        forms.append(number if kind == "f" and not gaps else "%s")
+        if gaps:
+            cells.append(["" if value != value else number % value for value in array.tolist()])
+        elif kind in "fiub":
+            cells.append(array.tolist())
+        else:  # dates without the time of day where all are midnight
+            cells.append(list(map(word, values.astype(str) if kind in "mM" else values)))
+    yield ",".join(map(word, columns)) + "\n"
+    form = ",".join(forms) + "\n"
+    yield from (form % row for row in zip(*cells, strict=True))
 
 
 def write_text(path: str | Path, text: str) -> None:

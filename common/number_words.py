@@ -14,6 +14,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -107,6 +108,33 @@ def values_of(words: Sequence[str]) -> np.ndarray:
     if all(is_number(word) or is_missing(word) for word in words):
         return np.array([np.nan if is_missing(word) else _float(word) for word in words])
     return np.array([_value(word) for word in words], dtype=object)
+
+
+def plain_numbers(lines: Sequence[str], separator: str, width: int) -> list[np.ndarray] | None:
+    """Read lines of plain numbers at once, as `check_marks` and `values_of` would; None where one is different."""
+    text = "\n".join(lines).rstrip("\n")
+    if separator not in (",", "\t") or text.encode().translate(None, f"0123456789+-.eE\n{separator}".encode()):
+        return None
+    rows = text.split("\n")
+    if not all(line.count(separator) == width - 1 for line in rows):
+        return None
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DeprecationWarning)  # numpy's, where it finds something else
+        try:
+            values = np.fromstring(text.replace("\n", separator), sep=separator)
+        except (DeprecationWarning, ValueError):
+            return None
+    if len(values) != width * len(rows):
+        return None
+    return [_whole(column, rows, separator, k) for k, column in enumerate(values.reshape(-1, width).T)]
+
+
+def _whole(values: np.ndarray, rows: Sequence[str], separator: str, place: int) -> np.ndarray:
+    """Convert a column to integers if they are written so."""
+    if np.abs(values).max() >= 2.0**53 or np.any(values % 1):
+        return values
+    written = "".join(row.split(separator, place + 1)[place] for row in rows)
+    return values if set(written) & set(".eE") else values.astype(np.int64)
 
 
 def _float(word: str) -> float:

@@ -32,7 +32,7 @@ import pandas as pd
 
 from common.errors import InputError
 from common.keywords import checks_keywords
-from common.number_words import check_marks, is_missing, is_number, plain_text, values_of
+from common.number_words import check_marks, is_missing, is_number, plain_numbers, plain_text, values_of
 from common.reading import MOST_BYTES, decode, read_bytes
 from common.units import find_unit
 
@@ -187,10 +187,17 @@ def _parse_lines(lines: Sequence[str], where: str, names: bool, separator: str =
     columns, rows = _header(lines, top, separator, where)
     if columns is None and names:
         raise InputError(f"{where} has no names of columns; write them into its first line")
-    content = list(rows)
-    if not content:
+    first = next(rows, None)
+    if first is None:
         raise InputError(f"{where} has no rows; give at least one below the header")
-    width = len(content[0][1]) if columns is None else len(columns)
+    width = len(first[1]) if columns is None else len(columns)
+    titles = range(width) if columns is None else columns
+    numbers = plain_numbers(lines[first[0] - 1 :], separator, width) if all(map(str, titles)) else None
+    if numbers is not None:
+        return pd.DataFrame(
+            dict(zip(titles, numbers, strict=True)), pd.RangeIndex(first[0], first[0] + len(numbers[0]), name=LINE)
+        )
+    content = [first, *rows]
     long = next((line for line, words in content if any(words[width:])), None)
     if long is not None:
         raise InputError(
@@ -205,7 +212,6 @@ def _parse_lines(lines: Sequence[str], where: str, names: bool, separator: str =
         )
     cells = list(zip_longest(*(words[:width] for _, words in content), fillvalue=""))
     check_marks(cells, where, separator)
-    titles = range(width) if columns is None else columns
     table = {
         f"column {i + 1}" if title == "" else title: values_of(words)
         for i, (title, words) in enumerate(zip(titles, cells, strict=False))

@@ -73,10 +73,17 @@ def _query(
     from sim.motion.steady_motion import describe_motion
     from sim.robot_rows import command_rows, write_motion
     from surrogate.answers import answer_rows
+    from surrogate.interface import NOTE
     from surrogate.table_file import load_table
 
     rows = command_rows(robots, robot, out, DWELL)
     answer = answer_rows(rows, load_table(lookup), **query.given)
+    outside = sum(map(bool, answer.get(NOTE, ())))
+    if outside and len(answer[NOTE]) > 1:
+        print(
+            f"note: {outside} of {len(answer[NOTE])} robots are outside the look-up table: see the column {NOTE}",
+            file=sys.stderr,
+        )
     if rows.file:
         return write_motion(rows, answer, out, f"{len(answer['v_z'])} rows")
     said = describe_motion(rows.robots[0], answer, error="relative error of the look-up table (90 %)")

@@ -29,6 +29,7 @@ from sim.model.robot import Robot
 from sim.robot_rows import RobotRows
 from surrogate.held_out import CERTIFIED_OUTPUTS, RATES
 from surrogate.interface import LookupTable, OutsideError
+from surrogate.robot_table import RobotTable
 from surrogate.table import OUTSIDE, NeuralTable
 
 _FACTOR, _STEPS = 1000.0, 600  # values up to this many times as large or as small are asked about, on either side
@@ -139,7 +140,12 @@ def _variants(robot: Robot, group: str) -> list[Robot]:
 
 
 def answer_with_error(
-    table: LookupTable, columns: Mapping[str, Floats], *, flag: bool = False, certify: bool = False
+    table: LookupTable,
+    columns: Mapping[str, Floats],
+    *,
+    flag: bool = False,
+    certify: bool = False,
+    strict: bool = True,
 ) -> dict[str, Any]:
     """Predict outputs, their intervals where the table has them, and `error`, each (M,).
 
@@ -148,16 +154,18 @@ def answer_with_error(
         columns: robots by column name, each (M,).
         flag: answer for robots outside the domain as well, see `NeuralTable.query`.
         certify: simulate each robot as well.
+        strict: refuse all robots where one is outside; otherwise add the column NOTE, see `NeuralTable.query`.
 
     Raises:
         InputError: a robot that cannot be, or one outside the domain.
     """
     if not isinstance(table, NeuralTable):
-        answer: dict[str, Any] = dict(table.query(columns))
+        mark = {"mark": not strict} if isinstance(table, RobotTable) else {}
+        answer: dict[str, Any] = dict(table.query(columns, **mark))
         error = max(table.errors[name]["rms"] for name in CERTIFIED_OUTPUTS if name in table.errors)
         return {**answer, "error": np.full(len(answer["v_z"]), error)}
     intervals = table.intervals is not None
-    answer = table.query(columns, intervals=intervals, flag=flag, certify=certify)
+    answer = table.query(columns, intervals=intervals, flag=flag, certify=certify, mark=not strict)
     if not intervals:
         return answer
     speed = np.hypot(answer["v_x"], answer["v_z"])
@@ -168,8 +176,8 @@ def answer_with_error(
 
 
 def answer_rows(
-    rows: RobotRows, table: LookupTable, *, flag: bool = False, certify: bool = False
+    rows: RobotRows, table: LookupTable, *, flag: bool = False, certify: bool = False, strict: bool = False
 ) -> dict[str, Any]:
     """Answer as `answer_with_error`; refusals name the robots, and the file of their table."""
     with rows.naming(), refusing_robots(rows.robots, table) if rows.robots else nullcontext():
-        return answer_with_error(table, rows.columns, flag=flag, certify=certify)
+        return answer_with_error(table, rows.columns, flag=flag, certify=certify, strict=strict)

@@ -30,6 +30,7 @@ def query(
     lookup: LookupTable | str | Path | None = None,
     flag: bool = False,
     certify: bool = False,
+    strict: bool = False,
     derivatives: bool | Sequence[str] = False,
 ) -> pd.DataFrame:
     """Ask a look-up table for the mean motion at constant motor speed, without simulating.
@@ -39,6 +40,8 @@ def query(
         lookup: look-up table, or its file; default: the one that comes with the package.
         flag: answer for robots outside the domain as well; the column `outside` says which.
         certify: simulate each robot as well; the column `certified_error` is the actual error of its answer.
+        strict: refuse all robots where one is outside the domain; otherwise its numbers are missing, and the
+            column `note` says why it is outside.
         derivatives: add the Jacobian, in all dimensionless inputs but N, or in those named; effects may be named,
             too. A column `omega_yr_bar_per_C_yr` is ∂ω̄_yr/∂C_yr. For torch there is `torch_query`.
 
@@ -48,7 +51,7 @@ def query(
         `<column>_low` and `<column>_high` are the intervals of the dimensionless columns.
 
     Raises:
-        InputError: a robot cannot be, or is outside the domain of the table, or an input has no derivatives.
+        InputError: a robot cannot be, none is within the domain of the table, or an input has no derivatives.
 
     Example:
         >>> import softflagella as sf
@@ -57,11 +60,15 @@ def query(
         [['paper-control', 10.36, 0.23], ['paper-triangle', 10.11, 0.36]]
     """
     rows, table = robot_rows(robots, robot, DWELL), as_table(lookup)
-    answer = answer_rows(rows, table, flag=flag, certify=certify)
+    answer = answer_rows(rows, table, flag=flag, certify=certify, strict=strict)
     if derivatives is not False:
         names = () if derivatives is True else derivatives
         slopes = trained_table(table).derivatives(rows.columns, names, flag=True)
-        answer |= {f"{output}_per_{name}": s for output, part in slopes.items() for name, s in part.items()}
+        answer |= {
+            f"{output}_per_{name}": s + 0 * answer["v_z"]
+            for output, part in slopes.items()
+            for name, s in part.items()
+        }
     return rows.frame(answer)
 
 

@@ -15,6 +15,8 @@ from common.arrays import Floats
 from common.errors import InputError
 from sim.model.response import Responses
 
+NOTE = "note"  # the column that says why a robot of many is outside
+
 
 class OutsideError(InputError):
     """A robot is outside the domain of a look-up table."""

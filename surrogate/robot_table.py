@@ -26,7 +26,7 @@ from sim.model.response import DWELLS, Responses
 from sim.motion.steady_motion import STEADY_OUTPUTS, net_speeds, twists
 from surrogate.domain import ROBOT
 from surrogate.error_modes import error_modes
-from surrogate.interface import ErrorModes
+from surrogate.interface import NOTE, ErrorModes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -67,14 +67,23 @@ class RobotTable(Shown):
         """Hash of everything in the table."""
         return _digest(asdict(self))[:16]
 
-    def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
+    def query(self, columns: Mapping[str, Floats], *, mark: bool = False) -> dict[str, Any]:
         """Return outputs (M,) of this robot; the sign of `omega_bar` is the direction of the motor.
+
+        Args:
+            columns: robots by column name, each (M,).
+            mark: as for `NeuralTable.query`: rows of another robot have NaN, and a note.
 
         Raises:
             InputError: the columns are another robot's.
         """
-        side = self._side(columns)
-        return {name: np.array(values)[side] for name, values in self.steady.items()}
+        notes = self._notes(columns)
+        known = np.array([not note for note in notes])
+        if not mark or not known.any():
+            return {name: np.array(values)[self._side(columns)] for name, values in self.steady.items()}
+        side = np.where(np.asarray(columns["omega_bar"]) < 0, 1, 0)
+        found = {name: np.where(known, np.array(values)[side], np.nan) for name, values in self.steady.items()}
+        return {**found, NOTE: np.array(notes)}
 
     def response(self, columns: Mapping[str, Floats]) -> Responses:
         """Return the response of this robot to a flip, for M rows; see `LookupTable.response`.
@@ -134,17 +143,21 @@ class RobotTable(Shown):
 
     def _side(self, columns: Mapping[str, Floats]) -> Any:
         """Return 0 or 1 for every row, by the direction of its motor."""
-        count = len(next(iter(columns.values())))
+        for note in filter(None, notes := self._notes(columns)):
+            raise InputError(f"{note}; make its own table with softflagella surrogate robot")
+        return np.where(np.asarray(columns.get("omega_bar", np.ones(len(notes)))) < 0, 1, 0)
+
+    def _notes(self, columns: Mapping[str, Floats]) -> list[str]:
+        """Say of every row why it is another robot; empty if it is not."""
+        notes = [""] * len(next(iter(columns.values())))
         for name, values in columns.items():
             expected = self.robot.get(name, 0.0)
             given = np.abs(values) if name == "omega_bar" else np.asarray(values, dtype=float)
-            for value in given[~(np.abs(given - expected) <= 1e-9 * max(abs(expected), 1.0))][:1]:
-                raise InputError(
-                    f"{name} = {value:g} is outside this robot's table ({expected:g} only); make its own "
-                    "table with softflagella surrogate robot"
+            for row in np.flatnonzero(~(np.abs(given - expected) <= 1e-9 * max(abs(expected), 1.0))).tolist():
+                notes[row] = (
+                    notes[row] or f"{name} = {given[row]:g} is outside this robot's table ({expected:g} only)"
                 )
-        omega = columns.get("omega_bar", np.ones(count))
-        return np.where(np.asarray(omega) < 0, 1, 0)
+        return notes
 
 
 def load_robot_table(path: str | Path) -> RobotTable:

@@ -31,7 +31,7 @@ from sim.motion.steady_motion import STEADY_OUTPUTS, net_speeds, twists
 from surrogate.domain import INSIDE, NO_RESPONSE, NOT_LEARNED, ROBOT, Support, reason_of
 from surrogate.error_modes import CURVE_ERRORS, NORMAL_90, STEADY, CurveErrors, error_modes, joined
 from surrogate.held_out import OUTPUTS, RELATIVE, certified_error, error_scale
-from surrogate.interface import ErrorModes, OutsideError
+from surrogate.interface import NOTE, ErrorModes, OutsideError
 from surrogate.intervals import Intervals
 from surrogate.motions import (
     SPREAD,
@@ -94,7 +94,13 @@ class NeuralTable(Shown):
         return digest(table_content(self))[:16]
 
     def query(
-        self, columns: Mapping[str, Floats], *, intervals: bool = False, flag: bool = False, certify: bool = False
+        self,
+        columns: Mapping[str, Floats],
+        *,
+        intervals: bool = False,
+        flag: bool = False,
+        certify: bool = False,
+        mark: bool = False,
     ) -> dict[str, Any]:
         """Predict outputs, each (M,); with a column `dwell_bar` also RESPONSE_OUTPUTS for equal dwells.
 
@@ -104,6 +110,8 @@ class NeuralTable(Shown):
             flag: answer for robots outside the domain as well; the column OUTSIDE says which.
             certify: simulate each robot as well; the column CERTIFIED is the largest relative error of the spins,
                 the yaw rate and the velocities (these relative to the speed), with the simulator's own error.
+            mark: refuse only if no robot is inside; the column NOTE says why a robot is outside, and its numbers
+                are NaN unless such robots are flagged.
 
         Raises:
             InputError: a robot that cannot be, or one outside the domain.
@@ -115,17 +123,25 @@ class NeuralTable(Shown):
             _check_flips(values)
             dwells, wrong = _checked_dwells(columns[DWELL])
             if wrong:
-                self._check_known(values, motions, flag=flag)  # a robot outside is refused before a dwell is
+                self._check_known(
+                    values, motions, flag=flag, mark=mark
+                )  # a robot outside is refused before a dwell is
                 raise InputError(wrong)
             self.curves.put_flips(motions, np.broadcast_to(dwells, values["N"].shape))
             result = dict(zip(OUTPUTS, motions.outputs, strict=True))
-        self._check_known(values, motions, flag=flag)
+        self._check_known(values, motions, flag=flag, mark=mark)
         if intervals:
             result |= self._ends(motions, result)
         if flag:
             result[OUTSIDE] = motions.outside != INSIDE
         if certify:
             result[CERTIFIED] = certified_error(values, result)
+        if mark:
+            rows = np.flatnonzero(motions.outside)
+            for column in result.values() if not flag else ():
+                column[rows] = np.nan
+            result[NOTE] = np.full(len(motions.outside), "", dtype=object)
+            result[NOTE][rows] = [self._why(values, motions, row) for row in rows.tolist()]
         return result
 
     @np.errstate(all="ignore")
@@ -267,12 +283,18 @@ class NeuralTable(Shown):
         ends = [self.ranges[name] if name in _OF_TAILS else (0.0, np.inf) for name in ROBOT]
         return np.ascontiguousarray(np.array(ends).T * [[1 - 1e-9], [1 + 1e-9]])
 
-    def _check_known(self, values: Mapping[str, Floats], motions: Motions, *, flag: bool = False) -> None:
-        """Refuse the first robot that is outside, unless such robots are flagged."""
-        if not flag and motions.outside.any():
+    def _check_known(
+        self, values: Mapping[str, Floats], motions: Motions, *, flag: bool = False, mark: bool = False
+    ) -> None:
+        """Refuse the first robot that is outside, unless such robots are flagged, or are marked among others."""
+        if not flag and (motions.outside.all() if mark else motions.outside.any()):
             row = int(np.flatnonzero(motions.outside)[0])
-            reason = reason_of(motions.outside[row], values["N"][row], motions.motion[row, 2])
-            raise self._refusal(values, row, reason)
+            raise OutsideError(
+                f"the robot in row {row + 1} is outside the look-up table: {self._why(values, motions, row)}; "
+                "change the robot, or simulate it (softflagella steady, softflagella surrogate robot)",
+                row,
+                _reason(values, motions, row),
+            )
 
     def width_features(self, motions: Motions) -> Floats:
         """Return what the width of an interval may depend on, (M, 11), with the spread of the members."""
@@ -296,19 +318,19 @@ class NeuralTable(Shown):
         return {f"{name}_{end}": ends[f"{name}_{end}"] for end in ("low", "high") for name in result
                 if f"{name}_{end}" in ends}  # fmt: skip
 
-    def _refusal(self, values: Mapping[str, Floats], row: int, reason: str) -> OutsideError:
-        words = ""
+    def _why(self, values: Mapping[str, Floats], motions: Motions, row: int) -> str:
+        """Say why a robot is outside, with a number that no learned robot had if there is one."""
+        reason = _reason(values, motions, row)
         for name in dict.fromkeys((*_OF_TAILS, *self.ranges)):
             low, high = self.ranges[name]
             value = abs(float(values[name][row]))
             if not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
-                words = f"; {name} = {value:g}, learned were {low:g} to {high:g}"
-                break
-        message = (
-            f"the robot in row {row + 1} is outside the look-up table: {reason}{words}; change the robot, or "
-            "simulate it (softflagella steady, softflagella surrogate robot)"
-        )
-        return OutsideError(message, row, reason)
+                return f"{reason}; {name} = {value:g}, learned were {low:g} to {high:g}"
+        return reason
+
+
+def _reason(values: Mapping[str, Floats], motions: Motions, row: int) -> str:
+    return reason_of(motions.outside[row], values["N"][row], motions.motion[row, 2])
 
 
 def _joined(parts: Sequence[tuple[Any, ...]]) -> list[Any]:

@@ -9,7 +9,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-from common.files import files_together, write_numbers, write_text
+from common.files import files_together, write_csv, write_text
 from common.keywords import checks_keywords
 from common.provenance import code_version
 from planner.files.headers import schedule_header
@@ -49,7 +49,7 @@ def _write_files(result: Plan, folder: Path) -> list[str]:
     identity, names = result.identity, list(FILES)
     write_text(folder / "plan.json", json.dumps({**result.to_dict(), "code_version": code_version()}) + "\n")
     columns = {name: values.tolist() for name, values in result.columns().items()}
-    write_numbers({**columns, "plan_id": [identity] * len(result.dwells)}, folder / "plan.csv")
+    write_csv({**columns, "plan_id": [identity] * len(result.dwells)}, folder / "plan.csv")
     write_text(folder / "schedule.h", schedule_header(result, identity))
     write_svg(draw_plan(replace(result, job=None)), folder / "plan.svg", identity)
     if result.job is not None:

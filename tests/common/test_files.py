@@ -16,7 +16,7 @@ import pandas as pd
 import pytest
 
 from common.errors import CLOSED_PIPE, INTERRUPTED, InputError, run_command
-from common.files import files_together, whole_file, write_csv, write_numbers, write_text
+from common.files import files_together, whole_file, write_csv, write_text
 from common.tables import read_table
 from tests.processes import LIMIT, ROOT
 
@@ -173,12 +173,28 @@ def test_a_reader_that_goes_ends_the_command_without_a_word() -> None:
     assert CLOSED_PIPE == 141
 
 
-def test_numbers_are_written_as_a_table_is(tmp_path: Path) -> None:
+def test_columns_are_written_as_pandas_writes_them(tmp_path: Path) -> None:
     numbers = [0.0, -0.0, 1.0, -1.5, 1 / 3, 1e-12, 123456789.0, -2.5e300]
     columns = {"x": numbers, "count": list(range(8)), "name": ["a1"] * 8, "y": np.array(numbers[::-1])}
-    write_csv(pd.DataFrame(columns), tmp_path / "table.csv")
-    write_numbers(columns, tmp_path / "numbers.csv")
-    assert (tmp_path / "numbers.csv").read_bytes() == (tmp_path / "table.csv").read_bytes()
+    columns |= {
+        "gap": [np.nan, np.inf, *numbers[2:]],
+        "yes": [True, False] * 4,
+        "a,b": ['x "y"', "u,v", None, ""] * 2,
+    }
+    columns |= {
+        "small": np.array([*numbers[:7], 1e30], dtype=np.float32),
+        "words": ["nan", np.nan, "∞\n"] + 5 * ["w"],
+    }
+    table = pd.DataFrame(columns)
+    table["day"] = pd.to_datetime(["2026-05-01"] * 7 + [None])
+    table["time"] = table["day"] + pd.to_timedelta(range(8), unit="s")
+    table["whole"] = pd.array([1, None, *range(6)], dtype="Int64")
+    write_csv(table, tmp_path / "table.csv")
+    table.to_csv(tmp_path / "wanted.csv", index=False, float_format="%.8g")
+    assert (tmp_path / "table.csv").read_text() == (tmp_path / "wanted.csv").read_text()
+    write_csv(columns, tmp_path / "columns.csv")
+    pd.DataFrame(columns).to_csv(tmp_path / "wanted.csv", index=False, float_format="%.8g")
+    assert (tmp_path / "columns.csv").read_text() == (tmp_path / "wanted.csv").read_text()
 
 
 def test_no_text_is_a_formula_and_every_text_is_read_back(tmp_path: Path) -> None:

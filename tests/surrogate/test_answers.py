@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import torch
 from torch import Tensor
@@ -115,7 +116,36 @@ def test_the_command_and_python_say_so(tmp_path: Path, capsys: pytest.CaptureFix
     assert WITHIN.search(line)
     assert "motor speed 1000 rpm (omega_bar = " in line
     with pytest.raises(sf.InputError, match=r"robot 'paper-control' is outside .* rpm \(omega_bar = "):
-        sf.query(["paper-control", str(tmp_path / "fast.toml")])
+        sf.query(["paper-control", str(tmp_path / "fast.toml")], strict=True)
+
+
+def test_a_robot_outside_is_marked_and_the_others_are_answered(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robots = pd.DataFrame([ROBOT.group_values()] * 4)
+    robots["omega_bar"] *= [1.0, 400.0, 1.1, 1.2]
+    robots.to_csv(file := tmp_path / "robots.csv", index=False)
+    words = ["query", str(file), "--out", str(tmp_path / "motion.csv")]
+    assert run_command(main, words) == 0
+    said = capsys.readouterr().err
+    assert said == "note: 1 of 4 robots are outside the look-up table: see the column note\n"
+    found, alone = pd.read_csv(tmp_path / "motion.csv"), sf.query(robots.iloc[[0, 2, 3]])
+    results = [name for name in alone if name not in (*robots, "note")]
+    assert found.loc[[0, 2, 3], results].to_numpy() == pytest.approx(alone[results].to_numpy(float), rel=1e-7)
+    assert found.loc[1, results].isna().all()
+    assert found["note"].notna().tolist() == [False, True, False, False]
+    assert re.search("not learned.*; omega_bar = .*, learned were ", found["note"][1])
+    slopes = sf.query(robots, derivatives=["C_t"])["v_z_per_C_t"]
+    assert slopes.isna().tolist() == [False, True, False, False]
+    flagged = sf.query(robots, flag=True)
+    assert flagged["outside"].tolist() == (flagged["note"] != "").tolist() == [False, True, False, False]
+    assert flagged[results].notna().all(axis=None)
+    (tmp_path / "motion.csv").unlink()
+    assert run_command(main, [*words, "--strict"]) == 2
+    assert "the robot in row 2 is outside" in capsys.readouterr().err
+    robots.iloc[[1, 1]].to_csv(file, index=False)  # none is inside
+    assert run_command(main, words) == 2
+    assert not (tmp_path / "motion.csv").exists()
 
 
 THREE_TAILS = sf.load_robot("paper-control").group_values() | {"N": 3}

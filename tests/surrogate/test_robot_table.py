@@ -158,6 +158,10 @@ def test_another_robot_is_refused() -> None:
         plan(polygon(4, 3.0), replace(ROBOT, effects={"end_over_end_drag": 4.0}), lookup=robot_table(5.0))
     with pytest.raises(InputError, match="C_t = 9"):
         robot_table(5.0).query({**columns(), "C_t": np.array([9.0])})
+    own, other = robot_table(5.0).query(columns())["v_z"].item(), {"C_t": np.array([9.0, columns()["C_t"].item()])}
+    found = robot_table(5.0).query({**{k: np.repeat(v, 2) for k, v in columns().items()}, **other}, mark=True)
+    np.testing.assert_array_equal(found["v_z"], [np.nan, own])
+    assert [note.split("(")[0] for note in found["note"]] == ["C_t = 9 is outside this robot's table ", ""]
 
 
 def test_its_slopes_are_those_of_the_simulator() -> None:
