@@ -17,6 +17,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,13 @@ _DETOUR = 1.15  # joints that are longer than this, beside the straight way or t
 _LINK = 2.5  # radii: poses within this distance are joined to start and goal
 _LONGEST_LINK = 4.0  # radii
 _STEP = 0.05  # l, between the places where a track is checked
+_EVERY = (
+    16,
+    4,
+    1,
+)  # of these places are checked, one after another; most tracks that are blocked end at the first
 _BLOCK = 200_000  # poses that are checked at once
+_PART = 512  # places of the lattice whose joints are sorted out at once
 _CELLS = 12  # of the map, for each spacing
 _MOST_POSES = 400_000
 COURSES = 24  # tried at a stop whose course is free
@@ -78,9 +85,20 @@ class RouteLimits:
             order = order[len(rows) :]
             count = max(2, math.ceil(float(length[rows[-1]]) / step) + 1)
             way = np.linspace(0, 1, count) * length[rows, None]
-            poses = tracks.take(rows).poses(way)
-            result[rows] = (self.clearance(poses, space) >= margin).all(1)
+            for every in _EVERY:
+                poses = tracks.take(rows).poses(way[:, ::every])
+                clear = (self.clearance(poses, space) >= margin).all(1)
+                rows, way = rows[clear], way[clear]
+            result[rows] = True
         return result
+
+
+class Joints(NamedTuple):
+    """J joints from any place to poses nearby, ordered by the course at the start and the pose at the end."""
+
+    course: Integers  # (J,), its index
+    ahead: Integers  # (J,), by how much the index of a pose is larger than that of one with course 0 at the start
+    length: Floats  # (J,)
 
 
 class Lattice:
@@ -96,52 +114,44 @@ class Lattice:
         self._shape, self._pad = (nx, ny), pad
         x, y = low[0] + spacing * np.arange(nx), low[1] + spacing * np.arange(ny)
         self.course = 2 * math.pi * np.arange(courses) / courses
-        self._table = self._split()
         grid = np.stack(np.meshgrid(x, y, self.course, indexing="ij"), -1)
         self.poses = grid.reshape(-1, 3)  # index (ix ny + iy) courses + k
-        self._edges = self._join()
+        self._joints, self._room = self._join()
+        self._open = np.count_nonzero(self._room > 0)
 
-    def _join(self) -> tuple[Integers, Integers, Floats, Floats]:
-        """Join poses by edges: from, to, length, clearance."""
+    def _join(self) -> tuple[Joints, NDArray[np.float32]]:
+        """Find the joints, and at each place (places, J) the distance along them from what is not free."""
         (nx, ny), n = self._shape, self.courses
-        index = np.arange(nx * ny).reshape(nx, ny) * n
         steps = np.arange(-_RANGE, _RANGE + 1)
-        i, j, k = (part.ravel() for part in np.meshgrid(steps, steps, np.arange(n), indexing="ij"))
+        course, i, j, k = (
+            part.ravel() for part in np.meshgrid(np.arange(n), steps, steps, np.arange(n), indexing="ij")
+        )
         goals = np.stack([i * self.spacing, j * self.spacing, self.course[k]], 1)
-        start, end, length, clearances = [], [], [], []
-        for start_course in range(n):
-            tracks = shortest_paths(
-                np.repeat([[0.0, 0.0, self.course[start_course]]], len(goals), 0), goals, self.limits.radius
-            )
-            turn = np.abs((self.course[k] - self.course[start_course] + math.pi) % (2 * math.pi) - math.pi)
-            least = np.maximum(np.hypot(goals[:, 0], goals[:, 1]), self.limits.radius * turn)
-            rows = np.flatnonzero((tracks.length <= _DETOUR * least) & (tracks.length > 0))
-            for row in rows.tolist():
-                di, dj = int(i[row]), int(j[row])
-                a = slice(max(0, -di), nx - max(0, di)), slice(max(0, -dj), ny - max(0, dj))
-                b = slice(max(0, di), nx + min(0, di)), slice(max(0, dj), ny + min(0, dj))
-                if not index[a].size:
-                    continue
-                clearance = self._clearance(tracks.take(np.array([row])))[a].ravel()
-                good = np.flatnonzero(clearance > 0)
-                start.append(index[a].ravel()[good] + start_course)
-                end.append(index[b].ravel()[good] + int(k[row]))
-                length.append(np.full(len(good), tracks.length[row]))
-                clearances.append(clearance[good])
-        return np.concatenate(start), np.concatenate(end), np.concatenate(length), np.concatenate(clearances)
+        starts = np.stack([0 * goals[:, 0], 0 * goals[:, 0], self.course[course]], 1)
+        tracks = shortest_paths(starts, goals, self.limits.radius)
+        turn = np.abs((self.course[k] - self.course[course] + math.pi) % (2 * math.pi) - math.pi)
+        least = np.maximum(np.hypot(goals[:, 0], goals[:, 1]), self.limits.radius * turn)
+        rows = np.flatnonzero((tracks.length <= _DETOUR * least) & (tracks.length > 0))
+        table, room = self._split(), np.full((nx, ny, len(rows)), -np.inf, dtype=np.float32)
+        for joint, row in enumerate(rows.tolist()):
+            di, dj = int(i[row]), int(j[row])
+            inside = slice(max(0, -di), nx - max(0, di)), slice(max(0, -dj), ny - max(0, dj))
+            room[(*inside, joint)] = self._distance(tracks.take(np.array([row])), table)[inside]
+        ahead = (i[rows] * ny + j[rows]) * n + k[rows]
+        return Joints(course[rows], ahead, tracks.length[rows]), room.reshape(nx * ny, -1)
 
-    def _clearance(self, track: DubinsPaths) -> Floats:
-        """Bound the clearance (nx, ny) along the track of one joint from below, by its place in the lattice."""
+    def _distance(self, track: DubinsPaths, table: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Compute the distance (nx, ny) along the track of one joint on the map, by its place in the lattice."""
         count = max(2, math.ceil(float(track.length[0]) / _STEP) + 1)
         poses = track.poses(np.linspace(0, track.length, count).T)[0]
         heading = poses[:, 2] - self.limits.drift.slip_along(poses[:, 2])
         centres = self.limits.body.centres(np.stack([poses[:, 0], poses[:, 1], heading], 1)).reshape(-1, 2)
         offsets = np.rint(centres / self.map.step).astype(int) + self._pad * _CELLS
-        (nx, ny) = self._shape
-        room = np.full(self._shape, np.inf, dtype=np.float32)
-        for (i, j), (pi, pj) in zip(*_distinct(offsets), strict=True):
-            np.minimum(room, self._table[pi, pj, i : i + nx, j : j + ny], out=room)
-        return np.asarray(room, dtype=float) - self.limits.body.radius - self.map.slack
+        (nx, ny), wide = self._shape, table.shape[-1]
+        rows, room = table.reshape(_CELLS, _CELLS, -1), np.full(nx * wide, np.inf, dtype=np.float32)
+        for (i, j), (pi, pj) in zip(*_distinct(offsets), strict=True):  # whole rows of the map are one piece
+            np.minimum(room, rows[pi, pj, i * wide + j :][: len(room)], out=room)
+        return room.reshape(nx, wide)[:, :ny]
 
     def _split(self) -> NDArray[np.float32]:
         """Split the map's table by the place between two poses of the lattice, (cells, cells, ., .)."""
@@ -159,30 +169,50 @@ class Lattice:
             costs (G,), infinite where there is no way, and the poses (n, 3) on each way, ends included; the first
             one is the start.
         """
-        count, s, g = len(self.poses), len(starts), len(goals)
-        source = count + s + g
-        open_ = self._edges[3] >= margin
-        edges = [(self._edges[0][open_], self._edges[1][open_], self._edges[2][open_])]
-        for index, pose in enumerate(starts):
-            if np.isfinite(costs[index]):
-                near, length = self._links(pose, margin, True)
-                edges.append((np.full(len(near), count + index), near, length))
-                edges.append((np.array([source]), np.array([count + index]), np.array([costs[index] + 1e-9])))
+        count, source = len(self.poses), len(self.poses) + len(starts)
+        begun = np.flatnonzero(np.isfinite(costs))
+        none = np.empty(0, int), np.empty(0)
+        rows = [
+            self._links(pose, margin, True) if np.isfinite(c) else none
+            for pose, c in zip(starts, costs, strict=True)
+        ]
+        graph = self._graph(margin, [*rows, (count + begun, costs[begun] + 1e-9)])
+        distance, before = dijkstra(graph, indices=source, return_predecessors=True)
+        poses, found, ways = np.concatenate([self.poses, starts]), np.full(len(goals), np.inf), []
         for index, pose in enumerate(goals):
             near, length = self._links(pose, margin, False)
-            edges.append((near, np.full(len(near), count + s + index), length))
-        start, end, length = (np.concatenate([part[i] for part in edges]) for i in range(3))
-        graph = csr_array((length, (start, end)), shape=(source + 1, source + 1))
-        distance, before = dijkstra(graph, indices=np.array([source]), return_predecessors=True)
-        poses = np.concatenate([self.poses, starts, goals])
-        ways = []
-        for index in range(g):
-            chain, at = [], count + s + index
+            total = distance[near] + length
+            chain, at = [], source
+            if len(near) and np.isfinite(total.min()):
+                at = int(near[np.lexsort((distance[near], total))[0]])
+                found[index] = total.min()
             while at >= 0 and at != source:
                 chain.append(at)
-                at = int(before[0, at])
-            ways.append(poses[chain[::-1]])
-        return distance[0, count + s : source], ways
+                at = int(before[at])
+            ways.append(np.concatenate([poses[chain[::-1]], pose[None]]))
+        return found, ways
+
+    def _graph(self, margin: float, further: Sequence[tuple[Integers, Floats]]) -> csr_array:
+        """Return the lengths of the joints with this margin, and further rows: ends and lengths."""
+        n, (course, ahead, lengths) = self.courses, self._joints
+        most = self._open + sum(len(ends) for ends, _ in further)
+        end, length, degrees, done = np.empty(most, np.int32), np.empty(most), [np.zeros(1, int)], 0
+
+        def add(ends: Integers, row: Floats, degree: Integers) -> None:
+            nonlocal done
+            part = slice(done, done := done + len(ends))
+            end[part], length[part] = ends, row
+            degrees.append(degree)
+
+        for first in range(0, len(self._room), _PART):
+            room = self._room[first : first + _PART].astype(float) - self.limits.body.radius - self.map.slack
+            place, joint = np.nonzero((room > 0) & (room >= margin))
+            degree = np.bincount(place * n + course[joint], minlength=len(room) * n)
+            add((first + place) * n + ahead[joint], lengths[joint], degree)
+        for ends, row in further:
+            add(ends, row, np.array([len(ends)]))
+        rows = np.cumsum(np.concatenate(degrees)).astype(np.int32)
+        return csr_array((length[:done], end[:done], rows), shape=(len(rows) - 1, len(rows) - 1))
 
     def _links(self, pose: Floats, margin: float, onward: bool) -> tuple[Integers, Floats]:
         """Find poses of the lattice that a pose can be joined to, or that can be joined to it; and the lengths."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from planner.paths.path import Path2D, axis_at
 from planner.paths.units import Scales
 
 _SIDES = 180  # of a circle as a polygon
+_TILE = 128  # points of a map, in each direction, that are computed at once
 _BLOCK = 2_000_000  # distances computed at once
 
 
@@ -154,6 +156,13 @@ class FreeSpace:
             distances = np.minimum(distances, -self.walls.distance(points))
         return distances
 
+    def near(self, points: Floats) -> FreeSpace:
+        """Leave out the regions that are nearest to none of the points (M, 2)."""
+        middle = points.mean(0, keepdims=True)
+        apart = np.array([region.distance(middle)[0] for region in self.regions])
+        most = apart.min(initial=np.inf) + 2.001 * float(np.hypot(*(points - middle).T).max())
+        return FreeSpace(tuple(r for r, away in zip(self.regions, apart, strict=True) if away <= most), self.walls)
+
     def boxes(self) -> list[Floats]:
         """List the corners (2, 2) of the boxes around the regions and walls."""
         return [region.box for region in (*self.regions, *([self.walls] if self.walls else []))]
@@ -212,8 +221,11 @@ class Map:
         self._low, self.step = low, step
         count = np.ceil(size / step).astype(int) + 1
         x, y = (low[i] + step * np.arange(count[i]) for i in (0, 1))
-        points = np.stack(np.meshgrid(x, y, indexing="ij"), -1)
-        self.table = space.distance(points.reshape(-1, 2)).reshape(points.shape[:2])
+        self.table = np.empty((len(x), len(y)))
+        for i, j in product(range(0, len(x), _TILE), range(0, len(y), _TILE)):
+            tile = self.table[i : i + _TILE, j : j + _TILE]
+            points = np.stack(np.meshgrid(x[i : i + _TILE], y[j : j + _TILE], indexing="ij"), -1).reshape(-1, 2)
+            tile[:] = space.near(points).distance(points).reshape(tile.shape)
         self.slack = step / math.sqrt(2)  # distances change by at most the way to the nearest grid point
 
     def distance(self, points: Floats) -> Floats:

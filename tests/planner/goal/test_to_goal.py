@@ -10,7 +10,7 @@ import pytest
 
 from common.arrays import Floats
 from common.errors import InputError
-from planner.goal.route import COURSES, NoWayError, RouteLimits, route
+from planner.goal.route import COURSES, Lattice, NoWayError, RouteLimits, route
 from planner.paths.dubins import TURNS, DubinsPaths, segment_lengths, shortest_paths
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.tractrix import STILL
@@ -230,3 +230,42 @@ def test_a_goal_inside_a_region_is_refused_with_the_distance() -> None:
     limits = RouteLimits(RADIUS, BODY, FreeSpace((Circle(5, 0, 1),)), STILL)
     with pytest.raises(NoWayError, match=r"at the goal, .*55\.00, 0\.00.* inside .*; it needs 1\.1 cm"):
         route([stop(0, 0, 0), stop(5, 0, 0)], limits, 0.1, {}, CONTROL)
+
+
+def test_a_lattice_needs_four_bytes_a_joint_and_finds_the_ways_of_a_plain_search() -> None:
+    """Memory is counted in arrays; the plain search joins the poses one after another."""
+    rng = np.random.default_rng(3)
+    circles = [Circle(float(x), float(y), 0.4) for x, y in rng.uniform([1, -3], [9, 3], (12, 2))]
+    space = FreeSpace(
+        (*circles, Polygon.of([[4, -6], [5, -6], [5, -4]])), Polygon.of([[-3, -8], [13, -8], [13, 8], [-3, 8]])
+    )
+    limits = RouteLimits(1.0, Footprint(np.array([-0.3, 0.0, 0.3]), 0.15), space, STILL)
+    lattice = Lattice(limits, *np.array([[0.0, -4.0], [10.0, 4.0]]), 0.6, 16)
+    room = next(part for part in vars(lattice).values() if getattr(part, "dtype", None) == np.float32)
+    others = sum(
+        part.nbytes for part in vars(lattice).values() if isinstance(part, np.ndarray) and part is not room
+    )
+    assert room.nbytes == 4 * room.size
+    assert others < room.nbytes
+
+    distance = lattice.map.table
+    x, y = (lattice.map._low[i] + lattice.map.step * np.arange(distance.shape[i]) for i in (0, 1))
+    points = np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
+    assert np.array_equal(distance, space.distance(points).reshape(distance.shape))
+
+    start, goals, margin = np.array([[0.5, 0.1, 0.2]]), np.array([[9.4, 0.3, 0.1], [5.1, 3.1, 2.0]]), 0.1
+    costs, ways = lattice.ways(start, np.zeros(1), goals, margin)
+    assert np.isfinite(costs).all()
+    for cost, way, goal in zip(costs.tolist(), ways, goals, strict=True):
+        assert np.array_equal(way[[0, -1]], [start[0], goal])
+        tracks = shortest_paths(way[:-1], way[1:], 1.0)
+        assert cost == pytest.approx(tracks.total, abs=1e-8)
+        assert limits.free(tracks, margin, lattice.map).all()
+    # A track is free where each of its places is, however many are looked at first.
+    poses = np.column_stack([rng.uniform([0, -4], [10, 4], (400, 2)), rng.uniform(0, 6, 400)])
+    tracks = shortest_paths(poses[:200], poses[200:], 1.0)
+    free, step = limits.free(tracks, margin, step=0.02), 0.05
+    for one, is_free in enumerate(free.tolist()):
+        places = tracks.take(np.array([one])).chain(step)
+        clear = limits.clearance(places).min()
+        assert clear >= margin - 0.1 * step if is_free else clear < margin + step
