@@ -63,7 +63,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     target = Path(path)
     if target.is_dir():
         raise InputError(f"{target} is a folder; give the name of a file")
-    if _is_stream(target):
+    if is_stream(target):
         with TemporaryDirectory() as folder:
             part = Path(folder, target.name)
             yield part
@@ -74,7 +74,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     target = target.resolve()  # a link of one's own stays, and what it points to is written
     refuse_kept(target.parent, [target.name])
     make_folder(target.parent)
-    with _refusals(target), TemporaryDirectory(dir=target.parent, prefix=".part-") as folder:
+    with refusals(target), TemporaryDirectory(dir=target.parent, prefix=".part-") as folder:
         part = Path(folder, target.name)
         yield part
         os.replace(part, target)
@@ -98,7 +98,7 @@ def files_together(folder: str | Path, names: Sequence[str]) -> Iterator[Path]:
     for name in names:
         if (target / name).exists() and not (target / name).is_file():
             raise InputError(f"{target / name} is not a regular file; remove it, or give another folder")
-    with _refusals(target), TemporaryDirectory(dir=target, prefix=".part-") as temporary:
+    with refusals(target), TemporaryDirectory(dir=target, prefix=".part-") as temporary:
         new, old = Path(temporary, "new"), Path(temporary, "old")
         new.mkdir()
         old.mkdir()
@@ -187,14 +187,14 @@ def write_text(path: str | Path, text: str) -> None:
         part.write_text(text, encoding="utf-8")
 
 
-def _is_stream(path: Path) -> bool:
+def is_stream(path: Path) -> bool:
     """Whether a path exists, but is no regular file that could be replaced."""
     return bool(_DESCRIPTOR.fullmatch(str(path))) or (path.exists() and not path.is_file())
 
 
 def _write_into(target: Path, part: Path) -> None:
     """Copy a complete file into a device, a pipe, or an open file of this process."""
-    with _refusals(target), open(part, "rb") as source, _opened(target) as sink:
+    with refusals(target), open(part, "rb") as source, _opened(target) as sink:
         shutil.copyfileobj(source, sink)
 
 
@@ -209,7 +209,7 @@ def _opened(target: Path) -> IO[bytes]:
 
 
 @contextmanager
-def _refusals(target: Path) -> Iterator[None]:
+def refusals(target: Path) -> Iterator[None]:
     """Turn what the operating system refuses into one line; the end of a pipe is no error of the file."""
     try:
         yield

@@ -11,6 +11,7 @@ from common.errors import InputError
 
 if TYPE_CHECKING:
     from sim.model.robot import Robot
+    from sim.robot_rows import RobotRows
 
 program = Program("sim", "simulate robots: steady motion, films, presets")
 main = program.main
@@ -25,18 +26,27 @@ def _steady(
     Args:
         robots: robot.toml, the name of a preset, or a table of points: CSV with
             C_t,C_r,C_yr,l_over_R,L_over_R,l_over_r0,omega_bar,N,…, or, with --robot, runs: N,l_cm,omega_rpm.
-        out: CSV with the same rows and their motion; needed for a table of points.
+        out: CSV with the same rows and their motion; needed for a table of points. Until it is there, OUT.journal
+            keeps the rows that are done, with which the same command goes on.
         shapes: of one robot, its shape and the forces on it in a turn of the disc: .npz, or .pvd for ParaView.
     """
     from sim.motion.batches import steady_columns
-    from sim.motion.steady_motion import describe_motion
-    from sim.robot_rows import command_rows, write_motion
+    from sim.robot_rows import command_rows
 
     rows = command_rows(robots, robot, out)
     if shapes is not None:
         _write_steady_shapes(rows.robots, shapes)
-    with rows.naming():
-        motion = steady_columns(rows.columns, title="steady" if rows.file else "", **steady.given)
+    with rows.journal(out, {**steady.given, "jobs": None}) as kept:
+        with rows.naming():
+            motion = steady_columns(rows.columns, title="steady" if rows.file else "", kept=kept, **steady.given)
+        _write_motion(rows, motion, out)
+
+
+def _write_motion(rows: RobotRows, motion: dict[str, Any], out: str | None) -> None:
+    """Say and write what was simulated."""
+    from sim.motion.steady_motion import describe_motion
+    from sim.robot_rows import write_motion
+
     if rows.file:
         said = _counts(rows.columns, motion)
     else:

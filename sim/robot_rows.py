@@ -13,9 +13,10 @@ have no lab units. `frame.attrs["units"]` has the unit of every column that has 
 
 from __future__ import annotations
 
+import json
 import sys
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +25,10 @@ import numpy as np
 
 from common.arrays import Floats
 from common.errors import InputError, naming
+from common.files import is_stream
+from common.journal import Journal, journal
+from common.provenance import code_version
+from common.reading import digest_of
 from common.units import column_units
 from sim.inputs import check_columns, group_columns, load_robot, names_robot, run_columns
 from sim.model.robot import Robot
@@ -56,6 +61,24 @@ class RobotRows:
     def naming(self) -> AbstractContextManager[None]:
         """Write the name of the table's file before messages."""
         return naming(self.file)
+
+    @contextmanager
+    def journal(self, out: str | None, options: Mapping[str, Any]) -> Iterator[Journal | None]:
+        """Keep the rows of a table that are done beside the file `out`, see `common.journal`; None: not kept.
+
+        Args:
+            out: the file; nothing is kept beside a stream.
+            options: that decide what is done with the rows.
+        """
+        if out is None or not self.file or is_stream(Path(out)):
+            yield None
+            return
+        numbers = {name: values.tolist() for name, values in self.columns.items()}
+        path, key = Path(f"{out}.journal"), digest_of(json.dumps([numbers, options, code_version()]))
+        with journal(path, key) as kept:
+            if kept.done:
+                print(f"note: goes on with the rows that are kept in {path}", file=sys.stderr)
+            yield kept
 
     def frame(self, values: Mapping[str, Any]) -> pd.DataFrame:
         """Make a table of M rows: names or given columns, columns in lab units, dimensionless columns.

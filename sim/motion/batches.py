@@ -16,6 +16,7 @@ from tqdm import tqdm
 
 from common.arrays import Floats, Integers
 from common.errors import InputError
+from common.journal import Journal
 from sim.inputs import check_columns
 from sim.model.groups import Groups
 from sim.motion.run import Resolution
@@ -50,6 +51,7 @@ def in_batches(
     *,
     jobs: int | None = None,
     title: str = "",
+    kept: Journal | None = None,
 ) -> dict[Any, Any]:
     """Apply `work` to batches of robots of one N in threads, and join its columns in the order of the robots.
 
@@ -59,6 +61,7 @@ def in_batches(
         rows: the most robots of a batch; the progress bar moves after each.
         jobs: threads; default all processors.
         title: of the progress bar; empty for none.
+        kept: has the batches that are done, and gets those that follow.
 
     Raises:
         InputError: fewer than one thread, or a robot is not possible.
@@ -66,27 +69,42 @@ def in_batches(
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs = {jobs}; give at least 1, or nothing for all processors")
     batches = split(columns["N"], rows)
-    parts = [Groups.from_columns({name: array[batch] for name, array in columns.items()}) for batch in batches]
-    count = min(jobs or available_jobs(), len(parts))
-    found = []
+    found: dict[int, Mapping[Any, Any]] = (
+        {} if kept is None else {k: _arrays(part) for k, part in kept.done.items()}
+    )
+    left = [k for k in range(len(batches)) if k not in found]
+    parts = [Groups.from_columns({name: array[batches[k]] for name, array in columns.items()}) for k in left]
+    count, before = min(jobs or available_jobs(), len(parts)), sum(len(batches[k]) for k in found)
     with (
         one_thread(),  # a setting of the process: set once, not in each thread
-        tqdm(total=len(columns["N"]), desc=title, unit="row", delay=1.0, disable=not title or None) as bar,
-    ):
+        tqdm(total=len(columns["N"]), initial=before, desc=title, unit="row", delay=1.0,
+             disable=not title or None) as bar,
+    ):  # fmt: skip
         done = map(work, parts)
         if count > 1:
             from joblib import Parallel, delayed  # slow to import, and one thread needs none of it
 
             done = Parallel(n_jobs=count, prefer="threads", return_as="generator")(map(delayed(work), parts))
-        for part in done:
-            found.append(part)
-            bar.update(len(batches[len(found) - 1]))
+        for k, part in zip(left, done, strict=True):
+            found[k] = part
+            if kept is not None:
+                kept.add(k, {name: values.tolist() for name, values in part.items()})
+            bar.update(len(batches[k]))
     order = np.argsort(np.concatenate(batches))
-    return {name: np.concatenate([part[name] for part in found])[order] for name in found[0]}
+    return {name: np.concatenate([found[k][name] for k in range(len(batches))])[order] for name in found[0]}
+
+
+def _arrays(columns: Mapping[str, list[Any]]) -> dict[str, Any]:
+    return {name: np.array(values) for name, values in columns.items()}
 
 
 def steady_columns(
-    columns: Mapping[str, Floats], *, stability: bool = True, jobs: int | None = None, title: str = "steady"
+    columns: Mapping[str, Floats],
+    *,
+    stability: bool = True,
+    jobs: int | None = None,
+    title: str = "steady",
+    kept: Journal | None = None,
 ) -> dict[str, Any]:
     """Simulate the steady motion of any robots, in parallel (`sim.motion.steady`).
 
@@ -95,6 +113,7 @@ def steady_columns(
         stability: whether to compute the growth of small perturbations, see `sim.motion.steady`.
         jobs: threads; default all processors.
         title: of the progress bar; empty for none.
+        kept: as for `in_batches`.
 
     Returns:
         The columns of `Steady.columns`, each (M,), in the order of the rows; without STABILITY_COLUMNS if these
@@ -105,7 +124,7 @@ def steady_columns(
         motion = steady(groups, stability=stability).columns()
         return {name: column for name, column in motion.items() if stability or name not in STABILITY_COLUMNS}
 
-    return in_batches(work, check_columns(columns), _DIRECT_ROWS, jobs=jobs, title=title)
+    return in_batches(work, check_columns(columns), _DIRECT_ROWS, jobs=jobs, title=title, kept=kept)
 
 
 def sensitivity_columns(
