@@ -44,7 +44,6 @@ from common.files import kept
 _HELP = {  # of parameters that no docstring describes
     "out": "folder",
     "jobs": "threads (default: all processors)",
-    "arduino": "DIR, an Arduino library with the schedule, and sketches that drive the motor",
     "robot": "robot.toml or the name of a preset",
     "plan": "plan.json",
     "data": "folder or URL of a data set",
@@ -203,7 +202,7 @@ def _sentence(about: str) -> str:
     return f"{about[0].upper()}{about[1:]}."
 
 
-_OUTPUTS = ("out", "check", "shapes")  # parameters that name files to write
+_OUTPUTS = ("out", "check", "shapes", "arduino", "micropython")  # parameters that name files to write
 
 
 class Call(NamedTuple):
@@ -242,11 +241,12 @@ class Subcommand(NamedTuple):
         return words[0].lower() + words[1:]
 
     def parameters(self) -> tuple[dict[str, FunctionParameter], dict[str, FunctionParameter]]:
-        """Return the parameters of the public function, and its own, without the first, which is that function."""
+        """Return the parameters of the public function, and its own, without that function."""
         own = read_function(self.place)
         if not self.of:
             return {}, own
-        return read_function(self.of), dict([*own.items()][1:])
+        call = _function(self.place)[0].args.args[0].arg
+        return read_function(self.of), {name: each for name, each in own.items() if name != call}
 
     def parser(self, prog: str) -> ArgumentParser:
         """Return a parser of this command alone."""

@@ -3,58 +3,67 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from common.commands import Call, Program
 from planner.paths.units import in_lab
 from planner.progress import progress_bar
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
     from planner.planning.plan import Plan
 
 program = Program("planner", "plan switching schedules for paths")
 main = program.main
 
 
-def _write(result: Plan, out: str, *lines: str, arduino: str | None = None) -> None:
+class BoardOptions(TypedDict, total=False):
+    """Folders for boards.
+
+    Attributes:
+        arduino: DIR, an Arduino library with the schedule, and sketches that drive the motor.
+        micropython: DIR, modules for MicroPython with the schedule, and the motor.
+    """
+
+    arduino: str
+    micropython: str
+
+
+def _write(result: Plan, out: str, *lines: str, **folders: Unpack[BoardOptions]) -> None:
     """Write a plan, and print warnings, what there is to say of it, and its files."""
-    from planner.files.arduino import write_arduino
+    from planner.files import boards
     from planner.files.plan_files import write_plan
 
-    library = [] if arduino is None else [write_arduino(result, arduino)]
-    files = [*write_plan(result, out), *library]
+    for_boards = [getattr(boards, f"write_{board}")(result, folder) for board, folder in folders.items()]
+    files = [*write_plan(result, out), *for_boards]
     for warning in result.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     for line in (*result.lines(), *lines, f"-> {', '.join(map(str, files))}"):
         print(line)
 
 
-def _refuse_early(arduino: str | None) -> None:
-    """Refuse a folder that no library can be written into, before a plan is made for it."""
-    if arduino is not None:
-        from planner.files.arduino import check_library
+def planned(call: Call, folders: BoardOptions, **further: Any) -> Plan:
+    """Plan with a public function and a bar; refuse first a folder that nothing can be written into."""
+    from planner.files.boards import check_folder
 
-        check_library(arduino)
-
-
-def planned(call: Call, *, arduino: str | None = None, **further: Any) -> Plan:
-    """Plan with a public function and a bar."""
-    _refuse_early(arduino)
+    for board, folder in folders.items():
+        check_folder(board, str(folder))
     with progress_bar() as progress:
         plan: Plan = call(progress=progress, **further)
     return plan
 
 
 @program.command("plan", of="planner.jobs.plan:plan", robot="--robot")
-def _plan(plan: Call, *, out: str, arduino: str | None = None) -> None:
+def _plan(plan: Call, *, out: str, **folders: Unpack[BoardOptions]) -> None:
     """Plan the switching times for a path."""
-    result = planned(plan, arduino=arduino, tell=print)
+    result = planned(plan, folders, tell=print)
     errors = result.errors
     rms, largest, missed = (
         in_lab(value, result.robot) for value in (errors.drawn_rms, errors.drawn_max, result.declared.missed)
     )
     drawn = f"from the path as drawn {rms} rms, {largest} at most; every drawn point is within {missed} of the "
-    _write(result, out, f"{drawn}declared path", arduino=arduino)
+    _write(result, out, f"{drawn}declared path", **folders)
 
 
 @program.command("goal", of="planner.goal.trip:to_goal", robot="--robot")
@@ -64,7 +73,7 @@ def _goal(
     goal: tuple[str, str, str],
     start: tuple[str, str, str] = ("0", "0", "0"),
     out: str,
-    arduino: str | None = None,
+    **folders: Unpack[BoardOptions],
 ) -> None:
     """Plan the way from one pose to another, around obstacles; exit status 3 where there is none.
 
@@ -72,13 +81,13 @@ def _goal(
         goal: X Y DEGREES, of the head's centre at the end.
         start: X Y DEGREES, of the head's centre at the start, at rest (default: 0 0 0).
     """
-    _write(planned(to_goal, arduino=arduino, start=start, goal=goal), out, arduino=arduino)
+    _write(planned(to_goal, folders, start=start, goal=goal), out, **folders)
 
 
 @program.command("hold", of="planner.jobs.hold:hold", robot="--robot", seconds="for")
 @program.command("tour", of="planner.jobs.tour:tour", robot="--robot", back="return")
-def _job(job: Call, *, out: str, arduino: str | None = None) -> None:
-    _write(planned(job, arduino=arduino), out, arduino=arduino)
+def _job(job: Call, *, out: str, **folders: Unpack[BoardOptions]) -> None:
+    _write(planned(job, folders), out, **folders)
 
 
 @program.command("page", of="planner.page.write_page:write_page", path="", robot="--robot", paths="path")

@@ -15,7 +15,8 @@ from common.provenance import __version__ as __version__
 from common.tables import read_table as read_table
 from dataset.api import sweep as sweep
 from dataset.data_set import read
-from planner.files.arduino import write_arduino as write_arduino
+from planner.files.boards import write_arduino as write_arduino
+from planner.files.boards import write_micropython as write_micropython
 from planner.files.plan_files import write_plan as write_plan
 from planner.files.saved_plan import load_goal as load_goal
 from planner.files.saved_plan import load_plan as load_plan

@@ -96,8 +96,9 @@ def schedule_template() -> str:
  * robot left. If it turns right, exchange the two wires of the motor, or -1 and +1 in your code.
  * Put the head's centre at START_X_CM, START_Y_CM with heading START_HEADING_DEG, at rest: in cm and degrees,
  * counter-clockwise from the x axis, seen from above. START_X and START_Y are the same in tail lengths,
- * START_HEADING in rad. Checkpoints say where it should be later, in tail lengths and rad.
- * C99 or C++11. Include it in one file only, since it holds the tables. */
+ * START_HEADING in rad.
+ * Checkpoints say where it should be later, in tail lengths and rad. C99 or C++11.
+ * Include it in one file only, since it holds the tables. */
 #ifndef SCHEDULE_H
 #define SCHEDULE_H
 #include <stdint.h>

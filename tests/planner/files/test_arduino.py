@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
-from planner.files.arduino import write_arduino
+from planner.files.boards import write_arduino
 from planner.files.headers import milliseconds
 from planner.jobs.plan import plan
 from planner.planning.plan import Plan
@@ -53,13 +53,13 @@ def run(library: Path, name: str, total: int, *words: str, first: int = 0, step:
     return np.array([[int(word) for word in line.split()] for line in done.stdout.splitlines()])
 
 
-def directions(events: np.ndarray) -> list[tuple[int, int]]:
-    """Times and directions of the motor: which input is at 255; never both are on."""
-    pins, turns = {PLUS: 0, MINUS: 0}, [(0, 0)]
-    for time, pin, value in events[np.isin(events[:, 1], [PLUS, MINUS])].tolist():
+def directions(events: np.ndarray, plus: int = PLUS, minus: int = MINUS, full: int = 255) -> list[tuple[int, int]]:
+    """Times and directions of the motor: which input is at the full duty; never both are on."""
+    pins, turns = {plus: 0, minus: 0}, [(0, 0)]
+    for time, pin, value in events[np.isin(events[:, 1], [plus, minus])].tolist():
         pins[pin] = value
-        assert sorted(pins.values()) in ([0, 0], [0, 255])
-        turn = (pins[PLUS] - pins[MINUS]) // 255
+        assert sorted(pins.values()) in ([0, 0], [0, full])
+        turn = (pins[plus] - pins[minus]) // full
         turns = [*turns[: -1 if turns[-1][0] == time else None], (time, turn)]
     return [turn for k, turn in enumerate(turns) if k == 0 or turn[1] != turns[k - 1][1]]
 
