@@ -123,6 +123,6 @@ def _schedule_module(result: Plan) -> str:
     del numbers["CHECKPOINTS"]
     numbers["REPEATS"] = str(result.lap is not None)
     entries = np.array(milliseconds(result.seconds), "<u2").tobytes()
-    lines = [f"    {entries[i : i + _A_LINE]}" for i in range(0, len(entries), _A_LINE)]
+    lines = [f"    {entries[i : i + _A_LINE]!r}" for i in range(0, len(entries), _A_LINE)]
     constants = [f"{name} = {value}" for name, value in numbers.items()]
     return "\n".join([f"# {words}", *constants, "ENTRIES = (", *lines, ")", ""])
