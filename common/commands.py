@@ -30,7 +30,7 @@ import os
 import re
 import sys
 import warnings
-from argparse import SUPPRESS, ArgumentParser
+from argparse import SUPPRESS, Action, ArgumentParser
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
 from importlib import import_module
@@ -40,6 +40,7 @@ from typing import Any, NamedTuple, NoReturn, TypeVar
 
 from common.errors import InputError, InputWarning, run_command
 from common.files import kept
+from common.glossary import terms_in
 
 _HELP = {  # of parameters that no docstring describes
     "out": "folder",
@@ -192,6 +193,15 @@ class Parser(ArgumentParser):
                 near = difflib.get_close_matches(option, known, 1)
                 self.error(f"no option {option}" + (f"; is it {near[0]}?" if near else ""))
         return super().parse_known_args(args, namespace)
+
+    def format_help(self) -> str:
+        """Explain below the options the terms that they and the description have."""
+        text, formatter = super().format_help(), self._get_formatter()
+        if terms := terms_in(text):
+            formatter.start_section("terms")
+            formatter.add_arguments(Action([], term, metavar=term, help=means) for term, means in terms.items())
+            formatter.end_section()
+        return "\n".join(filter(None, (text, formatter.format_help())))
 
     def error(self, message: str) -> NoReturn:
         """End with exit status 2."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import softflagella
+from common.glossary import TERMS
 from dataset.schema import FLAGS, INPUTS, OUTPUTS
 from sim.effects import catalogue
 from sim.model.effect import Effect
@@ -23,7 +24,7 @@ from softflagella.shadowing import PACKAGES
 def write_generated_pages(folder: Path) -> None:
     """Write what pages of the same names include into `folder`, where it has changed."""
     folder.mkdir(parents=True, exist_ok=True)
-    for make in (effects_page, columns_page, objects_page, commands_page):
+    for make in (effects_page, columns_page, objects_page, commands_page, glossary_page):
         page, text = folder / f"{make.__name__.removesuffix('_page')}.md", "\n\n".join(filter(None, make())) + "\n"
         if not page.exists() or page.read_text() != text:
             page.write_text(text)
@@ -109,6 +110,11 @@ def commands_page() -> Iterator[str]:
         for name, packaged in program.commands.items():
             yield f"### {package} {name}"
             yield usage(packaged.parser(f"softflagella {package} {name}").format_help())
+
+
+def glossary_page() -> Iterator[str]:
+    """List the terms that the help of commands explains."""
+    yield table(("term", "meaning"), sorted(TERMS.items(), key=lambda item: item[0].lower()))
 
 
 def number(*values: float) -> str:

@@ -104,7 +104,7 @@ class PointOptions(DwellOptions, total=False):
     """Which point follows, and what decides the dwell.
 
     Attributes:
-        point: which point of the robot follows the path or does the job (default: head_centre).
+        point: which point of the robot follows the declared path or does the job (default: head_centre).
         objective: what decides the dwell: small error, short time, or few flips (default: error).
         dwell: this shortest dwell, in time units, and not the one that the objective would choose.
     """

@@ -85,14 +85,19 @@ def _counts(robots: dict[str, Any], motion: dict[str, Any]) -> str:
 
 @program.command("effects")
 def _effects() -> None:
-    """List the effects that the base model leaves out, a sentence each."""
+    """List the effects that the base model leaves out: name, size, unit, what it is, and its inputs."""
     from importlib import import_module
 
     from sim.effects import catalogue
 
-    for name in catalogue():
+    print(f"{'name':22} {'size':>6} {'unit':32} what it is; the size is one that is often met")
+    for name, effect in catalogue().items():
         sentence = str(import_module(f"sim.effects.{name}").__doc__).splitlines()[0]
-        print(f"{name:22} {sentence}")
+        print(f"{name:22} {effect.typical:>6g} {effect.unit:32} {sentence}")
+        for driver in effect.drivers:
+            print(f"{'':22} {driver.typical:>6g} {driver.unit:32} times {driver.column}, a column of runs")
+        if effect.beside:
+            print(f"{'':62} it shows only beside {effect.beside}")
 
 
 @program.command("film")

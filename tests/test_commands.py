@@ -45,7 +45,7 @@ from tests.shared import FOLDER, shared
 FILES = {"plan.json", "plan.csv", "plan.svg", "schedule.h"}
 SAID = {  # by commands that write nothing
     "sim check": "this simulator, its fit     0.403",
-    "sim effects": "end_over_end_drag      Drag moment on the head when it turns end over end.",
+    "sim effects": "end_over_end_drag           5 8π μ0 R³  ",
     "sim compile": "loops compiled in",
     "surrogate compile": "loops compiled in",
 }

@@ -217,7 +217,7 @@ def _replay(
 
 @program.command("check", of="tracking.tracks:check", written_by="from")
 def _check(check: Call, plan: str, *, out: str | None = None) -> None:
-    """Tracking error of a replayed track.
+    """Compare a replayed or measured track with the declared path and the stated error of its plan.
 
     Args:
         out: overlay picture, PNG.

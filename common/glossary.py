@@ -1,0 +1,35 @@
+"""What terms mean, for the page of the glossary and for the help of the commands whose texts have them."""
+
+from __future__ import annotations
+
+import re
+
+TERMS = {  # a meaning has only terms that come later
+    "objective": "error: a small stated error; the paper's control robot flips every 2 s (with gears see "
+    "--minimum-seconds); time: a short duration, every 7 s; flips: as few as --tolerance allows, every 12 s",
+    "point of the robot": "on its axis: head_centre, head_tip, the front end of the head, or pivot",
+    "stated error": "distance from the declared path that 95 of 100 such robots keep to, without feedback",
+    "declared path": "the nearest path to the given one that the robot can follow; errors are distances from it",
+    "dwell": "time between two flips of the motor",
+    "pivot": "the point of the axis that does not slip sideways",
+    "Dubins path": "shortest path of bounded curvature between two poses: arcs of the smallest radius and "
+    "straight lines",
+    "domain": "the robots that a look-up table answers for",
+    "law": "a place on the robot where an unknown term acts, and the inputs on which the term depends",
+    "nuisance parameter": "a number of the robot or of the measurement that influences the prediction but is of "
+    "no interest itself; it is fitted with a prior",
+    "outlier": "a run that is excluded, because it is incompatible with the others and the noise",
+    "score": "test statistic of an effect: the part of its signal that the fit cannot absorb, in standard "
+    "deviations of the noise",
+    "session": "runs that share a filling of the tank, a day, or a robot",
+}
+
+
+def terms_in(text: str) -> dict[str, str]:
+    """Return the terms that a text has, with their meanings, and those that the meanings have."""
+    found = {}
+    for term, meaning in TERMS.items():
+        if re.search(rf"\b{term}\b", " ".join(text.split()), re.IGNORECASE):
+            found[term] = meaning
+            text += f" {meaning}"
+    return dict(sorted(found.items(), key=lambda item: item[0].lower()))
