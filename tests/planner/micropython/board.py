@@ -19,7 +19,7 @@ def at_once(ms):
     return ms
 
 
-class Clock:
+class Ticks:
     def __init__(self):
         self.now = 0
 
@@ -82,7 +82,7 @@ class Serial:
         return orders.pop(0)[1]
 
 
-clock, serial = Clock(), Serial()
+clock, serial = Ticks(), Serial()
 sys.modules.update({"time": clock, "machine": Machine(), "select": serial, "sys": serial})
 sys.path.insert(0, ".")
 try:
