@@ -10,6 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 from common.arrays import Floats
@@ -37,19 +38,22 @@ def draw_trends(rows: pd.DataFrame, output: str, inputs: Sequence[str]) -> Figur
     figure = Figure(figsize=(11, 2.6 * -(-len(inputs) // columns)))
     for panel, name in enumerate(inputs):
         axes = figure.add_subplot(-(-len(inputs) // columns), columns, panel + 1)
-        parts = [(colour(float(str(tails))), part) for tails, part in rows.groupby("N")]
-        if len(parts) > _MOST_BANDS:
-            _draw_band(axes, rows[name].to_numpy(float), rows[output].to_numpy(float), _ALL, line=False)
-        for shade, part in parts:
-            x, y = part[name].to_numpy(float), part[output].to_numpy(float)
-            _draw_band(axes, x, y, shade, band=len(parts) <= _MOST_BANDS)
-        _style(
-            axes,
-            x=column_named(name).title,
-            y=column_named(output).title if panel % columns == 0 else "",
-            logarithmic="x" * column_named(name).logarithmic + "y" * column_named(output).logarithmic,
-        )
+        plot_trend(axes, rows, output, name)
+        if panel % columns:
+            axes.set_ylabel("")
     return _with_tails_above(figure, rows, 0.95)
+
+
+def plot_trend(axes: Axes, rows: pd.DataFrame, output: str, name: str) -> None:
+    """Draw an output against an input, as `draw_trends` does, without a legend."""
+    parts = [(colour(float(str(tails))), part) for tails, part in rows.groupby("N")]
+    x, y = column_named(name), column_named(output)
+    if len(parts) > _MOST_BANDS:
+        _draw_band(axes, rows[name].to_numpy(float), rows[output].to_numpy(float), _ALL, line=False)
+    for shade, part in parts:
+        values = part[name].to_numpy(float), part[output].to_numpy(float)
+        _draw_band(axes, *values, shade, band=len(parts) <= _MOST_BANDS)
+    _style(axes, x=x.title, y=y.title, logarithmic="x" * x.logarithmic + "y" * y.logarithmic)
 
 
 def _draw_band(axes: Axes, x: Floats, y: Floats, shade: str, *, line: bool = True, band: bool = True) -> None:
@@ -177,10 +181,15 @@ def _style(
 def _with_tails_above(figure: Figure, rows: pd.DataFrame, top: float) -> Figure:
     """Add a legend of the numbers of tails above the panels, which end at `top` of the figure's height."""
     axes = figure.axes[0]
-    handles = [axes.plot([], [], color=colour(n), label=f"N = {n}")[0] for n in sorted(set(rows["N"]))]
+    handles = add_tails(axes, rows)
     figure.legend(handles=handles, ncols=len(handles), fontsize=8, frameon=False, loc="upper center")
     figure.tight_layout(rect=(0, 0, 1, top))
     return figure
+
+
+def add_tails(axes: Axes, rows: pd.DataFrame) -> list[Line2D]:
+    """Add what a legend of the numbers of tails shows."""
+    return [axes.plot([], [], color=colour(n), label=f"N = {n}")[0] for n in sorted(set(rows["N"]))]
 
 
 def _finished(figure: Figure, **legend: Any) -> Figure:

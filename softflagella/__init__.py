@@ -43,7 +43,8 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, attribute = _HOMES[name]
-    value = getattr(import_module(module), attribute)
+    own = module == __name__  # a module of this package, as plot
+    value = import_module(f"{module}.{attribute}") if own else getattr(import_module(module), attribute)
     globals()[name] = value
     return value
 

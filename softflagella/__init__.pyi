@@ -49,6 +49,7 @@ from sim.knowledge import CalibrationKnowledge as CalibrationKnowledge
 from sim.model.robot import Robot as Robot
 from sim.model.schedule import Schedule as Schedule
 from sim.model.schedule import load_schedule as load_schedule
+from softflagella import plot as plot
 from softflagella.closed_loop import calibrate as calibrate
 from surrogate.api import inverse as inverse
 from surrogate.api import query as query

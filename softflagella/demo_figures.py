@@ -17,7 +17,7 @@ from dataset.figures import plain_logarithms
 from planner.planning.picture import draw_tracks
 from sim.model.response import DWELLS
 from sim.model.robot import Robot
-from sim.motion.robot_views import draw_from_above, draw_from_behind, scene
+from sim.motion.robot_views import draw_from_above, draw_from_behind, plot_circles, scene
 from sim.motion.steady_motion import RPM, Steady, lab_columns
 from tracking.tracks import TrackingError, draw_overlay
 
@@ -61,21 +61,7 @@ def draw_circles(robot: Robot, motions: Sequence[Steady]) -> Figure:
     """Draw the circles of the head's centre for both directions of the motor, from the same start."""
     figure = Figure(figsize=(_WIDTH, 3.9))
     axes = figure.add_subplot()
-    cm = 100 * robot.tail_length
-    for motion, label, colour in zip(motions, ("motor at +1", "motor at −1"), (_LEFT, _RIGHT), strict=True):
-        turn, sway, surge = float(motion.omega_yr[0]), float(motion.v_x[0]), float(motion.v_z[0])
-        heading = np.linspace(0, 2 * np.pi, 200) * np.sign(turn)
-        x = cm * (surge * np.sin(heading) - sway * (1 - np.cos(heading))) / turn
-        y = cm * (surge * (1 - np.cos(heading)) + sway * np.sin(heading)) / turn
-        axes.plot(x, y, color=colour, label=label)
-        axes.annotate(
-            "", (x[30], y[30]), (x[27], y[27]), arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.2}
-        )
-    axes.plot(0, 0, "o", color=INK, ms=5)
-    axes.annotate("", (5, 0), (0, 0), arrowprops={"arrowstyle": "-|>", "color": INK})
-    axes.text(5.3, 0, "heading\nat the start", fontsize=8, va="center")
-    axes.set_aspect("equal")
-    axes.set_xlim(right=15)
+    plot_circles(axes, robot, motions)
     _label(axes, "x [cm]", "y [cm]")
     _legend_above(axes)
     return _finished(figure)

@@ -241,6 +241,15 @@ class NeuralTable(Shown):
         within = ", ".join(f"{name} {low:.4g} to {high:.4g}" for name, low, high in ends)
         return "\n".join([*lines, f"  within {within}"])
 
+    def quantities(self) -> list[tuple[str, str]]:
+        """List the held-out errors, and the robots that it knows."""
+        frame = 100 * self.to_frame()
+        rows = [
+            (f"error of {name}", f"median {row['median']:.2g} %, 95 % of robots below {row['p95']:.2g} %")
+            for name, row in frame.loc[frame.index.isin(RELATIVE)].iterrows()
+        ]
+        return [*rows, ("robots", repr(self).splitlines()[-1].strip())]
+
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw median and 95th percentile of the held-out errors of each steady output [%].
 

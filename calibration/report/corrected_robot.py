@@ -43,11 +43,12 @@ from common.reading import sealed
 from common.units import from_si, to_si
 from sim.effects import catalogue, effect_named, is_effect
 from sim.knowledge import NUMBERS, CalibrationKnowledge, knowledge_toml
+from sim.model.entries import ENTRIES
 from sim.model.laws import Load, make_law
 from sim.model.learnt_range import learnt_range
 from sim.model.presets import CONTROL
 from sim.model.robot import Robot
-from sim.model.robot_toml import ENTRIES, robot_toml
+from sim.model.robot_toml import robot_toml
 from surrogate.domain import COEFFICIENTS
 
 _CERTAIN = 1e-12  # least variance of a logarithm, and of a correlated combination of them

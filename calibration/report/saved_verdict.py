@@ -12,9 +12,10 @@ import pandas as pd
 
 from calibration.report.path_error import PathError
 from calibration.report.report import write_report
-from calibration.verdict.record import verdict_record
+from calibration.verdict.record import facts, verdict_record
 from calibration.verdict.samples import draw_samples
 from calibration.verdict.verdict import Verdict
+from calibration.words.quantities import sized
 from common.files import files_together, write_text
 from common.notebook import Shown, given_axes
 
@@ -34,6 +35,12 @@ class SavedVerdict(Shown, Verdict):
     @abstractmethod
     def _corrected_file(self) -> tuple[str, str]:
         """Return the name and the text of the file with what is corrected."""
+
+    def quantities(self) -> list[tuple[str, str]]:
+        """List conclusion, errors, and the numbers of the fit with their 95 % intervals."""
+        fitted = facts(self)["parameters"].values()
+        numbers = [(of["title"], sized(of["value"], of["interval"], of)) for of in fitted]
+        return [("conclusion", self.sentence), ("errors", self.errors_in_words), *numbers]
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the residual of each output, before and after, over the noise of a run.

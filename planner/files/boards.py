@@ -67,6 +67,10 @@ def write_micropython(result: Plan, folder: str | Path) -> Path:
 
     Raises:
         InputError: a dwell is too short for whole milliseconds, or the folder holds other files.
+
+    Example:
+        >>> from softflagella import circle, plan, write_micropython
+        >>> write_micropython(plan(circle(2.0), "paper-control"), "modules")  # doctest: +SKIP
     """
     modules = {"schedule.py": _schedule_module(result), "motor.py": _MOTOR.read_text()}
     return _write("micropython", folder, modules)

@@ -15,7 +15,7 @@ from planner.page.first_state import camel
 from planner.planning.request import PlanRequest
 from sim.knowledge import UNMEASURED
 from sim.model import uncertainty
-from sim.model.robot_toml import ENTRIES
+from sim.model.entries import ENTRIES
 
 _NAMES = {  # of each module; a leading underscore is left out
     "planner.files.headers": "MOST_MS CHECKPOINTS",

@@ -291,6 +291,22 @@ class Plan(Shown, Generic[J]):
             lines.append(f"  {count}: {textwrap.shorten(self.warnings[0], 120, placeholder=' …')}")
         return "\n".join(lines)
 
+    def quantities(self) -> list[tuple[str, str]]:
+        """List start and errors; what there is to say of obstacles, laps and the job; and warnings."""
+        robot, (x, y, heading) = self.robot, self.start
+        errors = {"predicted error, rms": self.predicted_rms, "predicted error, largest": self.predicted_max}
+        errors["stated error, open loop"] = self.stated_error
+        if self.feedback_error < self.stated_error:
+            errors["stated error, with feedback"] = self.feedback_error
+        given = "" if self.tracked.calibrated else ", if the coefficients are exact"
+        return [
+            ("start, at rest", f"{place_in_lab(x, y, robot)}, heading {heading_in_degrees(heading)}"),
+            *((name, f"{in_lab(error, robot)}{given}") for name, error in errors.items()),
+            *(("otherwise", words) for words in filter(None, [self.unmeasured_words])),
+            *(("besides", line) for line in self.conditions()),
+            *(("warning", warning) for warning in self.warnings),
+        ]
+
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the drawn, the declared and the predicted path, with the stated error, on axes in cm.
 
@@ -321,11 +337,14 @@ class Plan(Shown, Generic[J]):
             f"{len(self.dwells)} dwells of {shortest} ({self.minimum_dwell:.2f} time units) or more, {whole} "
             "in all",
             *self.error_line.splitlines(),
-            *([] if self.kept_clear is None else self.kept_clear.lines(robot)),
         ]
-        if self.lap is not None:
-            lines.append(self.lap.line(robot))
-        return lines if self.job is None else [*lines, *self.job.lines(self)]
+        return [*lines, *self.conditions()]
+
+    def conditions(self) -> list[str]:
+        """Say what the plan keeps clear of, how its laps differ, and what it does for its job."""
+        kept_clear = [] if self.kept_clear is None else self.kept_clear.lines(self.robot)
+        lap = [] if self.lap is None else [self.lap.line(self.robot)]
+        return [*kept_clear, *lap, *([] if self.job is None else self.job.lines(self))]
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Return the columns of `to_frame`, each (M,)."""

@@ -15,7 +15,8 @@ from typing import Any
 
 from common.errors import InputError
 from common.notebook import Shown
-from common.units import format_length, from_si
+from common.units import UNITS, format_length, from_si
+from sim.model.entries import ENTRIES
 from sim.model.groups import Groups, check_finite, check_positive, check_slenderness, check_tails
 from sim.model.learnt_range import LearntRange
 from sim.model.uncertainty import DEFAULTS, Sigma
@@ -109,6 +110,19 @@ class Robot(Shown):
         if self.effects:
             lines.append("  effects: " + ", ".join(f"{name} {size:.4g}" for name, size in self.effects.items()))
         return "\n".join(lines)
+
+    def quantities(self) -> list[tuple[str, str]]:
+        """List the numbers of robot.toml with units, stated standard deviations, and effects."""
+        rows = []
+        for entry in ENTRIES:
+            if (value := getattr(self, entry.field)) is not None:
+                numbers = [value, *([self.sigmas[entry.field].of(value)] if entry.field in self.sigmas else [])]
+                words = [f"{from_si(number, entry.unit) if entry.unit else number:.4g}" for number in numbers]
+                unit = f" {UNITS[entry.unit].text}" if entry.unit else ""
+                name = entry.quantity.replace("_", " ") if entry.unit else entry.quantity
+                rows.append((f"{entry.table}, {name}", f"{' ± '.join(words)}{unit}"))
+        effects = [(f"effect {name}", f"{size:.4g}") for name, size in self.effects.items()]
+        return [*rows, ("unit of time", f"{self.time_scale:.4g} s"), *effects]
 
     def sigma(self, name: str) -> Sigma:
         """Return one standard deviation of a field, as stated or by default (`sim.model.uncertainty`)."""

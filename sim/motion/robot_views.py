@@ -6,6 +6,7 @@ Arrows, arcs and angles are those of a simulation with the motor at +1.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,9 +17,11 @@ from sim.mechanics import planar
 from sim.model.robot import Robot
 from sim.motion.shapes import nodes_in_body, steady_states
 from sim.motion.steady import steady
+from sim.motion.steady_motion import Steady
 
 HEADING = math.radians(20)
 INK, PALE, TAIL, HEAD, PATH, TURN = "#222222", "#9aa3ab", "#c8452f", "#2a6fa8", "#2a7f4f", "#8a4fa8"
+CIRCLES = ("#2a7fba", "#e08a1e")  # of the directions of the motor
 SIZE = 9.5
 
 
@@ -169,3 +172,24 @@ def draw_from_behind(axes: Any, shown: RobotScene) -> None:
     axes.set_title("from behind: the motor at +1", fontsize=SIZE + 1.5)
     axes.set_xlim(-2.4, 2.4)
     axes.set_ylim(-2.1, 1.7)
+
+
+def plot_circles(axes: Any, robot: Robot, motions: Sequence[Steady]) -> None:
+    """Draw the circles of the head's centre for motor directions +1 and -1, from the same start, on axes in cm."""
+    cm = 100 * robot.tail_length
+    for motion, label, colour in zip(motions, ("motor at +1", "motor at −1"), CIRCLES, strict=True):
+        turn, sway, surge = float(motion.omega_yr[0]), float(motion.v_x[0]), float(motion.v_z[0])
+        heading = np.linspace(0, 2 * np.pi, 200) * np.sign(turn)
+        x = cm * (surge * np.sin(heading) - sway * (1 - np.cos(heading))) / turn
+        y = cm * (surge * (1 - np.cos(heading)) + sway * np.sin(heading)) / turn
+        axes.plot(x, y, color=colour, label=label)
+        axes.annotate(
+            "", (x[30], y[30]), (x[27], y[27]), arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.2}
+        )
+    axes.plot(0, 0, "o", color=INK, ms=5)
+    axes.annotate("", (0.45 * cm, 0), (0, 0), arrowprops={"arrowstyle": "-|>", "color": INK})
+    axes.text(0.48 * cm, 0, "heading\nat the start", fontsize=8, va="center")
+    axes.set_aspect("equal")
+    axes.set_xlim(right=max(1.4 * cm, axes.get_xlim()[1]))
+    axes.set_xlabel("x [cm]")
+    axes.set_ylabel("y [cm]")

@@ -74,6 +74,8 @@ def test_a_notebook_shows_escaped_text_and_the_picture_below_it() -> None:
     page = as_html('<script>\n  "a" & b')
     assert "&lt;script&gt;\n  &quot;a&quot; &amp; b</pre>" in page
     assert "<img" not in page
+    page = as_html("a plan", rows=[("<b>error</b>", "2 mm & more")])
+    assert "<tr><td>&lt;b&gt;error&lt;/b&gt;</td><td>2 mm &amp; more</td></tr></table>" in page
     page = as_html('Plan of "x"\nmore', lambda axes: axes.plot([0, 1]))
     match = re.search(r'<img alt="([^"]*)" src="data:image/png;base64,([^"]+)">$', page)
     assert match

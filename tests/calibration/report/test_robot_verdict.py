@@ -69,6 +69,16 @@ def test_a_verdict_says_what_it_found_in_a_few_lines() -> None:
     page = verdict._repr_html_()
     assert page.startswith("<pre ")
     assert "data:image/png" in page
+    values = dict(verdict.quantities())
+    assert verdict.sentence == values.pop("conclusion")
+    assert values.pop("errors") == verdict.errors_in_words
+    parameters = verdict.to_dict()["parameters"]
+    assert set(values) == {each["title"] for each in parameters.values()}
+    for each in parameters.values():
+        number, low, high = map(
+            float, re.findall(r"-?[\d.]+(?:e-?\d+)?", values[each["title"]].replace("−", "-"))[:3]
+        )
+        assert low < number < high
     axes = Figure().add_subplot()
     assert verdict.plot(axes) is axes
     assert axes.patches
