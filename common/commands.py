@@ -38,6 +38,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn, TypeVar
 
+from common.changes import changing
 from common.errors import InputError, InputWarning, run_command
 from common.files import kept
 from common.glossary import terms_in
@@ -212,6 +213,7 @@ def _sentence(about: str) -> str:
     return f"{about[0].upper()}{about[1:]}."
 
 
+_ROBOTS = ("robot", "robots", "preset")  # parameters that name a robot, which --set changes
 _OUTPUTS = ("out", "check", "shapes", "arduino", "micropython")  # parameters that name files to write
 
 
@@ -268,13 +270,19 @@ class Subcommand(NamedTuple):
             words = _from_words(parameter.hint, parameter.file) if parameter.hint else None
             if name and words is not None:
                 _add(parser, parameter, name.replace("_", "-"), words)
+        if not {*theirs, *own}.isdisjoint(_ROBOTS):
+            about = "change an entry of robot.toml, such as fluid.viscosity_Pa_s=0.7; may be given again"
+            parser.add_argument("--set", action="append", metavar="KEY=VALUE", help=about)
         return parser
 
     def main(self, prog: str, words: list[str]) -> None:
         """Parse words and run the command."""
         given, names = vars(self.parser(prog).parse_args(words)), self.parameters()[1]
+        changes = given.pop("set", [])
         own = {name: given.pop(name) for name in [*given] if name in names}
-        with kept(_inputs({**given, **own})), warnings.catch_warnings():
+        written = {**given, **own}
+        robots = [written[name] for name in _ROBOTS if name in written]
+        with kept(_inputs(written)), changing(robots, changes), warnings.catch_warnings():
             warnings.simplefilter("default", InputWarning)  # each line once
             warnings.showwarning = partial(_show_warning, warnings.showwarning)
             self.run(*([Call(self.of, given)] if self.of else []), **own)

@@ -6,7 +6,9 @@ import os
 import shlex
 import threading
 
+from common.changes import changes_of
 from common.commands import Call, Program
+from common.errors import InputError
 
 program = Program("dataset", "simulate sweeps into data sets, report and verify them")
 main = program.main
@@ -90,6 +92,8 @@ def _config(*, out: str, robot: str | None = None) -> None:
 
     if robot is None:
         text = SWEEP_TOML.read_text()
+    elif changes_of(robot):
+        raise InputError(f"a sweep.toml names the file of its robot, {robot}; change that, not --set")
     else:
         source = robot if robot in PRESETS else os.path.relpath(robot, os.path.dirname(os.path.abspath(out)))
         text = sweep_toml(load_robot(robot), source)

@@ -131,13 +131,12 @@ def _robot(preset: str, *, out: str) -> None:
         preset: paper-control, paper-triangle or paper-measured.
         out: robot.toml.
     """
-    from common.files import write_text
+    from sim.inputs import load_robot, save_robot
     from sim.model.presets import PRESETS
-    from sim.model.robot_toml import robot_toml
 
     if preset not in PRESETS:
         raise InputError(f"no preset {preset!r}; there are {', '.join(PRESETS)}")
-    write_text(out, robot_toml(PRESETS[preset]))
+    save_robot(load_robot(preset), out)
     print(f"{preset} -> {out}")
 
 

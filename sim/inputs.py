@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from common.arrays import Floats
+from common.changes import changed, changes_of
 from common.errors import InputError, InputWarning, naming
 from common.files import write_text
 from common.keywords import checks_keywords
@@ -25,7 +27,7 @@ from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, checked_values
 from sim.model.learnt_range import read_learnt_range
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
-from sim.model.robot_toml import doubtful, read_robot, robot_toml
+from sim.model.robot_toml import check_keys, doubtful, read_robot, robot_toml
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,6 +104,8 @@ def names_robot(source: str | Path) -> bool:
 def load_robot(source: str | Path) -> Robot:
     """Load a robot from a preset's name or a robot.toml; an `InputWarning` asks about doubtful units.
 
+    A command reads its robot with the changes of `--set` (`common.changes`).
+
     Args:
         source: path of a file, or one of `sim.model.presets.PRESETS`.
 
@@ -113,17 +117,31 @@ def load_robot(source: str | Path) -> Robot:
         >>> load_robot("paper-control").tails
         2
     """
-    if str(source) in PRESETS:
-        return PRESETS[str(source)]
-    path = Path(source)
-    if not path.exists():
+    path, preset, changes = Path(source), PRESETS.get(str(source)), changes_of(source)
+    if preset and not changes:
+        return preset
+    if not preset and not path.exists():
         raise InputError(f"no robot {str(source)!r}; give a robot.toml or one of {', '.join(PRESETS)}")
     with naming(path):
-        return _read_robot(path)
+        tables = tomllib.loads(robot_toml(preset)) if preset else read_toml(path)
+        robot = robot_of(tables, path)
+    if changes:
+        check_keys(changes)
+        tables = changed(tables, changes)
+        with naming("--set"):
+            robot = robot_of(tables, path)
+    if doubts := ", ".join(doubtful(tables)):
+        warnings.warn(f"{path}: {doubts}", InputWarning, stacklevel=1)  # from one place, so once a command
+    return robot
 
 
-def _read_robot(path: Path) -> Robot:
-    tables = read_toml(path)
+def robot_of(content: Mapping[str, Any], path: Path) -> Robot:
+    """Return the robot that the content of a robot.toml describes.
+
+    Raises:
+        InputError: it describes none.
+    """
+    tables = dict(content)
     name = tables.pop("name", path.stem)
     tables.pop("calibration", None)  # read by sim.knowledge
     if "correction" in tables:
@@ -134,10 +152,7 @@ def _read_robot(path: Path) -> Robot:
         raise InputError(f"effects = {effects!r}; write a table [effects] with lines name = size")
     values = read_robot(tables)
     check_effects(effects)
-    robot = Robot(name=str(name), effects=dict(effects), learnt_from=learnt_from, **values)
-    if doubts := ", ".join(doubtful(tables)):
-        warnings.warn(f"{path}: {doubts}", InputWarning, stacklevel=1)  # from one place, so once a command
-    return robot
+    return Robot(name=str(name), effects=dict(effects), learnt_from=learnt_from, **values)
 
 
 @checks_keywords

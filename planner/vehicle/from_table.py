@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.arrays import Floats
+from common.changes import changes_of
 from common.errors import InputError
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle, lag_table, resampled
 from planner.vehicle.zigzag import LONGEST
@@ -77,7 +78,7 @@ def table_for(
             reason = f"{str(unknown).partition('; ')[0]}: "
         else:
             return shipped
-    kept = None if source is None or source in PRESETS else Path(source).with_suffix(ENDING)
+    kept = None if source is None or source in PRESETS or changes_of(source) else Path(source).with_suffix(ENDING)
     table = _kept_table(robot, kept, knowledge)
     if table is None:
         if robot.omega_bar < _STIFF:

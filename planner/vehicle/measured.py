@@ -26,6 +26,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from common.arrays import Floats
+from common.changes import changed, changes_of
 from common.errors import InputError, naming
 from common.reading import read_toml
 from common.units import UNITS, of_kind, split, to_si
@@ -184,7 +185,7 @@ class MeasuredVehicle:
         Raises:
             InputError: the file does not describe a vehicle; the message names the key.
         """
-        content = read_toml(path)
+        content = changed(read_toml(path), changes_of(path))
         with naming(path):
             return MeasuredVehicle.from_dict({"name": Path(path).stem, **content})
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 import difflib
 import json
 import math
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 from common.errors import InputError
 from common.units import UNITS, from_si, of_kind, split, to_si
@@ -77,9 +77,9 @@ def read_robot(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def doubtful(tables: Mapping[str, Any]) -> Iterator[str]:
-    """Ask about each number, of tables that `read_robot` has read, that silicone in glycerine can hardly have."""
+    """Ask about each number, of a robot.toml that has been read, that silicone in glycerine can hardly have."""
     for table, content in tables.items():
-        for key, number in content.items():
+        for key, number in content.items() if isinstance(content, dict) else ():
             entry, unit = _entry(table, key), split(key).unit
             paper = getattr(PRESETS["paper-control"], entry.field) if entry and entry.field != "tails" else None
             if not (entry and paper and number):
@@ -93,6 +93,18 @@ def doubtful(tables: Mapping[str, Any]) -> Iterator[str]:
                 asked = f"is its unit {likely}?" if 1 / _NEAR <= times[likely] <= _NEAR else "is it right?"
                 size = f"{ratio:,.0f}" if 1 < ratio < 1e9 else f"{ratio:.2g}"
                 yield f"{key} = {number:g} is {size} times that of the paper's robot; {asked}"
+
+
+def check_keys(names: Iterable[str]) -> None:
+    """Refuse names TABLE.KEY that are no entry of a robot, with the nearest ones."""
+    known = ["name", *(f"{entry.table}.{entry.key}" for entry in ENTRIES)]
+    for name in names:
+        table, _, key = name.rpartition(".")
+        if name == "name" or table == "effects" or _entry(table, key.removesuffix(_SIGMA)):
+            continue
+        near = [each for each in known if key in each] or difflib.get_close_matches(name, known, 3, 0.5)
+        hint = f"is it {' or '.join(near)}?" if near else f"there are {', '.join(known)} and effects.NAME"
+        raise InputError(f"--set {name}: a robot has no such entry; {hint}")
 
 
 def robot_toml(robot: Robot) -> str:
