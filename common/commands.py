@@ -214,7 +214,7 @@ def _sentence(about: str) -> str:
 
 
 _ROBOTS = ("robot", "robots", "preset")  # parameters that name a robot, which --set changes
-_OUTPUTS = ("out", "check", "shapes", "arduino", "micropython")  # parameters that name files to write
+_OUTPUTS = ("out", "check", "shapes", "arduino", "micropython", "plot")  # parameters that name files to write
 
 
 class Call(NamedTuple):

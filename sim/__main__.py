@@ -19,7 +19,14 @@ main = program.main
 
 @program.command("steady", of="sim.api:steady")
 def _steady(
-    steady: Call, robots: str, *, robot: str | None = None, out: str | None = None, shapes: str | None = None
+    steady: Call,
+    robots: str,
+    *,
+    robot: str | None = None,
+    out: str | None = None,
+    shapes: str | None = None,
+    vary: Sequence[str] = (),
+    plot: str | None = None,
 ) -> None:
     """Mean motion of a robot, or of many, at constant motor speed.
 
@@ -29,10 +36,19 @@ def _steady(
         out: CSV with the same rows and their motion; needed for a table of points. Until it is there, OUT.journal
             keeps the rows that are done, with which the same command goes on.
         shapes: of one robot, its shape and the forces on it in a turn of the disc: .npz, or .pvd for ParaView.
+        vary: KEY=VALUES, a number of one robot: motor.speed_rpm=20:120:11, drag.C_t=1:8:9log, or a list; a second
+            one makes a family of curves.
+        plot: SVG, PNG or PDF, of what is varied, with a CSV of the same name beside.
     """
     from sim.motion.batches import steady_columns
     from sim.robot_rows import command_rows
 
+    if vary or plot:
+        from sim.variations import write_variations
+
+        if robot or shapes:
+            raise InputError("--vary and --plot are for one robot, without --robot and --shapes")
+        return write_variations(robots, vary, lambda rows: steady_columns(rows.columns, **steady.given), out, plot)
     rows = command_rows(robots, robot, out)
     if shapes is not None:
         _write_steady_shapes(rows.robots, shapes)

@@ -117,32 +117,44 @@ def load_robot(source: str | Path) -> Robot:
         >>> load_robot("paper-control").tails
         2
     """
-    path, preset, changes = Path(source), PRESETS.get(str(source)), changes_of(source)
-    if preset and not changes:
-        return preset
-    if not preset and not path.exists():
-        raise InputError(f"no robot {str(source)!r}; give a robot.toml or one of {', '.join(PRESETS)}")
-    with naming(path):
-        tables = tomllib.loads(robot_toml(preset)) if preset else read_toml(path)
-        robot = robot_of(tables, path)
+    changes, name = changes_of(source), Path(source).stem
+    if str(source) in PRESETS and not changes:
+        return PRESETS[str(source)]
+    content = robot_content(source)
+    with naming(source):
+        robot = robot_of(content, name)
     if changes:
-        check_keys(changes)
-        tables = changed(tables, changes)
+        check_keys(changes, "--set")
+        content = changed(content, changes)
         with naming("--set"):
-            robot = robot_of(tables, path)
-    if doubts := ", ".join(doubtful(tables)):
-        warnings.warn(f"{path}: {doubts}", InputWarning, stacklevel=1)  # from one place, so once a command
+            robot = robot_of(content, name)
+    if doubts := ", ".join(doubtful(content)):
+        warnings.warn(f"{source}: {doubts}", InputWarning, stacklevel=1)  # from one place, so once a command
     return robot
 
 
-def robot_of(content: Mapping[str, Any], path: Path) -> Robot:
-    """Return the robot that the content of a robot.toml describes.
+def robot_content(source: str | Path) -> dict[str, Any]:
+    """Return the content of a robot.toml, or that of a preset.
+
+    Raises:
+        InputError: there is no such robot, or the file cannot be read.
+    """
+    if preset := PRESETS.get(str(source)):
+        return tomllib.loads(robot_toml(preset))
+    if not Path(source).exists():
+        raise InputError(f"no robot {str(source)!r}; give a robot.toml or one of {', '.join(PRESETS)}")
+    with naming(source):
+        return read_toml(source)
+
+
+def robot_of(content: Mapping[str, Any], name: str) -> Robot:
+    """Return the robot that the content of a robot.toml describes, by default with this name.
 
     Raises:
         InputError: it describes none.
     """
     tables = dict(content)
-    name = tables.pop("name", path.stem)
+    name = str(tables.pop("name", name))
     tables.pop("calibration", None)  # read by sim.knowledge
     if "correction" in tables:
         raise InputError("[correction] is no longer read; calibrate the robot as it was given again")
@@ -152,7 +164,7 @@ def robot_of(content: Mapping[str, Any], path: Path) -> Robot:
         raise InputError(f"effects = {effects!r}; write a table [effects] with lines name = size")
     values = read_robot(tables)
     check_effects(effects)
-    return Robot(name=str(name), effects=dict(effects), learnt_from=learnt_from, **values)
+    return Robot(name=name, effects=dict(effects), learnt_from=learnt_from, **values)
 
 
 @checks_keywords

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
-from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
 
-from common.files import whole_file
 from common.units import format_time
 from planner.paths.units import in_lab
 from planner.planning.plan import Plan
@@ -20,18 +16,6 @@ _LONGER = 5.2  # inches, of the longer side of the frame
 _LEAST = np.array([4.2, 1.2])  # inches, width and height of the frame
 _MARGIN = 0.05  # of the longer side of what is drawn, around it
 _LEGEND = 32.0  # points, from the frame to the legend: the numbers and the label of the x axis are between
-
-
-def write_svg(figure: Figure, path: Path, identity: str) -> None:
-    """Write a figure as SVG, completely or not at all; `identity` names the plan."""
-    # Words stay words, and a plan has one picture.
-    with (
-        mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": identity}),
-        whole_file(path) as part,
-        warnings.catch_warnings(),
-    ):
-        warnings.filterwarnings("ignore", "Glyph .* missing")  # the reader's own font has it
-        figure.savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None, "Identifier": identity})
 
 
 def draw_plan(plan: Plan) -> Figure:

@@ -9,6 +9,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+from common.figure_files import write_figure
 from common.files import files_together, write_csv, write_text
 from common.keywords import checks_keywords
 from common.provenance import code_version
@@ -44,17 +45,17 @@ def write_plan(result: Plan, folder: str | Path) -> list[Path]:
 
 def _write_files(result: Plan, folder: Path) -> list[str]:
     """Write the files of a plan into a folder, one after the other, and return their names."""
-    from planner.files.pictures import draw_plan, write_svg  # loads matplotlib
+    from planner.files.pictures import draw_plan  # loads matplotlib
 
     identity, names = result.identity, list(FILES)
     write_text(folder / "plan.json", json.dumps({**result.to_dict(), "code_version": code_version()}) + "\n")
     columns = {name: values.tolist() for name, values in result.columns().items()}
     write_csv({**columns, "plan_id": [identity] * len(result.dwells)}, folder / "plan.csv")
     write_text(folder / "schedule.h", schedule_header(result, identity))
-    write_svg(draw_plan(replace(result, job=None)), folder / "plan.svg", identity)
+    write_figure(draw_plan(replace(result, job=None)), folder / "plan.svg", identity)
     if result.job is not None:
         names += [f"{result.job.kind}.json", f"{result.job.kind}.svg"]
         content = {**result.job.to_dict(result), "plan_id": identity}
         write_text(folder / names[-2], json.dumps(content) + "\n")
-        write_svg(draw_plan(result), folder / names[-1], identity)
+        write_figure(draw_plan(result), folder / names[-1], identity)
     return names

@@ -95,16 +95,17 @@ def doubtful(tables: Mapping[str, Any]) -> Iterator[str]:
                 yield f"{key} = {number:g} is {size} times that of the paper's robot; {asked}"
 
 
-def check_keys(names: Iterable[str]) -> None:
-    """Refuse names TABLE.KEY that are no entry of a robot, with the nearest ones."""
+def check_keys(names: Iterable[str], option: str) -> None:
+    """Refuse names TABLE.KEY, given with an option, that are no entry of a robot, with the nearest ones."""
     known = ["name", *(f"{entry.table}.{entry.key}" for entry in ENTRIES)]
     for name in names:
         table, _, key = name.rpartition(".")
         if name == "name" or table == "effects" or _entry(table, key.removesuffix(_SIGMA)):
             continue
-        near = [each for each in known if key in each] or difflib.get_close_matches(name, known, 3, 0.5)
+        within = [each for each in known if key in each]
+        near = within if 0 < len(within) <= 3 else difflib.get_close_matches(name, known, 3, 0.5)
         hint = f"is it {' or '.join(near)}?" if near else f"there are {', '.join(known)} and effects.NAME"
-        raise InputError(f"--set {name}: a robot has no such entry; {hint}")
+        raise InputError(f"{option} {name}: a robot has no such entry; {hint}")
 
 
 def robot_toml(robot: Robot) -> str:

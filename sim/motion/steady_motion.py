@@ -52,6 +52,11 @@ _QUANTITIES = {
 LAB_COLUMNS = tuple(_QUANTITIES)
 
 
+def lab_title(column: str) -> str:
+    """Return what a column of LAB_COLUMNS is, with its unit: speed [cm/s]."""
+    return "{} [{}]".format(*_QUANTITIES[column][:2])
+
+
 @dataclass(frozen=True)
 class Steady:
     """Mean motion of B robots; all (B,), dimensionless; NaN where `failed`."""

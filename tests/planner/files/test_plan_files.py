@@ -89,7 +89,7 @@ def test_a_plan_that_cannot_be_drawn_leaves_the_plan_before(
     def broken(*_: object) -> None:
         raise RuntimeError
 
-    monkeypatch.setattr("planner.files.pictures.write_svg", broken)
+    monkeypatch.setattr("planner.files.plan_files.write_figure", broken)
     with pytest.raises(RuntimeError):
         write_plan(planned("circle:2l", objective="flips"), tmp_path)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
