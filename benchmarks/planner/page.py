@@ -1,9 +1,9 @@
 """The page that plans: its size, and how long users wait for it in Chromium.
 
 Prints the size, the time from opening to the first plan and until the page's own planner has made it, from lifting
-the pen to the plan of a drawn circle, and from a changed viscosity to the robot's motion. Medians over several
-openings. Writes pictures of the page on a
-laptop, on a telephone and in the dark into reports/; docs/page*.png are these.
+the pen to the plan of a drawn circle, from a changed viscosity to the robot's motion, and from a moved corner to
+the plan of a closed path with 30 corners. Medians over several openings. Writes pictures of the page on a laptop,
+on a telephone and in the dark into reports/; docs/page*.png are these.
 
 Usage: python -m benchmarks page [TIMES]     (default 5)
 
@@ -23,6 +23,8 @@ import softflagella as sf
 from benchmarks.common import heading, row
 from tests.planner.page.view.browser import chromium, planned
 
+_ANGLES, _RADII = 2 * np.pi * np.arange(30) / 30, np.random.default_rng(1).uniform(24, 36, 30)  # cm
+_CORNERS = np.stack([_RADII * np.cos(_ANGLES), _RADII * np.sin(_ANGLES)], 1)
 LAPTOP = {"viewport": {"width": 1280, "height": 860}}
 PICTURES: dict[str, dict[str, Any]] = {
     "laptop": LAPTOP,
@@ -42,13 +44,15 @@ def main(times: str = "5") -> None:
         browser = control.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
         for name, settings in PICTURES.items():
             _picture(browser, path.as_uri(), Path("reports", f"page-{name}.png"), settings)
-        opened = [_times(browser, path.as_uri()) for _ in range(int(times))]
+        address = path.as_uri()
+        opened = [(*_times(browser, address), corner_time(browser, address)) for _ in range(int(times))]
         browser.close()
     names = (
         "from opening to the first plan",
         "until the page's own planner has made it",
         "from lifting the pen to the plan of a drawn circle",
         "from another viscosity to the robot's motion",
+        "from a moved corner to the plan with 30 corners",
     )
     for name, values in zip(names, zip(*opened, strict=True), strict=True):
         print(row(name, f"{median(values):.2f} s"))
@@ -92,3 +96,23 @@ def _times(browser: Any, address: str) -> tuple[float, float, float, float]:
     changing = (page.evaluate("performance.now()") - began) / 1000
     page.context.close()
     return opening, ready, drawing, changing
+
+
+def corner_time(browser: Any, address: str) -> float:
+    """Move a corner of a path with 30, and measure the wait [s] for its plan."""
+    page = browser.new_context(offline=True, reduced_motion="reduce").new_page()
+    places = "~".join(f"{x:.2f},{y:.2f}" for x, y in _CORNERS)
+    page.goto(f"{address}#v=1&places={places}&closed=1")
+    waits = []
+    for moved in ("30", "31", "32"):  # the first one plans with a program that is not compiled yet
+        planned(page)
+        script = """async (moved) => {
+            const corner = document.querySelector("[aria-label='corner 1, x in cm']"), began = performance.now();
+            corner.value = moved;
+            corner.dispatchEvent(new Event("change", { bubbles: true }));
+            while (document.body.dataset.busy !== "0") await new Promise((wake) => setTimeout(wake, 5));
+            return (performance.now() - began) / 1000;
+        }"""
+        waits.append(page.evaluate(script, moved))
+    page.context.close()
+    return median(waits)

@@ -145,7 +145,9 @@ function tableModes(twist, errors) {
 }
 
 function mirrored(table, side) {
-  return table.map((value, at) => value * side[at % 3]);
+  const image = new Float64Array(table.length);
+  for (let at = 0; at < table.length; at++) image[at] = table[at] * side[at % 3];
+  return image;
 }
 
 export { trackedVehicle, vehicleOfParts };

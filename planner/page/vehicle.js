@@ -25,6 +25,7 @@ const CURVE = DWELLS.length * 3; // numbers of a curve
 const COUNT = TIMES.length;
 const RESAMPLE = splineMatrix(DWELLS.map(Math.log), TIMES.map((time) => Math.log(Math.max(time, DWELLS[0]))))
   .map((row, i) => row.map((share) => share * Math.min(TIMES[i] / DWELLS[0], 1)));
+const AFTER = sharesAfter(BEFORE);
 const SAMPLES = 8; // of the track in each dwell
 const OBJECTIVES = ["error", "time", "flips"];
 const POINTS = ["head_centre", "head_tip", "pivot"];
@@ -124,18 +125,31 @@ function trackedPoint(robot, { vehicle, unmeasured, calibrated, ownTable }, poin
 
 /* Resample a flat curve over DWELLS at TIMES. Below the shortest dwell it is a straight line to zero. */
 function resampled(curve) {
-  const columns = [0, 1, 2].map((axis) => curve.filter((_, at) => at % 3 === axis));
-  return Float64Array.from(RESAMPLE.flatMap((row) => columns.map((values) => dot(row, values))));
+  const values = new Float64Array(3 * COUNT);
+  for (let at = 0; at < values.length; at++) {
+    const row = RESAMPLE[Math.floor(at / 3)];
+    for (let k = 0, from = at % 3; k < row.length; k++, from += 3) values[at] += row[k] * curve[from];
+  }
+  return values;
+}
+
+/* Shares of the memories after dwells `before` in those after dwells of BEFORE_KNOTS. */
+function sharesAfter(before) {
+  return splineMatrix([...before, FORGOTTEN].map(Math.log), BEFORE_KNOTS.map(Math.log), true);
 }
 
 /* Lags after dwells of BEFORE_KNOTS, from flat curves of the lag and of the memory after dwells `before`. */
 function lagTable(lag, memory, before = BEFORE) {
-  const shares = splineMatrix([...before, FORGOTTEN].map(Math.log), BEFORE_KNOTS.map(Math.log), true);
-  const after = Array.from(before, (_, j) => resampled(memory.slice(j * CURVE, (j + 1) * CURVE))), long = resampled(lag);
-  return Float64Array.from({ length: BEFORE_KNOTS.length * 3 * COUNT }, (_, at) => {
-    const row = shares[Math.floor(at / long.length)], place = at % long.length;
-    return after.reduce((total, values, j) => total + row[j] * values[place], long[place]);
-  });
+  const shares = before === BEFORE ? AFTER : sharesAfter(before);
+  const after = Array.from(before, (_, j) => resampled(memory.slice(j * CURVE, (j + 1) * CURVE)));
+  const long = resampled(lag), size = long.length, table = new Float64Array(shares.length * size);
+  for (let k = 0; k < shares.length; k++) {
+    table.set(long, k * size);
+    for (let j = 0; j < after.length; j++) {
+      for (let at = 0; at < size; at++) table[k * size + at] += shares[k][j] * after[j][at];
+    }
+  }
+  return table;
 }
 
 /* What a vehicle does on a schedule: changes of the pose in each dwell; poses of the head's centre at the flips and
