@@ -235,9 +235,12 @@ const HOW = { none: "", time: "its first time is 0", rigid: "its first pose is t
 /* Compare a track with a plan, as measured ("none"), from time 0 ("time"), or laid on the plan's start ("rigid").
  *
  * plan: content of plan.json. table: {names, columns} of the head's centre, as replays or labs have them, and
- * `plans`, the ids in it. The page plans anew, with other last digits, so the id of another plan is told, not
- * refused. */
+ * `plans`, the ids in it. */
 function comparedTrack(plan, table, how) {
+  const [other] = (table.plans ?? []).filter((id) => id !== plan.id).sort();
+  if (other !== undefined) {
+    throw new InputError(`the track is of plan ${other}, not of ${plan.id}; compare it with its own plan.json`);
+  }
   const moved = movedTrack(columnsInTails(table, plan.robot), plan, how), [time, x, y, heading] = moved;
   checkTrack(moved);
   const { tail_length_m: tail, time_scale_s: second } = plan.robot, cm = 100 * tail, offset = plan.offset_over_l ?? 0;
@@ -255,7 +258,6 @@ function comparedTrack(plan, table, how) {
   return {
     points: track.map(place),
     shift: HOW[how],
-    ofPlan: (table.plans ?? []).find((id) => id !== plan.id) ?? "",
     csv: trackTable(moved, cm, second),
     error: {
       rms: rms(declared), largest: cm * largest(declared), rawRms: rms(raw), rawLargest: cm * largest(raw),

@@ -55,7 +55,7 @@ function refuseOtherKinds(name, bytes) {
   throw new InputError(`${name}: ${kind} is not read; ${words}`);
 }
 
-/* The drawn path of a plan.json, which may have more: walls, laps. */
+/* The drawn path of a plan.json, which may have more: walls, laps; and the plan, for its tracks. */
 function pathOfPlan(text, name, stem) {
   const refused = (why) => new InputError(`${name} is not a plan.json of the planner (${why}); plan again`);
   let plan;
@@ -76,7 +76,7 @@ function pathOfPlan(text, name, stem) {
     throw new InputError(`${name}: raw_path must have two or more rows of 2 finite numbers; plan again`);
   }
   const points = closed ? path.slice(0, -1) : path;
-  return { kind: "path", unit: 100 * robot.tail_length_m, paths: [{ points, closed, name: stem }] };
+  return { kind: "path", unit: 100 * robot.tail_length_m, paths: [{ points, closed, name: stem }], plan };
 }
 
 export { openFile };

@@ -2,6 +2,7 @@
 
 const ADVICE_NUMBERS = 'under "Corners as numbers; move, scale, turn"';
 const ADVICE = [ // what a message of the planner says, and what the page says instead
+  ["compare it with its own plan.json", "open its own plan.json first"],
   ["choose one with --shape, or remove the others", "remove the others"],
   [/simulate this robot's own table \([^)]*\), or measure/, "measure"],
   [/give --smooth (\S+)/, 'set "Smooth over" to $1 cm and press "Smooth this path"'],

@@ -24,6 +24,7 @@ async function service(data) {
   if (locked) locked.vehicle = vehicleOfParts(locked.vehicle, locked.name);
   const table = locked ? null : await readTable(data.table);
   let last = null; // {key, plan}: the plan that the page shows
+  const opened = new Map(); // plan.json files by their ids, for tracks of these plans
   let asked = null; // {key, swims}: the vehicle that was asked for last
 
   function tracked(fields, point) {
@@ -65,11 +66,17 @@ async function service(data) {
       if (name === "robot.toml") return robotToml(makeRobot(wish.robot));
       return planFiles(planOf(wish), data.files)[name];
     },
-    open: openFile,
+    open: (file) => {
+      const { plan, ...content } = openFile(file);
+      if (plan?.id) opened.set(plan.id, plan);
+      return content;
+    },
     runs: ({ table: measured, name, robot }) => comparedRuns(measured, name, robot, table),
     compare: ({ table: track, how }) => {
       if (!last) throw new InputError("there is no plan with which the track can be compared; plan first");
-      return comparedTrack(JSON.parse(planRecord(last.plan).text), track, how);
+      const shown = JSON.parse(planRecord(last.plan).text), [id] = track.plans ?? [];
+      const itsOwn = id !== shown.id && opened.get(id); // the page plans anew, with other last digits and another id
+      return { ...comparedTrack(itsOwn || shown, track, how), ofFile: itsOwn ? id : "" };
     },
   };
 }

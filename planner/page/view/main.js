@@ -328,6 +328,7 @@ class Page {
   async compare(how = this.track.how, track = this.track) {
     await this.ask("compare", { table: track.table, how }, ({ answer, refusal }) => {
       this.fileProblem.tell("measured", refusal ? `${track.name}: ${refusal}` : "");
+      if (refusal && this.track?.table === track.table) this.removeTrack();
       if (refusal) return;
       this.track = { ...track, ...answer, how };
       this.view.moved = false;
@@ -340,14 +341,16 @@ class Page {
     const drawErrors = showTrack(this.track, this.plan, byId("tails").checked, {
       fit: (wished) => this.compare(wished),
       saveTrack: () => save("track.csv", this.track.csv, "text/csv"),
-      remove: () => {
-        this.track = null;
-        byId("measured").replaceChildren();
-        this.charts.delete("track");
-        this.show();
-      },
+      remove: () => this.removeTrack(),
     });
     this.draw("track", drawErrors);
+  }
+
+  removeTrack() {
+    this.track = null;
+    byId("measured").replaceChildren();
+    this.charts.delete("track");
+    this.show();
   }
 
   newAddress() {

@@ -8,7 +8,7 @@ function showTrack(track, plan, tails, actions) {
   const { error } = track, [worstX, worstY] = error.worst.place, within = error.largest <= error.stated;
   describe(list, [
     ["Track", `${track.name}${track.shift ? ` (moved: ${track.shift})` : ""}`],
-    ...(track.ofPlan ? [["Of plan", `${track.ofPlan}, as the file says; compared with the plan above`]] : []),
+    ...(track.ofFile ? [["Of plan", `${track.ofFile}, with whose plan.json, which is open, it is compared`]] : []),
     ["From the path to follow", `${size(error.rms)} rms, ${size(error.largest)} at most`],
     ["Stated error", `${size(error.stated)}: the track is ${within ? "within" : "above"} it`],
     ["From the drawn path", `${size(error.rawRms)} rms, ${size(error.rawLargest)} at most`],

@@ -269,6 +269,25 @@ def test_a_track_is_shown_over_its_plan_with_its_error(page: Any, tmp_path: Path
     page.set_viewport_size(size)
 
 
+def test_a_track_of_another_plan_is_refused_until_its_plan_is_open(page: Any, tmp_path: Path) -> None:
+    result: Plan = planned_by_python("circle:2l", objective="flips")
+    (tmp_path / "plan.json").write_text(json.dumps(result.to_dict()))
+    rows = result.to_frame()[["start_s", "x_cm", "y_cm", "heading_deg"]].rename(columns={"start_s": "time_s"})
+    rows.assign(plan_id=result.identity).to_csv(tmp_path / "track.csv", index=False)
+    drop(page, tmp_path / "track.csv")
+    refusal = page.locator(
+        "#measured-problem", has_text=f"track.csv: the track is of plan {result.identity}, not of p"
+    )
+    refusal.wait_for()
+    assert text_of(page, "#measured-problem").endswith("; open its own plan.json first")
+    assert text_of(page, "#measured") == ""
+    drop(page, tmp_path / "plan.json")
+    planned(page)
+    drop(page, tmp_path / "track.csv")
+    page.locator("#measured", has_text=f"{result.identity}, with whose plan.json, which is open").wait_for()
+    assert "the track is within it" in text_of(page, "#measured")
+
+
 def test_files_and_folders_are_dragged_onto_the_picture(page: Any, tmp_path: Path) -> None:
     one, other = tmp_path / "one.csv", tmp_path / "other.csv"
     one.write_text("x_cm,y_cm\n0,0\n40,0\n40,30\n")
@@ -319,6 +338,9 @@ def test_runs_are_compared_and_the_command_is_copied(page: Any, tmp_path: Path) 
     planned(page)
     assert is_seen(page, "#runs")
     assert page.locator("#runs tbody tr").count() == 23
+    table = page.locator("#runs .wide")  # is wider than its place, and has a bar that shows it
+    assert table.evaluate("part => part.scrollWidth > part.clientWidth")
+    assert table.evaluate("part => getComputedStyle(part, '::-webkit-scrollbar').height") == "12px"
     seen = text_of(page, "#runs")
     assert "answers for 23 of 23 usable runs" in seen
     assert "row 5 (line 6): theta_deg = -3.0 is not above 0" in seen
