@@ -33,7 +33,7 @@ _NAMES = {  # of each module; a leading underscore is left out
     "planner.planning.line_of_sight": "EXACT LARGEST_STEP LARGEST_TURN TURNS MOST_BIAS HALVINGS MOST_LOOKS "
     "MOST_SWITCHES PATIENCE EVERY QUICKEST TIGHTEST PAIRS_AHEAD",
     "planner.planning.plan": "WIDE OWN_TABLE_FROM",
-    "planner.planning.solve": "WORTH SAVED LENGTHENED_FROM",
+    "planner.planning.solve": "WORTH SAVED LENGTHENED_FROM MORE",
     "planner.vehicle.from_table": "ODD TIME_STEPS STEP",
     "planner.vehicle.vehicle": "SHORTEST STEP TIMES BEFORE_KNOTS",
     "planner.vehicle.zigzag": "PAIRS TRIES QUICK LONGEST KEPT NEARLY COMPARED WIDEST COUNT LONGER",

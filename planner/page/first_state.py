@@ -183,5 +183,7 @@ def first_options(request: PlanRequest, robot: Robot, smooth: float | None) -> d
         "minimumSeconds": request.minimum_seconds if least is None else least * robot.time_scale,
         "tolerance": None if request.tolerance is None else request.tolerance * cm,
         "timeWeight": request.time_weight,
+        "keepOut": "",
+        "walls": "",
         "smooth": None if smooth is None else smooth * cm,
     }

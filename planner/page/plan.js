@@ -1,12 +1,13 @@
 /* From a path and a robot to a plan, without simulating.
  *
- * A plan is {tracked, objective, drawn, declared, straight, guidance, switches, errors, unmeasured}. Lengths in l, times in
- * μ0 l⁴/EI, unless a name says its unit. */
+ * A plan is {tracked, objective, drawn, declared, straight, guidance, switches, errors, unmeasured, clear}; clear is as in
+ * obstacles.js. Lengths in l, times in μ0 l⁴/EI, unless a name says its unit. */
 import { CONSTANTS } from "./constants.js";
 import { declare } from "./declare.js";
 import { Followed, guaranteedError, lookAhead } from "./stated_error.js";
 import { follow } from "./guidance.js";
 import { sum } from "./math.js";
+import { ANYWHERE, keptClear } from "./obstacles.js";
 import { checkSize } from "./path.js";
 import { inLab, timeInLab } from "./units.js";
 import { QUICK, checkLeast, dwellsFor, longerDwells, nearlyFastest, rodOf, turnRadius, zigzag } from "./vehicle.js";
@@ -19,7 +20,7 @@ const { DEFAULTS } = CONSTANTS.request;
 
 /* Fill in the defaults of what is asked of a plan besides path and robot; refuse a tolerance that is none. */
 function planRequest(options = {}) {
-  const request = { ...DEFAULTS, ...options }, { tolerance } = request;
+  const request = { ...DEFAULTS, space: ANYWHERE, ...options }, { tolerance } = request;
   if (tolerance !== null && !(Number.isFinite(tolerance) && tolerance > 0)) {
     throw new InputError(`tolerance ${general(tolerance)} l; give a number above 0`, "options");
   }
@@ -38,15 +39,15 @@ function leastDwell({ minimumSeconds, minimumDwell }, robot) {
 /* Plan for a path, a vehicle with its tracked point and a request. progress: called now and then. */
 function makePlan(drawn, tracked, request, progress = null) {
   const chosen = followedPath(drawn, tracked, request, progress), { declared, straight, guidance, switches } = chosen;
-  const { errors, unmeasured } = chosen, { objective } = request;
-  return { tracked, objective, drawn, declared, straight, guidance, switches, errors, unmeasured };
+  const { errors, unmeasured, clear } = chosen, { objective } = request;
+  return { tracked, objective, drawn, declared, straight, guidance, switches, errors, unmeasured, clear };
 }
 
 /* The schedule that a request chooses, as in stated_error.js. */
 function followedPath(drawn, tracked, request, progress = null) {
   const { vehicle, robot } = tracked, declaredPaths = new Map();
   checkSize(drawn, robot, turnRadius(vehicle));
-  const { dwell: given, objective, corner, timeWeight, tolerance, seed } = request;
+  const { dwell: given, objective, corner, timeWeight, tolerance, seed, space } = request;
   const least = leastDwell(request, robot);
   let dwells = given === null ? dwellsFor(vehicle, objective, least) : [checkLeast(given)];
   const declaredPath = (drift) => {
@@ -65,7 +66,8 @@ function followedPath(drawn, tracked, request, progress = null) {
     const guaranteed = guaranteedError(vehicle, rodOf(tracked), straight.swing, guidance.ahead);
     return new Followed({ tracked, drawn, declared, straight, guidance, switches, guaranteed, seed });
   };
-  if (given === null && objective === "time") {
+  const clear = (followed) => Object.assign(followed, { clear: keptClear(followed, space) });
+  if (given === null && objective === "time" && space === ANYWHERE) {
     const drift = driftOf(tracked, zigzag(vehicle, dwells[0], tracked.offset), dwells[0]);
     const best = quickest(tracked, declaredPath(drift), dwells[0], least);
     dwells = [best, ...dwells.filter((dwell) => dwell < best)];
@@ -74,8 +76,9 @@ function followedPath(drawn, tracked, request, progress = null) {
   if (given === null && objective === "error") {
     first = leastStated(first, longerDwells(vehicle, first.guidance.dwell), withDwell);
   }
+  clear(first);
   if (tolerance === null || first.stated <= tolerance) return first;
-  return shortened(first, dwells, withDwell, tolerance);
+  return shortened(first, dwells, (dwell) => clear(withDwell(dwell)), tolerance);
 }
 
 /* The dwell with which a declared path takes the least time; straight motion is the fastest with `fastest`. */

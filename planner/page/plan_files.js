@@ -3,6 +3,7 @@
  * A plan is as in plan.js, with `unmeasured`. Lengths in l, times in μ0 l⁴/EI, unless a name says its unit. */
 import { CONSTANTS } from "./constants.js";
 import { differences, linspace, runningSum, sum } from "./math.js";
+import { keptClearRecord } from "./obstacles.js";
 import { extent, polyline } from "./path.js";
 import { groupValues } from "./robot.js";
 import { planId } from "./seals.js";
@@ -99,6 +100,7 @@ function planContent(plan) {
     model: tracked.model,
     own_table: tracked.ownTable,
     warnings: planWarnings(plan),
+    ...(plan.clear ? { kept_clear: keptClearRecord(plan.clear) } : {}),
   };
 }
 

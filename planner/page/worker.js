@@ -5,6 +5,7 @@
 import { readData } from "./data.js";
 import { trackedVehicle, vehicleOfParts } from "./from_table.js";
 import { geomspace } from "./math.js";
+import { readSpace } from "./obstacles.js";
 import { openFile } from "./open_file.js";
 import { extent, pageShape, pathLength, pathOf, polyline, scaled, smoothed } from "./path.js";
 import { followedPath, makePlan, planRequest } from "./plan.js";
@@ -49,9 +50,9 @@ async function service(data) {
   }
 
   return {
-    path: ({ path }) => {
-      const drawn = drawnPath(path);
-      return { points: drawn.points, closed: drawn.closed, corners: drawn, length: pathLength(drawn) };
+    path: ({ path, options }) => {
+      const drawn = drawnPath(path), space = refusing(() => readSpace(options, 1), () => null); // the plan says why
+      return { points: drawn.points, closed: drawn.closed, corners: drawn, length: pathLength(drawn), space };
     },
     steady: ({ robot }) => steadyMotion(tracked(robot, "head_centre")),
     plan: (wish, progress) => pictured(planOf(wish, progress)),
@@ -91,7 +92,8 @@ function drawnPath({ points, closed, words }) {
 /* The drawn path in tail lengths, and what is asked of a plan; options of the page are in s and cm. */
 function wishIn({ path, options }, { robot }) {
   const cm = 100 * robot.tailLength, tolerance = options.tolerance === null ? null : options.tolerance / cm;
-  return { drawn: scaled(drawnPath(path), 1 / cm), request: planRequest({ ...options, tolerance }) };
+  const request = planRequest({ ...options, tolerance, space: readSpace(options, cm) });
+  return { drawn: scaled(drawnPath(path), 1 / cm), request };
 }
 
 /* Steady motion, in the units of a laboratory. */
@@ -109,7 +111,7 @@ function steadyMotion({ robot, vehicle }) {
 
 /* The numbers of a plan that the page shows; `first_plan` of Python has the same. */
 function pictured(plan) {
-  const { tracked, errors, switches, declared, drawn, guidance, straight, unmeasured } = plan, { robot } = tracked;
+  const { tracked, errors, switches, declared, drawn, guidance, straight, unmeasured, clear } = plan, { robot } = tracked;
   const cm = 100 * robot.tailLength, place = ([x, y, ...heading]) => [x * cm, y * cm, ...heading];
   const inCm = (length) => (length === null ? null : length * cm);
   return {
@@ -134,6 +136,7 @@ function pictured(plan) {
     netSpeed: inCm(straight.speed) / robot.timeScale,
     warnings: planWarnings(plan),
     timeScale: robot.timeScale,
+    ...(clear && { margin: inCm(clear.margin), clearance: inCm(clear.clearance) }),
   };
 }
 

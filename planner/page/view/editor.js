@@ -12,12 +12,16 @@ const WORDS = {
   move: "Drag or use arrow keys to move the picture; wheel, pinch, plus and minus zoom.",
   draw: "Draw a path with one stroke. Where it ends near its start, it is closed.",
   corners: "Click to add a corner, drag to move one, double-click to remove one.",
+  keepOut: "Click the corners of a region that the robot must keep out of, then the first one again.",
+  walls: "Click the corners of the walls that the robot must stay within, then the first one again.",
   many: "Its points are too many to be moved: click to begin a new path, corner by corner.",
 };
 
 class PathEditor {
-  /* `finished(points, closed)` takes a stroke, `changed(points, closed, settled)` takes corners. */
-  constructor(finished, changed) {
+  /* `finished(points, closed)` takes a stroke, `changed(points, closed, settled)` takes corners, `enclosed(points, mode)`
+   * those of a region. */
+  constructor(finished, changed, enclosed) {
+    this.enclosed = enclosed;
     this.finished = finished;
     this.changed = changed;
     this.mode = "move";
@@ -32,18 +36,23 @@ class PathEditor {
   /* Show a path. */
   take(path) {
     this.path = path;
-    this.begun = null;
+    this.begun = this.encloses ? this.begun ?? [] : null;
   }
 
   /* Choose what the pointer does; `anew`: corners are those of a new path. */
   use(mode, anew = false) {
     this.mode = mode;
-    this.begun = anew ? [] : null;
+    this.begun = anew || this.encloses ? [] : null;
   }
 
   /* The corners that can be moved: those of a new path, or of a path that has few. */
   get corners() {
     return this.begun ?? (this.path.points.length <= HANDLES ? this.path.points : []);
+  }
+
+  /* Whether the corners are those of a region or of walls. */
+  get encloses() {
+    return this.mode === "keepOut" || this.mode === "walls";
   }
 
   /* What the pointer does, in words. */
@@ -61,7 +70,7 @@ class PathEditor {
       this.stroke = [place];
       return true;
     }
-    if (this.mode !== "corners") return false;
+    if (this.mode !== "corners" && !this.encloses) return false;
     const points = [...this.corners], index = points.findIndex((point) => this.near(point, place));
     if (index < 0) points.push(this.snapped(place, points[points.length - 1], event));
     this.held = { index: index < 0 ? points.length - 1 : index, points };
@@ -98,7 +107,11 @@ class PathEditor {
     if (stroke && stroke.length > 2) this.finished(stroke, closes(stroke));
     if (!held) return;
     const [first] = held.points, added = held.points.length > this.corners.length;
-    if (held.points.length < 2) this.begun = held.points;
+    if (this.encloses) {
+      const ends = !added && held.index === 0 && held.points.length > 2;
+      this.begun = ends ? [] : held.points;
+      if (ends) this.enclosed(held.points, this.mode);
+    } else if (held.points.length < 2) this.begun = held.points;
     else if (added && held.points.length > 3 && this.near(first, held.points[held.index])) {
       this.changed(held.points.slice(0, -1), true);
     } else this.changed(held.points, this.continues && this.path.closed);
@@ -119,13 +132,13 @@ class PathEditor {
   /* What is drawn over the picture [pixels]. */
   overlay(view) {
     this.view = view;
-    const shapes = [], points = this.held?.points ?? this.corners, line = this.stroke ?? this.held?.points;
+    const shapes = [], points = this.held?.points ?? this.corners, line = this.stroke ?? (this.encloses ? points : this.held?.points);
     if (line) {
       const pixels = line.map((point) => pixelOf(view, point));
       const closed = !this.stroke && this.continues && this.path.closed;
       shapes.push(figure("path", { class: "stroke", d: lineData(pixels, closed) }));
     }
-    if (this.mode !== "corners") return shapes;
+    if (this.mode !== "corners" && !this.encloses) return shapes;
     return [...shapes, ...points.map((point, i) => {
       const [cx, cy] = pixelOf(view, point);
       return figure("circle", { class: i === this.held?.index ? "handle chosen" : "handle", cx, cy, r: 6 });

@@ -24,7 +24,8 @@ class Page {
     this.client = new PlannerClient(() => this.worker(), (words) => this.problem(words));
     this.view = new PlanView();
     const drawn = (points, closed) => this.smooth(points, closed, "my stroke");
-    this.editor = new PathEditor(drawn, (points, closed) => this.setPoints(points, closed));
+    const enclosed = (points, kind) => this.enclose(points, kind);
+    this.editor = new PathEditor(drawn, (points, closed) => this.setPoints(points, closed), enclosed);
     this.view.editor = this.editor;
     this.player = new Player((pose, time) => this.played(pose, time));
     this.form = new RobotForm(data.limits, (values, key) => this.setRobot(values, key), () => this.history.settle());
@@ -250,6 +251,12 @@ class Page {
     if (refusal) return;
     this.editor.take({ points, closed });
     this.change({ path: { points: grid, closed, name } });
+  }
+
+  /* Take the outline of a region, or of the walls. */
+  enclose(points, kind) {
+    const words = `polygon:${onGrid(points).flat().join(",")}`, before = kind === "walls" ? "" : this.state.options.keepOut;
+    this.setOption(kind, `${before} ${words}`.trim());
   }
 
   /* Smooth a stroke, or the path that is shown, and make it the path. */

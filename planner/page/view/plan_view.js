@@ -62,7 +62,9 @@ class PlanView {
   /* The points that are to be seen. */
   shown() {
     const { drawn, plan, tracks } = this.content;
-    return [...(drawn?.points ?? []),...(plan?.reference ?? []),...tracks.flatMap((track) => track.points)];
+    const { keepOut = [], walls } = drawn?.space ?? {}, regions = walls ? [walls, ...keepOut] : keepOut;
+    const ends = regions.flatMap(({ x, y, radius, corners }) => corners ?? [[x - radius, y - radius], [x + radius, y + radius]]);
+    return [...(drawn?.points ?? []), ...ends, ...(plan?.reference ?? []), ...tracks.flatMap((track) => track.points)];
   }
 
   fit() {

@@ -88,9 +88,13 @@ function line(kind, d) {
   return figure("path", { class: kind, d, "vector-effect": "non-scaling-stroke" });
 }
 
-/* Build the layers of a plan [cm]: band, drawn and declared path, track by direction. */
+/* Build the layers of a plan [cm]: walls and regions, band, drawn and declared path, track by direction. */
 function planLayers({ drawn, plan, tracks, old }) {
-  const layers = figure("g", { class: old ? "old" : "" });
+  const layers = figure("g", { class: old ? "old" : "" }), { keepOut = [], walls } = drawn?.space ?? {};
+  if (walls) layers.append(line("walls", lineData(walls.corners, true)));
+  for (const { x, y, radius, corners } of keepOut) {
+    layers.append(corners ? line("region", lineData(corners, true)) : figure("circle", { class: "region", cx: x, cy: y, r: radius }));
+  }
   if (plan) layers.append(band(plan));
   if (drawn) layers.append(line("drawn", lineData(drawn.points, drawn.closed)));
   if (plan) layers.append(line("declared", lineData(plan.reference, plan.closed)), ...motion(plan), startMark(plan));

@@ -36,6 +36,8 @@ const OPTIONS = {
   minimumSeconds: null, // shortest dwell that the motor allows [s]
   tolerance: null, // largest stated error [cm]
   timeWeight: 0,
+  keepOut: "", // regions, and walls, as words [cm]
+  walls: "",
   smooth: null, // length over which a drawn stroke is smoothed [cm]; null: the page's own
 };
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -12,10 +13,13 @@ import pytest
 
 from common.errors import InputError
 from planner.jobs.plan import make_plan, plan
+from planner.options import read_region
 from planner.page.first_state import first_plan
 from planner.page.write_page import packed_data, table_data
+from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.path import Path2D, circle, polygon
 from planner.paths.path_files import read_path
+from planner.planning.conditions import BlockedError
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.from_table import table_vehicle
@@ -231,6 +235,84 @@ def test_refusals(path: Path2D, options: dict[str, Any]) -> None:
     (found,) = answers([plan_call(case)], left_out=["vehicle"])
     assert isinstance(found, InputError)
     assert without_digits(found) == without_digits(refusal_of(python_plan, case))
+
+
+def random_regions(seed: int) -> tuple[list[str], str]:
+    """Draw regions beside and on a square of 33 cm, and walls, in the words of the page [cm]."""
+    rng = np.random.default_rng(seed)
+    words = []
+    for kind in rng.permutation(["circle", "box", "polygon"])[: 1 + seed % 3]:
+        x, y = rng.uniform(-10, 43, 2)
+        size = rng.uniform(1, 6)
+        if kind == "circle":
+            words.append(f"circle:{x:.2f},{y:.2f},{size:.2f}")
+        elif kind == "box":
+            words.append(f"box:{x:.2f},{y:.2f},{x + size:.2f},{y + 2 * size:.2f}")
+        else:
+            angles = np.sort(rng.uniform(0, 2 * np.pi, 5))
+            corners = np.stack([x + size * np.cos(angles), y + 2 * size * np.sin(angles)], 1)
+            words.append("polygon:" + ",".join(f"{number:.2f}" for number in corners.ravel()))
+    return words, "box:-40,-40,73,73" if seed % 2 else ""
+
+
+def region(words: str) -> Circle | Polygon:
+    """Read a region as the command does; it has corners from a file."""
+    shape, _, numbers = words.partition(":")
+    if shape == "polygon":
+        return Polygon.of(np.reshape([float(number) for number in numbers.split(",")], (-1, 2)) / 11)
+    return read_region(words, "cm", CONTROL)
+
+
+REGIONS = [pytest.param(seed, marks=[] if seed < 6 else pytest.mark.rates) for seed in range(40)]
+
+
+@pytest.mark.parametrize("seed", REGIONS)
+def test_a_plan_beside_regions_is_that_of_the_command_and_a_blocked_path_is_refused(seed: int) -> None:
+    words, walls = random_regions(seed)
+    case = ParityCase(SQUARE, ("biased", 0.27), {"objective": ("error", "time", "flips")[seed % 3]})
+    file, name, *given, request = plan_call(case)
+    read = answer("obstacles.js", "readSpace", {"keepOut": " ".join(words), "walls": walls}, 11.0)
+    options = {**request["call"][2][0], "space": read}
+    space = FreeSpace(tuple(map(region, words)), region(walls) if walls else None)  # type: ignore[arg-type]
+    try:
+        wanted = python_plan(case._replace(options={**case.options, "space": space}))
+    except BlockedError:
+        wanted = None
+    found = answer(file, name, *given, call("plan.js", "planRequest", options))
+    if wanted is None or wanted.kept_clear.detours:  # type: ignore[union-attr]
+        assert re.match(r"the path is blocked at \(.*; the page finds no way around", str(found))
+        return
+    assert difference(numbers_of_page(found), numbers(wanted)) <= ALIKE
+    record = answer("obstacles.js", "keptClearRecord", found["clear"])
+    kept = wanted.kept_clear.to_dict()  # type: ignore[union-attr]
+    assert list(record) == list(kept)
+    for key in ("margin_over_l", "predicted_clearance_over_l"):
+        assert record[key] == pytest.approx(kept[key], abs=1e-8)
+    for one, other in zip(record["keep_out"], kept["keep_out"], strict=True):
+        check_near(*(next(iter(each.values())) for each in (one, other)))
+
+
+SHAPELESS = {
+    "bow": "0,0,9,9,9,0,0,9", "line": "0,0,5,5,9,9", "touches": "0,0,9,0,9,9,4,0,0,9",
+    "two notches on one line": "",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SHAPELESS)
+def test_outlines_that_cross_or_touch_themselves_are_refused(name: str) -> None:
+    words = f"polygon:{SHAPELESS[name] or '0,0,9,0,9,5,7,5,7,2,5,2,5,5,3,5,3,2,1,2,1,5,0,5'}"
+    found = answer("obstacles.js", "readSpace", {"keepOut": words, "walls": ""}, 11.0)
+    if not SHAPELESS[name]:
+        check_near(found["keepOut"][0]["corners"], region(words).corners)  # type: ignore[union-attr]
+        return
+    refusal_of(region, words)
+    assert str(found).startswith(f"region '{words}'")
+
+
+@pytest.mark.parametrize("words", ["circle:1,2", "circle:1,2,-3", "box:1,2,3,x", "cube:1,2,3", "polygon:1,2", "5"])
+def test_words_that_are_no_region_are_refused(words: str) -> None:
+    found = answer("obstacles.js", "readSpace", {"keepOut": words, "walls": ""}, 11.0)
+    assert str(found).startswith(f"region '{words}'; write circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH or polygon:")
 
 
 SOLVED = 1e-9  # relative; balances are solved until a correction is 2e-12, on different ways

@@ -288,6 +288,34 @@ def test_a_track_of_another_plan_is_refused_until_its_plan_is_open(page: Any, tm
     assert "the track is within it" in text_of(page, "#measured")
 
 
+def test_a_region_is_drawn_and_a_path_that_it_blocks_is_refused(page: Any, tmp_path: Path) -> None:
+    page.evaluate("location.hash = 'v=1&objective=flips&path=circle%3A22&walls=box%3A-50%2C-50%2C50%2C50'")
+    planned(page)
+    page.check("input[value=keepOut]")
+    x, y = middle_of(page)
+    for right, down in ((-30, -30), (30, -30), (0, 40), (-30, -30)):
+        page.mouse.click(x + right, y + down)
+    page.locator("#scene .region").wait_for(state="attached")
+    planned(page)
+    assert re.search(r"[\d.]+ cm around the body; predicted clearance [\d.]+ cm", text_of(page, "#facts"))
+    ours = json.loads(saved(page, "plan.json", tmp_path).read_text())
+    space = {"walls": ours["kept_clear"]["walls"], "keep_out": [ours["kept_clear"]["keep_out"][0]["polygon"]]}
+    drawn = circle(22.0).scaled(0.01 / 0.11)
+    theirs = plan(drawn, CONTROL, lookup=shipped(), objective="flips", **space).to_dict()
+    del ours["code_version"]
+    check_plans(ours, theirs)
+    for name in ("margin_over_l", "predicted_clearance_over_l"):
+        assert ours["kept_clear"][name] == pytest.approx(theirs["kept_clear"][name], abs=1e-8)
+    unfold(page)
+    page.fill("#keepOut", "circle:22,0,3")
+    page.locator("#keepOut").blur()
+    page.locator("#path-problem", has_text="the path is blocked at").wait_for()
+    page.click("#undo")
+    page.locator("#path-problem").wait_for(state="hidden")
+    assert "dwells" in planned(page)
+    assert "polygon:" in page.input_value("#keepOut")
+
+
 def test_files_and_folders_are_dragged_onto_the_picture(page: Any, tmp_path: Path) -> None:
     one, other = tmp_path / "one.csv", tmp_path / "other.csv"
     one.write_text("x_cm,y_cm\n0,0\n40,0\n40,30\n")

@@ -1,0 +1,124 @@
+/* Regions that the robot's body must keep out of, walls that it must stay within, and its clearance from them.
+ *
+ * A region is {x, y, radius} or {corners}; a space is {keepOut: regions, walls: a region with corners, or null}. The
+ * body is a row of discs {places, radius}, with places forward along its axis. Lengths in l. */
+import { CONSTANTS } from "./constants.js";
+import { clip, smallest } from "./math.js";
+import { pathLength, pathOf } from "./path.js";
+import { inLab, placeInLab } from "./units.js";
+import { pivotDistance } from "./vehicle.js";
+import { InputError, quoted, refusing } from "./words.js";
+
+const { MORE } = CONSTANTS.solve;
+const ANYWHERE = { keepOut: [], walls: null };
+const AROUND = "the page finds no way around: move the path, or plan with softflagella plan and --keep-out or --walls";
+
+/* Read what a page's options say of regions, in cm, with the length of `cm` tails. */
+function readSpace({ keepOut, walls }, cm) {
+  if (!`${keepOut}${walls}`.trim()) return ANYWHERE;
+  return refusing(() => {
+    const [outline = null, more] = regionsOf(walls, cm);
+    if (more || (outline && !outline.corners)) throw new InputError("the walls are one box or polygon");
+    return { keepOut: regionsOf(keepOut, cm), walls: outline };
+  }, (refusal) => {
+    throw new InputError(refusal.message, "options");
+  });
+}
+
+function regionsOf(words, cm) {
+  return words.split(/\s+/).filter(Boolean).map((word) => {
+    const [shape, numbers = ""] = word.split(":"), values = numbers.split(",").map((text) => (text ? text / cm : NaN));
+    const [a, b, c, d] = values, count = values.length, known = values.every(Number.isFinite);
+    if (known && shape === "circle" && count === 3 && c > 0) return { x: a, y: b, radius: c };
+    if (known && shape === "box" && count === 4) return polygonOf([[a, b], [c, b], [c, d], [a, d]], word);
+    if (known && shape === "polygon" && count > 5 && count % 2 === 0) {
+      return polygonOf(values.flatMap((x, i) => (i % 2 ? [] : [[x, values[i + 1]]])), word);
+    }
+    throw new InputError(
+      `region ${quoted(word)}; write circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH or polygon:X,Y,X,Y,X,Y with numbers in cm`,
+    );
+  });
+}
+
+/* Make a region of points; refuse an outline that encloses nothing, crosses or touches itself. */
+function polygonOf(points, word) {
+  const outline = pathOf(points, true), { points: corners } = outline, last = corners.length - 1;
+  const side = ([x, y], [toX, toY], [atX, atY]) => (toX - x) * (atY - y) - (toY - y) * (atX - x);
+  const area = corners.reduce((total, corner, i) => total + side(corners[0], corner, corners[i < last ? i + 1 : 0]), 0);
+  if (Math.abs(area) / 2 <= 1e-12 * pathLength(outline) ** 2) {
+    throw new InputError(`region ${quoted(word)} needs three or more points that are not on one line`);
+  }
+  const edges = corners.map((corner, i) => [corner, corners[i < last ? i + 1 : 0]]);
+  const overlap = (edge, other, axis) => {
+    const [[low, high], [from, to]] = [edge, other].map((each) => each.map((end) => end[axis]).sort((p, q) => p - q));
+    return low <= to && from <= high;
+  };
+  const meet = ([p, q], [r, s]) => {
+    return side(p, q, r) * side(p, q, s) <= 0 && side(r, s, p) * side(r, s, q) <= 0 && overlap([p, q], [r, s], 0)
+      && overlap([p, q], [r, s], 1);
+  };
+  if (edges.some((edge, i) => edges.some((other, j) => j > i + 1 && j - i < last && meet(edge, other)))) {
+    throw new InputError(`region ${quoted(word)}: draw it so that it neither crosses, touches nor repeats itself`);
+  }
+  return { corners };
+}
+
+/* Cover the body with discs; origin: from the head's centre forward to the point from which places count. */
+function footprint({ headLength, headRadius, discOffset, tailRadius, tailLength }, origin) {
+  const front = headLength / 2 / tailLength, length = 2 * front + 1;
+  const width = Math.max(headRadius, (discOffset || headRadius) + tailRadius) / tailLength;
+  const count = Math.max(2, Math.ceil(length / width)), step = length / count;
+  const places = Array.from({ length: count }, (_, i) => front - length + step * (i + 0.5) - origin);
+  return { places, radius: Math.hypot(width, step / 2) };
+}
+
+/* The distance of the body at each pose from what is not free, negative inside. */
+function clearances(poses, { places, radius }, { keepOut, walls }) {
+  const room = (x, y) => {
+    const within = walls ? -distanceFrom(walls, x, y) : Infinity;
+    return keepOut.reduce((least, region) => Math.min(least, distanceFrom(region, x, y)), within);
+  };
+  return Float64Array.from(poses, ([x, y, heading]) => {
+    const c = Math.cos(heading), s = Math.sin(heading);
+    return Math.min(...places.map((place) => room(x + place * c, y + place * s))) - radius;
+  });
+}
+
+/* The distance of a place from a region, negative inside. */
+function distanceFrom({ x: midX, y: midY, radius, corners }, x, y) {
+  if (!corners) return Math.hypot(x - midX, y - midY) - radius;
+  let square = Infinity, inside = false, [fromX, fromY] = corners[corners.length - 1];
+  for (const [toX, toY] of corners) {
+    const dx = toX - fromX, dy = toY - fromY, awayX = x - fromX, awayY = y - fromY;
+    const share = clip((awayX * dx + awayY * dy) / (dx * dx + dy * dy), 0, 1);
+    square = Math.min(square, (awayX - share * dx) ** 2 + (awayY - share * dy) ** 2);
+    if (fromY <= y !== toY <= y && awayX < (awayY * dx) / dy) inside = !inside;
+    [fromX, fromY] = [toX, toY];
+  }
+  return (inside ? -1 : 1) * Math.sqrt(square);
+}
+
+/* How a followed path keeps clear: {space, margin, clearance}; null: there is nothing in its way. One that is blocked is
+ * refused: its way around is sought by the command. */
+function keptClear({ tracked: { robot, vehicle }, declared: { reference }, rolled, stated }, space) {
+  if (space === ANYWHERE) return null;
+  const margin = MORE * stated, poses = reference.q.map(([x, y], i) => [x, y, reference.heading[i]]);
+  const room = clearances(poses, footprint(robot, -pivotDistance(vehicle)), space), least = smallest(room);
+  const clearance = smallest(clearances(rolled.motion, footprint(robot, 0), space));
+  if (least >= margin && clearance > 0) return { space, margin, clearance };
+  const place = placeInLab(...reference.p[room.indexOf(least)], robot), free = inLab(Math.max(least, 0), robot);
+  throw new InputError(
+    `the path is blocked at ${place}, where the robot has ${free} around it; it needs ${inLab(margin, robot)}, the stated `
+    + `error; ${AROUND}`,
+  );
+}
+
+/* The entry `kept_clear` of plan.json. */
+function keptClearRecord({ space: { keepOut, walls }, margin, clearance }) {
+  return {
+    keep_out: keepOut.map(({ x, y, radius, corners }) => (corners ? { polygon: corners } : { circle: [x, y, radius] })),
+    walls: walls && walls.corners, margin_over_l: margin, predicted_clearance_over_l: clearance, detours: [],
+  };
+}
+
+export { ANYWHERE, readSpace, keptClear, keptClearRecord };
