@@ -57,7 +57,7 @@ test-rest: $(VENV)/.extras ## run clusters and the longer tests
 test-rates: $(VENV)/.extras ## count claims and coverage over many tables, robots and paths
 	$(RUN) $(PYTEST) -m rates
 $(VENV)/.extras: $(STAMP)
-	$(INSTALL) -e '.[clusters,page,hdf5,gym,camera,boards]'
+	$(INSTALL) -e '.[clusters,page,hdf5,dxf,gym,camera,boards]'
 	touch $@
 
 quick: $(STAMP) ## run the quick tests
@@ -65,7 +65,7 @@ quick: $(STAMP) ## run the quick tests
 
 constraints: $(VENV)/bin/uv ## pin what pyproject.toml needs, with hashes (UPGRADE=1: the newest versions)
 	$(RUN) -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"])' \
-	| $(UV) pip compile --quiet pyproject.toml - --extra dev --extra clusters --extra docs --extra page --extra hdf5 --extra gym --extra camera --extra boards --universal --generate-hashes \
+	| $(UV) pip compile --quiet pyproject.toml - --extra dev --extra clusters --extra docs --extra page --extra hdf5 --extra gym --extra camera --extra dxf --extra boards --universal --generate-hashes \
 	--no-annotate --custom-compile-command 'make constraints' $(if $(UPGRADE),--upgrade) -o constraints.txt
 
 lint: $(STAMP) ## style, types; prints the lines of each package

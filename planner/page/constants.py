@@ -12,6 +12,7 @@ import numpy as np
 
 from common import units
 from planner.page.first_state import camel
+from planner.paths.path_files import READERS
 from planner.planning.request import PlanRequest
 from sim.knowledge import UNMEASURED
 from sim.model import uncertainty
@@ -20,7 +21,7 @@ from sim.model.entries import ENTRIES
 _NAMES = {  # of each module; a leading underscore is left out
     "planner.files.headers": "MOST_MS CHECKPOINTS",
     "planner.paths.distance": "TIE",
-    "planner.paths.path_files": "KINDS",
+    "planner.paths.path_files": "KINDS ADVICE",
     "planner.paths.nearest_path": "SPACING MOST_POSES COARSEST WEIGHTS ITERATIONS ALONG POINTS_A_POSE ROUNDS "
     "LEAST EVEN SHORT SHORTEST_STEP",
     "planner.paths.path": "CIRCLE_POINTS LARGEST MOST_SMOOTHED EVEN",
@@ -67,6 +68,7 @@ def constants() -> dict[str, dict[str, Any]]:
     request = PlanRequest()
     options = [name for name in vars(request) if name not in _NOT_ASKED]
     found["request"] = {"DEFAULTS": {camel(name): getattr(request, name) for name in options}}
+    found["path_files"]["READ"] = list(READERS)
     found["paths_units"] = _of("planner.paths.units", ["LONGEST", "SMALLEST"])
     found["stated_error"]["CAMERA"] = request.camera.to_dict()
     found["units"]["SIGNS"] = {chr(sign): str(word) for sign, word in units._SIGNS.items()}

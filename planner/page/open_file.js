@@ -13,7 +13,7 @@ import { numbersOf, parseWords, readTablePath, textsOf } from "./tables.js";
 import { splitName } from "./units.js";
 import { InputError } from "./words.js";
 
-const { KINDS } = CONSTANTS.path_files; // kind: its endings, and how it begins
+const { KINDS, ADVICE, READ } = CONSTANTS.path_files; // KINDS: of each its endings, and how it begins
 const HEAD = 4096; // bytes that tell
 const FORMAT = 2; // of plan.json
 const TRACK = ["heading", "time"]; // what a path does not have
@@ -51,7 +51,10 @@ function refuseOtherKinds(name, bytes) {
   const kind = kinds.find((each) => new RegExp(KINDS[each][1], "iy").test(head)) ??
     kinds.find((each) => KINDS[each][0].split(" ").includes(ending));
   if (kind === undefined || (kind === "JSON" && ending === "json")) return; // plan.json
-  const words = "give a table with columns x and y, such as CSV, or an SVG drawing";
+  if (READ.includes(kind)) {
+    throw new InputError(`${name}: the page does not read ${kind}; put it in with softflagella page ${name}`);
+  }
+  const words = ADVICE[kind] ?? "give a table with columns x and y, such as CSV, or an SVG drawing";
   throw new InputError(`${name}: ${kind} is not read; ${words}`);
 }
 

@@ -1,20 +1,25 @@
-"""Paths from files: CSV tables, and SVG drawings (`planner.paths.svg_drawing`)."""
+"""Paths from files: tables, drawings (`planner.paths.svg_drawing`, `planner.paths.dxf_drawing`), GeoJSON
+(`planner.paths.geojson`) and what other robots follow (`planner.paths.robot_messages`)."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from common.arrays import Floats
 from common.errors import InputError, naming
 from common.keywords import checks_keywords
 from common.units import split, to_si
+from planner.paths.dxf_drawing import read_dxf
+from planner.paths.geojson import read_geojson
+from planner.paths.named_paths import NamedPaths, Polyline
 from planner.paths.path import SHAPES, Path2D, like_a_shape, nearest_shape, shape_of
+from planner.paths.robot_messages import of_messages, read_messages, read_pathplanner
 from planner.paths.units import NO_UNIT, Scales, in_tails
 
 if TYPE_CHECKING:
@@ -23,9 +28,12 @@ if TYPE_CHECKING:
 KINDS = {  # of files that are neither tables nor drawings: their endings, and how they begin
     "GeoJSON": ("geojson topojson",
                 r'\{[\s\S]*?"type"\s*:\s*"(?:Feature|Topology|Geometry|(?:Multi)?(?:Point|Line|Poly))'),
+    "a path of PathPlanner": ("path", r'\{[\s\S]*?"waypoints"\s*:\s*\[\s*\{\s*"anchor'),
+    "a bag of ROS": ("bag db3 mcap", r"#ROSBAG|SQLite format 3|\x89MCAP"),
     "a map of ROS": ("pgm pbm ppm",
                      r"P[1-6]\s+(?:#[^\n]*\n\s*)*\d+\s+\d+\s|(?:[^\n]*\n)*?(?:image|resolution):\s"),
-    "a message of ROS": ("bag db3 mcap", r"(?:[^\n]*\n)*?(?:poses:|[^\n]*(?:nav|geometry)_msgs/)"),
+    "a message of ROS": ("",
+                         r'\{[\s\S]*?\bposes?"?:|(?:[^\n]*\n)*?(?:[\s-]*poses?:|[^\n]*(?:nav|geometry)_msgs/)'),
     "YAML": ("yaml yml", r"---\s"),
     "a script": ("sh py m", r"#!"),
     "JSON": ("json", r"\{|\[\s*[\[{\d-]"),
@@ -41,7 +49,29 @@ KINDS = {  # of files that are neither tables nor drawings: their endings, and h
     "PDF": ("pdf", r"%PDF"),
     "a picture": ("png jpg jpeg gif bmp tif tiff webp heic", r"\x89PNG|\xff\xd8\xff|GIF8|II\*|MM\x00\*|RIFF"),
 }  # fmt: skip
+ADVICE = {  # other than that of a table or a drawing
+    "GPX": "its degrees of longitude and latitude span kilometres; give x and y in a unit of length",
+    "KML": "its degrees of longitude and latitude span kilometres; give x and y in a unit of length",
+    "a map of ROS": "a path has an order; give --keep-out map.yaml, and the path in another file",
+    "a bag of ROS": "print the topic of the path: ros2 topic echo --full-length TOPIC > path.yaml",
+}
+_OF_BAG = re.compile(r"(?:poses\W?(\d+)\W.*)?\bposition\W([xy])$")  # /plan/poses[0]/pose/position/x
 _HEAD = 4096  # bytes that tell
+
+
+def _read_svg(path: Path) -> NamedPaths:
+    from planner.paths.svg_drawing import read_svg  # loads svgelements, which only a drawing needs
+
+    return read_svg(path)
+
+
+READERS: dict[str, Callable[[Path], NamedPaths]] = {
+    "GeoJSON": read_geojson,
+    "a path of PathPlanner": read_pathplanner,
+    "a message of ROS": read_messages,
+    "DXF": read_dxf,
+    "an SVG drawing": _read_svg,
+}
 
 
 @dataclass(frozen=True)
@@ -58,6 +88,7 @@ class Drawing:
 
     path: Path2D  # in the unit of the file
     unit: float | str | None  # its size in m, or "m", "cm", "mm", "l"; None: the numbers have no unit
+    no_unit: str = NO_UNIT  # what a message then asks for
 
     def in_tails(self, robot: Scales, unit: str | None = None) -> Path2D:
         """Return the path in tail lengths of a robot.
@@ -70,7 +101,7 @@ class Drawing:
             InputError: there is no unit, or there are two.
         """
         if self.unit is None and unit is None:
-            raise InputError(NO_UNIT)
+            raise InputError(self.no_unit)
         given, own = (
             in_tails(each, robot) if isinstance(each, str) else each and each / robot.length_scale
             for each in (unit, self.unit)
@@ -113,38 +144,41 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
         near = nearest_shape(words)
         raise InputError(f"{words}: no such file or shape; {f'is it {near}? ' if near else ''}shapes are {SHAPES}")
     with naming(source):
-        if Path(source).suffix.lower() == ".svg":
-            from planner.paths.svg_drawing import read_svg  # loads svgelements, which only a drawing needs
-
-            return Drawing(*read_svg(Path(source), closed, shape))
-        _refuse_other_kinds(Path(source))
-        if shape is not None:
-            raise InputError(f"{source} is no SVG, so it has no shape {shape!r}; leave --shape out")
-        points, unit = _read_columns(source)
-        return Drawing(Path2D.of(points, closed=closed), unit)
+        found = read_paths(Path(source))
+        return Drawing(found.chosen(source, shape, closed), found.unit, found.no_unit)
 
 
-def _refuse_other_kinds(path: Path) -> None:
-    """Refuse a file that is neither a table nor a drawing; a pipe is not looked into.
+def read_paths(path: Path) -> NamedPaths:
+    """Read all paths of a file.
 
     Raises:
-        InputError: it is of another kind, by its content or its ending.
+        InputError: it has none, or is of a kind that is not read.
     """
+    kind = _kind_of(path)
+    if kind is None:
+        return _read_columns(path)
+    if kind not in READERS:
+        advice = ADVICE.get(kind, "give a table with columns x and y, such as CSV, or an SVG drawing")
+        raise InputError(f"{path}: {kind} is not read; {advice}")
+    return READERS[kind](path)
+
+
+def _kind_of(path: Path) -> str | None:
+    """Tell what a file is, by its content or its ending; None: a table. A pipe is not looked into."""
+    ending = path.suffix.lower().removeprefix(".")
+    if ending == "svg":
+        return "an SVG drawing"
     if not path.is_file():
-        return
+        return None
     with path.open("rb") as file:
         head = file.read(_HEAD).decode("latin-1").removeprefix("\xef\xbb\xbf").lstrip()
-    ending = path.suffix.lower().removeprefix(".")
     by_content = [kind for kind, (_, start) in KINDS.items() if re.match(start, head, re.IGNORECASE)]
     by_ending = [kind for kind, (endings, _) in KINDS.items() if ending in endings.split()]
-    for kind in [*by_content, *by_ending][:1]:
-        raise InputError(
-            f"{path}: {kind} is not read; give a table with columns x and y, such as CSV, or an SVG drawing"
-        )
+    return next(iter([*by_content, *by_ending]), None)
 
 
-def _read_columns(source: str | Path) -> tuple[Floats, float | None]:
-    """Read x and y (n, 2) and the size of their unit in m; without names the first two columns.
+def _read_columns(source: Path) -> NamedPaths:
+    """Read x and y, and the size of their unit; without names the first two columns.
 
     Raises:
         InputError: the table has no x and y, only one of them has a unit, or a value is no number.
@@ -153,6 +187,11 @@ def _read_columns(source: str | Path) -> tuple[Floats, float | None]:
     from common.tables import read_table
 
     table = read_table(source, names=False)
+    if columns := _of_bag(table):
+        poses = (
+            table[columns].apply(numbers_of).to_numpy(dtype=float).reshape(len(table), 2, -1).transpose(0, 2, 1)
+        )
+        return of_messages([each[np.isfinite(each).all(axis=1)] for each in poses])
     if all(isinstance(column, int) for column in table):
         names, units = list(table.columns[:2]), []
     else:
@@ -165,13 +204,19 @@ def _read_columns(source: str | Path) -> tuple[Floats, float | None]:
     if len(broken):
         line = f" (line {table.index[broken[0]]})" if table.index.name else ""
         raise InputError(f"{source}: x or y of point {broken[0] + 1}{line} is no number; correct the file")
-    if not units:
-        return points, None
-    factors = np.array([to_si(1.0, unit.suffix) for unit in units])
-    return points * (factors / factors[0]), float(factors[0])
+    factors = np.array([to_si(1.0, unit.suffix) for unit in units] or [1.0, 1.0])
+    path = Polyline(points * (factors / factors[0]))
+    return NamedPaths({source.stem: path}, float(factors[0]) if units else None)
 
 
-def _column(source: str | Path, table: pd.DataFrame, axis: str) -> str:
+def _of_bag(table: pd.DataFrame) -> list[str]:
+    """List the columns of places of a bag of ROS, a message a row: x of each pose, then y of each; or none."""
+    found = sorted((m[2], int(m[1] or 0), name) for name in map(str, table) if (m := _OF_BAG.search(name)))
+    x, y = ([number for axis, number, _ in found if axis == wanted] for wanted in "xy")
+    return [name for _, _, name in found] if x == y and len(set(x)) == len(x) else []
+
+
+def _column(source: Path, table: pd.DataFrame, axis: str) -> str:
     """Choose the column of a coordinate, a bare number or a length."""
     columns = []
     for column in map(str, table):

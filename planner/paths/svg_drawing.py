@@ -5,7 +5,7 @@ another way than a browser, is refused by its name, if it moves, scales or hides
 few lines of <use> can stand for millions of shapes, so elements and numbers are counted on the way.
 
 In SVG y points down; here it points up. Every shape that is seen, and every subpath of a shape, is a separate
-path. A file with several paths is rejected unless one is chosen by name. Curves become polylines.
+path. Curves become polylines.
 """
 
 from __future__ import annotations
@@ -19,13 +19,15 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from svgelements import Circle, Close, Ellipse, Line, Matrix, Move, Polygon, Polyline, Rect, SimpleLine, Viewbox
+from svgelements import Circle, Close, Ellipse, Line, Matrix, Move, Polygon, Rect, SimpleLine, Viewbox
 from svgelements import Path as SvgPath
+from svgelements import Polyline as SvgPolyline
 
 from common.arrays import Floats
 from common.errors import InputError
 from common.reading import read_bytes
-from planner.paths.path import Path2D, steps_of
+from planner.paths.named_paths import NamedPaths, Polyline
+from planner.paths.path import steps_of
 
 METRES_PER_PIXEL = 0.0254 / 96  # of SVG
 _TURN = math.radians(2.0)  # largest turn of a curve between two points
@@ -58,7 +60,7 @@ _TRANSFORMS = {  # and their arguments: numbers 1, lengths x, angles a
 }  # fmt: skip
 
 _VISIBLE = {"visible": True, "hidden": False, "collapse": False}
-_OUTLINES = {"line": SimpleLine, "polyline": Polyline, "polygon": Polygon, "circle": Circle, "rect": Rect,
+_OUTLINES = {"line": SimpleLine, "polyline": SvgPolyline, "polygon": Polygon, "circle": Circle, "rect": Rect,
              "ellipse": Ellipse}  # fmt: skip
 _SVG = "{http://www.w3.org/2000/svg}"
 _XLINK = "{http://www.w3.org/1999/xlink}href"
@@ -85,11 +87,11 @@ _SELECTOR = re.compile(r"[.#]?[\w-]+")
 _IMPORTANT = re.compile(r"!\s*important$", re.IGNORECASE)
 
 
-def read_svg(path: Path, closed: bool | None, shape: str | None) -> tuple[Path2D, float | None]:
-    """Read one path of a drawing, and the size of its unit in metres if the drawing has physical units.
+def read_svg(path: Path) -> NamedPaths:
+    """Read the paths of a drawing, and the size of its unit if the drawing has physical units.
 
     Raises:
-        InputError: the file has no path, or several and none is chosen, or is larger than a drawing may be.
+        InputError: the file has no path, or is larger than a drawing may be.
     """
     data = read_bytes(path)
     if b"<?xml-stylesheet" in data:
@@ -105,17 +107,8 @@ def read_svg(path: Path, closed: bool | None, shape: str | None) -> tuple[Path2D
         raise InputError(f"{path} is not SVG: {reason}") from None
     if not subpaths:
         raise InputError(f"{path} has no path, line, polyline, polygon, rectangle, circle or ellipse; draw one")
-    if shape is None and len(subpaths) > 1:
-        names = ", ".join(subpaths)
-        raise InputError(
-            f"{path} has {len(subpaths)} paths ({names}); choose one with --shape, or remove the others"
-        )
-    name = next(iter(subpaths)) if shape is None else shape
-    if name not in subpaths:
-        raise InputError(f"{path} has no shape {name!r}; there are {', '.join(subpaths)}")
-    points, ends = subpaths[name]
-    upright = points * [1.0, -1.0] + 0.0  # no negative zeros
-    return Path2D.of(upright, closed=ends or closed), METRES_PER_PIXEL if drawing.physical else None
+    upright = {name: Polyline(points * [1.0, -1.0] + 0.0, closed) for name, (points, closed) in subpaths.items()}
+    return NamedPaths(upright, METRES_PER_PIXEL if drawing.physical else None)
 
 
 class _Shape(NamedTuple):
@@ -127,14 +120,14 @@ class _Shape(NamedTuple):
     matrix: Matrix  # to pixels
 
 
-def _subpaths(shapes: list[_Shape]) -> dict[str, tuple[Floats, bool]]:
-    """Find the points (n, 2) of every subpath by name, and whether it is closed."""
-    subpaths: dict[str, tuple[Floats, bool]] = {}
+def _subpaths(shapes: list[_Shape]) -> dict[str, Polyline]:
+    """Find every subpath by name."""
+    subpaths: dict[str, Polyline] = {}
     counts: dict[str, int] = {}
     for kind, identity, outline, matrix in shapes:
         counts[kind] = counts.get(kind, 0) + 1
         name = identity or f"{kind}{counts[kind]}"
-        parts = [_points(SvgPath(part), matrix) for part in outline.as_subpaths()]
+        parts = [polyline_of(SvgPath(part), matrix) for part in outline.as_subpaths()]
         parts = [part for part in parts if len(part[0]) > 1]
         for i, part in enumerate(parts):
             part_name = name if len(parts) == 1 else f"{name}/{i + 1}"
@@ -142,8 +135,8 @@ def _subpaths(shapes: list[_Shape]) -> dict[str, tuple[Floats, bool]]:
     return subpaths
 
 
-def _points(subpath: Any, matrix: Matrix) -> tuple[Floats, bool]:
-    """Sample the points of one subpath in pixels, curves as polylines, and tell whether it is closed.
+def polyline_of(subpath: Any, matrix: Matrix) -> Polyline:
+    """Sample the points of one subpath in pixels, curves as polylines.
 
     Points are sampled before the transform: svgelements takes the axes of a skewed ellipse for upright ones.
     """
@@ -160,7 +153,7 @@ def _points(subpath: Any, matrix: Matrix) -> tuple[Floats, bool]:
             points += segment.npoint(np.linspace(0, 1, _enough(segment, matrix) + 1)[1:]).tolist()
         if len(points) > _MOST_POINTS:
             raise InputError(f"a curve of the drawing needs more than {_MOST_POINTS} points; simplify the drawing")
-    return _moved(np.array(points, dtype=float).reshape(-1, 2), matrix), closed
+    return Polyline(_moved(np.array(points, dtype=float).reshape(-1, 2), matrix), closed)
 
 
 def _moved(points: Floats, matrix: Matrix) -> Floats:

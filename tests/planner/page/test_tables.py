@@ -12,8 +12,7 @@ import pytest
 from common.errors import InputError
 from common.quantities import numbers_of
 from common.tables import parse_table
-from planner.paths.path_files import read_path
-from planner.paths.svg_drawing import read_svg
+from planner.paths.path_files import ADVICE, READERS, read_path
 from tests.common.test_tables import READ, REFUSED, TEXTS
 from tests.planner.page.page_core import (
     EXACT,
@@ -98,13 +97,16 @@ KINDS = {
     "WKT": ["LINESTRING (0 0, 1 1)", "SRID=4326;POLYGON Z((0 0 1, 1 1 1))", "MULTILINESTRING((0 0,1 1))",
             'WKT,name\n"LINESTRING (0 0,1 1)",a\n', "id;geom\n1;POINT(1 2)\n"],
     "DXF": ["0\nSECTION\n2\nHEADER\n", "  0\r\nSECTION\r\n"],
+    "a path of PathPlanner": ['{"waypoints": [{"anchor": {"x": 1, "y": 2}}]}'],
+    "a bag of ROS": ["#ROSBAG V2.0\n"],
     "a map of ROS": ["image: tank.pgm\nresolution: 0.01\n", "# a\nresolution: 0.01\n", "P5\n8 6\n255\n"],
-    "a message of ROS": ["header:\n  frame_id: map\nposes:\n- header:\n", "#!/bin/sh\nros2 pub nav_msgs/Path\n"],
+    "a message of ROS": ["header:\n  frame_id: map\nposes:\n- header:\n", "#!/bin/sh\nros2 pub nav_msgs/Path\n",
+                         '{"header": {},\n"poses": [{"pose": {"position": {"x": 0, "y": 0}}}]}'],
     "YAML": ["---\na: 1\n"], "a script": ["#!/bin/sh\necho 1\n"],
     "PDF": ["%PDF-1.7"], "a picture": ["\x89PNG\r\n", "\xff\xd8\xff\xe0"],
 }  # fmt: skip
 ENDINGS = {"a.geojson": "GeoJSON", "a.gpx": "GPX", "a.GCODE": "G-code", "a.wkt": "WKT", "a.dxf": "DXF",
-           "a.svgz": "a drawing"}  # fmt: skip
+           "a.svgz": "a drawing", "a.mcap": "a bag of ROS", "a.path": "a path of PathPlanner"}  # fmt: skip
 
 
 def test_files_of_other_kinds_are_refused_by_name() -> None:
@@ -113,10 +115,13 @@ def test_files_of_other_kinds_are_refused_by_name() -> None:
     files += [(name, b"1,2\n3,4\n", kind) for name, kind in ENDINGS.items()]
     for name, content, kind in files:
         Path(name).write_bytes(content)
-        refusal = refusal_of(read_path, name)
-        assert kind in refusal, content
-        assert "is not read; give a table with columns x and y, such as CSV, or an SVG drawing" in refusal
-        assert str(opened(name, content)) == refusal
+        shown = str(opened(name, content))
+        assert kind in shown, content
+        if kind in READERS:
+            assert shown == f"{name}: the page does not read {kind}; put it in with softflagella page {name}"
+            continue
+        assert f"is not read; {ADVICE.get(kind, 'give a table with columns x and y')}" in shown
+        assert shown == refusal_of(read_path, name)
 
 
 BODIES = [
@@ -153,7 +158,8 @@ DRAWINGS += [text for pair in svg_cases.ALIKE for text in pair]
 
 def check_drawing(text: str, shape: str | None = None, index: int = 0) -> None:
     Path("a.svg").write_text(text, encoding="utf-8")
-    (path, unit), found = read_svg(Path("a.svg"), None, shape), opened("a.svg", text)
+    drawing, found = read_path("a.svg", shape=shape), opened("a.svg", text)
+    path, unit = drawing.path, drawing.unit
     assert not isinstance(found, InputError), (found, text)
     drawn = found["paths"][index]
     assert drawn["closed"] == path.closed

@@ -13,7 +13,7 @@ from planner.options import read_region
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.path import SHAPES, Path2D, polygon
 from planner.paths.path_files import Drawing, read_path
-from planner.paths.svg_drawing import METRES_PER_PIXEL, read_svg
+from planner.paths.svg_drawing import METRES_PER_PIXEL
 from planner.paths.units import (
     check_size,
     heading_in_degrees,
@@ -101,8 +101,16 @@ def test_several_paths_are_named_and_one_can_be_chosen(tmp_path: Path) -> None:
         drawn(tmp_path, body)
     assert drawn(tmp_path, body, shape="outline/2").path.length == pytest.approx(2)
     assert drawn(tmp_path, body, shape="rect1").path.length == pytest.approx(8)
-    with pytest.raises(InputError, match="no shape 'circle1'; there are outline/1"):
+    with pytest.raises(InputError, match=r"no shape 'circle1'; there are 3 \(outline/1"):
         drawn(tmp_path, body, shape="circle1")
+
+
+def test_of_many_paths_the_longest_are_named(tmp_path: Path) -> None:
+    lines = "".join(f"<line id='n{k}' x2='{1 + (k * 7) % 300}'/>" for k in range(300))
+    with pytest.raises(InputError) as refusal:
+        drawn(tmp_path, lines)
+    longest = ", ".join(sorted((f"n{k}" for k in range(300)), key=lambda name: -(int(name[1:]) * 7 % 300))[:10])
+    assert f"a.svg has 300 paths (the longest: {longest}); choose one with --shape" in str(refusal.value)
 
 
 @pytest.mark.parametrize("text", [*svg_cases.BROKEN, "\xff\xfe\x00"])
@@ -115,7 +123,7 @@ def test_what_is_no_drawing_is_refused(text: str, tmp_path: Path) -> None:
 def test_a_table_has_no_shapes(tmp_path: Path) -> None:
     (tmp_path / "p.csv").write_text("x,y\n0,0\n1,1\n")
     assert read_path(tmp_path / "p.csv").unit is None
-    with pytest.raises(InputError, match="no SVG"):
+    with pytest.raises(InputError, match="no shape 'a'; leave --shape out"):
         read_path(tmp_path / "p.csv", shape="a")
 
 
@@ -169,9 +177,9 @@ def test_drawings_that_show_the_same_are_read_alike(text: str, reference: str, t
     read = []
     for name, content in (("a.svg", text), ("b.svg", reference)):
         (tmp_path / name).write_text(content)
-        read.append(read_svg(tmp_path / name, None, None))
-    (path, unit), (wanted, wanted_unit) = read
-    assert (unit, path.closed) == (wanted_unit, wanted.closed)
+        read.append(read_path(tmp_path / name))
+    path, wanted = (drawing.path for drawing in read)
+    assert (read[0].unit, path.closed) == (read[1].unit, wanted.closed)
     assert path.points == pytest.approx(wanted.points, rel=1e-8, abs=1e-8 * np.abs(wanted.points).max())
 
 
@@ -182,7 +190,7 @@ DEEP = (svg_cases.svg("<g>" * 20_000 + "</g>" * 20_000), "more than 100 levels")
 def test_what_is_not_read_is_refused_by_name(text: str, words: str, tmp_path: Path) -> None:
     (tmp_path / "a.svg").write_text(text)
     with pytest.raises(InputError) as refusal:
-        read_svg(tmp_path / "a.svg", None, None)
+        read_path(tmp_path / "a.svg")
     assert words in str(refusal.value)
 
 

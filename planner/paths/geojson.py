@@ -1,0 +1,74 @@
+"""Paths and polygons of GeoJSON.
+
+RFC 7946 has degrees of longitude and latitude, in which nothing of a tank can be drawn well; many programs write
+metres all the same. So its numbers have no unit until one is given, and declared degrees are refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from common.arrays import Floats
+from common.errors import InputError
+from common.reading import expecting, read_json
+from planner.paths.named_paths import NamedPaths, Polyline, with_own_names
+
+_DEGREES = re.compile(r"CRS:?84|EPSG:+(?:4326|4979)")
+_NO_UNIT = (
+    "GeoJSON has degrees of longitude and latitude (RFC 7946), which no robot in a tank can follow; if these are "
+    'metres, give --unit m (in Python unit="m")'
+)
+
+
+def read_geojson(path: Path) -> NamedPaths:
+    """Read the lines and rings of a file, named as its features are.
+
+    Raises:
+        InputError: it has none, or degrees.
+    """
+    parts = (
+        (name if k == 0 else f"{name}/hole{k}", Polyline(ring, kind == "Polygon"))
+        for name, kind, rings in read_shapes(path)
+        for k, ring in enumerate(rings)
+    )
+    return NamedPaths(with_own_names(parts), None, _NO_UNIT)
+
+
+def read_shapes(path: Path) -> list[tuple[str, str, list[Floats]]]:
+    """Read name, kind and rings of each LineString and Polygon; of a polygon holes follow the outline.
+
+    Raises:
+        InputError: there are none, or they are in degrees.
+    """
+    with expecting("GeoJSON", path, "export it again"):
+        content = read_json(path)
+        system = (content.get("crs") or {}).get("properties", {}).get("name", "")
+        if _DEGREES.search(system):
+            raise InputError(f"its crs is {system}: degrees of longitude and latitude; export it in metres")
+        shapes = [
+            (name, kind, [np.array([place[:2] for place in ring], dtype=float) for ring in rings])
+            for name, kind, rings in _shapes(content, "")
+        ]
+        if not shapes:
+            raise InputError("it has no LineString and no Polygon; draw one")
+        return shapes
+
+
+def _shapes(part: Mapping[str, Any], name: str) -> Iterator[tuple[str, str, list[Any]]]:
+    """Yield name, kind and rings of the shapes of a part of the file."""
+    kind = part["type"]
+    if kind == "Feature":
+        name = str((part.get("properties") or {}).get("name") or part.get("id") or "")
+        if part["geometry"] is not None:
+            yield from _shapes(part["geometry"], name)
+    for inner in (*part.get("features", ()), *part.get("geometries", ())):
+        yield from _shapes(inner, name)
+    if kind in ("LineString", "MultiLineString", "Polygon", "MultiPolygon"):
+        single, places = kind.removeprefix("Multi"), part["coordinates"]
+        for each in places if kind != single else [places]:
+            yield name or single, single, [each] if single == "LineString" else each

@@ -1,0 +1,67 @@
+"""The paths of a file by their names, of which one is chosen."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+from common.arrays import Floats
+from common.errors import InputError
+from planner.paths.path import Path2D, arc_length
+from planner.paths.units import NO_UNIT
+
+_LISTED = 10  # names in a message
+
+
+class Polyline(NamedTuple):
+    """A path as a file has it."""
+
+    points: Floats  # (n, 2), in the unit of the file
+    closed: bool = False  # the last point is joined to the first
+
+
+class NamedPaths(NamedTuple):
+    """The paths of a file, one or more."""
+
+    paths: Mapping[str, Polyline]
+    unit: float | None  # its size in m; None: the numbers have no unit
+    no_unit: str = NO_UNIT  # what a message then asks for
+
+    def chosen(self, source: object, shape: str | None, closed: bool | None) -> Path2D:
+        """Return the path of a name, or the only one; its ends are joined if it is closed, or `closed` says so.
+
+        Raises:
+            InputError: there are several and none is chosen, or none has this name.
+        """
+        if shape is None and len(self.paths) > 1:
+            raise InputError(
+                f"{source} has {len(self.paths)} paths{self._listed()}; choose one with --shape, or remove the "
+                "others"
+            )
+        name = next(iter(self.paths)) if shape is None else shape
+        if name not in self.paths:
+            there = f"there are {len(self.paths)}{self._listed()}" if len(self.paths) > 1 else "leave --shape out"
+            raise InputError(f"{source} has no shape {name!r}; {there}")
+        points, ends = self.paths[name]
+        return Path2D.of(points, closed=ends or closed)
+
+    def _listed(self) -> str:
+        """List the names of all paths, or of the longest ones."""
+        names = list(self.paths)
+        if len(names) > _LISTED:
+            names.sort(key=lambda name: -arc_length(self.paths[name].points)[-1])
+        return f" ({'the longest: ' if len(names) > _LISTED else ''}{', '.join(names[:_LISTED])})"
+
+
+def with_own_names(paths: Iterable[tuple[str, Polyline]]) -> dict[str, Polyline]:
+    """Name paths apart: a name that comes again is followed by a number."""
+    named: dict[str, Polyline] = {}
+    again: Counter[str] = Counter()
+    for name, path in paths:
+        label = name
+        while label in named:
+            again[name] += 1
+            label = f"{name}/{again[name] + 1}"
+        named[label] = path
+    return named

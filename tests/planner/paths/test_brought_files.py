@@ -1,0 +1,203 @@
+"""Paths of files that other programs write: GeoJSON, DXF, messages of ROS, PathPlanner."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.errors import InputError
+from planner.paths.path_files import Drawing, read_path
+from tests.planner.plans import CONTROL
+
+CORNERS = [[0, 0], [0.3, 0], [0.3, 0.2], [0.6, 0.2]]
+RING = [[0, 0], [4, 0], [4, 3], [0, 3], [0, 0]]
+
+
+def written(folder: Path, name: str, text: str, **options: Any) -> Drawing:
+    (folder / name).write_text(text)
+    return read_path(folder / name, **options)
+
+
+def refused(folder: Path, name: str, text: str, **options: Any) -> str:
+    with pytest.raises(InputError) as refusal:
+        written(folder, name, text, **options)
+    assert "\n" not in str(refusal.value)
+    assert name in str(refusal.value)
+    return str(refusal.value)
+
+
+def block(x: float, y: float) -> str:
+    return f"- header:\n    frame_id: map\n  pose:\n    position:\n      x: {x}\n      y: {y}\n      z: 0.0\n"
+
+
+POSES = [  # of messages: ros2 topic echo, with --flow-style, rostopic echo, its poses alone, JSON, one pose each
+    "header:\n  frame_id: map\nposes:\n" + "".join(block(x, y) for x, y in CORNERS) + "---\n",
+    "header: {frame_id: map}\nposes: [" + ", ".join(
+        f"{{pose: {{position: {{x: {x}, y: {y}, z: 0.0}}}}}}" for x, y in CORNERS) + "]\n---\n",
+    "header: \n  seq: 0\nposes: \n" + "".join(
+        f"  - \n    pose: \n      position: \n        x: {x}\n        y: {y}\n" for x, y in CORNERS),
+    "poses:\n" + "".join(f"- position:\n    x: {x}\n    y: {y}\n" for x, y in CORNERS),
+    json.dumps({"poses": [{"pose": {"position": {"x": x, "y": y}}} for x, y in CORNERS]}, indent=1),
+    "---\n".join(f"header:\n  seq: 1\npose:\n  position:\n    x: {x}\n    y: {y}\n" for x, y in CORNERS),
+    "#!/bin/sh\nros2 topic pub /path nav_msgs/msg/Path \"poses:\n"
+    + "".join(block(x, y) for x, y in CORNERS) + '"',
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", POSES, ids=range(len(POSES)))
+def test_messages_of_ros_are_paths_in_metres(text: str, tmp_path: Path) -> None:
+    drawing = written(tmp_path, "path.yaml", text)
+    assert drawing.path.points.tolist() == CORNERS
+    assert drawing.unit == 1.0
+
+
+def test_a_message_that_comes_again_is_one_and_others_have_names(tmp_path: Path) -> None:
+    assert written(tmp_path, "a.yaml", POSES[0] * 3).path.points.tolist() == CORNERS
+    both = POSES[0] + POSES[0].replace("0.6", "0.9")
+    assert "has 2 paths (message1, message2); choose one with --shape" in refused(tmp_path, "a.yaml", both)
+    assert written(tmp_path, "a.yaml", both, shape="message2").path.points[-1].tolist() == [0.9, 0.2]
+
+
+def test_a_message_that_was_cut_or_has_no_place_is_refused(tmp_path: Path) -> None:
+    assert "--full-length" in refused(tmp_path, "a.yaml", POSES[0].replace("---", "- '...'\n---"))
+    assert "no poses" in refused(tmp_path, "a.yaml", "header:\n  frame_id: map\nposes: []\n---\n")
+    assert "could not convert" in refused(tmp_path, "a.yaml", POSES[0].replace("0.6", "far"))
+    assert "finite numbers" in refused(tmp_path, "a.yaml", POSES[0].replace("0.6", "nan"))
+
+
+@pytest.mark.parametrize("start", ["field.poses{}.pose.position.", "/plan/poses[{}]/pose/position/"])
+def test_a_row_of_a_bag_is_a_path(start: str, tmp_path: Path) -> None:
+    """The columns are sorted by name, as some programs do."""
+    many = [[k, k % 2] for k in range(12)]
+    columns = {
+        start.format(k) + axis: point[i] for k, point in enumerate(many) for i, axis in enumerate("xyz"[:2])
+    }
+    names = ["%time", *sorted(columns)]
+    row = ",".join(str(columns.get(name, 17)) for name in names)
+    drawing = written(tmp_path, "a.csv", f"{','.join(names)}\n{row}\n{row}\n")
+    assert drawing.path.points.tolist() == many
+    assert drawing.unit == 1.0
+
+
+def test_a_bag_of_single_poses_is_a_path(tmp_path: Path) -> None:
+    rows = "".join(f"{k},map,{x},{y},0\n" for k, (x, y) in enumerate(CORNERS))
+    head = "%time,field.header.frame_id,field.pose.position.x,field.pose.position.y,field.pose.position.z\n"
+    assert written(tmp_path, "a.csv", head + rows).path.points.tolist() == CORNERS
+    two = "a.position.x,a.position.y,b.position.x,b.position.y\n0,0,1,1\n1,1,2,2\n"
+    assert "give x and y" in refused(tmp_path, "b.csv", two)
+
+
+@pytest.mark.parametrize("anchor", ["anchor", "anchorPoint"])
+def test_pathplanner_is_followed_along_its_curves(anchor: str, tmp_path: Path) -> None:
+    """The quarter of a circle about (0, 0) from (1, 0) to (0, 1), of which a Bézier curve misses 0.03 %."""
+    k = 4 / 3 * (math.sqrt(2) - 1)
+    knots = [
+        {anchor: {"x": 1, "y": 0}, "prevControl": None, "nextControl": {"x": 1, "y": k}},
+        {anchor: {"x": 0, "y": 1}, "prevControl": {"x": k, "y": 1}, "nextControl": None},
+    ]
+    drawing = written(tmp_path, "a.path", json.dumps({"version": "2025.0", "waypoints": knots}))
+    assert drawing.unit == 1.0
+    assert np.hypot(*drawing.path.points.T) == pytest.approx(np.ones(len(drawing.path.points)), abs=4e-4)
+    assert drawing.path.points[[0, -1]].tolist() == [[1, 0], [0, 1]]
+    knots[1]["prevControl"] = None
+    assert "not a path of PathPlanner" in refused(tmp_path, "a.path", json.dumps({"waypoints": knots}))
+    assert "not a path of PathPlanner" in refused(tmp_path, "a.path", '{"waypoints": [{"anchor": {}}]}')
+
+
+def features(*parts: tuple[str, Any], **more: Any) -> str:
+    shapes = [{"type": kind, "coordinates": places} for kind, places in parts]
+    found = [{"type": "Feature", "id": f"f{k}", "geometry": shape} for k, shape in enumerate(shapes)]
+    return json.dumps({"type": "FeatureCollection", **more, "features": found})
+
+
+def test_geojson_needs_a_unit(tmp_path: Path) -> None:
+    drawing = written(tmp_path, "a.geojson", features(("LineString", [[0, 0, 9], [0.5, 0, 9], [0.5, 0.4, 9]])))
+    assert drawing.path.points.tolist() == [[0, 0], [0.5, 0], [0.5, 0.4]]
+    with pytest.raises(InputError, match=r"degrees of longitude.* if these are metres, give --unit m"):
+        drawing.in_tails(CONTROL)
+    assert drawing.in_tails(CONTROL, "m").length == pytest.approx(0.9 / CONTROL.length_scale)
+    for name in ("urn:ogc:def:crs:OGC:1.3:CRS84", "EPSG:4326"):
+        crs = {"type": "name", "properties": {"name": name}}
+        assert "degrees" in refused(tmp_path, "b.json", features(("LineString", RING), crs=crs))
+
+
+def test_rings_and_parts_of_geojson_have_names(tmp_path: Path) -> None:
+    hole = [[1, 1], [2, 1], [2, 2], [1, 1]]
+    text = features(("Polygon", [RING, hole]), ("MultiLineString", [CORNERS, RING]), ("Point", [0, 0]))
+    assert "has 4 paths (f0, f0/hole1, f1, f1/2)" in refused(tmp_path, "a.geojson", text)
+    ring = written(tmp_path, "a.geojson", text, shape="f0").path
+    assert ring.closed
+    assert ring.length == 14
+    assert written(tmp_path, "a.geojson", json.dumps({"type": "LineString", "coordinates": CORNERS})).path.length
+
+
+BROKEN = [
+    ("{\"type\": \"Feature\", \"geometry\": ", "not JSON"), ('{"type": "Feature"}', "no entry 'geometry'"),
+    (features(("Point", [0, 0])), "no LineString and no Polygon"), (features(("LineString", 3)), "not GeoJSON"),
+    (features(("LineString", [[0, "a"], [1, 1]])), "not GeoJSON"),
+    (features(("Polygon", [[[0], [1]]])), "give (n, 2)"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "words"), BROKEN, ids=range(len(BROKEN)))
+def test_damaged_geojson_is_refused_in_one_line(text: str, words: str, tmp_path: Path) -> None:
+    assert words in refused(tmp_path, "a.geojson", text)
+
+
+def test_drawings_of_cad_are_read_by_layer(tmp_path: Path) -> None:
+    """A slot of two lines and two arcs, drawn in no order, and a polyline with a bulge, in mm."""
+    ezdxf = pytest.importorskip("ezdxf")
+    drawing = ezdxf.new(units=4)
+    for layer in ("slot", "track", "off"):
+        drawing.layers.add(layer)
+    drawing.layers.get("off").off()
+    space = drawing.modelspace()
+    space.add_line((0, -10), (40, -10), dxfattribs={"layer": "slot"})
+    space.add_arc((0, 0), 10, 90, 270, dxfattribs={"layer": "slot"})
+    space.add_line((0, 10), (40, 10), dxfattribs={"layer": "slot"})
+    space.add_arc((40, 0), 10, 270, 90, dxfattribs={"layer": "slot"})
+    space.add_lwpolyline([(0, 0, 0), (30, 0, 1), (30, 20, 0)], format="xyb", dxfattribs={"layer": "track"})
+    space.add_circle((0, 0), 5, dxfattribs={"layer": "off"})
+    space.add_text("not drawn")
+    drawing.saveas(tmp_path / "a.dxf")
+    with pytest.raises(InputError, match=r"2 paths \(slot, track\); choose one with --shape"):
+        read_path(tmp_path / "a.dxf")
+    slot, track = (read_path(tmp_path / "a.dxf", shape=name) for name in ("slot", "track"))
+    assert slot.unit == 0.001
+    assert slot.path.closed
+    assert slot.path.points[:2].tolist() == [[0, -10], [40, -10]]
+    assert slot.path.length == pytest.approx(80 + 20 * math.pi, rel=1e-4)
+    assert not track.path.closed
+    assert track.path.length == pytest.approx(30 + 10 * math.pi, rel=1e-4)
+    assert track.path.points[:, 0].max() == pytest.approx(40, abs=1e-3)
+
+
+def test_blocks_and_curves_of_cad_are_read(tmp_path: Path) -> None:
+    ezdxf = pytest.importorskip("ezdxf")
+    drawing = ezdxf.new(units=0)
+    drawing.blocks.new("ring").add_circle((0, 0), 1)
+    drawing.modelspace().add_blockref("ring", (5, 0), dxfattribs={"xscale": 3, "yscale": 3})
+    drawing.saveas(tmp_path / "a.dxf")
+    ring = read_path(tmp_path / "a.dxf")
+    assert ring.path.closed
+    assert ring.path.length == pytest.approx(6 * math.pi, rel=2e-4)
+    assert ring.path.points.mean(0) == pytest.approx([5, 0], abs=1e-2)
+    with pytest.raises(InputError, match=r"\$INSUNITS does not say"):
+        ring.in_tails(CONTROL)
+    ellipse = ezdxf.new()
+    ellipse.modelspace().add_spline([(0, 0), (1, 2), (3, 2), (4, 0)])
+    ellipse.saveas(tmp_path / "b.dxf")
+    assert read_path(tmp_path / "b.dxf").path.points[[0, -1]] == pytest.approx(np.array([[0, 0], [4, 0]]))
+
+
+def test_a_dxf_without_lines_or_damaged_is_refused(tmp_path: Path) -> None:
+    ezdxf = pytest.importorskip("ezdxf")
+    ezdxf.new().saveas(tmp_path / "a.dxf")
+    with pytest.raises(InputError, match=r"has no line, polyline, arc"):
+        read_path(tmp_path / "a.dxf")
+    assert "not DXF" in refused(tmp_path, "b.dxf", "0\nSECTION\n2\nENTITIES\n0\nLINE\n10\n")
