@@ -19,7 +19,7 @@ from common.errors import InputError, naming
 from common.units import LengthUnit
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.path import Path2D, like_a_shape, shape_of
-from planner.paths.path_files import Drawing, read_path
+from planner.paths.path_files import Drawing, read_outlines, read_path
 from planner.paths.units import Scales, in_tails, read_length, read_pose, read_time
 from planner.planning.request import POSE, Camera, Corner, PlanRequest
 from planner.vehicle.from_table import table_for
@@ -78,9 +78,9 @@ class SpaceOptions(TypedDict, total=False):
 
     Attributes:
         keep_out: REGION, that the robot's body must not touch: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a
-            CSV or SVG outline. Where it is in the way, a way around is chosen. In Python also a `Circle`, or
-            corners (n, 2).
-        walls: REGION, what the body must stay within: box:…, or a CSV or SVG outline. In Python also corners.
+            file with closed outlines, polygons (GeoJSON) or a map of ROS (map.yaml). Where it is in the way, a way
+            around is chosen. In Python also a `Circle`, or corners (n, 2).
+        walls: REGION, what the body must stay within: box:…, or a file with one outline. In Python also corners.
         feedback: the pose will be measured for a tracker: the margin around obstacles is the stated error with
             feedback.
         camera: NOISE RAD EVERY LATE LOST, of the stated error with feedback: standard deviations of a place and of
@@ -219,11 +219,11 @@ def request_of(options: Mapping[str, Any], robot: Scales, **own: Any) -> PlanReq
     if given.get("tolerance") is not None:
         given["tolerance"] = length_of(given["tolerance"], unit, robot, "--tolerance")
     walls = options.get("walls")
-    outline = None if walls is None else region_of(walls, unit, robot)
-    if isinstance(outline, Circle):
-        raise InputError(f"--walls {walls!r}; give a box or an outline")
-    regions = tuple(region_of(each, unit, robot) for each in options.get("keep_out", ()))
-    return PlanRequest(**given, **own, space=FreeSpace(regions, outline))
+    outlines = [None] if walls is None else regions_of(walls, unit, robot)
+    if len(outlines) > 1 or isinstance(outlines[0], Circle):
+        raise InputError(f"--walls {walls!r}; give a box or one outline")
+    regions = tuple(part for each in options.get("keep_out", ()) for part in regions_of(each, unit, robot))
+    return PlanRequest(**given, **own, space=FreeSpace(regions, outlines[0]))
 
 
 def length_of(given: Length, unit: str | None, robot: Scales, name: str) -> float:
@@ -250,11 +250,11 @@ def camera_of(given: Camera | Sequence[str], unit: str | None, robot: Scales) ->
     return Camera((noise, heading), every_s, delay_s, lost)
 
 
-def region_of(given: AnyRegion, unit: str | None, robot: Scales) -> Circle | Polygon:
-    """Return a region, or read its words, see `read_region`."""
+def regions_of(given: AnyRegion, unit: str | None, robot: Scales) -> list[Circle | Polygon]:
+    """Return regions, or read their words, see `read_regions`."""
     if isinstance(given, str | Path):
-        return read_region(str(given), unit, robot)
-    return given if isinstance(given, Circle | Polygon) else Polygon.of(given)
+        return read_regions(str(given), unit, robot)
+    return [given if isinstance(given, Circle | Polygon) else Polygon.of(given)]
 
 
 def pose_of(given: Sequence[Length], unit: str | None, robot: Scales, name: str) -> POSE:
@@ -326,11 +326,11 @@ def seconds_of(given: float | str | None, name: str) -> float | None:
     return read_time(given, name) if isinstance(given, str) else given
 
 
-def read_region(words: str, unit: str | None, robot: Scales) -> Circle | Polygon:
-    """Read a region, in tail lengths.
+def read_regions(words: str, unit: str | None, robot: Scales) -> list[Circle | Polygon]:
+    """Read regions, in tail lengths.
 
     Args:
-        words: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG with a closed outline.
+        words: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a file with closed outlines.
         unit: of numbers without one; a drawing with a size has its own.
         robot: its tail length.
 
@@ -341,29 +341,35 @@ def read_region(words: str, unit: str | None, robot: Scales) -> Circle | Polygon
     if shape in _SHAPES and numbers:
         values = [read_length(number, unit, robot, words) for number in numbers.split(",")]
         if shape == "circle" and len(values) == 3:
-            return Circle(*values)
+            return [Circle(*values)]
         if shape == "box" and len(values) == 4:
             left, low, right, high = values
-            return Polygon.of([[left, low], [right, low], [right, high], [left, high]])
+            return [Polygon.of([[left, low], [right, low], [right, high], [left, high]])]
         raise InputError(f"{words!r}; write {_SHAPES[shape]}")
-    drawing = read_outline(words)
     with naming(words):
-        given = drawing.unit or unit
-        named = given if isinstance(given, str) else {1.0: "m", 0.001: "mm"}.get(given or 0.0, "cm")
-        path = drawing.in_tails(robot, unit if drawing.unit is None else None)
-        return Polygon.of(path, 1.0 / in_tails(named, robot), named)
+        return [_polygon_of(drawing, unit, robot) for drawing in _outlines(words)]
 
 
-def read_outline(words: str) -> Drawing:
-    """Read a closed outline from a CSV or SVG.
+def _polygon_of(drawing: Drawing, unit: str | None, robot: Scales) -> Polygon:
+    given = drawing.unit or unit
+    named = given if isinstance(given, str) else {1.0: "m", 0.001: "mm"}.get(given or 0.0, "cm")
+    path = drawing.in_tails(robot, unit if drawing.unit is None else None)
+    return Polygon.of(path, 1.0 / in_tails(named, robot), named)
+
+
+def _outlines(words: str) -> list[Drawing]:
+    """Read the closed outlines of a file, or a shape in words.
 
     Raises:
         InputError: there is no such file, or it has no outline; the words may be a misspelt region.
     """
-    if like_a_shape(words) and shape_of(words) is None and not Path(words).exists():
+    if shape_of(words) is not None:
+        return [read_path(words)]
+    if like_a_shape(words) and not Path(words).exists():
         shape, _, numbers = words.partition(":")
         near = difflib.get_close_matches(shape.lower(), _SHAPES, 1)
         guess = f"is it {near[0]}:{numbers}? " if near else ""
-        regions = f"{', '.join(_SHAPES.values())}, or a CSV or SVG outline"
+        regions = f"{', '.join(_SHAPES.values())}, or a file with outlines"
         raise InputError(f"{words}: no such file or region; {guess}regions are {regions}")
-    return read_path(words, closed=True)
+    paths, unit, no_unit = read_outlines(Path(words))
+    return [Drawing(Path2D.of(points, closed=True), unit, no_unit) for points, _ in paths.values()]

@@ -39,6 +39,30 @@ def read_geojson(path: Path) -> NamedPaths:
     return NamedPaths(with_own_names(parts), None, _NO_UNIT)
 
 
+def read_regions(path: Path) -> NamedPaths:
+    """Read the polygons of a file; what has a hole is cut through it.
+
+    Raises:
+        InputError: there are none, or other shapes besides, or degrees.
+    """
+    from shapely import Polygon
+    from shapely.validation import explain_validity
+
+    from planner.paths.ros_map import without_holes
+
+    outlines = []
+    for name, kind, rings in read_shapes(path):
+        if kind != "Polygon":
+            raise InputError(f"{path}: {name} is a {kind}, which encloses nothing; give polygons")
+        region = Polygon(rings[0], rings[1:])
+        if not region.is_valid:
+            raise InputError(
+                f"{path}: {name}: {explain_validity(region)}; draw it so that it does not cross itself"
+            )
+        outlines += [(name, Polyline(np.array(part.exterior.coords), True)) for part in without_holes(region)]
+    return NamedPaths(with_own_names(outlines), None, _NO_UNIT)
+
+
 def read_shapes(path: Path) -> list[tuple[str, str, list[Floats]]]:
     """Read name, kind and rings of each LineString and Polygon; of a polygon holes follow the outline.
 

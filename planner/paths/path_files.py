@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ from common.errors import InputError, naming
 from common.keywords import checks_keywords
 from common.units import split, to_si
 from planner.paths.dxf_drawing import read_dxf
-from planner.paths.geojson import read_geojson
+from planner.paths.geojson import read_geojson, read_regions
 from planner.paths.named_paths import NamedPaths, Polyline
 from planner.paths.path import SHAPES, Path2D, like_a_shape, nearest_shape, shape_of
 from planner.paths.robot_messages import of_messages, read_messages, read_pathplanner
@@ -30,8 +30,8 @@ KINDS = {  # of files that are neither tables nor drawings: their endings, and h
                 r'\{[\s\S]*?"type"\s*:\s*"(?:Feature|Topology|Geometry|(?:Multi)?(?:Point|Line|Poly))'),
     "a path of PathPlanner": ("path", r'\{[\s\S]*?"waypoints"\s*:\s*\[\s*\{\s*"anchor'),
     "a bag of ROS": ("bag db3 mcap", r"#ROSBAG|SQLite format 3|\x89MCAP"),
-    "a map of ROS": ("pgm pbm ppm",
-                     r"P[1-6]\s+(?:#[^\n]*\n\s*)*\d+\s+\d+\s|(?:[^\n]*\n)*?(?:image|resolution):\s"),
+    "a map of ROS": ("", r"(?:[^\n]*\n)*?(?:image|resolution):\s"),
+    "the picture of a map of ROS": ("pgm pbm ppm", r"P[1-6]\s+(?:#[^\n]*\n\s*)*\d+\s+\d+\s"),
     "a message of ROS": ("",
                          r'\{[\s\S]*?\bposes?"?:|(?:[^\n]*\n)*?(?:[\s-]*poses?:|[^\n]*(?:nav|geometry)_msgs/)'),
     "YAML": ("yaml yml", r"---\s"),
@@ -53,9 +53,10 @@ ADVICE = {  # other than that of a table or a drawing
     "GPX": "its degrees of longitude and latitude span kilometres; give x and y in a unit of length",
     "KML": "its degrees of longitude and latitude span kilometres; give x and y in a unit of length",
     "a map of ROS": "a path has an order; give --keep-out map.yaml, and the path in another file",
+    "the picture of a map of ROS": "give its map.yaml as --keep-out",
     "a bag of ROS": "print the topic of the path: ros2 topic echo --full-length TOPIC > path.yaml",
 }
-_OF_BAG = re.compile(r"(?:poses\W?(\d+)\W.*)?\bposition\W([xy])$")  # /plan/poses[0]/pose/position/x
+_POSE, _PLACE = re.compile(r"poses\W?(\d+)"), re.compile(r"\bposition\W([xy])$")  # /plan/poses[0]/pose/position/x
 _HEAD = 4096  # bytes that tell
 
 
@@ -154,13 +155,28 @@ def read_paths(path: Path) -> NamedPaths:
     Raises:
         InputError: it has none, or is of a kind that is not read.
     """
+    return _read(path, READERS)
+
+
+def read_outlines(path: Path) -> NamedPaths:
+    """Read all outlines of obstacles of a file, without holes.
+
+    Raises:
+        InputError: it has none, or is of a kind that is not read.
+    """
+    from planner.paths.ros_map import read_map
+
+    return _read(path, {**READERS, "GeoJSON": read_regions, "a map of ROS": read_map})
+
+
+def _read(path: Path, readers: Mapping[str, Callable[[Path], NamedPaths]]) -> NamedPaths:
     kind = _kind_of(path)
     if kind is None:
         return _read_columns(path)
-    if kind not in READERS:
+    if kind not in readers:
         advice = ADVICE.get(kind, "give a table with columns x and y, such as CSV, or an SVG drawing")
         raise InputError(f"{path}: {kind} is not read; {advice}")
-    return READERS[kind](path)
+    return readers[kind](path)
 
 
 def _kind_of(path: Path) -> str | None:
@@ -211,7 +227,8 @@ def _read_columns(source: Path) -> NamedPaths:
 
 def _of_bag(table: pd.DataFrame) -> list[str]:
     """List the columns of places of a bag of ROS, a message a row: x of each pose, then y of each; or none."""
-    found = sorted((m[2], int(m[1] or 0), name) for name in map(str, table) if (m := _OF_BAG.search(name)))
+    places = [(place[1], _POSE.search(name), name) for name in map(str, table) if (place := _PLACE.search(name))]
+    found = sorted((axis, int(pose[1]) if pose else 0, name) for axis, pose, name in places)
     x, y = ([number for axis, number, _ in found if axis == wanted] for wanted in "xy")
     return [name for _, _, name in found] if x == y and len(set(x)) == len(x) else []
 

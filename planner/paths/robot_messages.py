@@ -13,8 +13,8 @@ from common.errors import InputError
 from common.reading import decode, expecting, read_bytes, read_json
 from planner.paths.named_paths import NamedPaths, Polyline
 
-_POSITION = re.compile(r'\bposition"?:\s*\{?\s*"?x"?:\s*([^\s,}]+)[\s,]+"?y"?:\s*([^\s,}]+)')
-_CUT = re.compile(r"^\s*-\s*'?\.\.\.'?\s*$", re.M)  # where `ros2 topic echo` leaves poses out
+_POSITION = re.compile(r'\bposition"?:[\s{]*+"?x"?:\s*+([^\s,}]++)[\s,]++"?y"?:\s*+([^\s,}]++)')
+_CUT = re.compile(r"^[ \t]*+-[ \t]*+'?\.\.\.'?[ \t\r]*+$", re.M)  # where `ros2 topic echo` leaves poses out
 
 
 def read_messages(path: Path) -> NamedPaths:

@@ -31,7 +31,7 @@ from dataset.folder import Folder
 from dataset.schema import schema
 from dataset.shards import BadFileError, checked_part, file_name
 from planner.files.saved_plan import load_goal, load_plan, restore_plan
-from planner.options import read_region
+from planner.options import read_regions
 from planner.paths.path_files import read_path
 from planner.vehicle.from_table import default_table
 from sim.inputs import check_columns, load_robot
@@ -267,7 +267,7 @@ FORMATS: dict[str, FileFormat] = {
     "drawing": FileFormat(file("path.svg", lambda: SVG), _read_path, SVG_TOKENS),
     "region": FileFormat(
         file("region.csv", lambda: text({"x": [0, 1, 1, 0], "y": [0, 0, 1, 1]})),
-        lambda path: read_region(str(path), "cm", ROBOT), TABLE,
+        lambda path: read_regions(str(path), "cm", ROBOT), TABLE,
     ),
     "plan": FileFormat(file("plan.json", plan_file), _read_plan, JSON),
     "plan to track": FileFormat(file("plan.json", plan_file), _read_saved_plan, JSON),

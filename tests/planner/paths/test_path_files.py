@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
-from planner.options import read_region
+from planner.options import read_regions
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.path import SHAPES, Path2D, polygon
 from planner.paths.path_files import Drawing, read_path
@@ -268,7 +268,7 @@ def test_outlines_that_cross_touch_or_repeat_themselves_are_refused(
     ):  # fmt: skip
         (tmp_path / name).write_text(text)
         with pytest.raises(InputError) as refusal:
-            read_region(str(tmp_path / name), unit, PRESETS["paper-control"])
+            read_regions(str(tmp_path / name), unit, PRESETS["paper-control"])
         assert f"{name}: " in str(refusal.value)
         assert f"at {place} {told}; draw it so" in str(refusal.value)
 

@@ -1,0 +1,102 @@
+"""Obstacles of a map of ROS: cells of map.yaml and its picture that are not free, joined to polygons, in m.
+
+A cell counts where it is occupied or unknown, as `map_server` reads it. Outlines lie up to two cells outside their
+cells, so that they have few corners, and never inside. What has a hole is cut through it.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+from shapely import Geometry, box, union_all
+from shapely import Polygon as Outline
+from shapely.affinity import affine_transform
+
+from common.arrays import Flags, Floats
+from common.errors import InputError, InputWarning
+from common.reading import decode, expecting, read_bytes
+from planner.paths.named_paths import NamedPaths, Polyline, with_own_names
+
+_ENTRY = re.compile(r"^(\w+):(.*)", re.M)
+_ORIGIN = re.compile("^origin:" + 3 * r"[\[\s,]++(?:-\s++)?([-+.\deE]++)", re.M)
+_MOST_CELLS = 5e7
+_GROWN, _MOVED = 0.75, 0.72  # of a cell: outlines are moved outwards, and then simplified by at most so much
+
+
+def read_map(path: Path) -> NamedPaths:
+    """Read the outlines of what is not free.
+
+    Raises:
+        InputError: the file is no map.yaml, or its picture cannot be read; or all cells are free.
+    """
+    with expecting("a map of ROS", path, "give map.yaml as map_saver writes it"):
+        text = decode(read_bytes(path))
+        entries = {name: words.partition("#")[0].strip(" \t\r'\"") for name, words in _ENTRY.findall(text)}
+        cell = float(entries["resolution"])
+        if not 0 < cell < math.inf:
+            raise InputError(f"resolution {cell:g}; give the side of a cell in m, above 0")
+        if (origin := _ORIGIN.search(text)) is None:
+            raise KeyError("origin: [x, y, yaw]")
+        x, y, yaw = map(float, origin.groups())
+        limits = float(entries["occupied_thresh"]), float(entries["free_thresh"])
+        levels = _levels(path.parent / entries["image"], entries)
+    unknown = (levels > limits[1]) & (levels < limits[0])
+    if unknown.any():
+        count = f"{unknown.sum()} of {unknown.size} cells"
+        warnings.warn(f"{path}: {count} are unknown and count as occupied", InputWarning, stacklevel=2)
+    cells = union_all(_runs((levels > limits[1]) | (levels >= limits[0])))
+    parts = without_holes(cells.buffer(_GROWN, join_style="mitre").simplify(_MOVED))
+    if not parts:
+        raise InputError(f"{path}: all cells are free; leave it out")
+    along, aside = cell * np.cos(yaw), cell * np.sin(yaw)
+    placed = [affine_transform(part, [along, -aside, aside, along, x, y]) for part in parts]
+    outlines = [("outline", Polyline(np.array(part.exterior.coords), True)) for part in placed]
+    return NamedPaths(with_own_names(outlines), 1.0)
+
+
+def _levels(picture: Path, entries: Mapping[str, str]) -> Floats:
+    """Read how occupied the cells are, from 0 to 1; what is transparent is occupied."""
+    data = read_bytes(picture)
+    try:
+        with Image.open(io.BytesIO(data)) as image:
+            if image.width * image.height > _MOST_CELLS:
+                raise ValueError(f"more than {_MOST_CELLS:.0e} cells")
+            grey, seen = np.moveaxis(np.asarray(image.convert("LA"), dtype=float), 2, 0) / 255
+    except Exception as broken:  # a damaged picture can raise any error from within the parser
+        raise InputError(f"{picture} cannot be read as a picture ({broken}); save the map again") from None
+    if (mode := entries.get("mode", "trinary")) == "raw":
+        return grey * 2.55
+    if mode not in ("trinary", "scale"):
+        raise InputError(f"mode {mode}; allowed are trinary, scale and raw")
+    return np.where(seen < 1, 1.0, grey if entries["negate"].lower() in ("1", "true") else 1 - grey)
+
+
+def _runs(cells: Flags) -> Any:
+    """Return a box for each run of cells in a row; the lower left corner of the picture is (0, 0)."""
+    steps = np.diff(np.pad(cells.astype(np.int8), ((0, 0), (1, 1))), axis=1)
+    row, start = np.nonzero(steps == 1)
+    return box(start, len(cells) - row - 1, np.nonzero(steps == -1)[1], len(cells) - row)
+
+
+def without_holes(region: Geometry) -> list[Outline]:
+    """Cut the polygons of a region through their holes."""
+    found, rest = [], [region]
+    while rest:
+        part = rest.pop()
+        if not isinstance(part, Outline):
+            rest += [each for each in getattr(part, "geoms", ()) if each.area]
+        elif part.interiors:
+            low, bottom, high, top = part.bounds
+            cut = part.interiors[0].centroid.x
+            rest += [part & box(low, bottom, cut, top), part & box(cut, bottom, high, top)]
+        elif part.area > 1e-9 * part.length**2:
+            found.append(part)
+    return found
