@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
+from contextlib import suppress
 from pathlib import Path
 from typing import Unpack
 
@@ -47,7 +48,8 @@ def read_tracks(path: str | Path, **options: Unpack[TrackOptions]) -> pd.DataFra
         if not wrote:
             return read_table(path)
         if wrote != ["tum"]:  # which needs no options
-            raise InputError(f"{path} is no table of poses; say what wrote it: --from {' or '.join(wrote)}")
+            asked = f"say what wrote it: --from {' or '.join(wrote)}{_also_missing(path, wrote)}"
+            raise InputError(f"{path} is no table of poses; {asked}")
         source = "tum"
     if source not in PROGRAMS:
         raise InputError(f"no program {source!r}; there are {', '.join(PROGRAMS)}")
@@ -82,13 +84,12 @@ def _films(folder: Path, program: TrackingProgram) -> list[Path]:
 
 def _poses(seen: Seen, path: Path, program: TrackingProgram, options: TrackOptions) -> pd.DataFrame:
     """Make poses of the points of a file."""
-    seconds, metres = _scales(seen, path, options)
-    points = seen.points
+    if faults := _missing(seen, options):
+        raise InputError(f"{path} {', and it '.join(faults)}")
+    seconds, metres = _scales(seen, options)
+    points, names = seen.points, _two(seen, options)
     points.loc[points["sure"] < program.likely, ["x", "y"]] = math.nan
-    if "heading" in points and not {"front", "rear"} & set(options):
-        poses = points[points["robot"] != ""]
-    else:
-        poses = _poses_of_two(points, path, program, options)
+    poses = _poses_of_two(points, names, program) if names else points[points["robot"] != ""]
     x, y = options.get("origin", (0.0, 0.0))
     if not (math.isfinite(x) and math.isfinite(y)):
         raise InputError(f"--origin {x:g} {y:g}; give two finite numbers")
@@ -112,62 +113,62 @@ def _poses(seen: Seen, path: Path, program: TrackingProgram, options: TrackOptio
     return table
 
 
-def _scales(seen: Seen, path: Path, options: TrackOptions) -> tuple[float, float]:
-    """Return the units of a file's times [s] and lengths [m]: its own ones, or those of the options.
+def _also_missing(path: Path, programs: list[str]) -> str:
+    """Say what the first program that can have written a file needs besides its name; empty: nothing."""
+    for name in programs:
+        with warnings.catch_warnings(), suppress(Exception):  # a file of another program can raise any error
+            warnings.simplefilter("ignore")
+            return "".join(f"; it {fault}" for fault in _missing(PROGRAMS[name].read(path), {}))
+    return ""
 
-    Raises:
-        InputError: one is missing or impossible, or is given though the file has its own.
-    """
-    _, own_metres, own_seconds = seen
-    fps, scale = options.get("fps"), options.get("scale")
-    seconds = own_seconds if own_seconds is not None else 1 / fps if fps else math.nan
-    metres = own_metres or _length(scale or "")
-    faults = [
-        f"has its own units; leave out --{name}"
-        for name, given, own in (("fps", fps, own_seconds), ("scale", scale, own_metres))
-        if given is not None and own is not None
-    ]
-    if own_seconds is not None and not 0 < own_seconds < math.inf:
-        faults.append(f"has frames {own_seconds:g} s apart; correct its frame rate, above 0 and finite")
-    elif not 0 < seconds < math.inf:
-        faults.append("counts frames; give the frames per second of its film, such as --fps 30")
-    if metres is None:
-        scaled = f"cannot have --scale {scale}" if scale else "has no unit of length"
-        faults.append(f"{scaled}; give the length of a pixel, or of the file's unit, such as --scale 0.2mm")
-    if metres is None or faults:
-        raise InputError(f"{path} {', and it '.join(faults)}")
+
+def _scales(seen: Seen, options: TrackOptions) -> tuple[float, float]:
+    """Return the units of a file's times [s] and lengths [m]: its own ones, or those of the options; or nan."""
+    fps, scale = options.get("fps"), number_and_unit(options.get("scale") or "", of_kind("length"))
+    seconds = seen.seconds if seen.seconds is not None else 1 / fps if fps else math.nan
+    metres = seen.metres or (math.nan if scale[1] is None else float(to_si(*scale)))
     return seconds, metres
 
 
-def _poses_of_two(
-    points: pd.DataFrame, path: Path, program: TrackingProgram, options: TrackOptions
-) -> pd.DataFrame:
+def _two(seen: Seen, options: TrackOptions) -> tuple[str, str] | None:
+    """Name the points ahead and behind; None: the file has headings."""
+    if "heading" in seen.points and not {"front", "rear"} & set(options):
+        return None
+    return options.get("front", "front"), options.get("rear", "rear")
+
+
+def _missing(seen: Seen, options: TrackOptions) -> list[str]:
+    """List what is missing or impossible, or is given though the file has its own, all at once."""
+    (seconds, metres), scale = _scales(seen, options), options.get("scale")
+    faults = [
+        f"has its own units; leave out --{name}"
+        for name, given, own in (("fps", options.get("fps"), seen.seconds), ("scale", scale, seen.metres))
+        if given is not None and own is not None
+    ]
+    if seen.seconds is not None and not 0 < seconds < math.inf:
+        faults.append(f"has frames {seconds:g} s apart; correct its frame rate, above 0 and finite")
+    elif not 0 < seconds < math.inf:
+        faults.append("counts frames; give the frames per second of its film, such as --fps 30")
+    if not 0 < metres < math.inf:
+        scaled = f"cannot have --scale {scale}" if scale else "has no unit of length"
+        faults.append(f"{scaled}; give the length of a pixel, or of the file's unit, such as --scale 0.2mm")
+    names, there = _two(seen, options) or (), list(seen.points["point"].unique())
+    if unknown := [name for name in names if name not in there]:
+        listed = ", ".join(there[:_LISTED]) + (", …" if len(there) > _LISTED else "")
+        faults.append(
+            f"has no point {' and no '.join(map(repr, unknown))} but {listed}; a heading needs two on the robot's "
+            "axis: --front NAME --rear NAME"
+        )
+    elif names and names[0] == names[1]:
+        faults.append(f"needs two points for a heading; --front and --rear are both {names[0]!r}")
+    return faults
+
+
+def _poses_of_two(points: pd.DataFrame, names: tuple[str, str], program: TrackingProgram) -> pd.DataFrame:
     """Make poses of two points on the robot's axis: the place half-way, the heading from rear to front."""
-    names = options.get("front", "front"), options.get("rear", "rear")
-    front, rear = (_rows(points, path, name) for name in names)
-    if names[0] == names[1]:
-        raise InputError(f"--front and --rear are both {names[0]!r}; a heading needs two points")
+    front, rear = (points[points["point"] == name].drop_duplicates(["robot", "time"]) for name in names)
     poses = front.merge(rear, on=["robot", "time"], how="outer", suffixes=("_front", "_rear"))
     along, aside = (poses[f"{axis}_front"] - poses[f"{axis}_rear"] for axis in "xy")
     poses["heading"] = np.arctan2(-aside if program.y_down else aside, along)
     poses["x"], poses["y"] = poses["x_rear"] + along / 2, poses["y_rear"] + aside / 2
     return poses
-
-
-def _length(words: str) -> float | None:
-    """Read the length of a pixel, in metres; None: the words are none."""
-    value, unit = number_and_unit(words, of_kind("length"))
-    return float(to_si(value, unit)) if unit is not None and 0 < value < math.inf else None
-
-
-def _rows(points: pd.DataFrame, path: Path, name: str) -> pd.DataFrame:
-    """Return the rows of a point, one for each time."""
-    rows = points[points["point"] == name]
-    if rows.empty:
-        names = list(points["point"].unique())
-        listed = ", ".join(names[:_LISTED]) + (", …" if len(names) > _LISTED else "")
-        raise InputError(
-            f"{path} has no point {name!r} but {listed}; a heading needs two on the robot's axis: --front NAME "
-            "--rear NAME"
-        )
-    return rows.drop_duplicates(["robot", "time"])

@@ -94,12 +94,13 @@ def test_of_a_point_that_is_seen_twice_at_a_time_the_first_counts(tmp_path: Path
     ("run3DLC_resnet50_swim.csv", {"fps": 25.0, "scale": "0.5"}, r"--scale 0.5; give the length of a pixel"),
     ("run3DLC_resnet50_swim.csv", {"fps": 25.0, "scale": "2s"}, r"--scale 2s; give the length of a pixel"),
     ("run3DLC_resnet50_swim.csv", {**FILMED, "rear": "tail"}, "has no point 'tail' but front, rear; a heading"),
-    ("run3DLC_resnet50_swim.csv", {**FILMED, "rear": "front"}, "--front and --rear are both 'front'; a heading"),
+    ("run3DLC_resnet50_swim.csv", {**FILMED, "rear": "front"}, "heading; --front and --rear are both 'front'"),
     ("run3DLC_resnet50_swim.csv", {**FILMED, "origin": (np.nan, 0.0)}, "--origin nan 0; give two finite numbers"),
     ("spots.csv", FILMED, "has its own units; leave out --fps"),
     ("take.csv", {"scale": "0.5mm"}, "has its own units; leave out --scale"),
     ("spots.csv", {"fps": 25.0, **TRACKS}, "leave out --fps, and it has no unit of length; .* --scale 0.2mm"),
     ("run3.xml", TRACKS, "counts frames; .* --fps 30, and it has no unit of length; .* --scale 0.2mm"),
+    ("run3.xml", {}, "--fps 30, and it has no unit of length; .* no point 'front' and no 'rear' but 0, 1"),
     ("run3.xml", {**FILMED, "fps": 1e-320}, "counts frames; give the frames per second"),
 ])  # fmt: skip
 def test_what_is_missing_or_too_much_is_said(
@@ -107,6 +108,12 @@ def test_what_is_missing_or_too_much_is_said(
 ) -> None:
     with pytest.raises(InputError, match=words):
         read_tracks(written(name, tmp_path), written_by=WRITTEN[name][0], **options)
+
+
+def test_a_file_without_its_program_is_told_all_that_is_missing(tmp_path: Path) -> None:
+    needs = "--from trackmate; it counts frames; .*--fps 30; it has no unit of length; .*; it has no point 'front'"
+    with pytest.raises(InputError, match=needs):
+        read_tracks(written("run3.xml", tmp_path))
 
 
 @pytest.mark.parametrize("name", [name for name in WRITTEN if name != "trajectory.tum"])
