@@ -69,8 +69,8 @@ def sweep(
     from dataset.report import usable_rows
 
     table = read(str(rows)) if isinstance(rows, str | Path) else rows
-    for name in (output, over):
-        if name not in table or table[name].dtype.kind not in "fiu":
+    for name in (output, over, "N", "converged", "failed", "touching"):
+        if name not in table or table[name].dtype.kind not in "fiub":
             numbers = ", ".join(map(str, table.select_dtypes("number").columns))
             raise InputError(f"{name!r} is no column of numbers in this sweep; there are {numbers}")
     ax, usable = given_axes(ax), usable_rows(table)

@@ -83,6 +83,7 @@ def test_the_motor_flips_when_the_plan_says(
         *(result.first_direction * (-1) ** k for k in range(len(result.dwells))),
         0,
     ]
+    assert len(events) == 2 + 1 + 2 * (len(result.dwells) - 1) + 1  # no pin changes but at rest, start, flips, end
     after = np.array([time for time, _ in turns]) - [0, *flips]
     assert after.min() >= 0
     assert after.max() <= 2 * late  # the first flip waits for the motor's start

@@ -27,9 +27,12 @@ class Ticks:
         return (int(first) + self.now) % PERIOD
 
     def ticks_add(self, ticks, ms):
+        assert 0 <= ticks < PERIOD
         return (ticks + at_once(ms)) % PERIOD
 
     def ticks_diff(self, end, start):
+        assert 0 <= start < PERIOD
+        assert 0 <= end < PERIOD
         return (end - start + PERIOD // 2) % PERIOD - PERIOD // 2
 
     def sleep_ms(self, ms):
