@@ -12,7 +12,7 @@ import difflib
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from common.errors import InputError
 from common.units import UNITS, from_si, of_kind, split, to_si
