@@ -72,7 +72,7 @@ def draw(of_label: dict[str, Floats], figure: str) -> None:
     """Draw histograms of ranks, with the band that holds 95 % of the bars of even ranks."""
     picture, panels = plt.subplots(1, len(of_label), figsize=(9, 2.7), layout="constrained", squeeze=False)
     for axes, (label, found) in zip(panels[0], of_label.items(), strict=True):
-        low, high = binom.ppf([0.025, 0.975], len(found), 1 / _BINS)
+        low, high = binom.interval(0.95, len(found), 1 / _BINS)
         axes.axhspan(low, high, color="#d5dce2")
         axes.hist(found, bins=np.linspace(0, 1, _BINS + 1), color="#2a7fba", rwidth=0.92)
         axes.set_title("\n".join(label.split(": ")), fontsize=9)

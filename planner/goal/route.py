@@ -17,7 +17,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,7 +192,7 @@ class Lattice:
             ways.append(np.concatenate([poses[chain[::-1]], pose[None]]))
         return found, ways
 
-    def _graph(self, margin: float, further: Sequence[tuple[Integers, Floats]]) -> csr_array:
+    def _graph(self, margin: float, further: Sequence[tuple[Integers, Floats]]) -> Any:
         """Return the lengths of the joints with this margin, and further rows: ends and lengths."""
         n, (course, ahead, lengths) = self.courses, self._joints
         most = self._open + sum(len(ends) for ends, _ in further)
