@@ -47,8 +47,9 @@ def _write_files(result: Plan, folder: Path) -> list[str]:
     """Write the files of a plan into a folder, one after the other, and return their names."""
     from planner.files.pictures import draw_plan  # loads matplotlib
 
-    identity, names = result.identity, list(FILES)
-    write_text(folder / "plan.json", json.dumps({**result.to_dict(), "code_version": code_version()}) + "\n")
+    content, names = result.to_dict(), list(FILES)
+    identity = content["id"]
+    write_text(folder / "plan.json", json.dumps({**content, "code_version": code_version()}) + "\n")
     columns = {name: values.tolist() for name, values in result.columns().items()}
     write_csv({**columns, "plan_id": [identity] * len(result.dwells)}, folder / "plan.csv")
     write_text(folder / "schedule.h", schedule_header(result, identity))

@@ -177,7 +177,7 @@ class Lattice:
             for pose, c in zip(starts, costs, strict=True)
         ]
         graph = self._graph(margin, [*rows, (count + begun, costs[begun] + 1e-9)])
-        distance, before = dijkstra(graph, indices=source, return_predecessors=True)
+        (distance,), (before,) = dijkstra(graph, indices=np.array([source]), return_predecessors=True)
         poses, found, ways = np.concatenate([self.poses, starts]), np.full(len(goals), np.inf), []
         for index, pose in enumerate(goals):
             near, length = self._links(pose, margin, False)

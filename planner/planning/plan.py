@@ -377,7 +377,9 @@ class Plan(Shown, Generic[J]):
 
         `id` is `identity`.
         """
-        return {"id": self.identity, **self._content()}
+        content = self._content()
+        self.__dict__.setdefault("identity", plan_id(content))  # long paths take seconds to tabulate twice
+        return {"id": self.identity, **content}
 
     @cached_property
     def identity(self) -> str:
