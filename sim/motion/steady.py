@@ -85,7 +85,8 @@ def orbits(groups: Groups, *, phases: int = PHASES, stability: bool = False) -> 
         stability: as for `steady`.
     """
     rows = numbers(groups)
-    return joined([_at_once(rows[part], groups.N, phases, stability) for part in slices(len(rows))])
+    parts = [_at_once(rows[part], groups.N, phases, stability) for part in slices(len(rows))]
+    return parts[0] if len(parts) == 1 else joined(parts)
 
 
 def _at_once(rows: Floats, tails: int, phases: int, stability: bool) -> Steady:
