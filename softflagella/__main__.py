@@ -28,6 +28,7 @@ _IMPORTANT = (
     ("tracking", "replay check"),
     ("sim", "film"),
     ("surrogate", "query"),
+    ("softflagella", "compare"),
     ("softflagella", "demo"),
 )
 WORDS = {  # the most important commands -> package and command
@@ -126,6 +127,28 @@ def _model(*, out: str = "falls.py") -> None:
     write_text(out, EXAMPLE.read_text().replace("falls.py", out))
     print(f"-> {out}; python {out} makes a table for it, falls.csv. Then:")
     print(f"softflagella calibrate falls.csv --model {out} --session round --specimen ball --out falls")
+
+
+@program.command("compare", plan="with")
+def _compare(files: Sequence[str], *, plan: str | None = None, plot: str | None = None) -> None:
+    """Say what differs between robots, plans, tracks or verdicts.
+
+    Args:
+        files: two or more of one kind: robot.toml, presets, tables of robots; plan.json, verdict.json, or their
+            folders; tracks.
+        plan: plan.json, the plan of tracks.
+        plot: SVG, PNG or PDF, a picture of them.
+    """
+    from common.figure_files import check_figure_name, write_figure
+    from softflagella.compare import compare
+
+    if plot is not None:
+        check_figure_name(plot)
+    comparison = compare(files, plan)
+    print(*comparison.lines(), sep="\n")
+    if plot is not None:
+        write_figure(comparison.figure, plot)
+        print(f"-> {plot}")
 
 
 def _filmed(films: str, view: str, robot: str, out: str) -> str:
