@@ -46,7 +46,7 @@ _ERRORS = {
 }
 
 
-class Estimate(NamedTuple):
+class Bounded(NamedTuple):
     """A number with its interval, where it has one."""
 
     value: float
@@ -58,15 +58,15 @@ class Estimate(NamedTuple):
         return f"{self.value:.4g}" + (f" ({self.low:.4g} to {self.high:.4g})" if self.low < self.high else "")
 
     @staticmethod
-    def around(value: float, half: float, scale: str = "") -> Estimate:
+    def around(value: float, half: float, scale: str = "") -> Bounded:
         """Return a number with an interval, given half its width, on the scale on which it was fitted."""
         if scale == _LOGARITHM:
-            return Estimate(value, value * math.exp(-half), value * math.exp(half), scale)
-        return Estimate(value, value - half, value + half, scale)
+            return Bounded(value, value * math.exp(-half), value * math.exp(half), scale)
+        return Bounded(value, value - half, value + half, scale)
 
     def minus(self, first: object) -> str:
         """Write the difference from the first file's number; nothing where there is none."""
-        if not isinstance(first, Estimate) or self.value == first.value:
+        if not isinstance(first, Bounded) or self.value == first.value:
             return ""
         if self.scale and first.scale:
             a, b = np.array([first[:3], self[:3]])
@@ -75,7 +75,7 @@ class Estimate(NamedTuple):
         return f"{100 * (self.value / first.value - 1):+.3g} %" if first.value else ""
 
 
-Cells = dict[str, Estimate | str]  # title of a quantity -> what a file says of it
+Cells = dict[str, Bounded | str]  # title of a quantity -> what a file says of it
 
 
 class Comparison(NamedTuple):
@@ -92,7 +92,7 @@ class Comparison(NamedTuple):
         for title in titles:
             first, *others = (cells.get(title, "-") for cells in self.files.values())
             if any(str(each) != str(first) for each in others):
-                apart = [each.minus(first) if isinstance(each, Estimate) else "" for each in others]
+                apart = [each.minus(first) if isinstance(each, Bounded) else "" for each in others]
                 rows.append([title, *map(str, (first, *others)), ", ".join(apart).strip(", ")])
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         table = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
@@ -164,8 +164,8 @@ def _robots(robots: Mapping[str, tuple[RobotRows, Any]]) -> Comparison:
         frame = rows.frame(motion)
         for k, error in enumerate(frame["error"]):
             cells = _inputs(rows.robots[k], known) if lab else Cells()
-            cells |= {} if lab else {name: Estimate(values[k]) for name, values in rows.columns.items()}
-            cells |= {title: Estimate.around(frame[c][k], abs(frame[c][k]) * error) for c, title in titles.items()}
+            cells |= {} if lab else {name: Bounded(values[k]) for name, values in rows.columns.items()}
+            cells |= {title: Bounded.around(frame[c][k], abs(frame[c][k]) * error) for c, title in titles.items()}
             files[f"{name} {k + 1}" if len(frame) > 1 else name] = {**cells, "source of the motion": source}
     return Comparison(files, _dots(files, [*titles.values()][:4]), "intervals: of inputs 95 %, of the motion 90 %")
 
@@ -183,9 +183,9 @@ def _inputs(robot: Robot, known: CalibrationKnowledge) -> Cells:
         value, sigma = (from_si(each, entry.unit) if entry.unit else each for each in (size, stated))
         fitted = entry.field in half
         within = (half[entry.field], _LOGARITHM) if fitted else (_HALF * sigma, "")
-        cells[f"{entry.table}.{entry.key}"] = Estimate.around(value, *within)
+        cells[f"{entry.table}.{entry.key}"] = Bounded.around(value, *within)
     for name, size in robot.effects.items():
-        cells[f"effects.{name}"] = Estimate.around(size, half.get(name, 0.0), "as it is" if name in half else "")
+        cells[f"effects.{name}"] = Bounded.around(size, half.get(name, 0.0), "as it is" if name in half else "")
     return cells
 
 
@@ -198,17 +198,15 @@ def _plans(plans: Mapping[str, dict[str, Any]]) -> Comparison:
         declared, drawn = (cm * np.array(plan[key]) for key in ("reference", "raw_path"))
         files[name] = {
             "robot": robot["name"],
-            "tail length [cm]": Estimate(cm),
-            **{group: Estimate(value) for group, value in robot.get("groups", {}).items()},
+            "tail length [cm]": Bounded(cm),
+            **{group: Bounded(value) for group, value in robot.get("groups", {}).items()},
             **{key: str(plan.get(key, "-")) for key in ("point", "objective", "model")},
-            "duration [s]": Estimate(seconds.sum()),
-            "flips": Estimate(len(seconds) - 1),
-            "shortest dwell [s]": Estimate(seconds.min()),
-            "declared path [cm]": Estimate(_length(declared)),
-            "path as drawn [cm]": Estimate(_length(drawn)),
-            **{
-                title: Estimate(10 * cm * plan[key]) for title, key in _ERRORS.items() if plan.get(key) is not None
-            },
+            "duration [s]": Bounded(seconds.sum()),
+            "flips": Bounded(len(seconds) - 1),
+            "shortest dwell [s]": Bounded(seconds.min()),
+            "declared path [cm]": Bounded(_length(declared)),
+            "path as drawn [cm]": Bounded(_length(drawn)),
+            **{title: Bounded(10 * cm * plan[key]) for title, key in _ERRORS.items() if plan.get(key) is not None},
         }
         axes.plot(*drawn.T, color=f"C{k}", lw=0.8, ls=":")
         axes.plot(*declared.T, color=f"C{k}", lw=1.4, label=name)
@@ -233,14 +231,14 @@ def _tracks(tracks: Mapping[str, DataFrame], plan: str | None) -> Comparison:
         read.append((times, poses[:, :2]))
         x, y, heading = poses[-1]
         cells: Cells = {
-            "duration [s]": Estimate(np.ptp(times)),
-            "length [cm]": Estimate(_length(poses[:, :2])),
+            "duration [s]": Bounded(np.ptp(times)),
+            "length [cm]": Bounded(_length(poses[:, :2])),
             "last pose [cm, degrees]": f"{x:.2f}, {y:.2f}, {math.degrees(heading):.1f}",
         }
         if error is not None:
             mm = 1000 * error.tail_length
             for key in ("rms", "largest"):
-                cells[f"tracking error, {key} [mm]"] = Estimate(mm * getattr(error, key))
+                cells[f"tracking error, {key} [mm]"] = Bounded(mm * getattr(error, key))
         if k:
             gaps = {"from its path": 10 * distance_to(read[0][1], poses[:, :2])}
             begin, end = max(times[0], read[0][0][0]), min(times[-1], read[0][0][-1])
@@ -250,8 +248,8 @@ def _tracks(tracks: Mapping[str, DataFrame], plan: str | None) -> Comparison:
                 gaps["at equal times"] = 10 * np.hypot(*np.subtract(here, there))
                 apart.plot(both, gaps["at equal times"], color=f"C{k}")
             for words, gap in gaps.items():
-                cells[f"off the first {words}, rms [mm]"] = Estimate(math.sqrt((gap**2).mean()))
-                cells[f"off the first {words}, largest [mm]"] = Estimate(gap.max())
+                cells[f"off the first {words}, rms [mm]"] = Bounded(math.sqrt((gap**2).mean()))
+                cells[f"off the first {words}, largest [mm]"] = Bounded(gap.max())
         files[name] = cells
         axes.plot(*poses[:, :2].T, color=f"C{k}", lw=1.2, label=name)
         axes.plot(x, y, "o", color=f"C{k}", ms=5)
@@ -269,18 +267,18 @@ def _verdicts(verdicts: Mapping[str, dict[str, Any]]) -> Comparison:
         with expecting("a verdict.json of this version", name, "calibrate the table again"):
             cells = files[name] = {key: str(record[key]) for key in ("verdict", "advice", "table")}
             cells["effects"] = ", ".join(record["effects"]) or "none"
-            cells["runs"] = Estimate(record["number_of_runs"])
+            cells["runs"] = Bounded(record["number_of_runs"])
             for model, ends in (("uncalibrated", []), ("before", []), ("after", record["error_after_interval"])):
                 if (error := record[f"error_{model}"]) is not None:
-                    cells[f"error {model} [%]"] = Estimate(*(100 * each for each in (error, *ends)))
+                    cells[f"error {model} [%]"] = Bounded(*(100 * each for each in (error, *ends)))
             for number in record["parameters"].values():
                 title = f"{number['title']} [{number['unit']}]".removesuffix(" [1]").removesuffix(" []")
                 value, low, high = (number["shown"] * each for each in (number["value"], *number["interval"]))
-                cells[title] = Estimate(value, low, high, number["scale"])
+                cells[title] = Bounded(value, low, high, number["scale"])
             for output, scatter in record["scatter_of_a_run"].items():
                 scale, unit = record["output_scales"][output]
-                cells[f"noise, {record['output_titles'][output]} [{unit}]"] = Estimate(scale * scatter)
-    counts = Counter(t for cells in files.values() for t, cell in cells.items() if isinstance(cell, Estimate))
+                cells[f"noise, {record['output_titles'][output]} [{unit}]"] = Bounded(scale * scatter)
+    counts = Counter(t for cells in files.values() for t, cell in cells.items() if isinstance(cell, Bounded))
     shared = [title for title, count in counts.items() if count > 1 and title != "runs"]
     return Comparison(files, _dots(files, shared), "intervals: 95 %")
 
@@ -310,7 +308,7 @@ def _dots(files: Mapping[str, Cells], titles: Sequence[str]) -> Figure:
     for place, title in enumerate(titles, 1):
         axes = figure.add_subplot(rows, 2, place)
         for k, cells in enumerate(files.values()):
-            if isinstance(cell := cells.get(title), Estimate):
+            if isinstance(cell := cells.get(title), Bounded):
                 axes.plot(cell.value, k, "o", color=f"C{k}", ms=5)
                 axes.plot([cell.low, cell.high], [k, k], color=f"C{k}", lw=1.5)
         names = [*files] if place % 2 else [""] * len(files)

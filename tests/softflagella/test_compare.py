@@ -14,7 +14,7 @@ from common.errors import InputError
 from sim.api import replay
 from sim.inputs import load_robot
 from softflagella.__main__ import main
-from softflagella.compare import Estimate, compare
+from softflagella.compare import Bounded, compare
 
 Capsys = pytest.CaptureFixture[str]
 C_T = {"title": "C_t", "unit": "1", "shown": 1.0, "scale": "logarithm", "value": 3.0, "interval": [2.0, 4.5]}
@@ -136,18 +136,18 @@ def test_plans_are_compared_by_what_they_state(folder: Path) -> None:
     content = json.loads((folder / "slow" / "plan.json").read_text())
     slow = comparison.files["slow"]
     assert [*comparison.files] == ["slow", "fast"]
-    assert slow["duration [s]"] == Estimate(pytest.approx(sum(content["dwell_s"])))
-    assert slow["flips"] == Estimate(len(content["dwell_s"]) - 1)
-    assert slow["stated error [mm]"] == Estimate(pytest.approx(1000 * content["stated_error_over_l"] * 0.11))
-    assert slow["path as drawn [cm]"] == Estimate(pytest.approx(2 * math.pi * 22, rel=1e-3))
+    assert slow["duration [s]"] == Bounded(pytest.approx(sum(content["dwell_s"])))
+    assert slow["flips"] == Bounded(len(content["dwell_s"]) - 1)
+    assert slow["stated error [mm]"] == Bounded(pytest.approx(1000 * content["stated_error_over_l"] * 0.11))
+    assert slow["path as drawn [cm]"] == Bounded(pytest.approx(2 * math.pi * 22, rel=1e-3))
     assert "omega_bar" in table(comparison.lines())
     assert "tail length [cm]" not in table(comparison.lines())
 
 
 def test_tracks_are_compared_at_equal_times_and_with_their_plan(folder: Path) -> None:
     there = compare([str(folder / "here.csv"), str(folder / "there.csv")]).files["there"]
-    assert there["off the first at equal times, rms [mm]"] == Estimate(pytest.approx(3.0))
-    assert there["off the first from its path, largest [mm]"] == Estimate(pytest.approx(3.0))
+    assert there["off the first at equal times, rms [mm]"] == Bounded(pytest.approx(3.0))
+    assert there["off the first from its path, largest [mm]"] == Bounded(pytest.approx(3.0))
     assert there["last pose [cm, degrees]"] == "10.00, 0.30, 100.0"
     files = [str(folder / "slow.csv"), str(folder / "here.csv")]
     tracks = compare(files, str(folder / "slow" / "plan.json")).files
@@ -159,7 +159,7 @@ def test_tracks_without_a_common_time_have_no_distance_at_equal_times(folder: Pa
     late.to_csv(tmp_path / "late.csv", index=False)
     cells = compare([str(folder / "here.csv"), str(tmp_path / "late.csv")]).files["late"]
     assert "off the first at equal times, rms [mm]" not in cells
-    assert cells["off the first from its path, rms [mm]"] == Estimate(pytest.approx(0.0, abs=1e-9))
+    assert cells["off the first from its path, rms [mm]"] == Bounded(pytest.approx(0.0, abs=1e-9))
 
 
 def test_verdicts_are_compared_in_standard_deviations(folder: Path) -> None:
