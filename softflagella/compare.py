@@ -190,24 +190,31 @@ def _inputs(robot: Robot, known: CalibrationKnowledge) -> Cells:
 
 
 def _plans(plans: Mapping[str, dict[str, Any]]) -> Comparison:
+    from sim.model.schedule import PLAN_FILE
+
     files = dict[str, Cells]()
     figure, (axes,) = _plane(1)
     for k, (name, plan) in enumerate(plans.items()):
-        robot, seconds = plan["robot"], np.array(plan["dwell_s"])
-        cm = 100 * robot["tail_length_m"]
-        declared, drawn = (cm * np.array(plan[key]) for key in ("reference", "raw_path"))
-        files[name] = {
-            "robot": robot["name"],
-            "tail length [cm]": Bounded(cm),
-            **{group: Bounded(value) for group, value in robot.get("groups", {}).items()},
-            **{key: str(plan.get(key, "-")) for key in ("point", "objective", "model")},
-            "duration [s]": Bounded(seconds.sum()),
-            "flips": Bounded(len(seconds) - 1),
-            "shortest dwell [s]": Bounded(seconds.min()),
-            "declared path [cm]": Bounded(_length(declared)),
-            "path as drawn [cm]": Bounded(_length(drawn)),
-            **{title: Bounded(10 * cm * plan[key]) for title, key in _ERRORS.items() if plan.get(key) is not None},
-        }
+        with expecting(PLAN_FILE, name, "plan again"):
+            robot, seconds = plan["robot"], np.array(plan["dwell_s"])
+            cm = 100 * robot["tail_length_m"]
+            declared, drawn = (cm * np.array(plan[key]) for key in ("reference", "raw_path"))
+            files[name] = {
+                "robot": robot["name"],
+                "tail length [cm]": Bounded(cm),
+                **{group: Bounded(value) for group, value in robot.get("groups", {}).items()},
+                **{key: str(plan.get(key, "-")) for key in ("point", "objective", "model")},
+                "duration [s]": Bounded(seconds.sum()),
+                "flips": Bounded(len(seconds) - 1),
+                "shortest dwell [s]": Bounded(seconds.min()),
+                "declared path [cm]": Bounded(_length(declared)),
+                "path as drawn [cm]": Bounded(_length(drawn)),
+                **{
+                    title: Bounded(10 * cm * plan[key])
+                    for title, key in _ERRORS.items()
+                    if plan.get(key) is not None
+                },
+            }
         axes.plot(*drawn.T, color=f"C{k}", lw=0.8, ls=":")
         axes.plot(*declared.T, color=f"C{k}", lw=1.4, label=name)
     axes.set_title("declared paths; dotted: as drawn", fontsize=10)
@@ -303,7 +310,7 @@ def _dots(files: Mapping[str, Cells], titles: Sequence[str]) -> Figure:
     """Draw numbers with their intervals, a panel for each quantity and a row for each file."""
     from matplotlib.figure import Figure
 
-    rows = -(-len(titles) // 2)
+    rows = max(1, -(-len(titles) // 2))
     figure = Figure(figsize=(7.5, (0.7 + 0.25 * len(files)) * rows), layout="constrained")
     for place, title in enumerate(titles, 1):
         axes = figure.add_subplot(rows, 2, place)

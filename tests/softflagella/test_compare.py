@@ -78,6 +78,7 @@ def table(lines: list[str]) -> dict[str, str]:
         ("slow empty", "empty"),
         ("slow list.json", "list.json"),
         ("verdict.json bare.json", "bare is not a verdict.json of this version (no entry 'advice')"),
+        ("slow bare-plan.json", "bare-plan is not a plan.json of the planner (no entry 'dwell_s'); plan again"),
         ("here.csv there.csv --plot picture", "a name that ends with .svg, .png, .pdf"),
         ("slow.csv fast.csv --with slow", "fast: the track is of plan"),
     ],
@@ -88,6 +89,8 @@ def test_what_cannot_be_compared_is_refused(
     monkeypatch.chdir(folder)
     Path("empty").mkdir(exist_ok=True)
     Path("list.json").write_text("[1, 2]")
+    plan = json.loads(Path("slow/plan.json").read_text())
+    Path("bare-plan.json").write_text(json.dumps({k: v for k, v in plan.items() if k not in ("id", "dwell_s")}))
     Path("bare.json").write_text('{"verdict": "none"}')
     with pytest.raises(InputError) as refused:
         main(["compare", *words.split()])
@@ -187,3 +190,12 @@ def test_what_is_compared_is_drawn(ending: str, folder: Path, tmp_path: Path, ca
 def test_what_is_equal_is_left_out(folder: Path) -> None:
     lines = compare([str(folder / "slow.toml")] * 2).lines()
     assert lines == ["intervals: of inputs 95 %, of the motion 90 %", "19 of 19 quantities are equal"]
+
+
+def test_verdicts_without_a_common_number_have_an_empty_picture(folder: Path, tmp_path: Path) -> None:
+    for name, titles in (("one", {"v": "speed"}), ("two", {"v": "spin"})):
+        errors = {f"error_{model}": None for model in ("uncalibrated", "before", "after")}
+        record = {**VERDICT, **errors, "output_titles": titles, "parameters": {}}
+        (tmp_path / f"{name}.json").write_text(json.dumps(record))
+    main(["compare", str(tmp_path / "one.json"), str(tmp_path / "two.json"), "--plot", str(tmp_path / "out.png")])
+    assert (tmp_path / "out.png").stat().st_size > 100
