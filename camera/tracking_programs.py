@@ -29,6 +29,7 @@ _SPELLINGS = {"micron": "um", "microns": "um", "millimeters": "mm", "centimeters
 _SPOT = ["TRACK_ID", "FRAME", "POSITION_T", "POSITION_X", "POSITION_Y"]  # of TrackMate
 _MOST_NAMES = 2**16  # bytes of names
 _NUMBERS = r"(?:[-+.\de]+[ \t]+){7}[-+.\de]+"  # time, place and quaternion, in a line of text
+_NO_NAMES = r"(?![ \t]*(?:\S+[ \t]+){7}\S+[ \t]*\r?\n)"  # eight words above them are names of a table
 
 
 class Seen(NamedTuple):
@@ -301,6 +302,10 @@ PROGRAMS = {
     ),
     "motive": TrackingProgram("Motive", _motive, (".csv",), "Format Version,"),
     "tum": TrackingProgram(
-        "TUM", _tum, (".txt", ".tum"), rf"(?:(?:#.*\n)*#.* tx .*\n)?{_NUMBERS}[ \t]*\r?\n", y_down=False
+        "TUM",
+        _tum,
+        (".txt", ".tum"),
+        rf"(?:(?:#.*\n)*#(?:.* tx .*|{_NO_NAMES}.*)\n)?{_NUMBERS}[ \t]*\r?\n",
+        y_down=False,
     ),
 }

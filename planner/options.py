@@ -372,4 +372,4 @@ def _outlines(words: str) -> list[Drawing]:
         regions = f"{', '.join(_SHAPES.values())}, or a file with outlines"
         raise InputError(f"{words}: no such file or region; {guess}regions are {regions}")
     paths, unit, no_unit = read_outlines(Path(words))
-    return [Drawing(Path2D.of(points, closed=True), unit, no_unit) for points, _ in paths.values()]
+    return [Drawing(Path2D.of(path.points, closed=True), unit, no_unit) for path in paths.values()]

@@ -47,14 +47,14 @@ def plan(
     """Plan the motor's switching times for a path.
 
     Args:
-        path: CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE, polygon:CORNERS:SIDE (square:24cm,
-            polygon:6:2l). In Python also what `read_path` reads, a Path2D, or points (n, 2), in tail lengths l or
-            in `unit`.
+        path: CSV with x, y, SVG, DXF, GeoJSON and others; or circle:RADIUS, square:SIDE, triangle:SIDE,
+            polygon:CORNERS:SIDE (square:24cm, polygon:6:2l). In Python also what `read_path` reads, a Path2D, or
+            points (n, 2), in tail lengths l or in `unit`.
         robot: robot.toml or the name of a preset, with its motor speed in both directions; or the vehicle.toml of
             a measured vehicle. In Python also the robot, the vehicle, or the verdict of a calibration: its
             corrected robot, with an error that holds for each robot that the runs cannot tell from it.
         scale: multiply the path's coordinates.
-        shape: which path of an SVG with several.
+        shape: which path of a file with several, such as the layer of a DXF.
         closed: join the path's end to its start.
         smooth: LENGTH, smooth the path over this length, such as 1cm.
         loop: a closed path is followed lap after lap, until told otherwise. In Python `Plan.lap` says how well a

@@ -99,7 +99,7 @@ def write_page(
         path: the file.
         robot: robot.toml or the name of a preset, that the page begins with. Robots with effects or a calibration
             cannot be changed in the page. In Python also the robot.
-        paths: a path that the page offers: CSV, SVG, or a shape such as circle:20cm; the first one is planned when
+        paths: a path that the page offers: a file, or a shape such as circle:20cm; the first one is planned when
             the page opens. In Python also points (n, 2) or a Path2D by name, in tail lengths l.
         smooth: LENGTH, smooth drawn strokes over this length, such as 1cm.
         title: of the page.

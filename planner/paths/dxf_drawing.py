@@ -15,15 +15,13 @@ import numpy as np
 
 from common.errors import InputError
 from common.reading import read_bytes
-from planner.paths.named_paths import NamedPaths, Polyline, with_own_names
+from planner.paths.named_paths import NamedPaths, with_own_names
+from planner.paths.path import Path2D
 
 _DRAWN = {"LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "HELIX"}
 _METRES = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 10: 0.9144, 13: 1e-6, 14: 0.1}  # of $INSUNITS
 _MEETS = 1e-5  # of the drawing's size
-_NO_UNIT = (
-    "$INSUNITS does not say in which unit the drawing is; set it in the CAD program, or give --unit mm (in Python "
-    'unit="mm")'
-)
+_NO_UNIT = '$INSUNITS does not say its unit; set it in the CAD program, or give --unit mm (in Python unit="mm")'
 
 
 def read_dxf(path: Path) -> NamedPaths:
@@ -40,22 +38,24 @@ def read_dxf(path: Path) -> NamedPaths:
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # what it mends is not told
     try:
         drawing = ezdxf.readfile(path)
-        layers: dict[str, list[Polyline]] = {}
+        layers: dict[str, list[Path2D]] = {}
         for layer, piece in _pieces(drawing):
             layers.setdefault(layer, []).append(piece)
+        if not layers:
+            raise InputError(
+                f"{path} has no line, polyline, arc, circle, ellipse or spline in model space; draw one"
+            )
+        places = np.concatenate([piece.points for pieces in layers.values() for piece in pieces])
+        gap = _MEETS * float(np.ptp(places, axis=0).max())
+        joined = with_own_names((layer, each) for layer, pieces in layers.items() for each in _joined(pieces, gap))
+        return NamedPaths(joined, _METRES.get(drawing.units), _NO_UNIT)
     except InputError:
         raise
     except Exception as broken:  # a damaged file can raise any error from within the parser
         raise InputError(f"{path} is not DXF ({' '.join(str(broken).split())}); save it again") from None
-    if not layers:
-        raise InputError(f"{path} has no line, polyline, arc, circle, ellipse or spline in model space; draw one")
-    places = np.concatenate([piece.points for pieces in layers.values() for piece in pieces])
-    gap = _MEETS * float(np.ptp(places, axis=0).max())
-    joined = with_own_names((layer, each) for layer, pieces in layers.items() for each in _joined(pieces, gap))
-    return NamedPaths(joined, _METRES.get(drawing.units), _NO_UNIT)
 
 
-def _pieces(drawing: Any) -> Iterator[tuple[str, Polyline]]:
+def _pieces(drawing: Any) -> Iterator[tuple[str, Path2D]]:
     """Yield the layer and the points of all that is drawn, in blocks too."""
     from ezdxf.disassemble import recursive_decompose
     from ezdxf.path import Command, make_path
@@ -77,26 +77,24 @@ def _pieces(drawing: Any) -> Iterator[tuple[str, Polyline]]:
             between = [getattr(step, name) for name in ("ctrl", "ctrl1", "ctrl2") if hasattr(step, name)]
             curve.append(curves[step.type](*(complex(at.x, at.y) for at in (start, *between, step.end))))
             start = step.end
-        points, _ = polyline_of(curve, Matrix())
+        points = polyline_of(curve, Matrix()).points
         if len(points) > 1:
-            yield layer, Polyline(points, outline.is_closed)
+            yield layer, Path2D(points, outline.is_closed)
 
 
-def _joined(pieces: list[Polyline], gap: float) -> Iterator[Polyline]:
+def _joined(pieces: list[Path2D], gap: float) -> Iterator[Path2D]:
     """Join pieces whose ends are at most a gap apart, where no third one meets them."""
     from ezdxf import edgeminer
 
     yield from (piece for piece in pieces if piece.closed)
-    if all(piece.closed for piece in pieces):
-        return
     edges = [edgeminer.make_edge(*piece.points[[0, -1]], payload=piece) for piece in pieces if not piece.closed]
-    ends, used = edgeminer.Deposit(edges, gap_tol=gap), set()
+    ends, used = edges and edgeminer.Deposit(edges, gap_tol=gap), set()
     for edge in edges:
         if edge not in used:
             chain = edgeminer.find_simple_chain(ends, edge)
             used.update(chain)
             points = [each.payload.points[:: -1 if each.is_reverse else 1] for each in chain]
-            yield Polyline(
+            yield Path2D(
                 np.concatenate([points[0], *(more[1:] for more in points[1:])]),
                 edgeminer.is_loop(chain, gap_tol=gap),
             )

@@ -16,13 +16,11 @@ import numpy as np
 from common.arrays import Floats
 from common.errors import InputError
 from common.reading import expecting, read_json
-from planner.paths.named_paths import NamedPaths, Polyline, with_own_names
+from planner.paths.named_paths import NamedPaths, with_own_names
+from planner.paths.path import Path2D
 
 _DEGREES = re.compile(r"CRS:?84|EPSG:+(?:4326|4979)")
-_NO_UNIT = (
-    "GeoJSON has degrees of longitude and latitude (RFC 7946), which no robot in a tank can follow; if these are "
-    'metres, give --unit m (in Python unit="m")'
-)
+_NO_UNIT = 'GeoJSON has degrees of longitude and latitude; if these are metres, give --unit m (in Python unit="m")'
 
 
 def read_geojson(path: Path) -> NamedPaths:
@@ -32,7 +30,7 @@ def read_geojson(path: Path) -> NamedPaths:
         InputError: it has none, or degrees.
     """
     parts = (
-        (name if k == 0 else f"{name}/hole{k}", Polyline(ring, kind == "Polygon"))
+        (name if k == 0 else f"{name}/hole{k}", Path2D(ring, kind == "Polygon"))
         for name, kind, rings in read_shapes(path)
         for k, ring in enumerate(rings)
     )
@@ -51,15 +49,14 @@ def read_regions(path: Path) -> NamedPaths:
     from planner.paths.ros_map import without_holes
 
     outlines = []
-    for name, kind, rings in read_shapes(path):
-        if kind != "Polygon":
-            raise InputError(f"{path}: {name} is a {kind}, which encloses nothing; give polygons")
-        region = Polygon(rings[0], rings[1:])
-        if not region.is_valid:
-            raise InputError(
-                f"{path}: {name}: {explain_validity(region)}; draw it so that it does not cross itself"
-            )
-        outlines += [(name, Polyline(np.array(part.exterior.coords), True)) for part in without_holes(region)]
+    with expecting("GeoJSON", path, "draw polygons that do not cross themselves"):
+        for name, kind, rings in read_shapes(path):
+            if kind != "Polygon":
+                raise InputError(f"{name} is a {kind}, which encloses nothing; give polygons")
+            region = Polygon(rings[0], rings[1:])
+            if not region.is_valid:
+                raise ValueError(f"{name}: {explain_validity(region)}")
+            outlines += [(name, Path2D(np.array(part.exterior.coords), True)) for part in without_holes(region)]
     return NamedPaths(with_own_names(outlines), None, _NO_UNIT)
 
 
@@ -74,13 +71,14 @@ def read_shapes(path: Path) -> list[tuple[str, str, list[Floats]]]:
         system = (content.get("crs") or {}).get("properties", {}).get("name", "")
         if _DEGREES.search(system):
             raise InputError(f"its crs is {system}: degrees of longitude and latitude; export it in metres")
-        shapes = [
-            (name, kind, [np.array([place[:2] for place in ring], dtype=float) for ring in rings])
-            for name, kind, rings in _shapes(content, "")
-        ]
+        shapes = [(name, kind, [_points(ring) for ring in rings]) for name, kind, rings in _shapes(content, "")]
         if not shapes:
             raise InputError("it has no LineString and no Polygon; draw one")
         return shapes
+
+
+def _points(ring: list[list[float]]) -> Floats:
+    return np.array([(x, y) for x, y, *_ in ring], dtype=float).reshape(-1, 2)
 
 
 def _shapes(part: Mapping[str, Any], name: str) -> Iterator[tuple[str, str, list[Any]]]:

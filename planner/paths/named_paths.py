@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from common.arrays import Floats
 from common.errors import InputError
 from planner.paths.path import Path2D, arc_length
 from planner.paths.units import NO_UNIT
@@ -14,17 +13,10 @@ from planner.paths.units import NO_UNIT
 _LISTED = 10  # names in a message
 
 
-class Polyline(NamedTuple):
-    """A path as a file has it."""
-
-    points: Floats  # (n, 2), in the unit of the file
-    closed: bool = False  # the last point is joined to the first
-
-
 class NamedPaths(NamedTuple):
     """The paths of a file, one or more."""
 
-    paths: Mapping[str, Polyline]
+    paths: Mapping[str, Path2D]  # as the file has them, not checked
     unit: float | None  # its size in m; None: the numbers have no unit
     no_unit: str = NO_UNIT  # what a message then asks for
 
@@ -43,8 +35,7 @@ class NamedPaths(NamedTuple):
         if name not in self.paths:
             there = f"there are {len(self.paths)}{self._listed()}" if len(self.paths) > 1 else "leave --shape out"
             raise InputError(f"{source} has no shape {name!r}; {there}")
-        points, ends = self.paths[name]
-        return Path2D.of(points, closed=ends or closed)
+        return Path2D.of(self.paths[name].points, closed=self.paths[name].closed or closed)
 
     def _listed(self) -> str:
         """List the names of all paths, or of the longest ones."""
@@ -54,9 +45,9 @@ class NamedPaths(NamedTuple):
         return f" ({'the longest: ' if len(names) > _LISTED else ''}{', '.join(names[:_LISTED])})"
 
 
-def with_own_names(paths: Iterable[tuple[str, Polyline]]) -> dict[str, Polyline]:
+def with_own_names(paths: Iterable[tuple[str, Path2D]]) -> dict[str, Path2D]:
     """Name paths apart: a name that comes again is followed by a number."""
-    named: dict[str, Polyline] = {}
+    named: dict[str, Path2D] = {}
     again: Counter[str] = Counter()
     for name, path in paths:
         label = name

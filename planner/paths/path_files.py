@@ -17,7 +17,7 @@ from common.keywords import checks_keywords
 from common.units import split, to_si
 from planner.paths.dxf_drawing import read_dxf
 from planner.paths.geojson import read_geojson, read_regions
-from planner.paths.named_paths import NamedPaths, Polyline
+from planner.paths.named_paths import NamedPaths
 from planner.paths.path import SHAPES, Path2D, like_a_shape, nearest_shape, shape_of
 from planner.paths.robot_messages import of_messages, read_messages, read_pathplanner
 from planner.paths.units import NO_UNIT, Scales, in_tails
@@ -117,13 +117,13 @@ class Drawing:
 
 @checks_keywords
 def read_path(source: str | Path, *, closed: bool | None = None, shape: str | None = None) -> Drawing:
-    """Read a path from a table with columns x, y (or x_mm, y_mm and so on), from an SVG file, or from words.
+    """Read a path from a table with columns x, y (or x_mm, y_mm and so on), from a drawing, or from words.
 
     Args:
         source: the file, or a shape: circle:RADIUS, square:SIDE, triangle:SIDE or polygon:CORNERS:SIDE, with the
             unit of its size, as in square:24cm or square:3l.
         closed: join the end to the start; by default as in the file.
-        shape: name of the path, for an SVG with several; without it the error message lists the names.
+        shape: name of the path, of several; without it the error message lists the names.
 
     Raises:
         InputError: the file has no path, or several and none is chosen; or there is no such file or shape.
@@ -221,7 +221,7 @@ def _read_columns(source: Path) -> NamedPaths:
         line = f" (line {table.index[broken[0]]})" if table.index.name else ""
         raise InputError(f"{source}: x or y of point {broken[0] + 1}{line} is no number; correct the file")
     factors = np.array([to_si(1.0, unit.suffix) for unit in units] or [1.0, 1.0])
-    path = Polyline(points * (factors / factors[0]))
+    path = Path2D(points * (factors / factors[0]))
     return NamedPaths({source.stem: path}, float(factors[0]) if units else None)
 
 

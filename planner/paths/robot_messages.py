@@ -11,7 +11,8 @@ import numpy as np
 from common.arrays import Floats
 from common.errors import InputError
 from common.reading import decode, expecting, read_bytes, read_json
-from planner.paths.named_paths import NamedPaths, Polyline
+from planner.paths.named_paths import NamedPaths
+from planner.paths.path import Path2D
 
 _POSITION = re.compile(r'\bposition"?:[\s{]*+"?x"?:\s*+([^\s,}]++)[\s,]++"?y"?:\s*+([^\s,}]++)')
 _CUT = re.compile(r"^[ \t]*+-[ \t]*+'?\.\.\.'?[ \t\r]*+$", re.M)  # where `ros2 topic echo` leaves poses out
@@ -46,7 +47,7 @@ def of_messages(messages: list[Floats]) -> NamedPaths:
     different = {poses.tobytes(): poses for poses in messages if len(poses)}.values()
     if not different:
         raise InputError("its messages have no poses with x and y; give nav_msgs/Path, PoseStamped or Odometry")
-    return NamedPaths({f"message{k + 1}": Polyline(poses) for k, poses in enumerate(different)}, 1.0)
+    return NamedPaths({f"message{k + 1}": Path2D(poses) for k, poses in enumerate(different)}, 1.0)
 
 
 def read_pathplanner(path: Path) -> NamedPaths:

@@ -23,7 +23,8 @@ from shapely.affinity import affine_transform
 from common.arrays import Flags, Floats
 from common.errors import InputError, InputWarning
 from common.reading import decode, expecting, read_bytes
-from planner.paths.named_paths import NamedPaths, Polyline, with_own_names
+from planner.paths.named_paths import NamedPaths, with_own_names
+from planner.paths.path import Path2D
 
 _ENTRY = re.compile(r"^(\w+):(.*)", re.M)
 _ORIGIN = re.compile("^origin:" + 3 * r"[\[\s,]++(?:-\s++)?([-+.\deE]++)", re.M)
@@ -58,7 +59,7 @@ def read_map(path: Path) -> NamedPaths:
         raise InputError(f"{path}: all cells are free; leave it out")
     along, aside = cell * np.cos(yaw), cell * np.sin(yaw)
     placed = [affine_transform(part, [along, -aside, aside, along, x, y]) for part in parts]
-    outlines = [("outline", Polyline(np.array(part.exterior.coords), True)) for part in placed]
+    outlines = [("outline", Path2D(np.array(part.exterior.coords), True)) for part in placed]
     return NamedPaths(with_own_names(outlines), 1.0)
 
 

@@ -19,15 +19,14 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from svgelements import Circle, Close, Ellipse, Line, Matrix, Move, Polygon, Rect, SimpleLine, Viewbox
+from svgelements import Circle, Close, Ellipse, Line, Matrix, Move, Polygon, Polyline, Rect, SimpleLine, Viewbox
 from svgelements import Path as SvgPath
-from svgelements import Polyline as SvgPolyline
 
 from common.arrays import Floats
 from common.errors import InputError
 from common.reading import read_bytes
-from planner.paths.named_paths import NamedPaths, Polyline
-from planner.paths.path import steps_of
+from planner.paths.named_paths import NamedPaths
+from planner.paths.path import Path2D, steps_of
 
 METRES_PER_PIXEL = 0.0254 / 96  # of SVG
 _TURN = math.radians(2.0)  # largest turn of a curve between two points
@@ -60,7 +59,7 @@ _TRANSFORMS = {  # and their arguments: numbers 1, lengths x, angles a
 }  # fmt: skip
 
 _VISIBLE = {"visible": True, "hidden": False, "collapse": False}
-_OUTLINES = {"line": SimpleLine, "polyline": SvgPolyline, "polygon": Polygon, "circle": Circle, "rect": Rect,
+_OUTLINES = {"line": SimpleLine, "polyline": Polyline, "polygon": Polygon, "circle": Circle, "rect": Rect,
              "ellipse": Ellipse}  # fmt: skip
 _SVG = "{http://www.w3.org/2000/svg}"
 _XLINK = "{http://www.w3.org/1999/xlink}href"
@@ -107,7 +106,7 @@ def read_svg(path: Path) -> NamedPaths:
         raise InputError(f"{path} is not SVG: {reason}") from None
     if not subpaths:
         raise InputError(f"{path} has no path, line, polyline, polygon, rectangle, circle or ellipse; draw one")
-    upright = {name: Polyline(points * [1.0, -1.0] + 0.0, closed) for name, (points, closed) in subpaths.items()}
+    upright = {name: Path2D(path.points * [1.0, -1.0] + 0.0, path.closed) for name, path in subpaths.items()}
     return NamedPaths(upright, METRES_PER_PIXEL if drawing.physical else None)
 
 
@@ -120,22 +119,22 @@ class _Shape(NamedTuple):
     matrix: Matrix  # to pixels
 
 
-def _subpaths(shapes: list[_Shape]) -> dict[str, Polyline]:
+def _subpaths(shapes: list[_Shape]) -> dict[str, Path2D]:
     """Find every subpath by name."""
-    subpaths: dict[str, Polyline] = {}
+    subpaths: dict[str, Path2D] = {}
     counts: dict[str, int] = {}
     for kind, identity, outline, matrix in shapes:
         counts[kind] = counts.get(kind, 0) + 1
         name = identity or f"{kind}{counts[kind]}"
         parts = [polyline_of(SvgPath(part), matrix) for part in outline.as_subpaths()]
-        parts = [part for part in parts if len(part[0]) > 1]
+        parts = [part for part in parts if len(part.points) > 1]
         for i, part in enumerate(parts):
             part_name = name if len(parts) == 1 else f"{name}/{i + 1}"
             subpaths[part_name if part_name not in subpaths else f"{part_name}-{kind}{counts[kind]}"] = part
     return subpaths
 
 
-def polyline_of(subpath: Any, matrix: Matrix) -> Polyline:
+def polyline_of(subpath: Any, matrix: Matrix) -> Path2D:
     """Sample the points of one subpath in pixels, curves as polylines.
 
     Points are sampled before the transform: svgelements takes the axes of a skewed ellipse for upright ones.
@@ -153,7 +152,7 @@ def polyline_of(subpath: Any, matrix: Matrix) -> Polyline:
             points += segment.npoint(np.linspace(0, 1, _enough(segment, matrix) + 1)[1:]).tolist()
         if len(points) > _MOST_POINTS:
             raise InputError(f"a curve of the drawing needs more than {_MOST_POINTS} points; simplify the drawing")
-    return Polyline(_moved(np.array(points, dtype=float).reshape(-1, 2), matrix), closed)
+    return Path2D(_moved(np.array(points, dtype=float).reshape(-1, 2), matrix), closed)
 
 
 def _moved(points: Floats, matrix: Matrix) -> Floats:

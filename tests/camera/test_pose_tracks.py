@@ -141,10 +141,10 @@ def test_without_a_program_a_table_is_read_as_it_is(tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(table.reset_index(drop=True), poses())
 
 
-@pytest.mark.parametrize("first", [0, 2])
-def test_a_trajectory_with_its_own_units_needs_no_options(first: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("first", "comments"), [(0, b""), (2, b""), (2, b"# of a run\n# frame: /camera\n")])
+def test_a_trajectory_with_its_own_units_needs_no_options(first: int, comments: bytes, tmp_path: Path) -> None:
     path = tmp_path / "trajectory.txt"
-    path.write_bytes(b"\n".join(files.tum().splitlines()[first:]) + b"\n")
+    path.write_bytes(comments + b"\n".join(files.tum().splitlines()[first:]) + b"\n")
     table = read_tracks(path).drop(columns="run")
     assert table.to_numpy() == pytest.approx(poses().to_numpy(), abs=1e-5)
     path.write_text("# time_s x_cm y_cm heading_deg a b c d\n" + "0 1 2 3 4 5 6 7\n")

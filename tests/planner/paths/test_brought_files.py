@@ -140,7 +140,7 @@ BROKEN = [
     ("{\"type\": \"Feature\", \"geometry\": ", "not JSON"), ('{"type": "Feature"}', "no entry 'geometry'"),
     (features(("Point", [0, 0])), "no LineString and no Polygon"), (features(("LineString", 3)), "not GeoJSON"),
     (features(("LineString", [[0, "a"], [1, 1]])), "not GeoJSON"),
-    (features(("Polygon", [[[0], [1]]])), "give (n, 2)"),
+    (features(("Polygon", [[[0], [1]]])), "not enough values"),
 ]  # fmt: skip
 
 

@@ -137,6 +137,9 @@ def test_lines_and_crossing_polygons_of_geojson_are_no_obstacles(tmp_path: Path)
     eight = [[[0, 0], [1, 1], [1, 0], [0, 1], [0, 0]]]
     with pytest.raises(InputError, match="Self-intersection"):
         read_regions(geojson(tmp_path, ("Polygon", eight)), "m", CONTROL)
+    for few in ([[[0, 0], [1, 1]]], []):
+        with pytest.raises(InputError, match="not GeoJSON"):
+            read_regions(geojson(tmp_path, ("Polygon", few)), "m", CONTROL)
 
 
 def test_all_shapes_of_a_drawing_are_obstacles(tmp_path: Path) -> None:
