@@ -124,9 +124,9 @@ def _also_missing(path: Path, programs: list[str]) -> str:
 
 def _scales(seen: Seen, options: TrackOptions) -> tuple[float, float]:
     """Return the units of a file's times [s] and lengths [m]: its own ones, or those of the options; or nan."""
-    fps, (size, unit) = options.get("fps"), number_and_unit(options.get("scale") or "", of_kind("length"))
+    fps, (scale, unit) = options.get("fps"), number_and_unit(options.get("scale") or "", of_kind("length"))
     seconds = seen.seconds if seen.seconds is not None else 1 / fps if fps else math.nan
-    metres = seen.metres or (math.nan if unit is None else float(to_si(size, unit)))
+    metres = seen.metres or (math.nan if unit is None else float(to_si(scale, unit)))
     return seconds, metres
 
 

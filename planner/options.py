@@ -221,7 +221,7 @@ def request_of(options: Mapping[str, Any], robot: Scales, **own: Any) -> PlanReq
     walls = options.get("walls")
     outlines = [None] if walls is None else regions_of(walls, unit, robot)
     if len(outlines) > 1 or isinstance(outlines[0], Circle):
-        raise InputError(f"--walls {walls!r}; give a box or one outline")
+        raise InputError(f"--walls {walls!r}; give a box or an outline")
     regions = tuple(part for each in options.get("keep_out", ()) for part in regions_of(each, unit, robot))
     return PlanRequest(**given, **own, space=FreeSpace(regions, outlines[0]))
 

@@ -88,7 +88,8 @@ def _joined(pieces: list[Path2D], gap: float) -> Iterator[Path2D]:
 
     yield from (piece for piece in pieces if piece.closed)
     edges = [edgeminer.make_edge(*piece.points[[0, -1]], payload=piece) for piece in pieces if not piece.closed]
-    ends, used = edges and edgeminer.Deposit(edges, gap_tol=gap), set()
+    ends = edges and edgeminer.Deposit(edges, gap_tol=gap)
+    used: set[Any] = set()
     for edge in edges:
         if edge not in used:
             chain = edgeminer.find_simple_chain(ends, edge)

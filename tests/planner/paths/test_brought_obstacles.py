@@ -127,7 +127,7 @@ def test_polygons_of_geojson_are_obstacles_and_their_holes_are_free(tmp_path: Pa
     assert space.distance(places[4:]) * CONTROL.length_scale == pytest.approx([0.3, 1.0])
     with pytest.raises(InputError, match=r"a\.geojson.* give --unit m"):
         read_regions(file, None, CONTROL)
-    with pytest.raises(InputError, match="give a box or one outline"):
+    with pytest.raises(InputError, match="give a box or an outline"):
         request_of({"walls": file, "unit": "m"}, CONTROL)
 
 
