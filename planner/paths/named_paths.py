@@ -27,22 +27,20 @@ class NamedPaths(NamedTuple):
             InputError: there are several and none is chosen, or none has this name.
         """
         if shape is None and len(self.paths) > 1:
-            raise InputError(
-                f"{source} has {len(self.paths)} paths{self._listed()}; choose one with --shape, or remove the "
-                "others"
-            )
+            raise InputError(f"{source} has {self._listed()}; choose one with --shape, or remove the others")
         name = next(iter(self.paths)) if shape is None else shape
         if name not in self.paths:
-            there = f"there are {len(self.paths)}{self._listed()}" if len(self.paths) > 1 else "leave --shape out"
+            there = f"there are {self._listed()}" if len(self.paths) > 1 else "leave --shape out"
             raise InputError(f"{source} has no shape {name!r}; {there}")
         return Path2D.of(self.paths[name].points, closed=self.paths[name].closed or closed)
 
     def _listed(self) -> str:
-        """List the names of all paths, or of the longest ones."""
+        """Count the paths, and list the names of all or of the longest ones."""
         names = list(self.paths)
         if len(names) > _LISTED:
             names.sort(key=lambda name: -arc_length(self.paths[name].points)[-1])
-        return f" ({'the longest: ' if len(names) > _LISTED else ''}{', '.join(names[:_LISTED])})"
+        longest = "the longest: " if len(names) > _LISTED else ""
+        return f"{len(names)} paths ({longest}{', '.join(names[:_LISTED])})"
 
 
 def with_own_names(paths: Iterable[tuple[str, Path2D]]) -> dict[str, Path2D]:

@@ -119,7 +119,9 @@ def test_files_of_other_kinds_are_refused_by_name() -> None:
         shown = str(opened(name, content))
         assert kind in shown, content
         if kind in READERS:
-            assert shown == f"{name}: the page does not read {kind}; put it in with softflagella page --path {name}"
+            assert (
+                shown == f"{name}: the page does not read {kind}; put it in with softflagella page --path {name}"
+            )
             continue
         assert f"is not read; {ADVICE.get(kind, 'give a table with columns x and y')}" in shown
         assert shown == refusal_of(read_path, name)

@@ -101,7 +101,7 @@ def test_several_paths_are_named_and_one_can_be_chosen(tmp_path: Path) -> None:
         drawn(tmp_path, body)
     assert drawn(tmp_path, body, shape="outline/2").path.length == pytest.approx(2)
     assert drawn(tmp_path, body, shape="rect1").path.length == pytest.approx(8)
-    with pytest.raises(InputError, match=r"no shape 'circle1'; there are 3 \(outline/1"):
+    with pytest.raises(InputError, match=r"no shape 'circle1'; there are 3 paths \(outline/1"):
         drawn(tmp_path, body, shape="circle1")
 
 
