@@ -11,7 +11,7 @@ import { InputError, quoted, refusing } from "./words.js";
 
 const { MORE } = CONSTANTS.solve;
 const ANYWHERE = { keepOut: [], walls: null };
-const AROUND = "the page finds no way around: move the path, or plan with softflagella plan and --keep-out or --walls";
+const AROUND = "the page finds no way around, as softflagella plan does: move the path or the region";
 
 /* Read what a page's options say of regions, in cm, with the length of `cm` tails. */
 function readSpace({ keepOut, walls }, cm) {
