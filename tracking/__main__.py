@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable
-from contextlib import redirect_stdout
+from contextlib import nullcontext, redirect_stdout
 from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +36,7 @@ def _track(
     view: str | None = None,
     serial: str | None = None,
     lost: float | None = None,
+    show: bool = False,
 ) -> None:
     """Keep a robot on a path or a saved plan: poses come in on a pipe or from a camera.
 
@@ -52,6 +53,7 @@ def _track(
         view: the camera's view.toml.
         serial: port of the motor's board, such as /dev/ttyACM0 (default: nothing moves).
         lost: seconds without a pose after which the motor rests (default: 2).
+        show: serve a page to this computer: picture, path, robot, and a button that stops the motor.
     """
     from planner.files.saved_plan import is_plan
     from planner.paths.units import read_length, read_pose
@@ -60,9 +62,9 @@ def _track(
     from tracking.tracker import Tracker
 
     _check_options(noise_rad, latency, lost)
-    if camera is None and (view or serial or lost):
+    if camera is None and (view or serial or lost or show):
         raise InputError(
-            "--view, --serial and --lost are for --camera, whose number is missing, such as --camera 0"
+            "--view, --serial, --lost and --show are for --camera, whose number is missing, such as --camera 0"
         )
     if camera is not None and (view is None or start is not None):
         raise InputError("--camera needs --view view.toml and shows where the robot is; leave --start out")
@@ -84,7 +86,7 @@ def _track(
         return Tracker(plan, noise=deviations, latency=latency / scale, begin=now, start=pose)
 
     if camera is not None and view is not None:
-        _live(plan, camera, view, serial, latency, lost or 2.0, begin)
+        _live(plan, camera, view, serial, latency, lost or 2.0, begin, show=show)
         return
     if start is not None:
         tracker: Tracker | None = begin(read_pose(start, unit, plan.robot, "--start"), 0.0)
@@ -106,30 +108,39 @@ def _check_options(noise_rad: float, latency: float, lost: float | None) -> None
 
 def _live(
     plan: Plan, source: str, view: str, port: str | None, latency: float, lost: float,
-    begin: Callable[[tuple[float, float, float] | None, float], Tracker],
+    begin: Callable[[tuple[float, float, float] | None, float], Tracker], *, show: bool,
 ) -> None:  # fmt: skip
     """Follow a plan with a camera and a motor; print the track."""
     from tracking.live import Motor, Pictures, Ride, Sight, ending_on_signals, steer, watch
+    from tracking.live_page import LivePage
 
     length = plan.robot.length_scale
+    page = LivePage(plan.reference, length)
 
-    def row(sight: Sight, direction: int, error: float, alarm: bool) -> None:
+    def row(sight: Sight, direction: int, error: float, alarm: bool, flip_in: float) -> None:
+        page.show(sight, direction, error, alarm, flip_in)
         if sight.pose is not None:
             x, y, heading = sight.pose
             place = f"{100 * length * x:.4f},{100 * length * y:.4f},{math.degrees(heading):.3f}"
             print(f"{sight.time:.4f},{place},{direction},{100 * length * error:.4f},{alarm:d}", flush=True)
 
     def tell(line: str) -> None:
+        page.tell(line)
         print(line, file=sys.stderr, flush=True)
 
-    sights, ride = watch(source, view, plan.robot.name, length, latency), Ride()
-    with ending_on_signals():
+    sights, ride = watch(source, view, plan.robot.name, length, latency, page.see), Ride()
+    with ending_on_signals(), page if show else nullcontext():
+        if show:
+            print(f"live page: {page.address}", file=sys.stderr, flush=True)
         motor = Motor(port)
         print("time_s,x_cm,y_cm,heading_deg,direction,error_cm,alarm", flush=True)
         try:
             with Pictures(sights) as pictures, motor:  # which stops first
-                steer(ride, pictures, motor, begin, plan.robot.time_scale, lost=lost, row=row, tell=tell)
+                steer(ride, pictures, motor, begin, plan.robot.time_scale, lost=lost, row=row, tell=tell,
+                      stopped=page.stopped.is_set)  # fmt: skip
         finally:
+            if page.stopped.is_set():
+                tell("stopped on the live page")
             if ride.pictures:
                 tell(ride.line())
 

@@ -26,13 +26,16 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from common.errors import InputError
 from planner.planning.request import POSE
 from tracking.tracker import Tracker
+
+if TYPE_CHECKING:
+    from camera.view import View
 
 REPEAT = 0.2  # s between two orders, at most
 WATCHDOG = 1.0  # s without a byte after which the board stops the motor
@@ -170,10 +173,11 @@ def steer(
     unit: float,
     *,
     lost: float,
-    row: Callable[[Sight, int, float, bool], object],
+    row: Callable[[Sight, int, float, bool, float], object],
     tell: Callable[[str], object],
+    stopped: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Steer until the path or the film ends.
+    """Steer until the path or the film ends, or until somebody stops it.
 
     Args:
         ride: gets what happens.
@@ -182,8 +186,10 @@ def steer(
         begin: makes a tracker that begins at rest at a pose and a time [μ0 l⁴/EI].
         unit: of the tracker's time [s].
         lost: time without a pose after which the motor rests [s].
-        row: is given each sight, the direction ordered then, the tracker's bound on the error [l], and its alarm.
+        row: is given each sight, the direction ordered then, the tracker's bound on the error [l], its alarm,
+            and the time until the next flip [s].
         tell: is given what the user should know at once.
+        stopped: whether the motor is to stop now.
 
     Raises:
         InputError: the board or the camera has gone.
@@ -192,7 +198,7 @@ def steer(
     direction, flip_at, error, alarm, waiting = 0, math.inf, math.nan, False, True
     seen_at = ordered_at = pictures.now()
     nothing = Sight(0.0, None)
-    while not ride.finished:
+    while not ride.finished and not stopped():
         # Wait for a picture, but no longer than until the next flip, or until the board needs a sign of life.
         try:
             sight = pictures.get(max(min(ordered_at + REPEAT, flip_at) - pictures.now(), 0.0))
@@ -232,11 +238,14 @@ def steer(
         if sight is not nothing:
             ride.pictures += 1
             ride.delays += [pictures.now() - sight.time] * (sight.pose is not None)
-            row(sight, direction, error, alarm)
+            row(sight, direction, error, alarm, flip_at - now)
     motor.turn(0)
 
 
-def watch(source: str, view: str, robot: str, length: float, latency: float) -> Sights:
+def watch(
+    source: str, view: str, robot: str, length: float, latency: float,
+    see: Callable[[Any, View], object] = lambda picture, view: None,
+) -> Sights:  # fmt: skip
     """Open a camera, or a film, and return what yields its sights; a film keeps its own pace.
 
     Args:
@@ -245,6 +254,7 @@ def watch(source: str, view: str, robot: str, length: float, latency: float) -> 
         robot: whose markers are looked for, if there are several.
         length: of a tail [m].
         latency: of the camera [s].
+        see: is given each picture, once the robot was looked for in it, and the view.
 
     Raises:
         InputError: OpenCV is missing, camera, film or file cannot be read, or, later, the camera has gone.
@@ -277,6 +287,8 @@ def watch(source: str, view: str, robot: str, length: float, latency: float) -> 
             same = same + 1 if good and before is not None and np.array_equal(picture, before) else 0
             before = picture if good else before
             (seen,) = detector.poses(picture) if good else (Lost(robot, "a damaged picture"),)
+            if good:
+                see(picture, detector.view)
             if same >= FROZEN:
                 seen = Lost(robot, f"the last {same} pictures are the same one: is the camera frozen?")
             if isinstance(seen, Lost):
