@@ -186,8 +186,8 @@ def steer(
         begin: makes a tracker that begins at rest at a pose and a time [μ0 l⁴/EI].
         unit: of the tracker's time [s].
         lost: time without a pose after which the motor rests [s].
-        row: is given each sight, the direction ordered then, the tracker's bound on the error [l], its alarm,
-            and the time until the next flip [s].
+        row: is given each sight, an empty one where none has come, the direction ordered then, the tracker's bound
+            on the error [l], its alarm, and the time until the next flip [s].
         tell: is given what the user should know at once.
         stopped: whether the motor is to stop now.
 
@@ -238,7 +238,7 @@ def steer(
         if sight is not nothing:
             ride.pictures += 1
             ride.delays += [pictures.now() - sight.time] * (sight.pose is not None)
-            row(sight, direction, error, alarm, flip_at - now)
+        row(sight, direction, error, alarm, flip_at - now)
     motor.turn(0)
 
 

@@ -56,17 +56,13 @@ class LivePage:
     def __enter__(self) -> LivePage:
         self._server = _Server(("127.0.0.1", 0), _handler(self))
         self.host = f"127.0.0.1:{self._server.server_port}"
+        self.address = f"http://{self.host}/{self._token}/"
         threading.Thread(target=self._server.serve_forever, args=(0.05,), daemon=True).start()
         return self
 
     def __exit__(self, *error: object) -> None:
         self._server.shutdown()
         self._server.server_close()
-
-    @property
-    def address(self) -> str:
-        """Where the page is."""
-        return f"http://{self.host}/{self._token}/"
 
     def see(self, picture: Any, view: View) -> None:
         """Take the newest picture."""
@@ -80,7 +76,7 @@ class LivePage:
         """Take what is known after a sight: as for `tracking.live.steer`, and the time until the next flip [s]."""
         now = time.monotonic()
         self._flip_at = now + flip_in
-        state = {**self._state, "direction": direction, "alarm": alarm, "why": sight.why}
+        state = {**self._state, "direction": direction, "alarm": alarm, "why": sight.why or self._state["why"]}
         state["error_cm"] = 100 * self._length * error if math.isfinite(error) else None
         if sight.pose is not None:
             state |= {"pose": sight.pose, "seen": now, "time_s": sight.time}
@@ -90,9 +86,9 @@ class LivePage:
         """Return what the page shows: lengths in cm, places in the picture in pixels."""
         state, now, seen = self._state, time.monotonic(), self._seen
         flip = self._flip_at - now
-        answer = {name: state.get(name) for name in ("direction", "alarm", "error_cm", "time_s")}
-        answer |= {"flip_in_s": max(flip, 0.0) if math.isfinite(flip) else None, "lines": self._lines,
-                   "why": state["why"], "unseen_s": now - state["seen"] if "seen" in state else None}  # fmt: skip
+        answer = {name: state.get(name) for name in ("direction", "alarm", "error_cm", "time_s", "why")}
+        answer |= {"flip_in_s": max(flip, 0.0) if math.isfinite(flip) else None, "lines": self._lines}
+        answer["unseen_s"] = now - state["seen"] if "seen" in state else None
         if "pose" in state:
             x, y, heading = state["pose"]
             cm = 100 * self._length
@@ -108,8 +104,8 @@ class LivePage:
         """Return the size of a picture and the path in it [pixels]; None: neither is known yet."""
         if self._seen is None or self._seen[1].homography is None:
             return None
-        picture, view = self._seen
-        return {"size": picture.shape[1::-1], "path": np.round(view.to_picture(self._path), 1).tolist()}
+        size = self._seen[0].shape[1::-1]
+        return {"size": size, "path": np.round(self._seen[1].to_picture(self._path), 1).tolist()}
 
     def picture(self) -> bytes:
         """Compress the newest picture, JPEG; nothing before the first one."""
@@ -125,22 +121,23 @@ class LivePage:
     def answer(self, method: str, path: str) -> tuple[str, bytes, str] | None:
         """Answer a request: type, content, and policy for scripts and styles; None: there is no such thing."""
         _, token, *what = path.partition("?")[0].split("/")
-        if not hmac.compare_digest(token.encode(), self._token.encode()) or len(what) != 1:
+        if not hmac.compare_digest(token.encode(), self._token.encode()):
             return None
-        if (method, what) == ("POST", ["stop"]):
-            self.stopped.set()
-            return "application/json", b"{}", ""
-        if method != "GET":
-            return None
-        if what == [""]:
-            nonce = secrets.token_urlsafe(16)
-            text = Path(__file__).with_suffix(".html").read_text(encoding="utf-8").replace("@NONCE@", nonce)
-            policy = f"script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'"
-            return "text/html; charset=utf-8", text.encode(), policy
-        if what == ["picture"]:
-            return "image/jpeg", self.picture(), ""
-        asked = {"state": self.state, "path": self.path}.get(what[0])
-        return None if asked is None else ("application/json", json.dumps(asked()).encode(), "")
+        match method, *what:
+            case "POST", "stop":
+                self.stopped.set()
+                return "application/json", b"{}", ""
+            case "GET", "":
+                nonce = secrets.token_urlsafe(16)
+                text = Path(__file__).with_suffix(".html").read_text(encoding="utf-8").replace("@NONCE@", nonce)
+                policy = f"script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'"
+                return "text/html; charset=utf-8", text.encode(), policy
+            case "GET", "picture":
+                return "image/jpeg", self.picture(), ""
+            case "GET", ("state" | "path") as name:
+                content = self.state() if name == "state" else self.path()
+                return "application/json", json.dumps(content).encode(), ""
+        return None
 
 
 class _Server(ThreadingHTTPServer):

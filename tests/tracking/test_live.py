@@ -150,6 +150,18 @@ def test_an_alarm_is_told_once_and_stands_in_the_track() -> None:
     assert rows[-1][3]
 
 
+def test_a_motor_that_rests_is_told_of_without_a_picture_and_a_stop_comes_at_once() -> None:
+    tank, told = FilmedTank(), list[tuple[float, int]]()
+    tank.next = np.inf  # the camera hangs
+    tank.sights = [Sight(0.0, tuple(tank.pose.tolist()))]
+    row = lambda *row: told.append((tank.time, row[1]))  # noqa: E731
+    steer(Ride(), tank, tank, begin, UNIT, lost=LOST, row=row, tell=print, stopped=lambda: tank.time > 5.0)
+    assert told[0][1] != 0
+    assert min(when for when, direction in told if direction == 0) < LOST + 2 * REPEAT
+    assert tank.time < 5.0 + 2 * REPEAT
+    assert tank.orders[-1] == (tank.time, 0)
+
+
 def test_a_robot_that_was_never_seen_is_said_to_be() -> None:
     ride, told = steered(FilmedTank(blind=(0.0, 99.0), over=20.0))
     assert told == ["no robot for 3 s from the start (dark); the motor rests until it is seen"]
