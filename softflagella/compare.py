@@ -172,7 +172,7 @@ def _robots(robots: Mapping[str, tuple[RobotRows, Any]]) -> Comparison:
 
 def _inputs(robot: Robot, known: CalibrationKnowledge) -> Cells:
     """Return the numbers of a robot.toml with the intervals of a calibration, or those that the file states."""
-    from sim.model.robot_toml import ENTRIES
+    from sim.model.entries import ENTRIES
 
     half = dict(zip(known.names, _HALF * np.sqrt(np.diag(known.covariance)), strict=True))
     cells = Cells()
