@@ -64,9 +64,8 @@ def test_one_command_has_those_of_all_packages(capsys: pytest.CaptureFixture[str
         assert all(name in said for name in further(package).commands)
     commands = [name for package in COMMANDED for name in program_of(package).commands]
     named = [*WORDS, *(name for package in packages() for name in further(package).commands)]
-    assert (
-        len(named) == len(commands) + 4
-    )  # each has one name; calibrate, compare, model and demo are of no package
+    # each has one name; calibrate, compare, model and demo are of no package
+    assert len(named) == len(commands) + 4
 
 
 def test_words_are_commands_of_packages(capsys: pytest.CaptureFixture[str]) -> None:
