@@ -52,7 +52,7 @@ function refuseOtherKinds(name, bytes) {
     kinds.find((each) => KINDS[each][0].split(" ").includes(ending));
   if (kind === undefined || (kind === "JSON" && ending === "json")) return; // plan.json
   if (READ.includes(kind)) {
-    throw new InputError(`${name}: the page does not read ${kind}; put it in with softflagella page --path ${name}`);
+    throw new InputError(`${name}: the page does not read ${kind}; give CSV or SVG, or make the page with this path`);
   }
   const words = ADVICE[kind] ?? "give a table with columns x and y, such as CSV, or an SVG drawing";
   throw new InputError(`${name}: ${kind} is not read; ${words}`);

@@ -120,7 +120,7 @@ def test_files_of_other_kinds_are_refused_by_name() -> None:
         assert kind in shown, content
         if kind in READERS:
             assert (
-                shown == f"{name}: the page does not read {kind}; put it in with softflagella page --path {name}"
+                shown == f"{name}: the page does not read {kind}; give CSV or SVG, or make the page with this path"
             )
             continue
         assert f"is not read; {ADVICE.get(kind, 'give a table with columns x and y')}" in shown
