@@ -38,7 +38,7 @@ def query(
     Args:
         robots, robot: as for `steady`; a table may have a column `dwell_bar`, for the response to flips after it.
         lookup: look-up table, or its file; default: the one that comes with the package.
-        flag: answer for robots outside the domain as well; the column `outside` says which.
+        flag: give numbers for robots outside the domain, too; the column `outside` says which.
         certify: simulate each robot as well; the column `certified_error` is the actual error of its answer.
         strict: refuse all robots where one is outside the domain; otherwise its numbers are missing, and the
             column `note` says why it is outside.
