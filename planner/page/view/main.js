@@ -13,7 +13,7 @@ import { Player } from "./player.js";
 import { Runs, showTrack } from "./runs.js";
 import { addressOf, fromAddress, History, labValues, onGrid, pointsRefusal, wishOf } from "./state.js";
 
-const PAUSE = 120; // ms after the last change until a plan begins
+const PAUSE = 120; // ms after the last change that goes on, such as by a slider, until a plan begins
 
 class Page {
   /* `data` is what Python has written, `planner` the text of the worker. */
@@ -103,7 +103,7 @@ class Page {
     if (wish === this.wished) return; // else a refusal would leave, and move the button that it tells to press
     this.wished = wish;
     clearTimeout(this.timer);
-    this.timer = setTimeout(() => this.planNow(), PAUSE);
+    this.timer = setTimeout(() => this.planNow(), more ? PAUSE : 0);
     this.mark();
     this.drawPath();
   }
