@@ -15,7 +15,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from scipy.stats import binomtest
 
-from sim.motion.batches import available_jobs
+from sim.threads import available_jobs
 
 ROOT = Path(__file__).parents[1]
 Result = TypeVar("Result")

@@ -43,7 +43,7 @@ def open_backend(name: str, jobs: int | None, address: str | None) -> Backend:
     Raises:
         InputError: a cluster does not answer.
     """
-    from sim.motion.batches import available_jobs
+    from sim.threads import available_jobs
 
     count = jobs or available_jobs()
     if name == "local":

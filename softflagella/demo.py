@@ -43,12 +43,12 @@ from planner.paths.path import Path2D, polygon
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml
-from sim.motion.batches import available_jobs
 from sim.motion.replay import replay
 from sim.motion.response import responses
 from sim.motion.steady import steady
 from sim.motion.steady_motion import Steady
 from sim.motion.warm import compile_once
+from sim.threads import available_jobs
 from softflagella.demo_figures import draw_plans
 from softflagella.demo_page import ROBOT_PAGE, Results, Swum, write_page
 from surrogate.table_file import load

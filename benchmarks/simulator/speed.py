@@ -16,8 +16,9 @@ from threadpoolctl import threadpool_limits
 from benchmarks.common import timed
 from dataset.design import load_design
 from sim.model.groups import Groups
-from sim.motion.batches import available_jobs, steady_columns
+from sim.motion.batches import steady_columns
 from sim.motion.steady import steady
+from sim.threads import available_jobs
 from tests.oracles.plain_swimmer import settle_plainly
 
 ROBOTS = 5

@@ -5,7 +5,6 @@ Each thread uses one processor. More threads inside small operations would only 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -25,6 +24,7 @@ from sim.motion.settling import settle
 from sim.motion.steady import steady
 from sim.motion.steady_motion import STABILITY_COLUMNS
 from sim.solve.refinement import PHASES_FOR_SLOPES
+from sim.threads import in_threads
 
 _DIRECT_ROWS, _SLOPE_ROWS, _STEPPED_ROWS = 128, 16, 4  # robots a batch: the progress bar moves after each
 RESPONSE_ROWS = 16
@@ -37,11 +37,6 @@ def split(tails: Floats, rows: int) -> list[Integers]:
     order = np.argsort(tails, kind="stable")
     ends = np.flatnonzero(np.diff(tails[order])) + 1
     return [part for same in np.split(order, ends) for part in np.array_split(same, -(-len(same) // rows))]
-
-
-def available_jobs() -> int:
-    """Count the threads to use by default: the processors that this process may run on."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def in_batches(
@@ -74,18 +69,13 @@ def in_batches(
     )
     left = [k for k in range(len(batches)) if k not in found]
     parts = [Groups.from_columns({name: array[batches[k]] for name, array in columns.items()}) for k in left]
-    count, before = min(jobs or available_jobs(), len(parts)), sum(len(batches[k]) for k in found)
+    before = sum(len(batches[k]) for k in found)
     with (
         one_thread(),  # a setting of the process: set once, not in each thread
         tqdm(total=len(columns["N"]), initial=before, desc=title, unit="row", delay=1.0,
              disable=not title or None) as bar,
     ):  # fmt: skip
-        done = map(work, parts)
-        if count > 1:
-            from joblib import Parallel, delayed  # slow to import, and one thread needs none of it
-
-            done = Parallel(n_jobs=count, prefer="threads", return_as="generator")(map(delayed(work), parts))
-        for k, part in zip(left, done, strict=True):
+        for k, part in zip(left, in_threads(work, parts, jobs), strict=True):
             found[k] = part
             if kept is not None:
                 kept.add(k, {name: values.tolist() for name, values in part.items()})

@@ -20,6 +20,7 @@ from sim.mechanics import planar
 from sim.model.groups import Groups
 from sim.model.schedule import Schedule
 from sim.motion.run import COARSER, MOST_REPLAY_WORK, Resolution, SteppedRobot
+from sim.motion.segments import swum
 from sim.solve.assembly import bodies
 from sim.solve.march import YAW, X, Y
 
@@ -118,23 +119,39 @@ def stretches(
         InputError: the schedule cannot be simulated.
     """
     run = run_at_rest(schedule, resolution)
-    ends, direction, now = np.cumsum(schedule.dwells), schedule.first_direction, 0.0
+    ends, now = np.cumsum(schedule.dwells), 0.0
     dwell_of_stop = np.minimum(np.searchsorted(ends, stops, side="right"), len(ends) - 1)
-    for index, dwell_end in enumerate(ends.tolist()):
+    spans = []
+    for index, end in enumerate(ends.tolist()):
+        marks = np.maximum.accumulate([now, *stops[dwell_of_stop == index], end])
+        now = marks[-1]
+        spans.append(
+            np.diff(marks).tolist() if now > marks[0] else [0.0] * (len(marks) - 2) + [schedule.dwells[index]]
+        )
+    simulated = swum(
+        run,
+        [[span for span in dwell if span > 0] for dwell in spans],
+        progress or (lambda _: None),
+        exact=len(stops) > 0,
+    )
+    now = 0.0
+    for index, dwell in enumerate(spans):
+        try:
+            parts = iter(next(simulated))
+        except StopIteration:
+            raise InputError(
+                f"the simulation failed in dwell {index + 1} of the schedule; a finer step may help"
+            ) from None
         if index:
             run.flip()
-            direction = -direction
-        for stop in (*stops[dwell_of_stop == index].tolist(), None):
-            until = max(dwell_end if stop is None else stop, now)
-            times, poses = run.go(until - now) if until > now else (_NONE, np.empty((0, 6)))
-            if run.failed:
-                raise InputError(
-                    f"the simulation failed in dwell {index + 1} of the schedule; a finer step may help"
-                )
-            yield SimulatedStretch(run, index, direction, now + times, poses, stop is not None)
-            now = until
-        if progress is not None:
-            progress(1)
+        for place, span in enumerate(dwell):
+            times, poses = _NONE, np.empty((0, 6))
+            if span > 0:
+                times, poses, run.state = next(parts)
+                run.jumped = False
+            direction = schedule.first_direction * (-1) ** index
+            yield SimulatedStretch(run, index, direction, now + times, poses, place < len(dwell) - 1)
+            now += span
 
 
 @np.errstate(over="ignore")  # seconds of an absurd time scale

@@ -19,12 +19,12 @@ from sim.mechanics.geometry import straight
 from sim.model.body import PLACES
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED, Responses
-from sim.motion.run import REVERSED
 from sim.motion.steady import steady
 from sim.motion.steady_motion import Steady, net_speeds, twists
 from sim.motion.stepped_response import Curves, stepped_response
 from sim.solve.assembly import bodies, numbers
 from sim.solve.grouping import slices
+from sim.solve.march import REVERSED
 from sim.solve.refinement import OnMesh, coarse_orbits, orbits_on_mesh
 from sim.solve.transient import NO_MARKS, Flip, follow_flips
 

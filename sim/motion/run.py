@@ -19,7 +19,20 @@ from sim.mechanics.balance import tail_spin
 from sim.mechanics.flow import has_flow
 from sim.mechanics.tail_contact import has_contact
 from sim.model.body import Body
-from sim.solve.march import TOLERANCE, YAW, State, X, Y, advance, new_state
+from sim.solve.march import (
+    REVERSED,
+    YAW,
+    Marched,
+    Marcher,
+    State,
+    Steps,
+    X,
+    Y,
+    equal_steps,
+    joined,
+    new_state,
+    side_by_side,
+)
 
 MOST_WORK = 1e8  # of one robot in a table: about a minute
 MOST_REPLAY_WORK = 3e9  # of one schedule: about half an hour
@@ -30,7 +43,6 @@ _CONTACT = 500.0  # the same for contact of one tail with another
 BROKE_DOWN = "Newton's method did not converge in a time step"
 TOO_MUCH = "it would take more time steps than a row may ask for"
 _GRADES = (1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2)  # parts of a step, two of each, after a jump of the motor's speed
-REVERSED = np.array([-1.0, 1.0, -1.0, -1.0])  # signs of (v_x, v_z, ω_yr, ω_h) after a flip
 
 
 @dataclass(frozen=True)
@@ -93,6 +105,27 @@ def steps_in(duration: float, dt: float) -> float:
         return max(1.0, float(np.ceil(np.float64(duration) / dt - 1e-9)))
 
 
+def steps_for(duration: float, dt: float, jumped: bool) -> Steps:
+    """Choose the steps of some time at constant speed.
+
+    They are equal and at most dt long, except for some short ones after a jump of the motor's speed. There all
+    modes of the tails start anew, and equal steps would converge at first order only.
+    """
+    parts = []
+    if jumped:
+        share = min(dt, duration / 2 / (2 * sum(_GRADES)))
+        parts = [(2 * share * grade, 2) for grade in _GRADES]
+    remaining = duration - sum(part for part, _ in parts)
+    return joined(
+        [equal_steps(part, count) for part, count in (*parts, (remaining, int(steps_in(remaining, dt))))]
+    )
+
+
+def times_of(steps: Steps, duration: float) -> Floats:
+    """Return the times of steps that take some time together, from their start."""
+    return np.append(np.cumsum(steps.lengths)[:-1], duration)
+
+
 class SteppedRobot:
     """A robot stepped in time. `failed` says why it cannot go on: BROKE_DOWN, TOO_MUCH, or empty."""
 
@@ -134,39 +167,29 @@ class SteppedRobot:
         return not self.failed
 
     def go(self, duration: float) -> tuple[Floats, Floats]:
-        """Advance at constant speed: times from now (count,) and the poses then, (count, 6); none if it fails.
-
-        Steps are equal, except for some short ones after a jump of the motor's speed. There all modes of the tails
-        start anew, and equal steps would converge at first order only.
-        """
+        """Advance at constant speed: times from now (count,) and the poses then, (count, 6); none if it fails."""
         if not self.can_afford(duration, flips=1):
             return np.empty(0), np.empty((0, 6))
-        parts = []
-        if self.jumped:
-            share = min(self.time_step, duration / 2 / (2 * sum(_GRADES)))
-            parts = [(2, 2 * share * grade) for grade in _GRADES]
-        remaining = duration - sum(part for _, part in parts)
-        parts.append((int(steps_in(remaining, self.time_step)), remaining))
-        times, poses, now = [], [], 0.0
-        for count, part in parts:
-            times.append(now + part * np.arange(1, count + 1) / count)
-            poses.append(self.steps(count, part)[0])
-            now += part
+        steps = steps_for(duration, self.time_step, self.jumped)
         self.jumped = False
-        times[-1][-1] = duration
-        return np.concatenate(times), np.concatenate(poses)
+        return times_of(steps, duration), self._make(steps).poses
 
     def steps(self, count: int, duration: float, *, shapes: int = 0) -> tuple[Floats, Floats]:
         """Advance in `count` equal steps: poses (count, 6) and the last `shapes` shapes (K, n, N, 3)."""
-        work = count * self._work_of_a_step
+        swum = self._make(equal_steps(duration, count)._replace(kept=np.arange(count) >= count - shapes))
+        return swum.poses, swum.kept.x
+
+    def _make(self, steps: Steps) -> Marched:
+        """Make time steps; none if it has failed, or they are too many."""
+        work = len(steps.lengths) * self._work_of_a_step
         if not self.failed and work > self._work_left:
             self.failed = TOO_MUCH
         if self.failed:
-            return np.empty((0, 6)), np.empty((0, *self.state.x.shape))
+            return Marched(0, np.empty((0, 6)), State(*(part[None][:0] for part in self.state)))
         self._work_left -= work
-        steps = advance(self.body, self.state, duration / count, count, TOLERANCE, shapes=shapes)
-        self.failed = "" if steps.solved else BROKE_DOWN
-        return steps.poses, steps.shapes
+        (swum,) = side_by_side([Marcher(self.body, self.reverse, self.state, steps)])
+        self.failed = "" if swum.done == len(steps.lengths) else BROKE_DOWN
+        return swum
 
     def flip(self) -> None:
         """Reverse the motor: the shape stays, velocities become their mirror image."""

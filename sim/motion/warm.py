@@ -22,9 +22,11 @@ from sim.motion.response import responses
 from sim.motion.sensitivity import sensitivities
 from sim.motion.settling import settle
 from sim.motion.steady import steady
-from sim.solve.assembly import numbers
+from sim.solve.assembly import bodies, numbers
+from sim.solve.march import Marcher, equal_steps, new_state, side_by_side
 from sim.solve.orbit import straight_starts
 from sim.solve.transient import Flip, follow_flips
+from sim.threads import available_jobs
 
 _ROBOT = PRESETS["paper-control"].groups()
 Stage = tuple[str, Callable[[], object]]
@@ -46,7 +48,15 @@ def _of_orbits(groups: Groups, whose: str) -> tuple[Stage, ...]:
     )
 
 
-_OF_GROUPS = _of_orbits(_ROBOT.select(np.array([0, 0])), "groups")
+def _swim_side_by_side() -> None:
+    body, steps = bodies(_ROBOT)[0], equal_steps(0.1, 2)
+    side_by_side([Marcher(body, body, new_state(_ROBOT.N, 8, body.offset), steps) for _ in range(2)])
+
+
+_OF_GROUPS = (
+    *_of_orbits(_ROBOT.select(np.array([0, 0])), "groups"),
+    ("time steps of groups", _swim_side_by_side),
+)
 _OF_ONE = (("flips", _flip), ("time steps", lambda: settle(_ROBOT)), *_of_orbits(_ROBOT, "one robot"))
 
 
@@ -82,8 +92,6 @@ def compile_all() -> float:
     Returns:
         The time that it took, in seconds.
     """
-    from sim.motion.batches import available_jobs  # which imports this file
-
     began = time.perf_counter()
     if available_jobs() > 1 and not all_compiled():
         code = f"import sys; sys.path[:] = {sys.path!r}; import {__name__} as warm; warm.compile_for_one()"

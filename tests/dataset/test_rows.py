@@ -24,7 +24,7 @@ from dataset.verify import verify
 from sim.model.groups import SLOPE_INPUTS
 from sim.model.presets import PRESETS
 from sim.motion import response, run, settling, steady
-from sim.solve.march import Steps
+from sim.solve.march import Marched, State
 from sim.solve.refinement import LOST, NO_START, OrbitOnMeshes
 from tests.dataset.sweeps import InThisProcess, design, invented
 
@@ -112,7 +112,8 @@ def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(steady, "refined_orbits", lambda rows, *_: [lost] * len(rows))
     monkeypatch.setattr(response, "orbits_with_phases", lambda rows, _, meshes: [[None] * len(rows)] * len(meshes))
     monkeypatch.setattr(settling, "state_on_orbit", lambda *_: None)
-    monkeypatch.setattr(run, "advance", lambda *_, shapes: Steps(False, np.empty((0, 6)), np.empty(shapes)))
+    nothing = Marched(0, np.empty((0, 6)), State(*[np.empty(0)] * 4))
+    monkeypatch.setattr(run, "side_by_side", lambda _: [nothing])
     columns = simulate(some_rows({}))
     assert columns["failed"].tolist() == [True]
     assert columns["converged"].tolist() == [False]

@@ -18,10 +18,11 @@ from sim.mechanics.balance import tail_spin
 from sim.model.body import Body
 from sim.motion.run import copied
 from sim.motion.shapes import state_on_orbit
-from sim.solve.march import PHASE, advance
+from sim.solve.march import PHASE
 from sim.solve.orbit import mean_motion
 from sim.solve.rates import FIRST_PHASE
 from sim.solve.refinement import MESHES, orbit_on_mesh
+from tests.sim.robots import advance
 
 _SIZE = 1e-6  # of the first difference, in l
 _TOLERANCE = 1e-9  # of Newton's method: errors of the steps stay below the difference

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from dataset.design import load_design
@@ -11,6 +13,7 @@ from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.motion.stability import growths, growths_on_mesh
 from sim.solve.assembly import bodies, row
+from sim.solve.march import Marcher, State, equal_steps, side_by_side
 from sim.solve.orbit import residuals_on_orbits, solve_orbits_in_place, straight_starts
 from sim.solve.refinement import MESHES, OrbitOnMeshes, extrapolate
 
@@ -91,3 +94,18 @@ def held_filament(omega_bar: float, l_over_r0: float, offset: float, **effects: 
 def sweep_points(count: int) -> dict[str, np.ndarray]:
     """Return the columns of the first `count` robots of sweep.toml."""
     return load_design().with_rows(count).points()
+
+
+class Advanced(NamedTuple):
+    """What `advance` has done."""
+
+    solved: bool
+    poses: np.ndarray  # after every step
+    shapes: np.ndarray  # after the last ones
+
+
+def advance(body: Body, state: State, dt: float, count: int, tolerance: float, *, shapes: int = 0) -> Advanced:
+    """Make equal steps at constant motor speed from a state, which is changed."""
+    steps = equal_steps(dt * count, count)._replace(kept=np.arange(count) >= count - shapes)
+    (swum,) = side_by_side([Marcher(body, body, state, steps)], tolerance)
+    return Advanced(swum.done == count, swum.poses, swum.kept.x)

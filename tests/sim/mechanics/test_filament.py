@@ -11,11 +11,19 @@ from sim.mechanics.drag import tail_coefficients
 from sim.mechanics.linear_theory import linear_filament, linear_motion
 from sim.model.presets import PRESETS
 from sim.motion.steady import steady
-from sim.solve.march import advance, new_state
+from sim.solve.march import new_state
 from sim.solve.rates import FIRST_PHASE
 from sim.solve.residual import fluid_forces
 from tests.reference.cases import BEAM_K4, FILAMENT, FILAMENT_TIP, LINEAR_FILAMENT
-from tests.sim.robots import control, extrapolated_loads, held_filament, held_loads, solve_orbit, straight_start
+from tests.sim.robots import (
+    advance,
+    control,
+    extrapolated_loads,
+    held_filament,
+    held_loads,
+    solve_orbit,
+    straight_start,
+)
 
 ROBOT = PRESETS["paper-control"]
 SLENDERNESS, OFFSET = ROBOT.tail_length / ROBOT.tail_radius, 0.016 / 0.11

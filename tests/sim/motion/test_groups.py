@@ -22,8 +22,7 @@ from sim.motion.stability import growths
 from sim.motion.steady import orbits
 from sim.solve import grouping, refinement
 from sim.solve.assembly import Nonlocal, bodies, numbers
-from sim.solve.grouping import in_groups, robots_in_lanes
-from sim.solve.march import TOLERANCE, State, _march, advance, new_state
+from sim.solve.march import Marcher, equal_steps, new_state, side_by_side
 from sim.solve.refinement import NO_START, PHASES, PHASES_FOR_SLOPES, refined_orbits
 from sim.solve.transient import Flip, follow_flips
 from tests.sim.motion.test_stability import UNSTABLE
@@ -211,15 +210,12 @@ def test_robots_with_nonlocal_effects_have_the_same_numbers_in_a_group_and_alone
 @pytest.mark.parametrize("effect", ["", "tail_interaction", "natural_curvature", "tail_contact", "motor_droop"])
 def test_time_steps_of_a_robot_alone_have_the_numbers_of_a_lane(tails: int, effect: str) -> None:
     sizes = {effect: np.array([effect_named(effect).typical])} if effect else {}
-    robot, count = control(1, **sizes), 12
-    alone = new_state(tails, 8, bodies(robot)[0].offset)
-    state = State(*(in_groups(np.array([part, part]))[0] for part in alone))
-    poses = advance(bodies(robot)[0], alone, 0.02, count, TOLERANCE).poses
-    in_lanes, no_shapes = (in_groups(np.empty((2, *shape)))[0] for shape in ((count, 6), (0, *alone.x.shape)))
-    two = robots_in_lanes(numbers(robot)[[0, 0]])
-    assert _march(two, state, 0.02, count, TOLERANCE, in_lanes, no_shapes)
-    for plain, lanes in ((poses, in_lanes), *zip(alone, state, strict=True)):
-        assert lanes[..., 1] == pytest.approx(plain, rel=1e-9, abs=1e-12)
+    body, steps = bodies(control(1, **sizes))[0], equal_steps(0.24, 12)
+    alone, first, second = (Marcher(body, body, new_state(tails, 8, body.offset), steps) for _ in range(3))
+    (swum,), (_, beside) = side_by_side([alone]), side_by_side([first, second])
+    assert swum.done == beside.done == len(steps.lengths)
+    for plain, in_lane in ((swum.poses, beside.poses), *zip(alone.state, second.state, strict=True)):
+        assert in_lane == pytest.approx(plain, rel=1e-9, abs=1e-12)
 
 
 def test_batches_hold_every_row_once_and_one_n_each() -> None:

@@ -16,14 +16,14 @@ from sim.linear.spectral import differentiation
 from sim.mechanics.balance import motion_at
 from sim.model.body import Body
 from sim.motion.shapes import state_from_orbit
-from sim.solve.march import PHASE, TOLERANCE, State, advance, new_state
+from sim.solve.march import PHASE, TOLERANCE, State, new_state
 from sim.solve.rates import FIRST_PHASE
 from sim.solve.refinement import PHASES, SOLVED, refined_orbit
 from sim.solve.residual import fluid_forces
 from tests.oracles.clamped_rod import ClampedRod, dead_load
 from tests.sim import lanes
 from tests.sim.lanes import Plain, corrections, linear
-from tests.sim.robots import CONTROL_VALUES, control, first_body, straight_start
+from tests.sim.robots import CONTROL_VALUES, advance, control, first_body, straight_start
 
 Unknowns = tuple[np.ndarray, np.ndarray]
 
