@@ -25,7 +25,7 @@ from unittest.mock import patch
 from benchmarks.common import ROOT, heading, row
 from dataset.build import build
 from dataset.design import load_design
-from sim.motion.batches import available_jobs
+from sim.threads import available_jobs
 from tests.dataset import sweeps
 
 _PROFILED, _SYNTHETIC = 4096, (100_000, 400_000)
