@@ -36,6 +36,7 @@ def points(start: int, stop: int, *, curves: bool = False) -> SimulatedRobots:
     """Simulate points of the sweep."""
     design = replace(load_design(SWEEP_TOML), rows=stop)
     drawn = {name: np.asarray(values, dtype=float) for name, values in design.points(start, stop).items()}
+    drawn["a_over_R"] = np.ones_like(drawn["N"])
     return simulate_robots(drawn, curves=curves, title=f"points {start} to {stop}")
 
 
