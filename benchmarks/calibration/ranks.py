@@ -31,14 +31,14 @@ _SIZE = "one effect, λ = 4 to 20: its size, where it is named"
 _CASE = FormsCase("one effect", strength=(4.0, 20.0))
 
 
-class Ranked(NamedTuple):
+class TrueRank(NamedTuple):
     """A true value among samples."""
 
     label: str
     rank: float  # share of the samples below it
 
 
-def ranks(planted: bool, seed: int) -> list[Ranked]:
+def ranks(planted: bool, seed: int) -> list[TrueRank]:
     """Draw a table, and rank the true values."""
     truth, random = PLANTED[seed % len(PLANTED)], np.random.default_rng(seed)
     size = float(random.uniform(*_CASE.strength)) / length(truth, _CASE) if planted else 0.0
@@ -46,10 +46,10 @@ def ranks(planted: bool, seed: int) -> list[Ranked]:
     table = falls(seed, rounds=_CASE.rounds, scatter=_CASE.scatter, **effects)
     verdict = calibrate(model_of(table, NAMES), draws=300, seed=seed, progress=False)
     samples = draw_samples(verdict, _SAMPLES, seed)
-    said = [Ranked(_EFFECT if planted else _NOTHING, float((samples["viscosity"] < 1.0).mean()))]
+    said = [TrueRank(_EFFECT if planted else _NOTHING, float((samples["viscosity"] < 1.0).mean()))]
     if planted and truth in samples:
         sizes = samples[truth][samples[truth] != 0.0]
-        said += [Ranked(_SIZE, float((sizes < size).mean()))] if sizes.std() else []
+        said += [TrueRank(_SIZE, float((sizes < size).mean()))] if sizes.std() else []
     return said
 
 

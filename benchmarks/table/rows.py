@@ -41,8 +41,9 @@ def points(start: int, stop: int, *, curves: bool = False) -> SimulatedRobots:
 
 
 def errors(lookup: NeuralTable, rows: SimulatedRobots) -> dict[str, Floats]:
-    """Return the errors on held-out robots whose tails do not touch, in per cent."""
+    """Return the errors on held-out robots in the table's domain whose tails do not touch, in per cent."""
     apart = rows.at(rows.motion["tail_gap"] >= 1)
+    apart = apart.at(~lookup.query(apart.robots, flag=True)["outside"])
     answer = lookup.query(apart.robots)
     found = relative_errors(answer, with_radius(apart.motion))
     return {name: 100 * np.abs(found[name]) for name in _OUTPUTS}

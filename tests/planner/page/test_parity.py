@@ -13,7 +13,7 @@ import pytest
 
 from common.errors import InputError
 from planner.jobs.plan import make_plan, plan
-from planner.options import read_region
+from planner.options import read_regions
 from planner.page.first_state import first_plan
 from planner.page.write_page import packed_data, table_data
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
@@ -260,7 +260,8 @@ def region(words: str) -> Circle | Polygon:
     shape, _, numbers = words.partition(":")
     if shape == "polygon":
         return Polygon.of(np.reshape([float(number) for number in numbers.split(",")], (-1, 2)) / 11)
-    return read_region(words, "cm", CONTROL)
+    (read,) = read_regions(words, "cm", CONTROL)
+    return read
 
 
 REGIONS = [pytest.param(seed, marks=[] if seed < 6 else pytest.mark.rates) for seed in range(40)]
