@@ -11,10 +11,14 @@ TERMS = {  # a meaning has only terms that come later
     "stated error": "distance from the declared path that 95 of 100 such robots keep to, without feedback",
     "declared path": "the nearest path to the given one that the robot can follow; errors are distances from it",
     "dwell": "time between two flips of the motor",
+    "flips": "reversals of the motor, the robot's only control input",
     "pivot": "the point of the axis that does not slip sideways",
     "Dubins path": "shortest path of bounded curvature between two poses: arcs of the smallest radius and "
     "straight lines",
     "domain": "the robots that a look-up table answers for",
+    "verdict": "what a calibration concludes: no effect is missing, one is, a number is wrong, or the runs cannot "
+    "decide",
+    "preset": "a robot that comes with the package, such as paper-control",
     "law": "a place on the robot where an unknown term acts, and the inputs on which the term depends",
     "nuisance parameter": "a number of the robot or of the measurement that influences the prediction but is of "
     "no interest itself; it is fitted with a prior",
@@ -22,6 +26,7 @@ TERMS = {  # a meaning has only terms that come later
     "score": "test statistic of an effect: the part of its signal that the fit cannot absorb, in standard "
     "deviations of the noise",
     "session": "runs that share a filling of the tank, a day, or a robot",
+    "effect": "physics that the model may lack; softflagella effects lists those of a robot",
 }
 
 

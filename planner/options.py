@@ -63,7 +63,8 @@ class DwellOptions(TableOptions, total=False):
     """What dwells must keep to.
 
     Attributes:
-        minimum_dwell: shortest dwell that the motor allows, in time units μ0 l⁴/EI.
+        minimum_dwell: shortest dwell that the motor allows, in time units μ0 l⁴/EI (viscosity, tail length,
+            bending stiffness).
         minimum_seconds: the same in seconds; the larger one counts.
         tolerance: LENGTH, largest acceptable stated error, such as 5mm; the dwell is shortened until it is kept.
     """
@@ -104,7 +105,7 @@ class PointOptions(DwellOptions, total=False):
     """Which point follows, and what decides the dwell.
 
     Attributes:
-        point: which point of the robot follows the declared path or does the job (default: head_centre).
+        point: which point of the robot follows the declared path, or reaches goals (default: head_centre).
         objective: what decides the dwell: small error, short time, or few flips (default: error).
         dwell: this shortest dwell, in time units, and not the one that the objective would choose.
     """

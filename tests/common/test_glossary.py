@@ -16,11 +16,20 @@ from softflagella.__main__ import WORDS, command, main
 from tests.docs.pages import DOCS
 
 EXPECTED = {
-    "plan": {"objective", "stated error", "declared path", "dwell", "pivot", "point of the robot"},
-    "goal": {"objective", "stated error", "declared path", "dwell", "pivot"},
+    "plan": {
+        "objective",
+        "stated error",
+        "declared path",
+        "dwell",
+        "flips",
+        "pivot",
+        "point of the robot",
+        "preset",
+    },
+    "goal": {"objective", "stated error", "declared path", "dwell", "flips", "pivot", "preset"},
     "check": {"stated error", "declared path"},
-    "query": {"domain"},
-    "robot": set(),
+    "query": {"domain", "preset"},
+    "robot": {"preset"},
 }
 
 
