@@ -87,7 +87,7 @@ def main(most: str = "100000", figure: str = "") -> None:
 
 def draw(drawn: dict[int, dict[str, Floats]], figure: str) -> None:
     """Draw errors against rows, medians and 95 % quantiles."""
-    picture, axes = plt.subplots(figsize=(6, 3.6), layout="constrained")
+    picture, axes = plt.subplots(figsize=(7, 3.6), layout="constrained")
     for place, (name, words) in enumerate(_OUTPUTS.items()):
         for share, style in ((0.5, "o-"), (0.95, "o--")):
             values = [np.quantile(found[name], share) for found in drawn.values()]
@@ -98,7 +98,8 @@ def draw(drawn: dict[int, dict[str, Floats]], figure: str) -> None:
     axes.minorticks_off()
     axes.set_yscale("log")
     axes.set_xlabel("rows that the table has learned")
-    axes.set_ylabel("held-out error, %: median (solid), 95 % (dashed)")
+    axes.set_ylabel("held-out error [%]")
+    axes.set_title("solid: median; dashed: 95 % of robots", fontsize=10)
     axes.grid(alpha=0.3)
-    axes.legend(frameon=False)
+    axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     picture.savefig(figure, dpi=110)
