@@ -61,8 +61,9 @@ def calibrate(
             the columns of its table are those for which its function asks, and its outputs.
         protocol: what is fitted: all sessions but one ("session"), or N = 3 and 4 as in the paper ("paper").
         seed: of the bootstrap; the same seed gives the same result.
-        own: what the lab can set in its next runs, `{"l_cm": (5, 7, 9)}` or `("l_cm=5,7,9",)`; for `N`, `l_cm`
-            and `omega_rpm` (both directions). Default: the table's range.
+        own: KEY=VALUES, what the lab can set in the next runs that the verdict proposes, such as l_cm=5,7,9; for
+            `N`, `l_cm` and `omega_rpm` (both directions). Default: the table's range. In Python a list of such
+            words, or `{"l_cm": (5, 7, 9)}`.
         laws: look for laws where no effect explains the runs.
         paths: files or shapes, such as `("square:24cm",)`, on which the error with the robot as given and with the
             corrected one is stated; `verdict.paths` has it.
@@ -72,9 +73,10 @@ def calibrate(
         specimen: COL, the column that says what was run, where there are several.
         held_out: NAME, a session that is held out for the test, or a column that says so of each run (default: the
             middle session).
-        noise: say that neither repeats nor stated errors tell it. In Python also the standard deviation of
+        noise: say that neither repeats nor stated errors tell the noise of a run; nothing is claimed then. In Python also the standard deviation of
             one run for each output, {"v": 0.02}: relative where ratios are compared.
-        notes: COL, a column in which runs may differ without the model's knowledge (default: all others).
+        notes: COL, a column in which runs may differ without the model's knowledge; columns that are not named then
+            are not looked at (default: all others).
         max_seconds: of processor time for the search (default 90, with laws 180). The verdict then is provisional,
             and says what was not tried.
         jobs: threads; default all processors.
