@@ -47,8 +47,8 @@ class TableOptions(TypedDict, total=False):
     Attributes:
         lookup: look-up table, or its file (default: the one that comes with the package; where that one does not
             know the robot, the robot's own table is simulated, and kept beside its file).
-        own_table: simulate a look-up table of this robot, once, in seconds (minutes where its parts interact); it is
-            more accurate on long paths.
+        own_table: simulate a look-up table of this robot, once, in seconds (minutes where its parts interact); it
+            is more accurate on long paths.
         knowledge: what a calibration found besides the robot: covariance, current. Default: that of the file.
         unit: of all lengths in words that are given without one; l for tail lengths. 24cm and 3l, columns x_cm and
             y_cm, and drawings with a size have their own.
