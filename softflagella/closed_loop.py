@@ -73,10 +73,11 @@ def calibrate(
         specimen: COL, the column that says what was run, where there are several.
         held_out: NAME, a session that is held out for the test, or a column that says so of each run (default: the
             middle session).
-        noise: say that neither repeats nor stated errors tell the noise of a run; nothing is claimed then. In Python also the standard deviation of
-            one run for each output, {"v": 0.02}: relative where ratios are compared.
-        notes: COL, a column in which runs may differ without the model's knowledge; columns that are not named then
-            are not looked at (default: all others).
+        noise: say that neither repeats nor stated errors tell the noise of a run; nothing is claimed then.
+            In Python also the standard deviation of one run for each output, {"v": 0.02}: relative where ratios are
+            compared.
+        notes: COL, a column in which runs may differ without the model's knowledge; columns that are not named
+            then are not looked at (default: all others).
         max_seconds: of processor time for the search (default 90, with laws 180). The verdict then is provisional,
             and says what was not tried.
         jobs: threads; default all processors.
