@@ -73,8 +73,8 @@ def calibrate(
         specimen: COL, the column that says what was run, where there are several.
         held_out: NAME, a session that is held out for the test, or a column that says so of each run (default: the
             middle session).
-        noise: say that neither repeats nor stated errors tell the noise of a run; nothing is claimed then.
-            In Python also the standard deviation of one run for each output, {"v": 0.02}: relative where ratios are
+        noise: say that neither repeats nor stated errors tell the noise of a run; nothing is claimed then. In
+            Python also the standard deviation of one run for each output, {"v": 0.02}: relative where ratios are
             compared.
         notes: COL, a column in which runs may differ without the model's knowledge; columns that are not named
             then are not looked at (default: all others).

@@ -66,7 +66,7 @@ def test_planning_never_calls_the_simulator_and_says_how_far_it_is(monkeypatch: 
         raise AssertionError("the planner simulated")
 
     for module, name in ((sim.motion.steady, "steady"), (sim.motion.steady, "refined_orbits"),
-                         (sim.motion.run, "advance")):  # fmt: skip
+                         (sim.motion.run, "side_by_side")):  # fmt: skip
         monkeypatch.setattr(module, name, refuse)
     shares: list[Any] = []
     again = plan(polygon(4, 3.0), CONTROL, progress=shares.append)
