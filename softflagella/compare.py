@@ -190,6 +190,7 @@ def _inputs(robot: Robot, known: CalibrationKnowledge) -> Cells:
 
 
 def _plans(plans: Mapping[str, dict[str, Any]]) -> Comparison:
+    from planner.paths.path import arc_length
     from sim.model.schedule import PLAN_FILE
 
     files = dict[str, Cells]()
@@ -207,8 +208,8 @@ def _plans(plans: Mapping[str, dict[str, Any]]) -> Comparison:
                 "duration [s]": Bounded(seconds.sum()),
                 "flips": Bounded(len(seconds) - 1),
                 "shortest dwell [s]": Bounded(seconds.min()),
-                "declared path [cm]": Bounded(_length(declared)),
-                "path as drawn [cm]": Bounded(_length(drawn)),
+                "declared path [cm]": Bounded(arc_length(declared)[-1]),
+                "path as drawn [cm]": Bounded(arc_length(drawn)[-1]),
                 **{
                     title: Bounded(10 * cm * plan[key])
                     for title, key in _ERRORS.items()
@@ -225,6 +226,7 @@ def _plans(plans: Mapping[str, dict[str, Any]]) -> Comparison:
 def _tracks(tracks: Mapping[str, DataFrame], plan: str | None) -> Comparison:
     from planner.files.saved_plan import load_plan, plan_json
     from planner.paths.distance import distance_to
+    from planner.paths.path import arc_length
     from tracking.tracks import poses_of, tracking_error
 
     content = None if plan is None else load_plan(plan_json(plan))
@@ -239,7 +241,7 @@ def _tracks(tracks: Mapping[str, DataFrame], plan: str | None) -> Comparison:
         x, y, heading = poses[-1]
         cells: Cells = {
             "duration [s]": Bounded(np.ptp(times)),
-            "length [cm]": Bounded(_length(poses[:, :2])),
+            "length [cm]": Bounded(arc_length(poses[:, :2])[-1]),
             "last pose [cm, degrees]": f"{x:.2f}, {y:.2f}, {math.degrees(heading):.1f}",
         }
         if error is not None:
@@ -288,11 +290,6 @@ def _verdicts(verdicts: Mapping[str, dict[str, Any]]) -> Comparison:
     counts = Counter(t for cells in files.values() for t, cell in cells.items() if isinstance(cell, Bounded))
     shared = [title for title, count in counts.items() if count > 1 and title != "runs"]
     return Comparison(files, _dots(files, shared), "intervals: 95 %")
-
-
-def _length(points: Floats) -> float:
-    """Compute the length of a polyline (n, 2)."""
-    return float(np.hypot(*np.diff(points, axis=0).T).sum())
 
 
 def _plane(count: int) -> tuple[Figure, Sequence[Axes]]:

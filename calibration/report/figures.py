@@ -170,8 +170,9 @@ def draw_corner(result: Verdict) -> Figure | None:
 
     Numbers that were given to a tolerance are left out, and of the others all but the first _CORNER.
     """
-    samples = draw_samples(result, _SAMPLES, seed=0)
-    fitted = {p.name: p for refit in open_forms(result).values() for p in refit.fitted if p.sigma is None}
+    forms = open_forms(result)
+    samples = draw_samples(forms, _SAMPLES, seed=0)
+    fitted = {p.name: p for refit in forms.values() for p in refit.fitted if p.sigma is None}
     free = [p for p in fitted.values() if samples[p.name].nunique() > 1][:_CORNER]
     if len(free) < 2:
         return None

@@ -13,7 +13,7 @@ import pandas as pd
 from calibration.report.path_error import PathError
 from calibration.report.report import write_report
 from calibration.verdict.record import facts, verdict_record
-from calibration.verdict.samples import draw_samples
+from calibration.verdict.samples import draw_samples, open_forms
 from calibration.verdict.verdict import Verdict
 from calibration.words.quantities import sized
 from common.files import files_together, write_text
@@ -79,7 +79,7 @@ class SavedVerdict(Shown, Verdict):
             >>> verdict = sf.calibrate("falls.csv", MODEL)  # doctest: +SKIP
             >>> verdict.samples(4000)["viscosity"].quantile([0.025, 0.975])  # doctest: +SKIP
         """
-        return draw_samples(self, count, seed)
+        return draw_samples(open_forms(self), count, seed)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of verdict.json."""

@@ -7,6 +7,7 @@ and for what the form leaves (Birge 1932).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -39,17 +40,22 @@ def _refit(result: Findings, fitted: Fit) -> FinalRefit:
     return replace(refit, covariance=birge(result.runs, fitted, result.split.fitted) * refit.covariance)
 
 
-def draw_samples(result: Findings, count: int, seed: int) -> pd.DataFrame:
+def draw_samples(forms: Mapping[str, FinalRefit], count: int, seed: int) -> pd.DataFrame:
     """Draw `count` rows: a column for each number and effect, and `form`, the title of the row's form.
 
     An effect that a form does not have is at its null. Rows are in random order.
+
+    Args:
+        forms: as `open_forms` returns them.
+        count: rows.
+        seed: of the draws.
 
     Raises:
         InputError: the count is below 1.
     """
     if count < 1:
         raise InputError(f"samples: {count}; give a number of rows from 1")
-    random, forms, parts = np.random.default_rng(seed), open_forms(result), []
+    random, parts = np.random.default_rng(seed), []
     nulls = {p.name: p.start for refit in forms.values() for p in refit.fitted}
     for place, (title, refit) in enumerate(forms.items()):
         share = len(range(place, count, len(forms)))

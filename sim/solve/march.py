@@ -45,7 +45,7 @@ REVERSED = np.array([-1.0, 1.0, -1.0, -1.0])  # signs of (v_x, v_z, ω_yr, ω_h)
 
 
 class State(NamedTuple):
-    """Shape, pose and velocities of a robot, changed in place by `advance`; tails are in their own frames."""
+    """Shape, pose and velocities of a robot, changed in place by time steps; tails are in their own frames."""
 
     x: Floats
     x_dot: Floats

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from tests.planner.page.view.browser import chromium
+from tests.planner.page.view.browser import started_chromium
 from tests.processes import LIMIT
 from tests.tracking.test_live import LINE, pseudo_terminal, sent, swum, tank_files, tracking
 from tracking.live import Sight
@@ -107,13 +107,8 @@ def test_the_newest_sight_is_shown(page: LivePage) -> None:
 
 @pytest.fixture
 def browser() -> Iterator[Any]:
-    program = chromium()
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as control:
-        started = control.chromium.launch(executable_path=program, args=["--no-sandbox"])
+    with started_chromium() as started:
         yield started
-        started.close()
 
 
 def address_of(process: subprocess.Popen[str]) -> str:

@@ -24,7 +24,7 @@ from tests.planner.page.page_core import (
     refusal_of,
     without_digits,
 )
-from tests.planner.page.view.browser import chromium
+from tests.planner.page.view.browser import started_chromium
 from tests.planner.paths import svg_cases
 from tests.planner.paths.svg_cases import BROKEN, svg
 from tests.planner.paths.test_path_files import ALIKE, SIZED, UNCLEAR
@@ -192,21 +192,16 @@ def test_bad_drawings_are_refused(text: str) -> None:
 
 
 def test_a_browser_reads_the_same_trees() -> None:
-    program = chromium()
-    from playwright.sync_api import sync_playwright
-
     source = "\n".join((FOLDER / name).read_text() for name in ("words.js", "view/files.js"))
     source = "\n".join(line for line in source.splitlines() if not line.startswith(("import ", "export ")))
     read = f"""(texts) => {{ {source}
       return texts.map((text) => refusing(() => drawingTree(text, "a.svg"), ({{ message }}) => message)); }}"""
     entity = "<!DOCTYPE svg [<!ENTITY e 'M 0 0 L 9 9'>]>"
     texts = [*DRAWINGS, svg("<path d='&e;'/>", "", entity), svg(BODIES[0], "", "<?xml version='1.0'?><!-- c -->")]
-    with sync_playwright() as control:
-        browser = control.chromium.launch(executable_path=program, args=["--no-sandbox"])
+    with started_chromium() as browser:
         found: list[Any] = browser.new_page().evaluate(
             read, [*texts, *BROKEN, "<?xml-stylesheet href='a'?><svg/>"]
         )
-        browser.close()
     assert found[: len(texts)] == [drawing_tree(text) for text in texts]
     assert all(words.startswith("a.svg is not SVG: ") and "\n" not in words for words in found[len(texts) : -1])
     assert "save the drawing with its style" in found[-1]

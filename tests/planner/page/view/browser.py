@@ -32,6 +32,18 @@ def chromium() -> str:
 
 
 @contextmanager
+def started_chromium() -> Iterator[Any]:
+    """Start Chromium; see `chromium` for a machine without it."""
+    program = chromium()
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as control:
+        started = control.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+@contextmanager
 def opened_page(browser: Any, address: str, **context: Any) -> Iterator[Any]:
     """Open a page in a context of its own, offline, and yield it when the first plan is there."""
     settings = {"viewport": {"width": 1280, "height": 860}, "reduced_motion": "reduce", **context}

@@ -10,7 +10,7 @@ import pytest
 
 from planner.page.write_page import write_page
 from tests.planner.page.cases import CONTROL, shipped
-from tests.planner.page.view.browser import chromium, opened_page, planned
+from tests.planner.page.view.browser import opened_page, planned, started_chromium
 from tests.shared import FOLDER, shared
 
 LARGEST_PAGE = 1.6e6  # bytes
@@ -31,13 +31,8 @@ def address() -> str:
 @pytest.fixture(scope="package")
 def browser() -> Iterator[Any]:
     """Start Chromium."""
-    program = chromium()
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as control:
-        started = control.chromium.launch(executable_path=program, args=["--no-sandbox"])
+    with started_chromium() as started:
         yield started
-        started.close()
 
 
 @pytest.fixture(scope="package")
