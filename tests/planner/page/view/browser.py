@@ -44,8 +44,8 @@ def started_chromium() -> Iterator[Any]:
 
 
 @contextmanager
-def opened_page(browser: Any, address: str, **context: Any) -> Iterator[Any]:
-    """Open a page in a context of its own, offline, and yield it when the first plan is there."""
+def opened_page(browser: Any, address: str, script: str = "", **context: Any) -> Iterator[Any]:
+    """Open a page in a context of its own, offline, and yield it when it has loaded; `script` runs before its own."""
     settings = {"viewport": {"width": 1280, "height": 860}, "reduced_motion": "reduce", **context}
     troubles: list[str] = []
     place = browser.new_context(offline=True, accept_downloads=True, **settings)
@@ -55,6 +55,7 @@ def opened_page(browser: Any, address: str, **context: Any) -> Iterator[Any]:
         page.on("console", lambda message: troubles.append(f"console: {message.text}"))
         page.on("pageerror", lambda error: troubles.append(f"error: {error}"))
         page.on("request", lambda request: _check_request(request.url, troubles))
+        page.add_init_script(script)
         page.goto(address)
         yield page
     finally:
