@@ -38,7 +38,7 @@ setup: $(STAMP) ## make .venv, install everything, pinned, and compile all loops
 $(STAMP): pyproject.toml constraints.txt | $(VENV)/bin/uv
 	$(INSTALL) -e '.[dev]'
 	$(RUN) -m sim compile
-	$(RUN) -m surrogate compile
+	$(RUN) -m planner compile
 	touch $@
 $(VENV)/bin/uv: constraints.txt
 	$(PYTHON) -m venv $(VENV)

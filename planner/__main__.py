@@ -1,4 +1,4 @@
-"""Command line of the planner: plan a path, go to a goal, visit places, hold one, write the page."""
+"""Command line of the planner: plan a path, go to a goal, visit places, hold one, write the page, compile."""
 
 from __future__ import annotations
 
@@ -99,6 +99,27 @@ def _page(write_page: Call, *, out: str) -> None:
     """
     page = write_page(path=out)
     print(f"{page.stat().st_size / 1e6:.2f} MB, opens in a browser -> {page}")
+
+
+@program.command("compile")
+def _compile() -> None:
+    """Compile the loops of queries and plans now rather than on first use."""
+    from time import perf_counter
+
+    import numpy as np
+
+    from planner.jobs.plan import plan
+    from planner.paths.path import circle
+    from sim import jit
+    from sim.inputs import group_columns
+    from sim.model.presets import PRESETS
+    from surrogate.table_file import load
+
+    jit.beforehand, began = True, perf_counter()
+    robot, table = group_columns([PRESETS["paper-control"]]), load()
+    table.query({**robot, "dwell_bar": np.ones(1)}, intervals=True)
+    plan(circle(2.0), PRESETS["paper-control"])
+    print(f"loops compiled in {perf_counter() - began:.0f} s -> {jit.CACHE}")
 
 
 if __name__ == "__main__":

@@ -21,12 +21,13 @@ from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.path import Path2D, like_a_shape, shape_of
 from planner.paths.path_files import Drawing, read_outlines, read_path
 from planner.paths.units import Scales, in_tails, read_length, read_pose, read_time
-from planner.planning.request import POSE, Camera, Corner, PlanRequest
+from planner.planning.request import Camera, Corner, PlanRequest
 from planner.vehicle.from_table import table_for
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import Point, TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import Objective
 from sim.knowledge import CalibratedRobot, CalibrationKnowledge, read_knowledge
+from sim.mechanics.planar import POSE
 from sim.model.robot import Robot
 from sim.robot_rows import OneRobot, one_robot
 from surrogate.interface import LookupTable

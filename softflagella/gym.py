@@ -32,6 +32,7 @@ import numpy as np
 from common.arrays import Floats
 from common.errors import InputError
 from planner.files.saved_plan import restore_plan
+from planner.guidance.law import REST
 from planner.jobs.plan import plan as plan_path
 from planner.paths.distance import closest_segment
 from planner.paths.path import arc_length, polygon
@@ -121,7 +122,7 @@ class PathEnv(gymnasium.Env[Observation, np.int64]):
         super().reset(seed=seed)
         rng, plan, self._is_reset = self.np_random, self.plan, True
         self._direction, self._kept, self._steps = plan.first_direction, 0, 0
-        self._before: float | None = None  # length of the last dwell
+        self._before = REST  # length of the last dwell
         x, y, heading = (plan.start + rng.normal(size=3) * START).tolist()
         self._pose = self._flipped = x, y, heading
         self._swimmer, vehicle = None, plan.tracked.vehicle
@@ -166,7 +167,7 @@ class PathEnv(gymnasium.Env[Observation, np.int64]):
         self._law.integrate(self._pose, self._direction)  # moves its place along the path
         noise = self.np_random.normal(size=3) * [self.noise[0], self.noise[0], self.noise[1]]
         x, y, heading = (self._pose + noise).tolist()
-        rows = np.minimum(self._law.place + self._ahead, len(self._places) - 1)
+        rows = np.minimum(self._law.state.step + self._ahead, len(self._places) - 1)
         from_here = (self._places[rows] - complex(x, y)) * cmath.exp(-1j * heading)
         turned = np.append(self._headings[rows] - heading, heading)
         turned -= 2 * np.pi * np.round(turned / (2 * np.pi))
@@ -179,7 +180,7 @@ class PathEnv(gymnasium.Env[Observation, np.int64]):
     def _info(self, flipped: bool) -> dict[str, Any]:
         x, y, heading = self._pose
         point = np.array([[x + self._offset * math.cos(heading), y + self._offset * math.sin(heading)]])
-        place = self._law.place
+        place = self._law.state.step
         near = np.arange(max(place - self._near, 0), min(place + self._near, len(self._moves)))
         error = float(closest_segment(self._points, self._moves, point, near[None])[0][0])
         return {"error": error, "time": self._steps * self.every, "flipped": flipped}

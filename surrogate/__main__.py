@@ -1,4 +1,4 @@
-"""Command line of the look-up table: `train`, `query`, `inverse`, `errors`, `robot`, `compile`."""
+"""Command line of the look-up table: `train`, `query`, `inverse`, `errors`, `robot`."""
 
 from __future__ import annotations
 
@@ -151,26 +151,6 @@ def _robot(robot: str, *, out: str) -> None:
     table.save(out)
     worst = max(error["rms"] for error in table.errors.values())
     print(f"both directions of the motor, largest error {100 * worst:.2f} % -> {out}")
-
-
-@program.command("compile")
-def _compile() -> None:
-    """Compile the loops of queries and plans now rather than on first use."""
-    from time import perf_counter
-
-    import numpy as np
-
-    from sim import jit
-    from sim.inputs import group_columns
-    from sim.model.presets import PRESETS
-    from surrogate.table_file import load
-
-    jit.beforehand, began = True, perf_counter()
-    robot, table = group_columns([PRESETS["paper-control"]]), load()
-    table.query({**robot, "dwell_bar": np.ones(1)}, intervals=True)
-    table.response(robot)
-    table.error_modes(robot)
-    print(f"loops compiled in {perf_counter() - began:.0f} s -> {jit.CACHE}")
 
 
 if __name__ == "__main__":

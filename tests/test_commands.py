@@ -47,7 +47,7 @@ SAID = {  # by commands that write nothing
     "sim check": "this simulator, its fit     0.403",
     "sim effects": "end_over_end_drag           5 8π μ0 R³  ",
     "sim compile": "loops compiled in",
-    "surrogate compile": "loops compiled in",
+    "planner compile": "loops compiled in",
 }
 COMMANDS = [(package, name) for package in COMMANDED for name in program_of(package).commands]
 COMMANDS.append(("softflagella", "calibrate"))

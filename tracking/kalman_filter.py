@@ -22,11 +22,11 @@ from typing import NamedTuple
 import numpy as np
 
 from common.arrays import Floats
+from planner.guidance.law import arc_terms
 from planner.paths.tractrix import Drift
-from planner.planning.line_of_sight import arc_terms
 from planner.planning.plan import Plan
-from planner.planning.request import POSE
 from planner.vehicle.vehicle import interpolated
+from sim.mechanics.planar import POSE
 from tracking.guidance import TrackerGuidance
 
 NAMES = ("x", "y", "heading", "yaw rate, left", "yaw rate, right", "surge", "sway", "lag angle",
@@ -44,11 +44,11 @@ _PROCESS = np.diag([*[WALK**2] * 3, *(change**2 for change in CHANGES), *[0.0] *
 
 
 class Dwell(NamedTuple):
-    """A dwell of the past; `before` is None for the first one."""
+    """A dwell of the past; `before` is REST for the first one."""
 
     start: float
     sense: int
-    before: float | None
+    before: float
     length: float
 
 

@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from common.errors import InputError
-from planner.planning.request import POSE
+from sim.mechanics.planar import POSE
 from tracking.tracker import Tracker
 
 if TYPE_CHECKING:

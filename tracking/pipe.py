@@ -36,7 +36,7 @@ from dataclasses import dataclass
 from common.errors import InputError
 from common.units import from_si, split, to_si
 from planner.paths.units import Scales
-from planner.planning.request import POSE
+from sim.mechanics.planar import POSE
 from tracking.tracker import Tracker
 
 BEGIN = "begin"  # the word before a pose where the robot begins

@@ -19,9 +19,10 @@ from common.units import format_length
 from planner.paths.distance import distance_to, farthest
 from planner.paths.units import missed_words
 from planner.planning.plan import Plan
-from planner.planning.request import POSE, Camera
+from planner.planning.request import Camera
 from planner.vehicle.vehicle import Vehicle
 from sim.mechanics import planar
+from sim.mechanics.planar import POSE
 from sim.model.robot import Robot
 from sim.motion.replay import run_at_rest
 from sim.motion.run import SteppedRobot

@@ -41,10 +41,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from common.errors import InputError
 from common.notebook import Shown
 from common.units import format_time
+from planner.guidance.law import REST
 from planner.paths.units import heading_in_degrees, in_lab
 from planner.planning.plan import Plan
-from planner.planning.request import POSE
 from planner.planning.stated_error import KEPT, bound
+from sim.mechanics.planar import POSE
 from tracking.guidance import TrackerGuidance
 from tracking.kalman_filter import NAMES, Dwell, Estimate, difference
 
@@ -120,7 +121,7 @@ class Tracker(Shown):
         self._latency = latency
         self._clock = Clock(begin)
         self._displacement = Displacement()
-        self._dwell = Dwell(begin, plan.first_direction, None, 0.0)
+        self._dwell = Dwell(begin, plan.first_direction, REST, 0.0)
         self._past: deque[Dwell] = deque(maxlen=KEPT)
         self._finished = False
         self._rejected = 0
@@ -254,18 +255,18 @@ class Tracker(Shown):
         self._estimate.apply()
         law, pose, dwell = self._law, self._estimate.pose, self._dwell
         elapsed = max(self._now - dwell.start, 0.0)
-        where = law.where()
+        state = law.state
         present = law.pose_after(pose, dwell.sense, dwell.before, elapsed) if elapsed else pose
         self._approach(elapsed)
         if law.is_off(present):
             law.plan_way(present)
-            where = law.where()
-        law.go_to(where)
+            state = law.state
+        law.state = state
         try:
             length, self._ends = law.next_dwell(pose, dwell.sense, dwell.before, elapsed)
         except InputError:  # the robot turns in circles: swim on
             length, self._ends = self.shortest, False
-        law.go_to(where)
+        law.state = state
         start = self._dwell.start
         self._flip_at = max(start + length, self._now, start + (0.0 if self._ends else self.shortest))
 
@@ -277,14 +278,14 @@ class Tracker(Shown):
     def _error(self) -> float:
         """Bound the distance of the tracked point from the path until the next flip."""
         law, dwell, offset = self._law, self._dwell, self._plan.tracked.offset
-        where, ends, spread = law.where(), [], 0.0
+        state, ends, spread = law.state, [], 0.0
         for when in (max(self._now, dwell.start), max(self._flip_at, dwell.start)):
             prediction = self._estimate.pose_at(when, dwell, ())
             assert prediction is not None
             pose, D = prediction
             self._approach(when - dwell.start)
             distance, direction = law.distance(pose)
-            law.go_to(where)
+            law.state = state
             ends.append(distance)
             spread = self._estimate.spread(D, direction, offset * math.sin(direction - pose[2]))
         return bound(ends[0], ends[1], SPREADS * spread)

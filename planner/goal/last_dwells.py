@@ -29,11 +29,12 @@ from planner.planning.conditions import OVERLAP, Lap
 from planner.planning.declare import FeasiblePath
 from planner.planning.line_of_sight import follow
 from planner.planning.plan import J, Plan
-from planner.planning.request import POSE, ProgressCallback
+from planner.planning.request import ProgressCallback
 from planner.planning.solve import Trial
 from planner.planning.stated_error import drift_of_a_lap, plan_errors
 from planner.vehicle.vehicle import Switches, Vehicle, flips_after, roll_out
 from sim.mechanics import planar
+from sim.mechanics.planar import POSE
 
 _STEP = 1e-4  # time units, for derivatives
 _LAST = 30  # dwells before a goal that are changed

@@ -31,9 +31,9 @@ from planner.planning.declare import FeasiblePath
 from planner.planning.line_of_sight import Start
 from planner.planning.picture import BODY, REPLAYED
 from planner.planning.plan import Job, Plan
-from planner.planning.request import POSE
 from planner.planning.solve import PathTask, Trial, solve
 from planner.vehicle.zigzag import Objective, check_least
+from sim.mechanics.planar import POSE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -30,8 +30,8 @@ from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D, circle
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.plan import Job, Plan
-from planner.planning.request import POSE
 from planner.vehicle.vehicle import roll_out
+from sim.mechanics.planar import POSE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,7 @@ import { clip, column, compose, inversePose, sum } from "./math.js";
 import { motionAfter, pivotDistance, pivotRadius, sideOf, speedOf, turnRadius, zigzag } from "./vehicle.js";
 import { FOLLOWING, InputError, general } from "./words.js";
 
-const { EXACT, LARGEST_STEP, LARGEST_TURN, TURNS, MOST_BIAS, HALVINGS, MOST_LOOKS } = CONSTANTS.line_of_sight;
+const { EXACT, LARGEST_STEP, LARGEST_TURN, TURNS, MOST_BIAS, HALVINGS, MOST_LOOKS } = CONSTANTS.law;
 const { MOST_SWITCHES, PATIENCE, EVERY, QUICKEST } = CONSTANTS.line_of_sight;
 
 /* Compute h at every step of the reference. */

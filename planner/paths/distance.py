@@ -65,11 +65,10 @@ def closest_segment(
     start: Floats, direction: Floats, points: Floats, candidates: Integers
 ) -> tuple[Floats, Integers, Floats]:
     """Choose the nearest of the candidate segments (M, k) of each point; of equally near ones the first."""
-    chosen = direction[candidates]
-    away = points[:, None] - start[candidates]
-    square = np.maximum((chosen**2).sum(-1), 1e-300)
-    share = np.clip((away * chosen).sum(-1) / square, 0, 1)
-    gap = np.hypot(*np.moveaxis(away - share[..., None] * chosen, -1, 0))
+    (x, y), (dx, dy) = start.T[:, candidates], direction.T[:, candidates]
+    away_x, away_y = points[:, :1] - x, points[:, 1:] - y
+    share = np.clip((away_x * dx + away_y * dy) / np.maximum(dx * dx + dy * dy, 1e-300), 0, 1)
+    gap = np.hypot(away_x - share * dx, away_y - share * dy)
     tied = gap <= gap.min(1, keepdims=True) + TIE
     best = np.where(tied, candidates, len(start)).argmin(1)
     rows = np.arange(len(points))

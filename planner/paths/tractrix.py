@@ -25,6 +25,7 @@ import numpy as np
 from common.arrays import Floats
 from common.errors import InputError
 from planner.paths.path import Path2D, arc_length, axis_at, resample
+from sim.mechanics import planar
 
 _LAPS = 6
 _MOST_SLIP = 3.0  # sideways by forward motion
@@ -49,8 +50,7 @@ class Drift:
 
     def slip_at(self, heading: Floats | float) -> Floats:
         """Compute the angles (...) from headings (...) to the direction of motion."""
-        (x, y), c, s = self.current, np.cos(heading), np.sin(heading)
-        return np.asarray(np.arctan2(self.sideways - x * s + y * c, 1 + x * c + y * s))
+        return np.asarray(planar.slip(self.sideways, *self.current, heading))
 
     def slip_along(self, course: Floats | float) -> Floats:
         """Compute the angles δ (...) from the heading to courses (...): sin δ − u cos δ = c·n, n left of a course.

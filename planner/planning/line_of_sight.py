@@ -22,10 +22,8 @@ do not accumulate along the path. Without this feedback they grow with its lengt
 where a is the distance from the pivot to the tracked point. A flip adds its lag: at most |lag_x, lag_z| + 2 a
 |lag_ψ| + Δ |lag_ψ|. Source: ours; the tests check it on random paths.
 
-The time of a flip is the root of one equation, which the secant method finds in about four evaluations. Their
-cost does not depend on the length of the path: the place on it is remembered, and moves forward. Plans
-(`planner.planning.solve`) and trackers (`tracking.tracker`) ask for one flip at a time, so it computes
-with plain numbers. A pose is x, y and heading of the head's centre. Lengths in l, times in μ0 l⁴/EI.
+`planner.guidance.law` finds the flips, for whole plans in a compiled loop and for trackers (`tracking.tracker`)
+one at a time. A pose is x, y and heading of the head's centre. Lengths in l, times in μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -38,25 +36,32 @@ import numpy as np
 
 from common.arrays import Floats
 from common.errors import InputError
+from planner.guidance.law import (
+    REST,
+    Following,
+    GuidanceLaw,
+    PathState,
+    approach,
+    follow_some,
+    has_ended,
+    integrate,
+    lag_after,
+    next_dwell,
+    pose_after,
+)
 from planner.paths.tractrix import Reference
-from planner.planning.request import FOLLOWING, POSE, ProgressCallback, tell
+from planner.planning.request import FOLLOWING, ProgressCallback, tell
 from planner.vehicle.vehicle import BEFORE_KNOTS, SHORTEST, STEP, Switches, Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.mechanics import planar
+from sim.mechanics.planar import POSE
 
-EXACT = 1e-7  # rad, of the heading at a flip
-LARGEST_STEP = 0.4  # rad that the robot turns between two evaluations
-LARGEST_TURN = 1.5  # rad that it turns while its place on the path is sought from the last one
-TURNS = 4 * math.pi  # a dwell that turns further than this leads nowhere
-MOST_BIAS = 0.3  # rad
-HALVINGS = 30
-MOST_LOOKS = 500  # evaluations of the equation for one dwell; about four are needed
 _TIGHTEST = 0.97
 _PAIRS_AHEAD = 4.0  # pairs of dwells
-_KNOTS: list[float] = BEFORE_KNOTS.tolist()
 MOST_SWITCHES = 2_000_000
 _PATIENCE = 30.0  # lengths of the robot's motion that may pass without progress along the path
 _EVERY = 2_000  # switches between two calls of `progress`
+_CIRCLES = "the robot turns in circles and does not reach the path; check the path's scale"
 _QUICKEST = 0.5  # of the time that the pivot needs for the reference at its largest speed: no schedule is shorter
 
 
@@ -74,8 +79,34 @@ def hysteresis(reference: Reference, vehicle: Vehicle, swing: float) -> Floats:
     return np.asarray(swing * (1 + bend) / 2)
 
 
+def law_of(reference: Reference, vehicle: Vehicle, guidance: Guidance, offset: float) -> GuidanceLaw:
+    """Return the law of guidance about a reference, as compiled loops take it; no way leads to the reference."""
+
+    def table(array: Floats) -> Floats:
+        return np.ascontiguousarray(array, dtype=float)
+
+    return GuidanceLaw(
+        x=table(reference.q[:, 0]),
+        y=table(reference.q[:, 1]),
+        heading=table(reference.heading),
+        arc=table(reference.arc),
+        hysteresis=table(hysteresis(reference, vehicle, guidance.swing)),
+        last=len(reference.q) - 2,
+        dwell=float(guidance.dwell),
+        ahead=float(guidance.ahead),
+        rod=float(vehicle.pivot_distance + offset),
+        offset=float(offset),
+        knots=BEFORE_KNOTS,
+        step=STEP,
+        twist=table(vehicle.twist),
+        lag=table(vehicle.lag),
+        rest=table(vehicle.rest),
+        current=table(vehicle.current),
+    )
+
+
 class LineOfSight:
-    """A vehicle, its reference, and the place that it has reached.
+    """A vehicle, its reference, and the place that it has reached, for one flip at a time.
 
     Args:
         reference: declared path and its tractrix.
@@ -85,222 +116,55 @@ class LineOfSight:
     """
 
     def __init__(self, reference: Reference, vehicle: Vehicle, guidance: Guidance, offset: float):
-        self._x, self._y = reference.q[:, 0].tolist(), reference.q[:, 1].tolist()
-        self._heading: list[float] = reference.heading.tolist()
-        self._arc: list[float] = reference.arc.tolist()
-        self._last = len(self._x) - 2
-        self._dwell, self._ahead = guidance.dwell, guidance.ahead
-        self._rod, self._offset = vehicle.pivot_distance + offset, offset
-        self._hysteresis: list[float] = hysteresis(reference, vehicle, guidance.swing).tolist()
-        self._twist: list[list[float]] = vehicle.twist.tolist()
-        self._lag = vehicle.lag.tolist()
-        self._rest = vehicle.rest.tolist()
-        self._current: list[float] = vehicle.current.tolist()
-        self._lag_angle = 0.0
-        self._lean = 0.0  # angle by which the reference is turned about the tracked point
-        self.place = 0
-        self.share = 0.0  # of the step at the place
-        self._error = self._last_error = self._bias = self._reached = 0.0
+        law = law_of(reference, vehicle, guidance, offset)
+        arrays = {name: each for name, each in law._asdict().items() if isinstance(each, np.ndarray)}
+        self._law = law._replace(**{name: array.tolist() for name, array in arrays.items()})
+        self.state = PathState()
 
     def update_vehicle(self, twist: list[list[float]], lag_angle: float, current: list[float]) -> None:
         """Update the vehicle: twists (2, 3), an offset added to all lag angles, and a current (2,)."""
-        self._twist, self._lag_angle, self._current = twist, lag_angle, current
+        self._law = self._law._replace(twist=twist, lag_angle=lag_angle, current=current)
 
-    def pose_after(
-        self, pose: tuple[float, float, float], sense: int, before: float | None, time: float
-    ) -> tuple[float, float, float]:
+    def pose_after(self, pose: POSE, sense: int, before: float, time: float) -> POSE:
         """Predict the pose of the head's centre after `time` in direction `sense`."""
-        side = 0 if sense > 0 else 1
-        z, x, turned = self.lag_after(side, before, time)
-        turned += sense * self._lag_angle
-        forward, left, rate = self._twist[side]
-        along, across, angle = arc_terms(rate, time)
-        ahead, aside = along * forward - across * left, across * forward + along * left
-        c, s = math.cos(turned), math.sin(turned)
-        z, x = z + c * ahead - s * aside, x + s * ahead + c * aside
-        c, s = math.cos(pose[2]), math.sin(pose[2])
-        return (
-            pose[0] + c * z - s * x + self._current[0] * time,
-            pose[1] + s * z + c * x + self._current[1] * time,
-            pose[2] + turned + angle,
-        )
+        return pose_after(self._law, pose, sense, before, time)
 
-    def lag_after(self, side: int, before: float | None, time: float) -> tuple[float, float, float]:
-        """Interpolate the lag after `time` in direction `side` (0: positive, 1: negative); None: from rest."""
-        u = time / STEP
-        i = int(u)
-        rest = self._rest[side]
-        if i > len(rest) - 2:
-            i, w = len(rest) - 2, 1.0
-        else:
-            w = u - i
-        if before is None:
-            (z0, x0, a0), (z1, x1, a1) = rest[i], rest[i + 1]
-            return z0 + w * (z1 - z0), x0 + w * (x1 - x0), a0 + w * (a1 - a0)
-        k, part = _knot_below(before)
-        shorter, longer = self._lag[side][k], self._lag[side][k + 1]
-        (z0, x0, a0), (z1, x1, a1) = shorter[i], shorter[i + 1]
-        z, x, turned = z0 + w * (z1 - z0), x0 + w * (x1 - x0), a0 + w * (a1 - a0)
-        if part:
-            (z0, x0, a0), (z1, x1, a1) = longer[i], longer[i + 1]
-            z += part * (z0 + w * (z1 - z0) - z)
-            x += part * (x0 + w * (x1 - x0) - x)
-            turned += part * (a0 + w * (a1 - a0) - turned)
-        return z, x, turned
+    def lag_after(self, side: int, before: float, time: float) -> POSE:
+        """Interpolate the lag after `time` in direction `side` (0: positive, 1: negative)."""
+        return lag_after(self._law, side, before, time)
 
-    def integrate(self, pose: tuple[float, float, float], sense: int) -> None:
-        """Add the mean error of the last two dwells to the integral; errors at flips alternate."""
-        self._excess(pose, sense)
-        reached = self._arc[self.place]
-        advance, self._reached = reached - self._reached, reached
-        self._bias += (self._error + self._last_error) * advance / (4 * self._ahead**2)
-        self._bias = min(max(self._bias, -MOST_BIAS), MOST_BIAS)
-        self._last_error = self._error
-
-    def _excess(self, pose: tuple[float, float, float], sense: int) -> float:
-        """Compute σ(φ − φ_d) − h, which is zero at a flip; move the place to the step nearest to the pivot."""
-        c, s = math.cos(pose[2]), math.sin(pose[2])
-        heading = pose[2] - self._lean
-        x, y = pose[0] + self._offset * c, pose[1] + self._offset * s  # tracked point
-        x -= self._rod * math.cos(heading)
-        y -= self._rod * math.sin(heading)
-        i, xs, ys = self.place, self._x, self._y
-        moved = 0
-        while True:
-            dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
-            away_x, away_y = x - xs[i], y - ys[i]
-            square = dx * dx + dy * dy
-            share = (away_x * dx + away_y * dy) / square if square > 0 else 2.0
-            if share > 1 and i < self._last and moved >= 0:
-                i, moved = i + 1, 1
-            elif share < 0 and i > 0 and moved <= 0:
-                i, moved = i - 1, -1
-            else:
-                break
-        self.place, self.share = i, share
-        error = (dx * away_y - dy * away_x) / math.sqrt(square) if square > 0 else 0.0
-        within = min(max(share, 0.0), 1.0)
-        wanted = self._heading[i] + within * (self._heading[i + 1] - self._heading[i])
-        self._error = error
-        wanted -= math.atan(error / self._ahead) + self._bias
-        return sense * (heading - wanted) - self._hysteresis[i]
+    def integrate(self, pose: POSE, sense: int) -> None:
+        """Add the mean error of the last two dwells to the integral."""
+        self.state = integrate(self._law, self.state, pose, sense)
 
     @property
     def ended(self) -> bool:
-        return self.place >= self._last and self.share >= 1
+        return has_ended(self._law, self.state)
 
-    def approach(self, pose: POSE, sense: int, before: float | None, time: float) -> tuple[float, float]:
-        """Move the place with the robot from `pose`, where the dwell began, nearly until `time`.
+    def approach(self, pose: POSE, sense: int, before: float, time: float) -> None:
+        """Move the place with the robot from `pose`, where the dwell began, nearly until `time`."""
+        *_, self.state = approach(self._law, self.state, pose, sense, before, time)
 
-        The nearest step is sought from the last one. Seen from across a circle another step may be nearer, so the
-        place moves in turns of at most LARGEST_TURN.
-
-        Returns:
-            When to look next, `time` or an earlier one at which the path has ended; and when it had not yet ended.
-        """
-        rate = abs(self._twist[0 if sense > 0 else 1][2])
-        count, low = math.ceil(time * rate / LARGEST_TURN), 0.0
-        for n in range(1, count):
-            high = n * (time / count)
-            self._excess(self.pose_after(pose, sense, before, high), sense)
-            if self.ended:
-                return high, low
-            low = high
-        return time, low
-
-    def next_dwell(
-        self, pose: tuple[float, float, float], sense: int, before: float | None, elapsed: float = 0.0
-    ) -> tuple[float, bool]:
+    def next_dwell(self, pose: POSE, sense: int, before: float, elapsed: float = 0.0) -> tuple[float, bool]:
         """Compute the length of the dwell that began at `pose`, and whether the path ends in it.
 
-        `elapsed` is the time since then: the motor cannot flip before it. The last dwell is trimmed. If it were
-        too short for the motor, it is the shortest one or none at all, whichever ends nearer to the path's end.
+        `elapsed` is the time since then: the motor cannot flip before it.
+
+        Raises:
+            InputError: the robot turns in circles.
         """
-        time, ended = self.next_flip(pose, sense, before, elapsed)
-        if ended and time < self._dwell and before is not None:
-            time = self._dwell if 2 * time > self._dwell else 0.0
-        return time, ended
-
-    def next_flip(
-        self, pose: tuple[float, float, float], sense: int, before: float | None, elapsed: float = 0.0
-    ) -> tuple[float, bool]:
-        """Compute the length of the dwell that began at `pose`, and whether the path ends in it."""
-        rate = abs(self._twist[0 if sense > 0 else 1][2])
-        place, longest, largest = self.place, TURNS / rate, LARGEST_STEP / rate
-        time, low = self.approach(pose, sense, before, max(self._dwell, elapsed))
-        value = self._excess(self.pose_after(pose, sense, before, time), sense)
-        low_value, slope = None, rate
-        for _ in range(MOST_LOOKS):
-            if self.ended:
-                return self._end(pose, sense, before, low, time), True
-            if value >= 0 and (low_value is None or value < EXACT):
-                return time, False
-            if value >= 0:  # between two evaluations
-                return self._root(pose, sense, before, (low, low_value or 0.0), (time, value)), False
-            if -value < EXACT:
-                return time, False
-            low, low_value = time, value
-            time += min(-1.02 * value / max(slope, 0.1 * rate), largest)
-            if time > longest:
-                if self.place <= place:
-                    break
-                place, longest = self.place, longest + TURNS / rate  # its circles lead along the path
-            value = self._excess(self.pose_after(pose, sense, before, time), sense)
-            slope = (value - low_value) / (time - low)
-        raise InputError("the robot turns in circles and does not reach the path; check the path's scale")
-
-    def _root(
-        self,
-        pose: tuple[float, float, float],
-        sense: int,
-        before: float | None,
-        low: tuple[float, float],
-        high: tuple[float, float],
-    ) -> float:
-        """Find the root between a value below zero and one above, by regula falsi (Illinois)."""
-        (a, fa), (b, fb) = low, high
-        for _ in range(HALVINGS):
-            time = a - fa * (b - a) / (fb - fa)
-            value = self._excess(self.pose_after(pose, sense, before, time), sense)
-            if abs(value) < EXACT:
-                break
-            if value < 0:
-                a, fa, fb = time, value, fb / 2
-            else:
-                b, fb, fa = time, value, fa / 2
-        return time
-
-    def _end(self, pose: POSE, sense: int, before: float | None, low: float, high: float) -> float:
-        """Find the time at which the path ends, by bisection between a time before its end and one after it."""
-        for _ in range(HALVINGS):
-            middle = (low + high) / 2
-            self._excess(self.pose_after(pose, sense, before, middle), sense)
-            low, high = (low, middle) if self.ended else (middle, high)
-        return high
-
-
-def arc_terms(rate: float, time: float) -> tuple[float, float, float]:
-    """Return sin Ω T/Ω, (1 − cos Ω T)/Ω and Ω T."""
-    angle = rate * time
-    half = math.sin(angle / 2)
-    return math.sin(angle) / rate, 2 * half * half / rate, angle
-
-
-def _knot_below(before: float) -> tuple[int, float]:
-    """Find the knot below the length of the dwell before, and the share of the step to the next knot."""
-    if before >= _KNOTS[-1]:
-        return len(_KNOTS) - 2, 1.0
-    k = 0
-    while before > _KNOTS[k + 1]:
-        k += 1
-    return k, max((before - _KNOTS[k]) / (_KNOTS[k + 1] - _KNOTS[k]), 0.0)
+        flip = next_dwell(self._law, self.state, pose, sense, before, elapsed)
+        self.state = flip.state
+        if flip.lost:
+            raise InputError(_CIRCLES)
+        return flip.time, flip.ended
 
 
 @dataclass(frozen=True)
 class Start:
     """Where a schedule begins, at rest: pose of the head's centre, and direction of the first dwell."""
 
-    pose: tuple[float, float, float]
+    pose: POSE
     sense: int
 
 
@@ -327,38 +191,32 @@ def follow(
         InputError: the path needs too many switches, or the robot turns in circles.
     """
     start = start or start_at_rest(reference, vehicle, guidance, offset)
-    law = LineOfSight(reference, vehicle, guidance, offset)
-    pose, sense = start.pose, start.sense
-    before: float | None = None  # at rest
-    dwells: list[float] = []
-    poses = [pose]
-    furthest, stalled = law.place, 0.0
-    rod = vehicle.pivot_distance + offset
-    patience = _PATIENCE * (guidance.ahead + rod + vehicle.turn_radius) / max(vehicle.speed, 1e-300)
-    while True:
-        time, ended = law.next_dwell(pose, sense, before)
-        if time > 0:
-            pose = law.pose_after(pose, sense, before, time)
-            law.integrate(pose, sense)
-            dwells.append(time)
-            poses.append(pose)
-            sense, before = -sense, time
-        if ended:
-            switches = Switches(start.sense, np.array(dwells), np.array(poses))
-            _check_duration(switches, reference, vehicle)
-            return switches
-        stalled = 0.0 if law.place > furthest else stalled + time
-        furthest = max(furthest, law.place)
-        if stalled > patience:
-            x, y = reference.p[furthest]
+    law = law_of(reference, vehicle, guidance, offset)
+    patience = _PATIENCE * (guidance.ahead + law.rod + vehicle.turn_radius) / max(vehicle.speed, 1e-300)
+    following = Following(start.pose, start.sense, REST, PathState())
+    dwells, poses = [np.empty(0)], [np.array([start.pose])]
+    switches = 0
+    while not following.ended:
+        times, places = np.empty(_EVERY), np.empty((_EVERY, 3))
+        following = follow_some(law, following, patience, times, places)
+        dwells.append(times[: following.done])
+        poses.append(places[: following.done])
+        switches += following.done
+        if following.lost:
+            raise InputError(_CIRCLES)
+        if following.stalled > patience:
+            x, y = reference.p[following.furthest]
             raise InputError(
                 f"the robot does not get past ({x:.3g}, {y:.3g}) l, where the path turns back too "
                 "sharply; split it there"
             )
-        if len(dwells) >= MOST_SWITCHES:
+        if switches >= MOST_SWITCHES:
             raise InputError(f"the path needs more than {MOST_SWITCHES} switches; split it")
-        if len(dwells) % _EVERY == 0:
-            tell(progress, FOLLOWING, law.place / len(reference.q))
+        if not following.ended:
+            tell(progress, FOLLOWING, following.state.step / len(reference.q))
+    schedule = Switches(start.sense, np.concatenate(dwells), np.concatenate(poses))
+    _check_duration(schedule, reference, vehicle)
+    return schedule
 
 
 def _check_duration(switches: Switches, reference: Reference, vehicle: Vehicle) -> None:

@@ -30,11 +30,12 @@ def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float, length
         stated: half the width of the band, in l.
         length_scale: l in m.
     """
+    from matplotlib.collections import PolyCollection
+
     cm = 100 * length_scale
     edges = cm * band(declared, stated)
-    axes.fill(
-        *edges.T, color="#2a7fba", alpha=0.25, lw=0, label=f"stated error {format_length(stated * length_scale)}"
-    )
+    label = f"stated error {format_length(stated * length_scale)}"
+    axes.add_collection(PolyCollection([edges], color="#2a7fba", alpha=0.25, lw=0, label=label))
     axes.plot(*(cm * raw.T), color=RAW, lw=1.0, label="path as given")
     axes.plot(*(cm * declared.T), color=DECLARED, lw=1.2, label="declared")
     axes.set_aspect("equal")

@@ -21,12 +21,13 @@ from planner.paths.units import extent, heading_in_degrees, in_lab, place_in_lab
 from planner.planning.conditions import KeptClear, Lap
 from planner.planning.declare import FeasiblePath
 from planner.planning.line_of_sight import Guidance
-from planner.planning.request import POSE, PlanRequest
+from planner.planning.request import PlanRequest
 from planner.planning.stated_error import PlanErrors, feedback_error, plan_errors
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Switches, roll_out, smooth_track
 from planner.vehicle.zigzag import Zigzag
+from sim.mechanics.planar import POSE
 from sim.model.robot import Robot
 from sim.model.schedule import FORMAT, Schedule, plan_id
 from sim.robot_rows import with_units

@@ -18,6 +18,7 @@ from planner.paths.units import Scales
 from planner.vehicle.tracked_point import Point
 from planner.vehicle.zigzag import QUICK, Objective
 from sim.mechanics import planar
+from sim.mechanics.planar import POSE
 
 Corner = Literal["nearest", "minimax", "fillet", "error"]
 DECLARING = "finding the nearest path that can be followed"
@@ -25,7 +26,6 @@ REMEDY = "too tight: looking for a change that helps"
 FOLLOWING = "following the path"
 ERRORS = "computing the error of the path"
 ProgressCallback = Callable[[float], object]  # called with a Progress
-POSE = tuple[float, float, float]
 _ANYWHERE = (5.0, 5.0, 2.0)  # standard deviations of wrong poses
 
 

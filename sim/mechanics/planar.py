@@ -20,6 +20,7 @@ from common.arrays import Floats
 from sim.jit import formula
 
 Poses = Floats  # (..., 3)
+POSE = tuple[float, float, float]  # one, in plain numbers
 
 MIRROR = np.array([1.0, -1.0, -1.0])  # reflection about the body's axis: what a reversed motor does
 
@@ -80,3 +81,13 @@ def zigzag_speed(ahead: Any, aside: Any, turned: Any, forward: Any, left: Any, y
     half, turn = yaw_rate * dwell / 2, turned / 2
     along = dwell * np.sinc(half / np.pi) * (forward * np.cos(turn) - left * np.sin(turn))
     return np.abs(ahead * np.cos(turn + half) + aside * np.sin(turn + half) + along) / dwell
+
+
+@formula
+def slip(sideways: Any, current_x: Any, current_y: Any, heading: Any) -> Any:
+    """Return the angle from a heading to the direction of motion.
+
+    The robot goes along the heading at speed 1, `sideways` to the left of it, and with a current in the lab.
+    """
+    c, s = np.cos(heading), np.sin(heading)
+    return np.arctan2(sideways - current_x * s + current_y * c, 1 + current_x * c + current_y * s)

@@ -9,16 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from planner.guidance.law import project
 from planner.jobs.plan import plan
 from planner.paths.dubins import shortest_paths
 from planner.paths.tractrix import Drift
 from planner.planning.plan import Plan
-from planner.planning.request import POSE, Camera
+from planner.planning.request import Camera
 from planner.vehicle.zigzag import Objective
+from sim.mechanics.planar import POSE
 from sim.model.presets import PRESETS
 from tests.planner.plans import CONTROL, planned
 from tests.planner.vehicles import PROMPT, root_mean_square
-from tracking.guidance import MOST_LEFT_OUT, TrackerGuidance, WayBack, shortest_way
+from tracking.guidance import MOST_LEFT_OUT, TrackerGuidance, shortest_way
 from tracking.swim import Swim, swim
 from tracking.tracker import Tracker
 from tracking.tracks import check
@@ -52,9 +54,9 @@ def in_current() -> Plan:
 def test_a_drift_that_the_plan_knows_does_not_turn_the_reference() -> None:
     guidance = TrackerGuidance(in_current())
     for place in (50, 200, 350):
-        guidance.place = place
+        guidance.state = guidance.state._replace(step=place)
         guidance.integrate(in_current().start, 1)
-    assert guidance._lean == pytest.approx(0.0, abs=1e-15)
+    assert guidance._law.lean == pytest.approx(0.0, abs=1e-15)
 
 
 def test_on_a_straight_line_the_reference_turns_against_the_slip() -> None:
@@ -63,7 +65,7 @@ def test_on_a_straight_line_the_reference_turns_against_the_slip() -> None:
     guidance.update_drift(Drift(0.0, (0.0, 0.2)))
     for x in np.linspace(0, 11, 300):
         guidance.integrate((float(x), 0.0, 0.0), 1)
-    assert math.sin(-guidance._lean) == pytest.approx(0.2, rel=1e-3)
+    assert math.sin(-guidance._law.lean) == pytest.approx(0.2, rel=1e-3)
 
 
 def within(plan: Plan, tracker: Tracker, camera: Camera, rng: Any, current: float) -> np.ndarray:
@@ -142,13 +144,12 @@ def test_from_anywhere_it_is_back_in_little_more_than_the_least_time(seeds: rang
 def test_the_way_leads_to_the_target_and_is_short() -> None:
     targets = np.stack([np.linspace(0, 9, 901), np.zeros(901), np.zeros(901)], 1)
     track, target = shortest_way((4.0, 1.5, math.pi / 2), targets, np.linspace(0, 9, 901), 18, 0.4)
-    way = WayBack.of(track, target)
-    last = way.segments[-1]
-    x, y, _ = targets[way.target]
-    ends = [last.project(x, y, last.length)]
-    assert ends[0] == pytest.approx((last.length, 0.0), abs=1e-9)
-    assert math.remainder(way.course, 2 * math.pi) == pytest.approx(0.0, abs=1e-9)
-    assert sum(segment.length for segment in way.segments) < 1.5 + math.pi * 0.4 + 0.5
+    way = TrackerGuidance(eight())._way_of(track)
+    last = way[-1]
+    x, y, _ = targets[target]
+    assert project(last, x, y, last.length) == pytest.approx((last.length, 0.0), abs=1e-9)
+    assert math.remainder(last.course + last.curvature * last.length, 2 * math.pi) == pytest.approx(0.0, abs=1e-9)
+    assert sum(segment.length for segment in way) < 1.5 + math.pi * 0.4 + 0.5
 
 
 @dataclass(frozen=True)
@@ -198,4 +199,4 @@ def test_ways_back_leave_out_a_tenth_of_a_lap_at_most() -> None:
     guidance, arc, (x, y, heading) = TrackerGuidance(result), result.declared.reference.arc, result.start
     for _ in range(4):
         guidance.plan_way((x + 0.5, y, heading + math.pi))
-    assert arc[guidance.place] <= MOST_LEFT_OUT * arc[-1]
+    assert arc[guidance.state.step] <= MOST_LEFT_OUT * arc[-1]

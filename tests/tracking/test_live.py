@@ -19,7 +19,7 @@ import pytest
 from common.errors import InputError
 from planner.files.plan_files import write_plan
 from planner.paths.distance import distance_to
-from planner.planning.request import POSE
+from sim.mechanics.planar import POSE
 from tests.planner.plans import planned
 from tests.processes import LIMIT, ROOT
 from tracking import live

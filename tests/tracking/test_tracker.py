@@ -13,10 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
+from planner.guidance import law
 from planner.planning.plan import Plan
-from planner.planning.request import POSE, Camera
+from planner.planning.request import Camera
 from planner.vehicle.vehicle import Vehicle
 from sim.mechanics import planar
+from sim.mechanics.planar import POSE
 from tests.planner.plans import planned as plan_of
 from tests.planner.vehicles import PROMPT
 from tracking import tracker
@@ -235,7 +237,7 @@ def test_the_flips_go_on(jump: float, lasts: int) -> None:
 
 
 STATE = [0.3, -0.2, 1.1, 0.03, -0.02, 0.04, -0.05, 0.003, 2e-4, -1e-4, 0.02, -0.03, 0.2]
-PAST = [Dwell(0.0, 1, None, 0.9), Dwell(0.9, -1, 0.9, 0.8), Dwell(1.7, 1, 0.8, 1.1)]
+PAST = [Dwell(0.0, 1, law.REST, 0.9), Dwell(0.9, -1, 0.9, 0.8), Dwell(1.7, 1, 0.8, 1.1)]
 NOW = Dwell(2.8, -1, 1.1, 0.0)
 
 
@@ -298,7 +300,8 @@ def test_counting_back_and_going_forward_end_at_the_same_pose(estimate: Estimate
     twist = car.twist * np.array([[1.04, 0.95, 1.03], [1.04, 0.95, 0.98]])
 
     def change(dwell: Dwell, time: float) -> np.ndarray:
-        lag = car.lag_after(dwell.sense, dwell.before, time) + np.array([0, 0, dwell.sense * state[7]])
+        before = None if math.isnan(dwell.before) else dwell.before
+        lag = car.lag_after(dwell.sense, before, time) + np.array([0, 0, dwell.sense * state[7]])
         return planar.compose(lag, planar.arc(twist[0 if dwell.sense > 0 else 1], time))
 
     def drift(time: float) -> np.ndarray:

@@ -18,10 +18,11 @@ from planner.jobs.plan import make_plan
 from planner.paths.obstacles import Circle, Footprint, FreeSpace
 from planner.paths.path import Path2D, circle
 from planner.planning.plan import Plan
-from planner.planning.request import POSE, PlanRequest
+from planner.planning.request import PlanRequest
 from planner.vehicle.tracked_point import tracked_vehicle
 from planner.vehicle.vehicle import Switches, Vehicle, roll_out
 from sim.mechanics import planar
+from sim.mechanics.planar import POSE
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
 from tests.planner.plans import CONTROL, tracked
@@ -152,7 +153,7 @@ def test_a_tracked_robot_goes_around_until_it_is_told(current: float) -> None:
     assert result.distance.max() < 0.15
     settled = result.times > lap.duration
     assert result.distance[settled].max() < 2 * lap.predicted_max + 0.03
-    assert tracker.tracker._law.place < TrackerGuidance(lap)._lap
+    assert tracker.tracker._law.state.step < TrackerGuidance(lap)._lap
 
 
 def test_a_robot_that_was_moved_comes_back_in_any_lap() -> None:

@@ -20,9 +20,8 @@ from planner.options import PathOptions
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
 from planner.paths.units import in_lab
-from planner.planning import solve
+from planner.planning import line_of_sight, solve
 from planner.planning.conditions import BlockedError
-from planner.planning.line_of_sight import LineOfSight
 from planner.planning.request import ERRORS, PlanRequest
 from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.tracked_point import tracked_vehicle
@@ -362,6 +361,11 @@ def test_a_lap_with_too_few_flips_to_be_corrected_is_refused() -> None:
 
 
 def test_a_schedule_too_short_for_its_path_is_an_error_of_the_planner(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(LineOfSight, "ended", True)
+    follow = line_of_sight.follow_some
+
+    def stopped(*arguments: Any) -> Any:
+        return follow(*arguments)._replace(ended=True, done=1)
+
+    monkeypatch.setattr(line_of_sight, "follow_some", stopped)
     with pytest.raises(RuntimeError, match="error of the planner"):
         plan(circle(2.0), CONTROL, objective="flips")

@@ -45,7 +45,7 @@ def started_chromium() -> Iterator[Any]:
 
 @contextmanager
 def opened_page(browser: Any, address: str, script: str = "", **context: Any) -> Iterator[Any]:
-    """Open a page in a context of its own, offline, and yield it when it has loaded; `script` runs before its own."""
+    """Open a page in a context of its own, offline, and yield it when it has loaded; `script` runs before."""
     settings = {"viewport": {"width": 1280, "height": 860}, "reduced_motion": "reduce", **context}
     troubles: list[str] = []
     place = browser.new_context(offline=True, accept_downloads=True, **settings)

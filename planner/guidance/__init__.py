@@ -1,0 +1,1 @@
+"""The law of guidance, in loops that are compiled when a file of this folder changes."""
