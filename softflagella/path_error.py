@@ -25,15 +25,9 @@ from planner.paths.path import Path2D
 from planner.paths.path_files import read_path
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
-from planner.planning.stated_error import (
-    deviations_open_loop,
-    error_growth,
-    predicted_error,
-    rms_in_time,
-    stated_error,
-)
+from planner.planning.stated_error import carried_out, deviations_open_loop, rms_in_time, stated_error
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
-from planner.vehicle.vehicle import Switches, roll_out
+from planner.vehicle.vehicle import Switches
 from sim.knowledge import CalibrationKnowledge
 from sim.model.robot import Robot
 from surrogate.tabulate import tabulate
@@ -126,12 +120,9 @@ def carry_out(plan: Plan, swims: TrackedVehicle) -> CarriedOut:
     """
     metres = swims.robot.length_scale
     schedule = plan.schedule(swims.robot if isinstance(swims.robot, Robot) else None)
-    switches = Switches(schedule.first_direction, schedule.dwells, np.array([schedule.start]))
-    rollout = roll_out(swims.vehicle, switches, swims.offset)
-    path = plan.drawn.scaled(plan.robot.length_scale / metres).polyline()
-    predicted = predicted_error(path, rollout.track, closed=plan.drawn.closed)
-    growth = error_growth(swims.vehicle, switches, rollout)
-    missed = rollout.track[-1] - path[-1]
+    path, switches = plan.drawn.polyline(), Switches(plan.first_direction, plan.dwells, plan.poses[:1])
+    rollout, predicted, growth = carried_out(swims, plan.robot, path, switches, plan.drawn.closed)
+    missed = rollout.track[-1] - plan.robot.length_scale / metres * path[-1]
     ends = np.hypot(*(missed + deviations_open_loop(growth)[:, -1]).T)
     low, high = np.quantile(ends, _INTERVAL).tolist()
     return CarriedOut(

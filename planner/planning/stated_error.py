@@ -44,6 +44,7 @@ import numpy as np
 from common.arrays import Floats, Integers
 from planner.paths.distance import distance_to, nearest
 from planner.paths.path import Path2D
+from planner.paths.units import Scales
 from planner.planning.declare import FeasiblePath
 from planner.planning.request import ERRORS, Camera, ProgressCallback, tell
 from planner.vehicle.tracked_point import TrackedVehicle
@@ -140,12 +141,12 @@ def plan_errors(
         progress: called now and then with the share that is done.
     """
     path = declared.reference.p
-    rollout = roll_out(tracked.vehicle, switches, tracked.offset)
-    predicted = predicted_error(path, rollout.track, closed=drawn.closed)
-    growth = error_growth(tracked.vehicle, switches, rollout, progress)
+    rollout, predicted, growth = carried_out(tracked, tracked.robot, path, switches, drawn.closed, progress)
     stated = stated_error(growth, predicted, seed=seed)
     for other in tracked.alternatives:
-        stated = max(stated, stated_error_of(other, tracked, path, switches, closed=drawn.closed, seed=seed))
+        _, theirs, their_growth = carried_out(other, tracked.robot, path, switches, drawn.closed)
+        length = other.robot.length_scale / tracked.robot.length_scale
+        stated = max(stated, length * stated_error(their_growth, theirs, seed=seed))
     return PlanErrors(
         track=rollout.track,
         distance=predicted.distance,
@@ -159,25 +160,30 @@ def plan_errors(
     )
 
 
-def stated_error_of(
-    other: TrackedVehicle, tracked: TrackedVehicle, path: Floats, switches: Switches, *, closed: bool, seed: int
-) -> float:
-    """Compute the stated error [l] of another robot that carries out a schedule, in seconds as it is.
+def carried_out(
+    swims: TrackedVehicle,
+    planned: Scales,
+    path: Floats,
+    switches: Switches,
+    closed: bool,
+    progress: ProgressCallback | None = None,
+) -> tuple[Rollout, Predicted, ErrorGrowth]:
+    """Predict what a robot does on a schedule of any robot, in its own units: track, deviations, their growth.
 
     Args:
-        other: the robot.
-        tracked: the robot for which the schedule was made, in whose units path, schedule and result are.
-        path: declared, (m, 2).
+        swims: the robot that carries it out, from the same place and with the same seconds.
+        planned: the robot for which the schedule was made, in whose units it is, and the path.
+        path: (m, 2), from which the track deviates.
         switches: the schedule.
         closed: the path ends at its start.
-        seed: of the random robots.
+        progress: called now and then.
     """
-    length = tracked.robot.length_scale / other.robot.length_scale
-    time, places = tracked.robot.time_scale / other.robot.time_scale, np.array([length, length, 1.0])
-    theirs = Switches(switches.first_direction, time * switches.dwells, switches.poses * places)
-    rollout = roll_out(other.vehicle, theirs, other.offset)
+    length = planned.length_scale / swims.robot.length_scale
+    dwells = planned.time_scale / swims.robot.time_scale * switches.dwells
+    theirs = Switches(switches.first_direction, dwells, switches.poses * [length, length, 1.0])
+    rollout = roll_out(swims.vehicle, theirs, swims.offset)
     predicted = predicted_error(length * path, rollout.track, closed=closed)
-    return stated_error(error_growth(other.vehicle, theirs, rollout), predicted, seed=seed) / length
+    return rollout, predicted, error_growth(swims.vehicle, theirs, rollout, progress)
 
 
 def _table_share(vehicle: Vehicle, growth: ErrorGrowth) -> float:
