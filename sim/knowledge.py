@@ -16,18 +16,21 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from common.arrays import Floats
-from common.errors import InputError, naming
+from common.changes import changes_of
+from common.errors import InputError, InputWarning, naming
 from common.reading import read_toml
 from sim.effects import is_effect
 from sim.model.robot import Robot
+from sim.model.robot_toml import field_of
 from sim.model.uncertainty import DEFAULTS
 
 COEFFICIENTS = ("C_t", "C_r", "C_yr")
@@ -124,12 +127,25 @@ found (docs/results-calibration.md and the paper's two)."""
 def read_knowledge(path: str | Path) -> CalibrationKnowledge:
     """Read the table [calibration] of a robot.toml; nothing is known where there is no such file or table.
 
+    What a command gives with --set is no longer what was fitted, so it loses its row and column of the covariance.
+
     Raises:
         InputError: the table is not as described above.
     """
     if not Path(path).is_file():
         return CalibrationKnowledge()
-    return CalibrationKnowledge.from_dict(read_toml(path).get("calibration", {}), path)
+    known = CalibrationKnowledge.from_dict(read_toml(path).get("calibration", {}), path)
+    given = {field_of(key): key for key in changes_of(path)}
+    kept = [k for k, name in enumerate(known.names) if name not in given]
+    if lost := [given[name] for name in known.names if name in given]:
+        warnings.warn(
+            f"{path}: --set replaces {', '.join(lost)}, which the calibration fitted: taken as exact, its "
+            "uncertainty is left out",
+            InputWarning,
+            stacklevel=1,
+        )
+    names = tuple(known.names[k] for k in kept)
+    return replace(known, names=names, covariance=known.covariance[np.ix_(kept, kept)])
 
 
 def knowledge_toml(knowledge: CalibrationKnowledge) -> str:

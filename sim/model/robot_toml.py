@@ -108,6 +108,13 @@ def check_keys(names: Iterable[str], option: str) -> None:
         raise InputError(f"{option} {name}: a robot has no such entry; {hint}")
 
 
+def field_of(name: str) -> str:
+    """Return the field of `Robot` that TABLE.KEY is, in any unit; of an effect its name."""
+    table, _, key = name.rpartition(".")
+    entry = _entry(table, key)
+    return entry.field if entry else key
+
+
 def robot_toml(robot: Robot) -> str:
     """Write the text of a robot.toml that is read back to the same robot, to the last bit."""
     tables: dict[str, list[str]] = {table: [note] for table, note in _NOTES.items()}

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from common.errors import InputError
 from planner.vehicle import from_table
 from sim.inputs import load_robot
+from sim.knowledge import CalibrationKnowledge, knowledge_toml
 from softflagella.__main__ import main, program_of
 from softflagella.shadowing import COMMANDED
 
@@ -103,3 +105,25 @@ def test_a_doubtful_number_is_asked_about_as_in_the_file(robot: Path, capsys: py
 def test_a_sweep_refers_to_a_file(robot: Path) -> None:
     with pytest.raises(InputError, match="names the file of its robot"):
         main(["dataset", "config", "--robot", str(robot), "--set", "motor.speed_rpm=4", "--out", "sweep.toml"])
+
+
+def test_a_fitted_number_that_is_changed_loses_its_uncertainty(
+    robot: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    known = CalibrationKnowledge(
+        ("C_t", "C_r", "C_yr", "viscosity"),
+        0.01 * np.array([[4, 1, 0, 0], [1, 4, 0, 0], [0, 0, 4, 1], [0, 0, 1, 9]]),
+    )
+    Path("corrected.toml").write_text(robot.read_text() + knowledge_toml(known))
+    words = ["plan", "circle:2l", "--robot", "corrected.toml", "--objective", "flips", "--out", "plan"]
+    main([*words, "--set", "fluid.viscosity_mPa_s=1490", "--set", "motor.speed_rpm=40"])
+    content = json.loads(Path("plan/plan.json").read_text())
+    assert content["calibration"]["names"] == ["C_t", "C_r", "C_yr"]
+    assert content["calibration"]["covariance"] == known.covariance[:3, :3].tolist()
+    assert "--set replaces fluid.viscosity_mPa_s, which the calibration fitted" in capsys.readouterr().err
+    main([*words, "--set", "drag.C_t=3"])  # is what it was, but no longer what was fitted
+    said = capsys.readouterr()
+    assert "if the coefficients are exact" in said.out
+    assert "--set replaces drag.C_t" in said.err
+    main([*words, "--set", "motor.speed_rpm=40"])
+    assert "--set" not in capsys.readouterr().err
