@@ -1,8 +1,9 @@
-"""Keywords of public functions: a wrong one is refused, with a proposal."""
+"""Arguments of public functions: a wrong keyword is refused with a proposal, a wrong type with the right ones."""
 
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Callable
 from functools import wraps
 from inspect import Parameter, signature, unwrap
@@ -25,6 +26,27 @@ def checks_keywords(function: Callable[P, R]) -> Callable[P, R]:
                 near = difflib.get_close_matches(name, known, 1)
                 proposal = f"is it {near[0]}?" if near else f"there are {', '.join(known)}"
                 raise InputError(f"{function.__name__} has no keyword {name!r}; {proposal}")
+        return function(*arguments, **given)
+
+    return checked
+
+
+def checks_types(function: Callable[P, R]) -> Callable[P, R]:
+    """Make a function refuse arguments of other classes than it names, `A | pkg.B`, and unknown keywords.
+
+    Annotations are compared as names, so that the classes are not imported.
+    """
+    takes = signature(function)
+    kinds = {p.name: re.findall(r"(\w+)(?= \||$)", str(p.annotation)) for p in takes.parameters.values()}
+
+    @checks_keywords
+    @wraps(function)
+    def checked(*arguments: P.args, **given: P.kwargs) -> R:
+        for name, value in takes.bind(*arguments, **given).arguments.items():
+            classes = {each.__name__ for each in type(value).__mro__} | ({"None"} if value is None else set())
+            if classes.isdisjoint(kinds[name]):
+                wanted = " or ".join(kinds[name])
+                raise InputError(f"{function.__name__}: {name} is of type {type(value).__name__}; give {wanted}")
         return function(*arguments, **given)
 
     return checked

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from common.errors import InputError
+from common.keywords import checks_types
 from common.notebook import given_axes
 
 if TYPE_CHECKING:
@@ -23,10 +24,11 @@ if TYPE_CHECKING:
 
     from calibration.report.saved_verdict import SavedVerdict
     from planner.planning.plan import Plan
-    from sim.robot_rows import OneRobot
+    from sim.model.robot import Robot
 
 
-def motion(robot: OneRobot, *, ax: Axes | None = None) -> Axes:
+@checks_types
+def motion(robot: Robot | str | Path, *, ax: Axes | None = None) -> Axes:
     """Simulate a robot, and draw the circle of its head's centre for each direction of the motor, in cm."""
     from sim.motion.robot_views import plot_circles
     from sim.motion.steady import steady
@@ -41,6 +43,7 @@ def motion(robot: OneRobot, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
+@checks_types
 def plan(result: Plan, *, ax: Axes | None = None) -> Axes:
     """Draw the given, the declared and the predicted path of a plan, with the stated error, in cm."""
     ax = result.plot(given_axes(ax))
@@ -48,6 +51,7 @@ def plan(result: Plan, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
+@checks_types
 def sweep(
     rows: pd.DataFrame | str | Path,
     output: str = "R_yr_over_l",
@@ -79,6 +83,7 @@ def sweep(
     return ax
 
 
+@checks_types
 def verdict(result: SavedVerdict, *, ax: Axes | None = None) -> Axes:
     """Draw the residual of each output of a verdict, before and after, over the noise of a run."""
     return result.plot(given_axes(ax))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import re
 from dataclasses import replace
+from inspect import isfunction, signature
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +78,30 @@ def test_a_sweep_is_drawn_from_rows_or_their_folder(tmp_path: Path) -> None:
             sf.plot.sweep(rows, column)
     with pytest.raises(InputError, match=r"'N' is no column .*; there are R_yr_over_l, omega_bar"):
         sf.plot.sweep(pd.DataFrame({"R_yr_over_l": [1.0], "omega_bar": [1.0]}))
+
+
+@pytest.mark.parametrize(
+    "function", [f for f in vars(sf.plot).values() if isfunction(f) and f.__module__ == sf.plot.__name__]
+)
+def test_a_wrong_argument_is_refused_by_every_function(function: Any) -> None:
+    first = next(iter(signature(function).parameters))
+    right: dict[str, Any] = {"robot": CONTROL, "rows": pd.DataFrame()}
+    for wrong in (3, None, [square()], object()):
+        with pytest.raises(InputError, match=rf"^{function.__name__}: {first} is of type {type(wrong).__name__}; give "):
+            function(wrong)
+    with pytest.raises(InputError, match="has no keyword 'axes'; is it ax"):
+        function(right.get(first, "x"), axes=None)
+    if first in right:
+        with pytest.raises(InputError, match=r": ax is of type str; give Axes or None"):
+            function(right[first], ax="x")
+    else:
+        with pytest.raises(InputError, match=": result is of type str; give "):
+            function("x")
+
+
+def test_a_column_that_is_no_text_is_refused() -> None:
+    with pytest.raises(InputError, match="sweep: output is of type int; give str"):
+        sf.plot.sweep(pd.DataFrame(), 3)  # type: ignore[arg-type]
 
 
 def cells(thing: Any) -> dict[str, str]:
