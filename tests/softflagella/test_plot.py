@@ -87,7 +87,8 @@ def test_a_wrong_argument_is_refused_by_every_function(function: Any) -> None:
     first = next(iter(signature(function).parameters))
     right: dict[str, Any] = {"robot": CONTROL, "rows": pd.DataFrame()}
     for wrong in (3, None, [square()], object()):
-        with pytest.raises(InputError, match=rf"^{function.__name__}: {first} is of type {type(wrong).__name__}; give "):
+        kind = type(wrong).__name__
+        with pytest.raises(InputError, match=rf"^{function.__name__}: {first} is of type {kind}; give "):
             function(wrong)
     with pytest.raises(InputError, match="has no keyword 'axes'; is it ax"):
         function(right.get(first, "x"), axes=None)
