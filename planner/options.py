@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -20,7 +20,7 @@ from common.units import LengthUnit
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.path import Path2D, like_a_shape, shape_of
 from planner.paths.path_files import Drawing, read_outlines, read_path
-from planner.paths.units import Scales, in_tails, read_length, read_pose, read_time
+from planner.paths.units import Scales, in_tails, read_length, read_pose, read_time, time_in_lab
 from planner.planning.request import Camera, Corner, PlanRequest
 from planner.vehicle.from_table import table_for
 from planner.vehicle.measured import MeasuredVehicle
@@ -68,7 +68,8 @@ class DwellOptions(TableOptions, total=False):
         minimum_dwell: shortest dwell that the motor allows, in time units μ0 l⁴/EI (viscosity, tail length,
             bending stiffness).
         minimum_seconds: the same in seconds; the larger one counts.
-        tolerance: LENGTH, largest acceptable stated error, such as 5mm; the dwell is shortened until it is kept.
+        tolerance: LENGTH, largest acceptable stated error, such as 5mm; the dwell that the objective chooses is
+            shortened until it is kept, down to the minimum, or the plan is refused.
     """
 
     minimum_dwell: float | None
@@ -109,7 +110,8 @@ class PointOptions(DwellOptions, total=False):
     Attributes:
         point: which point of the robot follows the declared path, or reaches goals (default: head_centre).
         objective: what decides the dwell: small error, short time, or few flips (default: error).
-        dwell: this shortest dwell, in time units, and not the one that the objective would choose.
+        dwell: this shortest dwell, in time units, in place of an objective; with a tolerance that it does not keep
+            the plan is refused.
     """
 
     point: Point
@@ -214,7 +216,7 @@ def request_of(options: Mapping[str, Any], robot: Scales, **own: Any) -> PlanReq
     """Return what is asked of a plan; `own` are further fields.
 
     Raises:
-        InputError: an option cannot be, such as round walls.
+        InputError: an option cannot be, such as round walls, or two contradict each other.
     """
     given, unit = {name: options[name] for name in _REQUEST if name in options}, options.get("unit")
     if "camera" in given:
@@ -222,11 +224,20 @@ def request_of(options: Mapping[str, Any], robot: Scales, **own: Any) -> PlanReq
     if given.get("tolerance") is not None:
         given["tolerance"] = length_of(given["tolerance"], unit, robot, "--tolerance")
     walls = options.get("walls")
+    request = PlanRequest(**given, **own)
+    least = request.least_dwell(robot)
+    if request.dwell is not None and "objective" in given:
+        raise InputError("dwell and objective: the objective chooses the dwell; leave one of them out")
+    if request.dwell is not None and least is not None and request.dwell < least:
+        raise InputError(
+            f"dwell {time_in_lab(request.dwell, robot)} is shorter than the minimum, {time_in_lab(least, robot)}; "
+            "give a longer dwell, or allow a shorter one"
+        )
     outlines = [None] if walls is None else regions_of(walls, unit, robot)
     if len(outlines) > 1 or isinstance(outlines[0], Circle):
         raise InputError(f"--walls {walls!r}; give a box or an outline")
     regions = tuple(part for each in options.get("keep_out", ()) for part in regions_of(each, unit, robot))
-    return PlanRequest(**given, **own, space=FreeSpace(regions, outlines[0]))
+    return replace(request, space=FreeSpace(regions, outlines[0]))
 
 
 def length_of(given: Length, unit: str | None, robot: Scales, name: str) -> float:

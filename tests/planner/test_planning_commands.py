@@ -100,6 +100,12 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("plan circle:1l --camera 0.02 0.03 1.5 0.5 0.1 R", "0.02 has no unit"),
         ("plan circle:1l --camera 0.02l 0.03cm 1.5 0.5 0.1 R", "--camera 0.02l 0.03cm 1.5 0.5 0.1: RAD"),
         ("plan circle:1l --camera 0.02l 0.03 1.5 0.5 10% R", "numbers without a unit"),
+        ("plan circle:1l --dwell 1 --objective time R", "dwell and objective: the objective chooses"),
+        ("tour 0,0 2,0 --unit l --dwell 1 --objective error R", "leave one of them out"),
+        ("plan circle:1l --dwell 0.5 --minimum-seconds 2 R",
+         "dwell 1.1 s (0.5 time units) is shorter than the minimum, 2 s (0.91 time units)"),
+        ("hold 2l,1l --dwell 0.5 --minimum-dwell 0.6 R", "is shorter than the minimum, 1.3"),
+        ("plan circle:1l --dwell 4 --tolerance 0.01l R", "tolerance 1.1 mm (0.01 l) cannot be kept"),
         # jobs
         ("tour 0l,0 R", "two or more"),
         ("tour 0,0 1,1 0,0 --unit l R", "places 1 and 3 are the same"),
@@ -145,7 +151,7 @@ def test_refusals_are_one_line_and_write_nothing(
 ) -> None:
     monkeypatch.chdir(files)
     given = words.replace(" R", " --robot paper-control").split()
-    if given[0] in ("plan", "tour", "hold"):
+    if given[0] in ("plan", "tour", "hold") and "--dwell" not in given:
         given += ["--objective", "flips"]
     given += [] if given[0] == "track" else ["--out", "out"]
     assert run_command(main, given) == (3 if "no way" in expected else 2)
