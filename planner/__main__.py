@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 program = Program("planner", "plan switching schedules for paths")
 main = program.main
+CAMERA = "--camera-errors"  # the camera itself is that of softflagella track --camera
 
 
 class BoardOptions(TypedDict, total=False):
@@ -54,7 +55,7 @@ def planned(call: Call, folders: BoardOptions, **further: Any) -> Plan:
     return plan
 
 
-@program.command("plan", of="planner.jobs.plan:plan", robot="--robot")
+@program.command("plan", of="planner.jobs.plan:plan", robot="--robot", camera=CAMERA)
 def _plan(plan: Call, *, out: str, **folders: Unpack[BoardOptions]) -> None:
     """Plan the switching times for a path."""
     result = planned(plan, folders, tell=print)
@@ -66,7 +67,7 @@ def _plan(plan: Call, *, out: str, **folders: Unpack[BoardOptions]) -> None:
     _write(result, out, f"{drawn}declared path", **folders)
 
 
-@program.command("goal", of="planner.goal.trip:to_goal", robot="--robot")
+@program.command("goal", of="planner.goal.trip:to_goal", robot="--robot", camera=CAMERA)
 def _goal(
     to_goal: Call,
     *,
@@ -84,8 +85,8 @@ def _goal(
     _write(planned(to_goal, folders, start=start, goal=goal), out, **folders)
 
 
-@program.command("hold", of="planner.jobs.hold:hold", robot="--robot", seconds="for")
-@program.command("tour", of="planner.jobs.tour:tour", robot="--robot", back="return")
+@program.command("hold", of="planner.jobs.hold:hold", robot="--robot", camera=CAMERA, seconds="for")
+@program.command("tour", of="planner.jobs.tour:tour", robot="--robot", camera=CAMERA, back="return")
 def _job(job: Call, *, out: str, **folders: Unpack[BoardOptions]) -> None:
     _write(planned(job, folders), out, **folders)
 

@@ -87,9 +87,9 @@ class SpaceOptions(TypedDict, total=False):
         walls: REGION, what the body must stay within: box:…, or a file with one outline. In Python also corners.
         feedback: the pose will be measured for a tracker: the margin around obstacles is the stated error with
             feedback.
-        camera: NOISE RAD EVERY LATE LOST, of the stated error with feedback: standard deviations of a place and of
-            a heading in rad, seconds between poses, their age in seconds, share that is lost (default: 0.01l 0.01
-            1 2 0.2). In Python also a `Camera`.
+        camera: NOISE RAD EVERY LATE LOST, for the stated error with feedback: standard deviations of a place and
+            of a heading in rad, seconds between poses, their age in seconds, share that is lost (default: 0.01l
+            0.01 1 2 0.2). In Python also a `Camera`.
         seed: of the random robots from which the stated error is computed.
     """
 
@@ -254,12 +254,13 @@ def camera_of(given: Camera | Sequence[str], unit: str | None, robot: Scales) ->
     if isinstance(given, Camera):
         return given
     place, *numbers = given
-    noise = read_length(place, unit, robot, "--camera", above_zero=True)
+    noise = read_length(place, unit, robot, "--camera-errors", above_zero=True)
     try:
         heading, every_s, delay_s, lost = map(float, numbers)
     except ValueError:
         raise InputError(
-            f"--camera {' '.join(given)}: RAD, EVERY, LATE, LOST are numbers without a unit, such as 0.01 1 2 0.2"
+            f"--camera-errors {' '.join(given)}: RAD, EVERY, LATE and LOST are numbers without a unit, such as "
+            "0.01 1 2 0.2"
         ) from None
     return Camera((noise, heading), every_s, delay_s, lost)
 

@@ -90,7 +90,7 @@ def _query(
 
         if robot:
             raise InputError("--vary and --plot are for one robot, without --robot")
-        options = {**query.given, "flag": True}  # robots outside are marked
+        options = {"flag": not query.given.get("strict"), **query.given}  # robots outside are marked
         table = load_table(lookup)
         return write_variations(robots, vary, lambda rows: answer_rows(rows, table, **options), out, plot)
     rows = command_rows(robots, robot, out, DWELL)

@@ -179,5 +179,7 @@ def answer_rows(
     rows: RobotRows, table: LookupTable, *, flag: bool = False, certify: bool = False, strict: bool = False
 ) -> dict[str, Any]:
     """Answer as `answer_with_error`; refusals name the robots, and the file of their table."""
+    if flag and strict:
+        raise InputError("flag and strict: give numbers for robots outside, or refuse all; leave one of them out")
     with rows.naming(), refusing_robots(rows.robots, table) if rows.robots else nullcontext():
         return answer_with_error(table, rows.columns, flag=flag, certify=certify, strict=strict)

@@ -38,10 +38,10 @@ def query(
     Args:
         robots, robot: as for `steady`; a table may have a column `dwell_bar`, for the response to flips after it.
         lookup: look-up table, or its file; default: the one that comes with the package.
-        flag: give numbers for robots outside the domain, too; the column `outside` says which.
+        flag: give numbers for robots outside the domain, too; the column `outside` says which. Otherwise these
+            are missing, and the column `note` says why.
         certify: simulate each robot as well; the column `certified_error` is the actual error of its answer.
-        strict: refuse all robots where one is outside the domain; otherwise its numbers are missing, and the
-            column `note` says why it is outside.
+        strict: refuse all robots where one is outside the domain.
         derivatives: add the Jacobian, in all dimensionless inputs but N, or in those named; effects may be named,
             too. A column `omega_yr_bar_per_C_yr` is ∂ω̄_yr/∂C_yr. For torch there is `torch_query`.
 
@@ -51,7 +51,8 @@ def query(
         `<column>_low` and `<column>_high` are the intervals of the dimensionless columns.
 
     Raises:
-        InputError: a robot cannot be, none is within the domain of the table, or an input has no derivatives.
+        InputError: a robot cannot be, none is within the domain of the table, an input has no derivatives, or
+            `flag` and `strict` are given.
 
     Example:
         >>> import softflagella as sf

@@ -200,7 +200,7 @@ def surrogate_robot(made: Path, out: Path) -> str:
 
 
 def planner_plan(made: Path, out: Path) -> str:
-    camera = ["--camera", "0.02l", 0.03, 1.5, 0.5, 0.1]
+    camera = ["--camera-errors", "0.02l", 0.03, 1.5, 0.5, 0.1]
     done("planner", "plan", "square:3l", "--robot", made / "robot.toml", *camera, "--out", out / "plan")
     assert names(out / "plan") == FILES
     assert load_plan(out / "plan" / "plan.json")["camera"] == Camera((0.02, 0.03), 1.5, 0.5, 0.1).to_dict()

@@ -35,7 +35,7 @@ def _track(
     camera: str | None = None,
     view: str | None = None,
     serial: str | None = None,
-    lost: float | None = None,
+    lost_seconds: float | None = None,
     show: bool = False,
 ) -> None:
     """Keep a robot on a path or a saved plan: poses come in on a pipe or from a camera.
@@ -52,7 +52,7 @@ def _track(
         camera: number of a camera over the tank, such as 0, or a film; the track is printed.
         view: the camera's view.toml.
         serial: port of the motor's board, such as /dev/ttyACM0 (default: nothing moves).
-        lost: seconds without a pose after which the motor rests (default: 2).
+        lost_seconds: without a pose after which the motor rests (default: 2).
         show: serve a page to this computer: picture, path, robot, and a button that stops the motor.
     """
     from planner.files.saved_plan import is_plan
@@ -61,10 +61,10 @@ def _track(
     from tracking.pipe import answers
     from tracking.tracker import Tracker
 
-    _check_options(noise_rad, latency, lost)
-    if camera is None and (view or serial or lost or show):
+    _check_options(noise_rad, latency, lost_seconds)
+    if camera is None and (view or serial or lost_seconds or show):
         raise InputError(
-            "--view, --serial, --lost and --show are for --camera, whose number is missing, such as --camera 0"
+            "--view, --serial, --lost-seconds and --show are for --camera, which is missing, such as --camera 0"
         )
     if camera is not None and (view is None or start is not None):
         raise InputError("--camera needs --view view.toml and shows where the robot is; leave --start out")
@@ -86,7 +86,7 @@ def _track(
         return Tracker(plan, noise=deviations, latency=latency / scale, begin=now, start=pose)
 
     if camera is not None and view is not None:
-        _live(plan, camera, view, serial, latency, lost or 2.0, begin, show=show)
+        _live(plan, camera, view, serial, latency, lost_seconds or 2.0, begin, show=show)
         return
     if start is not None:
         tracker: Tracker | None = begin(read_pose(start, unit, plan.robot, "--start"), 0.0)
@@ -96,14 +96,14 @@ def _track(
         print(answer, flush=True)
 
 
-def _check_options(noise_rad: float, latency: float, lost: float | None) -> None:
+def _check_options(noise_rad: float, latency: float, lost_seconds: float | None) -> None:
     """Refuse numbers that cannot be."""
     if not 0 < noise_rad < math.inf:
         raise InputError(f"--noise-rad {noise_rad}; give a number above 0")
     if not 0 <= latency < math.inf:
         raise InputError(f"--latency {latency}; give a number of seconds, 0 or more")
-    if lost is not None and not 0 < lost < math.inf:
-        raise InputError(f"--lost {lost}; give a number of seconds above 0")
+    if lost_seconds is not None and not 0 < lost_seconds < math.inf:
+        raise InputError(f"--lost-seconds {lost_seconds}; give a number above 0")
 
 
 def _live(
