@@ -295,7 +295,7 @@ def _tum(path: Path) -> Seen:
 PROGRAMS = {
     "deeplabcut": TrackingProgram("DeepLabCut", _deeplabcut, (".csv", *_HDF5), "scorer,|\x89HDF", likely=0.6),
     "sleap": TrackingProgram("SLEAP", _sleap, (".csv", *_HDF5), "track,frame_idx,|\x89HDF", likely=0.2),
-    "trackmate": TrackingProgram("TrackMate", _trackmate, (".csv", ".xml"), "LABEL,ID,TRACK_ID,|<"),
+    "trackmate": TrackingProgram("TrackMate", _trackmate, (".csv", ".xml"), "(?i:LABEL),ID,TRACK_ID,|<"),
     "tracker": TrackingProgram("Tracker", _tracker, (".txt", ".csv"), "#?multi:", y_down=False),
     "idtrackerai": TrackingProgram(
         "idtracker.ai", _idtrackerai, (".csv", *_HDF5, ".npy"), "seconds,x1,y1|\x93NUMPY|\x89HDF"

@@ -26,6 +26,7 @@ WRITTEN: dict[str, tuple[str, bytes | Callable[[Path], None], dict[str, Any]]] =
     "run3.analysis.h5": ("sleap", files.sleap_h5, FILMED),
     "older.analysis.h5": ("sleap", partial(files.sleap_h5, scores=False), FILMED),
     "spots.csv": ("trackmate", files.trackmate(), {"scale": "0.5mm", **TRACKS}),
+    "older.csv": ("trackmate", files.trackmate_older(), {**FILMED, **TRACKS}),
     "run3.xml": ("trackmate", files.trackmate_xml(), {**FILMED, **TRACKS}),
     "run3_Tracks.xml": ("trackmate", files.trackmate_tracks(), {"scale": "0.5mm", **TRACKS}),
     "run3.txt": ("tracker", files.tracker(), {"scale": "1cm"}),

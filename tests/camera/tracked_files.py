@@ -107,6 +107,15 @@ def trackmate() -> bytes:
     return "\n".join([*heads, *spots, "ID999,999,,1.5,5,5,0,0,0,3", ""]).encode()
 
 
+def trackmate_older() -> bytes:
+    """Write a table as the versions before 6 did: without units, and None for a spot that is in no track."""
+    head, _, _, _, *spots = (
+        trackmate().decode().replace("LABEL", "Label").replace("999,,", "999,None,").split("\n")
+    )
+    rows = [spot.split(",") for spot in spots if spot]
+    return "\n".join([head, *(",".join([*row[:7], row[8], *row[8:]]) for row in rows), ""]).encode()
+
+
 def trackmate_xml() -> bytes:
     spots, edges = "", ""
     for track, name in enumerate(DOTS):
