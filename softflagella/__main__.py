@@ -134,8 +134,7 @@ def _compare(files: Sequence[str], *, plan: str | None = None, plot: str | None 
     """Say what differs between robots, plans, tracks or verdicts.
 
     Args:
-        files: two or more of one kind: robot.toml, presets, tables of robots; plan.json, verdict.json, or their
-            folders; tracks.
+        files: two or more of one kind: robot.toml, presets; plan.json, verdict.json, or their folders; tracks.
         plan: plan.json, the plan of tracks.
         plot: SVG, PNG or PDF, a picture of them.
     """

@@ -28,13 +28,11 @@ if TYPE_CHECKING:
 
     from sim.knowledge import CalibrationKnowledge
     from sim.model.robot import Robot
-    from sim.robot_rows import RobotRows
 
 _IN_FOLDER = ("plan.json", "verdict.json")
 _HALF = 1.96  # standard deviations in half a 95 % interval
 _LOGARITHM = "logarithm"  # the scale on which a number was fitted, as verdict.json says it
 _MOTION = ("v_cm_s", "omega_yr_rad_s", "R_yr_cm", "theta_deg", "omega_h_rpm", "circle_s")
-_BARE = ("v_z", "omega_yr_bar", "R_yr_over_l", "theta_deg", "omega_h_bar")
 _IN_TAILS = ("time_bar", "x_over_l", "y_over_l", "heading_rad")  # of a replay
 _ERRORS = {
     "stated error [mm]": "stated_error_over_l",
@@ -104,7 +102,7 @@ def compare(words: Sequence[str], plan: str | None = None) -> Comparison:
     """Compare two files or more of one kind.
 
     Args:
-        words: robot.toml, presets, tables of robots; plan.json, verdict.json, their folders; or tracks.
+        words: robot.toml, presets; plan.json, verdict.json, their folders; or tracks.
         plan: plan.json of tracks.
 
     Raises:
@@ -131,42 +129,36 @@ def compare(words: Sequence[str], plan: str | None = None) -> Comparison:
 def _read(word: str) -> tuple[str, Any]:
     """Tell what a file is, and return its content."""
     from planner.files.saved_plan import load_plan, plan_json
-    from sim.inputs import names_robot
+    from sim.inputs import load_robot, names_robot
     from sim.knowledge import read_knowledge
-    from sim.robot_rows import robot_rows
     from tracking.tracks import read_track
 
-    inside = [Path(word, name) for name in _IN_FOLDER if Path(word, name).is_file()]
-    path = inside[0] if inside else Path(word)
-    if not inside and names_robot(word):
-        return "robot", (robot_rows(word), read_knowledge(word))
+    if names_robot(word):
+        return "robot", (load_robot(word), read_knowledge(word))
+    path = next((path for name in _IN_FOLDER if (path := Path(word, name)).is_file()), Path(word))
     if path.suffix == ".json":
         content = read_json(path)
         return ("verdict", content) if "verdict" in content else ("plan", load_plan(plan_json(path)))
-    table = read_track(path)
-    return ("robot", (robot_rows(word), None)) if "omega_bar" in table else ("track", table)
+    return "track", read_track(path)
 
 
-def _robots(robots: Mapping[str, tuple[RobotRows, Any]]) -> Comparison:
+def _robots(robots: Mapping[str, tuple[Robot, CalibrationKnowledge]]) -> Comparison:
     from sim.motion.batches import steady_columns
     from sim.motion.steady_motion import lab_title
+    from sim.robot_rows import robot_rows
     from surrogate.answers import answer_rows
     from surrogate.table_file import load_table
 
-    files, lookup = dict[str, Cells](), load_table(None)
-    lab = all(rows.robots for rows, _ in robots.values())  # else in the simulator's units
-    titles = {column: lab_title(column) if lab else column for column in (_MOTION if lab else _BARE)}
-    for name, (rows, known) in robots.items():
+    files, titles = dict[str, Cells](), {column: lab_title(column) for column in _MOTION}
+    for name, (robot, known) in robots.items():
+        rows = robot_rows(robot)
         try:
-            motion, source = answer_rows(rows, lookup), "look-up table, 90 %"
+            motion, source = answer_rows(rows, load_table(None)), "look-up table, 90 %"
         except InputError:  # the table does not know it
             motion, source = steady_columns(rows.columns, title=""), "simulated, estimated errors"
-        frame = rows.frame(motion)
-        for k, error in enumerate(frame["error"]):
-            cells = _inputs(rows.robots[k], known) if lab else Cells()
-            cells |= {} if lab else {name: Bounded(values[k]) for name, values in rows.columns.items()}
-            cells |= {title: Bounded.around(frame[c][k], abs(frame[c][k]) * error) for c, title in titles.items()}
-            files[f"{name} {k + 1}" if len(frame) > 1 else name] = {**cells, "source of the motion": source}
+        row = rows.frame(motion).iloc[0]
+        moves = {title: Bounded.around(row[c], abs(row[c]) * row["error"]) for c, title in titles.items()}
+        files[name] = {**_inputs(robot, known), **moves, "source of the motion": source}
     return Comparison(files, _dots(files, [*titles.values()][:4]), "intervals: of inputs 95 %, of the motion 90 %")
 
 
