@@ -19,7 +19,6 @@ import numpy as np
 from common.arrays import Floats
 from common.errors import InputError, naming
 from common.reading import expecting, read_json
-from common.units import from_si
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -169,13 +168,10 @@ def _inputs(robot: Robot, known: CalibrationKnowledge) -> Cells:
     half = dict(zip(known.names, _HALF * np.sqrt(np.diag(known.covariance)), strict=True))
     cells = Cells()
     for entry in ENTRIES:
-        size = getattr(robot, entry.field)
-        size = robot.head_radius if size is None else size  # the default of the disc offset
+        size = robot.number(entry.field)
         stated = robot.sigmas[entry.field].of(size) if entry.field in robot.sigmas else 0.0
-        value, sigma = (from_si(each, entry.unit) if entry.unit else each for each in (size, stated))
-        fitted = entry.field in half
-        within = (half[entry.field], _LOGARITHM) if fitted else (_HALF * sigma, "")
-        cells[f"{entry.table}.{entry.key}"] = Bounded.around(value, *within)
+        fitted = (half[entry.field], _LOGARITHM) if entry.field in half else (_HALF * entry.written(stated), "")
+        cells[f"{entry.table}.{entry.key}"] = Bounded.around(entry.written(size), *fitted)
     for name, size in robot.effects.items():
         cells[f"effects.{name}"] = Bounded.around(size, half.get(name, 0.0), "as it is" if name in half else "")
     return cells

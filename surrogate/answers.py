@@ -97,13 +97,7 @@ def _group(robot: Robot, group: str) -> str:
 def _lab(robot: Robot, group: str) -> str:
     """Write the number that decides a group in its unit."""
     unit = _NUMBERS[group].unit
-    return f"{from_si(_size(robot, group), unit):.4g} {unit}" if unit else f"{robot.tails}"
-
-
-def _size(robot: Robot, group: str) -> float:
-    """Return the number that decides a group, in SI units."""
-    value = getattr(robot, _NUMBERS[group].field)
-    return float(robot.head_radius if value is None else value)  # the default of the disc offset
+    return f"{from_si(robot.number(_NUMBERS[group].field), unit):.4g} {unit}" if unit else f"{robot.tails}"
 
 
 def _known(robot: Robot, group: str, table: LookupTable) -> list[Robot]:
@@ -114,7 +108,8 @@ def _known(robot: Robot, group: str, table: LookupTable) -> list[Robot]:
     known = ~table.query(group_columns(robots), flag=True)[OUTSIDE]
     if not known.any():
         return []
-    far = np.abs(np.log([_size(variant, group) / _size(robot, group) for variant in robots]))
+    field = _NUMBERS[group].field
+    far = np.abs(np.log([variant.number(field) / robot.number(field) for variant in robots]))
     first = last = int(np.argmin(np.where(known, far, np.inf)))
     while first > 0 and known[first - 1]:
         first -= 1
@@ -126,12 +121,13 @@ def _known(robot: Robot, group: str, table: LookupTable) -> list[Robot]:
 def _variants(robot: Robot, group: str) -> list[Robot]:
     """Return robots that differ in the number that decides a group, rising; without those that cannot be."""
     values: list[Any] = list(range(1, MOST_TAILS + 1))
+    field = _NUMBERS[group].field
     if group != "N":
-        values = (_size(robot, group) * np.geomspace(1 / _FACTOR, _FACTOR, 2 * _STEPS + 1)).tolist()
+        values = (robot.number(field) * np.geomspace(1 / _FACTOR, _FACTOR, 2 * _STEPS + 1)).tolist()
     robots = []
     for value in values:
         try:
-            variant = replace(robot, **{_NUMBERS[group].field: value})
+            variant = replace(robot, **{field: value})
             variant.group_values()  # a law has a range of its own
         except InputError:
             continue

@@ -21,7 +21,7 @@ import numpy as np
 from calibration.laws.places import Place, place_named
 from calibration.laws.readings import EXPONENTS, INPUTS, NOTED, logarithms, noted_values, parameter_of
 from calibration.statistics.statistical_model import Parameter, Parameters
-from calibration.swimmer.influences import influence_of_law, robot_number
+from calibration.swimmer.influences import influence_of_law
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.swimmer import Inputs, SwimmerModel
 from common.arrays import Floats
@@ -49,7 +49,7 @@ def moved_parameter(robot: Robot, name: str) -> Parameter:
     """Return what a place moves as a parameter: a law's term, or a number of the robot, which may be exact."""
     if law := influence_of_law(name):
         return law.parameter
-    return Parameter(name, name, robot_number(robot, name), (0.0, math.inf), 1.0, logarithmic=True)
+    return Parameter(name, name, robot.number(name), (0.0, math.inf), 1.0, logarithmic=True)
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ class LawModel(SwimmerModel):
                 inner[name] = load
         else:
             for name, power in self.place.moves:
-                inner[name] = inner.get(name, robot_number(self.robot, name)) * m**power
+                inner[name] = inner.get(name, self.robot.number(name)) * m**power
         return inner
 
     def inputs_of_runs(self, sets: Sequence[Parameters]) -> Inputs:

@@ -47,12 +47,6 @@ _SHOWN_IN = {
 _FACTOR = 5.0  # a number may be off by
 
 
-def robot_number(robot: Robot, name: str) -> float:
-    """Return a number of the robot; a is the head's radius if it is not given."""
-    value = getattr(robot, name)
-    return float(robot.head_radius if value is None else value)
-
-
 def nuisance_parameters(
     robot: Robot, table: Mapping[str, float], outputs: Sequence[str], noted: Sequence[str]
 ) -> tuple[Parameter, ...]:
@@ -66,7 +60,7 @@ def nuisance_parameters(
     """
     parameters = []
     for name, title in FIELDS.items():
-        value = robot_number(robot, name)
+        value = robot.number(name)
         sigma = robot.sigma(name).of(value) / value
         bounds = (value / _FACTOR, value * _FACTOR)
         unit = UNITS[_SHOWN_IN[name]]

@@ -34,7 +34,6 @@ from calibration.swimmer.influences import (
     influences,
     nuisance_parameters,
     reason_untestable,
-    robot_number,
 )
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.observation import Observation
@@ -284,7 +283,7 @@ class SwimmerModel:
     def inputs_of_runs(self, sets: Sequence[Parameters]) -> Inputs:
         """Compute the robots of all runs in P parameter sets, and how they are observed."""
         runs, robot, of = self.runs, self.robot, partial(stacked, sets)
-        numbers = {name: of(name, robot_number(robot, name)) for name in (*COEFFICIENTS, *FIELDS)}
+        numbers = {name: of(name, robot.number(name)) for name in (*COEFFICIENTS, *FIELDS)}
         numbers |= {"tails": runs.tails[None], "tail_length": runs.length + of(LENGTH, 0.0)}
         numbers["motor_speed"] = np.abs(runs.omega) * of(TACHOMETER, 1.0) * (1 - of(SLIP, 0.0))
         effects = {name: np.full((1, 1), size) for name, size in robot.effects.items()}
@@ -361,5 +360,5 @@ def robot_numbers(robot: Robot, parameters: Parameters) -> dict[str, Any]:
     """Collect fitted coefficients and numbers of the robot, by field; a is kept where R changes."""
     numbers: dict[str, Any] = {name: float(parameters[name]) for name in COEFFICIENTS}
     for name in FIELDS:
-        numbers[name] = float(parameters.get(name, robot_number(robot, name)))
+        numbers[name] = float(parameters.get(name, robot.number(name)))
     return numbers

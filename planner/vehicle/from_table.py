@@ -284,8 +284,7 @@ def _slope_of_number(robot: Robot, lookup: LookupTable, motion: TwistsAndLags, n
 
     It changes groups, and the units of time and length. The schedule keeps its seconds, the path its metres.
     """
-    given = robot.head_radius if getattr(robot, name) is None else getattr(robot, name)
-    changed: list[dict[str, Any]] = [{name: given * math.exp(sign * _STEP)} for sign in (1.0, -1.0)]
+    changed: list[dict[str, Any]] = [{name: robot.number(name) * math.exp(sign * _STEP)} for sign in (1.0, -1.0)]
     ends = [replace(robot, **change) for change in changed]
     above, below = (end.group_values() for end in ends)
     changes = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from common.units import UNITS, split
+from common.units import UNITS, from_si, split
 
 
 class Entry(NamedTuple):
@@ -25,6 +25,10 @@ class Entry(NamedTuple):
     def with_unit(self, unit: str) -> str:
         """Return the key for another unit."""
         return f"{self.quantity}_{unit}" if unit else self.quantity
+
+    def written(self, number: float) -> float:
+        """Convert a number from SI units to the unit in which it is written."""
+        return float(from_si(number, self.unit)) if self.unit else number
 
     def fits(self, table: str, key: str) -> bool:
         """Say whether a key holds this number, in any unit of its kind."""

@@ -117,12 +117,17 @@ class Robot(Shown):
         for entry in ENTRIES:
             if (value := getattr(self, entry.field)) is not None:
                 numbers = [value, *([self.sigmas[entry.field].of(value)] if entry.field in self.sigmas else [])]
-                words = [f"{from_si(number, entry.unit) if entry.unit else number:.4g}" for number in numbers]
+                words = [f"{entry.written(number):.4g}" for number in numbers]
                 unit = f" {UNITS[entry.unit].text}" if entry.unit else ""
                 name = entry.quantity.replace("_", " ") if entry.unit else entry.quantity
                 rows.append((f"{entry.table}, {name}", f"{' ± '.join(words)}{unit}"))
         effects = [(f"effect {name}", f"{size:.4g}") for name, size in self.effects.items()]
         return [*rows, ("unit of time", f"{self.time_scale:.4g} s"), *effects]
+
+    def number(self, name: str) -> float:
+        """Return a number in SI units; the disc offset is by default the head's radius."""
+        value = getattr(self, name)
+        return float(self.head_radius if value is None else value)
 
     def sigma(self, name: str) -> Sigma:
         """Return one standard deviation of a field, as stated or by default (`sim.model.uncertainty`)."""
@@ -161,8 +166,7 @@ class Robot(Shown):
 
     def _given_groups(self) -> dict[str, float]:
         """Compute the groups of any robot, within the runs of its law or not."""
-        offset = self.head_radius if self.disc_offset is None else self.disc_offset
-        return {**groups_of({**vars(self), "disc_offset": offset}), **self.effects}
+        return {**groups_of({**vars(self), "disc_offset": self.number("disc_offset")}), **self.effects}
 
     def groups(self) -> Groups:
         """Return this robot as a batch of one."""
@@ -172,7 +176,7 @@ class Robot(Shown):
     def outline(self) -> tuple[float, float, float]:
         """Front and back of head and straight tails, forward from the head's centre, and half of the width [l]."""
         half = self.head_length / 2 / self.tail_length
-        width = max(self.head_radius, (self.disc_offset or self.head_radius) + self.tail_radius)
+        width = max(self.head_radius, self.number("disc_offset") + self.tail_radius)
         return half, -half - 1.0, width / self.tail_length
 
     def with_motor(self, omega_bar: float) -> Robot:

@@ -121,7 +121,7 @@ def robot_toml(robot: Robot) -> str:
     for entry in ENTRIES:
         lines = tables.setdefault(entry.table, [])
         value = getattr(robot, entry.field)
-        unit, number = _written(robot.head_radius if value is None else value, entry.unit)
+        unit, number = _written(robot.number(entry.field), entry.unit)
         text = f"{entry.with_unit(unit)} = {number}"
         if value is None:  # the default of the disc offset, the only optional number
             lines.append(_line(f"# {text}", f"{entry.comment}; without it R"))
