@@ -120,10 +120,10 @@ class LivePage:
 
     def answer(self, method: str, path: str) -> tuple[str, bytes, str] | None:
         """Answer a request: type, content, and policy for scripts and styles; None: there is no such thing."""
-        _, token, *what = path.partition("?")[0].split("/")
-        if not hmac.compare_digest(token.encode(), self._token.encode()):
+        root, _, what = path.partition("?")[0].rpartition("/")
+        if not hmac.compare_digest(root.encode(), f"/{self._token}".encode()):
             return None
-        match method, *what:
+        match method, what:
             case "POST", "stop":
                 self.stopped.set()
                 return "application/json", b"{}", ""
@@ -141,8 +141,6 @@ class LivePage:
 
 
 class _Server(ThreadingHTTPServer):
-    daemon_threads = True
-
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Say nothing of a browser that has gone away."""
         if not isinstance(sys.exception(), OSError):

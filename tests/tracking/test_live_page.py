@@ -63,6 +63,12 @@ def test_only_who_knows_the_token_and_names_this_host_is_answered(page: LivePage
     assert page.stopped.is_set()
 
 
+def test_a_request_without_a_path_is_refused_in_silence(page: LivePage, capfd: pytest.CaptureFixture[str]) -> None:
+    for what in ("state", "?", "*", "TOKEN"):
+        assert asked(page, what).status == 404, what
+    assert capfd.readouterr().err == ""
+
+
 def test_the_policy_allows_what_the_page_has_and_no_more(page: LivePage) -> None:
     first, again = (asked(page, "/TOKEN/") for _ in range(2))
     policy = first.policy
@@ -109,6 +115,26 @@ def test_the_newest_sight_is_shown(page: LivePage) -> None:
 def browser() -> Iterator[Any]:
     with started_chromium() as started:
         yield started
+
+
+@pytest.mark.slow
+def test_a_request_that_gets_lost_leaves_the_button_alive(browser: Any, page: LivePage) -> None:
+    tab = browser.new_page()
+    tab.set_default_timeout(1000 * LIMIT)
+    lost = {"state": "**/state", "stop": "**/stop"}
+    tab.goto(page.address)
+    tab.locator("#facts", has_text="no picture yet").wait_for()
+    for address in lost.values():
+        tab.route(address, lambda route: route.abort())
+    tab.locator("#alarm", has_text="does not answer").wait_for()
+    tab.click("#stop")
+    tab.locator("#stop", has_text="press again").wait_for()
+    tab.unroute(lost["state"])
+    tab.wait_for_selector("#alarm:empty", state="attached")
+    assert not page.stopped.is_set()
+    tab.unroute(lost["stop"])
+    tab.click("#stop")
+    assert page.stopped.wait(LIMIT)
 
 
 def address_of(process: subprocess.Popen[str]) -> str:
