@@ -48,7 +48,8 @@ def journal(path: Path, key: str) -> Iterator[Journal]:
         if not path.exists():
             os.close(open_no_link(path, new=True))
         descriptor = open_no_link(path, new=False)
-    with os.fdopen(descriptor, "r+b") as file:
+        opened = os.fdopen(descriptor, "r+b")
+    with opened as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

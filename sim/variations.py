@@ -89,13 +89,14 @@ def vary(
     load_robot(source)  # refuses what is none, and asks about doubtful numbers
     keys = [variation.key for variation in variations]
     check_keys(keys, "--vary")
-    meshes = np.meshgrid(*(variation.values for variation in variations[::-1]), indexing="ij")
-    numbers = dict(zip(keys, (mesh.ravel() for mesh in meshes[::-1]), strict=False))
-    count = meshes[0].size
-    if not len(keys) == len(numbers) <= 2 or count > _MOST:
+    quantities = {split(key).quantity for key in keys} - {"name"}
+    count = math.prod(len(variation.values) for variation in variations)
+    if not len(keys) == len(quantities) <= 2 or count > _MOST:
         raise InputError(
             f"--vary {', '.join(keys)}; vary one number or two different ones, {_MOST} robots at most"
         )
+    meshes = np.meshgrid(*(variation.values for variation in variations[::-1]), indexing="ij")
+    numbers = dict(zip(keys, (mesh.ravel() for mesh in meshes[::-1]), strict=True))
     content, robots, refused = changed(robot_content(source), changes_of(source)), [], {}
     for row in range(count):
         values = {key: float(column[row]) for key, column in numbers.items()}

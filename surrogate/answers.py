@@ -159,7 +159,7 @@ def answer_with_error(
         mark = {"mark": not strict} if isinstance(table, RobotTable) else {}
         answer: dict[str, Any] = dict(table.query(columns, **mark))
         error = max(table.errors[name]["rms"] for name in CERTIFIED_OUTPUTS if name in table.errors)
-        return {**answer, "error": np.full(len(answer["v_z"]), error)}
+        return {**answer, "error": error + 0 * answer["v_z"]}
     intervals = table.intervals is not None
     answer = table.query(columns, intervals=intervals, flag=flag, certify=certify, mark=not strict)
     if not intervals:

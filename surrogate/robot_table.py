@@ -77,13 +77,10 @@ class RobotTable(Shown):
         Raises:
             InputError: the columns are another robot's.
         """
-        notes = self._notes(columns)
-        known = np.array([not note for note in notes])
-        if not mark or not known.any():
-            return {name: np.array(values)[self._side(columns)] for name, values in self.steady.items()}
-        side = np.where(np.asarray(columns["omega_bar"]) < 0, 1, 0)
-        found = {name: np.where(known, np.array(values)[side], np.nan) for name, values in self.steady.items()}
-        return {**found, NOTE: np.array(notes)}
+        side, notes = self._sides(columns, mark=mark)
+        gaps = np.where([not note for note in notes], 0.0, np.nan)
+        outputs = {name: np.array(values)[side] + gaps for name, values in self.steady.items()}
+        return {**outputs, NOTE: np.array(notes)} if mark else outputs
 
     def response(self, columns: Mapping[str, Floats]) -> Responses:
         """Return the response of this robot to a flip, for M rows; see `LookupTable.response`.
@@ -91,7 +88,7 @@ class RobotTable(Shown):
         Raises:
             InputError: the columns are another robot's.
         """
-        side, before = self._side(columns), np.array(self.before)
+        (side, _), before = self._sides(columns), np.array(self.before)
         lag, memory, rest, spread = (np.array(getattr(self, name))[side] for name in _CURVES)
         outputs, sense = self.query(columns), np.where(side == 0, 1.0, -1.0)
         twist = twists(outputs["v_z"], outputs["v_x"], outputs["omega_yr_bar"], sense)
@@ -101,7 +98,7 @@ class RobotTable(Shown):
 
     def error_modes(self, columns: Mapping[str, Floats]) -> ErrorModes:
         """Return the errors of this robot's motion and response; see `LookupTable.error_modes`."""
-        self._side(columns)
+        self._sides(columns)
         motion = {name: values[0] for name, values in self.steady.items()}
         return error_modes(self.errors, motion, np.array(self.error_curves) if self.error_curves else None)
 
@@ -141,14 +138,12 @@ class RobotTable(Shown):
         """Return everything in the table as plain content."""
         return asdict(self)
 
-    def _side(self, columns: Mapping[str, Floats]) -> Any:
-        """Return 0 or 1 for every row, by the direction of its motor."""
-        for note in filter(None, notes := self._notes(columns)):
-            raise InputError(f"{note}; make its own table with softflagella surrogate robot")
-        return np.where(np.asarray(columns.get("omega_bar", np.ones(len(notes)))) < 0, 1, 0)
+    def _sides(self, columns: Mapping[str, Floats], *, mark: bool = False) -> tuple[Any, list[str]]:
+        """Return for every row 0 or 1, by the direction of its motor, and why it is another robot; empty if not.
 
-    def _notes(self, columns: Mapping[str, Floats]) -> list[str]:
-        """Say of every row why it is another robot; empty if it is not."""
+        Raises:
+            InputError: a row is of another robot; with `mark`, all are.
+        """
         notes = [""] * len(next(iter(columns.values())))
         for name, values in columns.items():
             expected = self.robot.get(name, 0.0)
@@ -157,7 +152,9 @@ class RobotTable(Shown):
                 notes[row] = (
                     notes[row] or f"{name} = {given[row]:g} is outside this robot's table ({expected:g} only)"
                 )
-        return notes
+        for note in filter(None, notes if all(notes) or not mark else ()):
+            raise InputError(f"{note}; make its own table with softflagella surrogate robot")
+        return np.where(np.asarray(columns.get("omega_bar", np.ones(len(notes)))) < 0, 1, 0), notes
 
 
 def load_robot_table(path: str | Path) -> RobotTable:

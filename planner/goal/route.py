@@ -36,11 +36,7 @@ _DETOUR = 1.15  # joints that are longer than this, beside the straight way or t
 _LINK = 2.5  # radii: poses within this distance are joined to start and goal
 _LONGEST_LINK = 4.0  # radii
 _STEP = 0.05  # l, between the places where a track is checked
-_EVERY = (
-    16,
-    4,
-    1,
-)  # of these places are checked, one after another; most tracks that are blocked end at the first
+_EVERY = 16, 4, 1  # of these places are checked, in turn; most tracks that are blocked end at the first
 _BLOCK = 200_000  # poses that are checked at once
 _PART = 512  # places of the lattice whose joints are sorted out at once
 _CELLS = 12  # of the map, for each spacing

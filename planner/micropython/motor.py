@@ -7,10 +7,7 @@ import time
 import schedule
 from machine import PWM, Pin
 
-PLUS_PIN, MINUS_PIN = (
-    14,
-    15,
-)  # inputs for directions +1 and -1: one carries the PWM, the other is low
+PLUS_PIN, MINUS_PIN = 14, 15  # inputs for directions +1 and -1: one carries the PWM, the other is low
 DUTY = 65535  # of the PWM, 0 to 65535: set it so that the motor has the speed of the plan
 DIRECTIONS = {"F": 1, "B": -1, "S": 0}
 

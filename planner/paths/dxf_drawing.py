@@ -78,7 +78,7 @@ def _pieces(drawing: Any) -> Iterator[tuple[str, Path2D]]:
             curve.append(curves[step.type](*(complex(at.x, at.y) for at in (start, *between, step.end))))
             start = step.end
         points = polyline_of(curve, Matrix()).points
-        if len(points) > 1:
+        if np.ptp(points, axis=0).any():
             yield layer, Path2D(points, outline.is_closed)
 
 

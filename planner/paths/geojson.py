@@ -72,8 +72,8 @@ def read_shapes(path: Path) -> list[tuple[str, str, list[Floats]]]:
         if _DEGREES.search(system):
             raise InputError(f"its crs is {system}: degrees of longitude and latitude; export it in metres")
         shapes = [(name, kind, [_points(ring) for ring in rings]) for name, kind, rings in _shapes(content, "")]
-        if not shapes:
-            raise InputError("it has no LineString and no Polygon; draw one")
+        if not shapes or not all(rings and all(map(len, rings)) for _, _, rings in shapes):
+            raise InputError("it has no LineString and no Polygon, or an empty one; draw one")
         return shapes
 
 

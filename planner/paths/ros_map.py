@@ -6,7 +6,6 @@ cells, so that they have few corners, and never inside. What has a hole is cut t
 
 from __future__ import annotations
 
-import io
 import math
 import re
 import warnings
@@ -65,9 +64,9 @@ def read_map(path: Path) -> NamedPaths:
 
 def _levels(picture: Path, entries: Mapping[str, str]) -> Floats:
     """Read how occupied the cells are, from 0 to 1; what is transparent is occupied."""
-    data = read_bytes(picture)
+    read_bytes(picture)  # says what is wrong if it cannot be read, or is too large
     try:
-        with Image.open(io.BytesIO(data)) as image:
+        with Image.open(picture) as image:
             if image.width * image.height > _MOST_CELLS:
                 raise ValueError(f"more than {_MOST_CELLS:.0e} cells")
             grey, seen = np.moveaxis(np.asarray(image.convert("LA"), dtype=float), 2, 0) / 255

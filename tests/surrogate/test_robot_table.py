@@ -20,6 +20,7 @@ from sim.model.robot import Robot
 from sim.motion.replay import replay
 from sim.motion.response import longer_memory, responses
 from sim.motion.steady import steady
+from surrogate.answers import answer_with_error
 from surrogate.robot_table import RobotTable, load_robot_table
 from surrogate.table_file import load_table
 from surrogate.tabulate import tabulate
@@ -159,8 +160,10 @@ def test_another_robot_is_refused() -> None:
     with pytest.raises(InputError, match="C_t = 9"):
         robot_table(5.0).query({**columns(), "C_t": np.array([9.0])})
     own, other = robot_table(5.0).query(columns())["v_z"].item(), {"C_t": np.array([9.0, columns()["C_t"].item()])}
-    found = robot_table(5.0).query({**{k: np.repeat(v, 2) for k, v in columns().items()}, **other}, mark=True)
+    two = {**{k: np.repeat(v, 2) for k, v in columns().items()}, **other}
+    found = answer_with_error(robot_table(5.0), two, strict=False)
     np.testing.assert_array_equal(found["v_z"], [np.nan, own])
+    assert np.isnan(found["error"]).tolist() == [True, False]
     assert [note.split("(")[0] for note in found["note"]] == ["C_t = 9 is outside this robot's table ", ""]
 
 

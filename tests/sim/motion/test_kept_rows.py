@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -83,6 +84,10 @@ def test_a_journal_is_written_by_one_process_and_replaces_no_other_file(
         assert run_command(main, words) == 2
         assert "give another --out, or remove it" in capsys.readouterr().err
         assert path.read_text() == content
+    path.unlink()
+    os.mkfifo(path)
+    assert run_command(main, words) == 2
+    assert f"cannot write {path}" in capsys.readouterr().err
     path.unlink()
     with journal(path, "key"):
         assert run_command(main, words) == 2
