@@ -14,7 +14,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -116,17 +115,13 @@ def plain_numbers(lines: Sequence[str], separator: str, width: int) -> list[np.n
     if separator not in (",", "\t") or text.encode().translate(None, f"0123456789+-.eE\n{separator}".encode()):
         return None
     rows = text.split("\n")
-    if not all(line.count(separator) == width - 1 for line in rows):
+    try:
+        values = np.loadtxt(rows, delimiter=separator, comments=None, ndmin=2)
+    except ValueError:
         return None
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", DeprecationWarning)  # numpy's, where it finds something else
-        try:
-            values = np.fromstring(text.replace("\n", separator), sep=separator)
-        except (DeprecationWarning, ValueError):
-            return None
-    if len(values) != width * len(rows):
+    if values.shape != (len(rows), width):
         return None
-    return [_whole(column, rows, separator, k) for k, column in enumerate(values.reshape(-1, width).T)]
+    return [_whole(column, rows, separator, k) for k, column in enumerate(values.T)]
 
 
 def _whole(values: np.ndarray, rows: Sequence[str], separator: str, place: int) -> np.ndarray:
