@@ -7,8 +7,10 @@ import resource
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 import numpy as np
@@ -67,6 +69,19 @@ class Records:
         if self.file:
             with self.file.open("a") as lines:
                 lines.write(json.dumps(record) + "\n")
+
+
+@contextmanager
+def checked_out(revision: str) -> Iterator[Path]:
+    """Check a revision of the project out into a temporary folder, with loops of its own, and yield the folder."""
+    worktree = ["git", "-C", str(ROOT), "worktree"]
+    with TemporaryDirectory() as folder:
+        place = Path(folder, "checked-out")
+        subprocess.run([*worktree, "add", "--detach", str(place), revision], check=True)
+        try:
+            yield place
+        finally:
+            subprocess.run([*worktree, "remove", "--force", str(place)], check=True)
 
 
 def timed(work: Callable[[], Result], *, repeats: int = 1) -> tuple[float, Result]:

@@ -12,13 +12,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
 
-from benchmarks.common import ROOT, heading, row
+from benchmarks.common import ROOT, checked_out, heading, row
 from sim.model.presets import PRESETS
 
 _ROBOTS = _POINTS = 100_000
@@ -34,18 +35,8 @@ print(used.ru_utime + used.ru_stime, used.ru_maxrss / 1024)
 
 def main(revision: str = "") -> None:
     """Print a line for each command."""
-    with TemporaryDirectory() as folder:
-        places = {"now": ROOT}
-        if revision:
-            places = {revision: Path(folder, "before"), **places}
-            subprocess.run(
-                ["git", "worktree", "add", "--detach", places[revision], revision], cwd=ROOT, check=True
-            )
-        try:
-            _compare(places, Path(folder))
-        finally:
-            if revision:
-                subprocess.run(["git", "worktree", "remove", "--force", places[revision]], cwd=ROOT, check=True)
+    with TemporaryDirectory() as folder, checked_out(revision) if revision else nullcontext() as before:
+        _compare({revision: before, "now": ROOT} if before else {"now": ROOT}, Path(folder))
 
 
 def _compare(places: dict[str, Path], folder: Path) -> None:

@@ -3,8 +3,6 @@
 1. A steady motion, with and without the growth of perturbations, for 4, 2 and 1 tails.
 2. A replay of 20 dwells, for 4 tails and 1.
 
-That commit is checked out into a temporary folder and compiles its own loops there.
-
 Usage: python -m benchmarks one_robot [COMMIT]
 
 Takes 8 minutes.
@@ -16,12 +14,10 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.common import ROOT, heading, row
-from common.errors import InputError
+from benchmarks.common import ROOT, checked_out, heading, row
 
 SCALAR = "f244bafa"
 TURNS = 3
@@ -59,12 +55,6 @@ print(json.dumps(found))
 """
 
 
-def git(*words: str) -> None:
-    done = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True)
-    if done.returncode:
-        raise InputError(f"git {words[0]}: {done.stderr.strip()}; one_robot needs the history of the project")
-
-
 def measured(folder: Path, version: str) -> dict[str, float]:
     code = f"import sys; sys.path.insert(0, {str(folder)!r}){_MEASURE}"
     command = [sys.executable, "-c", code, version]
@@ -73,13 +63,8 @@ def measured(folder: Path, version: str) -> dict[str, float]:
 
 
 def main(commit: str = SCALAR) -> None:
-    with TemporaryDirectory() as temporary:
-        old = Path(temporary, "old")
-        git("worktree", "add", "--detach", str(old), commit)
-        try:
-            turns = [(measured(old, "old"), measured(ROOT, "new")) for _ in range(TURNS)]
-        finally:
-            git("worktree", "remove", "--force", str(old))
+    with checked_out(commit) as old:
+        turns = [(measured(old, "old"), measured(ROOT, "new")) for _ in range(TURNS)]
     print(heading("one robot alone", f"{commit} [ms]", "this version [ms]", "ratio"))
     for name in turns[0][0]:
         before, now = (1e3 * min(turn[i][name] for turn in turns) for i in range(2))
