@@ -34,7 +34,7 @@ class Journal:
 
 @contextmanager
 def journal(path: Path, key: str) -> Iterator[Journal]:
-    """Open a journal, and remove it when the block succeeds.
+    """Open a journal, and remove it when the block succeeds, or ends with no part done.
 
     Args:
         path: of the journal.
@@ -70,5 +70,10 @@ def journal(path: Path, key: str) -> Iterator[Journal]:
         file.seek(0, os.SEEK_END)
         if not lines:
             os.write(descriptor, f"{key}\n".encode())
-        yield Journal(path, descriptor, done)
-        path.unlink(missing_ok=True)
+        finished = False
+        try:
+            yield Journal(path, descriptor, done)
+            finished = True
+        finally:
+            if finished or os.fstat(descriptor).st_size <= len(key) + 1:
+                path.unlink(missing_ok=True)

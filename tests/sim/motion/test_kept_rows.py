@@ -89,6 +89,9 @@ def test_a_journal_is_written_by_one_process_and_replaces_no_other_file(
     assert run_command(main, words) == 2
     assert f"cannot write {path}" in capsys.readouterr().err
     path.unlink()
+    assert run_command(main, [*words, "--jobs", "0"]) == 2
+    assert "jobs = 0" in capsys.readouterr().err
+    assert not path.exists()
     with journal(path, "key"):
         assert run_command(main, words) == 2
         assert "another process" in capsys.readouterr().err
