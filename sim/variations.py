@@ -152,9 +152,7 @@ def doubts(table: pd.DataFrame) -> tuple[Flags, Flags]:
     """Tell which rows have no reliable answer, and which none at all, (P,) each."""
     none = table["v_cm_s"].isna().to_numpy()
     wrong = table["error"].to_numpy(dtype=float) > LARGE_ERROR
-    for column, good in (("converged", True), ("outside", False)):
-        wrong |= table[column].ne(good).to_numpy() if column in table else False
-    return wrong & ~none, none
+    return (wrong | table["converged"].ne(True).to_numpy()) & ~none, none
 
 
 def draw_variations(title: str, variations: Sequence[Variation], table: pd.DataFrame) -> Figure:

@@ -59,14 +59,7 @@ def _train(
 
 @program.command("query", of="surrogate.api:query", derivatives="")
 def _query(
-    query: Call,
-    robots: str,
-    *,
-    robot: str | None = None,
-    out: str | None = None,
-    lookup: str | None = None,
-    vary: Sequence[str] = (),
-    plot: str | None = None,
+    query: Call, robots: str, *, robot: str | None = None, out: str | None = None, lookup: str | None = None
 ) -> None:
     """Predict the motion of a robot, or of many, with intervals, without simulating.
 
@@ -75,8 +68,6 @@ def _query(
             dwell_bar optional.
         robot: of a table of runs, N,l_cm,omega_rpm: robot.toml or the name of a preset.
         out: CSV; needed for a table of points.
-        vary: KEY=VALUES, a number of one robot, as for softflagella steady.
-        plot: SVG, PNG or PDF, of what is varied, with a CSV of the same name beside.
     """
     from sim.model.groups import DWELL
     from sim.motion.steady_motion import describe_motion
@@ -85,14 +76,6 @@ def _query(
     from surrogate.interface import NOTE
     from surrogate.table_file import load_table
 
-    if vary or plot:
-        from sim.variations import write_variations
-
-        if robot:
-            raise InputError("--vary and --plot are for one robot, without --robot")
-        options = {"flag": not query.given.get("strict"), **query.given}  # robots outside are marked
-        table = load_table(lookup)
-        return write_variations(robots, vary, lambda rows: answer_rows(rows, table, **options), out, plot)
     rows = command_rows(robots, robot, out, DWELL)
     answer = answer_rows(rows, load_table(lookup), **query.given)
     outside = sum(map(bool, answer.get(NOTE, ())))
