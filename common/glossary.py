@@ -32,9 +32,9 @@ TERMS = {  # a meaning has only terms that come later
 
 def terms_in(text: str) -> dict[str, str]:
     """Return the terms that a text has, with their meanings, and those that the meanings have."""
-    found = {}
+    meanings = {}
     for term, meaning in TERMS.items():
         if re.search(rf"\b{term}\b", " ".join(text.split()), re.IGNORECASE):
-            found[term] = meaning
+            meanings[term] = meaning
             text += f" {meaning}"
-    return dict(sorted(found.items(), key=lambda item: item[0].lower()))
+    return dict(sorted(meanings.items(), key=lambda item: item[0].lower()))

@@ -173,7 +173,13 @@ def _table_rows(
 
 
 def one_robot(robot: OneRobot) -> Robot:
-    """Return a robot, read from its file where a path or a preset's name is given."""
+    """Return a robot, read from its file where a path or a preset's name is given.
+
+    Raises:
+        InputError: it is neither, or its file cannot be read.
+    """
+    if not isinstance(robot, Robot | str | Path):
+        raise InputError(f"a {type(robot).__name__} is no robot; give a Robot, a robot.toml or a preset's name")
     return robot if isinstance(robot, Robot) else load_robot(robot)
 
 

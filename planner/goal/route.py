@@ -174,19 +174,19 @@ class Lattice:
         ]
         graph = self._graph(margin, [*rows, (count + begun, costs[begun] + 1e-9)])
         (distance,), (before,) = dijkstra(graph, indices=np.array([source]), return_predecessors=True)
-        poses, found, ways = np.concatenate([self.poses, starts]), np.full(len(goals), np.inf), []
+        poses, lowest, ways = np.concatenate([self.poses, starts]), np.full(len(goals), np.inf), []
         for index, pose in enumerate(goals):
             near, length = self._links(pose, margin, False)
             total = distance[near] + length
             chain, at = [], source
             if len(near) and np.isfinite(total.min()):
                 at = int(near[np.lexsort((distance[near], total))[0]])
-                found[index] = total.min()
+                lowest[index] = total.min()
             while at >= 0 and at != source:
                 chain.append(at)
                 at = int(before[at])
             ways.append(np.concatenate([poses[chain[::-1]], pose[None]]))
-        return found, ways
+        return lowest, ways
 
     def _graph(self, margin: float, further: Sequence[tuple[Integers, Floats]]) -> Any:
         """Return the lengths of the joints with this margin, and further rows: ends and lengths."""

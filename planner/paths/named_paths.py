@@ -30,8 +30,8 @@ class NamedPaths(NamedTuple):
             raise InputError(f"{source} has {self._listed()}; choose one with --shape, or remove the others")
         name = next(iter(self.paths)) if shape is None else shape
         if name not in self.paths:
-            there = f"there are {self._listed()}" if len(self.paths) > 1 else "leave --shape out"
-            raise InputError(f"{source} has no shape {name!r}; {there}")
+            advice = f"there are {self._listed()}" if len(self.paths) > 1 else "leave --shape out"
+            raise InputError(f"{source} has no shape {name!r}; {advice}")
         return Path2D.of(self.paths[name].points, closed=self.paths[name].closed or closed)
 
     def _listed(self) -> str:

@@ -145,8 +145,8 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
         near = nearest_shape(words)
         raise InputError(f"{words}: no such file or shape; {f'is it {near}? ' if near else ''}shapes are {SHAPES}")
     with naming(source):
-        found = read_paths(Path(source))
-        return Drawing(found.chosen(source, shape, closed), found.unit, found.no_unit)
+        named = read_paths(Path(source))
+        return Drawing(named.chosen(source, shape, closed), named.unit, named.no_unit)
 
 
 def read_paths(path: Path) -> NamedPaths:
@@ -228,9 +228,9 @@ def _read_columns(source: Path) -> NamedPaths:
 def _of_bag(table: pd.DataFrame) -> list[str]:
     """List the columns of places of a bag of ROS, a message a row: x of each pose, then y of each; or none."""
     places = [(place[1], _POSE.search(name), name) for name in map(str, table) if (place := _PLACE.search(name))]
-    found = sorted((axis, int(pose[1]) if pose else 0, name) for axis, pose, name in places)
-    x, y = ([number for axis, number, _ in found if axis == wanted] for wanted in "xy")
-    return [name for _, _, name in found] if x == y and len(set(x)) == len(x) else []
+    columns = sorted((axis, int(pose[1]) if pose else 0, name) for axis, pose, name in places)
+    x, y = ([number for axis, number, _ in columns if axis == wanted] for wanted in "xy")
+    return [name for _, _, name in columns] if x == y and len(set(x)) == len(x) else []
 
 
 def _column(source: Path, table: pd.DataFrame, axis: str) -> str:

@@ -88,7 +88,7 @@ def _runs(cells: Flags) -> Any:
 
 def without_holes(region: Geometry) -> list[Outline]:
     """Cut the polygons of a region through their holes."""
-    found, rest = [], [region]
+    whole, rest = [], [region]
     while rest:
         part = rest.pop()
         if not isinstance(part, Outline):
@@ -98,5 +98,5 @@ def without_holes(region: Geometry) -> list[Outline]:
             cut = part.interiors[0].centroid.x
             rest += [part & box(low, bottom, cut, top), part & box(cut, bottom, high, top)]
         elif part.area > 1e-9 * part.length**2:
-            found.append(part)
-    return found
+            whole.append(part)
+    return whole

@@ -64,24 +64,24 @@ def in_batches(
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs = {jobs}; give at least 1, or nothing for all processors")
     batches = split(columns["N"], rows)
-    found: dict[int, Mapping[Any, Any]] = (
+    results: dict[int, Mapping[Any, Any]] = (
         {} if kept is None else {k: _arrays(part) for k, part in kept.done.items()}
     )
-    left = [k for k in range(len(batches)) if k not in found]
+    left = [k for k in range(len(batches)) if k not in results]
     parts = [Groups.from_columns({name: array[batches[k]] for name, array in columns.items()}) for k in left]
-    before = sum(len(batches[k]) for k in found)
+    before = sum(len(batches[k]) for k in results)
     with (
         one_thread(),  # a setting of the process: set once, not in each thread
         tqdm(total=len(columns["N"]), initial=before, desc=title, unit="row", delay=1.0,
              disable=not title or None) as bar,
     ):  # fmt: skip
         for k, part in zip(left, in_threads(work, parts, jobs), strict=True):
-            found[k] = part
+            results[k] = part
             if kept is not None:
                 kept.add(k, {name: values.tolist() for name, values in part.items()})
             bar.update(len(batches[k]))
     order = np.argsort(np.concatenate(batches))
-    return {name: np.concatenate([found[k][name] for k in range(len(batches))])[order] for name in found[0]}
+    return {name: np.concatenate([results[k][name] for k in range(len(batches))])[order] for name in results[0]}
 
 
 def _arrays(columns: Mapping[str, list[Any]]) -> dict[str, Any]:

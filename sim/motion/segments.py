@@ -137,8 +137,8 @@ def _agreeing(
         groups = [todo[i : i + width()] for i in range(0, len(todo), width())]
         tasks = [[segments[k] for k in group] for group in groups]
         done = in_threads(lambda task: _simulated(run, dwells, task), tasks)
-        for group, found in zip(groups, done, strict=True):
-            for k, segment in zip(group, found, strict=True):
+        for group, simulated in zip(groups, done, strict=True):
+            for k, segment in zip(group, simulated, strict=True):
                 segments[k] = segment
                 tell(0 if number else (segment.end - segment.first) // 2)
         judged = _misfits(segments)
@@ -174,7 +174,7 @@ def _misfits(segments: Sequence[_Segment]) -> list[tuple[float, float]]:
         How differently they move in the last dwell that they share, infinite where the later one failed there, and
         how far the disc of the later one is behind at its first dwell.
     """
-    found, phase = [], segments[0].start.pose[PHASE]
+    misfits, phase = [], segments[0].start.pose[PHASE]
     for before, later in pairwise(segments):
         if not before.covers(before.end):
             break
@@ -189,8 +189,8 @@ def _misfits(segments: Sequence[_Segment]) -> list[tuple[float, float]]:
                 float(np.abs(moves[0] - moves[1]).max()),
                 float(phase - later.before(later.first).pose[PHASE]),
             )
-        found.append((apart, off))
-    return found
+        misfits.append((apart, off))
+    return misfits
 
 
 def _change(start: Floats, poses: Floats) -> Floats:
@@ -223,7 +223,7 @@ def _simulated(run: SteppedRobot, dwells: Dwells, segments: Sequence[_Segment]) 
             Marcher(*bodies, copied(segment.start), joined([steps for dwell in plan for steps, _ in dwell]))
         )
         plans.append(plan)
-    found = []
+    simulated = []
     for segment, plan, done in zip(segments, plans, side_by_side(swims), strict=True):
         made: list[list[Spell]] = []
         first = 0
@@ -239,5 +239,5 @@ def _simulated(run: SteppedRobot, dwells: Dwells, segments: Sequence[_Segment]) 
             if last > done.done:
                 made.pop()
                 break
-        found.append(segment._replace(dwells=made))
-    return found
+        simulated.append(segment._replace(dwells=made))
+    return simulated

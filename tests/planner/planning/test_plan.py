@@ -246,6 +246,8 @@ def test_the_stated_error_of_a_verdict_holds_for_every_robot_that_the_runs_allow
     assert joined.stated_error > far > alone.stated_error
     same = SimpleNamespace(corrected=CONTROL, knowledge=known, alternatives=((CONTROL, known),))
     assert plan(circle(2.0), same).stated_error == pytest.approx(alone.stated_error)
+    with pytest.raises(InputError, match="a SimpleNamespace is no robot; give a Robot"):  # verdict of a model
+        plan(circle(2.0), SimpleNamespace(corrected={"viscosity": 1.0}))
 
 
 def test_an_error_larger_than_the_path_is_no_error_of_the_path() -> None:
