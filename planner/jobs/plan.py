@@ -82,7 +82,8 @@ def plan(
         source = ""
     with naming(source or None):
         if isinstance(path, Drawing):
-            drawn = path.in_tails(swims, unit)
+            of_obstacles = path.unit is not None and not request.space.empty  # files of these may have no unit
+            drawn = path.in_tails(swims, None if of_obstacles else unit)
         else:
             drawn = path if isinstance(path, Path2D) else Path2D.of(path)
             drawn = drawn if unit is None else drawn.scaled(in_tails(unit, swims))

@@ -12,6 +12,7 @@ from PIL import Image
 
 from common.arrays import Flags, Floats
 from common.errors import InputError, InputWarning
+from planner.jobs.plan import plan
 from planner.options import read_regions, request_of
 from planner.paths.obstacles import FreeSpace
 from planner.paths.ros_map import without_holes
@@ -127,6 +128,12 @@ def test_polygons_of_geojson_are_obstacles_and_their_holes_are_free(tmp_path: Pa
     assert space.distance(places[4:]) * CONTROL.length_scale == pytest.approx([0.3, 1.0])
     with pytest.raises(InputError, match=r"a\.geojson.* give --unit m"):
         read_regions(file, None, CONTROL)
+    far_away = [[[x + 90, y] for x, y in SQUARE]]
+    obstacle = geojson(tmp_path, ("Polygon", far_away))
+    beside = plan("circle:2l", CONTROL, keep_out=(obstacle,), unit="m")
+    assert beside.request.space.boxes()[0][0] * CONTROL.length_scale == pytest.approx([90, 0])
+    assert beside.drawn.length == pytest.approx(4 * np.pi, rel=1e-3)
+    geojson(tmp_path, ("Polygon", [SQUARE, HOLE]), ("MultiPolygon", [far]))
     with pytest.raises(InputError, match="give a box or an outline"):
         request_of({"walls": file, "unit": "m"}, CONTROL)
 
