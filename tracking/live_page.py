@@ -79,7 +79,7 @@ class LivePage:
         state = {**self._state, "direction": direction, "alarm": alarm, "why": sight.why or self._state["why"]}
         state["error_cm"] = 100 * self._length * error if math.isfinite(error) else None
         if sight.pose is not None:
-            state |= {"pose": sight.pose, "seen": now, "time_s": sight.time}
+            state |= {"pose": sight.pose, "seen": now, "time_s": sight.time, "why": "no new picture"}
         self._state = state
 
     def state(self) -> dict[str, Any]:

@@ -102,6 +102,7 @@ def test_what_is_not_known_yet_is_null(page: LivePage) -> None:
 
 def test_the_newest_sight_is_shown(page: LivePage) -> None:
     page.show(Sight(0.5, (1.0, 2.0, np.pi / 2)), 1, 0.25, True, 3.0)
+    assert page.state()["why"] == "no new picture"  # if none follows
     page.show(Sight(0.7, None, "a hand"), -1, 0.5, False, 2.0)
     state = page.state()
     assert (state["x_cm"], state["y_cm"], state["heading_deg"]) == pytest.approx((11.0, 22.0, 90.0))
