@@ -21,6 +21,7 @@ from planner.paths.path import Path2D
 _DRAWN = {"LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "HELIX"}
 _METRES = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 10: 0.9144, 13: 1e-6, 14: 0.1}  # of $INSUNITS
 _MEETS = 1e-5  # of the drawing's size
+_SAGITTA = 3e-5  # of a curve's size, between it and its polyline
 _NO_UNIT = '$INSUNITS does not say its unit; set it in the CAD program, or give --unit mm (in Python unit="mm")'
 
 
@@ -58,12 +59,8 @@ def read_dxf(path: Path) -> NamedPaths:
 def _pieces(drawing: Any) -> Iterator[tuple[str, Path2D]]:
     """Yield the layer and the points of all that is drawn, in blocks too."""
     from ezdxf.disassemble import recursive_decompose
-    from ezdxf.path import Command, make_path
-    from svgelements import CubicBezier, Line, Matrix, Move, Path, QuadraticBezier
+    from ezdxf.path import make_path
 
-    from planner.paths.svg_drawing import polyline_of
-
-    curves = {Command.LINE_TO: Line, Command.CURVE3_TO: QuadraticBezier, Command.CURVE4_TO: CubicBezier}
     hidden = {layer.dxf.name.lower() for layer in drawing.layers if layer.is_off() or layer.is_frozen()}
     for entity in recursive_decompose(drawing.modelspace().query(" ".join([*_DRAWN, "INSERT"]))):
         layer = entity.dxf.layer
@@ -71,14 +68,9 @@ def _pieces(drawing: Any) -> Iterator[tuple[str, Path2D]]:
         if entity.dxftype() not in _DRAWN or mesh or entity.dxf.invisible or layer.lower() in hidden:
             continue
         outline = make_path(entity)
-        start = outline.start
-        curve = Path(Move(end=complex(start.x, start.y)))
-        for step in outline.commands():
-            between = [getattr(step, name) for name in ("ctrl", "ctrl1", "ctrl2") if hasattr(step, name)]
-            curve.append(curves[step.type](*(complex(at.x, at.y) for at in (start, *between, step.end))))
-            start = step.end
-        points = polyline_of(curve, Matrix()).points
-        if np.ptp(points, axis=0).any():
+        size = float(np.ptp([at.vec2 for at in (outline.start, *outline.control_vertices())], axis=0).max())
+        if size > 0:
+            points = np.array([at.vec2 for at in outline.flattening(_SAGITTA * size)])
             yield layer, Path2D(points, outline.is_closed)
 
 

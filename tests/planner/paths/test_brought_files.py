@@ -166,6 +166,7 @@ def test_drawings_of_cad_are_read_by_layer(tmp_path: Path) -> None:
     space.add_lwpolyline([(0, 0, 0), (30, 0, 1), (30, 20, 0)], format="xyb", dxfattribs={"layer": "track"})
     space.add_circle((0, 0), 5, dxfattribs={"layer": "off"})
     space.add_text("not drawn")
+    space.add_lwpolyline([])
     space.add_line((40, 10), (40, 10), dxfattribs={"layer": "slot"})  # as a slip of the mouse leaves it
     drawing.saveas(tmp_path / "a.dxf")
     with pytest.raises(InputError, match=r"2 paths \(slot, track\); choose one with --shape"):
