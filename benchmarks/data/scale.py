@@ -50,7 +50,7 @@ print(json.dumps([*took, peak, made["cost_s"], len(made["parts"])]))
 """
 _PARTS = {
     "simulate": ("simulate_here",),
-    "points of the design": ("points", "history", "indices"),
+    "points of the design": ("points", "history"),
     "pack: Parquet": ("arrow_table", "packed"),
     "write": ("write",),
     "check": ("checked_part",),
