@@ -10,7 +10,6 @@ Example:
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,7 +35,7 @@ def motion(robot: Robot | str | Path, *, ax: Axes | None = None) -> Axes:
 
     given = one_robot(robot)
     groups = given.groups()
-    both = [steady(replace(groups, omega_bar=sign * groups.omega_bar), stability=False) for sign in (1.0, -1.0)]
+    both = [steady(each, stability=False) for each in (groups, groups.reversed())]
     ax = given_axes(ax)
     plot_circles(ax, given, both)
     ax.legend(frameon=False, fontsize=8)

@@ -122,10 +122,8 @@ class NeuralTable(Shown):
         if DWELL in columns:
             _check_flips(values)
             dwells, wrong = _checked_dwells(columns[DWELL])
-            if wrong:
-                self._check_known(
-                    values, motions, flag=flag, mark=mark
-                )  # a robot outside is refused before a dwell is
+            if wrong:  # a robot outside is refused before a dwell is
+                self._check_known(values, motions, flag=flag, mark=mark)
                 raise InputError(wrong)
             self.curves.put_flips(motions, np.broadcast_to(dwells, values["N"].shape))
             result = dict(zip(OUTPUTS, motions.outputs, strict=True))
