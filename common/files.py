@@ -53,6 +53,12 @@ def refuse_kept(folder: str | Path, names: Iterable[str]) -> None:
             )
 
 
+def refuse_folder(path: str | Path) -> None:
+    """Refuse a folder where a file is to be written."""
+    if Path(path).is_dir():
+        raise InputError(f"{path} is a folder; give the name of a file")
+
+
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
     """Yield the path of a temporary file; it becomes `path` when the block succeeds, and is removed otherwise.
@@ -61,8 +67,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         InputError: the file cannot be written.
     """
     target = Path(path)
-    if target.is_dir():
-        raise InputError(f"{target} is a folder; give the name of a file")
+    refuse_folder(target)
     if is_stream(target):
         with TemporaryDirectory() as folder:
             part = Path(folder, target.name)

@@ -25,7 +25,7 @@ import numpy as np
 
 from common.arrays import Floats
 from common.errors import InputError, naming
-from common.files import is_stream
+from common.files import is_stream, refuse_folder
 from common.journal import Journal, journal
 from common.provenance import code_version
 from common.reading import digest_of
@@ -101,8 +101,10 @@ def command_rows(robots: str, robot: str | None, out: str | None, *beside: str) 
     """Read the robots of a command: one, or a table of points or runs, whose motion needs a file `out`.
 
     Raises:
-        InputError: the robots are bad, or there is no file.
+        InputError: the robots are bad, or there is no file, or it is a folder.
     """
+    if out is not None:
+        refuse_folder(out)
     if out is None and not names_robot(robots):
         from common.tables import read_table
 

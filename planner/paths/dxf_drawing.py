@@ -53,7 +53,8 @@ def read_dxf(path: Path) -> NamedPaths:
     except InputError:
         raise
     except Exception as broken:  # a damaged file can raise any error from within the parser
-        raise InputError(f"{path} is not DXF ({' '.join(str(broken).split())}); save it again") from None
+        reason = " ".join(str(broken).split()) or type(broken).__name__
+        raise InputError(f"{path} is not DXF ({reason}); save it again") from None
 
 
 def _pieces(drawing: Any) -> Iterator[tuple[str, Path2D]]:

@@ -89,6 +89,8 @@ def test_a_journal_is_written_by_one_process_and_replaces_no_other_file(
     assert run_command(main, words) == 2
     assert f"cannot write {path}" in capsys.readouterr().err
     path.unlink()
+    assert run_command(main, [*words[:-1], str(table), "--jobs", "0"]) == 2
+    assert "is a folder; give the name of a file" in capsys.readouterr().err  # before anything is simulated
     assert run_command(main, [*words, "--jobs", "0"]) == 2
     assert "jobs = 0" in capsys.readouterr().err
     assert not path.exists()
