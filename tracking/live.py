@@ -233,7 +233,7 @@ def steer(
         elif waiting and now - seen_at > lost:
             tell(f"no robot for {lost:g} s from the start ({ride.missing}); the motor rests until it is seen")
             waiting = False
-        motor.turn(direction)
+        motor.turn(0 if stopped() else direction)
         ordered_at = now
         if sight is not nothing:
             ride.pictures += 1

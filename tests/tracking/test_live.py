@@ -162,6 +162,18 @@ def test_a_motor_that_rests_is_told_of_without_a_picture_and_a_stop_comes_at_onc
     assert tank.orders[-1] == (tank.time, 0)
 
 
+def test_a_stop_while_the_way_is_planned_moves_nothing() -> None:
+    tank, stops = FilmedTank(), list[str]()
+
+    def stopped_while_planning(pose: POSE | None, now: float) -> Tracker:
+        stops.append("pressed")
+        return begin(pose, now)
+
+    steer(Ride(), tank, tank, stopped_while_planning, UNIT, lost=LOST, row=lambda *row: None, tell=print,
+          stopped=lambda: bool(stops))  # fmt: skip
+    assert {direction for _, direction in tank.orders} == {0}
+
+
 def test_a_robot_that_was_never_seen_is_said_to_be() -> None:
     ride, told = steered(FilmedTank(blind=(0.0, 99.0), over=20.0))
     assert told == ["no robot for 3 s from the start (dark); the motor rests until it is seen"]
