@@ -27,7 +27,8 @@ SOURCES = ("jit.py", "lane*.py", "model/body.py", "linear/*.py", "mechanics/*.py
 _HERE = Path(__file__).parent
 _KEPT = 3  # folders of other versions
 _LEVEL = 1  # of optimisation: as fast as level 3, compiled in less than half the time
-_OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+_COUNTED = {"_nrt": True}  # references to arrays, by which numba frees them
+_OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **_COUNTED}
 _FAST = {"contract", "reassoc", "nsz", "arcp"}  # what fast sums and products may do; NaN keeps its meaning
 beforehand = False  # loops are compiled by a command that says so
 _lock = RLock()  # over numba's settings
@@ -89,7 +90,7 @@ class Loop:
         with _lock:
             before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(CACHE / own)
             try:
-                return numba.njit(cache=True, **self.targetoptions)(self.py_func)
+                return numba.njit(cache=True, **self.targetoptions | _COUNTED)(self.py_func)
             finally:
                 numba.config.CACHE_DIR = before
 
@@ -120,8 +121,16 @@ def compiled_fast(function: F) -> F:
     return cast(F, Loop(function, fastmath=_FAST))
 
 
+def borrowing(function: F) -> F:
+    """Compile as `compiled` does what neither allocates nor returns an array, nor calls what returns one.
+
+    It counts no references to the arrays that it is given, which would take as long as its formulas.
+    """
+    return cast(F, Loop(function, _nrt=False))
+
+
 def inlined(function: F) -> F:
-    """Write a function out in the compiled loops that call it, which spares the work of linking what it calls.
+    """Write a function out in the compiled loops that call it: nothing to link, and no arguments to pass.
 
     numba optimises a function together with all that it calls, and again in each caller.
     """
@@ -130,7 +139,7 @@ def inlined(function: F) -> F:
 
 def formula(function: F) -> F:
     """Mark a formula: part of compiled loops, elsewhere plain Python, for numbers, arrays and tensors."""
-    return cast(F, _Formula(function))
+    return cast(F, _Formula(function, _nrt=False))
 
 
 @cache

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from common.arrays import Floats
-from sim.jit import compiled
-from sim.linear.vectors import Matrix, Vector
+from sim.jit import borrowing
+from sim.linear.vectors import Matrix, Vector, applied
 
 
-@compiled
+@borrowing
 def vector(a: Floats, k: int, m: int) -> Vector:
     """Return a[k, m] as components."""
     return (a[k, m, 0], a[k, m, 1], a[k, m, 2])
 
 
-@compiled
+@borrowing
 def put(a: Floats, k: int, m: int, v: Vector) -> None:
     """Set a[k, m] = v."""
     a[k, m, 0] = v[0]
@@ -21,7 +21,7 @@ def put(a: Floats, k: int, m: int, v: Vector) -> None:
     a[k, m, 2] = v[2]
 
 
-@compiled
+@borrowing
 def add(a: Floats, k: int, m: int, v: Vector) -> None:
     """Add in place: a[k, m] += v."""
     a[k, m, 0] += v[0]
@@ -29,19 +29,19 @@ def add(a: Floats, k: int, m: int, v: Vector) -> None:
     a[k, m, 2] += v[2]
 
 
-@compiled
+@borrowing
 def vector_at(a: Floats, i: int) -> Vector:
     """Return a[i] as components."""
     return (a[i, 0], a[i, 1], a[i, 2])
 
 
-@compiled
+@borrowing
 def put_at(a: Floats, i: int, v: Vector) -> None:
     """Set a[i] = v."""
     a[i, 0], a[i, 1], a[i, 2] = v
 
 
-@compiled
+@borrowing
 def add_at(a: Floats, i: int, v: Vector) -> None:
     """Add in place: a[i] += v."""
     a[i, 0] += v[0]
@@ -49,13 +49,13 @@ def add_at(a: Floats, i: int, v: Vector) -> None:
     a[i, 2] += v[2]
 
 
-@compiled
+@borrowing
 def block(a: Floats, k: int, m: int) -> Matrix:
     """Return a[k, m] as a 3×3 matrix."""
     return block_at(a[k, m], 0, 0)
 
 
-@compiled
+@borrowing
 def put_block(a: Floats, k: int, m: int, b: Matrix) -> None:
     """Set a[k, m] = b."""
     c = a[k, m]
@@ -64,7 +64,15 @@ def put_block(a: Floats, k: int, m: int, b: Matrix) -> None:
     c[2, 0], c[2, 1], c[2, 2] = b[2]
 
 
-@compiled
+@borrowing
+def apply_blocks(out: Floats, blocks: Floats, a: Floats) -> None:
+    """Set every out[k, m] to blocks[k, m] a[k, m]."""
+    for k in range(out.shape[0]):
+        for m in range(out.shape[1]):
+            put(out, k, m, applied(block(blocks, k, m), vector(a, k, m)))
+
+
+@borrowing
 def block_at(a: Floats, row: int, column: int) -> Matrix:
     """Return the 3×3 block of `a` at (row, column)."""
     return (

@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from common.arrays import Floats
-from sim.jit import compiled
+from sim.jit import borrowing, compiled
 from sim.lanes import zeros
 from sim.linear.blocks import block, put, put_block, vector
 from sim.linear.dense import factor_dense, solve_factored
@@ -52,14 +52,14 @@ def new_chains(like: Floats, n: int, chains: int, instants: int) -> Chains:
     )
 
 
-@compiled
+@borrowing
 def factor_and_solve(chains: Chains, s: Floats, t: Floats) -> None:
     """Factor the equations and solve them: s (n, M, 3) becomes δx, t (4,) becomes δu. See `factor`, `solve`."""
     factor(chains)
     solve(chains, s, t)
 
 
-@compiled
+@borrowing
 def factor(chains: Chains) -> None:
     """Eliminate chains of one instant, and factor the body's equations.
 
@@ -78,7 +78,7 @@ def factor(chains: Chains) -> None:
     factor_dense(corner, chains.exchanged)
 
 
-@compiled
+@borrowing
 def _eliminate(chains: Chains, m: int) -> None:
     """Eliminate chain m from tip to root."""
     n = chains.diagonal.shape[0]
@@ -111,7 +111,7 @@ def _eliminate(chains: Chains, m: int) -> None:
                 put(chains.border[k - 2], m, c, second)
 
 
-@compiled
+@borrowing
 def solve(chains: Chains, s: Floats, t: Floats) -> None:
     """Solve with the factors, in place: s (n, M, 3) becomes δx, t (4,) becomes δu."""
     n, count, _ = s.shape

@@ -24,7 +24,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from common.arrays import Floats
-from sim.jit import compiled
+from sim.jit import borrowing, compiled
 from sim.lanes import empty, fma, zeros
 from sim.linear.blocks import block, block_at
 from sim.linear.chains import Chains
@@ -38,6 +38,7 @@ from sim.linear.dense import (
     solve_factored,
     subtract_product,
 )  # fmt: skip
+from sim.linear.lane_arrays import copy
 from sim.linear.vectors import negative
 
 
@@ -50,6 +51,10 @@ class Coupled(NamedTuple):
     folded: Floats  # (n, m, 2 m + u + 1): Z, in the columns of the row above: body, s, node k − 1, node k − 2
     schur: Floats  # (u, u): factors of the body's equations with all nodes eliminated
     exchanged: Floats  # (u, u): row exchanges of these factors
+    second: Floats  # (m, u): Z of the second node, with the first one eliminated
+    by_first: Floats  # (m, m): Z of the second node in the first one
+    image: Floats  # (m,): a product with a vector
+    around: Floats  # (2 m + u + 1,): of the columns of Z; that of s is zero
 
 
 class Coupling(NamedTuple):
@@ -75,10 +80,14 @@ def new_coupled(like: Floats, n: int, chains: int, instants: int) -> Coupled:
         empty(like, (n, m, width)),
         zeros(like, (unknowns, unknowns)),
         zeros(like, (unknowns, unknowns)),
+        empty(like, (m, unknowns)),
+        empty(like, (m, m)),
+        empty(like, (m,)),
+        zeros(like, (width,)),
     )
 
 
-@compiled
+@borrowing
 def _fill(system: Coupled, chains: Chains, coupling: Coupling, s: Floats, k: int) -> None:
     """Fill the row of node k."""
     resistance, speed, differentiation = coupling
@@ -105,7 +114,7 @@ def _fill(system: Coupled, chains: Chains, coupling: Coupling, s: Floats, k: int
                 row[here, first + c] = chains.border[k, i, c, a]
 
 
-@compiled
+@borrowing
 def factor_and_solve(system: Coupled, chains: Chains, coupling: Coupling, s: Floats, t: Floats) -> None:
     """Factor the equations and solve them: s (n, m) becomes δx, t (u,) becomes δu."""
     n, m, width = system.folded.shape
@@ -138,7 +147,7 @@ def factor_and_solve(system: Coupled, chains: Chains, coupling: Coupling, s: Flo
     _substitute(system, chains, s, t)
 
 
-@compiled
+@borrowing
 def _multiply_blocks(a: Floats, blocks: Floats, out: Floats, first: int) -> None:
     """Set columns of `out` (m, ·) from `first` on to a (m, m) times a matrix of 3×3 blocks (M, 3, 3)."""
     for row in range(0, len(a), 3):
@@ -147,7 +156,7 @@ def _multiply_blocks(a: Floats, blocks: Floats, out: Floats, first: int) -> None
             multiply_block(block_at(a, row, at), blocks[chain], 0, 0, out, row, first + at, 3)
 
 
-@compiled
+@borrowing
 def _fold_two_up(system: Coupled, chains: Chains, i: int) -> None:
     """Subtract A_{i−2,i} Z_i from row i − 2; the columns of node i − 1 go to A_{i−2,i−1}."""
     row, upper, folded = system.rows[(i - 2) % 3], system.upper[i - 1], system.folded[i]
@@ -160,13 +169,12 @@ def _fold_two_up(system: Coupled, chains: Chains, i: int) -> None:
         add_block_product(factor, folded, at, body + m, row, at, body, m)
 
 
-@compiled
+@borrowing
 def _reduce_body(system: Coupled, chains: Chains) -> None:
     """Form the body's equations with all nodes eliminated, and factor them."""
     instants, count = chains.corner.shape[0], chains.diagonal.shape[1]
     m, unknowns = 3 * count, 4 * instants
-    first, second = system.folded[0], empty(system.schur, (m, unknowns))
-    by_first = empty(system.schur, (m, m))
+    first, second, by_first = system.folded[0], system.second, system.by_first
     for a in range(m):
         for j in range(m):
             by_first[a, j] = system.folded[1, a, unknowns + 1 + j]
@@ -189,14 +197,13 @@ def _reduce_body(system: Coupled, chains: Chains) -> None:
     factor_dense(schur, system.exchanged)
 
 
-@compiled
+@borrowing
 def solve(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
     """Solve with the factors, in place: s (n, m) becomes δx, t (u,) becomes δu."""
-    n, m = s.shape
-    image = zeros(s, (m,))
+    (n, m), image = s.shape, system.image
     for i in range(n - 1, -1, -1):
         apply(system.inverse[i], 0, s[i], m, image)
-        s[i] = image
+        copy(s[i], image)
         if i > 0:
             apply(system.upper[i], 0, s[i], m, image)
             for a in range(m):
@@ -209,12 +216,12 @@ def solve(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
     _substitute(system, chains, s, t)
 
 
-@compiled
+@borrowing
 def _substitute(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
     """Solve for the body, then for the nodes from root to tip; on entry s has the values after the elimination."""
     n, m, width = system.folded.shape
     instants, count, body = chains.corner.shape[0], m // 3, width - 2 * m
-    image, around = zeros(s, (m,)), zeros(s, (width,))  # of the columns of Z; that of s is zero
+    image, around = system.image, system.around
     apply(system.folded[1], body, s[0], m, image)  # of the first node on the second
     for i in range(count):
         for c in range(4):

@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 from common.arrays import Floats
-from sim.jit import compiled, formula
+from sim.jit import borrowing, formula
 from sim.lanes import choose, columns, fma, lane_count, less, load, somewhere, store
 from sim.linear.blocks import block_at
 from sim.linear.vectors import Matrix, Vector, inverse, negative
@@ -20,19 +20,19 @@ from sim.linear.vectors import Matrix, Vector, inverse, negative
 _Four = tuple[Any, Any, Any, Any]
 
 
-@compiled
+@borrowing
 def multiply(a: Floats, b: Floats, from_b: int, c: Floats, from_c: int, count: int) -> None:
     """Set `count` columns of c (m, ·) from `from_c` on to a (m, k) times those of b (k, ·) from `from_b` on."""
     _multiply(a, b, from_b, c, from_c, count, False)
 
 
-@compiled
+@borrowing
 def subtract_product(a: Floats, b: Floats, from_b: int, c: Floats, from_c: int, count: int) -> None:
     """Subtract a (m, k) times `count` columns of b (k, ·) from columns of c (m, ·), as in `multiply`."""
     _multiply(a, b, from_b, c, from_c, count, True)
 
 
-@compiled
+@borrowing
 def _multiply(a: Floats, b: Floats, from_b: int, c: Floats, from_c: int, count: int, subtract: bool) -> None:
     zero = columns(a)
     step = columns_in(zero, a)
@@ -129,7 +129,7 @@ def _put_three(c: Any, row: Any, at: Any, count: Any, v: Vector) -> None:
     store(c, row + 2, at, count, v[2])
 
 
-@compiled
+@borrowing
 def multiply_block(
     a: Matrix, b: Floats, row_b: int, from_b: int, c: Floats, row_c: int, from_c: int, count: int
 ) -> None:
@@ -150,7 +150,7 @@ def multiply_block(
         )
 
 
-@compiled
+@borrowing
 def add_block_product(
     a: Matrix, b: Floats, row_b: int, from_b: int, c: Floats, row_c: int, from_c: int, count: int
 ) -> None:
@@ -171,7 +171,7 @@ def add_block_product(
         )
 
 
-@compiled
+@borrowing
 def apply(a: Floats, from_a: int, x: Floats, count: int, y: Floats) -> None:
     """Set y (m,) to `count` columns of a (m, ·) from `from_a` on, times x."""
     for i in range(0, a.shape[0], 3):
@@ -188,7 +188,7 @@ def apply(a: Floats, from_a: int, x: Floats, count: int, y: Floats) -> None:
         y[i], y[i + 1], y[i + 2] = p + s, q + t, r + v
 
 
-@compiled
+@borrowing
 def invert(a: Floats) -> None:
     """Invert `a` (m, m) in place: Gauss-Jordan with 3×3 pivots, without exchanges."""
     m = a.shape[0]
@@ -207,7 +207,7 @@ def invert(a: Floats) -> None:
                 add_block_product(negative(factor), a, k, 0, a, i, 0, m)
 
 
-@compiled
+@borrowing
 def factor_dense(a: Floats, exchanged: Floats) -> None:
     """Factor a (n, n) in place for `solve_factored`, with pivoting in each lane.
 
@@ -226,7 +226,7 @@ def factor_dense(a: Floats, exchanged: Floats) -> None:
             _subtract(a, k, i, k + 1, a[i, k])
 
 
-@compiled
+@borrowing
 def solve_factored(a: Floats, exchanged: Floats, b: Floats) -> None:
     """Solve b = a⁻¹ b (n, K) in place with the factors that `factor_dense` left."""
     n = len(a)
@@ -239,7 +239,7 @@ def solve_factored(a: Floats, exchanged: Floats, b: Floats) -> None:
     _substitute(a, b)
 
 
-@compiled
+@borrowing
 def _exchange(a: Floats, k: int, i: int, first: int, where: Any) -> None:
     """Exchange rows k and i from column `first` on, in the lanes where a condition holds."""
     for j in range(first, a.shape[1]):
@@ -247,7 +247,7 @@ def _exchange(a: Floats, k: int, i: int, first: int, where: Any) -> None:
         a[k, j], a[i, j] = choose(where, lower, upper), choose(where, upper, lower)
 
 
-@compiled
+@borrowing
 def _subtract(a: Floats, k: int, i: int, first: int, factor: Any) -> None:
     """Subtract a multiple of row k from row i, from column `first` on."""
     zero, count = columns(a), a.shape[1]
@@ -256,7 +256,7 @@ def _subtract(a: Floats, k: int, i: int, first: int, factor: Any) -> None:
         store(a, i, j, left, fma(-factor, load(a, k, j, left, zero), load(a, i, j, left, zero)))
 
 
-@compiled
+@borrowing
 def _substitute(a: Floats, b: Floats) -> None:
     """Solve b = u⁻¹ b (n, K) in place, with u the upper triangle of a."""
     n, columns = b.shape

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.arrays import Floats
-from sim.jit import compiled
+from sim.jit import borrowing, compiled
 from sim.lanes import choose, empty, less, zeros
 from sim.linear.lane_arrays import divide, scalar_product, subtract_multiple
 
@@ -39,7 +39,7 @@ def new_krylov(like: Floats, size: int, most: int) -> Krylov:
     )
 
 
-@compiled
+@borrowing
 def start(krylov: Krylov, b: Floats) -> Any:
     """Begin with the right-hand side b; returns its norm."""
     norm = np.sqrt(scalar_product(b, b))
@@ -48,7 +48,7 @@ def start(krylov: Krylov, b: Floats) -> Any:
     return norm
 
 
-@compiled
+@borrowing
 def extend(krylov: Krylov, i: int, w: Floats, going: Any) -> Any:
     """Take in w, the image of basis vector i, where `going` is 1; w is changed. Returns the residual's norm."""
     basis, triangle, rotation, right = krylov
@@ -71,7 +71,7 @@ def extend(krylov: Krylov, i: int, w: Floats, going: Any) -> Any:
     return abs(left)
 
 
-@compiled
+@borrowing
 def solution(krylov: Krylov, count: int, x: Floats) -> None:
     """Combine the first `count` basis vectors to the solution x."""
     right = krylov.right

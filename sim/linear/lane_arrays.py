@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from common.arrays import Floats
-from sim.jit import compiled
+from sim.jit import borrowing
 from sim.lanes import choose, fma, lane, larger, with_lane
 
 
-@compiled
+@borrowing
 def put_lane(out: Floats, i: int, values: Floats) -> None:
     """Set lane i of an array of vectors to the numbers of an array of the same size."""
     flat, given = out.reshape(out.size), values.reshape(values.size)
@@ -17,7 +17,7 @@ def put_lane(out: Floats, i: int, values: Floats) -> None:
         flat[j] = with_lane(flat[j], i, given[j])
 
 
-@compiled
+@borrowing
 def take_lane(out: Floats, values: Floats, i: int) -> None:
     """Set the numbers of an array to lane i of an array of vectors of the same size."""
     flat, given = out.reshape(out.size), values.reshape(values.size)
@@ -25,7 +25,7 @@ def take_lane(out: Floats, values: Floats, i: int) -> None:
         flat[j] = lane(given[j], i)
 
 
-@compiled
+@borrowing
 def copy(out: Floats, values: Floats) -> None:
     """Set an array to another of the same size; numba takes seconds to compile `out[:] = values`."""
     flat, given = out.reshape(out.size), values.reshape(values.size)
@@ -33,7 +33,7 @@ def copy(out: Floats, values: Floats) -> None:
         flat[i] = given[i]
 
 
-@compiled
+@borrowing
 def combine(out: Floats, a: Any, x: Floats, b: Any, y: Floats) -> None:
     """Set out = a x + b y, for arrays of the same size."""
     flat, first, second = out.reshape(out.size), x.reshape(x.size), y.reshape(y.size)
@@ -41,7 +41,7 @@ def combine(out: Floats, a: Any, x: Floats, b: Any, y: Floats) -> None:
         flat[i] = a * first[i] + b * second[i]
 
 
-@compiled
+@borrowing
 def add_chosen(a: Floats, share: Any, change: Floats, going: Any) -> None:
     """Add in place: a += share · change, in the lanes where `going` is 1."""
     flat, changes = a.reshape(a.size), change.reshape(change.size)
@@ -49,7 +49,7 @@ def add_chosen(a: Floats, share: Any, change: Floats, going: Any) -> None:
         flat[i] = choose(going, flat[i] + share * changes[i], flat[i])
 
 
-@compiled
+@borrowing
 def choose_all(out: Floats, condition: Any, a: Floats, b: Floats) -> None:
     """Set every entry to that of a where the condition is true, else to that of b."""
     flat, first, second = out.reshape(out.size), a.reshape(a.size), b.reshape(b.size)
@@ -57,7 +57,7 @@ def choose_all(out: Floats, condition: Any, a: Floats, b: Floats) -> None:
         flat[i] = choose(condition, first[i], second[i])
 
 
-@compiled
+@borrowing
 def largest_entry(a: Floats) -> Any:
     """Find the largest magnitude in each lane; NaN where there is one."""
     flat = a.reshape(a.size)
@@ -67,7 +67,7 @@ def largest_entry(a: Floats) -> Any:
     return largest
 
 
-@compiled
+@borrowing
 def scalar_product(a: Floats, b: Floats) -> Any:
     """Compute the scalar product of two vectors (K,), as four sums that are added at the same time."""
     first = second = third = fourth = 0.0 * a[0]
@@ -80,14 +80,14 @@ def scalar_product(a: Floats, b: Floats) -> Any:
     return (first + second) + (third + fourth)
 
 
-@compiled
+@borrowing
 def subtract_multiple(out: Floats, factor: Any, a: Floats) -> None:
     """Set out -= factor · a, for vectors (K,)."""
     for k in range(len(out)):
         out[k] = fma(-factor, a[k], out[k])
 
 
-@compiled
+@borrowing
 def divide(out: Floats, a: Floats, by: Any) -> None:
     """Set out = a/by, for arrays of the same size."""
     flat, values = out.reshape(out.size), a.reshape(a.size)

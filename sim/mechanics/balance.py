@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.arrays import Floats
-from sim.jit import compiled, formula
+from sim.jit import borrowing, formula, inlined
 from sim.linear.blocks import vector
 from sim.linear.vectors import (
     E_Z,
@@ -68,7 +68,7 @@ class TailMotion(NamedTuple):
     load: Vector  # on the tails, force per length
 
 
-@compiled
+@borrowing
 def motion_at(body: Body, u: Floats, phase: float) -> TailMotion:
     """Compute the motion for the velocities u = (v_x, v_z, ω_yr, ω_h) at a phase."""
     e_x, e_y = (np.cos(phase), -np.sin(phase), 0.0), (np.sin(phase), np.cos(phase), 0.0)
@@ -77,7 +77,7 @@ def motion_at(body: Body, u: Floats, phase: float) -> TailMotion:
     return TailMotion(e_x, e_y, linear, plus(times(u[2], e_y), times(tail_spin(body, u), E_Z)), load)
 
 
-@compiled
+@inlined
 def node_balance(
     geometry: Geometry, body: Body, motion: TailMotion, k: int, m: int, velocity: Vector
 ) -> tuple[Vector, Matrix, Matrix, Matrix]:
@@ -114,7 +114,7 @@ class Clamp(NamedTuple):
     moment_by_second: Matrix
 
 
-@compiled
+@inlined
 def clamp_balance(
     geometry: Geometry, body: Body, m: int, motion: TailMotion, flow: Vector, moment: Vector
 ) -> Clamp:
@@ -152,13 +152,13 @@ def clamp_balance(
     )
 
 
-@compiled
+@borrowing
 def body_wrench(motion: TailMotion, force: Vector, moment: Vector) -> tuple[float, float, float, float]:
     """Compute the wrench (F_x, F_z, M_y, M_z) in the body frame of a force and a moment in a tail's frame."""
     return dot(motion.e_x, force), force[2], dot(motion.e_y, moment), moment[2]
 
 
-@compiled
+@borrowing
 def head_drag(body: Body, u: Floats, a: int) -> float:
     """Compute entry a of R (v_x, v_z, ω_yr, ω_h, ω_t): the resistance of the fluid to head and disc, about J."""
     total = body.resistance[a, 4] * tail_spin(body, u)

@@ -35,7 +35,7 @@ from typing import Any
 import numpy as np
 
 from common.arrays import Floats
-from sim.jit import compiled, formula
+from sim.jit import borrowing, formula
 from sim.linear.vectors import Matrix, Vector, dot, minus, outer, plus, plus_identity, times
 from sim.mechanics.geometry import Geometry, node_tangent
 from sim.model.body import Body
@@ -78,7 +78,7 @@ def drag_by_tangents(tangent: Vector, spread: Any, velocity: Vector, excess: Any
     return plus_identity(tilt, scale * along)
 
 
-@compiled
+@borrowing
 def thins(body: Body) -> bool:
     """Tell whether the drag differs from segment to segment."""
     terms = body.nonlocal_terms
@@ -86,7 +86,7 @@ def thins(body: Body) -> bool:
     return bool(terms.shear_thinning != 0 or local or terms.stratified_viscosity != 0)
 
 
-@compiled
+@borrowing
 def thinned(geometry: Geometry, body: Body, k: int, m: int, velocity: Vector, height: float) -> Vector:
     """Compute what this changes in the drag on node k of tail m (0: the half cell at the clamp).
 
@@ -105,7 +105,7 @@ def thinned(geometry: Geometry, body: Body, k: int, m: int, velocity: Vector, he
     return times(factor - 1, node_drag(node_tangent(geometry, k, m)[0], velocity, perp, excess))
 
 
-@compiled
+@borrowing
 def add_contact_line(body: Body, u: Floats, wrench: Floats) -> None:
     """Add the friction to the `wrench` (4,) on the robot about J, for velocities u (4,)."""
     lever = body.head_length / 2

@@ -35,7 +35,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.arrays import Floats, Integers
-from sim.jit import compiled, formula
+from sim.jit import borrowing, compiled, formula
 from sim.linear.blocks import add, add_at, put_at, vector, vector_at
 from sim.linear.vectors import E_Z, ZERO, Vector, cross, dot, minus, plus, times
 from sim.mechanics.balance import TailMotion, head_drag, motion_at
@@ -76,7 +76,7 @@ def _new_scene(n: int, tails: int) -> FlowScene:
     )
 
 
-@compiled
+@borrowing
 def has_flow(body: Body) -> bool:
     """Tell whether any part of the robot is in the flow of another part."""
     terms = body.nonlocal_terms
@@ -152,7 +152,7 @@ def _place_tail(
     scene.by[first_clamp + j] = j
 
 
-@compiled
+@borrowing
 def _place_head(scene: FlowScene, body: Body, n: int, tails: int) -> None:
     """Add the head's segments, which follow the nodes and edges of the tails."""
     first, length = (n + 1) * tails, body.head_length / _SEGMENTS
@@ -203,19 +203,19 @@ def _answer(
         _add_stokeslets(body, scene, fixed, answering, answer)
 
 
-@compiled
+@borrowing
 def _in_body(motion: TailMotion, v: Vector) -> Vector:
     """Convert a vector from a tail's frame to the body frame."""
     return dot(motion.e_x, v), dot(motion.e_y, v), v[2]
 
 
-@compiled
+@borrowing
 def _in_tail(motion: TailMotion, v: Vector) -> Vector:
     """Convert a vector from the body frame to a tail's frame."""
     return plus(plus(times(v[0], motion.e_x), times(v[1], motion.e_y)), times(v[2], E_Z))
 
 
-@compiled
+@borrowing
 def _add_stokeslets(body: Body, scene: FlowScene, places: Integers, segments: Integers, flow: Floats) -> None:
     """Add to `flow` (K, 3), at some places, the flow of the forces of some segments."""
     height = HEIGHT * max(body.offset, body.head_radius)
@@ -237,7 +237,7 @@ def _add_stokeslets(body: Body, scene: FlowScene, places: Integers, segments: In
         add_at(flow, i, times(1 / body.viscosity, total))
 
 
-@compiled
+@borrowing
 def _shares(body: Body, on: int, by: int, head: int) -> tuple[float, float]:
     """Return the factors on the flow of one part at another part: on the direct flow, and on that of the image."""
     terms = body.nonlocal_terms
@@ -247,7 +247,7 @@ def _shares(body: Body, on: int, by: int, head: int) -> tuple[float, float]:
     return share, share * terms.free_surface
 
 
-@compiled
+@borrowing
 def _head_resistance(body: Body) -> tuple[float, float]:
     """Compute the part of the head's drag that moves the fluid, across and along the axis.
 
@@ -262,7 +262,7 @@ def _head_resistance(body: Body) -> tuple[float, float]:
     return min(scale / across, body.resistance[0, 0]), min(scale / along, body.resistance[1, 1])
 
 
-@compiled
+@borrowing
 def _add_rotlets(body: Body, scene: FlowScene, nodes: int, torque: float, flow: Floats) -> None:
     """Add to `flow`, at the tails' nodes, the flow of the head's spin."""
     terms = body.nonlocal_terms

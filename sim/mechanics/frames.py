@@ -25,7 +25,7 @@ from __future__ import annotations
 import numpy as np
 
 from common.arrays import Floats
-from sim.jit import compiled, formula
+from sim.jit import borrowing, compiled, formula
 from sim.linear.blocks import add, add_at, put, vector
 from sim.linear.vectors import ZERO, Vector, cross, dot, minus, plus, times
 from sim.mechanics.balance import TailMotion
@@ -108,7 +108,7 @@ def _twist(a: Floats, b: Floats, torque: Floats, natural_twist: float) -> Floats
     return theta
 
 
-@compiled
+@borrowing
 def _rate(geometry: Geometry, x_dot: Floats, k: int, m: int) -> Vector:
     """Compute ė/|e| of edge k."""
     rate = vector(x_dot, k, m)
@@ -117,7 +117,7 @@ def _rate(geometry: Geometry, x_dot: Floats, k: int, m: int) -> Vector:
     return times(1 / geometry.length[k, m], rate)
 
 
-@compiled
+@borrowing
 def _add_viscosity(
     geometry: Geometry, directors: Floats, viscosity: float, m: int, x_dot: Floats, torque: Floats
 ) -> Vector:
@@ -155,7 +155,7 @@ def _add_viscosity(
     return moment
 
 
-@compiled
+@borrowing
 def has_frames(body: Body) -> bool:
     """Tell whether the tails are anything but straight, untwisted and elastic."""
     terms = body.nonlocal_terms
@@ -204,7 +204,7 @@ def add_frames(body: Body, geometry: Geometry, motion: TailMotion, m: int, x_dot
     add_at(moments, m, moment)
 
 
-@compiled
+@borrowing
 def _untwisted(
     body: Body,
     geometry: Geometry,
@@ -238,7 +238,7 @@ def _untwisted(
         before = after
 
 
-@compiled
+@borrowing
 def _turned(director: Vector, tangent: Vector, angle: float) -> tuple[Vector, Vector]:
     """Compute the material directors of an edge."""
     other = cross(tangent, director)

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.arrays import Floats
-from sim.jit import compiled
+from sim.jit import borrowing, compiled
 from sim.lanes import zeros
 from sim.linear.blocks import add, add_at, put, vector
 from sim.linear.vectors import ZERO, Matrix, Vector, dot, minus, plus, times
@@ -54,7 +54,7 @@ def new_geometry(like: Floats, n: int, tails: int) -> Geometry:
 def straight(n: int, tails: int, offset: Any) -> Floats:
     """Return the free nodes (n, M, 3) of straight tails; (B, n, M, 3) for B robots with offsets (B,)."""
     x = np.zeros((*np.shape(offset), n, tails, 3))
-    x[..., 0] = np.expand_dims(offset, (-1, -2))
+    x[..., 0] = np.reshape(offset, (*np.shape(offset), 1, 1))
     x[..., 2] = -np.arange(1, n + 1)[:, None] / n
     return x
 
@@ -82,7 +82,7 @@ def turned_edges(x: Floats, share: Any, dx: Floats, offset: float) -> Floats:
     return out
 
 
-@compiled
+@borrowing
 def measure(geometry: Geometry, x: Floats, offset: float, axial_stiffness: float) -> None:
     """Fill `geometry` for free nodes x (n, M, 3) of tails clamped at (offset, 0, 0) along −e_z."""
     n, tails, _ = x.shape
@@ -115,13 +115,13 @@ def measure(geometry: Geometry, x: Floats, offset: float, axial_stiffness: float
             put(forces, k, m, force)
 
 
-@compiled
+@borrowing
 def inverse_voronoi(k: int, n: int) -> float:
     """Compute 1/l_k of the bending energy of joint k: 2n at the clamp, n elsewhere."""
     return 2.0 * n if k == 0 else 1.0 * n
 
 
-@compiled
+@borrowing
 def edge_block(geometry: Geometry, k: int, m: int, axial_stiffness: float) -> Matrix:
     """Compute ∂²E/∂e_k²."""
     n = geometry.length.shape[0]
@@ -137,7 +137,7 @@ def edge_block(geometry: Geometry, k: int, m: int, axial_stiffness: float) -> Ma
     )  # fmt: skip
 
 
-@compiled
+@borrowing
 def joint_block(geometry: Geometry, k: int, m: int) -> Matrix:
     """Compute ∂²E/∂e_{k−1} ∂e_k of joint k."""
     c, first, second = vector(geometry.joint, k, m)
@@ -148,7 +148,7 @@ def joint_block(geometry: Geometry, k: int, m: int) -> Matrix:
     )  # fmt: skip
 
 
-@compiled
+@borrowing
 def node_tangent(geometry: Geometry, k: int, m: int) -> tuple[Vector, float]:
     """Compute the unit tangent of node k (0: clamp), the mean of the adjacent edges', and |S| of their sum S."""
     total = vector(geometry.tangent, k, m)
@@ -158,7 +158,7 @@ def node_tangent(geometry: Geometry, k: int, m: int) -> tuple[Vector, float]:
     return times(1 / spread, total), spread
 
 
-@compiled
+@borrowing
 def add_root_spring(body: Body, geometry: Geometry, m: int, moments: Floats) -> None:
     """Add the spring's forces to edge 0 of tail m, and the clamp's further moment to `moments` (M, 3)."""
     compliance = body.nonlocal_terms.root_compliance

@@ -34,7 +34,7 @@ from math import erfc
 import numpy as np
 
 from common.arrays import Floats, Integers
-from sim.jit import compiled
+from sim.jit import borrowing, compiled
 from sim.linear.blocks import add, add_at, put, put_at, vector, vector_at
 from sim.linear.vectors import ZERO, Vector, cross, dot, minus, plus, times
 from sim.mechanics.balance import body_wrench, motion_at
@@ -50,7 +50,7 @@ _BESIDE = 0.4  # of D²: edges whose squared distance is larger by this count fo
 _EDGES = 24  # of the smooth tail, or more
 
 
-@compiled
+@borrowing
 def has_contact(body: Body) -> bool:
     """Tell whether the tails feel each other's touch."""
     return bool(body.nonlocal_terms.tail_contact != 0)
@@ -145,14 +145,14 @@ def _smooth_chain(n: int) -> Floats:
     return weights
 
 
-@compiled
+@borrowing
 def _turned(v: Vector, share: float) -> Vector:
     """Turn a vector about e_z by a share of a whole turn."""
     cos, sin = np.cos(2 * np.pi * share), np.sin(2 * np.pi * share)
     return cos * v[0] - sin * v[1], sin * v[0] + cos * v[1], v[2]
 
 
-@compiled
+@borrowing
 def _edges_near(body: Body, tail: Floats, k: int, neighbour: Floats, near: Integers) -> int:
     """Count the edges of the other tail that may touch edge k of this one, and list them in `near`."""
     n, count, j = len(tail) - 1, 0, 0
@@ -213,7 +213,7 @@ def _push(
             add_at(on_neighbour, near[c] + 1, times(-scale, vector_at(on_ends[c], 1)))
 
 
-@compiled
+@borrowing
 def _squared_distance(at: Vector, start: Vector, end: Vector) -> float:
     """Compute the squared distance of a point from an edge."""
     edge, away = minus(end, start), minus(at, start)
@@ -222,7 +222,7 @@ def _squared_distance(at: Vector, start: Vector, end: Vector) -> float:
     return dot(away, away)
 
 
-@compiled
+@borrowing
 def _closeness(at: Vector, start: Vector, end: Vector, width: float) -> tuple[float, Vector, Vector]:
     """Integrate g over an edge y = start + σ e, g = exp(−|x − y|²/2w²)/√(2π) w; and the parts of ∫ (x − y) g dσ.
 

@@ -107,6 +107,7 @@ def _projected(rows: Floats, tails: int, x: Floats, u: Floats, shifts: Floats, m
     return from_groups(projected, len(rows))
 
 
+@cache
 def _damped_differentiation(columns: int, sense: float) -> Floats:
     """Differentiate in φ, (M, M); the component (−1)^m decays if the motor turns with `sense`."""
     matrix = differentiation(columns)

@@ -28,9 +28,8 @@ import numpy as np
 from common.arrays import Floats
 from sim.jit import compiled, inlined
 from sim.lanes import choose, lanes, less, somewhere, zeros
-from sim.linear.blocks import block, put, vector
+from sim.linear.blocks import apply_blocks
 from sim.linear.lane_arrays import choose_all, combine, divide, largest_entry, scalar_product, subtract_multiple
-from sim.linear.vectors import applied
 from sim.model.body import Body
 from sim.solve.grouping import InLanes, group_of, reaches_further
 from sim.solve.linearise import linearise
@@ -101,9 +100,7 @@ def _by_rate(
     """Compute −B q, (n, M, 3) and (P, 4): the drag on moving nodes, and by differences what else depends on ẋ."""
     du[:] = 0.0
     moving = q.reshape(x.shape)
-    for k in range(x.shape[0]):
-        for m in range(x.shape[1]):
-            put(dx, k, m, applied(block(work.equations.resistance, k, m), vector(moving, k, m)))
+    apply_blocks(dx, work.equations.resistance, moving)
     further = where * reaches_further(body)
     if not somewhere(further):
         return

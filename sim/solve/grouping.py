@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.arrays import Flags, Floats
-from sim.jit import compiled
+from sim.jit import borrowing, compiled
 from sim.lanes import lane, lanes, less, tuple_like, width_for
 from sim.linear.lane_arrays import take_lane
 from sim.model.body import PLACES, SHAPES, SINGLE, Body
@@ -106,7 +106,7 @@ def body_of_lane(body: Body, i: int) -> Body:
     return body_of_numbers(numbers, terms)
 
 
-@compiled
+@borrowing
 def reaches_further(body: Body) -> Any:
     """Tell where an effect reaches further than one node, as 1 or 0."""
     total = 0.0 * body.omega

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.arrays import Floats
-from sim.jit import compiled
+from sim.jit import borrowing, compiled, inlined
 from sim.lanes import zeros
 from sim.linear.blocks import put, put_block, vector
 from sim.linear.chains import Chains, new_chains
@@ -67,7 +67,7 @@ def new_equations(x: Floats, u: Floats) -> Equations:
     return Equations(chains, zeros(x, (n, columns, 3, 3)), zeros(x, x.shape), zeros(u, u.shape))
 
 
-@compiled
+@borrowing
 def linearise(body: Body, rates: Rates, x: Floats, u: Floats, scratch: Scratch, equations: Equations) -> None:
     """Fill the equations at x (n, M, 3), u (P, 4)."""
     columns, instants = x.shape[1], u.shape[0]
@@ -82,7 +82,7 @@ def linearise(body: Body, rates: Rates, x: Floats, u: Floats, scratch: Scratch, 
         _clamp(body, motion, rates, scratch, equations, m, m % instants)
 
 
-@compiled
+@inlined
 def _head(body: Body, u: Floats, corner: Floats, t: Floats) -> None:
     """Compute the drag on head and disc, and its derivative in u."""
     gain = motor_gain(body)
@@ -93,7 +93,7 @@ def _head(body: Body, u: Floats, corner: Floats, t: Floats) -> None:
         t[a] = -head_drag(body, u, a)
 
 
-@compiled
+@inlined
 def _tail(
     body: Body, motion: TailMotion, rates: Rates, x: Floats, scratch: Scratch, equations: Equations, m: int
 ) -> None:
@@ -138,7 +138,7 @@ def _tail(
         edge, joint, after_below = edge_next, joint_next, after
 
 
-@compiled
+@inlined
 def _clamp(
     body: Body, motion: TailMotion, rates: Rates, scratch: Scratch, equations: Equations, m: int, p: int
 ) -> None:
@@ -165,7 +165,7 @@ def _clamp(
         corner[a, 3] += by_load[a]
 
 
-@compiled
+@borrowing
 def _subtract_clamp_drag(
     corner: Floats, c: int, motion: TailMotion, resistance: Matrix, root: Vector, direction: Vector
 ) -> None:
@@ -176,13 +176,13 @@ def _subtract_clamp_drag(
         corner[a, c] -= by_velocity[a]
 
 
-@compiled
+@borrowing
 def _load_by_phase(body: Body, motion: TailMotion) -> Vector:
     """Compute the derivative of the load on a tail, force per length, in the phase."""
     return minus(times(body.tail_load[1], motion.e_x), times(body.tail_load[0], motion.e_y))
 
 
-@compiled
+@borrowing
 def _put_foot(foot: Floats, m: int, motion: TailMotion, force: Matrix, moment: Matrix) -> None:
     """Put the rows of the robot's equations for one node of column m."""
     put(foot, m, 0, applied(transposed(force), motion.e_x))

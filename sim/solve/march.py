@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.arrays import Floats, Integers
-from sim.jit import compiled
+from sim.jit import borrowing, compiled
 from sim.lanes import choose, lane, lanes, larger, less, somewhere, width_for, with_lane, zeros
 from sim.linear.lane_arrays import add_chosen, choose_all, largest_entry, take_lane
 from sim.mechanics.balance import tail_spin
@@ -168,7 +168,7 @@ def _new_like(state: State) -> State:
     return State(zeros(x, x.shape), zeros(x, x.shape), zeros(x, pose.shape), zeros(x, u.shape))
 
 
-@compiled
+@borrowing
 def _flip(own: Floats, other: Floats, state: State, flips: Any) -> None:
     """Reverse the motors in the lanes where `flips` is 1: shapes stay, velocities become their mirror image."""
     for j in range(len(own)):
@@ -180,7 +180,7 @@ def _flip(own: Floats, other: Floats, state: State, flips: Any) -> None:
         rate[j] = choose(flips, 0.0, rate[j])
 
 
-@compiled
+@borrowing
 def _begin_stage(
     state: State, star: State, now: State, before: State, dt: Any, tau: Any, starts: Any, begins: Any, anew: Any,
     second: Any,
@@ -215,7 +215,7 @@ def _begin_stage(
         x[j] = choose(begins, ahead * here[j] + behind * there[j] + lead * x_dot[j], x[j])
 
 
-@compiled
+@borrowing
 def _end_stage(body: Body, state: State, star: State, tau: Any, ends: Any) -> None:
     """Set x_dot and pose at the end of a stage, pose = star + τ d(pose)/dt, in the lanes where `ends` is 1."""
     size, rate = state.x.size, 1 / tau

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.arrays import Floats
-from sim.jit import compiled, inlined
+from sim.jit import borrowing, compiled, inlined
 from sim.lanes import choose, empty, larger, less, somewhere, zeros
 from sim.linear import chains as separate
 from sim.linear import coupled
@@ -111,7 +111,7 @@ def correct(
     solve_linear(body, rates, x, u, work, anew, RELATIVE_TOLERANCE, going, dx, du)
 
 
-@compiled
+@borrowing
 def largest_move(body: Body) -> Any:
     """Bound the move of a node in one correction, in l; tails in contact must not pass through each other."""
     return choose(abs(body.nonlocal_terms.tail_contact), body.tail_radius, LARGEST_MOVE)
@@ -224,7 +224,7 @@ def _solve_nonlocal(
         velocities[i] = choose(wanted, image[dx.size + i] * scale, velocities[i])
 
 
-@compiled
+@borrowing
 def _displace(out: Unknowns, x: Floats, u: Floats, step: Any, scale: Any, direction: Floats) -> None:
     """Move x and u by a step along a direction whose velocities are divided by `scale`."""
     combine(out.x, 1.0, x, step, direction[: x.size])

@@ -101,16 +101,18 @@ def mean_motion(body: Body, u: Floats) -> Floats:
 
     Args:
         body: one robot, or B of them (`sim.solve.assembly.batch`).
-        u: velocities, (P, 4); (B, P, 4) for B robots.
+        u: velocities, (P, 4); (…, B, P, 4) for B robots.
 
     Returns:
-        (5,), or (B, 5).
+        (5,), or (…, B, 5).
     """
-    time = 1 / tail_spin(body, u.T)
+    velocities = u.transpose(-1, -2, *range(u.ndim - 2))
+    time = 1 / tail_spin(body, velocities)
     whole = time.cumsum(0)[-1]  # in the same order for one robot and for many
-    v_x, v_z, omega_yr, omega_h = (u.T * time).cumsum(1)[:, -1] / whole
+    v_x, v_z, omega_yr, omega_h = (velocities * time).cumsum(1)[:, -1] / whole
     sway = v_x + omega_yr * (body.head_length / 2)
-    return np.ascontiguousarray(np.array([len(time) / whole, omega_h, omega_yr, sway, v_z]).T)
+    means = np.array([len(time) / whole, omega_h, omega_yr, sway, v_z])
+    return np.ascontiguousarray(means.transpose(*range(1, means.ndim), 0))
 
 
 def turns_forward(body: Body, u: Floats) -> Any:

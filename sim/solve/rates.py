@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.arrays import Floats
-from sim.jit import compiled
+from sim.jit import borrowing, compiled
 from sim.lanes import zeros
 from sim.linear.blocks import put, vector
 from sim.linear.spectral import differentiation
@@ -57,19 +57,19 @@ def in_transient(rate: Any, by_phase: Floats, start: Floats) -> Rates:
     return Rates(none + rate, none + FIRST_PHASE, by_phase, start)
 
 
-@compiled
+@borrowing
 def is_periodic(rates: Rates) -> bool:
     """Tell whether the columns are phases, joined to each other by ∂x/∂φ."""
     return rates.differentiation.shape[0] > 0
 
 
-@compiled
+@borrowing
 def base_phase(rates: Rates, body: Body, u: Floats) -> Any:
     """Return the phase of column 0, for velocities u (P, 4); column m is 2π m/M later."""
     return rates.phase + (0.0 if is_periodic(rates) else tail_spin(body, u[0]) / rates.rate)
 
 
-@compiled
+@borrowing
 def fill_rates(rates: Rates, body: Body, x: Floats, u: Floats, x_dot: Floats, by_spin: Floats) -> None:
     """Compute the velocities of the free nodes in the disc frame and what a faster spin changes in them.
 
@@ -102,7 +102,7 @@ def fill_rates(rates: Rates, body: Body, x: Floats, u: Floats, x_dot: Floats, by
                 put(x_dot, k, m, change)
 
 
-@compiled
+@borrowing
 def phase_gain(rates: Rates, body: Body) -> Any:
     """Compute ∂φ/∂ω_h."""
     return 0.0 if is_periodic(rates) else motor_gain(body) / rates.rate

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from common.arrays import Flags, Floats, Integers
+from common.arrays import Flags, Floats
 from sim.linear.spectral import with_phases
 from sim.model.body import PLACES, Body
 from sim.solve.assembly import CONTACT, are_local, batch, row, without_further
@@ -200,11 +200,13 @@ def coarse_orbits(rows: Floats, tails: int, least: int = PHASES) -> list[Coarse]
     going = np.lexsort((np.abs(rows[:, PLACES.omega]), ~are_local(rows)))  # similar robots share groups
     numbers = without_further(rows)
     x, u = straight_starts(numbers[going], MESHES[0], phases, tails)
+    begin = tails * -(-least // tails)
     touching = numbers[going, CONTACT] != 0
     if touching.any():
         x[touching], u[touching] = _from_a_slow_motor(numbers[going][touching], x[touching], u[touching], tails)
-    wanted, solved = FIRST, -1  # numbers of phases that the robots themselves were solved on, less one
-    means = change = np.empty(0)
+    at_once = phases == begin and bool((numbers == rows).all())  # a rough solution is then on the way
+    wanted, solved = (ROUGH, 0) if at_once else (FIRST, -1)  # numbers of phases used for the robots, less one
+    means, change = np.empty(0), np.full(len(going), np.nan)
     while len(going):
         new_x, new_u = with_phases(x, phases), with_phases(u, phases // tails)
         converged = solve_orbits_in_place(numbers[going], new_x, new_u, wanted) < wanted
@@ -214,8 +216,7 @@ def coarse_orbits(rows: Floats, tails: int, least: int = PHASES) -> list[Coarse]
         solved += 1
         more = converged
         if solved == 0:
-            numbers, wanted, phases = rows, ROUGH, tails * -(-least // tails)
-            change = np.full(np.count_nonzero(more), np.nan)
+            numbers, wanted, phases, change = rows, ROUGH, begin, change[more]
         else:
             new_means = mean_motion(batch(rows[going]), new_u)
             last, change = change, difference(means, new_means) if solved > 1 else np.full(len(going), np.nan)
@@ -275,7 +276,7 @@ def more_phases(tails: int, phases: int) -> int:
 
 def _next_change(last: Floats, change: Floats) -> Floats:
     """Estimate the changes of the means with the next number of phases from the last two; `last` may be NaN."""
-    fall = np.clip(change / last, 0.05, 1.0)
+    fall = np.minimum(np.maximum(change / last, 0.05), 1.0)
     return change * np.where(np.isfinite(last), fall, _SHRINKS)
 
 
@@ -295,9 +296,8 @@ def _on_finer_meshes(rows: Floats, coarse: Sequence[Coarse]) -> list[OrbitOnMesh
         if not unbalanced.any():
             break
         wanted *= 1e-3  # slow motors: all forces are small
-    status: Integers = np.select(
-        [lost, unbalanced, ~turns_forward(body, u2)], [LOST, UNBALANCED, BACKWARDS], SOLVED
-    )
+    status = np.where(lost, LOST, np.where(unbalanced, UNBALANCED, BACKWARDS))
+    status[~lost & ~unbalanced & turns_forward(body, u2)] = SOLVED
     limit, error = _limit_and_error(body, (u0, u1, u2))
     error += [one.error for one in coarse]
     return [
@@ -310,7 +310,7 @@ def _on_finer_meshes(rows: Floats, coarse: Sequence[Coarse]) -> list[OrbitOnMesh
 
 def _limit_and_error(robots: Body, velocities: Sequence[Floats]) -> tuple[Floats, Floats]:
     """Extrapolate the means of orbits with velocities (B, P, 4) on each of MESHES, and estimate the error (B,)."""
-    means = np.array([mean_motion(robots, u) for u in velocities])
+    means = mean_motion(robots, np.array(velocities))
     limit, limit_of_two = extrapolate(means), means[2] + _MORE * (means[2] - means[1])
     return limit, difference(limit_of_two, limit) + DOUBT * difference(means[2], limit)
 
@@ -344,7 +344,7 @@ def with_edges(x: Floats, offset: Any, wanted: int) -> Floats:
     *batch, n, phases, _ = x.shape
     weights = _weights(n, wanted)
     nodes = (weights[:, 1:] @ x.reshape(*batch, n, 3 * phases)).reshape(*batch, wanted, phases, 3)
-    nodes[..., 0] += weights[:, :1] * np.expand_dims(offset, (-1, -2))
+    nodes[..., 0] += weights[:, :1] * np.reshape(offset, (*batch, 1, 1))
     return nodes
 
 

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.arrays import Floats
-from sim.jit import compiled, inlined
+from sim.jit import borrowing, compiled
 from sim.lanes import lane, lane_count, somewhere, zeros
 from sim.linear.blocks import add, put, vector, vector_at
 from sim.linear.lane_arrays import put_lane, take_lane
@@ -63,7 +63,7 @@ def new_scratch(x: Floats, u: Floats) -> Scratch:
     return Scratch(new_geometry(x, n, columns), around, zeros(x, x.shape), zeros(x, x.shape))
 
 
-@compiled
+@borrowing
 def fill_residual(
     body: Body, rates: Rates, x: Floats, u: Floats, where: Any, scratch: Scratch, r: Floats, t: Floats
 ) -> None:
@@ -104,13 +104,13 @@ def fill_residual(
             t[m % instants, a] += wrench[a]
 
 
-@compiled
+@borrowing
 def _velocity(motion: TailMotion, position: Vector, x_dot: Vector, flow: Vector) -> Vector:
     """Compute the velocity of a node through the fluid."""
     return minus(plus(plus(motion.linear, cross(motion.spin, position)), x_dot), flow)
 
 
-@inlined
+@compiled
 def _surround_lanes(body: Body, base: Any, x: Floats, u: Floats, where: Any, scratch: Scratch) -> None:
     """Add up all non-local effects of the robots in the lanes where `where` is 1, one robot after the other."""
     columns, instants = x.shape[1], u.shape[0]
@@ -133,7 +133,7 @@ def _surround_lanes(body: Body, base: Any, x: Floats, u: Floats, where: Any, scr
         put_lane(scratch.around.wrench, i, alone.around.wrench)
 
 
-@compiled
+@borrowing
 def surround(body: Body, x: Floats, u: Floats, phase: float, p: int, instants: int, scratch: Scratch) -> None:
     """Add all non-local effects of one robot at instant p, its columns p, p + P, …
 

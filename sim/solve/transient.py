@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.arrays import Floats, Integers
-from sim.jit import compiled, formula, inlined
+from sim.jit import borrowing, compiled, formula, inlined
 from sim.lanes import choose, lane, lanes, larger, less, smaller, somewhere, width, with_lane, zeros
 from sim.linear.lane_arrays import add_chosen, choose_all, combine, copy, largest_entry, put_lane, take_lane
 from sim.linear.spectral import differentiation
@@ -230,7 +230,7 @@ def _load(
     put_lane(at.lag_rate, i, np.zeros(at.lag.shape))
 
 
-@compiled
+@borrowing
 def _has_ended(flips: Flip, progress: _Progress, i: int, at: _State, now: float, found: Course) -> bool:
     """Tell whether the robot of lane i has come to its end, or cannot; keep its shape at the end."""
     robot = progress.robot[i]
@@ -241,7 +241,7 @@ def _has_ended(flips: Flip, progress: _Progress, i: int, at: _State, now: float,
     return bool(progress.steps[i] >= _MOST_STEPS or progress.rejected[i] >= _MOST_REJECTED)
 
 
-@compiled
+@borrowing
 def _goal(flips: Flip, progress: _Progress, i: int, marks: Floats) -> float:
     """Return the time at which a step of lane i must end next."""
     until, mark = flips.until[progress.robot[i]], progress.marks[i]
@@ -269,7 +269,7 @@ def _try_step(
     return solved
 
 
-@compiled
+@borrowing
 def _begin_stage(at: _State, new: _State, step: _Step, stage: int, dt: Any, tau: Any) -> None:
     """Fill the starts of a stage, and guess its shape."""
     if stage == 0:
@@ -306,7 +306,7 @@ def _solve_stage(
     return solved
 
 
-@compiled
+@borrowing
 def _accept(at: _State, new: _State, step: _Step, accepted: Any) -> None:
     """Let accepted steps be the state."""
     choose_all(at.x, accepted, new.x, at.x)
@@ -316,7 +316,7 @@ def _accept(at: _State, new: _State, step: _Step, accepted: Any) -> None:
     choose_all(at.lag_rate, accepted, step.lag_slope[1], at.lag_rate)
 
 
-@compiled
+@borrowing
 def _record(
     i: int, progress: _Progress, at: _State, new: _State, new_rate: Floats, now: Any, new_now: Any, marks: Floats,
     times: Floats, found: Course,
@@ -364,7 +364,7 @@ def _shorter_step(dt: Any, error: Any, solved: Any, tolerance: Any) -> Any:
     return dt * choose(solved, larger(0.2, 0.9 * np.sqrt(tolerance / error)), 0.3)
 
 
-@compiled
+@borrowing
 def _embedded_error(slope: Floats, dt: Any) -> Any:
     """Compare with the embedded method, (1/2, 1/2) in place of (1 − γ, γ), in the largest entry.
 

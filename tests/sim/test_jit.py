@@ -59,6 +59,40 @@ assert (numba.config.OPT, numba.config.CACHE_DIR) == before
 assert not signed.part.signatures
 """
 
+MEMORY = """
+import gc
+from dataclasses import replace
+import numpy as np
+from numba.core.runtime import rtsys
+from sim.effects import catalogue
+from sim.model.presets import PRESETS
+from sim.model.schedule import Schedule
+from sim.motion.replay import replay
+from sim.motion.response import responses
+from sim.motion.sensitivity import sensitivities
+from sim.motion.steady import orbits
+
+robot = PRESETS["paper-control"]
+alone = robot.groups()
+pair = alone.select(np.zeros(2, int))
+further = {effect.name: 1e-3 for effect in catalogue().values() if effect.reach == "nonlocal"}
+schedule = Schedule({**robot.group_values(), "N": 4}, 1, np.full(2, 0.2), (0.0, 0.0, 0.0), robot.time_scale)
+
+def held():
+    for groups in (alone, pair):
+        effects = {name: np.full(len(groups), size) for name, size in further.items()}
+        orbits(groups, stability=True), orbits(replace(groups, effects=effects), stability=True)
+        sensitivities(groups, ["C_t"]), responses(groups)
+    replay(schedule)
+    gc.collect()
+    now = rtsys.get_allocation_stats()
+    return now.alloc - now.free, now.alloc
+
+held()
+(before, first), (after, second) = held(), held()
+print(second > first, after - before)
+"""
+
 
 def python(*words: str, folder: Path = ROOT, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run Python in a folder that it imports from first."""
@@ -149,11 +183,17 @@ def imported(file: Path) -> set[Path]:
     return {path for name in names if (path := SIM / f"{name.replace('.', '/')}.py").is_file()}
 
 
+def test_what_loops_allocate_is_freed() -> None:
+    """Loops that count no references must not take an array over from another loop."""
+    done = python("-c", MEMORY, NUMBA_NRT_STATS="1")
+    assert done.stdout == "True 0\n", done.stderr
+
+
 def test_the_version_is_named_by_all_files_that_loops_are_made_of() -> None:
     """An effect or a way to use the loops is no reason to compile them anew."""
     sources = {path for pattern in jit.SOURCES for path in SIM.glob(pattern)}
     made_of: set[Path] = set()
-    mark = re.compile(r"(?m)^@(compiled|compiled_fast|inlined|formula)$")
+    mark = re.compile(r"(?m)^@(compiled|compiled_fast|borrowing|inlined|formula)$")
     loops = left = {file for file in SIM.rglob("*.py") if mark.search(file.read_text())}
     assert {SIM / "linear" / "gmres.py", SIM / "mechanics" / "drag.py", SIM / "solve" / "newton.py"} <= loops
     arguments = SIM / "solve" / "assembly.py"  # of loops, made from what the robots are
