@@ -126,8 +126,8 @@ class Robot(Shown):
 
     def number(self, name: str) -> float:
         """Return a number in SI units; the disc offset is by default the head's radius."""
-        value = getattr(self, name)
-        return float(self.head_radius if value is None else value)
+        value: float | None = getattr(self, name)
+        return self.head_radius if value is None else value
 
     def sigma(self, name: str) -> Sigma:
         """Return one standard deviation of a field, as stated or by default (`sim.model.uncertainty`)."""
