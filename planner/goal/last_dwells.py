@@ -16,11 +16,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from common.arrays import Floats
 from common.errors import InputError
@@ -40,8 +37,10 @@ _STEP = 1e-4  # time units, for derivatives
 _LAST = 30  # dwells before a goal that are changed
 _DROPPED = 4  # at most this many are left out
 _REACHED = 1e-4  # l and rad
-_CONVERGED = 1e-3  # relative gain of the cost in a step, below which the search ends
-_MOST_EVALUATIONS = 200  # about thirty are needed
+_CONVERGED = 3e-5  # relative gain of the cost in a step, below which the search ends
+_CLOSELY = 1e-8  # the same for a lap
+_MOST_STEPS = 200  # about thirty are needed
+_DAMPING = 1.0
 _GOAL = 1e7  # time units that a squared distance [l² or rad²] from the goal costs
 _FAR = 3e4  # the same for a distance [l] from the track, beyond the largest one of the schedule
 _CHANGED = 60  # dwells before the end of a lap that are changed
@@ -102,8 +101,7 @@ def _ended(
         parts = (math.sqrt(_GOAL) * (poses[:, -1] - target), np.sqrt(last), math.sqrt(_FAR) * beyond)
         return np.concatenate(parts, 1)
 
-    first = np.maximum(switches.dwells[kept:], least * (1 + 1e-6))
-    last = _least_squares(residuals, first, least, x_scale=least, max_nfev=_MOST_EVALUATIONS, ftol=_CONVERGED)
+    last = _least_squares(residuals, switches.dwells[kept:], least, _CONVERGED)
     found = residuals(last[None])[0]
     missed = float(np.abs(found[:3]).max()) / math.sqrt(_GOAL)
     cost = float((found**2).sum() + switches.dwells[:kept].sum()) + 1e6 * max(missed - _REACHED, 0.0)
@@ -112,31 +110,39 @@ def _ended(
 
 
 def _least_squares(
-    residuals: Callable[[Floats], Floats], first: Floats, least: Floats | float, **options: Any
+    residuals: Callable[[Floats], Floats], first: Floats, least: Floats | float, converged: float
 ) -> Floats:
-    """Find dwells (K,), not below `least`, whose residuals have the least sum of squares.
+    """Find dwells (K,), not below `least`, whose residuals have a small sum of squares, by Levenberg's method.
+
+    A dwell that is the shortest stays so while only a shorter one would help.
 
     Args:
         residuals: (B, R) of dwells (B, K).
         first: the dwells to begin with.
         least: the shortest ones.
-        options: of SciPy's `least_squares`.
+        converged: relative gain of the sum in a step, below which the search ends.
     """
 
-    @lru_cache(maxsize=1)  # the solver asks for both, one after the other
-    def at(dwells: bytes) -> tuple[Floats, Floats]:
-        """Compute residuals (R,) and derivatives (R, K) together."""
-        last = np.frombuffer(dwells)
-        values = residuals(np.concatenate([last[None], last + _STEP * np.eye(len(last))]))
-        return values[0], (values[1:] - values[0]).T / _STEP
+    def at(dwells: Floats) -> tuple[float, Floats, Floats]:
+        """Compute the sum, and the normal equations: matrix (K, K) and gradient (K,)."""
+        values = residuals(np.concatenate([dwells[None], dwells + _STEP * np.eye(len(dwells))]))
+        slopes = (values[1:] - values[0]) / _STEP
+        slopes[(dwells <= least) & (slopes @ values[0] > 0)] = 0.0
+        return float(values[0] @ values[0]), slopes @ slopes.T, slopes @ values[0]
 
-    def values(dwells: Floats) -> Floats:
-        return at(dwells.tobytes())[0]
-
-    def slopes(dwells: Floats) -> Floats:
-        return at(dwells.tobytes())[1]
-
-    return np.asarray(least_squares(values, first, slopes, bounds=(least, np.inf), **options).x)
+    dwells, damping = np.maximum(first, least), _DAMPING
+    cost, matrix, gradient = at(dwells)
+    for _ in range(_MOST_STEPS):
+        step = np.linalg.solve(matrix + damping * np.eye(len(dwells)), gradient)
+        moved = np.maximum(dwells - step, least)
+        candidate = at(moved)
+        damping *= 6.0 if candidate[0] >= cost else 0.2
+        if candidate[0] < cost:
+            gained = 1 - candidate[0] / cost
+            dwells, (cost, matrix, gradient) = moved, candidate
+            if gained < converged:
+                break
+    return dwells
 
 
 def looped(plan: Plan[J], progress: ProgressCallback | None = None) -> Plan[J]:
@@ -205,8 +211,7 @@ def _closed(long: Switches, first: int, last: int, turn: float, plan: Plan) -> t
     def residuals(changed: Floats) -> Floats:
         return np.concatenate([_EXACT * (ends(changed) - goal), changed / planned - 1], 1)
 
-    begin, lowest = planned * (1 + 1e-9), least * (1 - 1e-9)
-    solution = _least_squares(residuals, begin, lowest, x_scale=plan.minimum_dwell)
+    solution = _least_squares(residuals, planned, least, _CLOSELY)
     if np.abs(ends(solution[None])[0] - goal).max() > _CLOSED:
         return None
     dwells[kept:-1] = solution

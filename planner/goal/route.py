@@ -25,7 +25,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from common.arrays import Flags, Floats, Integers
-from planner.paths.dubins import TURNS, DubinsPaths, segment_lengths, shortest_paths
+from planner.paths.dubins import ROUNDING, TURNS, DubinsPaths, first_least, segment_lengths, shortest_paths
 from planner.paths.obstacles import Footprint, FreeSpace, Map
 from planner.paths.tractrix import Drift
 from planner.paths.units import Scales, in_lab, place_in_lab
@@ -48,6 +48,7 @@ _ROUNDS = 3  # of shortening
 _PLACES = 40  # on a leg, between which shorter joints are sought
 _ENOUGH = 1.005  # a chain at most this much longer than the shortest one without obstacles needs no lattice
 _THIN = 3  # of the courses at a stop, every third one is joined to the lattice
+_GRAIN = 1e-4  # l: ways over a lattice are counted in whole ones, and those of equal length are equal
 _MOST_CHECKS = 300  # chains of words
 AROUND = 6.0  # radii that the lattice reaches beyond stops and obstacles
 
@@ -75,16 +76,14 @@ class RouteLimits:
         length = tracks.length
         order = np.argsort(length)
         while len(order):
-            count = max(2, math.ceil(float(length[order[0]]) / step) + 1)
+            count = math.ceil(float(length[order[0]]) / step) + 1
             rows = order[: max(1, _BLOCK // (2 * count))]
             rows = rows[length[rows] <= max(2 * length[rows[0]], 4 * step)]
             order = order[len(rows) :]
-            count = max(2, math.ceil(float(length[rows[-1]]) / step) + 1)
-            way = np.linspace(0, 1, count) * length[rows, None]
+            way = step * np.arange(math.ceil(float(length[rows[-1]]) / step) + 1)[None]  # beyond an end: the end
             for every in _EVERY:
-                poses = tracks.take(rows).poses(way[:, ::every])
-                clear = (self.clearance(poses, space) >= margin).all(1)
-                rows, way = rows[clear], way[clear]
+                poses = tracks.take(rows).poses(way[:, ::-every])
+                rows = rows[(self.clearance(poses, space) >= margin).all(1)]
             result[rows] = True
         return result
 
@@ -94,7 +93,7 @@ class Joints(NamedTuple):
 
     course: Integers  # (J,), its index
     ahead: Integers  # (J,), by how much the index of a pose is larger than that of one with course 0 at the start
-    length: Floats  # (J,)
+    length: Floats  # (J,), in grains
 
 
 class Lattice:
@@ -134,12 +133,11 @@ class Lattice:
             inside = slice(max(0, -di), nx - max(0, di)), slice(max(0, -dj), ny - max(0, dj))
             room[(*inside, joint)] = self._distance(tracks.take(np.array([row])), table)[inside]
         ahead = (i[rows] * ny + j[rows]) * n + k[rows]
-        return Joints(course[rows], ahead, tracks.length[rows]), room.reshape(nx * ny, -1)
+        return Joints(course[rows], ahead, _counted(tracks.length[rows])), room.reshape(nx * ny, -1)
 
     def _distance(self, track: DubinsPaths, table: NDArray[np.float32]) -> NDArray[np.float32]:
         """Compute the distance (nx, ny) along the track of one joint on the map, by its place in the lattice."""
-        count = max(2, math.ceil(float(track.length[0]) / _STEP) + 1)
-        poses = track.poses(np.linspace(0, track.length, count).T)[0]
+        poses = track.poses(_STEP * np.arange(math.ceil(float(track.length[0]) / _STEP) + 1)[None])[0]
         heading = poses[:, 2] - self.limits.drift.slip_along(poses[:, 2])
         centres = self.limits.body.centres(np.stack([poses[:, 0], poses[:, 1], heading], 1)).reshape(-1, 2)
         offsets = np.rint(centres / self.map.step).astype(int) + self._pad * _CELLS
@@ -159,7 +157,8 @@ class Lattice:
     def ways(self, starts: Floats, costs: Floats, goals: Floats, margin: float) -> tuple[Floats, list[Floats]]:
         """Find the shortest ways from any of the starts (S, 3), with initial costs, to each of the goals (G, 3).
 
-        The body keeps `margin` on all of them.
+        The body keeps `margin` on all of them. Of ways of the same length it is the one whose poses, from the goal
+        back, have the lowest indices.
 
         Returns:
             costs (G,), infinite where there is no way, and the poses (n, 3) on each way, ends included; the first
@@ -172,19 +171,21 @@ class Lattice:
             self._links(pose, margin, True) if np.isfinite(c) else none
             for pose, c in zip(starts, costs, strict=True)
         ]
-        graph = self._graph(margin, [*rows, (count + begun, costs[begun] + 1e-9)])
-        (distance,), (before,) = dijkstra(graph, indices=np.array([source]), return_predecessors=True)
+        graph = self._graph(margin, [*rows, (count + begun, _counted(costs[begun]) + 1)])
+        distance, into = dijkstra(graph, indices=source) - 1, graph.tocsc()
         poses, lowest, ways = np.concatenate([self.poses, starts]), np.full(len(goals), np.inf), []
         for index, pose in enumerate(goals):
             near, length = self._links(pose, margin, False)
             total = distance[near] + length
             chain, at = [], source
             if len(near) and np.isfinite(total.min()):
-                at = int(near[np.lexsort((distance[near], total))[0]])
-                lowest[index] = total.min()
-            while at >= 0 and at != source:
+                at = int(near[total.argmin()])
+                lowest[index] = _GRAIN * total.min()
+            while at != source:
                 chain.append(at)
-                at = int(before[at])
+                joints = slice(*into.indptr[at : at + 2])
+                before = into.indices[joints]
+                at = int(before[distance[before] + into.data[joints] == distance[at]].min())
             ways.append(np.concatenate([poses[chain[::-1]], pose[None]]))
         return lowest, ways
 
@@ -221,7 +222,11 @@ class Lattice:
         )
         rows = np.flatnonzero(tracks.length <= _LONGEST_LINK * radius + self.spacing)
         rows = rows[self.limits.free(tracks.take(rows), margin, self.map)]
-        return near[rows], tracks.length[rows]
+        return near[rows], _counted(tracks.length[rows])
+
+
+def _counted(lengths: Floats) -> Floats:
+    return np.rint(lengths / _GRAIN)
 
 
 def _distinct(offsets: Integers) -> tuple[list[list[int]], list[list[int]]]:
@@ -329,7 +334,7 @@ def _chosen(stops: list[Floats], limits: RouteLimits, margin: float) -> DubinsPa
         if not np.isfinite(total):
             return None
         ends = list(pairwise(options))
-        chosen = [int(length[pair].argmin()) for length, pair in zip(lengths, ends, strict=True)]
+        chosen = [int(first_least(length[pair])) for length, pair in zip(lengths, ends, strict=True)]
         start = np.array([stop[k] for stop, k in zip(stops[:-1], options[:-1], strict=True)])
         parts = np.array([leg[pair][word] for leg, pair, word in zip(legs, ends, chosen, strict=True)])
         joined = DubinsPaths(start, TURNS[chosen], parts, limits.radius)
@@ -405,8 +410,8 @@ def shortened(leg: DubinsPaths, lattice: Lattice, margin: float) -> DubinsPaths:
         for k in range(1, len(poses)):
             best[k] = best[k - 1] + places.length[k - 1]
             costs = best[i[ends[k]]] + tracks.length[ends[k]]
-            if len(costs) and costs.min() < best[k]:
-                best[k], choice[k] = costs.min(), ends[k][costs.argmin()]
+            if len(costs) and costs.min() < best[k] - ROUNDING:
+                best[k], choice[k] = costs.min(), ends[k][first_least(costs)]
         parts, k = [], len(poses) - 1
         while k > 0:
             row = choice[k]

@@ -8,13 +8,13 @@ course. All functions take arrays of poses.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from common.arrays import Floats, Integers
+from planner.paths.path import steps_of
 
 TURNS = np.array([[1, 0, 1], [-1, 0, -1], [1, 0, -1], [-1, 0, 1], [-1, 1, -1], [1, -1, 1]])
 _CIRCLE = 2 * np.pi
@@ -68,7 +68,7 @@ class DubinsPaths(NamedTuple):
         parts = [self.start[:1]]
         for row, length in enumerate(self.length.tolist()):
             if length > 0:
-                way = np.linspace(0, length, max(1, math.ceil(length / spacing)) + 1)[None, 1:]
+                way = np.linspace(0, length, max(1, steps_of(length, spacing)) + 1)[None, 1:]
                 parts.append(self.take(np.array([row])).poses(way)[0])
         poses = np.concatenate(parts)
         poses[:, 2] = np.unwrap(poses[:, 2])
@@ -120,8 +120,13 @@ def _three_arcs(d: Floats, a: Floats, b: Floats, side: float) -> tuple[Floats, F
 def shortest_paths(start: Floats, goal: Floats, radius: float) -> DubinsPaths:
     """Find the shortest paths between M pairs of poses (M, 3)."""
     lengths = segment_lengths(start, goal, radius)
-    best = lengths.sum(-1).argmin(-1)
+    best = first_least(lengths.sum(-1))
     return DubinsPaths(start, TURNS[best], lengths[np.arange(len(best)), best], radius)
+
+
+def first_least(values: Floats) -> Integers:
+    """Find the first of the least values (..., n), whichever of them rounding makes the smallest."""
+    return np.asarray((values <= values.min(-1, keepdims=True) + ROUNDING).argmax(-1))
 
 
 def _turn(angle: Floats) -> Floats:

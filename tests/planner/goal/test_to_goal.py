@@ -259,7 +259,7 @@ def test_a_lattice_needs_four_bytes_a_joint_and_finds_the_ways_of_a_plain_search
     for cost, way, goal in zip(costs.tolist(), ways, goals, strict=True):
         assert np.array_equal(way[[0, -1]], [start[0], goal])
         tracks = shortest_paths(way[:-1], way[1:], 1.0)
-        assert cost == pytest.approx(tracks.total, abs=1e-8)
+        assert cost == pytest.approx(tracks.total, abs=1e-4 * len(way))  # lengths are counted in grains
         assert limits.free(tracks, margin, lattice.map).all()
     # A track is free where each of its places is, however many are looked at first.
     poses = np.column_stack([rng.uniform([0, -4], [10, 4], (400, 2)), rng.uniform(0, 6, 400)])
