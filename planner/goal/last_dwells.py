@@ -1,14 +1,13 @@
 """Change the last dwells of a schedule so that the motion ends at a given pose: a goal, or the beginning of a lap.
 
-*A goal*: the dwells minimise a sum of squares: time, distances of the pivot from its track beyond those of the
-schedule, and the distance from the goal. A pose has three coordinates, so a few dwells are enough, and some may be
-dropped.
+The sum of the squares of the changes is least. A pose has three coordinates: changes of many dwells are small.
+
+*A goal*: some of the last dwells may be dropped, if that saves time and needs no large changes of the others.
 
 *A lap*: the reference of a closed path is followed for a lap and once more. The dwells of the second lap, which
-began in motion, are the schedule: an even number of them. The last ones are changed a little, so that pose and
-motion at the end are those at the beginning: the sum of the squares of the changes is least. The first dwell of
-the first lap begins at rest; the start is where that one, too, ends in the pose from which all laps go on. Lengths
-in l, times in μ0 l⁴/EI.
+began in motion, are the schedule: an even number of them. The last ones are changed so that pose and motion at the
+end are those at the beginning. The first dwell of the first lap begins at rest; the start is where that one, too,
+ends in the pose from which all laps go on. Lengths in l, times in μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ import numpy as np
 
 from common.arrays import Floats
 from common.errors import InputError
-from planner.paths.distance import distance_to
 from planner.planning.conditions import OVERLAP, Lap
 from planner.planning.declare import FeasiblePath
 from planner.planning.line_of_sight import follow
@@ -35,14 +33,13 @@ from sim.mechanics.planar import POSE
 
 _STEP = 1e-4  # time units, for derivatives
 _LAST = 30  # dwells before a goal that are changed
-_DROPPED = 4  # at most this many are left out
+_DROPPED = 2  # at most this many are left out
+_CHANGE = 40.0  # time units that the sum of the squares of changes costs
 _REACHED = 1e-4  # l and rad
-_CONVERGED = 3e-5  # relative gain of the cost in a step, below which the search ends
-_CLOSELY = 1e-8  # the same for a lap
+_MISSED = 1e6  # time units that more than that costs
+_CONVERGED = 1e-6  # relative gain of the sum in a step, below which the search ends
 _MOST_STEPS = 200  # about thirty are needed
 _DAMPING = 1.0
-_GOAL = 1e7  # time units that a squared distance [l² or rad²] from the goal costs
-_FAR = 3e4  # the same for a distance [l] from the track, beyond the largest one of the schedule
 _CHANGED = 60  # dwells before the end of a lap that are changed
 _NEAR = 6  # flips, or 2 % of them, from where the lap should end: its end is sought among them
 _FEWEST = 6  # dwells of a lap, below which none could be changed
@@ -60,77 +57,57 @@ class Ending:
 
     def __call__(self, switches: Switches, declared: FeasiblePath, setting: Trial) -> Switches:
         """Change a schedule: without any or some of its last dwells, whichever costs least."""
-        vehicle, track = setting.tracked.vehicle, declared.reference.q
-        dwell = min(setting.dwell, max(self.least, self.shorter * setting.dwell))
+        least = min(setting.dwell, max(self.least, self.shorter * setting.dwell))
         best, lowest = switches, math.inf
-        for dropped in range(min(_DROPPED, len(switches.dwells) - 1) + 1):
-            count = len(switches.dwells) - dropped
-            shorter = Switches(switches.first_direction, switches.dwells[:count], switches.poses[: count + 1])
-            candidate, cost = _ended(shorter, self.goal, vehicle, dwell, track)
+        for count in range(len(switches.dwells), max(len(switches.dwells) - _DROPPED, 1) - 1, -1):
+            fewer = Switches(switches.first_direction, switches.dwells[:count], switches.poses[: count + 1])
+            candidate, cost = _ended(fewer, self.goal, setting.tracked.vehicle, least)
             if cost < lowest:
                 best, lowest = candidate, cost
-        return best
+        return replace(best, poses=roll_out(setting.tracked.vehicle, best, samples=1).flips)
 
 
-def _ended(
-    switches: Switches, goal: POSE, vehicle: Vehicle, least: float, track: Floats
-) -> tuple[Switches, float]:
-    """Change the last dwells so that a schedule ends at a goal, and return it with its cost.
-
-    Args:
-        switches: the schedule.
-        goal: x, y [l] and heading [rad] of the head's centre.
-        vehicle: who carries it out.
-        least: the shortest dwell.
-        track: (m, 2), that of the pivot.
-    """
+def _ended(switches: Switches, goal: POSE, vehicle: Vehicle, least: float) -> tuple[Switches, float]:
+    """Change the last dwells, none below `least`, so that a schedule ends at a goal; return it with its cost."""
     kept = max(len(switches.dwells) - _LAST, 0)
     turns = round((switches.poses[-1, 2] - goal[2]) / (2 * math.pi))
     target = np.array([goal[0], goal[1], goal[2] + 2 * math.pi * turns])
+    planned = np.maximum(switches.dwells[kept:], least)
 
-    def distances(poses: Floats) -> Floats:
-        """Compute distances (B, K) of the pivot from its track, at poses (B, K, 3) of the head's centre."""
-        pivot = planar.compose(poses, np.array([-vehicle.pivot_distance, 0.0, 0.0]))[..., :2]
-        return distance_to(track, pivot.reshape(-1, 2)).reshape(pivot.shape[:-1])
+    def ends(dwells: Floats) -> Floats:
+        return flips_after(vehicle, switches, kept, dwells)[:, -1]
 
-    near = float(distances(switches.poses[None, kept + 1 :]).max())
-
-    def residuals(last: Floats) -> Floats:
-        poses = flips_after(vehicle, switches, kept, last)
-        beyond = np.maximum(distances(poses) - near, 0.0)
-        parts = (math.sqrt(_GOAL) * (poses[:, -1] - target), np.sqrt(last), math.sqrt(_FAR) * beyond)
-        return np.concatenate(parts, 1)
-
-    last = _least_squares(residuals, switches.dwells[kept:], least, _CONVERGED)
-    found = residuals(last[None])[0]
-    missed = float(np.abs(found[:3]).max()) / math.sqrt(_GOAL)
-    cost = float((found**2).sum() + switches.dwells[:kept].sum()) + 1e6 * max(missed - _REACHED, 0.0)
-    ended = replace(switches, dwells=np.concatenate([switches.dwells[:kept], last]))
-    return replace(ended, poses=roll_out(vehicle, ended, samples=1).flips), cost
+    last = _least_change(ends, planned, target, least)
+    dwells = np.concatenate([switches.dwells[:kept], last])
+    missed = float(np.abs(ends(last[None])[0] - target).max())
+    change = float(((last / planned - 1) ** 2).sum())
+    cost = float(dwells.sum()) + _CHANGE * change + _MISSED * max(missed - _REACHED, 0.0)
+    return replace(switches, dwells=dwells), cost
 
 
-def _least_squares(
-    residuals: Callable[[Floats], Floats], first: Floats, least: Floats | float, converged: float
+def _least_change(
+    ends: Callable[[Floats], Floats], planned: Floats, goal: Floats, least: Floats | float
 ) -> Floats:
-    """Find dwells (K,), not below `least`, whose residuals have a small sum of squares, by Levenberg's method.
+    """Find dwells (K,) that end at a goal and differ least from those planned, by Levenberg's method.
 
     A dwell that is the shortest stays so while only a shorter one would help.
 
     Args:
-        residuals: (B, R) of dwells (B, K).
-        first: the dwells to begin with.
-        least: the shortest ones.
-        converged: relative gain of the sum in a step, below which the search ends.
+        ends: last poses (B, 3) after dwells (B, K).
+        planned: (K,), the dwells to begin with; the sum of the squares of changes, as shares of them, is least.
+        goal: (3,), the last pose.
+        least: the shortest dwells.
     """
 
     def at(dwells: Floats) -> tuple[float, Floats, Floats]:
         """Compute the sum, and the normal equations: matrix (K, K) and gradient (K,)."""
-        values = residuals(np.concatenate([dwells[None], dwells + _STEP * np.eye(len(dwells))]))
+        tried = np.concatenate([dwells[None], dwells + _STEP * np.eye(len(dwells))])
+        values = np.concatenate([_EXACT * (ends(tried) - goal), tried / planned - 1], 1)
         slopes = (values[1:] - values[0]) / _STEP
         slopes[(dwells <= least) & (slopes @ values[0] > 0)] = 0.0
         return float(values[0] @ values[0]), slopes @ slopes.T, slopes @ values[0]
 
-    dwells, damping = np.maximum(first, least), _DAMPING
+    dwells, damping = planned, _DAMPING
     cost, matrix, gradient = at(dwells)
     for _ in range(_MOST_STEPS):
         step = np.linalg.solve(matrix + damping * np.eye(len(dwells)), gradient)
@@ -140,7 +117,7 @@ def _least_squares(
         if candidate[0] < cost:
             gained = 1 - candidate[0] / cost
             dwells, (cost, matrix, gradient) = moved, candidate
-            if gained < converged:
+            if gained < _CONVERGED:
                 break
     return dwells
 
@@ -208,10 +185,7 @@ def _closed(long: Switches, first: int, last: int, turn: float, plan: Plan) -> t
         final = np.full((len(changed), 1), dwells[-1])
         return flips_after(vehicle, lap, kept, np.concatenate([changed, final], 1))[:, -1]
 
-    def residuals(changed: Floats) -> Floats:
-        return np.concatenate([_EXACT * (ends(changed) - goal), changed / planned - 1], 1)
-
-    solution = _least_squares(residuals, planned, least, _CLOSELY)
+    solution = _least_change(ends, planned, goal, least)
     if np.abs(ends(solution[None])[0] - goal).max() > _CLOSED:
         return None
     dwells[kept:-1] = solution

@@ -27,6 +27,7 @@ from scipy.sparse.csgraph import dijkstra
 from common.arrays import Flags, Floats, Integers
 from planner.paths.dubins import ROUNDING, TURNS, DubinsPaths, first_least, segment_lengths, shortest_paths
 from planner.paths.obstacles import Footprint, FreeSpace, Map
+from planner.paths.path import steps_of
 from planner.paths.tractrix import Drift
 from planner.paths.units import Scales, in_lab, place_in_lab
 from planner.planning.conditions import BlockedError
@@ -427,7 +428,7 @@ def _cut(leg: DubinsPaths, spacing: float) -> DubinsPaths:
     for row, length in enumerate(leg.length.tolist()):
         if length == 0:
             continue
-        edges = np.linspace(0, length, math.ceil(length / spacing) + 1)
+        edges = np.linspace(0, length, max(1, steps_of(length, spacing)) + 1)
         ends = np.cumsum(leg.lengths[row])
         before = np.concatenate([[0.0], ends[:-1]])
         lengths = np.maximum(np.minimum(ends, edges[1:, None]) - np.maximum(before, edges[:-1, None]), 0.0)

@@ -19,8 +19,14 @@ from sim.model import uncertainty
 from sim.model.entries import ENTRIES
 
 _NAMES = {  # of each module; a leading underscore is left out
+    "planner.goal.last_dwells": "STEP LAST DROPPED CHANGE REACHED MISSED CONVERGED MOST_STEPS DAMPING "
+    "EXACT",
+    "planner.goal.route": "RANGE DETOUR LINK LONGEST_LINK STEP CELLS MOST_POSES LEVELS ROUNDS PLACES ENOUGH "
+    "AROUND GRAIN",
+    "planner.goal.trip": "SPACING SHORTER ZIGZAGS",
     "planner.files.headers": "MOST_MS CHECKPOINTS",
     "planner.paths.distance": "TIE",
+    "planner.paths.dubins": "ROUNDING",
     "planner.paths.path_files": "KINDS ADVICE",
     "planner.paths.nearest_path": "SPACING MOST_POSES COARSEST WEIGHTS ITERATIONS ALONG POINTS_A_POSE ROUNDS "
     "LEAST EVEN SHORT SHORTEST_STEP",
@@ -34,7 +40,7 @@ _NAMES = {  # of each module; a leading underscore is left out
     "planner.guidance.law": "EXACT LARGEST_STEP LARGEST_TURN TURNS MOST_BIAS HALVINGS MOST_LOOKS",
     "planner.planning.line_of_sight": "MOST_SWITCHES PATIENCE EVERY QUICKEST TIGHTEST PAIRS_AHEAD",
     "planner.planning.plan": "WIDE OWN_TABLE_FROM",
-    "planner.planning.solve": "WORTH SAVED LENGTHENED_FROM MORE",
+    "planner.planning.solve": "WORTH SAVED LENGTHENED_FROM MORE GROWS MARGINS OTHERS",
     "planner.vehicle.from_table": "ODD TIME_STEPS STEP",
     "planner.vehicle.vehicle": "SHORTEST STEP TIMES BEFORE_KNOTS",
     "planner.vehicle.zigzag": "PAIRS TRIES QUICK LONGEST KEPT NEARLY COMPARED WIDEST COUNT LONGER",

@@ -153,9 +153,10 @@ function root(look, [a, fa], [b, fb]) {
   return time;
 }
 
-/* Choose dwell times that keep the tracked point on the reference: switches {firstDirection, dwells, poses}. */
-function follow(reference, vehicle, guidance, offset = 0, progress = null) {
-  let { pose, sense } = startAtRest(reference, vehicle, guidance, offset);
+/* Choose dwell times that keep the tracked point on the reference: switches {firstDirection, dwells, poses}. start: at rest,
+ * {pose, sense}; null: on the reference. */
+function follow(reference, vehicle, guidance, offset = 0, progress = null, start = null) {
+  let { pose, sense } = start ?? startAtRest(reference, vehicle, guidance, offset);
   const law = new LineOfSight(reference, vehicle, guidance, offset), firstDirection = sense, dwells = [], poses = [pose];
   const around = guidance.ahead + pivotDistance(vehicle) + offset + turnRadius(vehicle);
   const patience = (PATIENCE * around) / Math.max(speedOf(vehicle), 1e-300);
@@ -205,12 +206,16 @@ function checkDuration(dwells, reference, vehicle) {
   }
 }
 
+/* The side to which the heading turns first: 1 to the left, or straight on; −1 to the right. */
+function firstTurn(heading) {
+  const turning = heading.find((angle) => Math.abs(angle - heading[0]) > 1e-6);
+  return turning === undefined || turning > heading[0] ? 1 : -1;
+}
+
 /* Start at rest near the beginning of the reference, so that the first dwell continues as one of the zigzag does:
  * {pose, sense}. */
 function startAtRest(reference, vehicle, guidance, offset) {
-  const [first] = reference.heading;
-  const turning = reference.heading.find((heading) => Math.abs(heading - first) > 1e-6);
-  const sense = turning === undefined || turning > first ? 1 : -1;
+  const [first] = reference.heading, sense = firstTurn(reference.heading);
   const straight = zigzag(vehicle, guidance.dwell, offset);
   const heading = first - sense * straight.swing * (1 - hysteresis(reference, vehicle, 1)[0]);
   const [[px, py], [qx, qy]] = [reference.p[0], reference.q[0]], toHead = Math.hypot(px - qx, py - qy) - offset;
@@ -221,4 +226,4 @@ function startAtRest(reference, vehicle, guidance, offset) {
   return { pose: compose(after, inversePose(motionAfter(vehicle, sense, null, guidance.dwell))), sense };
 }
 
-export { follow };
+export { follow, firstTurn };

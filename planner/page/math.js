@@ -128,7 +128,7 @@ function unwrap(angles) {
   const smooth = Float64Array.from(angles);
   for (let i = 1; i < smooth.length; i++) {
     const step = angles[i] - angles[i - 1];
-    smooth[i] = smooth[i - 1] + (Math.abs(step) < Math.PI ? step : halfTurn(step) || step);
+    smooth[i] = smooth[i - 1] + (Math.abs(step) <= Math.PI ? step : halfTurn(step));
   }
   return smooth;
 }

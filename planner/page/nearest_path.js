@@ -242,4 +242,4 @@ function dampedStep({ band, right, width }, damping) {
   return step;
 }
 
-export { nearestPath, poseSpacing };
+export { nearestPath, poseSpacing, dampedStep };

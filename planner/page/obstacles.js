@@ -3,7 +3,7 @@
  * A region is {x, y, radius} or {corners}; a space is {keepOut: regions, walls: a region with corners, or null}. The
  * body is a row of discs {places, radius}, with places forward along its axis. Lengths in l. */
 import { CONSTANTS } from "./constants.js";
-import { clip, smallest } from "./math.js";
+import { clip, largestSize, smallest } from "./math.js";
 import { pathLength, pathOf } from "./path.js";
 import { inLab, placeInLab } from "./units.js";
 import { pivotDistance } from "./vehicle.js";
@@ -12,6 +12,9 @@ import { InputError, quoted, refusing } from "./words.js";
 const { MORE } = CONSTANTS.solve;
 const ANYWHERE = { keepOut: [], walls: null };
 const AROUND = "the page finds no way around, as softflagella plan does: move the path or the region";
+
+/* There is no way around what stands on a path, or to a goal. */
+class BlockedError extends InputError {}
 
 /* Read what a page's options say of regions, in cm, with the length of `cm` tails. */
 function readSpace({ keepOut, walls }, cm) {
@@ -72,16 +75,28 @@ function footprint({ headLength, headRadius, discOffset, tailRadius, tailLength 
   return { places, radius: Math.hypot(width, step / 2) };
 }
 
-/* The distance of the body at each pose from what is not free, negative inside. */
-function clearances(poses, { places, radius }, { keepOut, walls }) {
-  const room = (x, y) => {
+/* Make a function of the distance of a place from what is not free, negative inside. */
+function roomIn({ keepOut, walls }) {
+  return (x, y) => {
     const within = walls ? -distanceFrom(walls, x, y) : Infinity;
     return keepOut.reduce((least, region) => Math.min(least, distanceFrom(region, x, y)), within);
   };
-  return Float64Array.from(poses, ([x, y, heading]) => {
-    const c = Math.cos(heading), s = Math.sin(heading);
-    return Math.min(...places.map((place) => room(x + place * c, y + place * s))) - radius;
-  });
+}
+
+/* The distance of the body at a pose from what is not free. room: as that of a space. */
+function clearance([x, y, heading], { places, radius }, room) {
+  const c = Math.cos(heading), s = Math.sin(heading);
+  return places.reduce((least, place) => Math.min(least, room(x + place * c, y + place * s)), Infinity) - radius;
+}
+
+function clearances(poses, body, space) {
+  const room = roomIn(space);
+  return Float64Array.from(poses, (pose) => clearance(pose, body, room));
+}
+
+/* The largest distance of a point of the body from its origin. */
+function reachOf({ places, radius }) {
+  return largestSize(places) + radius;
 }
 
 /* The distance of a place from a region, negative inside. */
@@ -107,7 +122,7 @@ function keptClear({ tracked: { robot, vehicle }, declared: { reference }, rolle
   const clearance = smallest(clearances(rolled.motion, footprint(robot, 0), space));
   if (least >= margin && clearance > 0) return { space, margin, clearance };
   const place = placeInLab(...reference.p[room.indexOf(least)], robot), free = inLab(Math.max(least, 0), robot);
-  throw new InputError(
+  throw new BlockedError(
     `the path is blocked at ${place}, where the robot has ${free} around it; it needs ${inLab(margin, robot)}, the stated `
     + `error; ${AROUND}`,
   );
@@ -121,4 +136,4 @@ function keptClearRecord({ space: { keepOut, walls }, margin, clearance }) {
   };
 }
 
-export { ANYWHERE, readSpace, keptClear, keptClearRecord };
+export { ANYWHERE, BlockedError, readSpace, footprint, roomIn, clearance, clearances, reachOf, keptClear, keptClearRecord };

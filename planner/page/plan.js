@@ -1,20 +1,21 @@
-/* From a path and a robot to a plan, without simulating.
+/* From a path, or a start and a goal, and a robot to a plan, without simulating.
  *
  * A plan is {tracked, objective, drawn, declared, straight, guidance, switches, errors, unmeasured, clear}; clear is as in
  * obstacles.js. Lengths in l, times in μ0 l⁴/EI, unless a name says its unit. */
 import { CONSTANTS } from "./constants.js";
 import { declare } from "./declare.js";
 import { Followed, guaranteedError, lookAhead } from "./stated_error.js";
-import { follow } from "./guidance.js";
-import { sum } from "./math.js";
-import { ANYWHERE, keptClear } from "./obstacles.js";
+import { ended, wayToGoal } from "./goal.js";
+import { follow, firstTurn } from "./guidance.js";
+import { linspace, smallest, sum } from "./math.js";
+import { ANYWHERE, BlockedError, clearances, footprint, keptClear } from "./obstacles.js";
 import { checkSize } from "./path.js";
 import { inLab, timeInLab } from "./units.js";
 import { QUICK, checkLeast, dwellsFor, longerDwells, nearlyFastest, rodOf, turnRadius, zigzag } from "./vehicle.js";
 import { zigzagHysteresis } from "./vehicle.js";
 import { InputError, general, refusing } from "./words.js";
 
-const { WORTH, SAVED, LENGTHENED_FROM } = CONSTANTS.solve;
+const { WORTH, SAVED, LENGTHENED_FROM, MORE, GROWS, MARGINS, OTHERS } = CONSTANTS.solve, { ZIGZAGS } = CONSTANTS.trip;
 const OWN_TABLE = "softflagella surrogate robot"; // makes the table of one robot
 const { DEFAULTS } = CONSTANTS.request;
 
@@ -39,12 +40,13 @@ function leastDwell({ minimumSeconds, minimumDwell }, robot) {
 /* Plan for a path, a vehicle with its tracked point and a request. progress: called now and then. */
 function makePlan(drawn, tracked, request, progress = null) {
   const chosen = followedPath(drawn, tracked, request, progress), { declared, straight, guidance, switches } = chosen;
-  const { errors, unmeasured, clear } = chosen, { objective } = request;
-  return { tracked, objective, drawn, declared, straight, guidance, switches, errors, unmeasured, clear };
+  const { errors, unmeasured, clear, drawn: asked, length } = chosen, { objective, goal } = request;
+  return { tracked, objective, drawn: asked, declared, straight, guidance, switches, errors, unmeasured, clear, goal, length };
 }
 
 /* The schedule that a request chooses, as in stated_error.js. */
 function followedPath(drawn, tracked, request, progress = null) {
+  if (request.goal) return followedWay(tracked, request, progress);
   const { vehicle, robot } = tracked, declaredPaths = new Map();
   checkSize(drawn, robot, turnRadius(vehicle));
   const { dwell: given, objective, corner, timeWeight, tolerance, seed, space } = request;
@@ -81,6 +83,57 @@ function followedPath(drawn, tracked, request, progress = null) {
   return shortened(first, dwells, (dwell) => clear(withDwell(dwell)), tolerance);
 }
 
+/* The schedule from a start to a goal, with the margin that covers its stated error. */
+function followedWay(tracked, request, progress) {
+  const { vehicle, robot, offset } = tracked, { start, goal, dwell: given, objective, tolerance, seed, space } = request;
+  const least = checkLeast(leastDwell(request, robot)), wayFor = wayToGoal(tracked, request);
+  const at = (dwell) => {
+    const straight = zigzag(vehicle, dwell, offset), drift = driftOf(tracked, straight, dwell);
+    let margin = space === ANYWHERE ? 0 : ZIGZAGS * straight.largest, stated;
+    for (let n = 0; n < MARGINS; n++) {
+      const { declared, length } = wayFor(drift, margin), guidance = chooseGuidance(vehicle, declared, straight, dwell);
+      const begin = { pose: start, sense: firstTurn(declared.reference.heading) };
+      const swum = follow(declared.reference, vehicle, guidance, offset, progress, begin);
+      const switches = ended(swum, goal, vehicle, dwell, least);
+      guidance.dwell = Math.min(dwell, ...switches.dwells);
+      const drawn = { points: declared.reference.p, closed: false };
+      const followed = new Followed({ tracked, drawn, declared, straight, guidance, switches, guaranteed: null, seed });
+      followed.length = length;
+      if (space === ANYWHERE) return followed;
+      ({ stated } = followed);
+      const clearance = smallest(clearances(followed.rolled.motion, footprint(robot, 0), space));
+      if (stated <= margin && clearance > 0) return Object.assign(followed, { clear: { space, margin, clearance } });
+      margin = Math.max(MORE * stated, GROWS * margin);
+    }
+    throw new BlockedError(
+      `there is no way that leaves the plan's stated error around the robot: it is ${inLab(stated, robot)}; plan with `
+      + `feedback, make a table of this robot (${OWN_TABLE}), or move the path, the goal or the obstacles`,
+    );
+  };
+  const dwells = given === null ? dwellsFor(vehicle, objective, least) : [checkLeast(given)];
+  const others = Array.from(linspace(0, dwells.length - 1, OTHERS + 1), (place) => dwells[Math.trunc(place)]);
+  const first = firstClear(at, given === null ? new Set(others) : dwells);
+  return tolerance === null || first.stated <= tolerance ? first : shortened(first, dwells, at, tolerance);
+}
+
+/* Plan with the first dwell for which there is a way. */
+function firstClear(at, dwells) {
+  const refusals = [];
+  for (const dwell of dwells) {
+    const followed = unblocked(() => at(dwell), (refusal) => refusals.push(refusal) && null);
+    if (followed) return followed;
+  }
+  throw refusals[0];
+}
+
+/* Do some work; where the way is blocked there is another answer. */
+function unblocked(work, instead) {
+  return refusing(work, (refusal) => {
+    if (refusal instanceof BlockedError) return instead(refusal);
+    throw refusal;
+  });
+}
+
 /* The dwell with which a declared path takes the least time; straight motion is the fastest with `fastest`. */
 function quickest({ vehicle, offset }, declared, fastest, least) {
   let best = fastest, time = Infinity;
@@ -110,9 +163,9 @@ function leastStated(first, longer, withDwell) {
 function shortened(first, dwells, withDwell, tolerance) {
   let best = first, kept = null, low = 0, high = dwells.length;
   while (high - low > 1) {
-    const middle = (low + high) >> 1, candidate = withDwell(dwells[middle]);
-    if (candidate.stated < best.stated) best = candidate;
-    if (candidate.stated <= tolerance) [kept, high] = [candidate, middle];
+    const middle = (low + high) >> 1, candidate = unblocked(() => withDwell(dwells[middle]), () => null);
+    if (candidate?.stated < best.stated) best = candidate;
+    if (candidate?.stated <= tolerance) [kept, high] = [candidate, middle];
     else low = middle;
   }
   if (kept !== null) return kept;

@@ -3,7 +3,7 @@
  * A drift is {sideways, current: [x, y]}, as shares of the net speed along the heading. Lengths in l, angles in
  * rad. */
 import { CONSTANTS } from "./constants.js";
-import { clip, column, differences, halfTurn, largest, linspace, smallest, unwrap } from "./math.js";
+import { TAU, clip, column, differences, halfTurn, largest, linspace, smallest, unwrap } from "./math.js";
 import { arcLength, pointsAt, polyline, resample, stepLengths, stepsOf } from "./path.js";
 import { InputError } from "./words.js";
 
@@ -25,9 +25,23 @@ function reference(path, pivotDistance, spacing, drift = STILL) {
   const q = p.map(([x, y], i) => {
     return [x - pivotDistance * Math.cos(heading[i]), y - pivotDistance * Math.sin(heading[i])];
   });
+  return withArc({ p, q, heading, closed: path.closed });
+}
+
+/* Place the path a rod ahead of a track of the pivot, poses [x, y, course]; heading: the first one, whole turns included. */
+function referenceOfPivot(poses, rod, drift, first) {
+  const headings = Float64Array.from(poses, ([, , course]) => course - slipOf(course, drift));
+  const whole = TAU * Math.round((first - headings[0]) / TAU), heading = headings.map((angle) => angle + whole);
+  const q = poses.map(([x, y]) => [x, y]);
+  const p = q.map(([x, y], i) => [x + rod * Math.cos(heading[i]), y + rod * Math.sin(heading[i])]);
+  return withArc({ p, q, heading, closed: false });
+}
+
+/* Add arc and curvature. */
+function withArc({ p, q, heading, closed }) {
   const arc = arcLength(q), steps = differences(arc);
   const curvature = differences(heading).map((turn, i) => turn / Math.max(steps[i], 1e-9));
-  return { p, q, heading, arc, curvature, closed: path.closed };
+  return { p, q, heading, arc, curvature, closed };
 }
 
 /* The heading where the pivot itself follows the path: the mean of the directions of two steps. */
@@ -154,4 +168,4 @@ function filled(line) {
   return pointsAt(line, lengths, Float64Array.from(new Set([...linspace(0, end, count), ...lengths])).sort());
 }
 
-export { STILL, reference, distanceTo, nearest, twoSided };
+export { STILL, reference, referenceOfPivot, slipOf, ratio, distanceTo, nearest, twoSided };

@@ -46,7 +46,7 @@ async function answered(call) {
   try {
     return { answer: await called(call) };
   } catch (refusal) {
-    if (refusal.name in { InputError: 0, OutsideError: 0 }) return { refusal: refusal.message };
+    if (refusal.name in { InputError: 0, BlockedError: 0, OutsideError: 0 }) return { refusal: refusal.message };
     return { broken: `${call[0]}, ${call[1]}: ${refusal.stack}` };
   }
 }

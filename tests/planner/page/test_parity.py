@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
+from planner.goal.trip import to_goal
 from planner.jobs.plan import make_plan, plan
 from planner.options import read_regions
 from planner.page.first_state import first_plan
@@ -19,6 +20,7 @@ from planner.page.write_page import packed_data, table_data
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from planner.paths.path import Path2D, circle, polygon
 from planner.paths.path_files import read_path
+from planner.paths.units import read_pose
 from planner.planning.conditions import BlockedError
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
@@ -51,6 +53,7 @@ from tests.planner.page.page_core import (
     opened,
     page_options,
     refusal_of,
+    typed,
     without_digits,
 )
 from tests.planner.plans import CORNER, planned
@@ -291,6 +294,112 @@ def test_a_plan_beside_regions_is_that_of_the_command_and_a_blocked_path_is_refu
         assert record[key] == pytest.approx(kept[key], abs=1e-8)
     for one, other in zip(record["keep_out"], kept["keep_out"], strict=True):
         check_near(*(next(iter(each.values())) for each in (one, other)))
+
+
+Pose = tuple[float, float, float]
+GOALS = [pytest.param(seed, marks=[] if seed < 5 else pytest.mark.rates) for seed in range(40)]
+
+
+def page_space(regions: Sequence[Circle | Polygon], walls: Polygon | None) -> dict[str, Any]:
+    """Return regions and walls as the page has them."""
+    return {
+        "keepOut": [vars(each) for each in regions],
+        "walls": None if walls is None else {"corners": walls.corners},
+    }
+
+
+def goal_call(start: Pose, goal: Pose, robot: Robot | str, **options: Any) -> tuple[Any, ...]:
+    request = call("plan.js", "planRequest", {"start": start, "goal": goal, "objective": "time", **options})
+    swims = (
+        call("from_table.js", "trackedVehicle", robot, TABLE, "head_centre")
+        if isinstance(robot, Robot)
+        else tracked_of(VEHICLES[robot])
+    )
+    return "plan.js", "makePlan", None, swims, request
+
+
+@pytest.mark.parametrize("seed", GOALS)
+def test_a_way_to_a_goal_among_ten_regions_is_that_of_the_command(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    regions: list[Circle | Polygon] = []
+    for x, y, size in rng.uniform([1.5, -3, 0.2], [7.5, 3, 0.6], (10, 3)):
+        angles = 2 * np.pi * (np.arange(count := rng.integers(3, 7)) + rng.uniform(-0.3, 0.3, count)) / count
+        corners = np.stack([x + size * np.cos(angles), y + size * np.sin(angles)], 1)
+        regions.append(Circle(x, y, size) if rng.random() < 0.5 else Polygon.of(corners))
+    walls = Polygon.of([[-3, -6], [12, -6], [12, 6], [-3, 6]]) if seed % 2 else None
+    start, goal = (0.0, *rng.uniform([-2, -3], [2, 3]).tolist()), (9.0, *rng.uniform([-2, -3], [2, 3]).tolist())
+    options = {} if seed % 3 else {"objective": "error"}
+    found = answers(
+        [goal_call(start, goal, CONTROL, space=page_space(regions, walls), **options)], left_out=["vehicle"]
+    )[0]
+    try:
+        wanted = to_goal(start, goal, CONTROL, keep_out=regions, walls=walls, lookup=shipped(), **options)  # type: ignore[arg-type]
+    except InputError as no_way:
+        refusal = str(no_way)
+    if isinstance(found, InputError):
+        assert str(found) == refusal
+        return
+    assert difference(numbers_of_page(found), numbers(wanted)) <= ALIKE
+    assert found["length"] == pytest.approx(wanted.job.length, abs=1e-8)
+    record = answer("obstacles.js", "keptClearRecord", found["clear"])
+    assert wanted.kept_clear is not None
+    for key in ("margin_over_l", "predicted_clearance_over_l"):
+        assert record[key] == pytest.approx(wanted.kept_clear.to_dict()[key], abs=1e-8)
+
+
+@pytest.mark.parametrize("robot", VEHICLES)
+def test_a_goal_without_regions_is_reached_as_by_the_command(robot: str) -> None:
+    start, goal = (0.3, -0.2, 0.4), (3.0, 1.0, -2.0)
+    (found,) = answers([goal_call(start, goal, robot)], left_out=["vehicle"])
+    wanted = to_goal(start, goal, tracked_of(VEHICLES[robot]))
+    assert difference(numbers_of_page(found), numbers(wanted)) <= ALIKE
+
+
+ROOM = Polygon.of([[-1, -2], [4.5, -2], [4.5, 2], [-1, 2]])
+GATE = (
+    Polygon.of([[1.5, -2], [2, -2], [2, -0.1], [1.5, -0.1]]),
+    Polygon.of([[1.5, 0.1], [2, 0.1], [2, 2], [1.5, 2]]),
+)
+
+
+@pytest.mark.parametrize(
+    ("goal", "regions", "walls", "options"),
+    [
+        ((0.0, 0.0, 0.0), (), None, {}),
+        ((3.0, 0.0, 0.0), (Circle(3.2, 0, 0.5),), None, {}),
+        ((3.0, 0.0, 0.0), GATE, ROOM, {}),
+        ((0.5, 0.0, 0.0), (), None, {"tolerance": 0.001}),
+        ((3.0, 0.0, 0.0), (), None, {"minimum_seconds": -2.0}),
+    ],
+    ids=["same", "goal", "closed", "tolerance", "seconds"],
+)
+def test_a_goal_that_cannot_be_reached_is_refused_as_by_the_command(
+    goal: Pose, regions: tuple[Circle | Polygon, ...], walls: Polygon | None, options: dict[str, Any]
+) -> None:
+    space = {"space": page_space(regions, walls)} if regions else {}
+    (found,) = answers([goal_call((0.0, 0.0, 0.0), goal, CONTROL, **space, **page_options(options))], ["vehicle"])
+    refusal = refusal_of(
+        to_goal, (0, 0, 0), goal, CONTROL, keep_out=regions, walls=walls, lookup=shipped(), **options
+    )
+    assert str(found) == refusal
+
+
+def test_angles_are_unwrapped_as_numpy_does() -> None:
+    """A whole turn is no step, and half a turn keeps its sign."""
+    angles = np.array([0.1, 0.1 + np.pi, 0.1, 0.1 - np.pi, 0.2, 3.0, 3.0 - 2 * np.pi, -np.pi, np.pi])
+    check_near(answer("math.js", "unwrap", typed(angles)), np.unwrap(angles))
+
+
+@pytest.mark.parametrize("words", ["60,20", "60,20,x", "60,,90", "1,2,3,4", "here"])
+def test_words_that_are_no_pose_are_refused(words: str) -> None:
+    found = answer("goal.js", "readPose", words, "goal", 11.0)
+    assert str(found) == f"goal '{words}'; write X,Y,DEGREES with numbers in cm, such as 60,20,90"
+
+
+@pytest.mark.parametrize("degrees", [0, 90, 180, -180, 190, -350, 400])
+def test_a_pose_is_read_as_by_the_command(degrees: int) -> None:
+    found = answer("goal.js", "readPose", f"66,-5.5,{degrees}", "goal", 11.0)
+    check_near(found, read_pose(["66", "-5.5", str(degrees)], "cm", CONTROL, "--goal"))
 
 
 SHAPELESS = {
