@@ -19,8 +19,7 @@ from sim.model import uncertainty
 from sim.model.entries import ENTRIES
 
 _NAMES = {  # of each module; a leading underscore is left out
-    "planner.goal.last_dwells": "STEP LAST DROPPED CHANGE REACHED MISSED CONVERGED MOST_STEPS DAMPING "
-    "EXACT",
+    "planner.goal.last_dwells": "STEP LAST DROPPED CHANGE REACHED MISSED CONVERGED MOST_STEPS DAMPING EXACT",
     "planner.goal.route": "RANGE DETOUR LINK LONGEST_LINK STEP CELLS MOST_POSES LEVELS ROUNDS PLACES ENOUGH "
     "AROUND GRAIN",
     "planner.goal.trip": "SPACING SHORTER ZIGZAGS",

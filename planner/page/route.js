@@ -20,10 +20,14 @@ function clearanceAt([x, y, course], { body, drift }, room) {
   return clearance([x, y, course - slipOf(course, drift)], body, room);
 }
 
-/* Tell whether the body keeps a margin all along a track. */
-function isFree(track, limits, margin, room) {
-  for (let k = Math.ceil(track.length / STEP); k >= 0; k--) {
-    if (clearanceAt(poseAlong(track, k * STEP), limits, room) < margin) return false;
+/* Tell whether the body keeps a margin all along a track; slack: of the room. Where there is more, steps are left out in
+ * which no point of the body gets there. */
+function isFree(track, limits, margin, room, slack = 0) {
+  const moves = STEP * (1 + reachOf(limits.body) / limits.radius);
+  for (let k = Math.ceil(track.length / STEP); k >= 0;) {
+    const more = clearanceAt(poseAlong(track, k * STEP), limits, room) - margin;
+    if (more < 0) return false;
+    k -= Math.max(1, Math.floor((more - 2 * slack) / moves));
   }
   return true;
 }
@@ -37,7 +41,7 @@ class Lattice {
     Object.assign(this, { limits, low, courses, step: this.spacing / CELLS, count: this.nx * this.ny * courses });
     const pad = Math.ceil(reachOf(body) / this.spacing) + RANGE + 3, [left, bottom] = low.map((end) => end - pad * this.spacing);
     const [columns, rows] = [width, height].map((size) => Math.ceil(size / this.step - 1e-9) + 2 * pad * CELLS + 1);
-    const known = new Float32Array(columns * rows).fill(NaN), room = roomIn(space), slack = this.step / Math.SQRT2;
+    const known = new Float32Array(columns * rows).fill(NaN), room = roomIn(space), slack = (this.slack = this.step / Math.SQRT2);
     this.room = (x, y) => { // bounded from below, by that of the nearest point of a map
       const i = Math.round((x - left) / this.step), j = Math.round((y - bottom) / this.step), at = i * rows + j;
       if (!(i >= 0 && i < columns && j >= 0 && j < rows)) return -Infinity;
@@ -101,7 +105,7 @@ class Lattice {
     const offer = (from, to, length) => {
       const total = cost[from] + length;
       if (total > cost[to] || (total === cost[to] && from > before[to])) return;
-      if (!isFree(track(from, to), limits, margin, this.room)) return;
+      if (!isFree(track(from, to), limits, margin, this.room, this.slack)) return;
       before[to] = from;
       if (total === cost[to]) return;
       cost[to] = total;
@@ -140,7 +144,7 @@ class Lattice {
         for (let i = 0; i < k - 1; i++) {
           const track = shortestTrack(poses[i], poses[k], radius), total = best[i] + track.length;
           if (track.length < along[k] - along[i] - 1e-6 && total < best[k] - ROUNDING
-            && isFree(track, limits, margin, this.room)) {
+            && isFree(track, limits, margin, this.room, this.slack)) {
             best[k] = total;
             came[k] = { from: i, track };
           }
