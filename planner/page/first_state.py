@@ -185,5 +185,7 @@ def first_options(request: PlanRequest, robot: Robot, smooth: float | None) -> d
         "timeWeight": request.time_weight,
         "keepOut": "",
         "walls": "",
+        "start": "",
+        "goal": "",
         "smooth": None if smooth is None else smooth * cm,
     }

@@ -11,6 +11,7 @@ const ADVICE = [ // what a message of the planner says, and what the page says i
   ["allow corner = nearest", 'choose another answer to "Corners that are too tight"'],
   [/change the robot, or simulate it \([^)]*\)/, 'change it under "Robot"'],
   ["simulate it (softflagella replay)", 'set "Number of tails N" to 2 or more'],
+  [/plan with feedback, make a table of .*, or move the path, /, "move "],
   [/, or make a table of this robot with .*/, ' under "Largest stated error"'],
 ];
 const DECLARING = "finding the nearest path that can be followed";

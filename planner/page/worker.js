@@ -4,6 +4,7 @@
  * The first message is {what: "start", content: the planner's data}. Errors of the program go out as `broken`. */
 import { readData } from "./data.js";
 import { trackedVehicle, vehicleOfParts } from "./from_table.js";
+import { readPose } from "./goal.js";
 import { geomspace } from "./math.js";
 import { readSpace } from "./obstacles.js";
 import { openFile } from "./open_file.js";
@@ -40,7 +41,7 @@ async function service(data) {
   function planOf(wish, progress = null) {
     const key = JSON.stringify(wish);
     if (last?.key === key) return last.plan;
-    const swims = refusing(() => tracked(wish.robot, wish.options.point), (refusal) => {
+    const swims = refusing(() => tracked(wish.robot, pointOf(wish.options)), (refusal) => {
       refusal.about ??= "robot";
       throw refusal;
     });
@@ -52,7 +53,8 @@ async function service(data) {
   return {
     path: ({ path, options }) => {
       const drawn = drawnPath(path), space = refusing(() => readSpace(options, 1), () => null); // the plan says why
-      return { points: drawn.points, closed: drawn.closed, corners: drawn, length: pathLength(drawn), space };
+      const poses = refusing(() => endsOf(options, 1), () => []);
+      return { points: poses.length > 1 ? [] : drawn.points, closed: drawn.closed, corners: drawn, poses, space };
     },
     steady: ({ robot }) => steadyMotion(tracked(robot, "head_centre")),
     plan: (wish, progress) => pictured(planOf(wish, progress)),
@@ -61,8 +63,9 @@ async function service(data) {
       const length = over ?? pathLength(stroke) / STROKE;
       return { points: smoothed(stroke, length).path.points, over: Number(length.toPrecision(2)) };
     },
-    tradeOff: (wish) => tradedOff(wish, tracked(wish.robot, wish.options.point)),
+    tradeOff: (wish) => tradedOff(wish, tracked(wish.robot, pointOf(wish.options))),
     file: ({ name, wish }) => {
+      if (name === "path.csv" && wish.options.goal) throw new InputError("a way to a goal has no path.csv; take plan.json along");
       if (name === "path.csv") return pathTable(drawnPath(wish.path));
       if (name === "robot.toml") return robotToml(makeRobot(wish.robot));
       return planFiles(planOf(wish), data.files)[name];
@@ -92,8 +95,20 @@ function drawnPath({ points, closed, words }) {
 /* The drawn path in tail lengths, and what is asked of a plan; options of the page are in s and cm. */
 function wishIn({ path, options }, { robot }) {
   const cm = 100 * robot.tailLength, tolerance = options.tolerance === null ? null : options.tolerance / cm;
-  const request = planRequest({ ...options, tolerance, space: readSpace(options, cm) });
+  const [start, goal = null] = endsOf(options, cm);
+  const request = planRequest({ ...options, tolerance, space: readSpace(options, cm), start, goal });
   return { drawn: scaled(drawnPath(path), 1 / cm), request };
+}
+
+/* The start, and the goal if there is one, with the length of `cm` tails. */
+function endsOf({ start, goal }, cm) {
+  const begin = readPose(start || "0,0,0", "start", cm);
+  return goal ? [begin, readPose(goal, "goal", cm)] : [begin];
+}
+
+/* The point that is tracked: a goal is that of the head's centre. */
+function pointOf({ point, goal }) {
+  return goal ? "head_centre" : point;
 }
 
 /* Steady motion, in the units of a laboratory. */
@@ -136,6 +151,7 @@ function pictured(plan) {
     netSpeed: inCm(straight.speed) / robot.timeScale,
     warnings: planWarnings(plan),
     timeScale: robot.timeScale,
+    ...(plan.goal && { goal: place(plan.goal), way: inCm(plan.length) }),
     ...(clear && { margin: inCm(clear.margin), clearance: inCm(clear.clearance) }),
   };
 }

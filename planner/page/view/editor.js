@@ -6,6 +6,7 @@ import { lineData, pixelOf, tickStep } from "./scene.js";
 const HANDLES = 80; // corners at most that are shown to be moved
 const NEAR = 14; // pixels from a corner that count as on it
 const JOINS = 0.08; // of a stroke's size: ends that are nearer make it a closed path
+const ARM = 50; // pixels from a pose to the tip of its arrow
 const DIRECTIONS = Math.PI / 12;
 
 const WORDS = {
@@ -14,13 +15,16 @@ const WORDS = {
   corners: "Click to add a corner, drag to move one, double-click to remove one.",
   keepOut: "Click the corners of a region that the robot must keep out of, then the first one again.",
   walls: "Click the corners of the walls that the robot must stay within, then the first one again.",
+  goal: "Click where the robot is to go, and drag to set its heading. Start, goal and the tips of their arrows can be dragged.",
   many: "Its points are too many to be moved: click to begin a new path, corner by corner.",
 };
 
 class PathEditor {
   /* `finished(points, closed)` takes a stroke, `changed(points, closed, settled)` takes corners, `enclosed(points, mode)`
-   * those of a region. */
-  constructor(finished, changed, enclosed) {
+   * those of a region, `posed(start, goal)` poses as words. */
+  constructor(finished, changed, enclosed, posed) {
+    this.posed = posed;
+    this.poses = [];
     this.enclosed = enclosed;
     this.finished = finished;
     this.changed = changed;
@@ -34,8 +38,9 @@ class PathEditor {
   }
 
   /* Show a path. */
-  take(path) {
+  take(path, poses = []) {
     this.path = path;
+    this.poses = poses;
     this.begun = this.encloses ? this.begun ?? [] : null;
   }
 
@@ -47,7 +52,14 @@ class PathEditor {
 
   /* The corners that can be moved: those of a new path, or of a path that has few. */
   get corners() {
+    if (this.mode === "goal") return this.poses.flatMap((pose) => [pose.slice(0, 2), this.tipOf(pose)]);
     return this.begun ?? (this.path.points.length <= HANDLES ? this.path.points : []);
+  }
+
+  /* Where the arrow of a pose ends. */
+  tipOf([x, y, heading]) {
+    const arm = ARM / this.view.scale;
+    return [x + arm * Math.cos(heading), y + arm * Math.sin(heading)];
   }
 
   /* Whether the corners are those of a region or of walls. */
@@ -70,9 +82,10 @@ class PathEditor {
       this.stroke = [place];
       return true;
     }
-    if (this.mode !== "corners" && !this.encloses) return false;
+    if (!["corners", "goal"].includes(this.mode) && !this.encloses) return false;
     const points = [...this.corners], index = points.findIndex((point) => this.near(point, place));
-    if (index < 0) points.push(this.snapped(place, points[points.length - 1], event));
+    if (index < 0 && this.mode === "goal") points.splice(2, 2, place, place);
+    else if (index < 0) points.push(this.snapped(place, points[points.length - 1], event));
     this.held = { index: index < 0 ? points.length - 1 : index, points };
     return true;
   }
@@ -96,8 +109,11 @@ class PathEditor {
   drag(place, event) {
     if (this.stroke) this.stroke.push(place);
     if (!this.held) return;
-    const { index, points } = this.held;
+    const { index, points } = this.held, [x, y] = points[index];
     points[index] = this.snapped(place, points[index - 1] ?? points[points.length - 1], event);
+    if (this.mode !== "goal" || index % 2) return;
+    const [right, up] = [points[index][0] - x, points[index][1] - y];
+    points[index + 1] = [points[index + 1][0] + right, points[index + 1][1] + up];
   }
 
   release(place, event) {
@@ -107,7 +123,11 @@ class PathEditor {
     if (stroke && stroke.length > 2) this.finished(stroke, closes(stroke));
     if (!held) return;
     const [first] = held.points, added = held.points.length > this.corners.length;
-    if (this.encloses) {
+    if (this.mode === "goal") {
+      const [start, , goal, tip] = held.points;
+      if (goal && this.near(goal, tip)) held.points[3] = goal.map((value, axis) => 2 * value - start[axis]);
+      this.posed(poseWords(held.points), goal ? poseWords(held.points.slice(2)) : "");
+    } else if (this.encloses) {
       const ends = !added && held.index === 0 && held.points.length > 2;
       this.begun = ends ? [] : held.points;
       if (ends) this.enclosed(held.points, this.mode);
@@ -138,12 +158,21 @@ class PathEditor {
       const closed = !this.stroke && this.continues && this.path.closed;
       shapes.push(figure("path", { class: "stroke", d: lineData(pixels, closed) }));
     }
-    if (this.mode !== "corners" && !this.encloses) return shapes;
+    if (this.mode === "goal") {
+      const arrows = points.flatMap((tip, i) => (i % 2 ? lineData([points[i - 1], tip].map((end) => pixelOf(view, end))) : []));
+      shapes.splice(0, 1, figure("path", { class: "stroke", d: arrows.join("") }));
+    } else if (this.mode !== "corners" && !this.encloses) return shapes;
     return [...shapes, ...points.map((point, i) => {
       const [cx, cy] = pixelOf(view, point);
       return figure("circle", { class: i === this.held?.index ? "handle chosen" : "handle", cx, cy, r: 6 });
     })];
   }
+}
+
+/* A pose as words, X,Y,DEGREES, from its place and a point ahead. */
+function poseWords([[x, y], [toX, toY]]) {
+  const degrees = (Math.atan2(toY - y, toX - x) * 180) / Math.PI;
+  return [...[x, y].map((value) => Math.round(value * 1000) / 1000), Math.round(10 * degrees) / 10].join(",");
 }
 
 /* Tell whether a stroke ends where it begins. */

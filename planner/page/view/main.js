@@ -25,7 +25,8 @@ class Page {
     this.view = new PlanView();
     const drawn = (points, closed) => this.smooth(points, closed, "my stroke");
     const enclosed = (points, kind) => this.enclose(points, kind);
-    this.editor = new PathEditor(drawn, (points, closed) => this.setPoints(points, closed), enclosed);
+    this.editor = new PathEditor(drawn, (points, closed) => this.setPoints(points, closed), enclosed,
+      (start, goal) => this.change({ options: { ...this.state.options, start, goal } }));
     this.view.editor = this.editor;
     this.player = new Player((pose, time) => this.played(pose, time));
     this.form = new RobotForm(data.limits, (values, key) => this.setRobot(values, key), () => this.history.settle());
@@ -123,7 +124,7 @@ class Page {
       say(byId("path-problem"), refusal ?? this.linkProblem.words, true);
       if (refusal) return;
       this.drawn = answer;
-      this.editor.take(answer.corners);
+      this.editor.take(answer.corners, answer.poses);
       this.hint();
       byId("close").textContent = answer.closed ? "Part the ends" : "Join the ends";
       showCorners(byId("corner-table"), this.editor.path.points, (points) => this.setPoints(points, answer.closed));

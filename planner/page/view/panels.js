@@ -1,5 +1,6 @@
 /* The parts beside the picture: what the plan says, the robot's fields in laboratory units, and what each control
  * changes. */
+import { halfTurn } from "../math.js";
 import { byId, degrees, describe, digits, duration, element, length, say } from "./dom.js";
 import { transformed } from "./editor.js";
 import { FIELDS, labValues, OPTIONS } from "./state.js";
@@ -28,14 +29,23 @@ function showResults(plan, tails) {
     [`Stated error${plan.calibrated ? "" : " if the coefficients are exact"}`, size(plan.stated)],
     ...(plan.unmeasured === null ? [] : [["With coefficients of another robot", lost + size(plan.unmeasured)]]),
     ["With a tracker and a camera", plan.feedback < plan.stated ? size(plan.feedback) : "more than without"],
-    ["Path to follow from the drawn one", `${size(plan.offDrawn)} at most`],
-    ["Drawn points from the path to follow", `${size(plan.missed)} at most`],
+    ...(plan.goal ? [["Goal", goalWords(plan, size)]] : [
+      ["Path to follow from the drawn one", `${size(plan.offDrawn)} at most`],
+      ["Drawn points from the path to follow", `${size(plan.missed)} at most`],
+    ]),
   ];
   if (plan.margin) pairs.push(["Kept clear", `${size(plan.margin)} around the body; predicted clearance ${size(plan.clearance)}`]);
   const exact = "no farther from the path, however long it is, if the robot moves exactly as predicted; no real one does";
   if (plan.guaranteed !== null) pairs.push(["Bound for an exact vehicle", `${size(plan.guaranteed)}: ${exact}`]);
   describe(byId("facts"), pairs);
   byId("warnings").replaceChildren(...plan.warnings.map((words) => element("li", {}, words)));
+}
+
+/* Where a plan to a goal ends. */
+function goalWords({ goal, motion, way }, size) {
+  const [x, y, heading] = motion[motion.length - 1], off = size(Math.hypot(x - goal[0], y - goal[1]));
+  const turned = Math.abs(halfTurn(heading - goal[2])), words = degrees(turned < 1e-4 ? 0 : turned);
+  return `way of ${size(way)}; predicted end ${off} and ${words} degrees from it`;
 }
 
 class RobotForm {

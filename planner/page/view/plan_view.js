@@ -64,7 +64,8 @@ class PlanView {
     const { drawn, plan, tracks } = this.content;
     const { keepOut = [], walls } = drawn?.space ?? {}, regions = walls ? [walls, ...keepOut] : keepOut;
     const ends = regions.flatMap(({ x, y, radius, corners }) => corners ?? [[x - radius, y - radius], [x + radius, y + radius]]);
-    return [...(drawn?.points ?? []), ...ends, ...(plan?.reference ?? []), ...tracks.flatMap((track) => track.points)];
+    const poses = drawn?.poses?.length > 1 ? drawn.poses : [];
+    return [...(drawn?.points ?? []), ...poses, ...ends, ...(plan?.reference ?? []), ...tracks.flatMap((track) => track.points)];
   }
 
   fit() {

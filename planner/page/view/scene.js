@@ -97,7 +97,7 @@ function planLayers({ drawn, plan, tracks, old }) {
   }
   if (plan) layers.append(band(plan));
   if (drawn) layers.append(line("drawn", lineData(drawn.points, drawn.closed)));
-  if (plan) layers.append(line("declared", lineData(plan.reference, plan.closed)), ...motion(plan), startMark(plan));
+  if (plan) layers.append(line("declared", lineData(plan.reference, plan.closed)), ...motion(plan), ...[plan.start, plan.goal].flatMap((pose) => (pose ? arrow(pose, plan.body) : [])));
   for (const { points } of tracks) layers.append(line("measured", lineData(points)));
   return layers;
 }
@@ -117,9 +117,8 @@ function motion(plan) {
   return [line("forward", data[1]), line("backward", data[-1])];
 }
 
-/* An arrow at the start pose, as long as the head. */
-function startMark(plan) {
-  const [x, y, heading] = plan.start, size = plan.body.headLength;
+/* An arrow at a pose, as long as the head. */
+function arrow([x, y, heading], { headLength: size }) {
   const from = ([atX, atY], length, angle) => [atX + length * Math.cos(angle), atY + length * Math.sin(angle)];
   const tip = from([x, y], size, heading), [left, right] = [2.6, -2.6].map((a) => from(tip, 0.35 * size, heading + a));
   return line("start", lineData([[x, y], tip]) + lineData([left, tip, right]));

@@ -38,6 +38,8 @@ const OPTIONS = {
   timeWeight: 0,
   keepOut: "", // regions, and walls, as words [cm]
   walls: "",
+  start: "", // and goal, as X,Y,DEGREES [cm]; no goal: the path is followed; no start: 0,0,0
+  goal: "",
   smooth: null, // length over which a drawn stroke is smoothed [cm]; null: the page's own
 };
 

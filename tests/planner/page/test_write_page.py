@@ -59,7 +59,7 @@ def test_paths_and_options_are_what_the_page_begins_with(tmp_path: Path) -> None
     assert data["first"] == {"robot": "paper-control", "shape": "mine", "options": {
         "objective": "flips", "corner": "nearest", "point": "head_centre", "minimumSeconds": None,
         "tolerance": pytest.approx(5.5), "timeWeight": 0.0, "keepOut": "", "walls": "",
-            "smooth": None}}  # fmt: skip
+            "start": "", "goal": "", "smooth": None}}  # fmt: skip
     shape = data["shapes"][0]
     assert (shape["name"], shape["closed"]) == ("mine", True)
     assert np.hypot(*np.array(shape["points"]).T) == pytest.approx(22.0)
