@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -13,8 +14,10 @@ import pandas as pd
 import pytest
 
 from common.errors import run_command
+from planner.goal.trip import to_goal
 from planner.jobs.plan import plan
 from planner.page.write_page import write_page
+from planner.paths.obstacles import Circle
 from planner.paths.path import circle
 from planner.planning.plan import Plan
 from planner.vehicle.vehicle import roll_out
@@ -320,6 +323,50 @@ def test_a_region_is_drawn_and_a_path_that_it_blocks_is_refused(page: Any, tmp_p
     page.locator("#path-problem").wait_for(state="hidden")
     assert "dwells" in planned(page)
     assert "polygon:" in page.input_value("#keepOut")
+
+
+def test_a_goal_is_set_dragged_typed_and_removed(page: Any, tmp_path: Path) -> None:
+    """A click sets it with a heading away from the start; its arrow turns it; the plan is that of the command."""
+    page.evaluate("location.hash = 'v=1&objective=time&path=circle%3A22&keepOut=circle%3A33%2C3%2C9'")
+    planned(page)
+    page.check("input[value=goal]")
+    x, y = middle_of(page)
+    page.mouse.click(x + 90, y + 40)
+    page.locator("#facts", has_text="Goal").wait_for()
+    planned(page)
+    unfold(page)
+    right, up, degrees = map(float, page.input_value("#goal").split(","))
+    assert degrees == pytest.approx(math.degrees(math.atan2(up, right)), abs=1)
+    page.fill("#goal", "66,0,0")
+    page.locator("#goal").blur()
+    assert "dwells" in planned(page)
+    assert re.search(r"way of [\d.]+ cm; predicted end below", text_of(page, "#facts"))
+    ours = json.loads(saved(page, "plan.json", tmp_path).read_text())
+    theirs = to_goal(
+        (0, 0, 0), (66 / 11, 0, 0), CONTROL, lookup=shipped(), keep_out=[Circle(33 / 11, 3 / 11, 9 / 11)]
+    )
+    del ours["code_version"]
+    check_plans(ours, theirs.to_dict())
+    handles = page.locator("#view .handle")
+    page.locator("#view").scroll_into_view_if_needed()
+    (place, tip) = (handles.nth(k).bounding_box() for k in (2, 3))
+    page.mouse.move(tip["x"] + 6, tip["y"] + 6)
+    page.mouse.down()
+    page.mouse.move(place["x"] + 6, place["y"] - 60, steps=3)
+    page.mouse.up()
+    planned(page)
+    assert page.input_value("#goal") == "66,0,90"
+    page.fill("#goal", "33,3")
+    page.locator("#goal").blur()
+    page.locator("#options-problem", has_text="write X,Y,DEGREES").wait_for()
+    page.fill("#goal", "33,3,0")
+    page.locator("#goal").blur()
+    page.locator("#path-problem", has_text="there is no way: at the goal").wait_for()
+    page.fill("#goal", "")
+    page.fill("#keepOut", "")
+    page.locator("#keepOut").blur()
+    planned(page)
+    assert "Drawn points" in text_of(page, "#facts")
 
 
 def test_files_and_folders_are_dragged_onto_the_picture(page: Any, tmp_path: Path) -> None:
