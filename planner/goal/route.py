@@ -81,7 +81,7 @@ class RouteLimits:
             rows = order[: max(1, _BLOCK // (2 * count))]
             rows = rows[length[rows] <= max(2 * length[rows[0]], 4 * step)]
             order = order[len(rows) :]
-            way = step * np.arange(math.ceil(float(length[rows[-1]]) / step) + 1)[None]  # beyond an end: the end
+            way = _ways(float(length[rows[-1]]), step)
             for every in _EVERY:
                 poses = tracks.take(rows).poses(way[:, ::-every])
                 rows = rows[(self.clearance(poses, space) >= margin).all(1)]
@@ -138,7 +138,7 @@ class Lattice:
 
     def _distance(self, track: DubinsPaths, table: NDArray[np.float32]) -> NDArray[np.float32]:
         """Compute the distance (nx, ny) along the track of one joint on the map, by its place in the lattice."""
-        poses = track.poses(_STEP * np.arange(math.ceil(float(track.length[0]) / _STEP) + 1)[None])[0]
+        poses = track.poses(_ways(float(track.length[0]), _STEP))[0]
         heading = poses[:, 2] - self.limits.drift.slip_along(poses[:, 2])
         centres = self.limits.body.centres(np.stack([poses[:, 0], poses[:, 1], heading], 1)).reshape(-1, 2)
         offsets = np.rint(centres / self.map.step).astype(int) + self._pad * _CELLS
@@ -173,7 +173,7 @@ class Lattice:
             for pose, c in zip(starts, costs, strict=True)
         ]
         graph = self._graph(margin, [*rows, (count + begun, _counted(costs[begun]) + 1)])
-        distance, into = dijkstra(graph, indices=source) - 1, graph.tocsc()
+        (distance,), into = dijkstra(graph, indices=np.array([source])) - 1, graph.tocsc()
         poses, lowest, ways = np.concatenate([self.poses, starts]), np.full(len(goals), np.inf), []
         for index, pose in enumerate(goals):
             near, length = self._links(pose, margin, False)
@@ -224,6 +224,11 @@ class Lattice:
         rows = np.flatnonzero(tracks.length <= _LONGEST_LINK * radius + self.spacing)
         rows = rows[self.limits.free(tracks.take(rows), margin, self.map)]
         return near[rows], _counted(tracks.length[rows])
+
+
+def _ways(length: float, step: float) -> Floats:
+    """List ways (1, K) along a track, a step apart, up to its end or beyond: there poses are those of the end."""
+    return np.asarray([step * np.arange(math.ceil(length / step) + 1)], dtype=np.float64)
 
 
 def _counted(lengths: Floats) -> Floats:
