@@ -136,7 +136,8 @@ def write_variations(
     variations = [read_variation(each) for each in words]
     table = vary(source, variations, solve)
     doubtful, none = (int(flags.sum()) for flags in doubts(table))
-    said = f"{len(table)} robot{'s' * (len(table) > 1)}" + f", {doubtful} without a reliable answer" * bool(doubtful)
+    said = f"{len(table)} robot{'s' * (len(table) > 1)}"
+    said += f", {doubtful} without a reliable answer" * bool(doubtful)
     said += f", {none} that cannot be simulated" * bool(none)
     first = [variation.key for variation in variations]
     if out is None:
