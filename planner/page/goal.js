@@ -18,7 +18,7 @@ const { SPACING, SHORTER } = CONSTANTS.trip, { LONGEST } = CONSTANTS.paths_units
 function readPose(words, name, cm) {
   const [x, y, degrees, ...more] = words.split(",").map((text) => (text.trim() ? Number(text) : NaN));
   if (more.length || ![x, y, degrees].every(Number.isFinite)) {
-    throw new InputError(`${name} ${quoted(words)}; write X,Y,DEGREES with numbers in cm, such as 60,20,90`, "options");
+    throw new InputError(`${name} ${quoted(words)}; write X,Y,DEGREES with numbers in cm, such as 60,20,90`, "regions");
   }
   const rest = degrees % 360;
   return [x / cm, y / cm, (Math.abs(rest) > 180 ? rest - 360 * Math.sign(rest) : rest) * (Math.PI / 180)];

@@ -24,7 +24,7 @@ function readSpace({ keepOut, walls }, cm) {
     if (more || (outline && !outline.corners)) throw new InputError("the walls are one box or polygon");
     return { keepOut: regionsOf(keepOut, cm), walls: outline };
   }, (refusal) => {
-    throw new InputError(refusal.message, "options");
+    throw new InputError(refusal.message, "regions");
   });
 }
 

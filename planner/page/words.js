@@ -20,7 +20,8 @@ const FOLLOWING = "following the path";
 
 /* An error for bad input: one sentence that says what was given, what is allowed, what to change. Others are bugs. */
 class InputError extends Error {
-  /* about: "options" where an option of the plan is wrong; null: what is wrong follows from the question. */
+  /* about: "options" or "regions" where an option of the plan, or the goal, a region or the walls are wrong; null:
+   * what is wrong follows from the question. */
   constructor(message, about = null) {
     super(message);
     this.name = new.target.name;

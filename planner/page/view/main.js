@@ -187,7 +187,7 @@ class Page {
   planned(answer, { robot }) {
     this.ended();
     if (!answer.broken) this.problem("");
-    say(byId("options-problem"), "", true);
+    for (const place of ["options", "regions"]) say(byId(`${place}-problem`), "", true);
     if (answer.refusal) say(byId(`${answer.about ?? "path"}-problem`), answer.refusal, true);
     this.refused = Boolean(answer.refusal);
     this.hint();

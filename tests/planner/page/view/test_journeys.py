@@ -358,7 +358,7 @@ def test_a_goal_is_set_dragged_typed_and_removed(page: Any, tmp_path: Path) -> N
     assert page.input_value("#goal") == "66,0,90"
     page.fill("#goal", "33,3")
     page.locator("#goal").blur()
-    page.locator("#options-problem", has_text="write X,Y,DEGREES").wait_for()
+    page.locator("#regions-problem", has_text="write X,Y,DEGREES").wait_for()
     page.fill("#goal", "33,3,0")
     page.locator("#goal").blur()
     page.locator("#path-problem", has_text="there is no way: at the goal").wait_for()
