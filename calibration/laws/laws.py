@@ -93,9 +93,7 @@ class FittedLaw:
     error: float  # relative rms on the held-out runs
     error_interval: tuple[float, float]  # 95 %
     reason: Rejection | None  # why it is not kept; None if it is
-    elsewhere: tuple[
-        FittedLaw, ...
-    ] = ()  # of a side force at the disc: the same with a lever that is not told from 0
+    elsewhere: tuple[FittedLaw, ...] = ()  # of a side force at the disc: those with a lever not told from 0
 
     @property
     def words(self) -> str:
@@ -219,11 +217,6 @@ def fitted_law(
 def _of_sessions(gain: tuple[float, float]) -> Rejection | None:
     """Say whether a law fails to predict left-out sessions better."""
     return Rejection.NOT_PREDICTIVE if gain[0] <= gain[1] else None
-
-
-def with_a_lever(law: FittedLaw) -> FittedLaw:
-    """Return a law whose interval of the lever includes 0, after the same force at the disc has fitted worse."""
-    return replace(law, reason=_of_sessions(law.session_gain))
 
 
 def _includes(interval: tuple[float, float], value: float) -> bool:
@@ -429,7 +422,7 @@ def _with_levers(
     for name, law in fitted.items():
         at_disc = fitted.get(law.place.at_disc)
         if law.reason is Rejection.NO_LEVER and at_disc and law.gain_at_lever - at_disc.gain > INDISTINGUISHABLE:
-            fitted[name] = with_a_lever(law)
+            fitted[name] = replace(law, reason=_of_sessions(law.session_gain))
     return [
         replace(law, elsewhere=tuple(
             fitted[name] for name in law.place.elsewhere

@@ -14,7 +14,9 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLoca
 
 from calibration.attribution.nearest import AdoptedForm
 from calibration.attribution.refits import UNSEEN
-from calibration.laws.group_factors import GroupFactors
+from calibration.laws.group_factors import GroupFactors, group_factors
+from calibration.laws.law_model import LEVER
+from calibration.laws.laws import FittedLaw
 from calibration.laws.places import Place
 from calibration.report.path_error import WORDS, Model, PathError
 from calibration.statistics.residual_tests import Misfit
@@ -36,6 +38,47 @@ _LONG = 0.45  # of an arrow, in l
 _LINE = 24  # letters in a line of a label
 _SAMPLES, _CORNER = 1500, 6  # rows, and numbers that are drawn in pairs
 _TICKS = (3.0, 10.0, 30.0, 100.0, 300.0)
+_LAW = (
+    "On what it depends. Line and band: the law. Points: the factor that the runs at this input ask for, "
+    "everything else fitted anew, with one standard error."
+)
+
+Drawn = tuple[Figure, str, str]  # with a description and a caption
+
+
+def draw_all(result: Verdict, paths: Sequence[PathError]) -> dict[str, list[Drawn]]:
+    """Draw the figures of a report, by their names in the template."""
+    kind, drawn = result.runs.drawn[1][0], [error for error in paths if error.carried_out]
+    figures: dict[str, list[Drawn]] = {
+        "summary": [(draw_summary(result), "residual of each output over the noise, for each model",
+                     "The same on the runs that were fitted, for each output.")],
+        "residuals": [(figure, f"residuals by output and {kind}, {model}", model)
+                      for figure, model in draw_residuals(result)],
+        "maps": [(figure, f"map of the residual over the runs' inputs, {model}", model)
+                 for figure, model in draw_maps(result)],
+    }  # fmt: skip
+    if result.found.candidates:
+        figures["evidence"] = [(draw_evidence(result), "score of each effect against what a claim needs", "")]
+    if corner := draw_corner(result):
+        figures["corner"] = [(corner, "samples of the fitted numbers and effects in pairs, by form", "")]
+    if drawn:
+        words = "the wanted path, and the tracks of both schedules on the corrected robot"
+        figures["paths"] = [(draw_paths(drawn), words, "")]
+    if result.nearest and result.nearest.sizes:
+        words = f"size of {result.nearest.effect.title} for each specimen"
+        figures["sizes"] = [(draw_sizes(result.nearest), words, "")]
+    if result.law and result.law.kept:
+        figures["law"] = _figures_of_law(result.law.kept[0], result.split.fitted)
+    return figures
+
+
+def _figures_of_law(law: FittedLaw, used: Flags) -> list[Drawn]:
+    """Draw where a law acts, and on what it depends in the runs `used` (n,)."""
+    place = draw_place(law.model.robot, law.place, law.fit.parameters.get(LEVER, 0.0))
+    drawn = [(place, f"where it acts: {law.place.words}", "Where it acts (red).")]
+    if inputs := group_factors(law.model, law.fit, used):
+        drawn.append((draw_factors(inputs), "the factor of the load against each input", _LAW))
+    return drawn
 
 
 def compared(result: Verdict) -> list[tuple[str, Floats]]:

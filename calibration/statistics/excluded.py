@@ -2,20 +2,34 @@
 
 A reader of tables and the search for outliers give a reason for each row. Rows of one reason are counted and named
 together; what is particular to a row, its value, is told of a single row alone.
+
+**Copies.** A copied row is no repeat, and makes the noise look smaller than it is. Two measurements under one
+condition differ by noise. An output that is recorded in steps d, with standard deviation s between repeats, is
+equal in two of them with probability
+
+    p = d / (2 √π s),   at most 1,
+
+the density of their difference at 0, times d. A row whose outputs all equal those of an earlier row of the same
+condition is a copy if less than `_CHANCE` such pairs are expected in the whole table: (pairs of repeats) × ∏ p.
+Outputs in coarse steps may agree by chance, and their rows are kept. Outputs are taken as independent.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.copies import COPY, find_copies
 from common.arrays import Flags, Floats
 from common.tables import row_name
 
+COPY = "a copy of an earlier row, equal in all inputs and outputs{}"
+_CHANCE = 0.01  # equal pairs that are expected by chance
+_ROUNDING = 1e-9  # relative difference below which two numbers are one, converted from another unit
+_TYPICAL = 0.01  # relative standard deviation that is assumed where no repeats but copies are left
 MANY = 0.2  # share of the rows; if more are excluded, the rest may not be a fair sample
 
 
@@ -110,3 +124,43 @@ def caveat_of_excluded(excluded: Sequence[Excluded], total: int) -> tuple[str, .
         f"{count} of {total} rows ({100 * count / total:.0f} %) were excluded: see why, and whether the rest is a "
         "fair sample of the runs",
     )
+
+
+def find_copies(inputs: Floats, outputs: Floats) -> dict[int, int]:
+    """Find copied rows: place -> place of the row that it repeats.
+
+    Args:
+        inputs: (n, q) what was set.
+        outputs: (n, k) what was measured.
+    """
+    first: dict[tuple[float, ...], int] = {}
+    copies = {}
+    for place, row in enumerate(np.column_stack([inputs, outputs]).tolist()):
+        earlier = first.setdefault(tuple(row), place)
+        if earlier != place:
+            copies[place] = earlier
+    if not copies:
+        return {}
+    condition = np.unique(inputs, axis=0, return_inverse=True)[1].reshape(-1)
+    sizes = np.bincount(condition)
+    pairs = float((sizes * (sizes - 1) / 2).sum())
+    kept = np.ones(len(inputs), dtype=bool)
+    kept[list(copies)] = False
+    chance = math.prod(_equal(outputs[kept, i], condition[kept].tolist()) for i in range(outputs.shape[1]))
+    return copies if pairs * chance < _CHANCE else {}
+
+
+def _equal(values: Floats, condition: Sequence[int]) -> float:
+    """Estimate the probability that two repeats of an output (n,) are equal."""
+    distinct = np.unique(values)
+    gaps = np.diff(distinct)
+    gaps = gaps[gaps > _ROUNDING * np.abs(distinct[1:])]
+    if not len(gaps):
+        return 1.0
+    groups: dict[int, list[float]] = {}
+    for place, value in zip(condition, values.tolist(), strict=True):
+        groups.setdefault(place, []).append(value)
+    square = sum(((np.array(group) - np.mean(group)) ** 2).sum() for group in groups.values())
+    repeats = len(values) - len(groups)
+    scatter = math.sqrt(square / repeats) if repeats else _TYPICAL * float(np.median(np.abs(values)))
+    return min(1.0, float(gaps.min()) / (2 * math.sqrt(math.pi) * scatter)) if scatter else 1.0

@@ -20,7 +20,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -58,10 +58,9 @@ class Parameter:
     shown: float = 1.0  # factor to that unit
     theory: float | None = None  # size of an effect that theory gives
     second: Parameter | None = None  # of an effect: its second number, which shows only with the effect
-    grid: tuple[
-        float, ...
-    ] = ()  # of a second number: values at which the effect is looked for. Of a number: changes
-    # from which one is fitted that differs in some runs
+    # Of a second number: values at which the effect is looked for. Of one that may differ in some runs: changes
+    # from which it is fitted.
+    grid: tuple[float, ...] = ()
     of_these_runs: bool = False  # no run that is made next has it
 
     def changed(self, value: Any, by: Any) -> Any:
@@ -101,24 +100,20 @@ class Runs:
     rows: Integers  # (n,) numbers in the table, from 1
     excluded: tuple[Excluded, ...]  # rows and columns of the table
     caveats: tuple[str, ...]  # what these runs cannot show, in words
-    weight: Floats | None = field(default=None, kw_only=True)  # (n,) variance of a run is S over it; None: 1
-    completion: Floats | None = field(
-        default=None, kw_only=True
-    )  # T, (n, k, k); None: no gaps. y is arbitrary there
-    sigma: Floats | None = field(default=None, kw_only=True)  # (k,) declared standard deviation of a run
-    noise_known: bool = field(default=True, kw_only=True)  # not so if it was declared to be unknown
-    specimen: Integers | None = field(default=None, kw_only=True)  # (n,) 0, 1, …: what was run; None: not noted
-    specimen_names: tuple[str, ...] = field(default=(), kw_only=True)  # by number
-    notes: Mapping[str, Any] = field(default_factory=dict, kw_only=True)  # column -> (n,), not of the model
-    lines: Integers | None = field(default=None, kw_only=True)  # (n,) of the rows in the file; None: it has none
-    output_titles: Mapping[str, str] = field(default_factory=dict, kw_only=True)  # in words; default: the name
-    output_scales: Mapping[str, tuple[float, str]] = field(
-        default_factory=dict, kw_only=True
-    )  # factor and unit in which residuals are shown; default: per cent
-    unit_checked: Mapping[str, bool] = field(
-        default_factory=dict, kw_only=True
-    )  # outputs of which it may be declared, and whether it is
-    differing: Floats | None = field(default=None, kw_only=True)  # (n, c) by which repeats were found to differ
+    _: KW_ONLY
+    weight: Floats | None = None  # (n,) variance of a run is S over it; None: 1
+    completion: Floats | None = None  # T, (n, k, k); None: no gaps. y is arbitrary there
+    sigma: Floats | None = None  # (k,) declared standard deviation of a run
+    noise_known: bool = True  # not so if it was declared to be unknown
+    specimen: Integers | None = None  # (n,) 0, 1, …: what was run; None: not noted
+    specimen_names: tuple[str, ...] = ()  # by number
+    notes: Mapping[str, Any] = field(default_factory=dict)  # column -> (n,), not of the model
+    lines: Integers | None = None  # (n,) of the rows in the file; None: it has none
+    output_titles: Mapping[str, str] = field(default_factory=dict)  # in words; default: the name
+    # Factor and unit in which residuals are shown; default: per cent.
+    output_scales: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    unit_checked: Mapping[str, bool] = field(default_factory=dict)  # outputs of which it may be declared
+    differing: Floats | None = None  # (n, c) by which repeats were found to differ
 
     @property
     def scale(self) -> Floats:

@@ -212,23 +212,25 @@ def errors(data: Runs, prediction: Floats, rows: Flags) -> tuple[float, dict[str
 
 def error_interval(data: Runs, prediction: Floats, rows: Flags, seed: int) -> tuple[float, float]:
     """Estimate the 95 % interval of the relative rms by resampling conditions."""
-    square = np.nanmean(_scaled_square(data, prediction, rows), 1)
-    condition = data.condition[rows]
-    kinds = np.unique(condition)
-    means = np.array([square[condition == c].mean() for c in kinds])
-    rng = np.random.default_rng(seed)
-    drawn = np.sqrt(means[rng.integers(0, len(kinds), (_DRAWS, len(kinds)))].mean(1))
-    return float(np.quantile(drawn, 0.025)), float(np.quantile(drawn, 0.975))
+    return _middle(_drawn_errors(data, prediction, rows, seed))
 
 
 def gain_interval(data: Runs, before: Floats, after: Floats, rows: Flags, seed: int) -> tuple[float, float]:
     """Estimate the 95 % interval of by how much the relative rms falls, paired, by resampling conditions."""
-    squares = [np.nanmean(_scaled_square(data, prediction, rows), 1) for prediction in (before, after)]
-    kinds = data.condition[rows]
-    means = np.array([[square[kinds == c].mean() for c in np.unique(kinds)] for square in squares])
-    drawn = np.random.default_rng(seed).integers(0, means.shape[1], (_DRAWS, means.shape[1]))
-    falls = np.subtract(*np.sqrt(means[:, drawn].mean(-1)))
-    return float(np.quantile(falls, 0.025)), float(np.quantile(falls, 0.975))
+    return _middle(np.subtract(*(_drawn_errors(data, prediction, rows, seed) for prediction in (before, after))))
+
+
+def _drawn_errors(data: Runs, prediction: Floats, rows: Flags, seed: int) -> Floats:
+    """Draw conditions, and compute the relative rms of each draw, (D,)."""
+    square, condition = np.nanmean(_scaled_square(data, prediction, rows), 1), data.condition[rows]
+    means = np.array([square[condition == c].mean() for c in np.unique(condition)])
+    drawn = np.random.default_rng(seed).integers(0, len(means), (_DRAWS, len(means)))
+    return np.asarray(np.sqrt(means[drawn].mean(1)))
+
+
+def _middle(drawn: Floats) -> tuple[float, float]:
+    """Return the ends of the middle 95 %."""
+    return float(np.quantile(drawn, 0.025)), float(np.quantile(drawn, 0.975))
 
 
 def quarter_of_conditions(data: Runs, used: Flags) -> tuple[Flags, str]:

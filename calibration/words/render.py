@@ -12,30 +12,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from calibration.words.quantities import (
-    Record,
-    along_in_words,
-    detectable,
-    digits,
-    direction_in_words,
-    error_in_words,
-    final_model,
-    fitted_value,
-    gain_in_words,
-    given,
-    interval_in_words,
-    offset,
-    output_error,
-    output_label,
-    p_in_words,
-    percent,
-    plain,
-    ranges_in_words,
-    removed,
-    size,
-    sized,
-    tolerance,
-)
+from calibration.words import quantities
+from calibration.words.quantities import Record
 from common.units import length_in_lab
 
 if TYPE_CHECKING:
@@ -91,20 +69,25 @@ def _environment() -> Environment:
         autoescape=lambda name: name == "report.j2",
     )
     environment.filters |= _FILTERS | {name: pass_context(words) for name, words in _OF_OUTPUTS.items()}
-    environment.globals |= {"final_model": final_model, "gain_in_words": pass_context(gain_in_words)}
+    environment.globals |= {
+        "final_model": quantities.final_model,
+        "gain_in_words": pass_context(quantities.gain_in_words),
+    }
     return environment
 
 
 _FILTERS: dict[str, Callable[..., str]] = {
-    "percent": percent, "digits": digits, "p": p_in_words, "plain": plain, "size": size, "sized": sized,
-    "detectable": detectable, "given": given, "tolerance": tolerance, "fitted_value": fitted_value,
-    "direction": direction_in_words, "ranges": ranges_in_words, "removed": removed, "in_lab": length_in_lab,
+    "percent": quantities.percent, "digits": quantities.digits, "p": quantities.p_in_words,
+    "plain": quantities.plain, "size": quantities.size, "sized": quantities.sized,
+    "detectable": quantities.detectable, "given": quantities.given, "tolerance": quantities.tolerance,
+    "fitted_value": quantities.fitted_value, "direction": quantities.direction_in_words,
+    "ranges": quantities.ranges_in_words, "removed": quantities.removed, "in_lab": length_in_lab,
 }  # fmt: skip
 _OF_OUTPUTS: dict[str, Callable[..., str]] = {  # their first argument is the whole record
-    "output": output_label,
-    "offset": offset,
-    "output_error": output_error,
-    "error": error_in_words,
-    "interval": interval_in_words,
-    "along": along_in_words,
+    "output": quantities.output_label,
+    "offset": quantities.offset,
+    "output_error": quantities.output_error,
+    "error": quantities.error_in_words,
+    "interval": quantities.interval_in_words,
+    "along": quantities.along_in_words,
 }

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.statistics.copies import find_copies
+from calibration.statistics.excluded import find_copies
 from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.swimmer.measured_table import read_measurements
 from common.errors import InputError
