@@ -27,7 +27,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from calibration.report.corrected_robot import corrected_robot, corrected_toml
+from calibration.report.corrected_robot import as_toml, corrected_robot, handed_on
 from calibration.report.report import write_report
 from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
@@ -217,6 +217,6 @@ def _calibrate(folder: Path, name: str) -> tuple[Verdict, Measurements]:
     record = verdict_record(verdict, table="table.csv")
     write_text(case / "verdict.json", json.dumps(record, indent=1) + "\n")
     write_report(verdict, record | {"table": f"table with {name}"}, case / "report.html")
-    write_text(case / "corrected.toml", corrected_toml(start, verdict.final_refit))
+    write_text(case / "corrected.toml", as_toml(*handed_on(start, verdict.final_refit)))
     print(f"  {name}: {verdict.sentence}")
     return verdict, data

@@ -185,7 +185,8 @@ def examine(
     effects = [e for e in study.effects if e not in beside]
     local = coefficients_within_range(study.model, base.parameters)
     scored = unexamined(misfit, effects, needed, beside)
-    reasons = reasons_not_to_refit(study, base, misfit, needed, beside)
+    most = study.noise_at_most(len(base.names))
+    reasons = [_reason(c, base, misfit, j, needed, most) if local else None for j, c in enumerate(scored)]
     examined = []
     title = " ".join(("effects", *(f"beside {e.title}" for e in beside)))
     order = np.argsort(-np.abs(misfit.scores.z)).tolist()
@@ -214,17 +215,6 @@ def examine(
             after_first(reasons.count(None), time.process_time() - began)
             after_first = None
     return examined
-
-
-def reasons_not_to_refit(
-    study: Study, base: Fit, misfit: Misfit, needed: float, beside: tuple[Parameter, ...] = ()
-) -> list[Judgement | None]:
-    """Say for each effect why it is not worth a refit by its score; None if it is. See `examine`."""
-    effects = [e for e in study.effects if e not in beside]
-    if not coefficients_within_range(study.model, base.parameters):
-        return [None] * len(effects)
-    most = study.noise_at_most(len(base.names))
-    return [_reason(c, base, misfit, j, needed, most) for j, c in enumerate(unexamined(misfit, effects, needed))]
 
 
 def _guess(base: Fit, misfit: Misfit, candidate: Candidate, place: int) -> float:

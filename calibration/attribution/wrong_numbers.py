@@ -16,7 +16,7 @@ effect is claimed for it. An effect is claimed only if it fits better than the f
 parameter can gain by chance. A smaller pull is mentioned only if it is notable among so many (`notable_pull`).
 
 A number that would have to be off by more than `IMPLAUSIBLE` of its standard deviations does not come ahead of
-effects that explain as much (`implausible`). They come first, and the number is named after them.
+effects that explain as much. They come first, and the number is named after them.
 """
 
 from __future__ import annotations
@@ -89,11 +89,6 @@ def notable_pull(count: int) -> float:
     return float(normal.isf((1 - (1 - _NOTABLE) ** (1 / count)) / 2))
 
 
-def implausible(freed: Sequence[Pull]) -> bool:
-    """Tell whether one of the freed parameters is further off than its stated tolerance makes credible."""
-    return any(pull.tolerances > IMPLAUSIBLE for pull in freed)
-
-
 def without_wrong_priors(study: Study, fitted: Fit, *, target: float = math.inf) -> Fit:
     """Fit again without the priors of wrong numbers, see `fit`; the same fit if no number is wrong."""
     while len(fitted.wrong_numbers) < _MOST:
@@ -137,12 +132,6 @@ def beside_wrong_numbers(
         judged.append(judge(study, candidate, base, refit, directions.without(names.index(name))))
     single = lowest_ebic(study, candidates)
     return [c for c in judged if c.refit and ebic(study, c.refit, len(c.refit.wrong_numbers) + 1) < single]
-
-
-def beats_number(best: Sequence[Candidate], number: Fit) -> bool:
-    """Tell whether the best effect fits better than a wrong number by more than chance."""
-    refit = best[0].refit if best else None
-    return refit is not None and refit.deviance < number.deviance - INDISTINGUISHABLE
 
 
 def as_good_as_number(candidates: Sequence[Candidate], number: Fit, level: float) -> list[Candidate]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -35,14 +35,9 @@ SIZE, LEVER = "law_size", "law_lever"
 _LARGEST = 2000.0  # size of a term
 
 
-def lever_arm(robot: Robot, unit: str) -> float:
-    """Compute how far ahead of the disc a lever of 1 is, in R: l/R or L/R."""
-    return (robot.tail_length if unit == "l" else robot.head_length) / robot.head_radius
-
-
 def lever_arms(robot: Robot, runs: Measurements, unit: str) -> Floats:
-    """Compute it for every run, (n,)."""
-    return np.array([lever_arm(replace(robot, tail_length=float(length)), unit) for length in runs.length])
+    """Compute how far ahead of the disc a lever of 1 is in every run, in R, (n,): l/R or L/R."""
+    return np.where(unit == "l", runs.length, robot.head_length) / robot.head_radius
 
 
 def moved_parameter(robot: Robot, name: str) -> Parameter:

@@ -108,11 +108,6 @@ def calibration_knowledge(
     )
 
 
-def corrected_toml(robot: Robot, final: FinalRefit) -> str:
-    """Write corrected.toml."""
-    return as_toml(*handed_on(robot, final))
-
-
 def as_toml(robot: Robot, known: CalibrationKnowledge) -> str:
     """Write a robot and what a calibration knows about it, with a digest."""
     return sealed(robot_toml(robot) + "\n" + knowledge_toml(known))

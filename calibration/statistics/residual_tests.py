@@ -293,13 +293,12 @@ def examine_residual(
     null_table = np.concatenate(batches)
     scores = Scores(*(getattr(observed, name)[0] for name in Scores.__dataclass_fields__))
     best = _best(scores.z, testable, directions)
+    general_p = _p_value(null_table[:, :-1], statistics[:-1])
     return Misfit(
         scores=replace(scores, z=scores.z[best], survived=scores.survived[best], length=scores.length[best]),
         p={name: _p_value(null_table[:, [i]], statistics[[i]]) for i, name in enumerate((*GENERAL, "score"))},
-        general_p=_p_value(null_table[:, :-1], statistics[:-1]),
-        p_value=_p_value(null_table, statistics)
-        if testable.any()
-        else _p_value(null_table[:, :-1], statistics[:-1]),
+        general_p=general_p,
+        p_value=_p_value(null_table, statistics) if testable.any() else general_p,
         critical_z=float(np.quantile(null_table[:, -1], 1 - study.level)),
         features=tester.names,
         exact_length=projected_scores(exact, int(free.sum()))[2][best],

@@ -393,10 +393,6 @@ def _faults(
     return faults
 
 
-def _session(data: Measurements) -> tuple[Measurements, Flags]:
-    return data, middle_session(data)
-
-
 def _paper(data: Measurements) -> tuple[Measurements, Flags]:
     outputs = ("omega_h", "omega_yr")
     missing = [n for n in outputs if n not in data.outputs]
@@ -411,4 +407,7 @@ def _paper(data: Measurements) -> tuple[Measurements, Flags]:
     return data, np.asarray(held_out)
 
 
-PROTOCOLS: dict[str, Callable[[Measurements], tuple[Measurements, Flags]]] = {"session": _session, "paper": _paper}
+PROTOCOLS: dict[str, Callable[[Measurements], tuple[Measurements, Flags]]] = {
+    "session": lambda data: (data, middle_session(data)),
+    "paper": _paper,
+}

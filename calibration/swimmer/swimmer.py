@@ -38,7 +38,6 @@ from calibration.swimmer.influences import (
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.observation import Observation
 from calibration.swimmer.possible_runs import Owned, check_inputs, check_outputs, check_owned, possible_settings
-from calibration.swimmer.tangent import Tangent
 from common.arrays import Flags, Floats, Integers
 from common.errors import InputError
 from sim.effects import effect_named, is_effect
@@ -172,15 +171,23 @@ class SwimmerModel:
         reaching = any(is_effect(name) and effect_named(name).reach == "nonlocal" for name in moved)
         phases = PHASES_FOR_SLOPES if reaching and not at_work else PHASES
         found = self.solver.slopes(distinct, moved, phases=phases, jobs=self.jobs, title=title)
-        tangent = Tangent.of_runs(columns, found, same[0])
-        if not (quick or tangent.is_known):
+        motions, slopes = (
+            {k: table[same[0]] for k, table in of.items()} for of in (found.values, found.derivatives)
+        )
+        if not (quick or all(np.isfinite(table).all() for table in (*motions.values(), *slopes.values()))):
             return secants(self, at, along, title=title)
 
         def predict(sets: Sequence[Parameters]) -> Floats:
             inputs = self.inputs_of_runs(sets)
             near = inputs.columns
             near["omega_bar"] = near["omega_bar"] * direction
-            return self.runs.compared(inputs.view.see(tangent.motions(near)))
+            seen = {name: values + 0 * near["N"] for name, values in motions.items()}
+            for j, name in enumerate(moved):
+                change = near[name] - columns[name]
+                differs = change.any(1)  # a slope that is not known does not reach the others
+                for output, of in slopes.items():
+                    seen[output][differs] += of[:, j] * change[differs]
+            return self.runs.compared(inputs.view.see(seen))
 
         return predict
 

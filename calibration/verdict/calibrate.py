@@ -46,10 +46,9 @@ from calibration.attribution.refits import (
     unexamined,
 )
 from calibration.attribution.wrong_numbers import (
+    IMPLAUSIBLE,
     as_good_as_number,
-    beats_number,
     beside_wrong_numbers,
-    implausible,
     pulls,
     without_wrong_priors,
 )
@@ -318,7 +317,8 @@ def explain(study: Study, base: Fit) -> Attribution:
 
     candidates = examine(study, base, misfit, tangents, threshold=threshold, after_first=forecast)
     best = explaining(candidates)
-    if number_explains and not beats_number(best, freed):
+    refit = best[0].refit if best else None
+    if number_explains and not (refit and refit.deviance < freed.deviance - INDISTINGUISHABLE):
         return _explained_by_number(study, Attribution(base, misfit, tangents, tuple(candidates)), freed)
     # From the simplest on: one effect, one beside a wrong number, two effects.
     best = best or explaining(beside_wrong_numbers(study, base, candidates, tangents))
@@ -340,7 +340,7 @@ def _explained_by_number(study: Study, found: Attribution, freed: Fit) -> Attrib
     rival_effects = tuple(as_good_as_number(list(found.candidates), freed, study.level))
     claims = [c for c in rival_effects if c.kept]
     off = tuple(p for p in pulls(freed, study.model.nuisances) if p.freed)
-    if claims and implausible(off):
+    if claims and any(pull.tolerances > IMPLAUSIBLE for pull in off):
         checked = tuple(with_checks(study, claims, found.base))
         return replace(found, best=checked, number=freed, rival_numbers=off)
     check = check_number(study, freed, found.base)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from calibration.attribution.claim_checks import NumberCheck
 from calibration.attribution.forms import Form
@@ -101,10 +100,6 @@ class LoopTurn:
     error: float  # relative rms on the held-out runs
     named: str  # what was adopted; empty: nothing yet
     left: str  # output and input along which most is left; empty: no more than noise
-
-    def record(self) -> dict[str, Any]:
-        """Return the record for verdict.json."""
-        return {"error": self.error, "named": self.named, "left": self.left}
 
 
 @dataclass(frozen=True, repr=False)

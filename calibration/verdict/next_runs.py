@@ -25,18 +25,20 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from scipy.special import ndtr
 
 from calibration.attribution.refits import Rival
+from calibration.laws.law_model import with_law
 from calibration.statistics.forward import derivatives
 from calibration.statistics.gls import Noise
 from calibration.statistics.statistical_model import ForwardModel, Runs, start_values
+from calibration.swimmer.swimmer import SwimmerModel
 from common.arrays import Flags, Floats
 from common.errors import InputError
 from common.reading import expecting, read_json
@@ -82,7 +84,6 @@ class Batch:
     settings: tuple[dict[str, Any], ...]  # of each run; the same settings may come more than once
     separation: float  # λ of the batch, for the two rivals that it tells apart least
     decides: float  # share of draws in which the true one of these two is chosen
-    stop: float  # difference of deviances on the new runs at which to stop
 
     @property
     def worth_making(self) -> bool:
@@ -94,7 +95,7 @@ class Batch:
             "separation": round(self.separation, 2),
             "decides": round(self.decides, 3),
             "worth_making": self.worth_making,
-            "stop_at_deviance": round(self.stop, 2),
+            "stop_at_deviance": round(GIVEN_UP, 2),
         }
 
 
@@ -137,7 +138,7 @@ def next_runs(rivals: Sequence[Rival], *, count: int = 3, seed: int = 0) -> tupl
         runs.append(NextRun(settings[place], repeats, strength, decides))
     chosen, strength = _greedy(pairs, noise)
     batch = tuple(settings[place] for place in chosen)
-    return tuple(runs), Batch(batch, strength, _decides(strength, rng), GIVEN_UP)
+    return tuple(runs), Batch(batch, strength, _decides(strength, rng))
 
 
 def _decides(strength: float, rng: np.random.Generator) -> float:
@@ -149,14 +150,10 @@ def _decides(strength: float, rng: np.random.Generator) -> float:
 def _greedy(pairs: Sequence[Pair], noise: Noise) -> tuple[list[int], float]:
     """Choose `BATCH` runs, one after the other; return their places and the smallest λ of them together."""
     chosen: list[int] = []
-    strengths = np.zeros(len(pairs))
     for _ in range(BATCH):
         tried = [_together(pairs, noise, [*chosen, place]) for place in range(len(pairs[0].difference))]
-        wrong = [float(ndtr(-np.sqrt(strength) / 2).sum()) for strength in tried]
-        place = int(np.argmin(wrong))
-        strengths = tried[place]
-        chosen.append(place)
-    return sorted(chosen), float(strengths.min())
+        chosen.append(int(np.argmin([ndtr(-np.sqrt(strength) / 2).sum() for strength in tried])))
+    return sorted(chosen), float(tried[chosen[-1]].min())
 
 
 def _together(pairs: Sequence[Pair], noise: Noise, places: list[int]) -> Floats:
@@ -179,7 +176,7 @@ class Explanation:
     covariance: Floats  # (p, p) of them
     noise: Noise  # of runs and sessions
     outputs: tuple[str, ...]  # (k,) that were fitted
-    law: Mapping[str, Any] = field(default_factory=dict)  # of a rival that is a law, see `with_law` of `standings`
+    law: Mapping[str, Any] = field(default_factory=dict)  # of a rival that is a law, see `with_law`
 
     @staticmethod
     def from_rival(rival: Rival) -> Explanation:
@@ -265,31 +262,18 @@ def new_runs(runs: Runs, before: set[str]) -> Flags:
     return new
 
 
-Model = TypeVar("Model", bound=ForwardModel)
-
-
-def standings(
-    model: Model,
-    explanations: Sequence[Explanation],
-    new: Flags,
-    with_law: Callable[[Model, Mapping[str, Any]], ForwardModel] | None = None,
-) -> list[Standing]:
+def standings(model: ForwardModel, explanations: Sequence[Explanation], new: Flags) -> list[Standing]:
     """Judge explanations by the new runs in `new` (n,), best first.
 
     It takes up where `calibration.verdict.findings.Attribution.verdict` says "ambiguous", and where several laws
     describe what nothing explains.
-
-    Args:
-        with_law: makes the model of a law from the model without it and the law's record.
 
     Raises:
         InputError: the table has other outputs than were fitted, or lacks what an effect needs.
     """
     data, scores = model.runs, []
     for explanation in explanations:
-        subject: ForwardModel = model
-        if explanation.law and with_law:
-            subject = with_law(model, explanation.law)
+        subject = with_law(cast(SwimmerModel, model), explanation.law) if explanation.law else model
         known = start_values(subject)
         if explanation.outputs != data.outputs:
             raise InputError(
@@ -341,16 +325,11 @@ class Decision:
         return f"Not decided between {' and '.join(titles)}: make more runs."
 
 
-def decide(
-    model: Model,
-    explanations: Sequence[Explanation],
-    before: set[str],
-    with_law: Callable[[Model, Mapping[str, Any]], ForwardModel] | None = None,
-) -> Decision:
+def decide(model: ForwardModel, explanations: Sequence[Explanation], before: set[str]) -> Decision:
     """Judge explanations by the runs of sessions that were not among those `before`, see `standings`.
 
     Raises:
         InputError: there are no new runs, or they cannot be compared with what was fitted.
     """
     new = new_runs(model.runs, before)
-    return Decision(tuple(standings(model, explanations, new, with_law)), int(new.sum()))
+    return Decision(tuple(standings(model, explanations, new)), int(new.sum()))

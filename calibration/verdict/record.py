@@ -53,7 +53,8 @@ def facts(result: Findings) -> dict[str, Any]:
         **_numbers(result),
         **_errors(result),
         **_tests(result),
-        **_descriptions(result),
+        "laws": result.law.to_dict(result.final if result.explaining else None) if result.law else None,
+        "described": result.described,
         **_next(result),
         **_data(result),
     }
@@ -120,7 +121,7 @@ def _claims(result: Findings) -> dict[str, Any]:
         "candidates": [_candidate(c) for c in found.candidates],
         "untestable": result.untestable,
         "forms": [form.record() for form in result.forms],
-        "turns": [turn.record() for turn in result.turns],
+        "turns": [vars(turn) for turn in result.turns],
     }
 
 
@@ -246,14 +247,6 @@ def _largest_departures(result: Findings) -> list[dict[str, Any]]:
         found[at] = max(found.get(at, 0.0), float(np.sqrt((mean**2).mean())))
     ranked = sorted(found.items(), key=lambda item: -item[1])[:_REPEATED]
     return [{"at": list(at), "departure": departure} for at, departure in ranked]
-
-
-def _descriptions(result: Findings) -> dict[str, Any]:
-    law = result.law
-    return {
-        "laws": law.to_dict(result.final if result.explaining else None) if law else None,
-        "described": result.described,
-    }
 
 
 def _next(result: Findings) -> dict[str, Any]:

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from calibration.report.corrected_robot import calibration_knowledge, corrected_robot, corrected_toml, handed_on
+from calibration.report.corrected_robot import as_toml, calibration_knowledge, corrected_robot, handed_on
 from calibration.report.report import write_report
 from calibration.report.robot_verdict import RobotVerdict
 from calibration.statistics.fit import Pull
@@ -105,7 +105,7 @@ def test_a_verdict_has_the_corrected_robot_and_writes_its_files_and_errors(tmp_p
 def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -> None:
     result = effect()
     path = tmp_path / "corrected.toml"
-    path.write_text(corrected_toml(START, result.final_refit))
+    path.write_text(as_toml(*handed_on(START, result.final_refit)))
     robot, knowledge = load_robot(path), read_knowledge(path)
     fitted = corrected_robot(START, result.final_refit.parameters)
     sigma = dict(zip(knowledge.names, np.sqrt(np.diag(knowledge.covariance)), strict=True))
