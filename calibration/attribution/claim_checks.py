@@ -60,7 +60,6 @@ class NumberCheck:
         return self.imitable > IMITABLE or self.transfer < SURE or self.implausible
 
     def record(self) -> dict[str, float | bool]:
-        """Return the record for verdict.json."""
         return {**vars(self), "implausible": self.implausible, "uncertain": self.uncertain}
 
 

@@ -95,7 +95,6 @@ class Form:
         return f"{title} at the size{'s' * (len(self.effects) > 1)} of theory, {sizes}"
 
     def record(self) -> dict[str, Any]:
-        """Return the record for verdict.json."""
         return {
             "title": self.title,
             "sizes": {e.name: self.fit.parameters[e.name] for e in self.effects},

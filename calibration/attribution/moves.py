@@ -119,10 +119,7 @@ def _has_partners(runs: Runs, rows: Flags) -> bool:
 
 
 def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[LocalShift, ...]]:
-    """Find the numbers that differ in some runs, the clearest first, and fit them.
-
-    Args:
-        base: a fit to the runs that the study uses.
+    """Find the numbers that differ in some runs, the clearest first, and fit them, from a fit `base` without.
 
     Returns:
         The study, with a model `Shifted` if something differs; the fit; and what differs.

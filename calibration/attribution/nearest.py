@@ -122,7 +122,6 @@ class AdoptedForm:
         return largest_along(self.misfit, self.model.runs)
 
     def record(self) -> dict[str, Any]:
-        """Return the record for verdict.json."""
         assert self.misfit is not None
         return {
             "effect": self.effect.name,
@@ -193,14 +192,7 @@ def sizes_of(model: Shifted, parameters: Parameters) -> Floats:
 def adopt_nearest(
     study: Study, base: Fit, misfit: Misfit, candidates: Sequence[Candidate], tangents: Directions
 ) -> AdoptedForm | None:
-    """Find the form that describes best what no effect explains; None if none does.
-
-    Args:
-        base: the fit without effects.
-        misfit: of its residual.
-        candidates: all effects, with their refits.
-        tangents: their directions.
-    """
+    """Find the form that describes best what no effect explains in the fit `base`; None if none does."""
     adopted: list[AdoptedForm] = []
     noise_known = study.model.runs.noise_known
     for candidate in _promising(base, misfit.critical_z if noise_known else 0.0, candidates):
@@ -238,11 +230,7 @@ def _birge(study: Study, fitted: Fit) -> float:
 
 
 def _promising(base: Fit, least: float, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Choose the effects that remove most by their refits, or by their scores where they have none.
-
-    Args:
-        least: |z| that an effect needs.
-    """
+    """Choose effects with |z| above `least` that remove most by their refits, or by their scores without one."""
     tested = [c for c in candidates if abs(c.z) > least and c.survived >= TESTABLE]
     return sorted(tested, key=lambda c: c.refit.deviance if c.refit else base.deviance - c.z**2)[:FIRST]
 

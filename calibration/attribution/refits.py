@@ -128,11 +128,7 @@ class Rival:
 def unexamined(
     misfit: Misfit, effects: Sequence[Parameter], threshold: float, beside: tuple[Parameter, ...] = ()
 ) -> list[Candidate]:
-    """Describe every effect by its score alone.
-
-    Args:
-        threshold: |z| that a claim needs.
-    """
+    """Describe every effect by its score alone; a claim needs a |z| above `threshold`."""
     scores = misfit.scores
     return [
         Candidate(
@@ -292,12 +288,7 @@ def ebic(study: Study, refit: Fit, count: int) -> float:
 
 
 def judge(study: Study, candidate: Candidate, base: Fit, refit: Fit, others: Directions) -> Candidate:
-    """Add to a candidate its refit, and the reason why that is kept or not.
-
-    Args:
-        base: the fit without the effect.
-        others: directions of all other effects.
-    """
+    """Add to a candidate its refit, and whether it is kept, in view of the directions of all `others`."""
     after = examine_residual(
         replace(study, seed=study.seed + 1), refit, others, draws=_DRAWS, decide=study.level / 2
     )

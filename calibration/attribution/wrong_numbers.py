@@ -64,13 +64,10 @@ def pulls(fitted: Fit, nuisances: Sequence[Parameter]) -> tuple[Pull, ...]:
 
 
 def wrong_number(candidates: Sequence[Pull]) -> tuple[Pull, ...]:
-    """Find the parameter that is most likely wrong, and after it those that may be wrong in its place.
+    """Find the parameter that is most likely wrong, and after it those that may be wrong in its place; () if none.
 
     To take a prior away lowers the deviance by z². Differences below `INDISTINGUISHABLE` are no evidence. So of
     those as far out as the farthest, the one comes first that is off by the fewest of its own standard deviations.
-
-    Returns:
-        Nothing if no parameter is wrong.
     """
     wrong = [p for p in candidates if p.wrong]
     if not wrong:
@@ -108,9 +105,6 @@ def beside_wrong_numbers(
 
     An effect beside a wrong number is a pair. It is returned only if its EBIC is lower than that of every single
     effect with all priors.
-
-    Args:
-        directions: of the effects.
     """
     names = [e.name for e in study.effects]
     promising = []

@@ -93,13 +93,7 @@ class GroupFactors:
 
 
 def group_factors(model: LawModel, fitted: Fit, used: Flags) -> list[GroupFactors]:
-    """Estimate the factors along each input whose exponent is fitted and that differs between the runs.
-
-    Args:
-        model: with a law.
-        fitted: to the runs in `used`.
-        used: (n,) runs.
-    """
+    """Estimate the factors along each input that differs in the runs `used` (n,) and whose exponent is fitted."""
     x = (logarithms(model.runs) - np.array(model.centre[: len(EXPONENTS)]))[used]
     return [
         _along(model, fitted, used, place, x[:, place]).levelled()

@@ -65,13 +65,7 @@ class LawModel(SwimmerModel):
         centre: Sequence[float] | None = None,
         noted: Sequence[str] = (),
     ) -> LawModel:
-        """Add a law to a model.
-
-        Args:
-            typical: a size of its term.
-            centre: ln ω_m, ln l_m, ln N_m, and the means of `noted`; default: the means of the model's runs.
-            noted: inputs of NOTED on which the factor depends, too.
-        """
+        """Add a law to a model; its centre is by default that of the model's runs."""
         if centre is None:
             centre = [*logarithms(model.runs).mean(0), *noted_values(model.runs, noted).mean(0)]
         plain = (model.robot, model.runs, model.jobs, model.solver, model.own)

@@ -172,9 +172,7 @@ def fitted_law(
 ) -> FittedLaw | None:
     """Fit a law from its linear model, and judge it; None where its motion cannot be simulated.
 
-    Args:
-        base: coefficients and nuisance parameters, without a law.
-        chosen_alone: whether only the exponents of the linear model are fitted.
+    With `chosen_alone` only the exponents of the linear model are fitted.
     """
     data = model.runs
     size = float(np.clip(ranked.size, -_LARGEST_AT_START, _LARGEST_AT_START))
@@ -226,14 +224,9 @@ def _includes(interval: tuple[float, float], value: float) -> bool:
 def _best_fit(
     study: Study, model: LawModel, base: Fit, names: tuple[str, ...], linear: dict[str, float]
 ) -> Fit | None:
-    """Fit a law from its linear model; if more than noise is left, from the model as given, too.
+    """Fit `names` of a law from its linear model, and, if more than noise is left, from the model as given.
 
-    Args:
-        names: its numbers that are fitted.
-        linear: size and exponents of the linear model.
-
-    Returns:
-        The better fit, or None where the motion cannot be simulated.
+    It is None where the motion cannot be simulated.
     """
     kept = {SIZE: linear[SIZE] / 2, LEVER: linear[LEVER]}
     flat = {name: kept.get(name, 0.0) for name in names}
@@ -327,11 +320,7 @@ class Laws:
         return [law for law in good if np.abs((law.fit.prediction - claim.prediction) / scatter).max() > _SAME]
 
     def to_dict(self, claim: Fit | None = None) -> dict[str, Any]:
-        """Return the record for verdict.json.
-
-        Args:
-            claim: an effect that is claimed, with which laws are compared.
-        """
+        """Return the record for verdict.json, with laws that fit as well as an effect that is claimed."""
         facts = self._facts(claim)
         beside = say_laws(facts) if claim else ""
         return {"sentence": say_laws({**facts, "as_good": None}), "beside": beside, **facts}
@@ -390,11 +379,7 @@ def find_laws(study: Study, base: Fit, *, beside_claim: bool = False) -> Laws:
 def _fit_all(
     study: Study, model: SwimmerModel, base: Fit, likely: Sequence[Ranked], *, chosen_alone: bool = False
 ) -> list[FittedLaw]:
-    """Fit and judge places, without those where the motion cannot be simulated.
-
-    Args:
-        chosen_alone: whether only the exponents of the linear model are fitted.
-    """
+    """Fit and judge places, without those where the motion cannot be simulated; see `fitted_law`."""
     bar = tqdm(likely, desc="laws", unit="law", delay=1.0, disable=not study.progress or None)
     tried = (one for one in bar if not skipped("some laws"))
     return [law for one in tried if (law := fitted_law(study, model, base, one, chosen_alone=chosen_alone))]

@@ -123,11 +123,7 @@ class Place:
 
 
 def place_named(name: str) -> Place:
-    """Return the place of that name.
-
-    Raises:
-        KeyError: there is none.
-    """
+    """Return the place of that name; KeyError if there is none."""
     return {place.name: place for place in places()}[name]
 
 
@@ -146,11 +142,7 @@ def in_common(chosen: Sequence[Place]) -> str:
 
 
 def places(*, both_directions: bool = True) -> tuple[Place, ...]:
-    """List every place.
-
-    Args:
-        both_directions: whether the runs have both directions of the motor, without which nothing is odd.
-    """
+    """List every place; what is odd only if there are runs in both directions of the motor."""
     loads = [_load(wrench, motion, odd=False) for wrench in WRENCHES for motion in MOTIONS]
     elsewhere = [_load("Fx", motion, odd=False, lever_unit=unit) for unit in LEVERS for motion in MOTIONS]
     odd = [_load(wrench, motion, odd=True) for wrench in WRENCHES for motion in MOTIONS] if both_directions else []

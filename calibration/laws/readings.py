@@ -141,14 +141,7 @@ def readings(
     covariance: Floats,
     quantities: Mapping[str, tuple[float, float, float]] = QUANTITIES,
 ) -> list[Reading]:
-    """List the powers of one quantity that agree with exponents, the nearest first.
-
-    Args:
-        inputs: of INPUTS, q of them that differ between the runs.
-        exponents: (q,)
-        covariance: (q, q) of them.
-        quantities: symbol -> exponents of INPUTS.
-    """
+    """List the powers of one quantity that agree with exponents (q,) of covariance (q, q), the nearest first."""
     precision = np.linalg.inv(covariance)
     limit = float(chi2.ppf(_AGREES, max(len(inputs) - 1, 1)))
     agreeing = []
@@ -174,12 +167,7 @@ def in_words(
     intervals: Sequence[Sequence[float]],
     of_motion: Mapping[str, tuple[float, float, float]] = MappingProxyType({}),
 ) -> str:
-    """Say on which inputs a law depends; empty if no input differs between the runs.
-
-    Args:
-        intervals: (q, 2), 95 % of the exponents.
-        of_motion: quantities of the motion, symbol -> exponents of INPUTS.
-    """
+    """Say on which inputs a law depends, with 95 % intervals (q, 2); empty if none differs between the runs."""
     if not inputs:
         return ""
     agreeing = readings(inputs, exponents, covariance)

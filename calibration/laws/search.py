@@ -194,13 +194,7 @@ class Search:
 
 
 def search(model: SwimmerModel, base: Fit, used: Flags, candidates: Sequence[Place], *, title: str = "") -> Search:
-    """Fit every linear model of places to the residual of a fit.
-
-    Args:
-        base: the fit without laws.
-        used: (n,) runs to which it was fitted.
-        title: of the progress bar for the derivatives; empty for none.
-    """
+    """Fit every linear model of places to the residual of a fit without laws to the runs in `used` (n,)."""
     directions, variants = _directions(model, base, candidates, title)  # (n, k, variants)
     noted = model.runs.noted_names
     inputs_of_runs = np.concatenate([logarithms(model.runs), noted_values(model.runs, noted)], 1)
@@ -234,11 +228,7 @@ def search(model: SwimmerModel, base: Fit, used: Flags, candidates: Sequence[Pla
 def _directions(
     model: SwimmerModel, base: Fit, candidates: Sequence[Place], title: str
 ) -> tuple[Floats, list[tuple[Place, float]]]:
-    """Compute ∂f/∂F of terms and ∂f/∂ln m of factors at the fit, with each lever, (n, k, variants).
-
-    Returns:
-        These, and the place and the lever of each variant.
-    """
+    """Compute ∂f/∂F of terms and ∂f/∂ln m of factors (n, k, variants), with the place and the lever of each."""
     names = tuple(dict.fromkeys(name for place in candidates for name, _ in place.moves))
     slopes: dict[str, Floats] = {}
     # What is odd needs both directions simulated, and what is not local more phases: each on its own.

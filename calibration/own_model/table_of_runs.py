@@ -137,11 +137,7 @@ def _levels(name: str | None, columns: AskedColumns) -> tuple[Integers, tuple[st
 
 
 def _faults_of_outputs(table: pd.DataFrame, outputs: pd.DataFrame, model: Model) -> Faults:
-    """Say of which rows the outputs cannot be used.
-
-    Raises:
-        InputError: many values are not above 0 that are to be compared as ratios.
-    """
+    """Say of which rows the outputs cannot be used; refuse ratios of which many are not above 0."""
     missing, faults = table[list(outputs)].isna(), Faults(table)
     faults.add(missing.all(axis=1), "no output has a value")
     for name, output in model.outputs.items():

@@ -155,11 +155,7 @@ def law_handed_on(given: Robot, law: FittedLaw, rows: Flags) -> tuple[Robot, Cal
 
 
 def robot_with_law(given: Robot, law: FittedLaw, parameters: Parameters) -> Robot:
-    """Return the corrected robot with a law as an effect.
-
-    Args:
-        parameters: of the law's model.
-    """
+    """Return the corrected robot with a law as an effect, by parameters of the law's model."""
     effects, factor = effects_of_law(law, parameters)
     written = dict(parameters)
     for name, power in law.place.moves:

@@ -314,11 +314,7 @@ def _draw_path(axes: Axes, error: PathError) -> None:
 
 
 def draw_place(robot: Robot, place: Place, lever: float = 0.0) -> Figure:
-    """Draw the robot from above with the load of a place: a force or a couple on the axis, or the tails.
-
-    Args:
-        lever: of a side force that has one.
-    """
+    """Draw the robot from above with the load of a place: a force or a couple on the axis, or the tails."""
     shown = scene(robot)
     figure = Figure(figsize=(_WIDTH, 2.2))
     axes = figure.add_subplot()

@@ -17,26 +17,14 @@ _ROUNDING = 1e-24  # variance of repeats that are equal, over the mean square
 
 
 def names_once(names: Iterable[str]) -> None:
-    """Refuse a name that two parameters have.
-
-    Raises:
-        InputError: there is one.
-    """
+    """Refuse a name that two parameters have."""
     for name, count in Counter(names).items():
         if count > 1:
             raise InputError(f"two numbers or effects of the model have the name {name!r}; rename or drop one")
 
 
 def refuse_equal_repeats(runs: Runs, repeated: Integers | Floats, columns: Sequence[str]) -> None:
-    """Refuse an output that is the same in all repeats, from which its noise cannot be estimated.
-
-    Args:
-        repeated: what is the same in repeats, see `Runs.repeats`.
-        columns: of the outputs, by which they are named.
-
-    Raises:
-        InputError: there is one.
-    """
+    """Refuse an output that is the same in all repeats, from which its noise cannot be estimated."""
     variances = np.diag(repeat_covariance(runs.y, repeated))
     for place in np.flatnonzero(variances <= _ROUNDING * np.mean(runs.y**2, 0))[:1].tolist():
         raise InputError(

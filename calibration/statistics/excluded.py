@@ -83,12 +83,7 @@ class Faults(dict[int, Excluded]):
 
 
 def summary_of_excluded(excluded: Sequence[Excluded], total: int) -> list[str]:
-    """Group rows by their reason, the most frequent first; columns follow.
-
-    Args:
-        excluded: rows and columns.
-        total: rows of the table.
-    """
+    """Group excluded rows by their reason, the most frequent first; columns follow."""
     groups: dict[str, list[Excluded]] = {}
     for each in excluded:
         if each.row:
@@ -127,12 +122,7 @@ def caveat_of_excluded(excluded: Sequence[Excluded], total: int) -> tuple[str, .
 
 
 def find_copies(inputs: Floats, outputs: Floats) -> dict[int, int]:
-    """Find copied rows: place -> place of the row that it repeats.
-
-    Args:
-        inputs: (n, q) what was set.
-        outputs: (n, k) what was measured.
-    """
+    """Find copied rows of inputs (n, q) and outputs (n, k): place -> place of the row that it repeats."""
     first: dict[tuple[float, ...], int] = {}
     copies = {}
     for place, row in enumerate(np.column_stack([inputs, outputs]).tolist()):

@@ -364,12 +364,7 @@ def birge(runs: Runs, fitted: Fit, used: Flags) -> float:
 
 
 def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, least: int) -> _FitStep:
-    """Compute a step from `parameters`.
-
-    Args:
-        whole: (p + 1, p + 1) products of the derivatives and the residual.
-        least: place of the least λ allowed.
-    """
+    """Compute a step from `parameters`, with a λ at the place `least` of _DAMPING or behind it."""
     for place in range(least, len(_DAMPING)):
         change = _damped(fitted, parameters, normal, _DAMPING[place])
         if all(abs(c) <= _LARGEST for c, p in zip(change, fitted, strict=True) if p.logarithmic):

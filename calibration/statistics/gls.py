@@ -68,11 +68,7 @@ class Noise:
         return float(np.sqrt(np.trace(self.run_covariance) / len(self.run_covariance)))
 
     def whitener(self, session: Integers, scale: Floats | None = None) -> Callable[[Floats], Floats]:
-        """Make Σ^−½, which flattens (n, k, ...) to (n k, ...), for runs of `session` (n,).
-
-        Args:
-            scale: (n,) roots of the weights of the runs.
-        """
+        """Make Σ^−½, (n, k, ...) to (n k, ...), for runs of `session` (n,); `scale` (n,): roots of weights."""
         along = np.ones(len(session)) if scale is None else scale
         root, (picks, sizes) = inverse_root(self.run_covariance), averaging_rows(session, along)
         less = 1 / np.sqrt(1 + sizes[:, None] * np.broadcast_to(self.session_ratio, len(root))) - 1  # (s, k)

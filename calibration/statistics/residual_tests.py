@@ -209,11 +209,7 @@ class _Tester:
         return np.asarray(np.where(removed > LEARNT * prior, pulls, 0.0).max(-1, initial=0.0))
 
     def _shapes(self, covariance: Floats, white: Floats, root: Floats, share: Floats) -> Floats:
-        """Compute z of every output along every feature, (B, k, f).
-
-        Args:
-            white: residuals, white in Σ.
-        """
+        """Compute z of every output along every feature, (B, k, f), of residuals that are white in Σ."""
         count, k = len(white), white.shape[-1]
         score = np.einsum("nf,bnk,bka->baf", self.F, self.design.shrink(white, share), root, optimize=True)
         less = 1 / (1 + share[:, None, :] * self.design.sizes[:, None]) - 1  # Σ⁻¹ of the sessions' means
@@ -229,11 +225,7 @@ class _Tester:
 
 
 def _kernel(inputs: Floats) -> tuple[Floats, Floats]:
-    """Compute the kernel between the u different rows of inputs (n, q).
-
-    Returns:
-        (u, n) rows that add up the runs with equal inputs, and (u, u) the kernel.
-    """
+    """Return rows (u, n) that add up the runs with equal inputs (n, q), and the kernel (u, u) between these."""
     kinds, place = np.unique(inputs, axis=0, return_inverse=True)
     square = (kinds**2).sum(1)
     distance = np.maximum(square[:, None] + square - 2 * kinds @ kinds.T, 0.0)

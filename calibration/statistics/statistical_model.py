@@ -131,11 +131,7 @@ class Runs:
         return repeat_covariance(self.y[rows], repeats, self.scale[rows]), repeat_count(repeats)
 
     def guessed_noise(self, rows: Flags, residual: Floats) -> dict[str, Any]:
-        """Return what to change in runs whose noise is unknown: a guess from a residual (n, k); else nothing.
-
-        Args:
-            rows: (n,) the runs that are fitted.
-        """
+        """Return what to change in runs whose noise is unknown: a guess from a residual (n, k) in `rows`."""
         if self.noise_known and (self.sigma is not None or self.repeated(rows)):
             return {}
         freedom = 0 if self.sigma is not None else repeat_count(self.repeats(rows))
@@ -316,14 +312,7 @@ class Experiment(ForwardModel, Protocol):
         ...
 
     def check(self, prediction: Floats) -> None:
-        """Reject measurements that are inconsistent with their stated units.
-
-        Args:
-            prediction: (n, k) of the model as given.
-
-        Raises:
-            InputError: a column is wrong by a factor that is not possible.
-        """
+        """Refuse measurements in wrong units, by the prediction (n, k) of the model as given."""
         ...
 
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:

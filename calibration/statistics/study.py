@@ -81,9 +81,6 @@ class Study:
         independent of them, and 1/S is inverse Wishart (von Rosen 1988): their mean is f c, c = ν/(ν − k − 1), and
 
             variance = 2 c ν (ν − 1)/((ν − k)(ν − k − 3)) (f + f²/(k (ν − k − 1))).
-
-        Args:
-            parameters: fitted to the values.
         """
         v, k = self.model.runs.noise(self.split.fitted)[1], self.model.runs.y.shape[1]
         if v <= k + 3 or not self.model.runs.noise_known:

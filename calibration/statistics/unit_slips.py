@@ -77,14 +77,7 @@ class Factor(NamedTuple):
 
 
 def refuse_unit_slips(runs: Runs, given: Floats) -> None:
-    """Refuse runs among which a session has an output in another unit.
-
-    Args:
-        given: (n, k) prediction of the model as given.
-
-    Raises:
-        InputError: there is one.
-    """
+    """Refuse runs of which a session has an output in another unit; `given` (n, k) is the model as given."""
     sessions = range(len(runs.session_names))
     factors = [[_compared(runs, given, i, s) for s in sessions] for i in range(len(runs.outputs))]
     for i, name in enumerate(runs.outputs):

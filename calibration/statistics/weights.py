@@ -157,12 +157,7 @@ def estimate(residual: Floats, condition: Integers) -> ContaminatedNormal | None
 def _maximise(
     rows: Floats, groups: _Groups, scatter: Floats, ratio: float | None
 ) -> tuple[ContaminatedNormal, float]:
-    """Estimate S, B and π from residuals (n, k); with the lower bound of the log likelihood.
-
-    Args:
-        scatter: (k,) standard deviations of a run, robust.
-        ratio: c²; None: π = 0.
-    """
+    """Estimate S, B and π (0 without a ratio c²) from residuals (n, k), with the bound of the log likelihood."""
     n = len(rows)
     share, factor = (_AT_START, ratio) if ratio is not None else (0.0, 1.0)
     run = np.diag(scatter**2)
@@ -192,9 +187,6 @@ def _maximise(
 
 def fit_weighted(study: Study, start: Mapping[str, float]) -> tuple[Study, Fit]:
     """Fit coefficients and nuisance parameters to the runs that a study uses, and weigh the runs if need be.
-
-    Args:
-        start: where the fit starts.
 
     Returns:
         The study, with the weights in its model's runs, and the fit. Without a share of worse runs it is the same

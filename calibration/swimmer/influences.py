@@ -50,14 +50,7 @@ _FACTOR = 5.0  # a number may be off by
 def nuisance_parameters(
     robot: Robot, table: Mapping[str, float], outputs: Sequence[str], noted: Sequence[str]
 ) -> tuple[Parameter, ...]:
-    """List every number that is not exact.
-
-    Args:
-        robot: with its standard deviations.
-        table: σ of CAMERA, HEADING [rad] and TACHOMETER.
-        outputs: of the table; what no output shows is left out.
-        noted: names of what was noted of the runs.
-    """
+    """List every number that is not exact and shows in these outputs; `table` has σ of what the table states."""
     parameters = []
     for name, title in FIELDS.items():
         value = robot.number(name)

@@ -219,11 +219,7 @@ def _unused_columns(empty: Sequence[str], sparse: Sequence[str], unknown: Sequen
 
 
 def _measured_outputs(table: pd.DataFrame, empty: Sequence[str]) -> tuple[str, ...]:
-    """Name the outputs that a table has; `empty` are columns without any value.
-
-    Raises:
-        InputError: they do not tell the coefficients apart.
-    """
+    """Name the outputs of a table, if they tell the coefficients apart; `empty` are columns without any value."""
     outputs = tuple(name for name, (column, _, _) in OUTPUTS.items() if column in table)
     if len(outputs) < 2 or not {"omega_yr", "R_yr", "theta", "v"} & set(outputs):
         raise InputError(
@@ -265,14 +261,7 @@ def _add_gaps(faults: Faults, numbers: pd.DataFrame) -> list[str]:
 
 
 def _independent(data: Measurements, copies: int) -> Measurements:
-    """Choose outputs that were measured: repeats differ, and not just as other outputs do.
-
-    Args:
-        copies: rows that were left out because they are copies.
-
-    Raises:
-        InputError: there are too few repeats, or an output is the same in all of them.
-    """
+    """Choose outputs that were measured: there are repeats that differ, and not just as other outputs do."""
     columns, repeats = [OUTPUTS[name][0] for name in data.outputs], repeat_count(data.apart)
     repeated = data.apart if repeats >= FEWEST_REPEATS else data.repeats()
     if (count := repeat_count(repeated)) < FEWEST_REPEATS:
@@ -302,11 +291,7 @@ def _independent(data: Measurements, copies: int) -> Measurements:
 
 
 def _sigmas(good: pd.DataFrame) -> dict[str, float]:
-    """Read standard deviations of the way of measuring, the same in all rows.
-
-    Raises:
-        InputError: a column has no number, two different ones, or one that is below 0 or too large.
-    """
+    """Read standard deviations of the way of measuring, the same in all rows."""
     sigmas = {}
     for column, (name, factor) in _SIGMAS.items():
         if column in good:
@@ -363,15 +348,7 @@ def _notes(unknown: pd.DataFrame) -> dict[str, Any]:
 def _faults(
     table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...], header: Flags, missing: pd.DataFrame
 ) -> Faults:
-    """Say why rows cannot be used.
-
-    Args:
-        table: as given.
-        numbers: its columns as numbers.
-        outputs: names of OUTPUTS that it has.
-        header: (n,) rows that are the header again.
-        missing: outputs without a value.
-    """
+    """Say why rows cannot be used; those of `header` (n,) are the header again."""
     faults = Faults(table)
     faults.add(header, "the header again")
     faults.add(missing.all(axis=1), "no output has a value")

@@ -36,11 +36,7 @@ Owned = Mapping[str, tuple[float, ...]]
 
 
 def check_inputs(robot: Robot, runs: Measurements) -> None:
-    """Check tail lengths and motor speeds.
-
-    Raises:
-        InputError: l_cm or omega_rpm seems to be in another unit.
-    """
+    """Refuse tail lengths and motor speeds that seem to be in another unit."""
     longest = float(runs.length.max())
     for length in (longest, float(runs.length.min())):
         if not SHORTEST < length / robot.head_radius < LONGEST:
@@ -58,11 +54,7 @@ def check_inputs(robot: Robot, runs: Measurements) -> None:
 
 
 def check_outputs(runs: Measurements, prediction: Floats) -> None:
-    """Compare outputs with the prediction (n, k) of the model as given.
-
-    Raises:
-        InputError: an output seems to be in another unit.
-    """
+    """Refuse outputs that seem to be in another unit, by the prediction (n, k) of the model as given."""
     y = {name: runs.y[:, i] for i, name in enumerate(runs.outputs)}
     if "omega_h" in y and "omega_t" in y:
         share = float(np.median((np.exp(y["omega_h"]) + np.exp(y["omega_t"])) / np.abs(runs.omega)))
@@ -86,14 +78,7 @@ def _all_spins(factor: float) -> str:
 
 
 def owned(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:
-    """Read the settings that a lab has, by the columns of a table.
-
-    Args:
-        entries: "COLUMN=VALUE,VALUE,…" each.
-
-    Raises:
-        InputError: a column or a value that cannot be set.
-    """
+    """Read the settings that a lab has from entries such as "l_cm=5,7,9", by the columns of a table."""
     settings: dict[str, tuple[float, ...]] = {}
     for entry in entries:
         name, _, values = entry.partition("=")
@@ -106,11 +91,7 @@ def owned(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:
 
 
 def check_owned(own: Owned) -> None:
-    """Refuse settings that no run can have.
-
-    Raises:
-        InputError: see `owned`.
-    """
+    """Refuse settings that no run can have."""
     for name, values in own.items():
         if name not in SETTINGS:
             raise InputError(f"settings of the next runs: {name!r} is none of {', '.join(SETTINGS)}")

@@ -229,9 +229,6 @@ def _refuted_claim(study: Study, found: Attribution) -> Withdrawn | None:
 def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any) -> tuple[Study, Fit, Floats]:
     """Divide and check the runs, and fit the model without effects.
 
-    Args:
-        settings: of the study.
-
     Returns:
         The study, the fit, and the prediction of the model as given.
     """
@@ -274,11 +271,7 @@ def _explain_with_moves(study: Study, base: Fit) -> tuple[Study, Attribution, tu
 
 
 def _fit_moves(study: Study, plain: Experiment, found: Attribution) -> tuple[Fit | None, tuple[LocalShift, ...]]:
-    """Fit the final model to all runs, the held-out ones included, with the numbers that differ in some of them.
-
-    Returns:
-        The fit, and what differs; no fit if nothing does.
-    """
+    """Fit the final model to all runs, with the numbers that differ in some of them; None if none does."""
     if not groups_that_may_differ(plain.runs) or not plain.runs.noise_known:
         return None, ()
     final = found.base if found.nearest else found.final
@@ -331,12 +324,7 @@ def explain(study: Study, base: Fit) -> Attribution:
 
 
 def _explained_by_number(study: Study, found: Attribution, freed: Fit) -> Attribution:
-    """Name a wrong number, unless an effect explains as much and the number is implausibly far off.
-
-    Args:
-        found: the residual, and what each effect does about it.
-        freed: the fit without the prior of the number.
-    """
+    """Name a wrong number, `freed` in a fit, unless an effect explains as much and it is implausibly far off."""
     rival_effects = tuple(as_good_as_number(list(found.candidates), freed, study.level))
     claims = [c for c in rival_effects if c.kept]
     off = tuple(p for p in pulls(freed, study.model.nuisances) if p.freed)

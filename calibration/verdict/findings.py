@@ -79,11 +79,7 @@ class Attribution:
         return ("partial" if self.nearest else "unexplained", "effect", "ambiguous")[min(explanations, 2)]
 
     def rivals(self, model: Experiment, laws: tuple[Rival, ...]) -> tuple[Rival, ...]:
-        """List explanations that the runs cannot tell apart, best first; none if there are not two.
-
-        Args:
-            laws: that fit as well as the best effect; the first of them come last.
-        """
+        """List explanations that the runs cannot tell apart, laws last; none if there are not two."""
         known = [(c.title, c.refit) for c in (*self.best, *self.rival_effects) if c.refit]
         if self.number and known:
             wrong = ", ".join(alike[0].parameter.title for alike in self.number.wrong_numbers)

@@ -55,7 +55,6 @@ class Withdrawn:
     after: float
 
     def record(self) -> dict[str, Any]:
-        """Return the record for verdict.json."""
         return {
             "title": self.title,
             "effects": list(self.effects),

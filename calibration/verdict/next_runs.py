@@ -108,11 +108,7 @@ class Pair(NamedTuple):
 
 
 def next_runs(rivals: Sequence[Rival], *, count: int = 3, seed: int = 0) -> tuple[tuple[NextRun, ...], Batch]:
-    """Find the best experiments to tell rivals apart, best first, and the best batch of `BATCH` runs.
-
-    Args:
-        rivals: two fitted models or more, the best first; of many, the first four are told apart.
-    """
+    """Find the best experiments to tell (the first four) rivals apart, best first, and the best `BATCH` runs."""
     told_apart = rivals[:_MOST_RIVALS]
     fits = [rival.fit for rival in told_apart]
     possible = [rival.model.possible() for rival in told_apart]
@@ -248,11 +244,7 @@ def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
 
 
 def new_runs(runs: Runs, before: set[str]) -> Flags:
-    """Choose the runs (n,) of sessions that were not there before.
-
-    Raises:
-        InputError: there are none.
-    """
+    """Choose the runs (n,) of sessions that were not there before; refuse a table without such."""
     new = np.array([runs.session_names[s] not in before for s in runs.session])
     if not new.any():
         raise InputError(
@@ -326,10 +318,6 @@ class Decision:
 
 
 def decide(model: ForwardModel, explanations: Sequence[Explanation], before: set[str]) -> Decision:
-    """Judge explanations by the runs of sessions that were not among those `before`, see `standings`.
-
-    Raises:
-        InputError: there are no new runs, or they cannot be compared with what was fitted.
-    """
+    """Judge explanations by the runs of sessions that were not among those `before`, see `standings`."""
     new = new_runs(model.runs, before)
     return Decision(tuple(standings(model, explanations, new)), int(new.sum()))

@@ -44,14 +44,6 @@ def draw_samples(forms: Mapping[str, FinalRefit], count: int, seed: int) -> pd.D
     """Draw `count` rows: a column for each number and effect, and `form`, the title of the row's form.
 
     An effect that a form does not have is at its null. Rows are in random order.
-
-    Args:
-        forms: as `open_forms` returns them.
-        count: rows.
-        seed: of the draws.
-
-    Raises:
-        InputError: the count is below 1.
     """
     if count < 1:
         raise InputError(f"samples: {count}; give a number of rows from 1")

@@ -75,11 +75,7 @@ def offset(record: Record, size: float, output: str, *, signed: bool = True) -> 
 
 
 def difference_in_words(record: Record, difference: Record) -> str:
-    """Say a difference, as in "the yaw rate of operator B is 12 % below that of operator A (6.8 σ)".
-
-    Args:
-        record: of the outputs, their titles and scales.
-    """
+    """Say a difference, as in "the yaw rate of operator B is 12 % below that of operator A (6.8 σ)"."""
     output, size, where, against = (difference[key] for key in ("output", "size", "where", "against"))
     by, side = offset(record, size, output, signed=False), "below" if size < 0 else "above"
     if not difference["numbers"]:
