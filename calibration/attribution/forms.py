@@ -103,9 +103,9 @@ class Form:
         }
 
 
-def at_theory(study: Study, base: Fit, effects: Sequence[Parameter]) -> list[Form]:
+def at_theory(study: Study, base: Fit) -> list[Form]:
     """Fit the model with each effect of the size that theory gives, if it gives one, and with all of them."""
-    known = [(e,) for e in effects if e.theory is not None]
+    known = [(e,) for e in study.effects if e.theory is not None]
     together = [sum(known, ())] if len(known) > 1 else []
     forms = []
     for some in (*known, *together):
@@ -128,7 +128,7 @@ def forms_of_claims(
         if c.claimed not in known and c.refit and c.refit.converged
     ]  # fmt: skip
     alike = [replace(form, error=_error_left_out(study, form.fit)) for form in claimed]
-    near = as_good(study, claimed[0], [*at_theory(study, base, study.effects), *fitted])
+    near = as_good(study, claimed[0], [*at_theory(study, base), *fitted])
     near = [form for form in near if form.error < _FARTHER * alike[0].error]
     return [*(f for f in near if f.at_theory), *alike, *(f for f in near if not f.at_theory)]
 

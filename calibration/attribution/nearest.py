@@ -210,7 +210,7 @@ def adopt_nearest(
             forms.pop()
         judged = [_judged(study, base, candidate.effect, *form) for form in reversed(forms)]
         adopted += [form for form in judged if form][:1]
-    of_theory = at_theory(study, base, study.effects)
+    of_theory = at_theory(study, base)
     single = (form for form in of_theory if len(form.effects) == 1)
     adopted += [a for f in single if (a := _judged(study, base, f.effects[0], study.model, f.fit, 0.0))]
     if not adopted:
