@@ -16,7 +16,7 @@ effect is claimed for it. An effect is claimed only if it fits better than the f
 parameter can gain by chance. A smaller pull is mentioned only if it is notable among so many (`notable_pull`).
 
 A number that would have to be off by more than `IMPLAUSIBLE` of its standard deviations does not come ahead of
-effects that explain as much. They come first, and the number is named after them.
+effects that explain as much (`implausible`). They come first, and the number is named after them.
 """
 
 from __future__ import annotations
@@ -84,6 +84,11 @@ def notable_pull(count: int) -> float:
     Šidák (1967): the probability is at most that of independent pulls, also where pulls are correlated.
     """
     return float(normal.isf((1 - (1 - _NOTABLE) ** (1 / count)) / 2))
+
+
+def implausible(freed: Sequence[Pull]) -> bool:
+    """Tell whether one of the freed parameters is further off than its stated tolerance makes credible."""
+    return any(pull.tolerances > IMPLAUSIBLE for pull in freed)
 
 
 def without_wrong_priors(study: Study, fitted: Fit, *, target: float = math.inf) -> Fit:

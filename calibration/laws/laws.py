@@ -31,7 +31,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from tqdm import tqdm
@@ -167,31 +167,32 @@ class FittedLaw:
         }
 
 
-def fitted_law(
-    study: Study, model: SwimmerModel, base: Fit, ranked: Ranked, *, chosen_alone: bool = False
-) -> FittedLaw | None:
+def fitted_law(study: Study, base: Fit, ranked: Ranked, *, chosen_alone: bool) -> FittedLaw | None:
     """Fit a law from its linear model, and judge it; None where its motion cannot be simulated.
 
     With `chosen_alone` only the exponents of the linear model are fitted.
     """
-    data = model.runs
+    data = study.model.runs
     size = float(np.clip(ranked.size, -_LARGEST_AT_START, _LARGEST_AT_START))
-    with_law = LawModel.of(model, ranked.place, size, noted=ranked.noted)
-    names = tuple(p.name for p in with_law.effects if not chosen_alone or p.name in (SIZE, LEVER, *ranked.chosen))
+    with_law = LawModel.of(cast(SwimmerModel, study.model), ranked.place, size, noted=ranked.noted)
+    names = tuple(
+        p.name for p in with_law.effects if not chosen_alone or p.name in (SIZE, LEVER, *ranked.exponents)
+    )
     refit = _best_fit(study, with_law, base, names, {**ranked.start, SIZE: size})
     if refit is None:
         return None
     gain = base.deviance - refit.deviance - len(names) * math.log(study.values)
     predictive = session_gain(study, base, refit)
+    null_in = {name for name in names if refit.interval(name)[0] <= 0 <= refit.interval(name)[1]}
     if not refit.converged:
         reason: Rejection | None = Rejection.NOT_CONVERGED
     elif any(refit.parameters[p.name] in p.bounds for p in with_law.effects if p.name in names):
         reason = Rejection.AT_THE_END
     elif gain <= 0:
         reason = Rejection.NO_GAIN
-    elif all(_includes(refit.interval(name), 0.0) for name in names if name != LEVER):
+    elif null_in >= {*names} - {LEVER}:
         reason = Rejection.INCLUDES_NULL
-    elif LEVER in names and _includes(refit.interval(LEVER), 0.0):
+    elif LEVER in null_in:
         reason = Rejection.NO_LEVER
     else:
         reason = _of_sessions(predictive)
@@ -215,10 +216,6 @@ def fitted_law(
 def _of_sessions(gain: tuple[float, float]) -> Rejection | None:
     """Say whether a law fails to predict left-out sessions better."""
     return Rejection.NOT_PREDICTIVE if gain[0] <= gain[1] else None
-
-
-def _includes(interval: tuple[float, float], value: float) -> bool:
-    return interval[0] <= value <= interval[1]
 
 
 def _best_fit(
@@ -358,9 +355,7 @@ def find_laws(study: Study, base: Fit, *, beside_claim: bool = False) -> Laws:
 
     Source: Schwarz (1978) for BIC; nested power laws as in dimensional analysis.
     """
-    model = study.model
-    if not isinstance(model, SwimmerModel):
-        raise TypeError("laws are looked for in a SwimmerModel")
+    model = cast(SwimmerModel, study.model)
     base = fit(model, base.parameters, base.names, study.split.fitted, in_sigma=True, title="")
     both = len(np.unique(np.sign(model.runs.omega[study.split.fitted]))) == 2
     candidates = places(both_directions=both)
@@ -368,31 +363,25 @@ def find_laws(study: Study, base: Fit, *, beside_claim: bool = False) -> Laws:
     ranked, p_value = searched.ranked, search_p_value(searched, seed=study.seed + 2)
     least = max(_LIKELY * ranked[0].gain, 0.0)
     likely = [one for one in ranked[:_FITTED] if one.gain > least]
-    laws = _fit_all(study, model, base, likely, chosen_alone=beside_claim)
+    laws = _fit_all(study, base, likely, chosen_alone=beside_claim)
     kept = _kept(laws)
     if not beside_claim and (not kept or kept[0].p_value < study.level / 2):
-        laws += _fit_all(study, model, base, [one for one in ranked if one.gain > 0 and one not in likely])
-    laws = _with_levers(study, model, base, laws, ranked, chosen_alone=beside_claim)
+        laws += _fit_all(
+            study, base, [one for one in ranked if one.gain > 0 and one not in likely], chosen_alone=False
+        )
+    laws = _with_levers(study, base, laws, ranked, chosen_alone=beside_claim)
     return Laws(base, tuple(ranked), tuple(sorted(laws, key=lambda law: -law.gain)), p_value, study.level)
 
 
-def _fit_all(
-    study: Study, model: SwimmerModel, base: Fit, likely: Sequence[Ranked], *, chosen_alone: bool = False
-) -> list[FittedLaw]:
+def _fit_all(study: Study, base: Fit, likely: Sequence[Ranked], *, chosen_alone: bool) -> list[FittedLaw]:
     """Fit and judge places, without those where the motion cannot be simulated; see `fitted_law`."""
     bar = tqdm(likely, desc="laws", unit="law", delay=1.0, disable=not study.progress or None)
     tried = (one for one in bar if not skipped("some laws"))
-    return [law for one in tried if (law := fitted_law(study, model, base, one, chosen_alone=chosen_alone))]
+    return [law for one in tried if (law := fitted_law(study, base, one, chosen_alone=chosen_alone))]
 
 
 def _with_levers(
-    study: Study,
-    model: SwimmerModel,
-    base: Fit,
-    laws: list[FittedLaw],
-    ranked: Sequence[Ranked],
-    *,
-    chosen_alone: bool,
+    study: Study, base: Fit, laws: list[FittedLaw], ranked: Sequence[Ranked], *, chosen_alone: bool
 ) -> list[FittedLaw]:
     """Compare side forces at the disc with the same ones elsewhere.
 
@@ -403,7 +392,7 @@ def _with_levers(
     wanted = {name for law in _kept(laws) for name in law.place.elsewhere}
     wanted |= {law.place.at_disc for law in laws if law.reason is Rejection.NO_LEVER}
     missing = [one for one in ranked if one.place.name in wanted - set(fitted)]
-    fitted |= {law.place.name: law for law in _fit_all(study, model, base, missing, chosen_alone=chosen_alone)}
+    fitted |= {law.place.name: law for law in _fit_all(study, base, missing, chosen_alone=chosen_alone)}
     for name, law in fitted.items():
         at_disc = fitted.get(law.place.at_disc)
         if law.reason is Rejection.NO_LEVER and at_disc and law.gain_at_lever - at_disc.gain > INDISTINGUISHABLE:

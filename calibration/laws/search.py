@@ -139,11 +139,6 @@ class Ranked:
     lever: float = 0.0  # of a place that has one
 
     @property
-    def chosen(self) -> tuple[str, ...]:
-        """Names of the exponents in the model."""
-        return tuple(self.exponents)
-
-    @property
     def noted(self) -> tuple[str, ...]:
         """Noted inputs in the model."""
         return tuple(name.removeprefix("law_") for name in self.exponents if name not in EXPONENTS)
@@ -155,11 +150,6 @@ class Ranked:
             name: min(max(value, -_POWERS_AT_START), _POWERS_AT_START) for name, value in self.exponents.items()
         }
         return {**dict.fromkeys(EXPONENTS, 0.0), **limited, LEVER: self.lever}
-
-    @property
-    def is_bounded(self) -> bool:
-        """Whether the exponents are within their bounds."""
-        return all(abs(value) <= STEEPEST for value in self.exponents.values())
 
 
 @dataclass(frozen=True)
@@ -179,7 +169,7 @@ class Search:
         best: dict[str, Ranked] = {}
         for model in np.argsort(-self.fits.gain[0], kind="stable"):
             ranked = self._ranked(int(model))
-            if ranked.is_bounded:
+            if all(abs(value) <= STEEPEST for value in ranked.exponents.values()):
                 best.setdefault(ranked.place.name, ranked)
         return list(best.values())
 

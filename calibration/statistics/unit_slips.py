@@ -22,6 +22,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from calibration.statistics.statistical_model import Runs
 from common.arrays import Flags, Floats
@@ -107,13 +108,9 @@ def refuse_unit_slips(runs: Runs, given: Floats) -> None:
 def _compared(runs: Runs, given: Floats, output: int, session: int) -> Factor | None:
     """Compare an output of a session with the others; None if too few runs can be compared."""
     y, measured, here = runs.y[:, output], ~runs.gaps[:, output], runs.session == session
-    sums, counts = (np.zeros((runs.condition.max() + 1, len(runs.session_names))) for _ in range(2))
-    others = measured & ~here
-    np.add.at(sums, (runs.condition[others], runs.session[others]), y[others])
-    np.add.at(counts, (runs.condition[others], runs.session[others]), 1)
-    with np.errstate(invalid="ignore"):
-        means = np.where((counts > 0).any(1), np.nansum(sums / counts, 1) / (counts > 0).sum(1), np.nan)
-    x, logarithmic = means[runs.condition], runs.outputs[output] not in runs.output_scales
+    others, logarithmic = measured & ~here, runs.outputs[output] not in runs.output_scales
+    means = pd.Series(y[others]).groupby([runs.condition[others], runs.session[others]]).mean()
+    x = means.groupby(level=0).mean().reindex(runs.condition).to_numpy()
     shared = here & measured & np.isfinite(x)
     if shared.sum() >= _FEWEST:
         return _factor(y[shared], x[shared], logarithmic=logarithmic)

@@ -332,7 +332,7 @@ class SwimmerModel:
     def _simulated(
         self, columns: Mapping[str, Floats], moved: Sequence[str] = ()
     ) -> tuple[dict[str, Floats], Integers]:
-        """Leave out effects at their null, and runs (P, n) that are equal to others; with the place of each there."""
+        """Leave out effects at their null, and runs (P, n) that equal others; with the place of each there."""
         kept = {}
         for name, column in columns.items():
             if is_effect(name):

@@ -46,9 +46,9 @@ from calibration.attribution.refits import (
     unexamined,
 )
 from calibration.attribution.wrong_numbers import (
-    IMPLAUSIBLE,
     as_good_as_number,
     beside_wrong_numbers,
+    implausible,
     pulls,
     without_wrong_priors,
 )
@@ -328,7 +328,7 @@ def _explained_by_number(study: Study, found: Attribution, freed: Fit) -> Attrib
     rival_effects = tuple(as_good_as_number(list(found.candidates), freed, study.level))
     claims = [c for c in rival_effects if c.kept]
     off = tuple(p for p in pulls(freed, study.model.nuisances) if p.freed)
-    if claims and any(pull.tolerances > IMPLAUSIBLE for pull in off):
+    if claims and implausible(off):
         checked = tuple(with_checks(study, claims, found.base))
         return replace(found, best=checked, number=freed, rival_numbers=off)
     check = check_number(study, freed, found.base)

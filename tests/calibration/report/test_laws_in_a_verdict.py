@@ -139,7 +139,7 @@ def test_what_is_no_rival_does_not_weaken_a_claim() -> None:
     assert same.fit.deviance == pytest.approx(verdict.final.deviance, abs=0.05)
     assert same.words not in [rival.title for rival in laws.as_good_as(verdict.final)]
     for law in laws.fitted:  # each with the numbers of its linear model
-        assert set(law.fit.names) & set(EXPONENTS) == set(law.ranked.chosen)
+        assert set(law.fit.names) & set(EXPONENTS) == set(law.ranked.exponents)
     better = replace(verdict.final, deviance=verdict.final.deviance - 100)
     assert laws.as_good_as(better) == ()
     assert laws.to_dict(better)["beside"] == "No law of the places that were searched describes it as well."
