@@ -34,7 +34,7 @@ from calibration.laws.law_model import LEVER, SIZE
 from calibration.laws.laws import FittedLaw
 from calibration.laws.readings import EXPONENTS
 from calibration.statistics.statistical_model import Parameters
-from calibration.statistics.study import FinalRefit, refit_to_all
+from calibration.statistics.study import FinalRefit, final_refit
 from calibration.swimmer.influences import CURRENT, LENGTH
 from calibration.swimmer.swimmer import robot_numbers
 from common.arrays import Flags, Floats
@@ -148,7 +148,7 @@ def _rounded(value: float, sigma: float, unit: str = "") -> float:
 
 def law_handed_on(given: Robot, law: FittedLaw, rows: Flags) -> tuple[Robot, CalibrationKnowledge]:
     """Return the corrected robot with a law, fitted once more to the runs in `rows` (n,), and its covariance."""
-    final = refit_to_all(law.model, law.fit, rows)
+    final = final_refit(law.fit.refitted(law.model.runs, rows))
     robot = robot_with_law(given, law, final.parameters)
     known = calibration_knowledge(given, final, _slopes(robot, law, final))
     return significant(robot, known), known

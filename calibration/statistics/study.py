@@ -297,14 +297,6 @@ class FinalRefit:
     covariance: Floats  # (p, p); a 95 % interval is 1.96 standard deviations to each side
 
 
-def refit_to_all(model: ForwardModel, fitted: Fit, rows: Flags) -> FinalRefit:
-    """Fit a fitted model to all runs in `rows` by one linear step.
-
-    The covariance allows for the estimates of S and ρ, as the intervals of the fit do.
-    """
-    return final_refit(fitted.refitted(model.runs, rows))
-
-
 def final_refit(fitted: Fit) -> FinalRefit:
     """Hand on a fit to all runs; its intervals, those of Student's t, become those of a normal distribution."""
     wider = student.ppf(0.975, fitted.freedom) / normal.ppf(0.975)

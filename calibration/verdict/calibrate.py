@@ -67,7 +67,6 @@ from calibration.statistics.study import (
     errors,
     final_refit,
     find_outliers,
-    refit_to_all,
     split_runs,
 )
 from calibration.statistics.unit_slips import refuse_unit_slips
@@ -361,7 +360,7 @@ def _handed_on(study: Study, found: Attribution, *, falls: bool) -> FinalRefit:
     nearest, final = found.nearest, found.final
     if nearest and not falls:
         nearest, final = None, found.base
-    refit = refit_to_all(study.model, final, study.split.kept)
+    refit = final_refit(final.refitted(study.model.runs, study.split.kept))
     return nearest.handed_on(refit) if nearest else refit
 
 

@@ -19,7 +19,7 @@ from calibration.laws.readings import EXPONENTS
 from calibration.report.corrected_robot import _slopes, check_given, robot_with_law
 from calibration.report.figures import draw_factors, draw_place
 from calibration.report.robot_verdict import RobotVerdict
-from calibration.statistics.study import refit_to_all
+from calibration.statistics.study import final_refit
 from calibration.verdict.next_runs import BATCH, Explanation, next_runs, standings
 from common.errors import InputError
 from dataset.robot_inputs import robot_fields
@@ -176,7 +176,7 @@ def test_the_uncertainty_of_the_exponents_is_that_of_the_load_at_the_robot(place
     verdict = described(place)
     law = next(one for one in laws_of(verdict).kept if one.place.name == place)
     assert set(EXPONENTS) - set(law.fit.names) <= {EXPONENTS[2]}
-    final = refit_to_all(law.model, law.fit, verdict.split.kept)
+    final = final_refit(law.fit.refitted(law.model.runs, verdict.split.kept))
     robot = robot_with_law(START, law, final.parameters)
     slopes = next(iter(_slopes(robot, law, final).values()))
     scale = next(iter(robot.effects.values())) if law.place.is_term else 1.0
