@@ -49,6 +49,7 @@ BATCH = 8  # runs
 SELDOM = 0.5  # share of cases in which runs must decide to be worth making
 _DRAWS = 4000
 _DECIDES = 3.84  # difference of χ² at which one of the two is chosen
+_PROPOSED = 3  # single settings
 _WANTED = 0.9  # share of draws that should decide
 _MOST_REPEATS = 16
 _MOST_RIVALS = 4
@@ -107,7 +108,7 @@ class Pair(NamedTuple):
     covariance: Floats  # (p, p) of its fit
 
 
-def next_runs(rivals: Sequence[Rival], *, count: int = 3, seed: int = 0) -> tuple[tuple[NextRun, ...], Batch]:
+def next_runs(rivals: Sequence[Rival], *, seed: int = 0) -> tuple[tuple[NextRun, ...], Batch]:
     """Find the best experiments to tell (the first four) rivals apart, best first, and the best `BATCH` runs."""
     told_apart = rivals[:_MOST_RIVALS]
     fits = [rival.fit for rival in told_apart]
@@ -125,7 +126,7 @@ def next_runs(rivals: Sequence[Rival], *, count: int = 3, seed: int = 0) -> tupl
     alone = np.array([_together(pairs, noise, [place]).min() for place in range(len(settings))])
     runs = []
     rng = np.random.default_rng(seed)
-    for place in np.argsort(-alone)[:count].tolist():
+    for place in np.argsort(-alone)[:_PROPOSED].tolist():
         for repeats in (1, 2, 4, 8, _MOST_REPEATS):
             strength = float(_together(pairs, noise, [place] * repeats).min())
             decides = _decides(strength, rng)
