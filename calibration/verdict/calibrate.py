@@ -274,9 +274,7 @@ def _fit_moves(study: Study, plain: Experiment, found: Attribution) -> tuple[Fit
     if not groups_that_may_differ(plain.runs) or not plain.runs.noise_known:
         return None, ()
     final = found.base if found.nearest else found.final
-    known = {p.name for p in (*plain.coefficients, *plain.nuisances, *plain.effects)}
-    known |= {e.second.name for e in plain.effects if e.second}
-    names = tuple(name for name in final.names if name in known)
+    names = tuple(name for name in final.names if name in start_values(plain))
     every = Study.fitted_to(plain, study.split.kept, level=study.level, seed=study.seed)
     _, fitted, moves = find_moves(every, fit(plain, final.parameters, names, study.split.kept, title=""))
     return fitted if moves else None, moves
