@@ -19,7 +19,7 @@ import numpy as np
 
 from calibration.statistics.between_repeats import Difference, find_differences
 from calibration.statistics.forward import stacked
-from calibration.statistics.statistical_model import Experiment, Parameter, Parameters, Predict, Runs, with_runs
+from calibration.statistics.statistical_model import Experiment, Parameter, Parameters, Predict, Wrapped, with_runs
 from calibration.statistics.study import middle_session
 from common.arrays import Flags, Floats
 
@@ -28,33 +28,16 @@ _TYPICAL = 0.1
 
 
 @dataclass(frozen=True)
-class Offsets:
+class Offsets(Wrapped):
     """A model with offsets."""
 
-    inner: Experiment
     of: Mapping[str, tuple[str, Floats]]  # number -> output, and what the note says of each run (n,)
-
-    @property
-    def runs(self) -> Runs:
-        return self.inner.runs
 
     @cached_property
     def coefficients(self) -> tuple[Parameter, ...]:
         ends = -_LARGEST, _LARGEST
         own = (Parameter(name, f"offset of {name}", 0.0, ends, _TYPICAL, of_these_runs=True) for name in self.of)
         return (*self.inner.coefficients, *own)
-
-    @property
-    def nuisances(self) -> tuple[Parameter, ...]:
-        return self.inner.nuisances
-
-    @property
-    def effects(self) -> tuple[Parameter, ...]:
-        return self.inner.effects
-
-    @property
-    def untestable(self) -> Mapping[str, str]:
-        return self.inner.untestable
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
         """Predict (P, n, k), see `ForwardModel`."""
@@ -78,10 +61,6 @@ class Offsets:
         for name, (output, column) in self.of.items():
             added[..., runs.outputs.index(output)] += stacked(sets, name) * column
         return runs.completed(added)
-
-    def check(self, prediction: Floats) -> None:
-        """Refuse measurements as the model within does."""
-        self.inner.check(prediction)
 
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """Find a better start as the model within does."""

@@ -10,7 +10,7 @@ on the parameter's own scale. The linear model of the model within is enough for
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from calibration.statistics.statistical_model import Experiment, Parameter, Parameters, Predict, Runs, parameter
+from calibration.statistics.statistical_model import Parameter, Parameters, Predict, Wrapped, parameter
 from common.arrays import Flags, Floats
 from common.errors import InputError
 
@@ -44,32 +44,23 @@ class Shift:
 
 
 @dataclass(frozen=True)
-class Shifted:
+class Shifted(Wrapped):
     """A model with shifts; an effect that shifts has the scale of its shift."""
 
-    inner: Experiment
     shifts: tuple[Shift, ...]
-
-    @property
-    def runs(self) -> Runs:
-        return self.inner.runs
 
     @cached_property
     def coefficients(self) -> tuple[Parameter, ...]:
         return (*self.inner.coefficients, *(s.parameter for s in self.shifts if s.sigma is None))
 
-    @cached_property
+    @property
     def nuisances(self) -> tuple[Parameter, ...]:
         return (*self.inner.nuisances, *(s.parameter for s in self.shifts if s.sigma is not None))
 
-    @cached_property
+    @property
     def effects(self) -> tuple[Parameter, ...]:
         shifted = {s.of.name: s.of for s in self.shifts}
         return tuple(shifted.get(effect.name, effect) for effect in self.inner.effects)
-
-    @property
-    def untestable(self) -> Mapping[str, str]:
-        return self.inner.untestable
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
         """Predict (P, n, k), see `ForwardModel`."""
@@ -121,10 +112,6 @@ class Shifted:
         for s in self.shifts:
             inner[s.of.name] = s.of.changed(inner[s.of.name], inner.pop(s.parameter.name) * s.rows)
         return inner
-
-    def check(self, prediction: Floats) -> None:
-        """Refuse measurements as the model within does."""
-        self.inner.check(prediction)
 
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """Return the start as it is: it comes from a fit."""

@@ -324,6 +324,33 @@ class Experiment(ForwardModel, Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class Wrapped:
+    """A model around another one; what it does not change is that of the model within."""
+
+    inner: Experiment
+
+    @property
+    def runs(self) -> Runs:
+        return self.inner.runs
+
+    @property
+    def nuisances(self) -> tuple[Parameter, ...]:
+        return self.inner.nuisances
+
+    @property
+    def effects(self) -> tuple[Parameter, ...]:
+        return self.inner.effects
+
+    @property
+    def untestable(self) -> Mapping[str, str]:
+        return self.inner.untestable
+
+    def check(self, prediction: Floats) -> None:
+        """Refuse measurements as the model within does."""
+        self.inner.check(prediction)
+
+
 Model = TypeVar("Model", bound=ForwardModel)
 
 
