@@ -106,10 +106,6 @@ class LawModel(SwimmerModel):
         values = np.concatenate([logarithms(self.runs), noted_values(self.runs, self.noted)], 1)
         return np.nan_to_num(values - np.array(self.centre), nan=0.0)
 
-    @cached_property
-    def _arms(self) -> Floats:
-        return lever_arms(self.robot, self.runs, self.place.lever_unit)
-
     def factor(self, parameters: Parameters) -> Floats:
         """Compute m of every run, (n,)."""
         return np.exp(self._inputs @ [parameters.get(name, 0.0) for name in self.exponents])
@@ -146,7 +142,8 @@ class LawModel(SwimmerModel):
         if self.place.is_term:
             loads = [parameters.get(SIZE, 0.0) * m]
             if self.place.lever_unit:
-                loads.append(loads[0] * parameters.get(LEVER, 0.0) * self._arms)
+                arms = lever_arms(self.robot, self.runs, self.place.lever_unit)
+                loads.append(loads[0] * parameters.get(LEVER, 0.0) * arms)
             for (name, _), load in zip(self.place.moves, loads, strict=True):
                 inner[name] = load
         else:

@@ -65,7 +65,11 @@ def by_differences(
 
 def secants(model: ForwardModel, at: Parameters, along: Sequence[Parameter], *, title: str = "") -> Predict:
     """Make the linear model of any model by its finite differences."""
-    seen, slopes = by_differences(model, at, along, title=title)
+    return linear(at, along, *by_differences(model, at, along, title=title))
+
+
+def linear(at: Parameters, along: Sequence[Parameter], seen: Floats, slopes: Floats) -> Predict:
+    """Make a linear model of the prediction (n, k) at a point and its derivatives (n, k, p) there."""
 
     def predict(sets: Sequence[Parameters]) -> Floats:
         predictions = np.tile(seen, (len(sets), 1, 1))

@@ -237,17 +237,12 @@ class NormalEquations:
         return self.within + np.swapaxes(self.means, -1, -2) @ seen, self.within + transposed @ (seen / weights)
 
     @cached_property
-    def _freedom(self) -> Floats:
-        """Degrees of freedom of the sessions' means about the common one that a fit at ρ = 0 leaves, (..., k)."""
+    def estimated(self) -> Flags:
+        """Axes (..., k) of which ρ is estimated: a fit at ρ = 0 leaves their means about the common one free."""
         columns = self._about_common(self.means)[..., :-1]
         covariance = solve_normal(self.at(0.0))[1]
         taken = ((columns @ covariance) * columns).sum(-1)
-        return len(self.sizes) - 1 - self._of_outputs(taken)
-
-    @property
-    def estimated(self) -> Flags:
-        """Axes of which ρ is estimated, and not assumed, (..., k)."""
-        return np.asarray(self._freedom > _LEAST_FREEDOM)
+        return np.asarray(len(self.sizes) - 1 - self._of_outputs(taken) > _LEAST_FREEDOM)
 
     def _of_outputs(self, means: Floats) -> Floats:
         """Add up what is stated for each session and output (..., s k), to (..., k)."""

@@ -268,9 +268,6 @@ class SwimmerModel:
             good &= ((low * (1 - 1e-9) <= np.abs(column)) & (np.abs(column) <= high * (1 + 1e-9)))[same]
         return good[0]
 
-    def _influence(self, name: str) -> Influence | None:
-        return self._influences.get(name) or influence_of_law(name)
-
     @cached_property
     def _drivers(self) -> dict[str, Floats]:
         """What drives influences, of every run (n,)."""
@@ -296,7 +293,8 @@ class SwimmerModel:
         effects = {name: np.full((1, 1), size) for name, size in robot.effects.items()}
         current: dict[str, Floats] = {}
         for name in dict.fromkeys(name for parameters in sets for name in parameters):
-            if (influence := self._seconds.get(name) or self._influence(name)) is None:
+            known = self._seconds.get(name) or self._influences.get(name)
+            if (influence := known or influence_of_law(name)) is None:
                 continue
             start, effect = influence.parameter.start, influence.effect
             value = of(name, robot.effects.get(name, start))

@@ -38,11 +38,6 @@ class ConditionErrors:
     after: float
     p_value: float  # agreement with the final model
 
-    @property
-    def refutes(self) -> bool:
-        """Whether what is claimed raises the error, and the runs reject the model."""
-        return self.after > self.before and self.p_value < REJECTED
-
 
 @dataclass(frozen=True)
 class Withdrawn:
@@ -119,6 +114,6 @@ def refuted(study: Study, before: Fit, claim: Fit, title: str, effects: tuple[st
         p = 0.0
     on_sessions = ConditionErrors(study.split.names, rms_before, rms_after, p)
     for one in filter(None, (on_sessions, errors_of_conditions(study, before, claim))):
-        if one.refutes:
+        if one.after > one.before and one.p_value < REJECTED:
             return Withdrawn(title, effects, one.names, one.before, one.after)
     return None
