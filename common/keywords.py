@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Callable
 from functools import wraps
 from inspect import Parameter, signature, unwrap
@@ -37,7 +36,10 @@ def checks_types(function: Callable[P, R]) -> Callable[P, R]:
     Annotations are compared as names, so that the classes are not imported.
     """
     takes = signature(function)
-    kinds = {p.name: re.findall(r"(\w+)(?= \||$)", str(p.annotation)) for p in takes.parameters.values()}
+    kinds = {
+        p.name: [word.rpartition(".")[2] for word in str(p.annotation).split(" | ")]
+        for p in takes.parameters.values()
+    }
 
     @checks_keywords
     @wraps(function)
