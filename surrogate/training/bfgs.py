@@ -6,7 +6,7 @@ iteration reads it once and writes it once, which takes about as long as the los
 
 Where the curvature along a step is smaller than the matrix says, the matrix is scaled before it is updated.
 Source: Oren and Luenberger (1974); Al-Baali (1998); for networks Urbán, Stefanou and Pons (2025). The line search
-is scipy's, for the strong Wolfe conditions.
+is scipy's, for the strong Wolfe conditions; where it finds no step, steps are halved until the value falls enough.
 """
 
 from __future__ import annotations
@@ -24,7 +24,9 @@ from common.arrays import Floats
 
 ValueAndGradient = Callable[[Tensor], tuple[float, Tensor]]
 _CURVATURE = 0.9  # of the Wolfe conditions
+_DECREASE = 1e-4  # of the slope: what counts as a step
 _SEARCHES = 15  # trial steps of a line search
+_HALVINGS = 40  # of a step, where there is none for the Wolfe conditions
 _STATE = ("x", "value", "gradient", "_matrix", "_direction")
 
 
@@ -86,7 +88,13 @@ class Minimiser:
             length = line_search(
                 value, gradient, start, direction, slope, self.value, c2=_CURVATURE, maxiter=_SEARCHES
             )[0]
-        return None if length is None else (float(length), *at(start + length * direction))
+        # scipy's search gives up after ten interpolations; a loss with narrow valleys may need steps of 1e-6
+        halved = (0.5**k for k in range(_HALVINGS)) if length is None else (length,)
+        for length in halved:
+            now, slopes = at(start + length * direction)
+            if now <= self.value + _DECREASE * length * (slope @ direction):
+                return float(length), now, slopes
+        return None
 
     def _forget(self) -> None:
         self._matrix = None
@@ -97,9 +105,9 @@ class Minimiser:
         self.x = self.x + step
         change = gradient - self.gradient
         curvature = float(step @ change)
-        if not curvature > 0:
-            self._direction = -gradient / gradient.abs().sum().clamp(min=1e-300)
-            self._matrix = None
+        if not curvature > 0:  # a halved step: it says nothing of the matrix
+            steepest = gradient / gradient.abs().sum().clamp(min=1e-300)
+            self._direction = -(steepest if self._matrix is None else self._matrix @ gradient)
             return
         if self._matrix is None:
             size = curvature / float(change @ change)

@@ -238,6 +238,22 @@ def test_it_reaches_the_minimum_of_a_narrow_valley_as_quickly_as_scipy() -> None
     assert steps <= 1.5 * minimize(rosen, start, jac=rosen_der, method="BFGS", options={"gtol": 1e-9}).nit
 
 
+@pytest.mark.parametrize("size", [1e-4, 1e-8])
+def test_it_takes_steps_that_are_much_smaller_than_its_first_trial(size: float) -> None:
+    """On the loss of a network, from a start as near to its valley as Adam gets."""
+    weights = torch.tensor([1.0, 3.0, 10.0], dtype=torch.float64) / size
+
+    def loss(x: Tensor) -> tuple[float, Tensor]:
+        point = x.clone().requires_grad_(True)
+        value = (((weights * point) ** 2 + 1e-4) ** 0.25).sum()
+        return value.item(), torch.autograd.grad(value, point)[0]
+
+    minimiser, steps = Minimiser(loss, torch.full((3,), size, dtype=torch.float64)), 0
+    while steps < 200 and minimiser.step():
+        steps += 1
+    assert minimiser.value == pytest.approx(0.3, rel=1e-9)
+
+
 def test_it_stops_at_a_minimum_and_where_the_function_breaks_down() -> None:
     at_rest = Minimiser(lambda x: (float(x @ x), 2 * x), torch.zeros(3, dtype=torch.float64))
     assert not at_rest.step()
