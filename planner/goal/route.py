@@ -194,7 +194,8 @@ class Lattice:
         """Return the lengths of the joints with this margin, and further rows: ends and lengths."""
         n, (course, ahead, lengths) = self.courses, self._joints
         most = self._open + sum(len(ends) for ends, _ in further)
-        end, length, degrees, done = np.empty(most, np.int32), np.empty(most), [np.zeros(1, int)], 0
+        end, length = np.empty(most, np.int32), np.empty(most, np.float32)  # whole numbers below 2²⁴: exact
+        degrees, done = [np.zeros(1, int)], 0
 
         def add(ends: Integers, row: Floats, degree: Integers) -> None:
             nonlocal done
