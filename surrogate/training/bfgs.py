@@ -38,7 +38,7 @@ class Minimiser:
         self.x = x
         self.value, self.gradient = function(x)
         self._matrix: Tensor | None = None  # (n, n); None: steepest descent
-        self._direction = -self.gradient / self.gradient.abs().sum().clamp(min=1e-300)
+        self._direction = _downhill(self.gradient)
 
     def state_dict(self) -> dict[str, Any]:
         """Return all that the next step depends on."""
@@ -98,7 +98,7 @@ class Minimiser:
 
     def _forget(self) -> None:
         self._matrix = None
-        self._direction = -self.gradient / self.gradient.abs().sum().clamp(min=1e-300)
+        self._direction = _downhill(self.gradient)
 
     def _update(self, step: Tensor, gradient: Tensor, length: float) -> None:
         """Update the matrix after a step, and the next direction."""
@@ -106,8 +106,7 @@ class Minimiser:
         change = gradient - self.gradient
         curvature = float(step @ change)
         if not curvature > 0:  # a halved step: it says nothing of the matrix
-            steepest = gradient / gradient.abs().sum().clamp(min=1e-300)
-            self._direction = -(steepest if self._matrix is None else self._matrix @ gradient)
+            self._direction = _downhill(gradient) if self._matrix is None else -(self._matrix @ gradient)
             return
         if self._matrix is None:
             size = curvature / float(change @ change)
@@ -125,3 +124,8 @@ class Minimiser:
         rows = torch.stack([outer, step])
         self._matrix.addmm_(columns, rows, beta=scale)
         self._direction = -(scale * moved + step * (outer @ gradient) + outer * (step @ gradient))
+
+
+def _downhill(gradient: Tensor) -> Tensor:
+    """Return the direction of steepest descent, a first step long."""
+    return -gradient / gradient.abs().sum().clamp(min=1e-300)
