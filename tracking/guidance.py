@@ -54,7 +54,8 @@ class TrackerGuidance(LineOfSight):
         self._lap_turn = reference.turn
         self._stopping = False
         x, y = (tracked.vehicle.current / straight.speed).tolist()
-        self._planned = self._drift = Drift(straight.drift / straight.speed, (x, y))
+        self._planned = Drift(straight.drift / straight.speed, (x, y))
+        self.update_drift(self._planned)  # until another is learned
         self._turns = 0.0  # whole turns by which headings differ from those of the reference
         self._pivot_distance = tracked.vehicle.pivot_distance
         self._pivot_radius = tracked.vehicle.pivot_radius

@@ -216,7 +216,7 @@ def excess(law: GuidanceLaw, state: PathState, pose: POSE, sense: int) -> tuple[
     back = law.rod - law.offset
     x, y = pose[0] - back * math.cos(pose[2]), pose[1] - back * math.sin(pose[2])
     sideways, current_x, current_y = law.drift
-    course = pose[2] + slip(sideways, current_x, current_y, pose[2])
+    course = pose[2] + float(slip(sideways, current_x, current_y, pose[2]))
     while True:
         segment = way[leg]
         along, error = project(segment, x, y, along)

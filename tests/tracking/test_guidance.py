@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.guidance.law import project
+from planner.guidance.law import REST, project
 from planner.jobs.plan import plan
 from planner.paths.dubins import shortest_paths
 from planner.paths.tractrix import Drift
@@ -57,6 +57,19 @@ def test_a_drift_that_the_plan_knows_does_not_turn_the_reference() -> None:
         guidance.state = guidance.state._replace(step=place)
         guidance.integrate(in_current().start, 1)
     assert guidance._law.lean == pytest.approx(0.0, abs=1e-15)
+
+
+def test_a_way_is_followed_in_the_current_that_the_plan_knows() -> None:
+    """Before anything is learned; told of the same drift, the guidance steers the same."""
+    x, y, heading = in_current().start
+    away = x + 0.8, y, heading + 1.0
+    guidance, told = TrackerGuidance(in_current()), TrackerGuidance(in_current())
+    told.update_drift(told._planned)
+    dwells = []
+    for each in (guidance, told):
+        each.plan_way(away)
+        dwells.append(each.next_dwell(away, each.first_turn or 1, REST)[0])
+    assert dwells[0] == dwells[1]
 
 
 def test_on_a_straight_line_the_reference_turns_against_the_slip() -> None:
