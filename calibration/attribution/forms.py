@@ -86,6 +86,12 @@ class Form:
     error: float = math.nan  # relative rms on left-out runs
 
     @property
+    def held(self) -> bool:
+        """Whether one of the effects is held at an end of its range."""
+        names = {e.name for e in self.effects}
+        return any(p.name in names and held for p, held in zip(self.fit.fitted, self.fit.held, strict=True))
+
+    @property
     def title(self) -> str:
         """The effects in words, with the size if theory gives it."""
         title = " and ".join(e.title for e in self.effects)
@@ -148,9 +154,7 @@ def envelope(study: Study, names: Sequence[str], forms: Sequence[Form]) -> dict[
     """Join the 95 % intervals of numbers over forms; nothing without forms."""
     ends: dict[str, list[float]] = {name: [] for name in names if forms}
     for form in forms:
-        wider = math.sqrt(birge(study.model.runs, form.fit, study.split.fitted))
+        ratio = birge(study.model.runs, form.fit, study.split.fitted)
         for name, of_name in ends.items():
-            place, value = form.fit.names.index(name), form.fit.parameters[name]
-            of, half = form.fit.fitted[place], wider * form.fit.half_width(place)
-            of_name += [of.changed(value, -half), of.changed(value, half)]
+            of_name += form.fit.interval(name, ratio)
     return {name: (min(of_name), max(of_name)) for name, of_name in ends.items()}

@@ -16,7 +16,7 @@ What the form leaves counts as noise: variances are multiplied by b = max(1, Ï‡Â
 
 A form is adopted if
 
-1. nothing explains the residual, and its fit converged, inside the bounds;
+1. nothing explains the residual, and its fit converged;
 2. its gain on left-out groups of runs, paired over conditions, has a 95 % interval above zero, or is consistent
    over them (`calibration.attribution.forms`). The size of a specimen that is left out as a whole is the mean;
 3. on these left-out runs it removes at least half of what the model without it leaves beyond noise, if that is
@@ -28,7 +28,8 @@ A form is adopted if
 Sizes differ if the restricted likelihood gains by it: -2 ln of its ratio is above 2.71, the 95 % quantile where a
 variance is at its bound of zero (Self and Liang 1987). Of the forms adopted the one with the largest gain is
 taken, or, if left-out runs cannot tell it from that one, a form at the size that theory gives. The others that
-they cannot tell from it are named.
+they cannot tell from it are named. A form that the runs hold at an end of its range counts only if none inside its
+range is as good.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ from scipy.stats import t as student
 from calibration.attribution.forms import Form, as_good, at_theory, gain_of_residuals
 from calibration.attribution.refits import FIRST, Candidate, left_out_residuals
 from calibration.statistics.budget import skipped, spent
-from calibration.statistics.fit import Fit, UnsolvedError, birge, fit
+from calibration.statistics.fit import Fit, UnsolvedError, birge, fit, profile_end
 from calibration.statistics.forward import derivatives
 from calibration.statistics.gls import solve_normal
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, examine_residual
@@ -218,8 +219,10 @@ def adopt_nearest(
     largest = max(adopted, key=lambda form: form.gain)
     together = [form for form in of_theory if len(form.effects) > 1]
     alike = as_good(study, largest.form, [*(a.form for a in adopted), *together])
+    alike = [form for form in alike if not form.held] or alike
     alike.sort(key=lambda form: not form.at_theory)
-    best = next((a for a in adopted if a.at_theory and any(a.fit is form.fit for form in alike)), largest)
+    as_well = [a for a in adopted if any(a.fit is form.fit for form in alike)]
+    best = max(as_well or [largest], key=lambda form: (form.at_theory, form.gain))
     place = next(i for i, e in enumerate(study.effects) if e.name == best.effect.name)
     left = examine_residual(replace(study, seed=study.seed + 5), best.fit, tangents.without(place), draws=_DRAWS)
     return replace(best, forms=tuple(alike), misfit=left)
@@ -293,7 +296,7 @@ def _judged(
 ) -> AdoptedForm | None:
     """Describe a form by its left-out runs; None if it is not adopted."""
     size, free = fitted.parameters[effect.name], effect.name in fitted.names
-    if not fitted.converged or (free and not effect.bounds[0] < size < effect.bounds[1]):
+    if not fitted.converged:
         return None
     b = _birge(study, fitted)
     before, after = left_out_residuals(study, base, fitted)
@@ -320,9 +323,13 @@ def _judged(
         sizes = _sizes(model, fitted, b, seen)
     if fitted.fitted[place].logarithmic and half > _VAGUE:
         return None
-    low, high = _ends(fitted.fitted[place], size, half)
+    held = fitted.held[place]
+    low, high = fitted.interval(effect.name, b) if held else _ends(fitted.fitted[place], size, half)
     if not spread and low <= effect.start <= high:
-        return None
+        end = profile_end(study.model, fitted, effect.name, study.split.fitted, b)
+        if end is None:
+            return None
+        low, high = (end, high) if size > effect.start else (low, end)
     return AdoptedForm(effect, model, fitted, spread, b, (low, high), sizes, *gain, left)
 
 

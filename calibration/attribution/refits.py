@@ -293,7 +293,6 @@ def judge(study: Study, candidate: Candidate, base: Fit, refit: Fit, others: Dir
         replace(study, seed=study.seed + 1), refit, others, draws=_DRAWS, decide=study.level / 2
     )
     gain, error = session_gain(study, base, refit)
-    low, high = interval_at_second(refit, candidate.effect)
     judgement = Judgement.KEPT
     if refit.stopped:
         judgement = Judgement.NO_TIME
@@ -301,11 +300,23 @@ def judge(study: Study, candidate: Candidate, base: Fit, refit: Fit, others: Dir
         judgement = Judgement.NOT_CONVERGED
     elif after.p_value < study.level / 2:
         judgement = Judgement.LEAVES_RESIDUAL
-    elif low <= candidate.effect.start <= high:
+    elif _includes_null(base, refit, candidate.effect):
         judgement = Judgement.INCLUDES_NULL
     elif gain <= error:
         judgement = Judgement.NOT_PREDICTIVE
     return replace(candidate, refit=refit, refit_misfit=after, gain=gain, gain_error=error, judgement=judgement)
+
+
+def _includes_null(base: Fit, refit: Fit, effect: Parameter) -> bool:
+    """Tell whether the 95 % interval of an effect includes its null, by the covariance and by the deviance there.
+
+    Along a bent valley the covariance alone says nothing.
+    """
+    low, high = interval_at_second(refit, effect)
+    alike = base.wrong_numbers == refit.wrong_numbers  # otherwise the base lacks more than the effect
+    return low <= effect.start <= high and not (
+        alike and base.deviance - refit.deviance > refit.risen(effect.name)
+    )
 
 
 def interval_at_second(refit: Fit, effect: Parameter) -> tuple[float, float]:
@@ -313,9 +324,10 @@ def interval_at_second(refit: Fit, effect: Parameter) -> tuple[float, float]:
 
     A weak effect's size and second number cannot be told apart, and the interval over both would hold the null.
     """
-    if effect.second is None:
+    i = refit.names.index(effect.name)
+    if effect.second is None or refit.held[i]:
         return refit.interval(effect.name)
-    i, j = refit.names.index(effect.name), refit.names.index(effect.second.name)
+    j = refit.names.index(effect.second.name)
     V = refit.covariance
     share = 1 - V[i, j] ** 2 / (V[i, i] * V[j, j])
     half = refit.half_width(i) * math.sqrt(max(share, 0.0))
@@ -341,7 +353,7 @@ def left_out_residual(study: Study, fitted: Fit, noise: Noise) -> Floats:
     data, parts = study.model.runs, []
     for learn, out in leave_one_group_out(groups(data)[0], study.split.fitted):
         step = solve_normal(fitted.normal_of_fit(data, learn, noise))[0]
-        predicted = (data.y - fitted.prediction)[out] - fitted.jacobian[out] @ step
+        predicted = (data.y - fitted.prediction)[out] - fitted.tangents[out] @ step
         parts.append(noise.whitener(data.session[out], data.scale[out])(predicted))
     return np.concatenate(parts)
 

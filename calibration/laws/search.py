@@ -198,7 +198,7 @@ def search(model: SwimmerModel, base: Fit, used: Flags, candidates: Sequence[Pla
         for inputs in _subsets(range(1, len(varied)), at_least=0 if place.is_term else 1)
     ]
     with_lever = [int(bool(variants[number][0].lever_unit)) for number, _ in kinds]
-    data, absorbed = model.runs, base.jacobian[used]
+    data, absorbed = model.runs, base.tangents[used]
     models = LinearModels(
         absorbed,
         precisions(base.fitted),

@@ -1,14 +1,18 @@
-"""Generalised least squares of a forward model, each parameter on its own scale.
+"""Generalised least squares of a forward model within bounds, each parameter on its own scale.
 
-Steps of Levenberg (1944) with the model's own derivatives:
+    least rᵀ W r over θ = (ln C_1, …, ε_1, …),   r = y − f(θ),   low ≤ θ ≤ high,
 
-    θ ← θ + (A + λ D⁻²)⁻¹ JᵀΣ⁻¹ (y − f(θ)),   A = JᵀΣ⁻¹J,   θ = (ln C_1, …, ε_1, …),
+by steps of Levenberg (1944) with the model's own derivatives J, each the least squares of a linear model within the
+bounds (Stark and Parker 1995, `scipy.optimize.lsq_linear`):
 
-D is 1 for ln C and a typical size for ε. λ is 0, unless the step is too long or does not improve the fit. A
-parameter at a bound stays there if the step would lead out. The covariance of the parameters is V = A⁻¹, times a
-factor because S is estimated (`_inflation`). Nuisance parameters have priors, which are rows of their own in
-A, in the residual and in the deviance. Intervals are 95 %, by Student's t. The scatter ρ of a few sessions is
-uncertain, which limits the degrees of freedom (Satterthwaite 1946):
+    least |W^½ (r − J s)|² + λ |D⁻¹ s|² over steps s,   low ≤ θ + s ≤ high.
+
+W is Σ⁻¹ but for the mean of all sessions (`calibration.statistics.gls`). D is 1 for ln C and a typical size for ε. λ is
+0, unless the step is too long or does not improve the fit. A parameter that the runs pull against a bound is *held*
+there: it is no direction of tests or of the covariance,
+which is V = A⁻¹, A = JᵀWJ, of the others, times a factor because S is estimated (`_inflation`). Nuisance parameters
+have priors, which are rows of their own in A, in the residual and in the deviance. Intervals are 95 %, by Student's
+t. The scatter ρ of a few sessions is uncertain, which limits the degrees of freedom (Satterthwaite 1946):
 
     ν = 2 V² / Σ_a V′_a² Var ρ_a,   Var ρ_a ≈ 2 (ρ_a + 1/n)² / (s − 1),   n runs in each of s sessions.
 
@@ -25,10 +29,12 @@ The pull of a nuisance parameter says how far the runs move it from its stated v
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq, lsq_linear
 from scipy.stats import t as student
 
 from calibration.statistics.budget import limited_as_one, skipped, spent
@@ -50,12 +56,14 @@ from calibration.statistics.statistical_model import (
     regression,
 )
 from common.arrays import Flags, Floats
+from common.errors import InputError
 
 WRONG = 3.0  # pull beyond which a nuisance parameter is taken to be wrong
 LEARNT = 0.02  # share of the prior's variance that the runs must remove before a pull means anything
 _NOTHING = 0.01  # change in per cent, or in the unit in which it is shown, that is not stated
 _STATED = 100.0  # change of a logarithm that is stated
-_MOST_STEPS = 25
+_MOST_STEPS = 60
+_STEPS_TO_TARGET = 25  # of a search that is above its target, or came to where the model cannot be solved quickly
 _TRIED = 4  # steps before a search is given up
 _SHORT = 0.1  # after a shorter step, in ln C or ε, the Jacobian is used once more
 _SMALL = 0.01  # the iteration ends at a step that is expected to reduce rᵀ Σ⁻¹ r by less
@@ -63,8 +71,14 @@ _LARGEST = 0.7  # change of ln C in one step
 _PASSES = 3  # iterations for the scatter of the sessions
 _DAMPING = (0.0, *(10.0 ** (e / 2) for e in range(-6, 17)))  # λ; a step is up to √10 shorter than it may be
 _NEARER = 5  # starts that are tried
+_PROBE = 0.1  # share of a step at which the curvature of the model is seen
+_MOST_BENT = 0.375  # largest share of a step by which it is bent
+_ON_BOUND = 1e-9  # distance in typical sizes
+_BLIND = 1e-12  # share of the largest eigenvalue below which a combination of parameters shows nothing
+_NEARLY_CERTAIN = 1e-6  # standard deviation of a parameter that is held, in typical sizes
 _KEPT = 0.25  # share of the promised fall below which the next step is damped
 _UNSETTLED = 1.0  # a fit has not converged if one more step is expected to reduce rᵀ Σ⁻¹ r by more
+_PROFILE = 0.05  # share of a size to which an end of its interval is found
 _FLAT = 0.05  # share of the expected rise; if the rise is smaller, the deviance is flat and the end stays
 _STEEP = 5.0  # if it is larger, the others were not refitted along a bent valley, and the end stays
 
@@ -136,29 +150,54 @@ class Fit:
     jacobian: Floats  # (n, k, p)
     noise: Noise  # of runs and sessions
     deviance: float  # rᵀ Σ⁻¹ r + ln |Σ|/|S ⊗ I| over the fitted runs
-    converged: bool  # the fit is at a minimum, or at one within the bounds
+    converged: bool  # the fit is at a minimum within the bounds
+    held: Flags  # (p,) parameters that the runs pull against a bound
+    full_normal: Floats  # (p + 1, p + 1) products at the end in W, with those that are held
     wrong_numbers: tuple[tuple[Pull, ...], ...] = ()  # the first of each has lost its prior; see `fit`
     tested: tuple[Floats, Floats] = (np.empty(0), np.empty(0))  # changes of the nuisance parameters from their
     # values as given, and variances, by least squares in Σ, as tests have them; (p,)
     stopped: bool = False  # the search ended because no time was left
 
+    @property
+    def tangents(self) -> Floats:
+        """Derivatives (n, k, p) of what is free: zero along parameters that are held."""
+        return np.where(self.held, 0.0, self.jacobian)
+
     def half_width(self, place: int) -> float:
-        """Compute half of the 95 % interval of a parameter, on its own scale."""
+        """Compute half of the 95 % interval of a parameter that is free, on its own scale."""
         return float(student.ppf(0.975, self.freedom[place])) * math.sqrt(self.covariance[place, place])
 
-    def interval(self, name: str) -> tuple[float, float]:
-        """Compute the 95 % interval of a parameter."""
-        value = self.parameters[name]
+    def interval(self, name: str, variance_ratio: float = 1.0) -> tuple[float, float]:
+        """Compute the 95 % interval of a parameter; of one that is held, it ends at the bound.
+
+        Args:
+            variance_ratio: by which the variance of the noise exceeds that of the fit.
+        """
         place = self.names.index(name)
-        half = self.half_width(place)
-        if self.fitted[place].logarithmic:
-            return value * math.exp(-half), value * math.exp(half)
-        return value - half, value + half
+        p, value = self.fitted[place], self.parameters[name]
+        if self.held[place]:
+            inside = p.moved(value, self._inward(place, variance_ratio))
+            return min(inside, value), max(inside, value)
+        half = math.sqrt(variance_ratio) * self.half_width(place)
+        return float(p.changed(value, -half)), float(p.changed(value, half))
+
+    def risen(self, name: str) -> float:
+        """Return by how much the deviance has risen at the ends of the 95 % interval of a parameter."""
+        return self.inflation * float(student.ppf(0.975, self.freedom[self.names.index(name)])) ** 2
+
+    def _inward(self, place: int, variance_ratio: float) -> float:
+        """Compute the step from a bound at which rᵀ W r has risen by t², the others refitted: 2 |g| δ + a δ²."""
+        others = [i for i in np.flatnonzero(~self.held).tolist() if i != place]
+        order = [*others, place, -1]
+        left = schur_complement(self.full_normal[np.ix_(order, order)], len(others))
+        a, g = float(left[0, 0]), float(left[0, 1])
+        risen = variance_ratio * self.risen(self.names[place])
+        return -math.copysign((math.sqrt(g**2 + max(a, 1e-300) * risen) - abs(g)) / max(a, 1e-300), g)
 
     def products(self, runs: Runs, rows: Flags, run: Floats | None = None) -> NormalEquations:
         """Multiply the derivatives and the residual of the runs in `rows` (n,), with the priors, in an S."""
         residual = (runs.y - self.prediction)[rows]
-        linear = regression(runs, rows, self.jacobian, self.fitted)
+        linear = regression(runs, rows, self.tangents, self.fitted)
         run = self.noise.run_covariance if run is None else run
         return linear.products(residual, run, prior_offsets(self.fitted, self.parameters))
 
@@ -166,14 +205,16 @@ class Fit:
         """Fit again to the runs in `rows` (n,), by one linear step; for a test, by least squares in Σ."""
         products = self.products(runs, rows)
         refit = products.solve(passes=_PASSES)
-        step, covariance = refit.step, refit.covariance
+        normal, covariance = products.for_fit(refit.share)[0], refit.covariance
         if for_test:
-            step, covariance = solve_normal(products.at(refit.share))
+            normal = products.at(refit.share)
+            covariance = solve_normal(normal)[1]
+        step = bounded_step(self.fitted, self.parameters, normal).change
         return replace(
             self,
             parameters=apply_step(self.fitted, self.parameters, step),
-            prediction=self.prediction + self.jacobian @ step,
-            covariance=self.inflation * covariance,
+            prediction=self.prediction + self.tangents @ step,
+            covariance=self.inflation * certain_where_held(covariance, self.held, self.fitted),
         )
 
     def normal(self, runs: Runs, rows: Flags) -> Floats:
@@ -218,8 +259,15 @@ def fit(
     with limited_as_one():
         point = _descend(problem, problem.first(dict(start)), target)
         stopped = spent()
-    linear = point.products.solve(passes=_PASSES)
-    normal = point.products.at(linear.share)
+    share = point.products.share(passes=_PASSES)
+    ahead = bounded_step(fitted, point.parameters, problem.normal(point, share))
+    free = np.where(ahead.held, 0.0, point.derivative)
+    residual = (data.y - point.prediction)[used]
+    products = regression(data, used, free, fitted).products(
+        residual, run, prior_offsets(fitted, point.parameters)
+    )
+    linear = products.solve(passes=_PASSES)
+    normal = products.at(linear.share)
     step, spread = solve_normal(normal)
     nuisances = {p.name for p in model.nuisances}
     offsets = [p.offset(point.parameters[p.name]) if p.name in nuisances else 0.0 for p in fitted]
@@ -228,18 +276,31 @@ def fit(
         parameters=point.parameters,
         fitted=fitted,
         names=names,
-        covariance=inflation * linear.covariance,
+        covariance=inflation * certain_where_held(linear.covariance, ahead.held, fitted),
         inflation=inflation,
-        freedom=_freedom(point.products, linear.share, len(names)),
+        freedom=_freedom(products, linear.share, len(names)),
         prediction=point.prediction,
         jacobian=point.derivative,
         noise=Noise(run, linear.share),
-        deviance=float(normal[-1, -1] + point.products.determinant(linear.share)),
-        converged=_step(fitted, point.parameters, problem.normal(point, linear.share), 0).promise < _UNSETTLED,
+        deviance=float(normal[-1, -1] + products.determinant(linear.share)),
+        converged=ahead.promise < _UNSETTLED,
+        held=ahead.held,
+        full_normal=point.products.for_fit(linear.share)[0],
         wrong_numbers=wrong_numbers,
-        tested=(np.array(offsets) + step, np.diag(spread)),
+        tested=(np.array(offsets) + step, np.diag(certain_where_held(spread, ahead.held, fitted))),
         stopped=stopped,
     )
+
+
+def certain_where_held(covariance: Floats, held: Flags, fitted: Sequence[Parameter]) -> Floats:
+    """Return a covariance (p, p) in which parameters that are held are known nearly exactly."""
+    free = np.where(held[:, None] | held, 0.0, covariance)
+    return free + np.diag(np.where(held, (_NEARLY_CERTAIN * typical_sizes(fitted)) ** 2, 0.0))
+
+
+def typical_sizes(fitted: Sequence[Parameter]) -> Floats:
+    """Return the typical size of each parameter on its own scale, (p,)."""
+    return np.array([1.0 if p.logarithmic else abs(p.typical) for p in fitted])
 
 
 @dataclass(frozen=True)
@@ -269,7 +330,11 @@ class _Problem:
 
     def normal(self, point: _Point, share: Floats) -> Floats:
         """Return the products of a point with the weights of the fit, (p + 1, p + 1)."""
-        return point.products.at(share) if self.in_sigma else point.products.for_fit(share)[0]
+        return self.weighted(point.products, share)
+
+    def weighted(self, products: NormalEquations, share: Floats) -> Floats:
+        """Return products with the weights of the fit, (p + 1, p + 1)."""
+        return products.at(share) if self.in_sigma else products.for_fit(share)[0]
 
     def first(self, parameters: dict[str, float]) -> _Point:
         """Run the model at the start; effects move towards their null while it cannot be solved quickly there."""
@@ -291,7 +356,7 @@ class _Problem:
         return [p for p in self.fitted if p.name in {e.name for e in self.model.effects}]
 
     def at(
-        self, parameters: dict[str, float], derivative: Floats | None, count: int, *, quick: bool = True
+        self, parameters: dict[str, float], derivative: Floats | None = None, count: int = 1, *, quick: bool = True
     ) -> _Point:
         """Run the model at `parameters`; its derivatives are computed if none are given."""
         title = f"{self.title}, step {count}" if self.title else ""
@@ -299,15 +364,42 @@ class _Problem:
             prediction, derivative = derivatives(self.model, parameters, self.fitted, title=title, quick=quick)
         else:
             prediction = derivatives(self.model, parameters, [], title=title, quick=quick)[0]
-        linear = regression(self.model.runs, self.used, derivative, self.fitted)
         residual = (self.model.runs.y - prediction)[self.used]
-        products = linear.products(residual, self.run, prior_offsets(self.fitted, parameters))
+        products = self.products(derivative, residual, prior_offsets(self.fitted, parameters))
         return _Point(parameters, prediction, derivative, products)
+
+    def products(self, derivative: Floats, residual: Floats, offsets: Floats | None = None) -> NormalEquations:
+        """Multiply derivatives (n, k, p) and a residual (n', k), with the priors of parameters off by `offsets`."""
+        return regression(self.model.runs, self.used, derivative, self.fitted).products(
+            residual, self.run, offsets
+        )
+
+    def bent(self, point: _Point, share: Floats, step: _FitStep) -> _FitStep:
+        """Bend a damped step along the curvature of the model, by two more predictions: it stays in a bent valley.
+
+        Source: geodesic acceleration, Transtrum and Sethna (2012).
+        """
+        either = [
+            derivatives(self.model, apply_step(self.fitted, point.parameters, side * step.change), [], quick=True)[
+                0
+            ]
+            for side in (_PROBE, -_PROBE)
+        ]
+        curvature = (either[0] + either[1] - 2 * point.prediction) / _PROBE**2
+        if not np.isfinite(curvature).all():
+            return step
+        normal = self.weighted(self.products(point.derivative, -curvature[self.used] / 2), share)
+        normal[:-1, :-1] += np.diag(_DAMPING[step.damping] / typical_sizes(self.fitted) ** 2)
+        further = bounded_step(self.fitted, step.parameters, normal).change
+        turn, length = (np.linalg.norm(c / typical_sizes(self.fitted)) for c in (further, step.change))
+        if turn > _MOST_BENT * length:
+            return step
+        return step._replace(parameters=apply_step(self.fitted, step.parameters, further))
 
 
 class _FitStep(NamedTuple):
+    change: Floats  # (p,)
     parameters: dict[str, float]  # after it
-    size: float  # largest change, of ln C or ε
     promise: float  # by how much it reduces rᵀ Σ⁻¹ r if the model is linear
     damping: int  # place of its λ in _DAMPING
 
@@ -321,6 +413,7 @@ def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
     fitted = problem.fitted
     least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
     refused = False  # whether the step before did not improve the fit
+    solved = True  # whether the model could be solved wherever it was tried
     for count in range(1, _MOST_STEPS + 1):
         # The scatter of the sessions comes from the residuals of the fit, but only near the solution. Far from it
         # every session looks shifted, and with a large ρ the search would stop there.
@@ -330,17 +423,22 @@ def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
         if step.promise < _SMALL and count > 1:
             break
         above = float(normal[-1, -1]) - target
-        if count > _TRIED and (_MOST_STEPS - count) * step.promise < above:
+        if count > _TRIED and (_STEPS_TO_TARGET - count) * step.promise < above:
             break
-        if skipped("more steps of some fits"):
+        if (count > _STEPS_TO_TARGET and not solved) or skipped("more steps of some fits"):
             break
-        tried = problem.at(step.parameters, None if step.size > _SHORT else point.derivative, count + 1)
+        in_valley = step.damping > 0 and count > _TRIED and solved  # elsewhere to bend costs more than it gains
+        if in_valley:
+            step = problem.bent(point, share, step)
+        short = not in_valley and bool(np.abs(step.change).max() <= _SHORT)
+        tried = problem.at(step.parameters, point.derivative if short else None, count + 1)
         fall = float(normal[-1, -1] - problem.normal(tried, share)[-1, -1])
+        solved = solved and tried.solved
         if tried.solved and fall > -_SMALL:
             # A step that keeps little of its promise overshoots, and the next one is damped (Marquardt 1963).
             least = step.damping + 1 if fall < _KEPT * step.promise else max(step.damping - 2, 0)
             least = min(least, len(_DAMPING) - 1)
-            point, kept, refused = tried, step.size <= _SHORT, False
+            point, kept, refused = tried, short, False
         elif kept:
             again = problem.at(point.parameters, None, count + 1, quick=bool(problem.effects))
             if not again.solved:
@@ -353,46 +451,61 @@ def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
     return point
 
 
+def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, least: int) -> _FitStep:
+    """Compute a step from `parameters`, with a λ at the place `least` of _DAMPING or behind it."""
+    damped, scale = normal.copy(), typical_sizes(fitted) ** -2
+    for place in range(least, len(_DAMPING)):
+        np.fill_diagonal(damped, np.diag(normal) + np.append(_DAMPING[place] * scale, 0.0))
+        change = bounded_step(fitted, parameters, damped).change
+        if all(abs(c) <= _LARGEST for c, p in zip(change, fitted, strict=True) if p.logarithmic):
+            break
+    promise = 2 * change @ normal[:-1, -1] - change @ normal[:-1, :-1] @ change
+    return _FitStep(change, apply_step(fitted, parameters, change), float(promise), place)
+
+
+class BoundedStep(NamedTuple):
+    """The step to the least rᵀ Σ⁻¹ r of a linear model within the bounds."""
+
+    change: Floats  # (p,) on the scales of the parameters
+    promise: float  # by how much it reduces rᵀ Σ⁻¹ r
+    held: Flags  # (p,) parameters that are on a bound, and would cross it
+
+
+def bounded_step(fitted: Sequence[Parameter], parameters: Parameters, normal: Floats) -> BoundedStep:
+    """Minimise the quadratic form of normal equations (p + 1, p + 1), from `parameters`, within the bounds.
+
+    Source: bounded-variable least squares, Stark and Parker (1995).
+    """
+    scale = np.sqrt(np.maximum(np.diag(normal)[:-1], 1e-300))
+    values, vectors = np.linalg.eigh(normal[:-1, :-1] / np.outer(scale, scale))
+    seen = values > _BLIND * values.max(initial=0.0)
+    root = np.sqrt(values[seen])[:, None] * vectors[:, seen].T
+    right = vectors[:, seen].T @ (normal[:-1, -1] / scale) / np.sqrt(values[seen])
+    low, high = room(fitted, parameters)
+    solved = lsq_linear(root, right, (low * scale, high * scale), method="bvls")
+    change = solved.x / scale
+    promise = 2 * change @ normal[:-1, -1] - change @ normal[:-1, :-1] @ change
+    on_bound = np.minimum(-low, high) < _ON_BOUND * typical_sizes(fitted)
+    return BoundedStep(change, float(promise), on_bound & (solved.active_mask != 0))
+
+
+def room(fitted: Sequence[Parameter], parameters: Parameters) -> tuple[Floats, Floats]:
+    """Compute how far parameters are from their bounds, on their scales: (p,) below 0, and above."""
+    with np.errstate(divide="ignore"):  # the logarithm of a bound at 0
+        ends = [[p.change(parameters[p.name], np.float64(p.bounds[i])) for p in fitted] for i in (0, 1)]
+    return np.array(ends[0]), np.array(ends[1])
+
+
 def birge(runs: Runs, fitted: Fit, used: Flags) -> float:
     """Compute the factor by which the variance of what a fit leaves exceeds that of the noise, at least 1.
 
+    Where the noise is unknown, what the fit leaves is all that is known of it, and the factor may be below 1.
     Source: Birge (1932).
     """
     priors = sum(p.sigma is not None for p in fitted.fitted)
     freedom = runs.values(used) + priors - len(fitted.names)
-    return max(1.0, float(fitted.normal(runs, used)[-1, -1]) / max(freedom, 1))
-
-
-def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, least: int) -> _FitStep:
-    """Compute a step from `parameters`, with a λ at the place `least` of _DAMPING or behind it."""
-    for place in range(least, len(_DAMPING)):
-        change = _damped(fitted, parameters, normal, _DAMPING[place])
-        if all(abs(c) <= _LARGEST for c, p in zip(change, fitted, strict=True) if p.logarithmic):
-            break
-    new = apply_step(fitted, parameters, change)
-    promise = 2 * change @ normal[:-1, -1] - change @ normal[:-1, :-1] @ change
-    return _FitStep(new, float(np.abs(change).max()), float(promise), place)
-
-
-def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, damping: float) -> Floats:
-    """Compute the change (p,) of the parameters; zero for those that stay at a bound."""
-    at_low = np.array([parameters[p.name] <= p.bounds[0] for p in fitted])
-    at_high = np.array([parameters[p.name] >= p.bounds[1] for p in fitted])
-    typical = np.array([1.0 if p.logarithmic else abs(p.typical) for p in fitted])
-    change = np.zeros(len(fitted))
-    free = np.arange(len(fitted))
-    while len(free):
-        damped = normal[np.ix_(free, free)] + np.diag(damping / typical[free] ** 2)
-        scale = np.sqrt(np.maximum(np.diag(damped), 1e-300))
-        inverse = np.linalg.pinv(damped / np.outer(scale, scale), rcond=1e-12, hermitian=True)
-        change[:] = 0.0
-        change[free] = inverse @ (normal[free, -1] / scale) / scale
-        outward = (at_low & (change < 0)) | (at_high & (change > 0))
-        if not outward.any():
-            break
-        free = free[~outward[free]]
-        change[outward] = 0.0
-    return change
+    ratio = float(fitted.normal(runs, used)[-1, -1]) / max(freedom, 1)
+    return max(1.0 if runs.noise_known else 1e-12, ratio)
 
 
 def _inflation(repeats: float, outputs: int) -> float:
@@ -423,14 +536,14 @@ def _freedom(products: NormalEquations, share: Floats, count: int) -> Floats:
 def profile_intervals(
     model: ForwardModel, fitted: Fit, used: Flags, *, title: str = ""
 ) -> dict[str, tuple[float, float]]:
-    """Compute the 95 % interval of every fitted parameter, by its profile deviance; of nuisance parameters by the
-    covariance.
+    """Compute the 95 % interval of every fitted parameter, by its profile deviance; by the covariance of nuisance
+    parameters and of what is held at a bound.
     """
     data, count = model.runs, len(fitted.names)
     along = solve_normal(fitted.normal_of_fit(data, used))[1]
     sets, ends = [], []
     for i, p in enumerate(fitted.fitted):
-        if p.sigma is not None:
+        if p.sigma is not None or fitted.held[i]:
             continue
         half = fitted.half_width(i)
         for side in (-1, 1):
@@ -443,7 +556,7 @@ def profile_intervals(
             ends.append((i, change))
     predictions = model.predict(sets, title=title)
     least = _deviance(fitted, data, used, list(range(count)))
-    intervals: dict[str, list[float]] = {p.name: [] for p in fitted.fitted if p.sigma is None}
+    intervals: dict[str, list[float]] = {}
     for (i, change), parameters, prediction in zip(ends, sets, predictions, strict=True):
         others = [j for j in range(count) if j != i]
         end_of = replace(fitted, parameters=parameters, prediction=prediction)
@@ -451,9 +564,39 @@ def profile_intervals(
         expected = change**2 / along[i, i]
         scale = math.sqrt(expected / rise) if _FLAT * expected < rise < _STEEP * expected else 1.0
         p = fitted.fitted[i]
-        intervals[p.name].append(p.moved(fitted.parameters[p.name], change * scale))
-    given = {p.name: fitted.interval(p.name) for p in fitted.fitted if p.sigma is not None}
-    return {**{name: (low, high) for name, (low, high) in intervals.items()}, **given}
+        intervals.setdefault(p.name, []).append(p.moved(fitted.parameters[p.name], change * scale))
+    by_profile = {name: (low, high) for name, (low, high) in intervals.items()}
+    return {name: by_profile.get(name) or fitted.interval(name) for name in fitted.names}
+
+
+def profile_end(
+    model: ForwardModel, fitted: Fit, name: str, used: Flags, variance_ratio: float = 1.0
+) -> float | None:
+    """Find the end of the 95 % interval of an effect between its null and its size, with all others fitted again.
+
+    None where the null is inside. Along a bent valley the covariance, and a parabola through its ends, say nothing.
+
+    Args:
+        variance_ratio: by which the variance of the noise exceeds that of the fit.
+    """
+    effect, size = parameter(model, name), fitted.parameters[name]
+    others = tuple(n for n in fitted.names if n != name and n != (effect.second.name if effect.second else ""))
+    risen = variance_ratio * fitted.risen(name)
+    last = fitted
+
+    def above(value: float) -> float:
+        nonlocal last
+        start = {**last.parameters, name: value}
+        last = fit(model, start, others, used, wrong_numbers=fitted.wrong_numbers, title="")
+        return last.deviance - fitted.deviance - risen
+
+    try:
+        if above(effect.start) <= 0:
+            return None
+        last = fitted
+        return float(brentq(above, effect.start, size, xtol=_PROFILE * abs(size - effect.start), rtol=_PROFILE))
+    except (UnsolvedError, InputError, ValueError):
+        return None
 
 
 def _deviance(fitted: Fit, data: Runs, used: Flags, others: list[int]) -> float:

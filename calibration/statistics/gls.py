@@ -337,6 +337,15 @@ def inverse_root(run: Floats) -> Floats:
     return np.asarray(root / deviation[..., None, :])
 
 
+def square_root(covariance: Floats) -> Floats:
+    """Return the Cholesky factor (p, p), also where rounding leaves a covariance indefinite."""
+    deviation = np.sqrt(np.diagonal(covariance))
+    values, vectors = np.linalg.eigh(covariance / np.outer(deviation, deviation))
+    half = deviation[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    lower = np.asarray(np.linalg.qr(half.T, mode="r")).T
+    return np.asarray(lower * np.where(np.diag(lower) < 0, -1.0, 1.0))
+
+
 def averaging_rows(session: Integers, scale: Floats | None = None) -> tuple[Floats, Floats]:
     """Make rows (s, n) that take the mean of each session times the root of its size; the sizes (s,).
 

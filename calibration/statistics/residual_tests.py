@@ -165,7 +165,7 @@ class _Tester:
         self.p = len(fitted.names)
         self.pulled = np.array([p.sigma is not None and not p.grid for p in fitted.fitted], dtype=bool)
         repeated = data.repeats(used)
-        self.design = regression(data, used, np.concatenate([fitted.jacobian, D], -1), fitted.fitted, repeated)
+        self.design = regression(data, used, np.concatenate([fitted.tangents, D], -1), fitted.fitted, repeated)
         self.J, scale = self.design.columns[..., : self.p], self.design.scale
         inputs = data.inputs[used]
         spread = inputs.std(0)
@@ -269,7 +269,7 @@ def examine_residual(
     shift = fitted.jacobian[used] @ prior_offsets(fitted.fitted, fitted.parameters)
     observed = tester.scores(residual[None] + shift)
     free = tester.design.precision == 0
-    columns = np.concatenate([fitted.jacobian[..., free], directions.table], -1)
+    columns = np.concatenate([fitted.tangents[..., free], directions.table], -1)
     exact = regression(data, used, columns, (), tester.design.repeated).products(residual)
     testable = observed.survived[0] >= TESTABLE
     rng = np.random.default_rng(study.seed)

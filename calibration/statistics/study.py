@@ -24,7 +24,7 @@ from scipy.stats import t as student
 
 from calibration.statistics.excluded import Excluded
 from calibration.statistics.fit import Fit
-from calibration.statistics.gls import inverse_root
+from calibration.statistics.gls import inverse_root, square_root
 from calibration.statistics.statistical_model import ForwardModel, Parameter, Runs, regression
 from common.arrays import Flags, Floats, Integers
 
@@ -272,8 +272,8 @@ def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> floa
     residual = scale * (data.y - fitted.prediction)[rows] @ root.T
     freedom = max(data.noise(~rows)[1], len(root) + 1)
     free = tuple(replace(p, sigma=None) for p in fitted.fitted)
-    linear = regression(data, rows, fitted.jacobian, free)
-    spread = np.asarray(np.linalg.cholesky(fitted.covariance + 1e-15 * np.diag(np.diag(fitted.covariance))))
+    linear = regression(data, rows, fitted.tangents, free)
+    spread = square_root(fitted.covariance)
     as_far = 0
     for _ in range(_DRAWS // _AT_ONCE):
         drawn = linear.draw(

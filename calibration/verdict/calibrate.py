@@ -55,7 +55,7 @@ from calibration.attribution.wrong_numbers import (
 from calibration.statistics.budget import Budget, limited, seconds_left
 from calibration.statistics.checks import predict_as_given
 from calibration.statistics.excluded import caveat_of_excluded
-from calibration.statistics.fit import Fit, fit, profile_intervals
+from calibration.statistics.fit import Fit, fit, profile_end, profile_intervals
 from calibration.statistics.offsets import Offsets, with_differences
 from calibration.statistics.residual_tests import directions, examine_residual
 from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values, with_runs
@@ -203,6 +203,12 @@ def _both_intervals(
     if found.final is not found.base:
         model = found.nearest.model if found.nearest else study.model
         final = _intervals(model, found.final, study.split.fitted, title)
+    for effect in found.best[0].claimed if found.best else ():
+        low, high = final[effect.name]
+        if low <= effect.start <= high:
+            end = profile_end(study.model, found.final, effect.name, study.split.fitted)
+            if end is not None:
+                final[effect.name] = (end, high) if end > effect.start else (low, end)
     if found.nearest:
         final[found.nearest.effect.name] = found.nearest.interval
     return base, final
