@@ -44,7 +44,7 @@ from scipy.stats import norm as normal
 from scipy.stats import t as student
 
 from calibration.attribution.forms import Form, as_good, at_theory, gain_of_residuals
-from calibration.attribution.refits import FIRST, Candidate, left_out_residuals
+from calibration.attribution.refits import FIRST, Candidate, Judgement, left_out_residuals
 from calibration.statistics.budget import skipped, spent
 from calibration.statistics.fit import Fit, UnsolvedError, birge, fit, profile_end
 from calibration.statistics.forward import derivatives
@@ -192,19 +192,26 @@ def sizes_of(model: Shifted, parameters: Parameters) -> Floats:
 
 def adopt_nearest(
     study: Study, base: Fit, misfit: Misfit, candidates: Sequence[Candidate], tangents: Directions
-) -> AdoptedForm | None:
-    """Find the form that describes best what no effect explains in the fit `base`; None if none does."""
+) -> tuple[AdoptedForm | None, tuple[Candidate, ...]]:
+    """Find the form that describes best what no effect explains in the fit `base`; None if none does.
+
+    Returns:
+        The form, and the candidates, the most promising ones with the fit and the left-out error that they have.
+    """
     adopted: list[AdoptedForm] = []
+    tried = {c.effect.name: c for c in candidates}
     noise_known = study.model.runs.noise_known
     for candidate in _promising(base, misfit.critical_z if noise_known else 0.0, candidates):
         if skipped(f"{candidate.title} as the nearest form"):
             continue
         try:
             constant = _converged(study, base, candidate)
+            tried[candidate.effect.name] = _as_form(study, base, candidate, constant)
             forms: list[tuple[ForwardModel, Fit, float]] = [(study.model, constant, 0.0)]
             if len(np.unique(specimens(study.model.runs)[0][study.split.fitted])) >= _FEWEST:
                 forms.append(_with_spread(study, constant, candidate.effect))
         except UnsolvedError:
+            tried[candidate.effect.name] = replace(candidate, judgement=Judgement.NOT_SOLVED)
             continue
         b = _birge(study, forms[-1][1])
         if len(forms) > 1 and _restricted(study, constant, b) - _restricted(study, forms[1][1], b) <= _DIFFERS:
@@ -215,7 +222,7 @@ def adopt_nearest(
     single = (form for form in of_theory if len(form.effects) == 1)
     adopted += [a for f in single if (a := _judged(study, base, f.effects[0], study.model, f.fit, 0.0))]
     if not adopted:
-        return None
+        return None, tuple(tried.values())
     largest = max(adopted, key=lambda form: form.gain)
     together = [form for form in of_theory if len(form.effects) > 1]
     alike = as_good(study, largest.form, [*(a.form for a in adopted), *together])
@@ -225,7 +232,17 @@ def adopt_nearest(
     best = max(as_well or [largest], key=lambda form: (form.at_theory, form.gain))
     place = next(i for i, e in enumerate(study.effects) if e.name == best.effect.name)
     left = examine_residual(replace(study, seed=study.seed + 5), best.fit, tangents.without(place), draws=_DRAWS)
-    return replace(best, forms=tuple(alike), misfit=left)
+    return replace(best, forms=tuple(alike), misfit=left), tuple(tried.values())
+
+
+def _as_form(study: Study, base: Fit, candidate: Candidate, fitted: Fit) -> Candidate:
+    """Describe a candidate by its fit as a form, and by its error on left-out runs."""
+    before, after = left_out_residuals(study, base, fitted)
+    left_out = float(np.linalg.norm(after) / np.linalg.norm(before))
+    judgement = candidate.judgement if fitted.converged else Judgement.NOT_CONVERGED
+    if fitted.converged and candidate.no_fit:
+        judgement = Judgement.LEAVES_RESIDUAL
+    return replace(candidate, refit=fitted, judgement=judgement, left_out=left_out)
 
 
 def _birge(study: Study, fitted: Fit) -> float:
@@ -239,16 +256,28 @@ def _promising(base: Fit, least: float, candidates: Sequence[Candidate]) -> list
 
 
 def _converged(study: Study, base: Fit, candidate: Candidate) -> Fit:
-    """Fit an effect to its end: the search for explanations stops where noise is out of reach."""
-    if candidate.refit is not None and candidate.refit.converged:
-        return candidate.refit
-    effect = candidate.effect
-    start = dict(candidate.refit.parameters if candidate.refit else base.parameters)
-    if candidate.refit is None:
-        guess = start[effect.name] + candidate.z * candidate.detectable / max(abs(candidate.z), 1e-300)
-        start[effect.name] = min(max(guess, effect.bounds[0]), effect.bounds[1])
-    seconds = (effect.second.name,) if effect.second else ()
-    return fit(study.model, start, (*base.names, effect.name, *seconds), study.split.fitted, title="")
+    """Fit an effect to its end: the search for explanations stops where noise is out of reach.
+
+    A fit that is held at an end of the effect's range, or does not converge, may be in a valley of its own: then
+    it is made again from a typical size and from that of theory, on the side of the score.
+    """
+    effect, refit = candidate.effect, candidate.refit
+    names = (*base.names, effect.name, *((effect.second.name,) if effect.second else ()))
+
+    def fitted_from(start: Parameters, size: float) -> Fit:
+        size = min(max(size, effect.bounds[0]), effect.bounds[1])
+        return fit(study.model, {**start, effect.name: size}, names, study.split.fitted, title="")
+
+    if refit is None:
+        step = math.copysign(candidate.detectable, candidate.z)
+        refit = fitted_from(base.parameters, base.parameters[effect.name] + step)
+    elif not refit.converged:
+        refit = fitted_from(refit.parameters, refit.parameters[effect.name])
+    if refit.converged and not refit.held[names.index(effect.name)]:
+        return refit
+    sizes = {effect.start + math.copysign(effect.typical, candidate.z), effect.theory} - {None}
+    again = [fitted_from(base.parameters, cast(float, size)) for size in sizes if not spent()]
+    return min((refit, *again), key=lambda one: (not one.converged, one.deviance))
 
 
 def _with_spread(study: Study, constant: Fit, effect: Parameter) -> tuple[Shifted, Fit, float]:

@@ -82,10 +82,16 @@ class Candidate:
     gain_error: float = 0.0  # standard error of `gain`
     imitable: float = 0.0  # imitability index of the claim (`calibration.attribution.claim_checks`), if it is kept
     transfer: float = 1.0  # p-value that it carries over to other runs, if it is kept
+    left_out: float = math.nan  # as a form: its error on left-out runs over that of the model without it
 
     @property
     def kept(self) -> bool:
         return self.judgement is Judgement.KEPT
+
+    @property
+    def no_fit(self) -> bool:
+        """Whether there is no fit of it from which anything could be concluded."""
+        return self.judgement in (Judgement.NOT_SOLVED, Judgement.NOT_CONVERGED)
 
     @property
     def reason(self) -> str:

@@ -24,7 +24,7 @@ The range of the runs goes into the table [learnt_from] (`sim.model.learnt_range
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -108,9 +108,10 @@ def calibration_knowledge(
     )
 
 
-def as_toml(robot: Robot, known: CalibrationKnowledge) -> str:
-    """Write a robot and what a calibration knows about it, with a digest."""
-    return sealed(robot_toml(robot) + "\n" + knowledge_toml(known))
+def as_toml(robot: Robot, known: CalibrationKnowledge, notes: Sequence[str] = ()) -> str:
+    """Write a robot and what a calibration knows about it, notes as comments, with a digest."""
+    comments = "".join(f"# {note}\n" for note in notes)
+    return sealed(robot_toml(robot) + "\n" + comments + knowledge_toml(known))
 
 
 def handed_on(robot: Robot, final: FinalRefit) -> tuple[Robot, CalibrationKnowledge]:

@@ -47,11 +47,12 @@ class ModelVerdict(SavedVerdict):
         for parameter, place in self._declared:
             half = _NORMAL * float(np.sqrt(self.final_refit.covariance[place, place]))
             value = self.corrected[parameter.name]
+            alone = [float(parameter.changed(value, end)) for end in (-half, half)]
             values["effects" if parameter.name in effects else "numbers"][parameter.name] = {
                 "title": parameter.title,
                 "unit": parameter.unit,
                 "value": value,
-                "interval": [float(parameter.changed(value, end)) for end in (-half, half)],
+                "interval": list(self.final_intervals.get(parameter.name, alone)),
                 "given": parameter.start,
                 "scale": "logarithm" if parameter.logarithmic else "as it is",
             }
@@ -59,6 +60,7 @@ class ModelVerdict(SavedVerdict):
         record = {
             **values,
             "covariance": {"names": [*self.corrected], "on_their_scales": covariance},
+            "forms": [form.record() for form in self.forms],
             "verdict": self.verdict,
             "table": self.table,
             "provenance": provenance({"table": self.table}),

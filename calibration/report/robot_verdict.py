@@ -57,7 +57,9 @@ class RobotVerdict(SavedVerdict):
         return tuple(handed_on(self.robot, refit) for refit in [*open_forms(self).values()][1:])
 
     def _corrected_file(self) -> tuple[str, str]:
-        return "corrected.toml", as_toml(*self._handed_on)
+        notes = [f"{title}: {words}" for title, words in self.quantities()[2:]]  # fitted, with 95 % intervals
+        notes += [f"as good: {form.title}" for form in self.forms]
+        return "corrected.toml", as_toml(*self._handed_on, () if self.described else notes)
 
 
 def read_runs(

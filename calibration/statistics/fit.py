@@ -2,17 +2,18 @@
 
     least rᵀ W r over θ = (ln C_1, …, ε_1, …),   r = y − f(θ),   low ≤ θ ≤ high,
 
-by steps of Levenberg (1944) with the model's own derivatives J, each the least squares of a linear model within the
-bounds (Stark and Parker 1995, `scipy.optimize.lsq_linear`):
+by steps of Levenberg (1944) with the model's own derivatives J, each the least squares of a linear model within
+the bounds (Stark and Parker 1995, `scipy.optimize.lsq_linear`):
 
     least |W^½ (r − J s)|² + λ |D⁻¹ s|² over steps s,   low ≤ θ + s ≤ high.
 
-W is Σ⁻¹ but for the mean of all sessions (`calibration.statistics.gls`). D is 1 for ln C and a typical size for ε. λ is
-0, unless the step is too long or does not improve the fit. A parameter that the runs pull against a bound is *held*
-there: it is no direction of tests or of the covariance,
-which is V = A⁻¹, A = JᵀWJ, of the others, times a factor because S is estimated (`_inflation`). Nuisance parameters
-have priors, which are rows of their own in A, in the residual and in the deviance. Intervals are 95 %, by Student's
-t. The scatter ρ of a few sessions is uncertain, which limits the degrees of freedom (Satterthwaite 1946):
+W is Σ⁻¹ but for the mean of all sessions (`calibration.statistics.gls`). D is 1 for ln C and a typical size for ε.
+λ is 0, unless the step is too long or does not improve the fit; then the step is bent along the curvature of the
+model. A parameter that the runs pull against a bound is *held* there: it is no direction of tests or of the
+covariance, which is V = A⁻¹, A = JᵀWJ, of the others, times a factor because S is estimated (`_inflation`).
+Nuisance parameters have priors, which are rows of their own in A, in the residual and in the deviance. Intervals
+are 95 %, by Student's t. The scatter ρ of a few sessions is uncertain, which limits the degrees of freedom
+(Satterthwaite 1946):
 
     ν = 2 V² / Σ_a V′_a² Var ρ_a,   Var ρ_a ≈ 2 (ρ_a + 1/n)² / (s − 1),   n runs in each of s sessions.
 
@@ -369,7 +370,7 @@ class _Problem:
         return _Point(parameters, prediction, derivative, products)
 
     def products(self, derivative: Floats, residual: Floats, offsets: Floats | None = None) -> NormalEquations:
-        """Multiply derivatives (n, k, p) and a residual (n', k), with the priors of parameters off by `offsets`."""
+        """Multiply derivatives (n, k, p) and a residual (n', k), with the priors of parameters `offsets` off."""
         return regression(self.model.runs, self.used, derivative, self.fitted).products(
             residual, self.run, offsets
         )
@@ -574,7 +575,7 @@ def profile_end(
 ) -> float | None:
     """Find the end of the 95 % interval of an effect between its null and its size, with all others fitted again.
 
-    None where the null is inside. Along a bent valley the covariance, and a parabola through its ends, say nothing.
+    None where the null is inside. Along a bent valley the covariance and a parabola through its ends say nothing.
 
     Args:
         variance_ratio: by which the variance of the noise exceeds that of the fit.

@@ -32,6 +32,7 @@ LEVEL = 0.04  # α of every claim; below 0.05, because the noise is estimated an
 DRAWS = 1000  # of the bootstrap
 FAR = 12.0  # robust standard deviations between repeats
 _BEYOND = 6.0  # standard deviations of a deviance
+_POINTED, _GROUP, _SINGLE = 6.0, 8, 0.02  # see `far_readings`
 _MAD = 1.4826  # median absolute deviation to standard deviation
 _FEWEST = 3  # sessions that are held out as a whole
 _BLOCKS = 4  # in all
@@ -192,6 +193,35 @@ def find_outliers(data: Runs, prediction: Floats) -> tuple[Flags, tuple[Excluded
             excluded.append(Excluded(far, data.row_name(int(out)), distance))
             group = group[group != out]
     return bad, tuple(excluded)
+
+
+def far_readings(data: Runs, residual: Floats) -> list[str]:
+    """Name single readings whose residual (n, k) is far from the rest of their specimen or session.
+
+    They are `_POINTED` robust standard deviations off, somewhat more where a group is small; a group of less than
+    `_GROUP` has the scatter of all. A larger share than `_SINGLE` is no single reading but a misfit.
+    """
+    group, names = (
+        (data.session, data.session_names) if data.specimen is None else (data.specimen, data.specimen_names)
+    )
+    residual, found = np.where(data.gaps, np.nan, residual * data.scale[:, None]), []
+    for place, output in enumerate(data.outputs):
+        centred, limit = residual[:, place].copy(), np.empty(len(data))
+        members = [np.flatnonzero(group == g) for g in range(len(names))]
+        for rows in members:
+            centred[rows] -= np.nanmedian(centred[rows]) if np.isfinite(centred[rows]).any() else 0.0
+        for rows in members:
+            rest = np.abs(centred[rows] if len(rows) >= _GROUP else centred)
+            limit[rows] = _POINTED * _MAD * np.nanmedian(rest) * (1 + 4 / len(rest))
+        far = np.flatnonzero(np.abs(centred) > np.maximum(limit, 1e-12))
+        if len(far) <= max(1, _SINGLE * len(data)) and np.isfinite(centred).sum() >= _GROUP:
+            words = "{}: {} is {:.0f} times as far from the model as the rest of {} scatters"
+            found += [
+                words.format(data.row_name(row), data.title_of(output), _POINTED * abs(centred[row]) / limit[row],
+                             names[group[row]])
+                for row in far.tolist()
+            ]  # fmt: skip
+    return found
 
 
 _DRAWS, _AT_ONCE = 2000, 50

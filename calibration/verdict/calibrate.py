@@ -31,12 +31,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 from calibration.attribution.claim_checks import check_number, with_checks
-from calibration.attribution.forms import Form, envelope, forms_of_claims
+from calibration.attribution.forms import Form, envelope, forms_of_claims, paired_gain
 from calibration.attribution.moves import LocalShift, StatedMove, find_moves, groups_that_may_differ
-from calibration.attribution.nearest import adopt_nearest, largest_along
+from calibration.attribution.nearest import AdoptedForm, adopt_nearest, largest_along
 from calibration.attribution.refits import (
     FIRST,
     INDISTINGUISHABLE,
+    Candidate,
     Rival,
     coefficients_within_range,
     ebic,
@@ -65,6 +66,7 @@ from calibration.statistics.study import (
     FinalRefit,
     Study,
     errors,
+    far_readings,
     final_refit,
     find_outliers,
     split_runs,
@@ -393,25 +395,41 @@ def _adopt_in_turns(
 ) -> tuple[Attribution, tuple[LoopTurn, ...], tuple[Withdrawn, ...]]:
     """Adopt the nearest form, and, where something is still missing with it in the base, a further one beside it.
 
-    A form that the held-out runs refute is withdrawn, and another one is looked for.
+    A form that the held-out runs refute is withdrawn, and another one is looked for. Where the noise is unknown,
+    no pair of effects can explain the residual, so pairs of forms are tried where no single one is adopted.
     """
     runs, test, tangents, misfit = study.model.runs, study.split.test, found.tangents, found.misfit
     base, candidates = found.base, found.candidates
     turns = [LoopTurn(errors(runs, base.prediction, test)[0], "", largest_along(misfit, runs))]
     withdrawn: list[Withdrawn] = []
     while len(turns) <= _MOST_TURNS:
-        form = adopt_nearest(study, base, misfit, candidates, tangents)
+        form, candidates = adopt_nearest(study, base, misfit, candidates, tangents)
+        first = None
+        if len(turns) == 1:
+            seen = {c.effect.name: c for c in (*found.candidates, *candidates)}
+            found = replace(found, candidates=tuple(seen.values()))
+            if form is None and not runs.noise_known:
+                first, form = _nearest_pair(study, base, candidates)
         if form is None:
             break
         place = next(i for i, e in enumerate(study.effects) if e.name == form.effect.name)
-        study = replace(study, settled=study.settled | {form.effect.name})
-        refutation = refuted(study, base, form.fit, form.effect.title, (form.effect.name,))
+        names = (*([first.effect.name] if first else []), form.effect.name)
+        title = " and ".join((*([first.title] if first else []), form.effect.title))
+        study = replace(study, settled=study.settled | set(names))
+        refutation = refuted(study, base, form.fit, title, names)
+        if refutation and first:
+            withdrawn.append(refutation)
+            break
         if refutation:
             withdrawn.append(refutation)
             tangents, candidates = tangents.without(place), tuple(c for c in candidates if c.effect != form.effect)
             misfit = misfit.without(place)
             continue
         found = replace(found, nearest=form)
+        if first and first.refit:
+            turns.append(
+                LoopTurn(errors(runs, first.refit.prediction, test)[0], first.title, largest_along(misfit, runs))
+            )
         assert form.misfit is not None
         beyond = form.misfit.p_value < study.level or not runs.noise_known
         left = form.largest_along if beyond else ""
@@ -424,6 +442,24 @@ def _adopt_in_turns(
     return found, tuple(turns) if found.nearest else (), tuple(withdrawn)
 
 
+def _nearest_pair(
+    study: Study, base: Fit, candidates: Sequence[Candidate]
+) -> tuple[Candidate | None, AdoptedForm | None]:
+    """Find two forms that together are adopted where neither is alone; two times None if there are none."""
+    pairs_of_forms = []
+    for first in candidates:
+        if first.refit is None or not first.refit.converged:
+            continue
+        beside = replace(study, settled=study.settled | {first.effect.name})
+        tangents = directions(study.model, first.refit.parameters, beside.effects)
+        misfit = examine_residual(beside, first.refit, tangents)
+        scored = unexamined(misfit, beside.effects, misfit.critical_z, (first.effect,))
+        form = adopt_nearest(beside, first.refit, misfit, scored, tangents)[0]
+        if form and paired_gain(study, form.fit, base).certain:
+            pairs_of_forms.append((first, form))
+    return min(pairs_of_forms, key=lambda pair: pair[1].fit.deviance, default=(None, None))
+
+
 def _caveats(
     verdict: Verdict, model: ForwardModel, budget: Budget, max_seconds: float, beside: str
 ) -> tuple[str, ...]:
@@ -432,11 +468,14 @@ def _caveats(
     ended = f"after {max_seconds:.0f} s of processor time" if budget.left > -math.inf else "at Ctrl-C"
     not_tried = f"provisional: the search ended {ended}, and did not try {', '.join(budget.not_tried)}"
     little = verdict.little_weight
-    at_bounds = [p.name for p in final.fitted if final.parameters[p.name] in p.bounds]
+    held = [p for p, on_bound in zip(final.fitted, final.held, strict=True) if on_bound]
+    far = far_readings(
+        with_runs(model, weight=None).runs.subset(split.kept), (runs.y - final.prediction)[split.kept]
+    )
     vague = [
         p.name
         for place, p in enumerate(final.fitted)
-        if p.logarithmic and p.sigma is None and final.half_width(place) > math.log(2) and p.name not in at_bounds
+        if p.logarithmic and p.sigma is None and final.half_width(place) > math.log(2) and p not in held
     ]
     outside = not coefficients_within_range(model, base.parameters)
     unknown = "there are neither repeats nor a declared noise, so no residual can be told from noise"
@@ -454,6 +493,7 @@ def _caveats(
         *split.caveats,
         *([not_tried] if budget.not_tried else []),
         *caveat_of_weights(little, int(split.kept.sum()), alike(runs, little)),
-        *(f"{name} is at the end of its range: these runs do not determine it" for name in at_bounds),
+        *(f"{p.title} ({p.name}) is held at the end of its range, {final.parameters[p.name]:g}" for p in held),
+        *([f"look at single readings again: {'; '.join(far)}"] if far else []),
         *(words for holds, words in of_fits if holds),
     )

@@ -23,11 +23,12 @@ from calibration.statistics.between_repeats import Difference
 from calibration.statistics.excluded import Excluded, count_of_rows, summary_of_excluded
 from calibration.statistics.fit import Fit, Pull
 from calibration.statistics.residual_tests import Directions, Misfit
-from calibration.statistics.statistical_model import Experiment, Runs
+from calibration.statistics.statistical_model import Experiment, Parameter, Runs
 from calibration.statistics.study import FinalRefit, Split
 from calibration.verdict.held_out import REJECTED, HeldOutErrors, Withdrawn
 from calibration.verdict.next_runs import Batch, Explanation, NextRun
 
+_HALF = 0.5  # of an error on left-out runs
 _LAWS_TOLD_APART = 3  # beside a claim; the more there are, the fewer runs tell all of them apart
 
 
@@ -143,6 +144,30 @@ class Findings:
         return self.found.nearest
 
     @property
+    def not_fitted(self) -> tuple[Candidate, ...]:
+        """Effects that may be missing, by their scores, of which there is no fit."""
+        least = self.found.misfit.critical_z if self.runs.noise_known else 0.0
+        return tuple(c for c in self.found.candidates if c.no_fit and abs(c.z) > least)
+
+    @property
+    def halving(self) -> str | None:
+        """Title of the form that halves the error on left-out runs, the best one; None if none does."""
+        halving = [c for c in self.found.candidates if c.left_out < _HALF]
+        return min(halving, key=lambda c: c.left_out).title if halving else None
+
+    @property
+    def certain(self) -> tuple[Parameter, ...]:
+        """Effects that all explanations have in common, where they are several."""
+        first, *others = [c.claimed for c in self.explaining] or [()]
+        return tuple(e for e in first if others and all(e in claimed for claimed in others))
+
+    @property
+    def undecided(self) -> tuple[tuple[Parameter, ...], ...]:
+        """What each explanation has beside them, where something is certain; nothing: none is needed."""
+        certain = self.certain
+        return tuple(tuple(e for e in c.claimed if e not in certain) for c in self.explaining) if certain else ()
+
+    @property
     def base(self) -> Fit:
         """The calibrated model, without effects."""
         return self.found.base
@@ -229,7 +254,7 @@ class Findings:
         no_gain = self.held_out_error_falls is False or self.gain_is_certain is False
         described = self.verdict in ("partial", "unexplained")  # more than noise is left anyway
         if not self.moves and self.error_corrected >= self.error_uncalibrated:
-            return "as given"
+            return "wait" if self.halving else "as given"
         if (claimed and no_gain) or not (self.held_out_runs_agree or described or self.moves):
             return "wait"
         return "corrected"

@@ -118,6 +118,10 @@ def _claims(result: Findings) -> dict[str, Any]:
         "claims_instead": [c.title for c in found.rival_effects],
         "nearest": {**shown(nearest.effect), **nearest.record()} if nearest else None,
         "nearest_candidate": _nearest_candidate(result),
+        "not_fitted": [{"title": c.title, "reason": c.reason} for c in result.not_fitted],
+        "halving": result.halving,
+        "certain": [e.name for e in result.certain],
+        "undecided": [" and ".join(e.title for e in rest) for rest in result.undecided],
         "candidates": [_candidate(c) for c in found.candidates],
         "untestable": result.untestable,
         "forms": [form.record() for form in result.forms],
@@ -138,6 +142,7 @@ def _candidate(c: Candidate) -> dict[str, Any]:
         "size": c.refit.parameters[c.effect.name] if c.refit else None,
         "deviance": c.refit.deviance if c.refit else None,
         "session_gain": [c.gain, c.gain_error],
+        "left_out_error_ratio": None if math.isnan(c.left_out) else c.left_out,
         "verdict": c.reason,
     }
 
