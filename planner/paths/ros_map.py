@@ -1,7 +1,8 @@
 """Obstacles of a map of ROS: cells of map.yaml and its picture that are not free, joined to polygons, in m.
 
-A cell counts where it is occupied or unknown, as `map_server` reads it. Outlines lie up to two cells outside their
-cells, so that they have few corners, and never inside. What has a hole is cut through it.
+A cell counts where it is occupied or unknown, as `map_server` reads it; grey 205 of a trinary map is unknown at
+any threshold, as savers of maps write it. Outlines lie up to two cells outside their cells, so that they have few
+corners, and never inside. What has a hole is cut through it.
 """
 
 from __future__ import annotations
@@ -9,7 +10,6 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from planner.paths.path import Path2D
 _ENTRY = re.compile(r"^(\w+):(.*)", re.M)
 _ORIGIN = re.compile("^origin:" + 3 * r"[\[\s,]++(?:-\s++)?([-+.\deE]++)", re.M)
 _MOST_CELLS = 5e7
+_UNSEEN = 50  # of 255: how occupied grey 205 is
 _GROWN, _MOVED = 0.75, 0.72  # of a cell: outlines are moved outwards, and then simplified by at most so much
 
 
@@ -46,13 +47,15 @@ def read_map(path: Path) -> NamedPaths:
         if (origin := _ORIGIN.search(text)) is None:
             raise KeyError("origin: [x, y, yaw]")
         x, y, yaw = map(float, origin.groups())
-        limits = float(entries["occupied_thresh"]), float(entries["free_thresh"])
-        levels = _levels(path.parent / entries["image"], entries)
-    unknown = (levels > limits[1]) & (levels < limits[0])
+        occupied, free = float(entries["occupied_thresh"]), float(entries["free_thresh"])
+        mode = entries.get("mode", "trinary")
+        levels = _levels(path.parent / entries["image"], mode, entries["negate"])
+    unseen = (levels > 1) | (mode == "trinary") & (np.rint(255 * levels) == _UNSEEN)
+    unknown = unseen | (levels > free) & (levels < occupied)
     if unknown.any():
         count = f"{unknown.sum()} of {unknown.size} cells"
         warnings.warn(f"{path}: {count} are unknown and count as occupied", InputWarning, stacklevel=2)
-    cells = union_all(_runs((levels > limits[1]) | (levels >= limits[0])))
+    cells = union_all(_runs(unknown | (levels >= occupied)))
     grown = union_all(buffer(get_parts(cells), _GROWN, join_style="mitre"))  # in parts: at once it takes minutes
     parts = without_holes(grown.simplify(_MOVED))
     if not parts:
@@ -63,8 +66,8 @@ def read_map(path: Path) -> NamedPaths:
     return NamedPaths(with_own_names(outlines), 1.0)
 
 
-def _levels(picture: Path, entries: Mapping[str, str]) -> Floats:
-    """Read how occupied the cells are, from 0 to 1; what is transparent is occupied."""
+def _levels(picture: Path, mode: str, negate: str) -> Floats:
+    """Read how occupied the cells are, from 0 to 1; what is transparent is occupied, and above 1 unknown."""
     read_bytes(picture)  # says what is wrong if it cannot be read, or is too large
     try:
         with Image.open(picture) as image:
@@ -73,11 +76,11 @@ def _levels(picture: Path, entries: Mapping[str, str]) -> Floats:
             grey, seen = np.moveaxis(np.asarray(image.convert("LA")), 2, 0)
     except Exception as broken:  # a damaged picture can raise any error from within the parser
         raise InputError(f"{picture} cannot be read as a picture ({broken}); save the map again") from None
-    if (mode := entries.get("mode", "trinary")) == "raw":
+    if mode == "raw":
         return grey / 100
     if mode not in ("trinary", "scale"):
         raise InputError(f"mode {mode}; allowed are trinary, scale and raw")
-    occupied = grey if entries["negate"].lower() in ("1", "true") else 255 - grey
+    occupied = grey if negate.lower() in ("1", "true") else 255 - grey
     return np.where(seen < 255, 1.0, occupied / 255)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +78,19 @@ def test_unknown_cells_are_occupied_and_said(tmp_path: Path) -> None:
     with pytest.warns(InputWarning, match="36 of 1200 cells are unknown and count as occupied"):
         space = map_of(tmp_path, levels)
     checked(space, levels == UNKNOWN)
+
+
+@pytest.mark.parametrize("mode", ["", "mode: trinary\n", "mode: scale\n", "mode: raw\n"])
+def test_the_grey_of_cells_that_no_scan_has_reached_is_unknown_at_the_threshold_of_nav2(
+    mode: str, tmp_path: Path
+) -> None:
+    """Grey 205 is 0.196, below 0.25; in the other modes it means what the thresholds say."""
+    levels = np.full((30, 40), FREE if "raw" not in mode else 0)
+    levels[10:14, 20:29] = UNKNOWN
+    levels[2:4, 2:4] = OCCUPIED if "raw" not in mode else 100
+    kept = levels != levels[0, 0] if "scale" not in mode else levels == OCCUPIED
+    with nullcontext() if "scale" in mode else pytest.warns(InputWarning, match="36 of 1200 cells are unknown"):
+        checked(map_of(tmp_path, levels, f"{YAML}free_thresh: 0.25\n{mode}"), kept)
 
 
 BROKEN = {
