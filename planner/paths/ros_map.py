@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 import re
 import warnings
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +49,9 @@ def read_map(path: Path) -> NamedPaths:
         if (origin := _ORIGIN.search(text)) is None:
             raise KeyError("origin: [x, y, yaw]")
         x, y, yaw = map(float, origin.groups())
-        occupied, free = float(entries["occupied_thresh"]), float(entries["free_thresh"])
+        occupied, free = (_share(entries, f"{kind}_thresh") for kind in ("occupied", "free"))
+        if free > occupied:
+            raise InputError(f"free_thresh {free:g} is above occupied_thresh {occupied:g}; exchange them")
         mode = entries.get("mode", "trinary")
         levels = _levels(path.parent / entries["image"], mode, entries["negate"])
     unseen = (levels > 1) | (mode == "trinary") & (np.rint(255 * levels) == _UNSEEN)
@@ -66,6 +70,14 @@ def read_map(path: Path) -> NamedPaths:
     return NamedPaths(with_own_names(outlines), 1.0)
 
 
+def _share(entries: Mapping[str, str], name: str) -> float:
+    """Read a threshold."""
+    with suppress(ValueError):
+        if 0 <= (share := float(entries[name])) <= 1:
+            return share
+    raise InputError(f"{name} {entries[name]}; give a share from 0 to 1, such as 0.65 for 65 %")
+
+
 def _levels(picture: Path, mode: str, negate: str) -> Floats:
     """Read how occupied the cells are, from 0 to 1; what is transparent is occupied, and above 1 unknown."""
     read_bytes(picture)  # says what is wrong if it cannot be read, or is too large
@@ -73,7 +85,16 @@ def _levels(picture: Path, mode: str, negate: str) -> Floats:
         with Image.open(picture) as image:
             if image.width * image.height > _MOST_CELLS:
                 raise ValueError(f"more than {_MOST_CELLS:.0e} cells")
-            grey, seen = np.moveaxis(np.asarray(image.convert("LA")), 2, 0)
+            deep = image.mode.startswith("I;16") or (image.mode == "I" and image.format in ("PNG", "PPM"))
+            if image.mode in ("I", "F") and not deep:
+                raise ValueError(f"mode {image.mode}, and not 8 or 16 bits")
+            if deep and mode == "raw":
+                raise ValueError("raw needs a picture of 8 bits")
+            if deep:  # Pillow would cut at 255
+                grey, seen = np.asarray(image) / 257, np.asarray(image) != image.info.get("transparency")
+            else:
+                grey, alpha = np.moveaxis(np.asarray(image.convert("LA")), 2, 0)
+                seen = alpha == 255
     except Exception as broken:  # a damaged picture can raise any error from within the parser
         raise InputError(f"{picture} cannot be read as a picture ({broken}); save the map again") from None
     if mode == "raw":
@@ -81,7 +102,7 @@ def _levels(picture: Path, mode: str, negate: str) -> Floats:
     if mode not in ("trinary", "scale"):
         raise InputError(f"mode {mode}; allowed are trinary, scale and raw")
     occupied = grey if negate.lower() in ("1", "true") else 255 - grey
-    return np.where(seen < 255, 1.0, occupied / 255)
+    return np.where(seen, occupied / 255, 1.0)
 
 
 def _runs(cells: Flags) -> Any:

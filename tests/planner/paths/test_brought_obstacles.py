@@ -93,10 +93,47 @@ def test_the_grey_of_cells_that_no_scan_has_reached_is_unknown_at_the_threshold_
         checked(map_of(tmp_path, levels, f"{YAML}free_thresh: 0.25\n{mode}"), kept)
 
 
+GREYS = np.repeat([[OCCUPIED, UNKNOWN, FREE, 255]], 8, axis=1).repeat(12, axis=0).astype(np.uint8)
+EIGHT, DEEP = Image.fromarray(GREYS), Image.fromarray(GREYS.astype(np.uint16) * 257)
+PICTURES = {  # with the options of their file
+    "8 bits.png": (EIGHT, {}), "16 bits.png": (DEEP, {}), "16 bits.pgm": (DEEP, {}), "16 bits.tiff": (DEEP, {}),
+    "palette.png": (EIGHT.convert("P"), {}), "colours.png": (EIGHT.convert("RGBA"), {}),
+    "ink.tiff": (EIGHT.convert("CMYK"), {}), "two bits.png": (EIGHT.quantize(4), {}),
+    "seen through.png": (EIGHT, {"transparency": UNKNOWN}),
+    "seen through and deep.png": (DEEP, {"transparency": UNKNOWN * 257}),
+    "palette seen through.png": (EIGHT.convert("P"), {"transparency": UNKNOWN}),
+    "palette of alphas.png": (EIGHT.convert("P"), {"transparency": bytes([255] * UNKNOWN + [0] + [255] * 50)}),
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore:.*unknown and count as occupied")
+@pytest.mark.parametrize("name", PICTURES)
+def test_pictures_of_any_depth_say_the_same(name: str, tmp_path: Path) -> None:
+    picture, options = PICTURES[name]
+    picture.save(tmp_path / name, **options)
+    (tmp_path / "map.yaml").write_text(YAML.replace("tank.pgm", name) + "free_thresh: 0.196\n")
+    checked(FreeSpace(tuple(read_regions(str(tmp_path / "map.yaml"), None, CONTROL))), GREYS < FREE)
+
+
+@pytest.mark.parametrize("mode", ["I", "F"])
+def test_a_picture_whose_white_is_not_known_is_refused(mode: str, tmp_path: Path) -> None:
+    EIGHT.convert(mode).save(tmp_path / "tank.tiff")
+    (tmp_path / "map.yaml").write_text(YAML.replace("pgm", "tiff") + "free_thresh: 0.196\n")
+    with pytest.raises(InputError, match=f"mode {mode}.* 8 or 16 bits"):
+        read_regions(str(tmp_path / "map.yaml"), None, CONTROL)
+    DEEP.save(tmp_path / "tank.tiff")
+    (tmp_path / "map.yaml").write_text(YAML.replace("pgm", "tiff") + "free_thresh: 0.196\nmode: raw\n")
+    with pytest.raises(InputError, match="raw needs a picture of 8 bits"):
+        read_regions(str(tmp_path / "map.yaml"), None, CONTROL)
+
+
 BROKEN = {
     "resolution: 0.01\n": ("", "no entry 'resolution'"), "0.01": ("0", "resolution 0; give"),
     "tank.pgm\n": ("other.pgm\n", "other.pgm: no such file"),
-    "free_thresh: 0.196": ("free_thresh: low", "could not"),
+    "free_thresh: 0.196": ("free_thresh: low", "free_thresh low; give a share from 0 to 1, such as 0.65 for 65 %"),
+    "0.196": ("19.6", "free_thresh 19.6; give a share"), "0.65": ("65%", "occupied_thresh 65%; give a share"),
+    "h: 0.65": ("h: -0.65", "occupied_thresh -0.65; give"), "h: 0.196": ("h: nan", "free_thresh nan; give"),
+    "sh: 0.196": ("sh: 0.7", "free_thresh 0.7 is above occupied_thresh 0.65; exchange them"),
     "[-0.5, -0.4, 0.0]": ("[1]", "no entry 'origin: [x, y, yaw]'"),
     "negate: 0": ("negate: 0\nmode: odd", "mode odd; allowed"),
 }  # fmt: skip
