@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from PIL import Image
-from shapely import Geometry, box, buffer, get_parts, union_all
+from shapely import Geometry, box, disjoint_subset_union_all, get_parts, simplify
 from shapely import Polygon as Outline
 from shapely.affinity import affine_transform
 
@@ -29,7 +29,7 @@ from planner.paths.path import Path2D
 
 _ENTRY = re.compile(r"^(\w+):(.*)", re.M)
 _ORIGIN = re.compile("^origin:" + 3 * r"[\[\s,]++(?:-\s++)?([-+.\deE]++)", re.M)
-_MOST_CELLS = 5e7
+_MOST_CELLS, _MOST_RUNS = 5e7, 200_000
 _UNSEEN = 50  # of 255: how occupied grey 205 is
 _GROWN, _MOVED = 0.75, 0.72  # of a cell: outlines are moved outwards, and then simplified by at most so much
 
@@ -54,14 +54,13 @@ def read_map(path: Path) -> NamedPaths:
             raise InputError(f"free_thresh {free:g} is above occupied_thresh {occupied:g}; exchange them")
         mode = entries.get("mode", "trinary")
         levels = _levels(path.parent / entries["image"], mode, entries["negate"])
-    unseen = (levels > 1) | (mode == "trinary") & (np.rint(255 * levels) == _UNSEEN)
-    unknown = unseen | (levels > free) & (levels < occupied)
-    if unknown.any():
-        count = f"{unknown.sum()} of {unknown.size} cells"
-        warnings.warn(f"{path}: {count} are unknown and count as occupied", InputWarning, stacklevel=2)
-    cells = union_all(_runs(unknown | (levels >= occupied)))
-    grown = union_all(buffer(get_parts(cells), _GROWN, join_style="mitre"))  # in parts: at once it takes minutes
-    parts = without_holes(grown.simplify(_MOVED))
+        unseen = (levels > 1) | (mode == "trinary") & (np.rint(255 * levels) == _UNSEEN)
+        unknown = unseen | (levels > free) & (levels < occupied)
+        if unknown.any():
+            count = f"{unknown.sum()} of {unknown.size} cells"
+            warnings.warn(f"{path}: {count} are unknown and count as occupied", InputWarning, stacklevel=2)
+        grown = get_parts(disjoint_subset_union_all(_grown_runs(unknown | (levels >= occupied))))
+    parts = [part for each in simplify(grown, _MOVED) for part in without_holes(each)]  # at once it takes minutes
     if not parts:
         raise InputError(f"{path}: all cells are free; leave it out")
     along, aside = cell * np.cos(yaw), cell * np.sin(yaw)
@@ -105,11 +104,21 @@ def _levels(picture: Path, mode: str, negate: str) -> Floats:
     return np.where(seen, occupied / 255, 1.0)
 
 
-def _runs(cells: Flags) -> Any:
-    """Return a box for each run of cells in a row; the lower left corner of the picture is (0, 0)."""
+def _grown_runs(cells: Flags) -> Any:
+    """Return a box around each run of cells in a row; the lower left corner of the picture is (0, 0).
+
+    Raises:
+        InputError: there are too many.
+    """
     steps = np.diff(np.pad(cells.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     row, start = np.nonzero(steps == 1)
-    return box(start, len(cells) - row - 1, np.nonzero(steps == -1)[1], len(cells) - row)
+    if len(row) > _MOST_RUNS:
+        raise InputError(
+            f"the cells that are not free are {len(row)} runs in rows, more than {_MOST_RUNS}; remove specks, "
+            "or save the map with larger cells"
+        )
+    end, top = np.nonzero(steps == -1)[1], len(cells) - row
+    return box(start - _GROWN, top - 1 - _GROWN, end + _GROWN, top + _GROWN)
 
 
 def without_holes(region: Geometry) -> list[Outline]:
@@ -121,7 +130,7 @@ def without_holes(region: Geometry) -> list[Outline]:
             rest += [each for each in getattr(part, "geoms", ()) if each.area]
         elif part.interiors:
             low, bottom, high, top = part.bounds
-            cut = part.interiors[0].centroid.x
+            cut = sorted(hole.centroid.x for hole in part.interiors)[len(part.interiors) // 2]
             rest += [part & box(low, bottom, cut, top), part & box(cut, bottom, high, top)]
         elif part.area > 1e-9 * part.length**2:
             whole.append(part)

@@ -6,6 +6,7 @@ import json
 import math
 from contextlib import nullcontext
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 import pytest
@@ -125,6 +126,16 @@ def test_a_picture_whose_white_is_not_known_is_refused(mode: str, tmp_path: Path
     (tmp_path / "map.yaml").write_text(YAML.replace("pgm", "tiff") + "free_thresh: 0.196\nmode: raw\n")
     with pytest.raises(InputError, match="raw needs a picture of 8 bits"):
         read_regions(str(tmp_path / "map.yaml"), None, CONTROL)
+
+
+def test_a_map_of_many_specks_is_read_at_once_and_one_of_too_many_is_refused(tmp_path: Path) -> None:
+    specks = np.random.default_rng(0).random((1100, 1100)) < 0.04
+    began = process_time()
+    space = map_of(tmp_path, np.where(specks, OCCUPIED, FREE))
+    assert process_time() - began < 10
+    assert len(space.regions) > 20_000
+    with pytest.raises(InputError, match=r"map\.yaml: .* 500000 runs in rows, more than 200000; remove specks"):
+        map_of(tmp_path, np.indices((1000, 1000)).sum(0) % 2 * FREE)
 
 
 BROKEN = {
