@@ -7,7 +7,10 @@ was drawn. Texts, dimensions and hatches, and layers that are off or frozen, are
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+import math
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +23,8 @@ from planner.paths.path import Path2D
 
 _DRAWN = {"LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "HELIX"}
 _METRES = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 10: 0.9144, 13: 1e-6, 14: 0.1}  # of $INSUNITS
+_STATES_UNIT = re.compile(rb"(?<!\d)9\s+\$INSUNITS|\t\0?\$INSUNITS")  # a text, or binary; ezdxf takes m without
+_MOST_PIECES = 100_000
 _MEETS = 1e-5  # of the drawing's size
 _SAGITTA = 3e-5  # of a curve's size, between it and its polyline
 _NO_UNIT = '$INSUNITS does not say its unit; set it in the CAD program, or give --unit mm (in Python unit="mm")'
@@ -31,7 +36,7 @@ def read_dxf(path: Path) -> NamedPaths:
     Raises:
         InputError: there are none, the file is damaged, or ezdxf is missing.
     """
-    read_bytes(path)  # says what is wrong if it cannot be read, or is too large
+    data = read_bytes(path)  # says what is wrong if it cannot be read, or is too large
     try:
         import ezdxf
     except ImportError:
@@ -49,7 +54,8 @@ def read_dxf(path: Path) -> NamedPaths:
         places = np.concatenate([piece.points for pieces in layers.values() for piece in pieces])
         gap = _MEETS * float(np.ptp(places, axis=0).max())
         joined = with_own_names((layer, each) for layer, pieces in layers.items() for each in _joined(pieces, gap))
-        return NamedPaths(joined, _METRES.get(drawing.units), _NO_UNIT)
+        unit = _METRES.get(drawing.units) if _STATES_UNIT.search(data) else None
+        return NamedPaths(joined, unit, _NO_UNIT)
     except InputError:
         raise
     except Exception as broken:  # a damaged file can raise any error from within the parser
@@ -63,7 +69,10 @@ def _pieces(drawing: Any) -> Iterator[tuple[str, Path2D]]:
     from ezdxf.path import make_path
 
     hidden = {layer.dxf.name.lower() for layer in drawing.layers if layer.is_off() or layer.is_frozen()}
-    for entity in recursive_decompose(drawing.modelspace().query(" ".join([*_DRAWN, "INSERT"]))):
+    drawn = drawing.modelspace().query(" ".join([*_DRAWN, "INSERT"]))
+    if _count(drawn, drawing.blocks, {}) > _MOST_PIECES:
+        raise InputError(f"it draws more than {_MOST_PIECES} pieces, those of blocks counted; keep only the path")
+    for entity in recursive_decompose(drawn):
         layer = entity.dxf.layer
         mesh = any(getattr(entity, name, False) for name in ("is_poly_face_mesh", "is_polygon_mesh"))
         if entity.dxftype() not in _DRAWN or mesh or entity.dxf.invisible or layer.lower() in hidden:
@@ -75,20 +84,48 @@ def _pieces(drawing: Any) -> Iterator[tuple[str, Path2D]]:
             yield layer, Path2D(points, outline.is_closed)
 
 
+def _count(entities: Iterable[Any], blocks: Any, counted: dict[str, float]) -> float:
+    """Count what entities stand for, blocks in blocks too, before it is made; a block in itself has no end."""
+    total = 0.0
+    for entity in entities:
+        kind = entity.dxftype()
+        total += 1
+        if kind in ("INSERT", "DIMENSION"):
+            name = str(entity.dxf.get("name" if kind == "INSERT" else "geometry")).lower()
+            if name not in counted:
+                counted[name] = math.inf  # until it is counted
+                counted[name] = _count(blocks.get(name, ()), blocks, counted)
+            total += counted[name] * (entity.mcount if kind == "INSERT" else 1)
+    return total
+
+
 def _joined(pieces: list[Path2D], gap: float) -> Iterator[Path2D]:
     """Join pieces whose ends are at most a gap apart, where no third one meets them."""
-    from ezdxf import edgeminer
+    from scipy.spatial import cKDTree
 
     yield from (piece for piece in pieces if piece.closed)
-    edges = [edgeminer.make_edge(*piece.points[[0, -1]], payload=piece) for piece in pieces if not piece.closed]
-    ends = edges and edgeminer.Deposit(edges, gap_tol=gap)
-    used: set[Any] = set()
-    for edge in edges:
-        if edge not in used:
-            chain = edgeminer.find_simple_chain(ends, edge)
-            used.update(chain)
-            points = [each.payload.points[:: -1 if each.is_reverse else 1] for each in chain]
-            yield Path2D(
-                np.concatenate([points[0], *(more[1:] for more in points[1:])]),
-                edgeminer.is_loop(chain, gap_tol=gap),
-            )
+    lines = [piece.points for piece in pieces if not piece.closed]
+    if not lines:
+        return
+    ends = np.concatenate([line[[0, -1]] for line in lines])  # 2 k and 2 k + 1 are those of line k
+    corners, corner = np.unique(ends, axis=0, return_inverse=True)  # many lines may meet in one
+    near = np.asarray(cKDTree(corners).query(corners, 3, distance_upper_bound=gap)[1])  # len(corners): none
+    meeting = defaultdict(list)
+    for end, at in enumerate(np.where(near[:, 2] < len(corners), -1, near.min(1))[corner.ravel()].tolist()):
+        meeting[at].append(end)
+    pairs = [ends for at, ends in meeting.items() if at >= 0 and len(ends) == 2]
+    other: dict[int, int] = {one: two for pair in pairs for one, two in (pair, pair[::-1])}
+    used: set[int] = set()
+    for k in range(len(lines)):
+        if k in used:
+            continue
+        start = 2 * k
+        while (before := other.get(start)) is not None and (start := before ^ 1) != 2 * k:
+            pass
+        chain = [start]
+        while (after := other.get(chain[-1] ^ 1)) not in (None, start):
+            chain.append(after)
+        used.update(end // 2 for end in chain)
+        points = [lines[end // 2][:: -1 if end % 2 else 1] for end in chain]
+        outline = np.concatenate([points[0], *(more[1:] for more in points[1:])])
+        yield Path2D(outline, math.dist(outline[0], outline[-1]) <= gap)

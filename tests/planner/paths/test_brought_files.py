@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+from itertools import product
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -197,6 +199,74 @@ def test_blocks_and_curves_of_cad_are_read(tmp_path: Path) -> None:
     ellipse.modelspace().add_spline([(0, 0), (1, 2), (3, 2), (4, 0)])
     ellipse.saveas(tmp_path / "b.dxf")
     assert read_path(tmp_path / "b.dxf").path.points[[0, -1]] == pytest.approx(np.array([[0, 0], [4, 0]]))
+
+
+def dxf(*lines: str, header: str = "$INSUNITS\n70\n4") -> str:
+    """Return a drawing of lines "x y u v"; without a header it lacks that section."""
+    parts = ["0\nLINE\n8\nway\n10\n{}\n20\n{}\n11\n{}\n21\n{}\n".format(*line.split()) for line in lines]
+    sections = [f"HEADER\n9\n{header}\n"] * bool(header) + ["ENTITIES\n" + "".join(parts)]
+    return "".join(f"0\nSECTION\n2\n{section}0\nENDSEC\n" for section in sections) + "0\nEOF\n"
+
+
+WAY = ("0 0 400 0", "400 0 400 300")
+
+
+@pytest.mark.parametrize("comment", ["", "999\n$INSUNITS is 9\n999\n$INSUNITS\n"])
+@pytest.mark.parametrize("header", ["", "$ACADVER\n1\nAC1015", "$INSUNITS\n70\n0", "$INSUNITS\n70\n4"])
+def test_a_drawing_that_does_not_say_its_unit_needs_one(header: str, comment: str, tmp_path: Path) -> None:
+    pytest.importorskip("ezdxf")
+    drawing = written(tmp_path, "a.dxf", comment + dxf(*WAY, header=header))
+    assert drawing.unit == (1e-3 if "4" in header else None)
+    assert drawing.in_tails(CONTROL, "mm").length * CONTROL.length_scale == pytest.approx(0.7)
+    if drawing.unit is None:
+        with pytest.raises(InputError, match="give --unit mm"):
+            drawing.in_tails(CONTROL)
+
+
+def test_the_unit_of_a_binary_drawing_is_known(tmp_path: Path) -> None:
+    ezdxf = pytest.importorskip("ezdxf")
+    for version, unit in product(("R12", "R2000"), (0, 4)):
+        drawing = ezdxf.new(version, units=unit)
+        drawing.modelspace().add_line((0, 0), (4, 0))
+        drawing.header["$INSUNITS"] = unit
+        drawing.saveas(tmp_path / "a.dxf", fmt="bin")
+        assert read_path(tmp_path / "a.dxf").unit == (1e-3 if unit and version == "R2000" else None)
+
+
+def test_blocks_that_stand_for_too_many_lines_are_refused_before_they_are_made(tmp_path: Path) -> None:
+    ezdxf = pytest.importorskip("ezdxf")
+
+    def drawn(insert: str, lines: int, rows: int = 1, last: str = "B0") -> str:
+        """Return a drawing of blocks B0, of lines, to B8, of ten of the block before."""
+        drawing = ezdxf.new(units=4)
+        for k in range(9):
+            drawing.blocks.new(f"B{k}")
+        for k in range(1, 9):
+            for _ in range(10):
+                drawing.blocks.get(f"B{k}").add_blockref(f"B{k - 1}", (0, 0))
+        for k in range(lines):
+            drawing.blocks.get("B0").add_line((0, k), (1, k), dxfattribs={"layer": "way"})
+        if last != "B0":
+            drawing.blocks.get("B0").add_blockref(last, (0, 0))
+        drawing.modelspace().add_blockref(insert, (0, 0)).grid((rows, rows), (2, 2))
+        drawing.saveas(tmp_path / "b.dxf")
+        return (tmp_path / "b.dxf").read_text()
+
+    for given in (("B8", 10), ("b0", 1, 30_000), ("B8", 0), ("B3", 1, 20), ("B0", 1, 1, "B1")):
+        assert "a.dxf: it draws more than 100000 pieces" in refused(tmp_path, "a.dxf", drawn(*given))
+    assert "has 900 paths" in refused(tmp_path, "a.dxf", drawn("B0", 1, 30))
+
+
+def test_many_lines_are_read_in_seconds_also_where_they_meet(tmp_path: Path) -> None:
+    pytest.importorskip("ezdxf")
+    turn = np.linspace(0, 60 * np.pi, 10_001)
+    x, y = turn * np.cos(turn), turn * np.sin(turn)
+    chain = map("{:.6f} {:.6f} {:.6f} {:.6f}".format, x, y, x[1:], y[1:])
+    began = process_time()
+    assert len(written(tmp_path, "a.dxf", dxf(*chain)).path.points) == 10_001
+    text = dxf(*(f"0 0 {x} {y}" for x, y in zip(x[1:], y[1:], strict=True)))
+    assert "has 10000 paths" in refused(tmp_path, "a.dxf", text)
+    assert process_time() - began < 10
 
 
 def test_a_dxf_without_lines_or_damaged_is_refused(tmp_path: Path) -> None:
