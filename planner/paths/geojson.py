@@ -19,7 +19,12 @@ from common.reading import expecting, read_json
 from planner.paths.named_paths import NamedPaths, with_own_names
 from planner.paths.path import Path2D
 
-_DEGREES = re.compile(r"CRS:?84|EPSG:+(?:4326|4979)")
+_DEGREES = re.compile(  # codes, datums that no projection follows, and words
+    r"CRS:?(?:84|83|27)\b|long?lat|lat\W?lon|geographic|\bGCS_"
+    r"|EPSG[:/ ]+(?:[\d.]+[:/ ]+)?(?:4326|4979|4258|4937|4269|4267|4283|7844|4490|4612|6668|4674|4167|6318)\b"
+    r"|^\w+ (?:WGS|ETRS|NAD|GDA|ED|JGD|CGCS|SIRGAS)[ _-]?(?:19|20)?\d\d(?:\W*\(\w+\))?$",
+    re.IGNORECASE,
+)
 _NO_UNIT = 'GeoJSON has degrees of longitude and latitude; if these are metres, give --unit m (in Python unit="m")'
 
 
@@ -68,9 +73,6 @@ def read_shapes(path: Path) -> list[tuple[str, str, list[Floats]]]:
     """
     with expecting("GeoJSON", path, "export it again"):
         content = read_json(path)
-        system = (content.get("crs") or {}).get("properties", {}).get("name", "")
-        if _DEGREES.search(system):
-            raise InputError(f"its crs is {system}: degrees of longitude and latitude; export it in metres")
         shapes = [(name, kind, [_points(ring) for ring in rings]) for name, kind, rings in _shapes(content, "")]
         if not shapes or not all(rings and all(map(len, rings)) for _, _, rings in shapes):
             raise InputError("it has no LineString and no Polygon, or an empty one; draw one")
@@ -83,7 +85,10 @@ def _points(ring: list[list[float]]) -> Floats:
 
 def _shapes(part: Mapping[str, Any], name: str) -> Iterator[tuple[str, str, list[Any]]]:
     """Yield name, kind and rings of the shapes of a part of the file."""
-    kind = part["type"]
+    kind, crs = part["type"], part.get("crs") or {}
+    system = " ".join(map(str, crs.get("properties", {}).values()))
+    if _DEGREES.search(f"{crs.get('type')} {system}"):
+        raise InputError(f"its crs is {system}: degrees; project it to metres, such as UTM, and export it again")
     if kind == "Feature":
         name = str((part.get("properties") or {}).get("name") or part.get("id") or "")
         if part["geometry"] is not None:

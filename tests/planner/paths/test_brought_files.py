@@ -201,6 +201,35 @@ def test_blocks_and_curves_of_cad_are_read(tmp_path: Path) -> None:
     assert read_path(tmp_path / "b.dxf").path.points[[0, -1]] == pytest.approx(np.array([[0, 0], [4, 0]]))
 
 
+def named(name: str) -> dict[str, Any]:
+    return {"type": "name", "properties": {"name": name}}
+
+
+DEGREES = [
+    *map(named, ["WGS 84", "WGS84", "EPSG:4326", "urn:ogc:def:crs:OGC:1.3:CRS84", "urn:ogc:def:crs:EPSG:6.9:4326",
+                 "http://www.opengis.net/def/crs/EPSG/0/4326", "OGC:CRS84", "GCS_WGS_1984", "ETRS89", "epsg:4258",
+                 "WGS 84 (G1762)", "NAD83", "WGS 84 (EPSG:4326)", "+proj=longlat +datum=WGS84"]),
+    {"type": "EPSG", "properties": {"code": 4326}},
+    {"type": "link", "properties": {"href": "http://spatialreference.org/ref/epsg/4326/proj4/", "type": "proj4"}},
+]  # fmt: skip
+METRES = [
+    *map(named, ["urn:ogc:def:crs:EPSG::25832", "EPSG:32632", "WGS 84 / UTM zone 32N", "WGS_1984_UTM_Zone_32N",
+                 "ETRS89 / UTM zone 32N", "EPSG:43260", "EPSG:2056", "WGS 84 UTM 32N", "local",
+                 "+proj=utm +zone=32 +datum=WGS84 +units=m"]),
+    {"type": "EPSG", "properties": {"code": 25832}}, None, {},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("crs", DEGREES + METRES)
+def test_geojson_is_refused_where_its_crs_is_of_degrees(crs: dict[str, Any] | None, tmp_path: Path) -> None:
+    line = {"type": "LineString", "coordinates": CORNERS}
+    for shape in (line | {"crs": crs}, {"type": "GeometryCollection", "geometries": [line | {"crs": crs}]}):
+        if crs in METRES:
+            assert written(tmp_path, "a.geojson", json.dumps(shape)).in_tails(CONTROL, "m").length > 0
+        else:
+            assert "project it to metres" in refused(tmp_path, "a.geojson", json.dumps(shape))
+
+
 def dxf(*lines: str, header: str = "$INSUNITS\n70\n4") -> str:
     """Return a drawing of lines "x y u v"; without a header it lacks that section."""
     parts = ["0\nLINE\n8\nway\n10\n{}\n20\n{}\n11\n{}\n21\n{}\n".format(*line.split()) for line in lines]
