@@ -27,6 +27,7 @@ from typing import Any, TypeVar
 from common.errors import InputError, naming
 
 MOST_BYTES = 256 * 2**20  # of a file
+_PIPED = re.compile(r"/dev/stdin|/(?:dev|proc/self)/fd/\d+")  # what a shell hands over: it has an end
 _FIRST = "# The last line is a digest of the others: a reader notices whether the file is whole.\n"
 _LAST = re.compile(r"^# digest: ([0-9a-f]{11})[ \t\r]*$\n?", re.M)
 _DECIMAL_COMMA = re.compile(r"^[ \t]*[\w-]+[ \t]*=[ \t]*([+-]?\d{1,20}),(\d{1,20})[ \t]*(?:#.*)?$", re.M)
@@ -67,11 +68,14 @@ def expecting(kind: str, source: object, remedy: str) -> Iterator[None]:
 
 
 def read_bytes(path: str | Path, *, first: int = MOST_BYTES + 1) -> bytes:
-    """Read a file, or a pipe, or its first bytes.
+    """Read a file, or a pipe of the shell, or its first bytes.
 
     Raises:
-        InputError: there is no such file, it cannot be read, or it is larger than MOST_BYTES.
+        InputError: there is no such file, it is a device or another pipe, whose end may never come, it cannot be
+            read, or it is larger than MOST_BYTES.
     """
+    if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path) or _PIPED.fullmatch(str(path))):
+        raise InputError(f"{path} is a pipe or a device, no file; give a file")
     try:
         with open(path, "rb") as file:
             data = file.read(first)

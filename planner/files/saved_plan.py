@@ -19,7 +19,7 @@ import numpy as np
 
 from common.errors import InputError
 from common.keywords import checks_keywords
-from common.reading import expecting, read_json
+from common.reading import expecting, read_bytes, read_json
 from planner.goal.trip import FORMAT, Trip
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
@@ -177,9 +177,8 @@ def is_plan(path: str | Path) -> bool:
     if place.is_dir():
         return (place / "plan.json").is_file()
     try:
-        with open(place, "rb") as file:
-            return file.read(512).removeprefix(b"\xef\xbb\xbf").lstrip()[:1] == b"{"
-    except (OSError, ValueError):
+        return read_bytes(place, first=512).removeprefix(b"\xef\xbb\xbf").lstrip()[:1] == b"{"
+    except InputError:
         return False
 
 

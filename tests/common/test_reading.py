@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from common.errors import InputError, run_command
 from common.reading import ContentError, check_seal, expecting, read_bytes, read_json, sealed
 from common.tables import read_table
 from dataset.design import load_design
+from planner.files.saved_plan import is_plan
+from planner.paths.path_files import read_outlines, read_path
 from sim.__main__ import main
 from sim.inputs import load_robot
 from sim.model.presets import PRESETS
@@ -50,6 +53,28 @@ def test_a_file_beyond_the_limit_is_not_read(tmp_path: Path) -> None:
     for read in (read_bytes, read_table):
         with pytest.raises(InputError, match="has more than 256 MiB"):
             read(path)
+
+
+NOTHING = {
+    read_bytes: "a.bin", read_table: "a.csv", read_json: "a.json", load_robot: "robot.toml", load_design: "a.toml",
+    read_path: "a.svg", read_outlines: "a.geojson",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("place", ["fifo", "/dev/zero", "/dev/tty", "folder"])
+@pytest.mark.parametrize("read", NOTHING)
+def test_what_is_no_file_is_refused_at_once(read: Callable[[Path], object], place: str, tmp_path: Path) -> None:
+    """It is not waited for."""
+    path = tmp_path / NOTHING[read]
+    if place == "fifo":
+        os.mkfifo(path)
+    elif place == "folder":
+        path.mkdir()
+    else:
+        path.symlink_to(place)
+    with pytest.raises(InputError, match="; give a file"):
+        read(path)
+    assert not is_plan(path)
 
 
 @pytest.mark.parametrize("data", [b"\xff\xfe\x00", b"\x80abc", b"{", b"[" * 100_000])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import os
+from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
 from time import process_time
@@ -166,6 +168,14 @@ def test_a_map_without_obstacles_or_with_a_damaged_picture_is_refused(tmp_path: 
         map_of(tmp_path, np.full((4, 4), FREE))
     (tmp_path / "tank.pgm").write_text("no picture")
     with pytest.raises(InputError, match=r"tank.pgm cannot be read as a picture [^<]*; save"):
+        read_regions(str(tmp_path / "map.yaml"), None, CONTROL)
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir])
+def test_a_picture_that_is_no_file_is_refused(make: Callable[[Path], None], tmp_path: Path) -> None:
+    make(tmp_path / "tank.pgm")
+    (tmp_path / "map.yaml").write_text(f"{YAML}free_thresh: 0.196\n")
+    with pytest.raises(InputError, match=r"tank\.pgm is a .*; give a file"):
         read_regions(str(tmp_path / "map.yaml"), None, CONTROL)
 
 
