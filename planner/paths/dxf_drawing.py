@@ -88,14 +88,14 @@ def _count(entities: Iterable[Any], blocks: Any, counted: dict[str, float]) -> f
     """Count what entities stand for, blocks in blocks too, before it is made; a block in itself has no end."""
     total = 0.0
     for entity in entities:
-        kind = entity.dxftype()
         total += 1
-        if kind in ("INSERT", "DIMENSION"):
-            name = str(entity.dxf.get("name" if kind == "INSERT" else "geometry")).lower()
+        key = "name" if entity.dxftype() == "INSERT" else "geometry"  # of a dimension
+        if entity.dxf.is_supported(key):
+            name = str(entity.dxf.get(key)).lower()
             if name not in counted:
                 counted[name] = math.inf  # until it is counted
                 counted[name] = _count(blocks.get(name, ()), blocks, counted)
-            total += counted[name] * (entity.mcount if kind == "INSERT" else 1)
+            total += counted[name] * getattr(entity, "mcount", 1)
     return total
 
 
@@ -105,9 +105,7 @@ def _joined(pieces: list[Path2D], gap: float) -> Iterator[Path2D]:
 
     yield from (piece for piece in pieces if piece.closed)
     lines = [piece.points for piece in pieces if not piece.closed]
-    if not lines:
-        return
-    ends = np.concatenate([line[[0, -1]] for line in lines])  # 2 k and 2 k + 1 are those of line k
+    ends = np.array([line[[0, -1]] for line in lines]).reshape(-1, 2)  # 2 k and 2 k + 1 are those of line k
     corners, corner = np.unique(ends, axis=0, return_inverse=True)  # many lines may meet in one
     near = np.asarray(cKDTree(corners).query(corners, 3, distance_upper_bound=gap)[1])  # len(corners): none
     meeting = defaultdict(list)

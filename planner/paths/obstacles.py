@@ -150,7 +150,7 @@ class FreeSpace:
     def distance(self, points: Floats) -> Floats:
         """Compute the distance (M,) of points (M, 2) from the nearest region or wall, negative inside."""
         distances = np.full(len(points), np.inf)
-        for region in self.regions:
+        for region in self.near(points).regions if len(points) > 1 else self.regions:
             distances = np.minimum(distances, region.distance(points))
         if self.walls is not None:
             distances = np.minimum(distances, -self.walls.distance(points))
@@ -225,7 +225,7 @@ class Map:
         for i, j in product(range(0, len(x), _TILE), range(0, len(y), _TILE)):
             tile = self.table[i : i + _TILE, j : j + _TILE]
             points = np.stack(np.meshgrid(x[i : i + _TILE], y[j : j + _TILE], indexing="ij"), -1).reshape(-1, 2)
-            tile[:] = space.near(points).distance(points).reshape(tile.shape)
+            tile[:] = space.distance(points).reshape(tile.shape)
         self.slack = step / math.sqrt(2)  # distances change by at most the way to the nearest grid point
 
     def distance(self, points: Floats) -> Floats:

@@ -113,10 +113,7 @@ def _grown_runs(cells: Flags) -> Any:
     steps = np.diff(np.pad(cells.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     row, start = np.nonzero(steps == 1)
     if len(row) > _MOST_RUNS:
-        raise InputError(
-            f"the cells that are not free are {len(row)} runs in rows, more than {_MOST_RUNS}; remove specks, "
-            "or save the map with larger cells"
-        )
+        raise InputError(f"{len(row)} runs of cells that are not free, more than {_MOST_RUNS}; remove specks")
     end, top = np.nonzero(steps == -1)[1], len(cells) - row
     return box(start - _GROWN, top - 1 - _GROWN, end + _GROWN, top + _GROWN)
 

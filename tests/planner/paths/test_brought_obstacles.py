@@ -18,7 +18,7 @@ from common.arrays import Flags, Floats
 from common.errors import InputError, InputWarning
 from planner.jobs.plan import plan
 from planner.options import read_regions, request_of
-from planner.paths.obstacles import FreeSpace
+from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.ros_map import without_holes
 from tests.planner.plans import CONTROL
 
@@ -136,7 +136,7 @@ def test_a_map_of_many_specks_is_read_at_once_and_one_of_too_many_is_refused(tmp
     space = map_of(tmp_path, np.where(specks, OCCUPIED, FREE))
     assert process_time() - began < 10
     assert len(space.regions) > 20_000
-    with pytest.raises(InputError, match=r"map\.yaml: .* 500000 runs in rows, more than 200000; remove specks"):
+    with pytest.raises(InputError, match=r"map\.yaml: 500000 runs of cells .*more than 200000; remove specks"):
         map_of(tmp_path, np.indices((1000, 1000)).sum(0) % 2 * FREE)
 
 
@@ -177,6 +177,15 @@ def test_a_picture_that_is_no_file_is_refused(make: Callable[[Path], None], tmp_
     (tmp_path / "map.yaml").write_text(f"{YAML}free_thresh: 0.196\n")
     with pytest.raises(InputError, match=r"tank\.pgm is a .*; give a file"):
         read_regions(str(tmp_path / "map.yaml"), None, CONTROL)
+
+
+@pytest.mark.parametrize("spread", [0.1, 5.0, 50.0])
+def test_distances_are_those_from_the_nearest_of_all_regions(spread: float) -> None:
+    rng = np.random.default_rng(6)
+    regions = tuple(Circle(*rng.uniform(-20, 20, 2), rng.uniform(0.1, 3)) for _ in range(60))
+    points = rng.uniform(-20, 20, 2) + spread * rng.standard_normal((40, 2))
+    nearest = np.min([region.distance(points) for region in regions], axis=0)
+    assert FreeSpace(regions).distance(points).tolist() == nearest.tolist()
 
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]
