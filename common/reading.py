@@ -71,8 +71,7 @@ def read_bytes(path: str | Path, *, first: int = MOST_BYTES + 1) -> bytes:
     """Read a file, or a pipe of the shell, or its first bytes.
 
     Raises:
-        InputError: there is no such file, it is a device or another pipe, whose end may never come, it cannot be
-            read, or it is larger than MOST_BYTES.
+        InputError: it is no file, or a pipe that may never end; it cannot be read, or is larger than MOST_BYTES.
     """
     if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path) or _PIPED.fullmatch(str(path))):
         raise InputError(f"{path} is a pipe or a device, no file; give a file")

@@ -78,17 +78,15 @@ def _share(entries: Mapping[str, str], name: str) -> float:
 
 
 def _levels(picture: Path, mode: str, negate: str) -> Floats:
-    """Read how occupied the cells are, from 0 to 1; what is transparent is occupied, and above 1 unknown."""
+    """Read how occupied the cells are, from 0 to 1; what is transparent is occupied, what is above 1 unknown."""
     read_bytes(picture)  # says what is wrong if it cannot be read, or is too large
     try:
         with Image.open(picture) as image:
             if image.width * image.height > _MOST_CELLS:
                 raise ValueError(f"more than {_MOST_CELLS:.0e} cells")
             deep = image.mode.startswith("I;16") or (image.mode == "I" and image.format in ("PNG", "PPM"))
-            if image.mode in ("I", "F") and not deep:
-                raise ValueError(f"mode {image.mode}, and not 8 or 16 bits")
-            if deep and mode == "raw":
-                raise ValueError("raw needs a picture of 8 bits")
+            if (mode == "raw") if deep else image.mode in ("I", "F"):
+                raise ValueError(f"a {mode} map of Pillow's mode {image.mode}, and not of 8 bits")
             if deep:  # Pillow would cut at 255
                 grey, seen = np.asarray(image) / 257, np.asarray(image) != image.info.get("transparency")
             else:
@@ -105,11 +103,7 @@ def _levels(picture: Path, mode: str, negate: str) -> Floats:
 
 
 def _grown_runs(cells: Flags) -> Any:
-    """Return a box around each run of cells in a row; the lower left corner of the picture is (0, 0).
-
-    Raises:
-        InputError: there are too many.
-    """
+    """Return a box around each run of cells in a row; the lower left corner of the picture is (0, 0)."""
     steps = np.diff(np.pad(cells.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     row, start = np.nonzero(steps == 1)
     if len(row) > _MOST_RUNS:

@@ -122,11 +122,11 @@ def test_pictures_of_any_depth_say_the_same(name: str, tmp_path: Path) -> None:
 def test_a_picture_whose_white_is_not_known_is_refused(mode: str, tmp_path: Path) -> None:
     EIGHT.convert(mode).save(tmp_path / "tank.tiff")
     (tmp_path / "map.yaml").write_text(YAML.replace("pgm", "tiff") + "free_thresh: 0.196\n")
-    with pytest.raises(InputError, match=f"mode {mode}.* 8 or 16 bits"):
+    with pytest.raises(InputError, match=f"a trinary map of Pillow's mode {mode}, and not of 8 bits"):
         read_regions(str(tmp_path / "map.yaml"), None, CONTROL)
     DEEP.save(tmp_path / "tank.tiff")
     (tmp_path / "map.yaml").write_text(YAML.replace("pgm", "tiff") + "free_thresh: 0.196\nmode: raw\n")
-    with pytest.raises(InputError, match="raw needs a picture of 8 bits"):
+    with pytest.raises(InputError, match="a raw map of Pillow's mode I;16, and not of 8 bits"):
         read_regions(str(tmp_path / "map.yaml"), None, CONTROL)
 
 
