@@ -9,8 +9,8 @@ where the table names no specimens) varies about its mean:
 
 where the null is an end of the effect's range, so that a size has one sign only. A normal distribution about the
 mean would have a good part of its sizes beyond the null; on a logarithmic scale there are none, and the fit stays
-within the range. The u_g are nuisance parameters with the standard deviation τ. It is estimated by expectation
-maximisation, τ² ← mean of u_g² + V_gg (Dempster, Laird, Rubin 1977).
+within the range. The u_g are nuisance parameters with the standard deviation τ. It has the largest restricted
+likelihood of the model that is linear about the fit with it (Lindstrom and Bates 1990).
 
 What the form leaves counts as noise: variances are multiplied by b = max(1, χ²/ν) of that remainder (Birge 1932).
 
@@ -40,6 +40,7 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 from scipy.stats import norm as normal
 from scipy.stats import t as student
 
@@ -48,7 +49,7 @@ from calibration.attribution.refits import FIRST, Candidate, Judgement, left_out
 from calibration.statistics.budget import skipped, spent
 from calibration.statistics.fit import Fit, UnsolvedError, birge, fit, profile_end
 from calibration.statistics.forward import derivatives
-from calibration.statistics.gls import solve_normal
+from calibration.statistics.gls import schur_complement, solve_normal
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, examine_residual
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import (
@@ -61,7 +62,7 @@ from calibration.statistics.statistical_model import (
     regression,
 )
 from calibration.statistics.study import FinalRefit, Study
-from common.arrays import Floats, Integers
+from common.arrays import Flags, Floats, Integers
 
 _REMOVED = 0.5  # least share of what is beyond noise
 _DIFFERS = 2.71  # ½ χ²₁ at 5 %
@@ -70,6 +71,7 @@ _DRAWS = 400  # of the bootstrap, for what the form leaves
 _LARGEST = 300.0  # half width, so that its exponential is a number
 _VAGUE = math.log(100.0)  # half width of the interval of a logarithm, which says nothing
 _ROUNDS, _SETTLED = 12, 0.03  # of the estimate of τ; its last relative change
+_WIDEST = 100.0  # factor by which τ may grow in a round
 
 
 @dataclass(frozen=True)
@@ -207,6 +209,8 @@ def adopt_nearest(
         try:
             constant = _converged(study, base, candidate)
             tried[candidate.effect.name] = _as_form(study, base, candidate, constant)
+            if constant.parameters[candidate.effect.name] == candidate.effect.start:  # held at its null
+                continue
             forms: list[tuple[ForwardModel, Fit, float]] = [(study.model, constant, 0.0)]
             if len(np.unique(specimens(study.model.runs)[0][study.split.fitted])) >= _FEWEST:
                 forms.append(_with_spread(study, constant, candidate.effect))
@@ -281,9 +285,8 @@ def _converged(study: Study, base: Fit, candidate: Candidate) -> Fit:
 
 
 def _with_spread(study: Study, constant: Fit, effect: Parameter) -> tuple[Shifted, Fit, float]:
-    """Fit an effect whose size differs between specimens, with τ by expectation maximisation."""
-    runs, used = study.model.runs, study.split.fitted
-    seen = np.unique(specimens(runs)[0][used])
+    """Fit an effect whose size differs between specimens, with the likeliest τ of the linear model, in turn."""
+    used = study.split.fitted
     logarithmic = effect.start in effect.bounds
     spread = 1.0 if logarithmic else max(abs(constant.parameters[effect.name]) / 2, effect.typical / 10)
     least = 1e-3 * (1.0 if logarithmic else effect.typical)
@@ -297,10 +300,7 @@ def _with_spread(study: Study, constant: Fit, effect: Parameter) -> tuple[Shifte
         # In units of S the prior is narrower by √b: the remainder counts as noise.
         model = varying(study.model, effect, spread / math.sqrt(b))
         fitted = fit(model, start, names, used, title="")
-        places = [fitted.names.index(departures[g]) for g in seen]
-        u = np.array([fitted.parameters[fitted.names[i]] for i in places])
-        V = b * np.diag(fitted.covariance)[places] / fitted.inflation
-        new = max(math.sqrt(float((u**2 + V).mean())), least)
+        new = _likeliest_spread(study, fitted, departures, b, least)
         new_b, start = _birge(study, fitted), fitted.parameters
         settled = abs(new / spread - 1) < _SETTLED and abs(new_b / b - 1) < _SETTLED
         spread, b = new, new_b
@@ -309,15 +309,48 @@ def _with_spread(study: Study, constant: Fit, effect: Parameter) -> tuple[Shifte
     return model, fitted, spread
 
 
+def _likeliest_spread(study: Study, fitted: Fit, departures: Sequence[str], b: float, least: float) -> float:
+    """Find the τ from `least` on with the largest restricted likelihood of the linear model of a fit."""
+    normal = fitted.normal(study.model.runs, study.split.fitted)
+    own = np.array([fitted.names.index(name) for name in departures])
+    u = np.array([fitted.parameters[name] for name in departures])
+
+    def changed(precision: float) -> Floats:
+        """Add a prior of the departures, in units of S; take one away, if it is below 0."""
+        more = normal.copy()
+        more[own, own] += precision
+        more[own, -1] -= precision * u
+        more[-1, own] -= precision * u
+        more[-1, -1] += precision * (u**2).sum()
+        return more
+
+    sigma = fitted.fitted[own[0]].sigma
+    assert sigma is not None
+
+    def minus_two_ln(log_spread: float) -> float:
+        with_prior = changed(b * math.exp(-2 * log_spread) - sigma**-2)
+        return _laplace(with_prior, fitted.held, b) + 2 * len(own) * log_spread
+
+    ends = (math.log(least), math.log(_WIDEST * sigma * math.sqrt(b)))
+    return math.exp(minimize_scalar(minus_two_ln, bounds=ends, method="bounded").x)
+
+
 def _restricted(study: Study, fitted: Fit, b: float) -> float:
     """Compute -2 ln of the restricted likelihood of a fit in the noise b S, up to a constant (Laplace).
 
     Priors of its parameters are in units of S, as those of the study are.
     """
-    normal = fitted.normal(study.model.runs, study.split.fitted) / b
+    normal = fitted.normal(study.model.runs, study.split.fitted)
     sigmas = [p.sigma for p in fitted.fitted if p.sigma is not None]
-    curvature = np.linalg.slogdet(normal[:-1, :-1])[1]
-    return float(normal[-1, -1] + curvature + sum(math.log(b * s**2) for s in sigmas))
+    return _laplace(normal, fitted.held, b) + sum(math.log(b * s**2) for s in sigmas)
+
+
+def _laplace(normal: Floats, held: Flags, b: float) -> float:
+    """Integrate the likelihood over parameters that are free: -2 ln of it, up to a constant."""
+    free = np.append(~held, True)
+    normal = normal[np.ix_(free, free)] / b
+    least = schur_complement(normal, len(normal) - 1)[0, 0]
+    return float(least + np.linalg.slogdet(normal[:-1, :-1])[1])
 
 
 def _judged(

@@ -67,7 +67,7 @@ _MOST_STEPS = 60
 _STEPS_TO_TARGET = 25  # of a search that is above its target, or came to where the model cannot be solved quickly
 _TRIED = 4  # steps before a search is given up
 _SHORT = 0.1  # after a shorter step, in ln C or ε, the Jacobian is used once more
-_SMALL = 0.01  # the iteration ends at a step that is expected to reduce rᵀ Σ⁻¹ r by less
+_SMALL = 0.01  # the iteration ends at a step that is expected to reduce rᵀ Σ⁻¹ r by less, over that of noise
 _LARGEST = 0.7  # change of ln C in one step
 _PASSES = 3  # iterations for the scatter of the sessions
 _DAMPING = (0.0, *(10.0 ** (e / 2) for e in range(-6, 17)))  # λ; a step is up to √10 shorter than it may be
@@ -78,7 +78,7 @@ _ON_BOUND = 1e-9  # distance in typical sizes
 _BLIND = 1e-12  # share of the largest eigenvalue below which a combination of parameters shows nothing
 _NEARLY_CERTAIN = 1e-6  # standard deviation of a parameter that is held, in typical sizes
 _KEPT = 0.25  # share of the promised fall below which the next step is damped
-_UNSETTLED = 1.0  # a fit has not converged if one more step is expected to reduce rᵀ Σ⁻¹ r by more
+_UNSETTLED = 1.0  # a fit has not converged if one more step is expected to reduce it by more
 _PROFILE = 0.05  # share of a size to which an end of its interval is found
 _FLAT = 0.05  # share of the expected rise; if the rise is smaller, the deviance is flat and the end stays
 _STEEP = 5.0  # if it is larger, the others were not refitted along a bent valley, and the end stays
@@ -284,7 +284,7 @@ def fit(
         jacobian=point.derivative,
         noise=Noise(run, linear.share),
         deviance=float(normal[-1, -1] + products.determinant(linear.share)),
-        converged=ahead.promise < _UNSETTLED,
+        converged=ahead.promise < _UNSETTLED * problem.noise_level(problem.normal(point, share)),
         held=ahead.held,
         full_normal=point.products.for_fit(linear.share)[0],
         wrong_numbers=wrong_numbers,
@@ -336,6 +336,15 @@ class _Problem:
     def weighted(self, products: NormalEquations, share: Floats) -> Floats:
         """Return products with the weights of the fit, (p + 1, p + 1)."""
         return products.at(share) if self.in_sigma else products.for_fit(share)[0]
+
+    def noise_level(self, normal: Floats) -> float:
+        """Compute rᵀ W r over its degrees of freedom: by so much may it change before anything is learnt.
+
+        Where the noise is known, it is 1 at least.
+        """
+        runs = self.model.runs
+        level = float(normal[-1, -1]) / max(runs.values(self.used) - len(self.fitted), 1)
+        return max(level, 1.0) if runs.noise_known else level
 
     def first(self, parameters: dict[str, float]) -> _Point:
         """Run the model at the start; effects move towards their null while it cannot be solved quickly there."""
@@ -421,21 +430,22 @@ def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
         share = point.products.share(passes=0 if count == 1 else _PASSES)
         normal = problem.normal(point, share)
         step = _step(fitted, point.parameters, normal, least)
-        if step.promise < _SMALL and count > 1:
+        small = _SMALL * problem.noise_level(normal)
+        if step.promise < small and count > 1:
             break
         above = float(normal[-1, -1]) - target
         if count > _TRIED and (_STEPS_TO_TARGET - count) * step.promise < above:
             break
         if (count > _STEPS_TO_TARGET and not solved) or skipped("more steps of some fits"):
             break
-        in_valley = step.damping > 0 and count > _TRIED and solved  # elsewhere to bend costs more than it gains
+        in_valley = step.damping > 0 and count > _TRIED and solved and target == math.inf
         if in_valley:
             step = problem.bent(point, share, step)
         short = not in_valley and bool(np.abs(step.change).max() <= _SHORT)
         tried = problem.at(step.parameters, point.derivative if short else None, count + 1)
         fall = float(normal[-1, -1] - problem.normal(tried, share)[-1, -1])
         solved = solved and tried.solved
-        if tried.solved and fall > -_SMALL:
+        if tried.solved and fall > -small:
             # A step that keeps little of its promise overshoots, and the next one is damped (Marquardt 1963).
             least = step.damping + 1 if fall < _KEPT * step.promise else max(step.damping - 2, 0)
             least = min(least, len(_DAMPING) - 1)
