@@ -21,6 +21,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
+from camera.correlation import correlation_time
+from camera.gaps import unwrapped
 from common.arrays import Floats
 
 LEAST_TURN = math.radians(20)  # smallest turn of a run to which a circle is fitted
@@ -44,19 +46,20 @@ class TrackedRun:
 
 
 class TrackFit(NamedTuple):
-    """Results of a track, and the fitted positions (m, 2) in cm."""
+    """Results of a track, and the fitted positions in cm of the samples that were used."""
 
     result: TrackedRun
     path: Floats
+    used: slice  # of the samples; a gap ends them, see `camera.gaps`
 
 
 def fit_track(time: Floats, x: Floats, y: Floats, heading_deg: Floats) -> TrackFit:
     """Fit a circle or a line to one track; arrays (m,), in s, cm and degrees."""
-    time = time - time.mean()
-    heading = np.unwrap(np.radians(heading_deg))
+    heading, used = unwrapped(time, np.radians(heading_deg))
+    time, x, y, heading = time[used] - time[used].mean(), x[used], y[used], heading[used]
     rate, middle = np.polyfit(time, heading, 1)
     if abs(rate) * np.ptp(time) < LEAST_TURN:
-        return _line(time, x, y, heading)
+        return _line(time, x, y, heading, used)
     scatter_h = max(float(np.std(heading - rate * time - middle)), 1e-9)
     # On the circle the position is linear in (c_x, c_y, R cos α0, R sin α0) for a given rate.
     drifts = abs(rate) * np.ptp(time) >= 2 * math.pi
@@ -93,10 +96,10 @@ def fit_track(time: Floats, x: Floats, y: Floats, heading_deg: Floats) -> TrackF
         math.degrees(slip_error), float(abs(rate) * radius), speed_error,
         *drifted,
     )  # fmt: skip
-    return TrackFit(result, path(fitted.x).T)
+    return TrackFit(result, path(fitted.x).T, used)
 
 
-def _line(time: Floats, x: Floats, y: Floats, heading: Floats) -> TrackFit:
+def _line(time: Floats, x: Floats, y: Floats, heading: Floats, used: slice) -> TrackFit:
     design = np.stack([np.ones_like(time), time], 1)
     fits, variances = [], []
     for values in (x, y, heading):
@@ -111,7 +114,7 @@ def _line(time: Floats, x: Floats, y: Floats, heading: Floats) -> TrackFit:
     result = TrackedRun(
         theta_deg=math.degrees(slip), theta_error=math.degrees(slip_error), v_cm_s=speed, v_error=error
     )
-    return TrackFit(result, np.stack([design @ fits[0], design @ fits[1]], 1))
+    return TrackFit(result, np.stack([design @ fits[0], design @ fits[1]], 1), used)
 
 
 def _covariance(J: Floats, residual: Floats, parts: int) -> Floats:
@@ -122,15 +125,3 @@ def _covariance(J: Floats, residual: Floats, parts: int) -> Floats:
         variance = float(series @ series) / max(len(series) - J.shape[1] / parts, 1)
         middle += variance * correlation_time(series) * rows.T @ rows
     return np.asarray(inverse @ middle @ inverse)
-
-
-def correlation_time(residual: Floats) -> float:
-    """Compute the integrated autocorrelation time in samples, at least 1 (summed up to its first zero)."""
-    centred = residual - residual.mean()
-    power = np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2
-    correlation = np.fft.irfft(power)[: len(centred)]
-    if correlation[0] <= 0:
-        return 1.0
-    correlation = correlation / correlation[0]
-    end = int(np.argmax(correlation <= 0)) or len(correlation)
-    return float(max(1.0, 1 + 2 * correlation[1:end].sum()))

@@ -21,6 +21,7 @@ import numpy as np
 import pandas as pd
 
 from camera.circle import TrackedRun, TrackFit, fit_track
+from camera.gaps import seen_poses
 from camera.pose_tracks import read_tracks
 from camera.spin import fit_spin
 from camera.track_options import TrackOptions
@@ -142,8 +143,13 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
         if fit is None:
             aside.append(f"run {run}: neither a circle nor a line fits its samples")
             continue
+        if len(fit.path) < len(time):
+            aside.append(
+                f"run {run}: {len(fit.path)} of {len(time)} samples are used, the longest part; how far the robot "
+                "turned in a gap beside it is unknown"
+            )
         tracked[index] = fit.result
-        fitted.append(Track(run, x, side * y, fit))
+        fitted.append(Track(run, x[fit.used], side * y[fit.used], fit))
         spins[index], reasons = _spins(track, table.iloc[index], fit.result.omega_yr_rad_s)
         aside += [f"run {run}: {reason}" for reason in reasons]
     columns = pd.DataFrame([asdict(p) | s for p, s in zip(tracked, spins, strict=True)], index=table.index)
@@ -187,7 +193,10 @@ def _usable(track: pd.DataFrame, run: str, samples: pd.DataFrame, aside: list[st
     elif len(track) < _FEWEST:
         aside.append(f"run {run}: {len(track)} samples; a track needs at least {_FEWEST}")
     else:
-        return track
+        values = track[list(COLUMNS[1:])].to_numpy(dtype=float)
+        seen, lines = seen_poses(values[:, 0], values[:, 1:])
+        aside += [f"run {run}: {line}" for line in lines]
+        return track[seen]
     return None
 
 

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from camera.circle import correlation_time
+from camera.correlation import correlation_time
 from common.arrays import Floats
 
 FRAMES_A_TURN = 4.0  # that a spin needs

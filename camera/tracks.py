@@ -19,6 +19,7 @@ import numpy as np
 from camera.circle import LEAST_TURN, fit_track
 from camera.detector import Detector, Lost, Pose, wrong_distance
 from camera.film import Film
+from camera.gaps import unwrapped
 from camera.learning import learn
 from camera.spin import Spin, aliasing, fit_spin
 from camera.view import DOTS, Markers, Setup, View, opencv
@@ -192,7 +193,8 @@ def _row(pose: Pose, index: int, time: float) -> dict[str, float]:
 
 def turn_sense(table: pd.DataFrame) -> int:
     """Return 1 for a robot that turns to the left all the time, −1 to the right, 0 if it does neither."""
-    heading = np.unwrap(np.radians(table["heading_deg"].to_numpy()))
+    turns, known = unwrapped(table["time_s"].to_numpy(), np.radians(table["heading_deg"].to_numpy()))
+    heading = turns[known]
     halves = np.diff(heading[[0, len(heading) // 2, -1]])
     return int(np.sign(halves[0])) if halves.prod() > 0 and np.abs(halves).min() > LEAST_TURN / 2 else 0
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 import pandas as pd
 
+from camera.gaps import seen_poses
 from camera.pose_tracks import read_tracks
 from camera.track_options import TrackOptions
 from common.arrays import Floats
@@ -38,6 +39,12 @@ _LAB = ("time_s", "x_cm", "y_cm", "heading_deg")  # or in other units
 _LARGEST = 1e6  # l, of a place; time units, of a time
 
 
+class MissedPathError(InputError):
+    """The track misses a part of the declared path."""
+
+    status = 3
+
+
 @dataclass(frozen=True)
 class TrackingError:
     """Errors in tail lengths l, from the declared path; those called raw from the path as given.
@@ -57,6 +64,7 @@ class TrackingError:
     missed: float  # largest distance of a point of the path as given from the track
     declared_missed: float  # largest distance of a point of the declared path from the track
     stated: float  # error that the plan states
+    gaps: tuple[str, ...]  # times without a new pose, in words
     track: Floats = field(repr=False)  # (S, 2) tracked point
     tail_length: float  # of the robot [m]
 
@@ -71,6 +79,7 @@ class TrackingError:
         return missed_words(self.declared_missed, self.stated, self.tail_length) + (
             f"tracking error {rms} rms, {largest} at most, {verdict} the stated error {stated}; from the path as "
             f"drawn {raw_rms} rms, {raw_largest} at most, every point of it within {missed}"
+            + "".join(f"; {line}" for line in self.gaps)
         )
 
 
@@ -91,7 +100,7 @@ def check(
     Returns:
         Distances of the tracked point from the declared path: `rms` and `largest`, with the `stated` error; from
         the path as drawn: `raw_rms` and `raw_largest`; of points of these paths from the track: `declared_missed`
-        and `missed` [l]. `line` says it in words.
+        and `missed` [l]. `gaps` says for how long, beyond a dwell, there is no new pose, `line` all of it.
 
     Raises:
         InputError: the track has no such columns, or values that are not finite.
@@ -133,6 +142,7 @@ def tracking_error(plan: Mapping[str, Any], track: pd.DataFrame) -> TrackingErro
     tracked = planar.compose(poses, offset)[:, :2]
     declared = distance_to(np.array(plan["reference"]), tracked)
     raw = distance_to(np.array(plan["raw_path"]), tracked)
+    seconds, longest = times * plan["robot"]["time_scale_s"], max(plan["dwell_s"])
     weight = np.gradient(times)
     weight = weight / weight.sum()
     return TrackingError(
@@ -143,6 +153,7 @@ def tracking_error(plan: Mapping[str, Any], track: pd.DataFrame) -> TrackingErro
         missed=farthest(np.array(plan["raw_path"]), tracked),
         declared_missed=farthest(np.array(plan["reference"]), tracked),
         stated=float(plan["stated_error_over_l"]),
+        gaps=tuple(seen_poses(seconds, poses, longest)[1]),
         track=tracked,
         tail_length=float(plan["robot"]["tail_length_m"]),
     )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -211,6 +213,52 @@ def test_a_current_drifts_the_circle_and_leaves_its_radius() -> None:
     assert motion["drift_error"] < 0.005
     assert motion["R_yr_cm"] == pytest.approx(measured(still)["R_yr_cm"], rel=1e-3)
     assert np.isnan(measured(track(2, seconds=30.0))["drift_x_cm_s"])  # two thirds of a turn
+
+
+GAPS = {
+    "one": [(15, 90)],
+    "several": [(20, 60), (80, 110), (112, 140)],
+    "almost at the start": [(1, 51)],
+    "almost at the end": [(80, 149)],
+}
+
+
+@pytest.mark.parametrize("frozen", [False, True])
+@pytest.mark.parametrize("gaps", GAPS.values(), ids=GAPS)
+@pytest.mark.parametrize("rate", [0.004, -0.04, RATE, 1.0])
+def test_turns_within_a_gap_are_counted_or_parts_left_out(
+    rate: float, gaps: list[tuple[float, float]], frozen: bool
+) -> None:
+    """Whether poses are missing, or a frozen camera repeats one."""
+    given = track(0, rate=rate, seconds=150.0)
+    for start, end in gaps:
+        inside = (given["time_s"] > start) & (given["time_s"] < end)
+        if frozen:
+            repeated = given.loc[inside, ["x_cm", "y_cm", "heading_deg"]].iloc[0]
+            given.loc[inside, ["x_cm", "y_cm", "heading_deg"]] = repeated.to_numpy()
+        else:
+            given = given[~inside]
+    measured_runs = measure_tracks(given, RUNS.assign(omega_rpm=math.copysign(150.0, rate)))
+    assert measured_runs.table["omega_yr_rad_s"][0] == pytest.approx(rate, rel=0.02)
+    assert measured_runs.table["R_yr_cm"][0] == pytest.approx(RADIUS, rel=0.02)
+    told, *rest = measured_runs.excluded
+    total = sum(end - start for start, end in gaps)
+    words, seconds, share = re.match(r"run 1: (.*) for (\d+) s \((\d+) %", told).groups()  # type: ignore[union-attr]
+    assert words == ("the same pose" if frozen else "no pose")
+    assert abs(int(seconds) - total) < 2
+    assert abs(int(share) - total / 1.5) < 2
+    assert all("samples are used" in line for line in rest)
+
+
+def test_rates_that_disagree_across_a_gap_leave_the_longer_part() -> None:
+    slowing = track(0, rate=0.5, seconds=150.0)
+    fast = slowing["time_s"] < 40
+    slow = track(0, rate=0.4, seconds=150.0)
+    given = pd.concat([slowing[fast], slow[slow["time_s"] > 90]])
+    measured_runs = measure_tracks(given, RUNS.assign(omega_rpm=150.0))
+    assert measured_runs.table["omega_yr_rad_s"][0] == pytest.approx(0.4, rel=0.01)
+    assert "run 1: 299 of 499 samples are used" in measured_runs.excluded[1]
+    assert len(measured_runs.tracks[0].x) == len(measured_runs.tracks[0].fit.path) == 299
 
 
 def test_errors_are_as_large_as_the_scatter_of_repeated_tracks() -> None:

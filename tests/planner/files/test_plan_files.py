@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -14,7 +15,7 @@ import pandas as pd
 import pytest
 
 from camera.pose_tracks import read_tracks
-from common.errors import InputError
+from common.errors import InputError, run_command
 from planner.files.headers import milliseconds
 from planner.files.pictures import draw_plan
 from planner.files.plan_files import write_plan
@@ -172,6 +173,41 @@ def test_a_track_of_a_camera_has_the_error_of_the_same_track_in_tail_lengths() -
     assert f"{1000 * error.rms * CONTROL.tail_length:.3g} mm ({error.rms:.3g} l) rms" in error.line
 
 
+def test_times_without_a_new_pose_are_told() -> None:
+    """A whole track has none, of even or uneven steps; parts that are cut out or repeated are told."""
+    record, track = tracks()
+    assert tracking_error(record, track).gaps == ()
+    times = np.linspace(track["time_bar"].iloc[0], track["time_bar"].iloc[-1], 500)
+    dense = pd.DataFrame({name: np.interp(times, track["time_bar"], track[name]) for name in track})
+    repeated = dense.copy()
+    repeated.loc[200:259, ["x_over_l", "y_over_l", "heading_rad"]] = repeated.iloc[200, 1:].to_numpy()
+    seconds = 60 * np.diff(times)[0] * CONTROL.time_scale
+    for given, words in ((dense.drop(index=range(200, 260)), "no pose"), (repeated, "the same pose")):
+        error = tracking_error(record, given)
+        (line,) = error.gaps
+        assert re.fullmatch(rf"{words} for \d+ s \(12 % of the time\)", line)
+        assert int(line.split()[-7]) == pytest.approx(seconds, abs=4)
+        assert error.line.endswith(f"; {line}")
+
+
+def test_check_of_a_track_that_misses_a_part_ends_with_status_3(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record, track = tracks()
+    json_file, whole, part = (tmp_path / name for name in ("plan.json", "whole.csv", "part.csv"))
+    json_file.write_text(json.dumps(record))
+    track.to_csv(whole, index=False)
+    track.head(len(track) // 2).to_csv(part, index=False)
+    assert run_command(main, ["check", str(json_file), str(whole)]) == 0
+    capsys.readouterr()
+    overlay = tmp_path / "overlay.png"
+    assert run_command(main, ["check", str(json_file), str(part), "--out", str(overlay)]) == 3
+    told = capsys.readouterr()
+    assert told.out.startswith("MISSED a part of the declared path")
+    assert told.err == f"error: {part} misses a part of the declared path\n"
+    assert overlay.exists()
+
+
 def test_tracks_of_another_program_are_read_as_options_say(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -182,7 +218,8 @@ def test_tracks_of_another_program_are_read_as_options_say(
     options: dict[str, Any] = {"written_by": "deeplabcut", "scale": "0.5mm", "fps": 25.0}
     wanted = tracking_error(tracks()[0], read_tracks(file, **options, origin=(900.0, 700.0)).drop(columns="run"))
     words = ["--from", "deeplabcut", "--scale", "0.5mm", "--fps", "25", "--origin", "900", "700"]
-    main(["check", str(json_file), str(file), *words])
+    with pytest.raises(InputError, match="misses a part of the declared path"):
+        main(["check", str(json_file), str(file), *words])
     assert capsys.readouterr() == (f"{wanted.line}\n", f"{file}: 1 of 40 poses are lost\n")
     with pytest.warns(UserWarning, match="1 of 40 poses are lost") as warned:
         assert check(json_file, file, **options, origin=(900.0, 700.0)).rms == wanted.rms
