@@ -101,7 +101,7 @@ def commands_page() -> Iterator[str]:
     """List every command with its help text."""
     os.environ["COLUMNS"] = "100"
     usage = "```text\n{}```".format
-    yield "Bad input ends with one line and exit status 2."
+    yield "Bad input ends with one line and exit status 2; no way to a goal, or a missed part of a path, with 3."
     for word in WORDS:
         yield from (f"## {word}", usage(command(word).parser(f"softflagella {word}").format_help()))
     for package in packages():

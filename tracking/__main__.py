@@ -227,22 +227,25 @@ def _replay(
 
 
 @program.command("check", of="tracking.tracks:check", written_by="from")
-def _check(check: Call, plan: str, *, out: str | None = None) -> None:
+def _check(check: Call, plan: str, track: str, *, out: str | None = None) -> None:
     """Compare a replayed or measured track with the declared path and the stated error of its plan.
+
+    A track that misses a part of the path ends it with exit status 3.
 
     Args:
         out: overlay picture, PNG.
     """
     from planner.files.saved_plan import load_plan
+    from tracking.tracks import MissedPathError, write_overlay
 
     content = load_plan(plan)
-    error = check(plan=content)
+    error = check(plan=content, track=track)
     print(error.line)
     if out is not None:
-        from tracking.tracks import write_overlay
-
         write_overlay(out, content, error)
         print(f"-> {out}")
+    if error.declared_missed > error.stated:
+        raise MissedPathError(f"{track} misses a part of the declared path")
 
 
 if __name__ == "__main__":
