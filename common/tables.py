@@ -199,17 +199,19 @@ def _parse_lines(lines: Sequence[str], where: str, names: bool, separator: str =
         )
     content = [first, *rows]
     long = next((line for line, words in content if any(words[width:])), None)
-    if long is not None:
-        raise InputError(
-            f"{where}: line {long} has more values than columns; if numbers have decimal commas, separate columns "
-            "by semicolons"
-        )
     named = max((i + 1 for i, name in enumerate(columns or ()) if name), default=0)
     longest = max(len(words) for _, words in content)
-    if longest < named:
-        raise InputError(
-            f"{where}: all rows have fewer values ({longest}) than there are columns ({named}); correct the names"
-        )
+    fault = ""
+    if long is not None:
+        commas = "if numbers have decimal commas, separate columns by semicolons"
+        fault = f"line {long} has more values than columns; {commas}"
+    elif longest < named:
+        fault = f"all rows have fewer values ({longest}) than there are columns ({named}); correct the names"
+    if fault or 2 * sum(map(bool, columns or ())) <= max(longest, 2):
+        marks = separator, _separator([line for line in lines if line.strip()][-2:], where)
+        fault = max(_lower_header(lines, top, mark, where) for mark in marks) or fault
+    if fault:
+        raise InputError(f"{where}: {fault}")
     cells = list(zip_longest(*(words[:width] for _, words in content), fillvalue=""))
     check_marks(cells, where, separator)
     table = {
@@ -241,6 +243,27 @@ def _header(lines: Sequence[str], top: int, separator: str, where: str) -> tuple
         words = [_with_unit(name, unit) for name, unit in zip(words, second[1], strict=True)]
         second = _next_row(rows)
     return [plain_text(word) for word in words], chain([second] if second else [], rows)
+
+
+def _lower_header(lines: Sequence[str], top: int, separator: str, where: str) -> str:
+    """Say in which line the header seems to be: below others, and above rows with two numbers or more."""
+    try:
+        rows = list(_rows(lines, top, separator, where))
+    except InputError:
+        return ""
+    columns = [i for i, word in enumerate(rows[-1][1] if rows else ()) if is_number(word)]
+    cells = [[words[i] for i in columns if words[i:] and not is_missing(words[i])] for _, words in rows]
+    data = [len(row[1]) > 1 and bool(n) and all(map(is_number, n)) for n, row in zip(cells, rows, strict=True)]
+    below = data.index(True) if True in data else 0
+    if below < 2 or len(columns) < 2:
+        return ""
+    count = len(rows[below - 1][1])
+    units = sum(find_unit(word) is not None for word in filter(None, rows[below - 1][1]))
+    header = below - (2 if len(rows[below - 2][1]) == count < 2 * units else 1)
+    named = len(cells[header]) == len(columns) and not any(map(is_number, cells[header]))
+    if header < 1 or not named or not all(map(is_number, chain(*cells[below:]))):
+        return ""
+    return f"the header seems to be in line {rows[header][0]}: delete the lines above it"
 
 
 def _next_row(rows: Iterator[Row]) -> Row | None:

@@ -85,19 +85,20 @@ function parseWords(bytes, where) {
   if (!rows.length) throw new InputError(`${where} has no rows; give at least one below the header`);
   const width = names === null ? rows[0].words.length : names.length;
   const long = rows.find(({ words }) => words.slice(width).some((word) => word));
-  if (long) {
-    throw new InputError(
-      `${where}: line ${long.line} has more values than columns; if numbers have decimal commas, separate columns by `
-      + "semicolons",
-    );
-  }
   const last = (names ?? []).reduce((most, name, i) => (name ? i + 1 : most), 0);
   const longest = rows.reduce((most, { words }) => Math.max(most, words.length), 0);
-  if (longest < last) {
-    throw new InputError(
-      `${where}: all rows have fewer values (${longest}) than there are columns (${last}); correct the names`,
-    );
+  let fault = "";
+  if (long) {
+    const commas = "if numbers have decimal commas, separate columns by semicolons";
+    fault = `line ${long.line} has more values than columns; ${commas}`;
+  } else if (longest < last) {
+    fault = `all rows have fewer values (${longest}) than there are columns (${last}); correct the names`;
   }
+  if (fault || 2 * (names ?? []).filter((name) => name).length <= Math.max(longest, 2)) {
+    const last = separatorOf(lines.filter((line) => line.trim()).slice(-2), where);
+    fault = lowerHeader(lines, top, separator, where) || lowerHeader(lines, top, last, where) || fault;
+  }
+  if (fault) throw new InputError(`${where}: ${fault}`);
   const cells = Array.from({ length: width }, (_, i) => rows.map(({ words }) => words[i] ?? ""));
   checkMarks(cells, where, separator);
   const kept = cells.flatMap((words, i) => (names === null || names[i] || words.some((word) => word) ? [i] : []));
@@ -132,6 +133,21 @@ function header(lines, top, separator, where) {
     second = next(second + 1);
   }
   return { names: names.map(plainText), rows: rows.slice(second) };
+}
+
+/* Say in which line the header seems to be: below others, and above rows with two numbers or more. */
+function lowerHeader(lines, top, separator, where) {
+  const rows = refusing(() => rowsOf(lines, top, separator, where), () => []);
+  const columns = [...(rows.at(-1)?.words ?? []).entries()].flatMap(([i, word]) => (isNumber(word) ? [i] : []));
+  const cells = rows.map(({ words }) => columns.flatMap((i) => (isMissing(words[i] ?? "") ? [] : [words[i]])));
+  const below = cells.findIndex((given, k) => rows[k].words.length > 1 && given.length && given.every(isNumber));
+  if (below < 2 || columns.length < 2) return "";
+  const count = rows[below - 1].words.length;
+  const units = rows[below - 1].words.filter((word) => word && findUnit(word) !== null).length;
+  const header = below - (rows[below - 2].words.length === count && count < 2 * units ? 2 : 1);
+  const named = cells[header].length === columns.length && !cells[header].some(isNumber);
+  if (header < 1 || !named || !cells.slice(below).flat().every(isNumber)) return "";
+  return `the header seems to be in line ${rows[header].line}: delete the lines above it`;
 }
 
 function isComment(words) {

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 KINDS = {  # of files that are neither tables nor drawings: their endings, and how they begin
     "GeoJSON": ("geojson topojson",
                 r'\{[\s\S]*?"type"\s*:\s*"(?:Feature|Topology|Geometry|(?:Multi)?(?:Point|Line|Poly))'),
-    "a path of PathPlanner": ("path", r'\{[\s\S]*?"waypoints"\s*:\s*\[\s*\{\s*"anchor'),
+    "a path of PathPlanner": ("", r'\{[\s\S]*?"waypoints"\s*:\s*\[\s*\{\s*"anchor'),
     "a bag of ROS": ("bag db3 mcap", r"#ROSBAG|SQLite format 3|\x89MCAP"),
     "a map of ROS": ("", r"(?:[^\n]*\n)*?(?:image|resolution):\s"),
     "the picture of a map of ROS": ("pgm pbm ppm", r"P[1-6]\s+(?:#[^\n]*\n\s*)*\d+\s+\d+\s"),

@@ -109,8 +109,47 @@ def test_what_is_no_table_or_could_be_two_is_refused(text: str, words: str, tmp_
     assert "\n" not in str(refusal.value)
 
 
+ETHOVISION = (
+    '\ufeff"Number of header lines:";"8";\n"Experiment";"Exp 1";\n"Trial name";"Trial     1";\n"Trial ID";"1";\n'
+    '"Start time";"12/3/2013 13:52:31.467";\n\n"Trial time";"X center";"Y center";"Area";\n"s";"cm";"cm";"cm²";\n'
+    '0;"-";"-";"-";\n0.04;10.1;3.2;4.5;\n0.08;10.3;3.4;4.6;\n'
+)
+LABVIEW = (
+    "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t,\nTime\t16:21:22,319\n***End_of_Header***\t\n\t\n"
+    "Channels\t2\t\t\nSamples\t3\t3\t\nY_Unit_Label\tV\tV\nX0\t0,00E+0\t0,00E+0\nDelta_X\t0,1\t0,1\t\n"
+    "***End_of_Header***\t\t\t\nX_Value\tx_cm\ty_cm\tComment\n0,0\t0,9\t1,5\t\n0,1\t1,4\t1,5\n"
+)
+TITLED = [  # and the line of the header
+    ("Versuch 3\nx_cm;y_cm\n0;0,5\n10;1\n", 2),
+    ("Versuch 3;\nx_cm;y_cm\n0;0\n10;1\n", 2),
+    ("Path of the robot\nx_cm,y_cm\n0,0\n10,1\n", 2),
+    ("Path\nx_cm\ty_cm\n0\t0\n10\t1\n", 2),
+    ("2026\nx_cm,y_cm\n0,0\n10,1\n", 2),
+    ("Tank A\nby me, on Monday\n\nrun,x,y\n,cm,cm\na,0,0\nb,10,1\n", 4),
+    (";Robot;\nt_s;x_cm;y_cm\n0;0;0\n1;10;1\n", 2),
+    ("Name:,Robert\nFrames:,30\nt_s,x_cm,y_cm\n0,0,0\n1,2,3\n", 3),
+    (ETHOVISION, 7),
+    (LABVIEW, 13),
+]
+
+
+@pytest.mark.parametrize(("text", "line"), TITLED)
+def test_lines_above_the_header_are_to_be_deleted(text: str, line: int, tmp_path: Path) -> None:
+    words = f"table: the header seems to be in line {line}: delete the lines above it"
+    with pytest.raises(InputError, match=words):
+        parse_table(text.encode(), "table", names=False)
+    below = "\n".join(text.splitlines()[line - 1 :])
+    assert parse_table(below.encode(), "table", names=False).shape[1] > 1
+    sheet(tmp_path / "titled.xlsx", [["Path of the robot", None], [], ["x_cm", "y_cm"], [0, 0], [10, 1]])
+    with pytest.raises(InputError, match="header seems to be in line 3"):
+        read_table(tmp_path / "titled.xlsx")
+
+
 NAN = float("nan")
 READ = {
+    "a row of words below the names": ("x,y\nleft,up\n1,2\n", {"x": ["left", "1"], "y": ["up", "2"]}),
+    "words below one name": ("x,\nleft,up\nright,2\n", {"x": ["left", "right"], "column 2": ["up", "2"]}),
+    "a note of words and numbers": ("note\na,b\nc,5\n", {"note": ["a,b", "c,5"]}),
     "a separator within quotes": ('"marker, note",x\n"a, b",0\n', {"marker, note": ["a, b"], "x": [0]}),
     "a comma before the unit": ("time, s;x, cm\n0,5;1\n", {"time, s": [0.5], "x, cm": [1]}),
     "the error of a formula": ("x,y\n#N/A,1\n#DIV/0!,2\n", {"x": [NAN, NAN], "y": [1, 2]}),

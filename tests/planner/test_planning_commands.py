@@ -246,7 +246,7 @@ def test_another_robot_carries_out_a_plan_and_its_tracking_error_is_told(
     output = capsys.readouterr()
     assert "replay:" not in output.err
     told = output.out.splitlines()[-1]
-    assert run_command(main, ["check", *words[:1], words[2]]) == 0
+    assert run_command(main, ["check", *words[:1], words[2]]) == 3
     assert capsys.readouterr().out.splitlines() == [told]
     track = pd.read_csv(tmp_path / "track.csv")[["time_s", "x_cm", "y_cm", "heading_deg"]]
     assert tracking_error(result.to_dict(), track).line == told

@@ -13,7 +13,7 @@ from common.errors import InputError
 from common.quantities import numbers_of
 from common.tables import parse_table
 from planner.paths.path_files import ADVICE, READERS, read_path
-from tests.common.test_tables import READ, REFUSED, TEXTS
+from tests.common.test_tables import READ, REFUSED, TEXTS, TITLED
 from tests.planner.page.page_core import (
     EXACT,
     FOLDER,
@@ -44,7 +44,7 @@ TABLES = [
     b"x,y,\n1,2,\n3,4\n", b"x y z\n 1 \"a b\" 3\n", b"x;y\n'=1+1;'-a\n''=b;-3\n", b"x,x_1\n1.200,300\n",
 ]  # fmt: skip
 BAD_TABLES = [
-    *(text.encode() for text, _ in REFUSED), b"\n\n", b"x,y\n1,2,3\n4,5,6,7\n", b'x,y\n"1"2,3\n',
+    *(text.encode() for text, _ in (*REFUSED, *TITLED)), b"\n\n", b"x,y\n1,2,3\n4,5,6,7\n", b'x,y\n"1"2,3\n',
     b"x;y\n1 200;1\n", "x;y\n1\u202f200,5;1\n".encode(), b"'=x,'=x\n1,2\n", b"x\ty\n1 2\n3 4\n",
 ]  # fmt: skip
 PATHS = [
@@ -107,7 +107,7 @@ KINDS = {
     "PDF": ["%PDF-1.7"], "a picture": ["\x89PNG\r\n", "\xff\xd8\xff\xe0"],
 }  # fmt: skip
 ENDINGS = {"a.geojson": "GeoJSON", "a.gpx": "GPX", "a.GCODE": "G-code", "a.wkt": "WKT", "a.dxf": "DXF",
-           "a.svgz": "a drawing", "a.mcap": "a bag of ROS", "a.path": "a path of PathPlanner"}  # fmt: skip
+           "a.svgz": "a drawing", "a.mcap": "a bag of ROS"}  # fmt: skip
 
 
 def test_files_of_other_kinds_are_refused_by_name() -> None:

@@ -111,6 +111,12 @@ def test_pathplanner_is_followed_along_its_curves(anchor: str, tmp_path: Path) -
     assert "not a path of PathPlanner" in refused(tmp_path, "a.path", '{"waypoints": [{"anchor": {}}]}')
 
 
+def test_a_path_of_pathweaver_is_a_table(tmp_path: Path) -> None:
+    rows = "0.8,3.9,2.4,0.0,true,false,\n4.6,3.0,1.1,0.9,true,false,\n"
+    drawing = written(tmp_path, "a.path", f"X,Y,Tangent X,Tangent Y,Fixed Theta,Reversed,Name\n{rows}")
+    assert drawing.path.points.tolist() == [[0.8, 3.9], [4.6, 3.0]]
+
+
 def features(*parts: tuple[str, Any], **more: Any) -> str:
     shapes = [{"type": kind, "coordinates": places} for kind, places in parts]
     found = [{"type": "Feature", "id": f"f{k}", "geometry": shape} for k, shape in enumerate(shapes)]
