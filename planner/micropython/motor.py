@@ -9,6 +9,7 @@ from machine import PWM, Pin
 
 PLUS_PIN, MINUS_PIN = 14, 15  # inputs for directions +1 and -1: one carries the PWM, the other is low
 DUTY = 65535  # of the PWM, 0 to 65535: set it so that the motor has the speed of the plan
+LATEST_MS = 65536  # a flip that is later is none
 DIRECTIONS = {"F": 1, "B": -1, "S": 0}
 
 plus, minus = (PWM(Pin(pin), freq=1000, duty_u16=0) for pin in (PLUS_PIN, MINUS_PIN))
@@ -39,7 +40,7 @@ def swim(turn=turn):
     """Carry out the schedule; stop at its end, at an error and at Ctrl-C.
 
     A dwell begins where the one before ends, so late flips do not add up. Where a dwell has several entries, each
-    shorter than 66 s, `turn` is called again with the same direction.
+    shorter than 66 s, `turn` is called again with the same direction. No wait is longer than its entry.
     """
     if sum(map(entry, range(schedule.COUNT))) != schedule.TOTAL_MS:
         raise ValueError("schedule.py is damaged; copy it again")
@@ -50,8 +51,14 @@ def swim(turn=turn):
                 if ms:
                     turn(direction)
                 flip = time.ticks_add(flip, ms)
-                while time.ticks_diff(flip, time.ticks_ms()) > 0:
-                    time.sleep_ms(time.ticks_diff(flip, time.ticks_ms()))
+                while True:
+                    now = time.ticks_ms()
+                    wait = time.ticks_diff(flip, now)
+                    if not -LATEST_MS < wait <= ms:  # the clock began anew where ticks_diff does not expect it
+                        flip, wait = time.ticks_add(now, ms), ms
+                    if wait <= 0:
+                        break
+                    time.sleep_ms(wait)
                 direction = -direction
             if not schedule.REPEATS:
                 direction = 0
@@ -69,7 +76,7 @@ def obey(turn=turn):
             if order in DIRECTIONS:
                 turn(DIRECTIONS[order])
                 heard = time.ticks_ms()
-            elif time.ticks_diff(time.ticks_ms(), heard) >= 1000:
+            elif not 0 <= time.ticks_diff(time.ticks_ms(), heard) < 1000:
                 turn(0)
     finally:
         turn(0)

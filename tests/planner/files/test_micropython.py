@@ -42,7 +42,7 @@ def run(
     modules: Path,
     name: str,
     *words: str,
-    first: int = 0,
+    first: int | str = 0,
     late: int = 0,
     until: int = ENDLESS,
 ) -> tuple[np.ndarray, list[str]]:
@@ -89,6 +89,24 @@ def test_the_motor_flips_when_the_plan_says(
     assert after.max() <= 2 * late  # the first flip waits for the motor's start
 
 
+@pytest.mark.parametrize("before", [100, 3000, 61_500, 200_000])
+@pytest.mark.parametrize("kind", ["4294967", "4294967:plain", "1073741824:plain"])
+def test_a_clock_that_starts_anew_elsewhere_delays_by_one_entry_at_most(
+    kind: str, before: int, python: tuple[str, ...], tmp_path: Path
+) -> None:
+    """In short entries and in those of a dwell of two minutes."""
+    result = with_dwells(once(), np.array([3.5, 2.5, 130.0, 2.0] * 3) / once().robot.time_scale)
+    modules = write_micropython(result, tmp_path / "modules")
+    first = int(kind.partition(":")[0]) - before
+    events, further = run(python, modules, "swim", first=f"{first}:{kind}", late=1)
+    turns, flips = turns_of(events), np.round(1000 * np.cumsum(result.seconds)).astype(int)
+    assert further == []
+    after = np.array([time for time, _ in turns]) - [0, *flips]
+    assert len(turns) == len(result.dwells) + 1
+    assert after.min() >= 0
+    assert after.max() <= max(milliseconds(result.seconds)) + 10
+
+
 def test_a_plan_that_repeats_goes_on_until_it_is_stopped(python: tuple[str, ...], tmp_path: Path) -> None:
     result = laps()
     modules = write_micropython(result, tmp_path / "modules")
@@ -129,10 +147,11 @@ def test_orders_turn_the_motor_and_silence_stops_it(python: tuple[str, ...], tmp
     """Other bytes are ignored, and do not count as orders; before the first order the motor is at rest."""
     modules = write_micropython(laps(), tmp_path / "modules")
     words = ["100", "x\r\nF\n", "900", "F\n", "1500", "B\n", "2000", "S\n", "2300", "B\nF", "2600", "?\n\n"]
-    expected = [(0, 0), (100, 1), (1500, -1), (2000, 0), (2300, 1), (3300, 0)]
-    for first in (0, 2**30 - 2800):
+    expected = [(0, 0), (100, 1), (1500, -1), (2000, 0), (2300, 1)]
+    anew = f"{2**32 // 1000 - 2900}:{2**32 // 1000}"  # elsewhere than expected: stops earlier
+    for first, silence in ((0, 3300), (2**30 - 2800, 3300), (anew, 2900)):
         events, _ = run(python, modules, "obey", *words, first=first, until=6000)
-        assert turns_of(events) == expected
+        assert turns_of(events) == [*expected, (silence, 0)]
 
 
 def test_the_first_test_turns_at_plus_one(python: tuple[str, ...], tmp_path: Path) -> None:

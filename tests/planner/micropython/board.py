@@ -1,15 +1,17 @@
 """A pretended board, for CPython and MicroPython: it prints milliseconds, pin and duty at each change of a pin.
 
-    board.py FUNCTION FIRST LATE UNTIL [TIME ORDERS]…
+    board.py FUNCTION FIRST[:RESTART[:plain]] LATE UNTIL [TIME ORDERS]…
 
-The clock begins at FIRST and starts anew at 2**30, as those of most boards. A sleep takes up to LATE ms more. At
+The clock begins at FIRST and starts anew at RESTART, or 2**30, as those of most boards; plain: differences of its
+times do not wrap. A sleep takes up to LATE ms more. At
 UNTIL comes Ctrl-C. From the serial port come ORDERS at their times.
 """
 
 import sys
 
 PERIOD = 1 << 30
-function, first, late, until, *words = sys.argv[1:]
+function, clock_words, late, until, *words = sys.argv[1:]
+first, restart, plain, *_ = (clock_words + "::").split(":")
 orders = [(int(time), order) for time, text in zip(words[::2], words[1::2]) for order in text]  # noqa: B905
 pins = {}
 
@@ -24,7 +26,7 @@ class Ticks:
         self.now = 0
 
     def ticks_ms(self):
-        return (int(first) + self.now) % PERIOD
+        return (int(first) + self.now) % int(restart or PERIOD)
 
     def ticks_add(self, ticks, ms):
         assert 0 <= ticks < PERIOD
@@ -33,6 +35,8 @@ class Ticks:
     def ticks_diff(self, end, start):
         assert 0 <= start < PERIOD
         assert 0 <= end < PERIOD
+        if plain:
+            return end - start
         return (end - start + PERIOD // 2) % PERIOD - PERIOD // 2
 
     def sleep_ms(self, ms):
