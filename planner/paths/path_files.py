@@ -199,14 +199,15 @@ def _read_columns(source: Path) -> NamedPaths:
     Raises:
         InputError: the table has no x and y, only one of them has a unit, or a value is no number.
     """
+    from pandas import Series
+
     from common.quantities import numbers_of  # these load pandas, and a drawing or a circle needs none of it
     from common.tables import read_table
 
     table = read_table(source, names=False)
     if columns := _of_bag(table):
-        poses = (
-            table[columns].apply(numbers_of).to_numpy(dtype=float).reshape(len(table), 2, -1).transpose(0, 2, 1)
-        )
+        numbers = numbers_of(Series(table[columns].to_numpy().ravel())).to_numpy()
+        poses = numbers.reshape(len(table), 2, -1).transpose(0, 2, 1)
         return of_messages([each[np.isfinite(each).all(axis=1)] for each in poses])
     if all(isinstance(column, int) for column in table):
         names, units = list(table.columns[:2]), []
