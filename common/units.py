@@ -96,6 +96,7 @@ _SPELLINGS = {  # other spellings of units, after signs have become underscores
     "-": "1", "": "1",
 }  # fmt: skip
 _MOST_PARTS = max(len(suffix.split("_")) for suffix in UNITS)  # of a suffix
+_KINEMATIC = re.compile(r"(?:^|[_ \[(])(?:c?St|[cm]?m(?:\^?2|²)(?:[_/]s|[_ ]?s(?:\^-|⁻)[1¹]))[\])]?$")
 _SIGNS = str.maketrans({"°": "deg", "º": "deg", "µ": "u", "μ": "u", "/": "_", "·": "_", "*": "_", " ": "_",
                         "⁻": "^-", "¹": "1", "−": "-"})  # fmt: skip
 
@@ -139,6 +140,13 @@ def number_and_unit(words: str, units: Collection[str] = LENGTHS) -> tuple[float
 def of_kind(kind: str) -> list[str]:
     """List the suffixes of the units of a kind, such as "length"."""
     return [suffix for suffix, unit in UNITS.items() if unit.kind == kind]
+
+
+def kinematic_words(name: str) -> str:
+    """Say what to give instead of a kinematic viscosity, if the unit of a name is of one; otherwise nothing."""
+    if not _KINEMATIC.search(name.strip()):
+        return ""
+    return "is a kinematic viscosity; give viscosity_mPa_s: cSt (mm²/s) times the density of the liquid in g/cm³"
 
 
 def to_si(value: Any, suffix: str) -> Any:

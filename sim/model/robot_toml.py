@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from common.errors import InputError
-from common.units import UNITS, from_si, of_kind, split, to_si
+from common.units import UNITS, from_si, kinematic_words, of_kind, split, to_si
 from sim.model.entries import ENTRIES, Entry
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
@@ -102,6 +102,8 @@ def check_keys(names: Iterable[str], option: str) -> None:
         table, _, key = name.rpartition(".")
         if name == "name" or table == "effects" or _entry(table, key.removesuffix(_SIGMA)):
             continue
+        if kinematic := kinematic_words(key.removesuffix(_SIGMA)):
+            raise InputError(f"{option} {name} {kinematic}")
         within = [each for each in known if key in each]
         near = within if 0 < len(within) <= 3 else difflib.get_close_matches(name, known, 3, 0.5)
         hint = f"is it {' or '.join(near)}?" if near else f"there are {', '.join(known)} and effects.NAME"
@@ -148,6 +150,8 @@ def _entry(table: str, key: str) -> Entry | None:
 def _unknown(table: str, key: str) -> str:
     """Say what is wrong with a key: it has no unit, or there is no such number; tell the nearest entry."""
     quantity = key.removesuffix(_SIGMA)
+    if kinematic := kinematic_words(quantity):
+        return f"[{table}] {key} {kinematic}"
     for entry in ENTRIES:
         if entry.unit and (table, quantity) == (entry.table, entry.quantity):
             units = ", ".join(entry.with_unit(suffix) for suffix in of_kind(UNITS[entry.unit].kind))
