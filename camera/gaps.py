@@ -42,15 +42,12 @@ def seen_poses(time: Floats, poses: Floats, least: float = 0.0) -> tuple[NDArray
     frozen = held > long
     totals = {"no pose": missing[missing > long].sum(), "the same pose": held[frozen].sum()}
     told = {words: total for words, total in totals.items() if total > _LEAST * whole}
-    if "the same pose" in told:
-        new |= ~np.repeat(frozen, ends - starts + 1)
-    else:
-        new[:] = True
+    kept = new | ~np.repeat(frozen, ends - starts + 1) | ("the same pose" not in told)
     lines = [
         f"{words} for {total:.{0 if total >= 10 else 1}f} s ({100 * total / whole:.0f} % of the time)"
         for words, total in told.items()
     ]
-    return new, lines
+    return kept, lines
 
 
 def unwrapped(time: Floats, heading: Floats) -> tuple[Floats, slice]:

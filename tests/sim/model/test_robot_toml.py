@@ -122,7 +122,7 @@ REFUSALS = {
     "misspelt": ("length_cm = 9", "lenght_cm = 9", "unknown entry [tails] lenght_cm; is it [tails] length_cm?"),
     "no such unit": ("speed_rpm = 90", "speed_V = 6", "unknown entry [motor] speed_V; is it [motor] speed_rpm?"),
     "another table": ("C_t = 3.0", "C_t = 3.0\nlength_mm = 16", "[drag] length_mm; is it [head] length_mm?"),
-    "cSt": ("viscosity_cP", "viscosity_cSt", "[fluid] viscosity_cSt is a kinematic viscosity; give viscosity_mPa_s"),
+    "cSt": ("viscosity_cP", "viscosity_cSt", "[fluid] viscosity_cSt is a kinematic viscosity; give"),
     "mm²/s": ("viscosity_cP", "kinematic_viscosity_mm2_s", "(mm²/s) times the density of the liquid in g/cm³"),
     "misspelt table": ("[motor]", "[moter]", "unknown entry [moter] speed_rpm; is it [motor] speed_rpm?"),
     "a correction": ("[motor]", "[correction]\nlow = [2]\n[motor]", "[correction] is no longer read; calibrate"),
