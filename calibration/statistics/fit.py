@@ -438,7 +438,7 @@ def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
             break
         if (count > _STEPS_TO_TARGET and not solved) or skipped("more steps of some fits"):
             break
-        in_valley = step.damping > 0 and count > _TRIED and solved and target == math.inf
+        in_valley = step.damping > 0 and count > _TRIED and solved  # elsewhere to bend costs more than it gains
         if in_valley:
             step = problem.bent(point, share, step)
         short = not in_valley and bool(np.abs(step.change).max() <= _SHORT)
