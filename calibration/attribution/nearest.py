@@ -218,7 +218,7 @@ def adopt_nearest(
             tried[candidate.effect.name] = replace(candidate, judgement=Judgement.NOT_SOLVED)
             continue
         b = _birge(study, forms[-1][1])
-        if len(forms) > 1 and _restricted(study, constant, b) - _restricted(study, forms[1][1], b) <= _DIFFERS:
+        if len(forms) > 1 and not _sizes_differ(study, candidate.effect, constant, forms[1][1], b):
             forms.pop()
         judged = [_judged(study, base, candidate.effect, *form) for form in reversed(forms)]
         adopted += [form for form in judged if form][:1]
@@ -293,7 +293,7 @@ def _with_spread(study: Study, constant: Fit, effect: Parameter) -> tuple[Shifte
     departures = [s.parameter.name for s in varying(study.model, effect, spread).shifts]
     start = {**constant.parameters, **dict.fromkeys(departures, 0.0)}
     if logarithmic:
-        start[effect.name] = max(start[effect.name], effect.typical / 100)
+        start[effect.name] = math.copysign(max(abs(start[effect.name]), effect.typical / 100), start[effect.name])
     names = (*constant.names, *departures)
     b = _birge(study, constant)
     for _ in range(_ROUNDS):
@@ -307,6 +307,13 @@ def _with_spread(study: Study, constant: Fit, effect: Parameter) -> tuple[Shifte
         if settled or spread == least or spent():
             break
     return model, fitted, spread
+
+
+def _sizes_differ(study: Study, effect: Parameter, constant: Fit, varied: Fit, b: float) -> bool:
+    """Tell whether the restricted likelihood gains by sizes that differ, both integrated over the same scale."""
+    logarithmic = next(p for p in varied.fitted if p.name == effect.name).logarithmic
+    scale = 2 * math.log(abs(constant.parameters[effect.name])) if logarithmic else 0.0
+    return _restricted(study, constant, b) + scale - _restricted(study, varied, b) > _DIFFERS
 
 
 def _likeliest_spread(study: Study, fitted: Fit, departures: Sequence[str], b: float, least: float) -> float:

@@ -503,8 +503,8 @@ def bounded_step(fitted: Sequence[Parameter], parameters: Parameters, normal: Fl
 def room(fitted: Sequence[Parameter], parameters: Parameters) -> tuple[Floats, Floats]:
     """Compute how far parameters are from their bounds, on their scales: (p,) below 0, and above."""
     with np.errstate(divide="ignore"):  # the logarithm of a bound at 0
-        ends = [[p.change(parameters[p.name], np.float64(p.bounds[i])) for p in fitted] for i in (0, 1)]
-    return np.array(ends[0]), np.array(ends[1])
+        ends = np.sort([p.change(parameters[p.name], np.array(p.bounds)) for p in fitted], axis=-1)
+    return ends[:, 0], ends[:, 1]
 
 
 def birge(runs: Runs, fitted: Fit, used: Flags) -> float:
