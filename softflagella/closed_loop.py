@@ -74,8 +74,8 @@ def calibrate(
         held_out: NAME, a session that is held out for the test, or a column that says so of each run (default: the
             middle session).
         noise: say that neither repeats nor stated errors tell the noise of a run; nothing is claimed then. In
-            Python also the standard deviation of one run for each output, {"v": 0.02}: relative where ratios are
-            compared.
+            Python also the standard deviation of one run for each output, {"v": "2 %"}; in the unit of the
+            output where differences are compared.
         notes: COL, a column in which runs may differ without the model's knowledge; columns that are not named
             then are not looked at (default: all others).
         max_seconds: of processor time for the search (default 90, with laws 180). The verdict then is provisional,

@@ -4,76 +4,144 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, fields, replace
 from functools import partial
-from typing import Any, Literal
+from numbers import Real
+from typing import Any, Literal, Self
 
 from calibration.statistics.checks import names_once
 from calibration.statistics.statistical_model import Parameter
 from common.errors import InputError
+from sim.model.uncertainty import parse_sigma
 
 Function = Callable[[Mapping[str, Any], Mapping[str, float]], Mapping[str, Any]]  # columns, parameters -> outputs
 _WIDE = 1000.0  # factor to the ends of the range of a number for which none is given
 
 
+class _Declared:
+    """What is declared: a unit and what follows it have their keywords."""
+
+    unit: str
+
+    def __new__(cls, *given: object, **_: object) -> Self:
+        """Refuse what is given by its place alone where it needs its keyword."""
+        first = [each.name for each in fields(cls) if not each.kw_only]  # type: ignore[arg-type]
+        if len(given) > len(first):
+            raise InputError(
+                f"sf.{_public(cls)}({', '.join(first)}, …): the further value {given[len(first)]!r} needs its "
+                f"keyword, as in unit={given[len(first)]!r}"
+            )
+        return super().__new__(cls)
+
+    def _tidy(self, of: str, numbers: Sequence[str] = (), *, needed: Sequence[str] = ()) -> None:
+        """Refuse a unit that is no text, and numbers that are none; without a unit it is 1."""
+        if not isinstance(self.unit, str):
+            raise InputError(f'{of}: unit {self.unit!r}; give a text such as "m/s", or leave it out')
+        object.__setattr__(self, "unit", self.unit.strip() or "1")
+        for name in (*needed, *numbers):
+            value = getattr(self, name)
+            if not (isinstance(value, Real) or (value is None and name not in needed)):
+                raise InputError(f"{of}: {name} {value!r}; give a number")
+
+
+def _public(kind: type) -> str:
+    return kind.__name__.removeprefix("Model")
+
+
 @dataclass(frozen=True)
-class Output:
+class Output(_Declared):
     """What was measured, in a column of the same name.
 
     Example:
         >>> import softflagella as sf
-        >>> sf.Output("speed", "m/s").kind
+        >>> sf.Output("speed", unit="m/s").kind
         'ratio'
     """
 
     title: str  # in words
+    _: KW_ONLY
     unit: str = "1"
     kind: Literal["ratio", "difference"] = "ratio"  # "difference" for angles and for values that change sign
-    sigma: float | None = None  # standard deviation of one run, if it is known: relative for a ratio
+    # Standard deviation of one run, if it is known: a text like "2 %" for a ratio; for a difference, in its unit.
+    sigma: float | str | None = None
     unit_checked: bool = False  # a session that reads 10, 60, … times as much as others is right
 
     def __post_init__(self) -> None:
         if self.kind not in ("ratio", "difference"):
             raise InputError(f"output {self.title!r}: kind {self.kind!r}; give 'ratio' or 'difference'")
-        _refuse_negative(f"output {self.title!r}", self.sigma)
+        self._tidy(f"output {self.title!r}")
+        if self.sigma is not None:
+            self.deviation(self.sigma, f"output {self.title!r}: sigma")
+
+    def deviation(self, sigma: float | str, entry: str) -> float:
+        """Read a standard deviation of one run, relative for a ratio; `entry` names its place."""
+        size, relative = parse_sigma(sigma, entry)
+        if relative != (self.kind == "ratio"):
+            meant = f"a number in {self.unit}" if relative else 'a share, such as "2 %"'
+            raise InputError(f"{entry} {sigma!r}: this output is compared as a {self.kind}; give {meant}")
+        _refuse_no_deviation(entry, size)
+        return size
 
 
 @dataclass(frozen=True)
-class Number:
+class Number(_Declared):
     """A number of the model, which is fitted; on a logarithmic scale if it is positive.
 
     Example:
         >>> import softflagella as sf
-        >>> sf.Number("viscosity", 1.0, "Pa s", low=0.01, high=100).parameter.logarithmic
+        >>> sf.Number("viscosity", 1.0, unit="Pa s", low=0.01, high=100).parameter.logarithmic
         True
     """
 
     name: str  # in the function's parameters
     start: float  # the value as given
+    _: KW_ONLY
     unit: str = "1"
     low: float | None = None  # least value; default: a thousandth of the start
     high: float | None = None  # largest value; default: a thousand times the start
     title: str | None = None  # in words; default: the name
-    sigma: float | None = None  # of a number that is known to a tolerance: relative if low is above 0
+    sigma: float | str | None = None  # of a number known to a tolerance: in its unit, or "1 %" of the start
 
     def __post_init__(self) -> None:
-        _refuse_outside(self.name, "start", self.start, self.parameter.bounds)
-        _refuse_negative(self.name, self.sigma)
+        self._tidy(self.name, ("low", "high"), needed=("start",))
+        bounds = self._bounds
+        _refuse_outside(self.name, "start", self.start, bounds)
+        if (sigma := self._deviation) is None:
+            return
+        _refuse_no_deviation(f"{self.name}: sigma", sigma)
+        if bounds[0] > 0 and sigma > self.start:
+            raise InputError(
+                f"{self.name}: sigma {self.sigma!r} is more than the number itself, {self.start:g}; give it in "
+                f'{self.unit}, or as a share, such as "1 %"; without sigma the number is free'
+            )
+
+    @property
+    def _bounds(self) -> tuple[float, float]:
+        size = abs(self.start) or 1.0
+        low, high = (size / _WIDE, size * _WIDE) if self.start > 0 else (-size * _WIDE, size * _WIDE)
+        return low if self.low is None else self.low, high if self.high is None else self.high
+
+    @property
+    def _deviation(self) -> float | None:
+        """The standard deviation in the unit of the number."""
+        return None if self.sigma is None else parse_sigma(self.sigma, f"{self.name}: sigma").of(self.start)
 
     @property
     def parameter(self) -> Parameter:
         """The number as the calibration has it."""
-        size = abs(self.start) or 1.0
-        low, high = (size / _WIDE, size * _WIDE) if self.start > 0 else (-size * _WIDE, size * _WIDE)
-        low, high = low if self.low is None else self.low, high if self.high is None else self.high
+        sigma, (low, high) = self._deviation, self._bounds
+        if low > 0:  # on a logarithmic scale
+            sigma, typical = sigma and sigma / self.start, 1.0
+        else:
+            typical = sigma or abs(self.start) or 1.0
         return Parameter(
-            self.name, self.title or self.name, self.start, (low, high), 1.0 if low > 0 else self.sigma or size,
-            logarithmic=low > 0, unit=self.unit, sigma=self.sigma,
+            self.name, self.title or self.name, self.start, (low, high), typical,
+            logarithmic=low > 0, unit=self.unit, sigma=sigma,
         )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class ModelEffect:
+class ModelEffect(_Declared):
     """What a model may lack, `sf.Effect`; at its null the function is the model without it.
 
     Example:
@@ -84,6 +152,7 @@ class ModelEffect:
 
     name: str  # in the function's parameters
     title: str  # in words
+    _: KW_ONLY
     low: float  # least size
     high: float  # largest size
     unit: str = "1"
@@ -93,6 +162,7 @@ class ModelEffect:
     plausible: tuple[float, float] | None = None  # sizes that its source allows; default: all
 
     def __post_init__(self) -> None:
+        self._tidy(self.name, ("typical", "theory"), needed=("low", "high", "null"))
         for what in ("null", "theory"):
             if (value := getattr(self, what)) is not None:
                 _refuse_outside(self.name, what, value, (self.low, self.high))
@@ -103,7 +173,7 @@ class ModelEffect:
         of_theory = 0.0 if self.theory is None else abs(self.theory - self.null)
         typical = self.typical or of_theory or (self.high - self.low) / 10
         return Parameter(
-            self.name, self.title, self.null, (self.low, self.high), typical, unit=self.unit,
+            self.name, self.title or self.name, self.null, (self.low, self.high), typical, unit=self.unit,
             plausible=self.plausible, theory=self.theory,
         )  # fmt: skip
 
@@ -122,8 +192,8 @@ class Model:
         ...     return {"v": 500 * d**2 / p["viscosity"] * (1 - 2.1 * p["wall"] * x)}
         >>> model = sf.Model(
         ...     fall,
-        ...     outputs={"v": sf.Output("speed", "m/s")},
-        ...     numbers=[sf.Number("viscosity", 1.0, "Pa s", low=0.01, high=100)],
+        ...     outputs={"v": sf.Output("speed", unit="m/s")},
+        ...     numbers=[sf.Number("viscosity", 1.0, unit="Pa s", low=0.01, high=100)],
         ...     effects=[sf.Effect("wall", "wall of the tube", low=0, high=2, theory=1.0)],
         ... )
         >>> sf.calibrate("falls.csv", model).corrected  # doctest: +SKIP
@@ -141,8 +211,9 @@ class Model:
             given = getattr(self, what)
             each = list(given.values() if what == "outputs" and isinstance(given, Mapping) else given)
             if not all(isinstance(one, kind) for one in each) or not (each or what == "effects"):
-                name = kind.__name__.removeprefix("Model")
-                raise InputError(f"{what} of a model are each an sf.{name}, one at least; given: {given!r}")
+                raise InputError(
+                    f"{what} of a model are each an sf.{_public(kind)}, one at least; given: {given!r}"
+                )
         names_once(parameter.name for parameter in self.parameters)
 
     def without(self, *names: str) -> Model:
@@ -171,6 +242,6 @@ def _refuse_outside(name: str, what: str, value: float, bounds: tuple[float, flo
         raise InputError(f"{name}: {what} {value:g} with low {low:g} and high {high:g}; give low ≤ {what} ≤ high")
 
 
-def _refuse_negative(name: str, sigma: float | None) -> None:
-    if sigma is not None and not 0 < sigma < math.inf:
-        raise InputError(f"{name}: sigma {sigma:g}; give a standard deviation above 0, or none")
+def _refuse_no_deviation(entry: str, sigma: float) -> None:
+    if not 0 < sigma < math.inf:
+        raise InputError(f"{entry} {sigma:g}; give a standard deviation above 0, or none")

@@ -6,7 +6,6 @@ counts with the others. Columns that nobody asks for are notes, unless an output
 
 from __future__ import annotations
 
-import math
 from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -26,7 +25,7 @@ from common.errors import InputError, naming
 from common.quantities import numbers_of
 from common.tables import LINE, read_table, row_name
 
-Noise = Mapping[str, float] | Literal["unknown"]
+Noise = Mapping[str, float | str] | Literal["unknown"]
 _FOLLOWS = 0.98  # correlation of ranks among repeats with an output that was computed from a column
 _TRUE = ("true", "yes", "1", "1.0")
 
@@ -104,7 +103,7 @@ def _read(table: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
         sigma=_sigma(model, roles.noise),
         noise_known=roles.noise != "unknown",
         notes=_notes(columns, [*needed, *_names(roles.held_out)], roles.notes, good, condition),
-        output_titles={name: o.title for name, o in kinds},
+        output_titles={name: o.title or name for name, o in kinds},
         output_scales={name: (1.0, o.unit.removeprefix("1")) for name, o in kinds if o.kind == "difference"},
         unit_checked={name: o.unit_checked for name, o in kinds},
         lines=table.index.to_numpy()[keep] if table.index.name == LINE else None,
@@ -200,17 +199,13 @@ def _sigma(model: Model, noise: Noise | None) -> Floats | None:
     """Return the declared standard deviation of each output, (k,), if there is one."""
     given = dict(noise) if isinstance(noise, Mapping) else {}
     declared = {name: output.sigma for name, output in model.outputs.items() if output.sigma is not None} | given
-    known = given or noise in (None, "unknown")
-    if (
-        not known
-        or (declared and set(declared) != set(model.outputs))
-        or not all(0 < s < math.inf for s in declared.values())
-    ):
+    if not (given or noise in (None, "unknown")) or (declared and set(declared) != set(model.outputs)):
         raise InputError(
             f"noise {noise or declared}; give 'unknown', or a standard deviation above 0 for each output, "
             f"{', '.join(model.outputs)}"
         )
-    return np.array([float(declared[name]) for name in model.outputs]) if declared else None
+    outputs = model.outputs.items()
+    return np.array([o.deviation(declared[name], f"noise of {name}") for name, o in outputs]) if declared else None
 
 
 def _names(given: str | Sequence[str] | None) -> list[str]:

@@ -42,8 +42,8 @@ def speed(columns: Mapping[str, Any], p: Mapping[str, float]) -> dict[str, Any]:
 
 MODEL = sf.Model(
     speed,
-    outputs={"speed_m_s": sf.Output("speed", "m/s")},
-    numbers=[sf.Number("gravity", 9.81, "m/s²", low=1, high=100, sigma=1e-3)],
+    outputs={"speed_m_s": sf.Output("speed", unit="m/s")},
+    numbers=[sf.Number("gravity", 9.81, unit="m/s²", low=1, high=100, sigma="0.1 %")],
     effects=[
         sf.Effect("quadratic_drag", "quadratic drag", low=0, high=5, unit="C_D", typical=0.2),
         sf.Effect("linear_drag", "linear drag", low=0, high=5, unit="1/s", typical=0.2),

@@ -33,8 +33,8 @@ def current(columns: Mapping[str, Any], p: Mapping[str, float]) -> dict[str, Any
 
 MODEL = sf.Model(
     current,
-    outputs={"current_A": sf.Output("current", "A")},
-    numbers=[sf.Number("inductance", 0.03, "H", low=1e-4, high=10)],
+    outputs={"current_A": sf.Output("current", unit="A")},
+    numbers=[sf.Number("inductance", 0.03, unit="H", low=1e-4, high=10)],
     effects=[
         sf.Effect("resistance", "resistance", low=0, high=20, unit="Ω", theory=1.2),
         sf.Effect("zero", "zero of the coarse ammeter", low=-0.05, high=0.05, unit="A", typical=0.01),

@@ -31,8 +31,8 @@ def speed(columns: Mapping[str, Any], p: Mapping[str, float]) -> dict[str, Any]:
 
 MODEL = sf.Model(
     speed,
-    outputs={"electrical_rpm": sf.Output("speed of the field", "rpm")},
-    numbers=[sf.Number("constant", 2000, "rpm/V", low=100, high=1e5)],
+    outputs={"electrical_rpm": sf.Output("speed of the field", unit="rpm")},
+    numbers=[sf.Number("constant", 2000, unit="rpm/V", low=100, high=1e5)],
     effects=[
         sf.Effect("zone", "dead zone of the throttle", low=-0.04, high=1, typical=0.1),
         sf.Effect("resistance", "resistance", low=0, high=0.2, unit="Ω", typical=0.1),

@@ -31,8 +31,8 @@ def thrust(columns: Mapping[str, Any], p: Mapping[str, float]) -> dict[str, Any]
 
 MODEL = sf.Model(
     thrust,
-    outputs={"thrust_gf": sf.Output("thrust", "gf")},
-    numbers=[sf.Number("coefficient", 100, "gf", low=1, high=1e4)],
+    outputs={"thrust_gf": sf.Output("thrust", unit="gf")},
+    numbers=[sf.Number("coefficient", 100, unit="gf", low=1, high=1e4)],
     effects=[
         sf.Effect("square", "square of the speed", low=-0.9, high=3, theory=1.0),
         sf.Effect("zero", "zero of the load cell", low=-3, high=5, unit="gf"),

@@ -31,8 +31,8 @@ def settle(columns: Mapping[str, Any], p: Mapping[str, float]) -> dict[str, Any]
 
 MODEL = sf.Model(
     settle,
-    outputs={"v_mm_s": sf.Output("speed", "mm/s")},
-    numbers=[sf.Number("viscosity", 1.0, "Pa s", low=0.01, high=100)],
+    outputs={"v_mm_s": sf.Output("speed", unit="mm/s")},
+    numbers=[sf.Number("viscosity", 1.0, unit="Pa s", low=0.01, high=100)],
     effects=[
         sf.Effect("wall", "wall of the vessel", low=0, high=2, unit="Faxén's correction", theory=1.0),
         sf.Effect("inertia", "inertia of the fluid", low=0, high=20, unit="Oseen's correction", theory=1.0),

@@ -37,8 +37,8 @@ def times(columns: Mapping[str, Any], p: Mapping[str, float]) -> dict[str, Any]:
 
 MODEL = sf.Model(
     times,
-    outputs={"time_s": sf.Output("time of fall", "s", kind="difference", sigma=0.1)},
-    numbers=[sf.Number("gravity", 9.81, "m/s²", low=9, high=10.5, sigma=1e-3)],
+    outputs={"time_s": sf.Output("time of fall", unit="s", kind="difference", sigma=0.1)},
+    numbers=[sf.Number("gravity", 9.81, unit="m/s²", low=9, high=10.5, sigma="0.1 %")],
     effects=[
         sf.Effect("quadratic_drag", "drag of a sphere", low=0, high=3, unit="C_D", typical=0.5),
         sf.Effect("linear_drag", "linear drag", low=0, high=2, unit="1/s", typical=0.1),

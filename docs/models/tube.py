@@ -35,8 +35,8 @@ def sink(columns: Mapping[str, Any], p: Mapping[str, float]) -> dict[str, Any]:
 
 MODEL = sf.Model(
     sink,
-    outputs={"v": sf.Output("speed", "m/s")},
-    numbers=[sf.Number("viscosity", 1.0, "Pa s", low=0.01, high=100)],
+    outputs={"v": sf.Output("speed", unit="m/s")},
+    numbers=[sf.Number("viscosity", 1.0, unit="Pa s", low=0.01, high=100)],
     effects=[
         sf.Effect("wall", "wall of the tube", low=0, high=3, unit="Faxén's correction", theory=1.0),
         sf.Effect("inertia", "inertia of the oil", low=0, high=20, unit="Oseen's correction", theory=1.0),

@@ -48,20 +48,24 @@ def read_sigma(given: object, value: float, entry: str, suffix: str = "") -> Sig
     Raises:
         InputError: neither of them, below 0, or more than half of the number.
     """
-    try:
-        if isinstance(given, str) and given.strip().endswith("%"):
-            sigma = Sigma(float(given.strip()[:-1]) / 100, True)
-        elif isinstance(given, int | float) and not isinstance(given, bool):
-            sigma = Sigma(float(to_si(given, suffix) if suffix else given), False)
-        else:
-            raise ValueError
-    except (ValueError, OverflowError):
-        raise InputError(
-            f'{entry} = {given!r}; give a number in the unit of its key, or a text like "10 %"'
-        ) from None
+    sigma = parse_sigma(given, entry)
+    if suffix and not sigma.relative:
+        sigma = Sigma(float(to_si(sigma.size, suffix)), False)
     if not (math.isfinite(sigma.size) and 0 <= sigma.of(value) <= _LARGEST * abs(value)):
         raise InputError(f"{entry} = {given!r}; a standard deviation lies from 0 to half of the number itself")
     return sigma
+
+
+def parse_sigma(given: object, entry: str) -> Sigma:
+    """Read σ from a number, or a text like "10 %", whatever it belongs to; `entry` names its place."""
+    try:
+        if isinstance(given, str) and given.strip().endswith("%"):
+            return Sigma(float(given.strip()[:-1]) / 100, True)
+        if isinstance(given, int | float) and not isinstance(given, bool):
+            return Sigma(float(given), False)
+        raise ValueError
+    except (ValueError, OverflowError):
+        raise InputError(f'{entry} = {given!r}; give a number in its unit, or a text like "10 %"') from None
 
 
 def sigma_text(sigma: Sigma) -> str:

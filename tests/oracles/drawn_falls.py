@@ -52,8 +52,8 @@ def model_of(
     """Make the model of a table, with some effects in its catalogue."""
     model = sf.Model(
         fall,
-        outputs={"v": sf.Output("speed", "mm/s")},
-        numbers=[sf.Number("viscosity", 1.0, "Pa s", low=0.01, high=100)],
+        outputs={"v": sf.Output("speed", unit="mm/s")},
+        numbers=[sf.Number("viscosity", 1.0, unit="Pa s", low=0.01, high=100)],
         effects=[effect for effect in EFFECTS if effect.name in effects],
         settings=["d"],
     )

@@ -30,8 +30,8 @@ def fall(columns: Any, p: Any) -> Any:
 
 MODEL = sf.Model(
     fall,
-    outputs={"v": sf.Output("speed", "m/s")},
-    numbers=[sf.Number("v1", 100.0, "1/m s", low=0.1, high=1e5)],
+    outputs={"v": sf.Output("speed", unit="m/s")},
+    numbers=[sf.Number("v1", 100.0, unit="1/m s", low=0.1, high=1e5)],
     effects=[sf.Effect("wall", "wall", low=0, high=4, theory=1.0)],
 )
 
@@ -67,7 +67,7 @@ def test_a_round_that_is_ten_times_as_fast_can_be_declared_right() -> None:
     """No other output could bear it out."""
     table = TABLE.assign(v=TABLE["v"] * np.where(TABLE["round"] == 2, 10, 1))
     assert said(MODEL, table).endswith("; if it is right, declare its Output with unit_checked=True")
-    checked = replace(MODEL, outputs={"v": sf.Output("speed", "m/s", unit_checked=True)})
+    checked = replace(MODEL, outputs={"v": sf.Output("speed", unit="m/s", unit_checked=True)})
     result = sf.calibrate(table, checked, session="round", progress=False)
     assert [(move.record["number"], move.record["where"]) for move in result.moves] == [
         ("v1", "in session round 2")
@@ -127,7 +127,18 @@ def test_a_model_without_sense_cannot_be_declared() -> None:
         lambda: replace(MODEL, numbers=["v1"]): "numbers of a model are each an sf.Number, one at least",
         lambda: sf.Number("v1", 5.0, low=10, high=20): "start 5 with low 10 and high 20",
         lambda: sf.Effect("wall", "wall", low=1, high=2): "null 0 with low 1 and high 2",
-        lambda: sf.Output("speed", sigma=-1.0): "sigma -1",
+        lambda: sf.Output("speed", kind="difference", sigma=-1.0): "sigma -1",
+        lambda: sf.Output("speed", sigma=0.02): 'compared as a ratio; give a share, such as "2 %"',
+        lambda: sf.Output("speed", kind="difference", unit="m/s", sigma="2 %"): "give a number in m/s",
+        lambda: sf.Output("speed", sigma="little"): "give a number in its unit, or a text like",
+        lambda: sf.Output("speed", "m/s"): "sf.Output(title, …): the further value 'm/s' needs its keyword",
+        lambda: sf.Number("v1", 5.0, "m/s"): "sf.Number(name, start, …): the further value 'm/s'",
+        lambda: sf.Effect("wall", "wall", 0, 1): "sf.Effect(name, title, …): the further value 0",
+        lambda: sf.Number("v1", 5.0, unit=None): "v1: unit None; give a text",
+        lambda: sf.Number("v1", "a"): "v1: start 'a'; give a number",
+        lambda: sf.Effect("wall", "wall", low="a", high=1): "wall: low 'a'; give a number",
+        lambda: sf.Number("R", 1e6, sigma=1e7): "is more than the number itself, 1e+06; give it in 1, or as a",
+        lambda: sf.Number("R", 1e6, sigma="-1 %"): "R: sigma -10000; give a standard deviation above 0",
         lambda: sf.Output("speed", kind="share"): "'ratio' or 'difference'",
         lambda: MODEL.without("wind"): "no effect 'wind'; it has wall",
     }.items():
@@ -141,7 +152,9 @@ def test_a_model_without_sense_cannot_be_declared() -> None:
 )
 @pytest.mark.parametrize("kind", ["ratio", "difference"])
 def test_another_unit_is_guessed(unit: str, factor: float, words: str, kind: Any) -> None:
-    model = replace(MODEL, outputs={"v": sf.Output("angle", unit, kind)}, numbers=[sf.Number("v1", 300.0)])
+    model = replace(
+        MODEL, outputs={"v": sf.Output("angle", unit=unit, kind=kind)}, numbers=[sf.Number("v1", 300.0)]
+    )
     assert words in said(model, TABLE.assign(v=factor * TABLE["v"]))
 
 
@@ -159,6 +172,17 @@ def test_a_fault_of_a_table_is_named() -> None:
     assert "2 usable rows for 2 numbers" in said(
         replace(MODEL, numbers=[*MODEL.numbers, sf.Number("power", 2.0)]), TABLE[:2]
     )
+
+
+def test_a_tolerance_is_in_the_unit_of_its_number() -> None:
+    for given, sigma in ({"sigma": 1e4}, 0.01), ({"sigma": "1 %"}, 0.01), ({"sigma": 1e4, "low": -1e7}, 1e4):
+        assert sf.Number("R", 1e6, unit="ohm", **given).parameter.sigma == pytest.approx(sigma)
+    assert sf.Number("zero", 0.0, sigma=0.1).parameter.sigma == 0.1
+
+
+def test_a_unit_and_a_title_may_be_empty() -> None:
+    assert sf.Number("k", 1.0, unit="").parameter.unit == "1"
+    assert sf.Effect("wall", "", low=0, high=1, unit=" ").parameter.title == "wall"
 
 
 def test_what_is_for_robots_is_refused_for_a_model_and_the_other_way_round() -> None:

@@ -59,7 +59,7 @@ def test_an_output_that_is_missing_in_some_rows_is_a_gap() -> None:
         v = fall(columns, p)["v"]
         return {"v": v, "tilt": 0.1 * v}
 
-    outputs = {"v": sf.Output("speed", "m/s"), "tilt": sf.Output("tilt", "rad", "difference")}
+    outputs = {"v": sf.Output("speed", unit="m/s"), "tilt": sf.Output("tilt", unit="rad", kind="difference")}
     model, noise = replace(MODEL, function=both, outputs=outputs), np.random.default_rng(5).normal(size=45)
     table = TABLE.assign(tilt=0.1 * TABLE["v"] + 0.01 * noise)
     table.loc[[4, 30], "tilt"] = np.nan
@@ -90,9 +90,9 @@ def test_each_column_has_its_role() -> None:
     by_name = read_runs_of(table, MODEL, Roles(session="round", held_out=["2", "round 4"]))[1]
     np.testing.assert_array_equal(by_name, table["round"].isin([2, 4]))
     assert (runs_of(table).sigma, runs_of(table).noise_known) == (None, True)
-    assert runs_of(table, noise={"v": 0.03}).sigma == pytest.approx([0.03])
+    assert runs_of(table, noise={"v": "3 %"}).sigma == pytest.approx([0.03])
     assert not runs_of(table, noise="unknown").noise_known
-    declared = replace(MODEL, outputs={"v": sf.Output("speed", "m/s", sigma=0.02)})
+    declared = replace(MODEL, outputs={"v": sf.Output("speed", unit="m/s", sigma="2 %")})
     assert runs_of(table, declared).subset(np.arange(5)).sigma == pytest.approx([0.02])
 
 

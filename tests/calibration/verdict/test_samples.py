@@ -23,8 +23,8 @@ def pull(columns: Any, p: Any) -> Any:
 
 MODEL = sf.Model(
     pull,
-    outputs={"y": sf.Output("force", "N")},
-    numbers=[sf.Number("stiffness", 1.0, "N/m", low=0.1, high=10)],
+    outputs={"y": sf.Output("force", unit="N")},
+    numbers=[sf.Number("stiffness", 1.0, unit="N/m", low=0.1, high=10)],
     effects=[sf.Effect("square", "square", low=0, high=2), sf.Effect("steeper", "steeper", low=0, high=2)],
 )
 

@@ -180,7 +180,7 @@ def test_a_noise_that_is_declared_needs_no_repeats() -> None:
     assert unknown.nearest is not None
     assert not unknown.harmless
     assert "neither repeats nor a declared noise" in " ".join(unknown.caveats)
-    declared = verdict(table, noise={"v": NOISE})
+    declared = verdict(table, noise={"v": f"{100 * NOISE:g} %"})
     assert declared.runs.noise_known
     assert "wall" in declared.effects
     assert declared.noise_ceiling == pytest.approx(NOISE)

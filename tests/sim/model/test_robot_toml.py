@@ -113,7 +113,7 @@ REFUSALS = {
     "above all tables": ("[tails]", "length_cm = 9\n[tails]", "length_cm is in no table; a robot has [tails]"),
     "sigma too large": ("length_cm = 9", "length_cm = 9\nlength_cm_sigma = 7", "length_cm_sigma = 7; a standard"),
     "sigma in words": ("length_cm = 9", 'length_cm = 9\nlength_cm_sigma = "ten %"', "length_cm_sigma"),
-    "sigma no number": ("length_cm = 9", "length_cm = 9\nlength_cm_sigma = true", "a number in the unit of its"),
+    "sigma no number": ("length_cm = 9", "length_cm = 9\nlength_cm_sigma = true", "a number in its unit, or"),
     "sigma below 0": ("length_cm = 9", "length_cm = 9\nlength_cm_sigma = -1", "from 0 to half"),
     "sigma in per cent": ("length_cm = 9", 'length_cm = 9\nlength_cm_sigma = "60 %"', "from 0 to half"),
     "sigma of a count": ("count = 3", "count = 3\ncount_sigma = 1", "[tails] count_sigma: this number takes no"),
