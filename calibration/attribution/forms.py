@@ -116,7 +116,9 @@ def at_theory(study: Study, base: Fit) -> list[Form]:
     forms = []
     for some in (*known, *together):
         start = {**base.parameters, **{e.name: e.theory for e in some}}
-        forms.append(Form(some, fit(study.model, start, base.names, study.split.fitted, title=""), True))
+        form = Form(some, fit(study.model, start, base.names, study.split.fitted, title=""), True)
+        if np.isfinite(form.fit.prediction).all():  # the model can be solved there
+            forms.append(form)
     return forms
 
 
