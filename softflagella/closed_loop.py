@@ -111,6 +111,7 @@ def calibrate(
             tell(line)
         limit = MAX_SECONDS if max_seconds is None else max_seconds
         verdict = find_what_is_missing(experiment, held_out=rows, seed=seed, max_seconds=limit, progress=progress)
+        verdict = replace(verdict, caveats=(*verdict.caveats, *experiment.caveats))
         return ModelVerdict(**vars(verdict), model=robot, table=_name(table))
     _refuse("a robot", **roles._asdict())
     robot = one_robot(robot)

@@ -16,6 +16,7 @@ _OTHER_UNITS = (  # factor, units of an output in which it is a mistake, what th
     (100.0, ("1", "%"), "per cent"),
     (180 / np.pi, ("1", "rad", "deg", "°"), "degrees"),
 )
+_NEXT = 0.01  # change of a number, in its typical size, with which a fit begins
 _NEAR = 1.3  # factor between another unit and what is found
 _TOGETHER = 0.9  # least correlation, about 0, of what is compared as a difference
 
@@ -38,6 +39,12 @@ def check_function(model: FunctionModel) -> None:
     if not np.array_equal(given, again):
         raise InputError("the model's function gives other values when it is called again; let it draw no numbers")
     for parameter, prediction in zip(parameters, changed, strict=True):
+        fitted = parameter in (*model.coefficients, *model.nuisances)
+        if fitted and not np.isfinite(prediction).all() and not _solved_near(model, parameter, start):
+            raise InputError(
+                f"the model's function gives no finite numbers with {parameter.name} = {_changed(parameter):g}, "
+                f"near its start, {parameter.start:g}: give a start, low and high where it can be computed"
+            )
         if np.array_equal(prediction, given):
             raise InputError(
                 f"{parameter.words} changes nothing in these runs, whether it is {parameter.start:g} or "
@@ -68,11 +75,20 @@ def _changed(parameter: Parameter) -> float:
     return up if up != parameter.start else down
 
 
+def _solved_near(model: FunctionModel, parameter: Parameter, start: dict[str, float]) -> bool:
+    """Say whether the function gives finite numbers a little above the start of a parameter, or below it."""
+    near = [
+        {**start, parameter.name: parameter.moved(parameter.start, by * parameter.typical)}
+        for by in (-_NEXT, _NEXT)
+    ]
+    return bool(np.isfinite(model.predict(near)).all((1, 2)).any())
+
+
 def _check_values(model: FunctionModel, given: Floats, changed: list[Floats]) -> None:
     """Refuse a value with which none can be compared, and name the effect that makes it."""
     for row, place in np.argwhere(_unusable(given))[:1].tolist():
         low = bool(given[row, place] == NOT_ABOVE_0)
-        value = "not above 0" if low else f"{given[row, place]:g}"
+        value = "not above 0" if low else "no finite number"
         what = f"{model.runs.outputs[place]} is {value} in {model.runs.row_name(row)}"
         names = {effect.name for effect in model.effects}
         for parameter, prediction in zip(model.model.parameters, changed, strict=True):

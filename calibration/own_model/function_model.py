@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from calibration.own_model.declared import Model
 from calibration.statistics.forward import secants
@@ -67,6 +68,9 @@ class FunctionModel:
     runs: TableRuns
     columns: AskedColumns  # of the runs
     untestable: Mapping[str, str] = field(default_factory=dict)
+    unsolved: dict[str, None] = field(
+        default_factory=dict
+    )  # parameters with which a value is not finite, in words
 
     @property
     def coefficients(self) -> tuple[Parameter, ...]:
@@ -89,15 +93,31 @@ class FunctionModel:
         values = {p.name: parameters.get(p.name, p.start) for p in self.model.parameters}
         differing = [name for name, value in values.items() if np.ndim(value)]
         if not differing:
-            return evaluate(self.model, self.columns, values)
+            return self._noted(evaluate(self.model, self.columns, values), values)
         every = np.stack([values[name] for name in differing], 1)
         kinds, kind = np.unique(every, axis=0, return_inverse=True)
         prediction = np.empty(self.runs.y.shape)
         for place, combination in enumerate(kinds.tolist()):
             rows = kind.reshape(-1) == place
             one = values | dict(zip(differing, combination, strict=True))
-            prediction[rows] = evaluate(self.model, self.columns.rows(rows), one)
+            prediction[rows] = self._noted(evaluate(self.model, self.columns.rows(rows), one), one)
         return prediction
+
+    def _noted(self, prediction: Floats, values: Mapping[str, Any]) -> Floats:
+        """Note the parameters if a prediction (n, k) is not finite; with NaN in it, it counts as not solved."""
+        if (finite := np.isfinite(prediction)).all():
+            return prediction
+        self.unsolved[_in_words(values)] = None
+        return np.where(finite, prediction, np.nan)
+
+    @property
+    def caveats(self) -> tuple[str, ...]:
+        """Where the function gave no finite numbers, in words."""
+        if not self.unsolved:
+            return ()
+        first, *others = self.unsolved
+        more = f" and {len(others)} other sets of parameters" if others else ""
+        return (f"the model's function gives no finite numbers with {first}{more}: nothing was fitted there",)
 
     def linearised(
         self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
@@ -134,7 +154,7 @@ def evaluate(model: Model, columns: AskedColumns, parameters: Mapping[str, Any])
             returned = model.function(columns, values)
     except InputError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         at = traceback.extract_tb(error.__traceback__)[-1]
         raise InputError(
             f"the model's function fails with {_in_words(values)}: {type(error).__name__}, {error} "
@@ -146,10 +166,7 @@ def evaluate(model: Model, columns: AskedColumns, parameters: Mapping[str, Any])
     for name, output in model.outputs.items():
         if name not in returned:
             raise InputError(f"the model's function returns no output {name!r}; it has {', '.join(returned)}")
-        try:
-            value = np.asarray(returned[name], dtype=float)
-        except (TypeError, ValueError):
-            raise InputError(f"the model's function returns {name!r} that is no array of numbers") from None
+        value = _real(name, returned[name], count)
         if value.shape not in ((), (count,)):
             raise InputError(f"the model's function returns {name!r} of shape {value.shape} for {count} rows; "
                              f"return one number for each row, ({count},)")  # fmt: skip
@@ -158,6 +175,24 @@ def evaluate(model: Model, columns: AskedColumns, parameters: Mapping[str, Any])
             logarithm = np.where(value <= 0, NOT_ABOVE_0, np.log(value))
         scaled.append(logarithm if output.kind == "ratio" else value)
     return np.stack(scaled, 1)
+
+
+def _real(name: str, value: Any, count: int) -> Floats:
+    """Return an output as an array of real numbers, a Series by its index."""
+    if isinstance(value, pd.Series) and len(value) == count:
+        if not np.array_equal(np.sort(value.index), np.arange(count)):
+            raise InputError(
+                f"the model's function returns {name!r} as a Series whose index does not number the {count} rows "
+                "from 0; return an array"
+            )
+        value = value.sort_index()
+    if np.ma.isMaskedArray(value) or np.iscomplexobj(value):
+        kind = "complex numbers" if np.iscomplexobj(value) else "a masked array"
+        raise InputError(f"the model's function returns {name!r} as {kind}; return a real number for each row")
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"the model's function returns {name!r} that is no array of numbers") from None
 
 
 def _in_words(parameters: Mapping[str, float]) -> str:

@@ -51,14 +51,20 @@ def by_differences(
     model: ForwardModel, at: Parameters, names: Sequence[str | Parameter], *, title: str = ""
 ) -> tuple[Floats, Floats]:
     """Compute `derivatives` by finite differences of the model itself, in one prediction."""
-    sets, widths = [dict(at)], []
-    for changed in _parameters(model, names):
+    sets, widths, along = [dict(at)], [], _parameters(model, names)
+    for changed in along:
         name, width = changed.name, _LOG_STEP if changed.logarithmic else _STEP * abs(changed.typical)
         if np.any(changed.moved(at[name], 2 * width) == changed.bounds[1]):  # downwards near the bound
             width = -width
         sets.append({**at, name: changed.moved(at[name], width)})
         widths.append(width)
     predictions = model.predict(sets, title=title)
+    lost = np.flatnonzero(~np.isfinite(predictions[1:]).all((1, 2))).tolist()
+    for place in lost:  # on the other side it may be solved
+        changed, width = along[place], -widths[place]
+        back = {**at, changed.name: changed.moved(at[changed.name], width)}
+        if np.any(back[changed.name] != at[changed.name]):
+            widths[place], predictions[place + 1] = width, model.predict([back])[0]
     slopes = (predictions[1:] - predictions[0]) / np.array(widths)[:, None, None]
     return predictions[0], np.moveaxis(slopes, 0, -1)
 

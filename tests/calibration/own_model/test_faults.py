@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ import pandas as pd
 import pytest
 
 import softflagella as sf
+from calibration.own_model.table_of_runs import Roles, read_runs_of
 from calibration.statistics.forward import secants
 from calibration.statistics.statistical_model import Parameter, Runs
 from calibration.verdict.calibrate import calibrate
@@ -88,9 +91,20 @@ def test_as_it_should_be_the_wall_is_named() -> None:
         (replace(MODEL, function=lambda c, p: {"w": c["d"]}), "returns no output 'v'; it has w"),
         (replace(MODEL, function=lambda c, p: c["d"]), "returns ndarray; return {output: array (n,)}"),
         (of(lambda v, p: v[:5]), "'v' of shape (5,) for 45 rows"),
+        (
+            of(lambda v, p: pd.Series(v, index=range(1, 46))),
+            "a Series whose index does not number the 45 rows from 0",
+        ),
+        (of(lambda v, p: np.ma.masked_less(v, 0.1)), "returns 'v' as a masked array"),
+        (of(lambda v, p: v + 0j), "returns 'v' as complex numbers"),
+        (of(lambda v, p: sys.exit(0)), "fails with v1 = 100, wall = 0: SystemExit, 0 ("),
+        (
+            of(lambda v, p: v if p["v1"] == 100 else v * np.nan),
+            "no finite numbers with v1 = 110.517, near its start",
+        ),
         (of(lambda v, p: v[None]), "'v' of shape (1, 45) for 45 rows"),
         (of(lambda v, p: ["fast"] * len(v)), "'v' that is no array of numbers"),
-        (of(lambda v, p: np.where(np.arange(len(v)) == 3, np.nan, v)), "v is nan in row 4"),
+        (of(lambda v, p: np.where(np.arange(len(v)) == 3, np.nan, v)), "v is no finite number in row 4"),
         (of(lambda v, p: v - 0.1), "v is not above 0 in row 1; return finite numbers, above 0"),
         (
             of(lambda v, p: v * p["wall"]),
@@ -98,7 +112,7 @@ def test_as_it_should_be_the_wall_is_named() -> None:
         ),
         (
             of(lambda v, p: v / p["wall"]),
-            "wall (wall) does not vanish at its null, 0: there v is inf in row 1",
+            "wall (wall) does not vanish at its null, 0: there v is no finite number",
         ),
         (replace(MODEL, function=lambda c, p: {"v": p["v1"] * c["d"] ** 2}), "wall (wall) changes nothing"),
         (replace(MODEL, function=lambda c, p: {"v": c["d"] ** 2 / (1 + p["wall"] * c["d"])}), "v1 (v1) changes"),
@@ -117,6 +131,34 @@ def test_as_it_should_be_the_wall_is_named() -> None:
 )
 def test_a_fault_of_a_model_is_named(model: sf.Model, words: str) -> None:
     assert words in said(model)
+
+
+def test_a_series_is_read_by_its_index() -> None:
+    shuffled = TABLE.sample(frac=1, random_state=3)
+    sorts = replace(MODEL, function=lambda c, p: {"v": pd.Series(fall(c, p)["v"]).sort_values()})
+    runs = [read_runs_of(shuffled, model, Roles("round"))[0] for model in (sorts, MODEL)]
+    one, other = (run.predict([{"v1": 300.0, "wall": 1.0}]) for run in runs)
+    np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("above", [0.5, 1e-4])
+def test_where_the_function_is_not_finite_nothing_is_fitted_and_it_is_said(above: float, tmp_path: Path) -> None:
+    """The true size of the wall is 1."""
+    model = of(lambda v, p: v if p["wall"] < above else v * np.nan)
+    result = sf.calibrate(TABLE, model, session="round", progress=False)
+    (caveat,) = (caveat for caveat in result.caveats if "finite" in caveat)
+    assert caveat.startswith("the model's function gives no finite numbers with v1 = 100, wall = 1 and ")
+    assert np.isfinite(list(result.corrected.values())).all()
+    assert np.isfinite(result.samples(100).drop(columns="form")).all(axis=None)
+
+
+def test_a_number_may_be_impossible_on_one_side() -> None:
+    """The step of a derivative goes to the other one."""
+    model = of(lambda v, p: v if p["v1"] < 100.5 else v * np.nan)
+    halved = TABLE.assign(v=TABLE["v"] / 4)
+    assert sf.calibrate(halved, model, session="round", progress=False).corrected["v1"] == pytest.approx(
+        75, rel=0.05
+    )
 
 
 def test_a_model_without_sense_cannot_be_declared() -> None:
