@@ -59,8 +59,8 @@ def by_differences(
         sets.append({**at, name: changed.moved(at[name], width)})
         widths.append(width)
     predictions = model.predict(sets, title=title)
-    lost = np.flatnonzero(~np.isfinite(predictions[1:]).all((1, 2))).tolist()
-    for place in lost:  # on the other side it may be solved
+    solved = np.isfinite(predictions).all((1, 2))
+    for place in np.flatnonzero(~solved[1:] & solved[0]).tolist():  # on the other side it may be
         changed, width = along[place], -widths[place]
         back = {**at, changed.name: changed.moved(at[changed.name], width)}
         if np.any(back[changed.name] != at[changed.name]):
