@@ -34,7 +34,7 @@ def check_function(model: FunctionModel) -> None:
     parameters, start = model.model.parameters, start_values(model)
     if runs.values(np.ones(len(runs), dtype=bool)) <= len(model.coefficients):
         raise InputError(f"{len(runs)} usable rows for {len(model.coefficients)} numbers to fit; give more rows")
-    given, again, *changed = model.predict([start, start, *({**start, p.name: _changed(p)} for p in parameters)])
+    given, again, *changed = model.returned([start, start, *({**start, p.name: _changed(p)} for p in parameters)])
     _check_values(model, given, changed)
     if not np.array_equal(given, again):
         raise InputError("the model's function gives other values when it is called again; let it draw no numbers")

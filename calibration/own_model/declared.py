@@ -12,6 +12,7 @@ from typing import Any, Literal, Self
 from calibration.statistics.checks import names_once
 from calibration.statistics.statistical_model import Parameter
 from common.errors import InputError
+from common.units import find_unit, from_si
 from sim.model.uncertainty import parse_sigma
 
 Function = Callable[[Mapping[str, Any], Mapping[str, float]], Mapping[str, Any]]  # columns, parameters -> outputs
@@ -72,6 +73,12 @@ class Output(_Declared):
         self._tidy(f"output {self.title!r}")
         if self.sigma is not None:
             self.deviation(self.sigma, f"output {self.title!r}: sigma")
+
+    @property
+    def turn(self) -> float:
+        """A whole turn in the unit of an angle whose differences are compared; 0 for all else."""
+        unit = find_unit(self.unit) if self.kind == "difference" else None
+        return float(from_si(math.tau, unit.suffix)) if unit and unit.kind == "angle" else 0.0
 
     def deviation(self, sigma: float | str, entry: str) -> float:
         """Read a standard deviation of one run, relative for a ratio; `entry` names its place."""

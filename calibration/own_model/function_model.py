@@ -68,6 +68,7 @@ class FunctionModel:
     runs: TableRuns
     columns: AskedColumns  # of the runs
     untestable: Mapping[str, str] = field(default_factory=dict)
+    about: Floats | None = None  # (n, k) within half a turn of which angles are predicted; None: the measured ones
     unsolved: dict[str, None] = field(
         default_factory=dict
     )  # parameters with which a value is not finite, in words
@@ -85,8 +86,19 @@ class FunctionModel:
         return tuple(effect.parameter for effect in self.model.effects)
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
-        """Predict (P, n, k), see `ForwardModel`."""
-        return np.array([self._predict(parameters) for parameters in sets])
+        """Predict (P, n, k), see `ForwardModel`; angles within half a turn of what was measured."""
+        return within_half_a_turn(
+            self.returned(sets), self.runs.y if self.about is None else self.about, self.turns
+        )
+
+    def returned(self, sets: Sequence[Parameters]) -> Floats:
+        """Compute what the function returns, scaled, (P, n, k)."""
+        return np.reshape([self._predict(parameters) for parameters in sets], (len(sets), *self.runs.y.shape))
+
+    @property
+    def turns(self) -> Floats:
+        """A whole turn of each output that is an angle, 0 of all others, (k,)."""
+        return np.array([output.turn for output in self.model.outputs.values()])
 
     def _predict(self, parameters: Parameters) -> Floats:
         """Call the function, once for each distinct combination of values where some differ between runs."""
@@ -123,6 +135,8 @@ class FunctionModel:
         self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
     ) -> Predict:
         """Return the linear model, by differences."""
+        if self.turns.any():  # no step of a derivative ends a turn away
+            self = replace(self, about=self.predict([at])[0])
         return secants(self, at, along)
 
     def check(self, prediction: Floats) -> None:
@@ -140,6 +154,11 @@ class FunctionModel:
         names = [name.removeprefix("ln ") for name in self.runs.input_names]
         settings = [{name: self.columns[name][row].item() for name in names} for row in first]
         return replace(self, runs=runs, columns=self.columns.rows(first)), settings
+
+
+def within_half_a_turn(values: Any, about: Any, turns: Any) -> Any:
+    """Change angles by whole turns, of size `turns`, to within half a turn of others; where that is 0, nothing."""
+    return values + turns * np.round((about - values) / np.where(turns, turns, 1.0))
 
 
 def evaluate(model: Model, columns: AskedColumns, parameters: Mapping[str, Any]) -> Floats:

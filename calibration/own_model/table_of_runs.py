@@ -8,14 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, cast
 
 import numpy as np
 import pandas as pd
 
 from calibration.own_model.checks import check_function
 from calibration.own_model.declared import Model
-from calibration.own_model.function_model import AskedColumns, FunctionModel, TableRuns, evaluate
+from calibration.own_model.function_model import (
+    AskedColumns,
+    FunctionModel,
+    TableRuns,
+    evaluate,
+    within_half_a_turn,
+)
 from calibration.statistics.excluded import MANY, Faults
 from calibration.statistics.gaps import filled, gaps_in_words, is_missing, with_outputs, without_gaps
 from calibration.statistics.gls import repeat_count
@@ -86,6 +92,9 @@ def _read(table: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
     specimen, specimen_names = _levels(roles.specimen, columns)
     kinds = model.outputs.items()
     compared = {name: np.log(good[name]) if o.kind == "ratio" else good[name] for name, o in kinds}
+    for name, output in kinds:
+        if output.turn:
+            compared[name] = _about_their_mean(compared[name], condition, output.turn)
     runs = TableRuns(
         outputs=tuple(model.outputs),
         y=filled(pd.DataFrame(compared), condition),
@@ -110,6 +119,15 @@ def _read(table: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
         words=frozenset(words),
     )
     return FunctionModel(model, with_outputs(runs, range(len(runs.outputs))), columns)
+
+
+def _about_their_mean(angles: pd.Series, condition: Integers, turn: float) -> pd.Series:
+    """Change angles by whole turns, so that repeats are within half a turn of their circular mean."""
+    first = angles.groupby(condition).transform("first")
+    around = (angles - first) * (2 * np.pi / turn)
+    sine, cosine = (part.groupby(condition).transform("mean") for part in (np.sin(around), np.cos(around)))
+    mean = first + np.arctan2(sine, cosine) * (turn / (2 * np.pi))
+    return cast(pd.Series, within_half_a_turn(angles, mean, turn))
 
 
 def _values(column: pd.Series) -> Floats | Words:

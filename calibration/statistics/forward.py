@@ -59,7 +59,7 @@ def by_differences(
         sets.append({**at, name: changed.moved(at[name], width)})
         widths.append(width)
     predictions = model.predict(sets, title=title)
-    solved = np.isfinite(predictions).all((1, 2))
+    solved = np.asarray(np.isfinite(predictions).all((1, 2)))
     for place in np.flatnonzero(~solved[1:] & solved[0]).tolist():  # on the other side it may be
         changed, width = along[place], -widths[place]
         back = {**at, changed.name: changed.moved(at[changed.name], width)}
