@@ -15,6 +15,7 @@ from calibration.own_model.table_of_runs import Noise, Roles, read_runs_of
 from calibration.report.corrected_robot import check_given
 from calibration.report.model_verdict import ModelVerdict
 from calibration.report.robot_verdict import RobotVerdict, read_runs
+from calibration.statistics.budget import limited
 from calibration.statistics.statistical_model import lines_of_excluded
 from calibration.swimmer.possible_runs import Owned, owned
 from calibration.swimmer.swimmer import SwimmerModel
@@ -79,7 +80,8 @@ def calibrate(
         notes: COL, a column in which runs may differ without the model's knowledge; columns that are not named
             then are not looked at (default: all others).
         max_seconds: of processor time for the search (default 90, with laws 180). The verdict then is provisional,
-            and says what was not tried.
+            and says what was not tried. Of a model of your own the whole calibration counts, and time in which
+            its function waits for another program.
         jobs: threads; default all processors.
         progress: show progress bars.
         tell: is told, before the fit, what was converted and what was excluded, a line at a time.
@@ -106,11 +108,14 @@ def calibrate(
         _refuse(
             "a model of your own", own=own, laws=not laws, paths=paths, unit=unit, protocol=protocol != "session"
         )
-        experiment, rows = read_runs_of(table, robot, roles)
-        for line in lines_of_excluded(experiment.runs):
-            tell(line)
         limit = MAX_SECONDS if max_seconds is None else max_seconds
-        verdict = find_what_is_missing(experiment, held_out=rows, seed=seed, max_seconds=limit, progress=progress)
+        with limited(limit):
+            experiment, rows = read_runs_of(table, robot, roles, title="checks" if progress else "")
+            for line in lines_of_excluded(experiment.runs):
+                tell(line)
+            verdict = find_what_is_missing(
+                experiment, held_out=rows, seed=seed, max_seconds=limit, progress=progress
+            )
         verdict = replace(verdict, caveats=(*verdict.caveats, *experiment.caveats))
         return ModelVerdict(**vars(verdict), model=robot, table=_name(table))
     _refuse("a robot", **roles._asdict())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibration.own_model.function_model import NOT_ABOVE_0, FunctionModel
+from calibration.own_model.function_model import NOT_ABOVE_0, FunctionModel, evaluate
 from calibration.statistics.checks import refuse_equal_repeats
 from calibration.statistics.gls import repeat_count
 from calibration.statistics.statistical_model import FEWEST_REPEATS, Parameter, start_values
@@ -21,7 +21,7 @@ _NEAR = 1.3  # factor between another unit and what is found
 _TOGETHER = 0.9  # least correlation, about 0, of what is compared as a difference
 
 
-def check_function(model: FunctionModel) -> None:
+def check_function(model: FunctionModel, *, title: str = "") -> None:
     """Check the function with its start values, and with each parameter changed.
 
     Raises:
@@ -34,9 +34,10 @@ def check_function(model: FunctionModel) -> None:
     parameters, start = model.model.parameters, start_values(model)
     if runs.values(np.ones(len(runs), dtype=bool)) <= len(model.coefficients):
         raise InputError(f"{len(runs)} usable rows for {len(model.coefficients)} numbers to fit; give more rows")
-    given, again, *changed = model.returned([start, start, *({**start, p.name: _changed(p)} for p in parameters)])
+    sets = [start, *({**start, p.name: _changed(p)} for p in parameters)]
+    given, *changed = model.returned(sets, title=title)
     _check_values(model, given, changed)
-    if not np.array_equal(given, again):
+    if not np.array_equal(given, evaluate(model.model, model.columns, start)):
         raise InputError("the model's function gives other values when it is called again; let it draw no numbers")
     for parameter, prediction in zip(parameters, changed, strict=True):
         fitted = parameter in (*model.coefficients, *model.nuisances)

@@ -9,13 +9,16 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from tqdm import tqdm
 
 from calibration.own_model.declared import Model
+from calibration.statistics.budget import spent, waiting
 from calibration.statistics.forward import secants
 from calibration.statistics.statistical_model import Parameter, Parameters, Predict, Runs
 from common.arrays import Flags, Floats, Integers
 from common.errors import InputError
 
+_KEPT = 16  # predictions
 NOT_ABOVE_0 = np.log(1e-300)  # stands for the logarithm of what is not above 0
 
 
@@ -69,6 +72,7 @@ class FunctionModel:
     columns: AskedColumns  # of the runs
     untestable: Mapping[str, str] = field(default_factory=dict)
     about: Floats | None = None  # (n, k) within half a turn of which angles are predicted; None: the measured ones
+    known: dict[tuple[float, ...], Floats] = field(default_factory=dict)  # parameters -> (n, k), the latest
     unsolved: dict[str, None] = field(
         default_factory=dict
     )  # parameters with which a value is not finite, in words
@@ -88,12 +92,13 @@ class FunctionModel:
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
         """Predict (P, n, k), see `ForwardModel`; angles within half a turn of what was measured."""
         return within_half_a_turn(
-            self.returned(sets), self.runs.y if self.about is None else self.about, self.turns
+            self.returned(sets, title=title), self.runs.y if self.about is None else self.about, self.turns
         )
 
-    def returned(self, sets: Sequence[Parameters]) -> Floats:
-        """Compute what the function returns, scaled, (P, n, k)."""
-        return np.reshape([self._predict(parameters) for parameters in sets], (len(sets), *self.runs.y.shape))
+    def returned(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
+        """Compute what the function returns, scaled, (P, n, k), with a progress bar if it has a title."""
+        bar = tqdm(sets, desc=title, unit="call", delay=1.0, leave=False, disable=not title or None)
+        return np.reshape([self._predict(parameters) for parameters in bar], (len(sets), *self.runs.y.shape))
 
     @property
     def turns(self) -> Floats:
@@ -105,11 +110,19 @@ class FunctionModel:
         values = {p.name: parameters.get(p.name, p.start) for p in self.model.parameters}
         differing = [name for name, value in values.items() if np.ndim(value)]
         if not differing:
-            return self._noted(evaluate(self.model, self.columns, values), values)
+            key = tuple(values.values())
+            if key not in self.known:
+                self.known[key] = self._noted(evaluate(self.model, self.columns, values), values)
+            found = self.known[key] = self.known.pop(key)  # the last of them
+            while len(self.known) > _KEPT:
+                del self.known[next(iter(self.known))]
+            return found
         every = np.stack([values[name] for name in differing], 1)
         kinds, kind = np.unique(every, axis=0, return_inverse=True)
-        prediction = np.empty(self.runs.y.shape)
+        prediction = np.full(self.runs.y.shape, np.nan)
         for place, combination in enumerate(kinds.tolist()):
+            if spent():  # as if it were not solved, so that many calls end within one
+                break
             rows = kind.reshape(-1) == place
             one = values | dict(zip(differing, combination, strict=True))
             prediction[rows] = self._noted(evaluate(self.model, self.columns.rows(rows), one), one)
@@ -137,7 +150,7 @@ class FunctionModel:
         """Return the linear model, by differences."""
         if self.turns.any():  # no step of a derivative ends a turn away
             self = replace(self, about=self.predict([at])[0])
-        return secants(self, at, along)
+        return secants(self, at, along, title=title)
 
     def check(self, prediction: Floats) -> None:
         """Accept any prediction: `calibration.own_model.checks` has looked at it."""
@@ -153,7 +166,7 @@ class FunctionModel:
         runs = replace(self.runs.subset(first), session=session, session_names=("next",))
         names = [name.removeprefix("ln ") for name in self.runs.input_names]
         settings = [{name: self.columns[name][row].item() for name in names} for row in first]
-        return replace(self, runs=runs, columns=self.columns.rows(first)), settings
+        return replace(self, runs=runs, columns=self.columns.rows(first), known={}), settings
 
 
 def within_half_a_turn(values: Any, about: Any, turns: Any) -> Any:
@@ -169,7 +182,7 @@ def evaluate(model: Model, columns: AskedColumns, parameters: Mapping[str, Any])
     """
     count, values = len(next(iter(columns.values()))), {name: float(value) for name, value in parameters.items()}
     try:
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), waiting():
             returned = model.function(columns, values)
     except InputError:
         raise

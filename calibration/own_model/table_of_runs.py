@@ -33,6 +33,7 @@ from common.tables import LINE, read_table, row_name
 
 Noise = Mapping[str, float | str] | Literal["unknown"]
 _FOLLOWS = 0.98  # correlation of ranks among repeats with an output that was computed from a column
+_MOST = 200_000_000  # rows times settings
 _TRUE = ("true", "yes", "1", "1.0")
 
 
@@ -47,7 +48,7 @@ class Roles(NamedTuple):
 
 
 def read_runs_of(
-    source: str | Path | pd.DataFrame, model: Model, roles: Roles
+    source: str | Path | pd.DataFrame, model: Model, roles: Roles, *, title: str = ""
 ) -> tuple[FunctionModel, Flags | None]:
     """Read the runs of a model from a file or a table, check both, and say which are held out, (n,).
 
@@ -61,7 +62,7 @@ def read_runs_of(
         result = _read(
             table, model, roles._replace(session=roles.session or ("session" in table and "session") or None)
         )
-        check_function(result)
+        check_function(result, title=title)
         return result, _held_out(roles.held_out, result)
 
 
@@ -83,6 +84,11 @@ def _read(table: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
         raise InputError(f"the table has no usable row: {faults[0]}")
     columns, was_set, good, missing = columns.rows(keep), was_set[keep], outputs[keep], table[list(outputs)].isna()
     condition = np.unique(was_set, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
+    if len(condition) * (distinct := int(condition.max()) + 1) > _MOST:
+        raise InputError(
+            f"{distinct} settings in {len(condition)} rows are more than can be tested; name what repeats share "
+            "in settings=[…] of the model, round it, or give fewer rows"
+        )
     inputs, words = {}, []
     for name, values in zip(settings, was_set[:, len(specimens) :].T, strict=True):
         logarithmic = columns[name].dtype.kind == "f" and bool((values > 0).all())

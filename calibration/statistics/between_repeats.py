@@ -37,7 +37,8 @@ from common.arrays import Flags, Floats, Integers
 
 SHARE_OF_LEVEL = 0.25  # of the level of a claim: 1 % beside the 4 % of all tests with the model
 ORDER = "order of the runs"
-_DRAWS = 999
+_DRAWS, _FEWEST_DRAWS = 999, 199
+_VALUES = 10_000_000  # of all draws, where a table is long
 _TOLERANCE = 0.02  # of an identity in all runs, and least break along a setting
 _MOST_KINDS = 12  # of a note in words
 _FREE = 0.05  # share of what a note differs by within sessions that M must leave
@@ -124,7 +125,7 @@ def _from_end_to_end(values: Floats) -> Floats:
 def find_differences(runs: Runs, *, level: float, seed: int = 0) -> tuple[Difference, ...]:
     """Find what differs between repeats, and identities that break, at the level of a claim of the model."""
     rng = np.random.default_rng(seed)
-    keys = rng.random((_DRAWS, len(runs)))
+    keys = rng.random((min(max(_VALUES // len(runs), _FEWEST_DRAWS), _DRAWS), len(runs)))
     outputs, found, broken = range(len(runs.outputs)), [], []
     columns, taken = [columns_of(runs) for _ in outputs], [list[NoteColumn]() for _ in outputs]
     tests: dict[int | str, list[_Test]] = {n: _breaks(runs, d, keys, rng) for n, d in runs.identities.items()}
@@ -132,7 +133,7 @@ def find_differences(runs: Runs, *, level: float, seed: int = 0) -> tuple[Differ
     while every := [(subject, test) for subject, of in tests.items() for test in of]:
         least = np.min([test.null for _, test in every], axis=0)
         subject, best = min(every, key=lambda each: each[1].p)
-        p = float(1 + np.count_nonzero(least <= best.p)) / (1 + _DRAWS)
+        p = float(1 + np.count_nonzero(least <= best.p)) / (1 + len(keys))
         if p > level * SHARE_OF_LEVEL:
             break
         z = float(-ndtri(max(best.p, _TINY) / 2))

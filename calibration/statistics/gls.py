@@ -374,6 +374,8 @@ def repeat_covariance(y: Floats, repeated: Integers | Floats, scale: Floats | No
 
 def repeat_count(repeated: Integers | Floats) -> int:
     """Count the degrees of freedom of `repeat_covariance`."""
+    if repeated.ndim == 1:
+        return len(repeated) - len(np.unique(repeated))
     basis = _same_in_repeats(repeated, None)
     return len(basis) - basis.shape[1]
 

@@ -39,6 +39,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import rankdata
 
+from calibration.statistics.budget import skipped
 from calibration.statistics.fit import LEARNT, Fit
 from calibration.statistics.forward import derivatives
 from calibration.statistics.gls import (
@@ -65,6 +66,8 @@ GENERAL = ("lack", "kernel", "shape", "pull")
 _PASSES = 3  # iterations for the scatter of the sessions
 _PASSES_OF_A_SCORE = 2
 _AT_ONCE = 50  # draws
+_FEWEST_DRAWS = 100  # where no time is left
+_MOST_PLACES = 1000  # distinct inputs between which a kernel is computed
 _VALUES = 2_000_000  # of the draws that are made at once
 
 
@@ -227,6 +230,11 @@ class _Tester:
 def _kernel(inputs: Floats) -> tuple[Floats, Floats]:
     """Return rows (u, n) that add up the runs with equal inputs (n, q), and the kernel (u, u) between these."""
     kinds, place = np.unique(inputs, axis=0, return_inverse=True)
+    if len(kinds) > _MOST_PLACES:  # some of the places, evenly chosen, are enough
+        chosen = np.linspace(0, len(kinds) - 1, _MOST_PLACES).astype(int)
+        number = np.full(len(kinds), -1)
+        number[chosen] = np.arange(_MOST_PLACES)
+        kinds, place = kinds[chosen], number[place.reshape(-1)]
     square = (kinds**2).sum(1)
     distance = np.maximum(square[:, None] + square - 2 * kinds @ kinds.T, 0.0)
     return (np.arange(len(kinds))[:, None] == place.reshape(-1)).astype(float), np.exp(-distance / 2)
@@ -280,6 +288,8 @@ def examine_residual(
         count = min(_AT_ONCE, max(1, _VALUES // residual.size), (draws or study.draws) - drawn)
         null = tester.scores(tester.design.draw(rng, run, np.tile(observed.share[0], (count, 1))))
         batches.append(np.column_stack([null.general, _largest(null.z, testable)]))
+        if drawn + count >= _FEWEST_DRAWS and skipped("more draws of some tests"):
+            break
         if decide is not None and _decided(np.concatenate(batches), statistics, decide):
             break
     null_table = np.concatenate(batches)

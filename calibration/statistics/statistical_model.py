@@ -142,8 +142,9 @@ class Runs:
 
     def repeated(self, rows: Flags | slice) -> bool:
         """Tell whether there are repeats, or mirror runs in their place, from which the noise can be estimated."""
-        mirrored = np.column_stack([self._mirror_design(rows), self._alone(rows)])
-        return max(repeat_count(self.apart[rows]), repeat_count(mirrored)) >= FEWEST_REPEATS
+        if repeat_count(self.apart[rows]) >= FEWEST_REPEATS or not self.mirrored[1][rows].any():
+            return repeat_count(self.apart[rows]) >= FEWEST_REPEATS
+        return repeat_count(np.column_stack([self._mirror_design(rows), self._alone(rows)])) >= FEWEST_REPEATS
 
     def _alone(self, rows: Flags | slice) -> Floats:
         """Make a level for each run with a gap."""
@@ -200,10 +201,9 @@ class Runs:
         alone = self._alone(rows)
         differing = np.empty((len(condition), 0)) if self.differing is None else self.differing[rows]
         if (count := repeat_count(condition)) < FEWEST_REPEATS:
-            designs = (
-                np.column_stack([self._mirror_design(rows), alone, differing]),
-                np.column_stack([_levels(session), features(self, rows)[1][rows], alone, differing]),
-            )
+            designs = [np.column_stack([_levels(session), features(self, rows)[1][rows], alone, differing])]
+            if self.mirrored[1][rows].any():
+                designs.insert(0, np.column_stack([self._mirror_design(rows), alone, differing]))
             return next((d for d in designs if repeat_count(d) >= max(FEWEST_REPEATS, count)), condition)
         crossed = len(np.unique(np.stack([condition, session]), axis=1).T) > len(np.unique(condition))
         levels = [_levels(f) for f in ((condition, session) if crossed else (condition,))]

@@ -224,7 +224,8 @@ def far_readings(data: Runs, residual: Floats) -> list[str]:
     return found
 
 
-_DRAWS, _AT_ONCE = 2000, 50
+_DRAWS, _FEWEST_DRAWS, _AT_ONCE = 2000, 200, 50
+_VALUES = 10_000_000  # of all draws, where a table is long
 
 
 def errors(data: Runs, prediction: Floats, rows: Flags) -> tuple[float, dict[str, float]]:
@@ -305,7 +306,8 @@ def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> floa
     linear = regression(data, rows, fitted.tangents, free)
     spread = square_root(fitted.covariance)
     as_far = 0
-    for _ in range(_DRAWS // _AT_ONCE):
+    draws = min(max(_VALUES // residual.size, _FEWEST_DRAWS), _DRAWS)
+    for _ in range(draws // _AT_ONCE):
         drawn = linear.draw(
             rng, fitted.noise.run_covariance, np.tile(fitted.noise.session_ratio, (_AT_ONCE, 1)), spread
         )
@@ -315,7 +317,7 @@ def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> floa
             of_repeats = inverse_root(np.swapaxes(repeats, -1, -2) @ repeats / freedom)
             white = white @ np.swapaxes(of_repeats, -1, -2)
         as_far += int(np.count_nonzero((white**2).sum((-1, -2)) >= (residual**2).sum()))
-    return (1 + as_far) / (1 + _DRAWS)
+    return (1 + as_far) / (1 + draws)
 
 
 @dataclass(frozen=True)

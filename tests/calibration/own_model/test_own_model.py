@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import runpy
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ import pytest
 import softflagella as sf
 from calibration.own_model.table_of_runs import Roles, read_runs_of
 from calibration.verdict.calibrate import calibrate
-from common.errors import run_command
+from common.errors import InputError, run_command
 from softflagella.__main__ import main
 from tests.calibration.own_model.test_faults import MODEL, TABLE, fall
 
@@ -209,3 +210,29 @@ def test_the_viscosity_is_that_of_the_capillary() -> None:
     assert result.errors.of_conditions.after < result.errors.of_conditions.before
     low, high = result.final_intervals["viscosity"]
     assert low < 0.1946 < high
+
+
+@pytest.mark.parametrize("limit", [2.0, 60.0])
+def test_time_in_which_the_function_waits_counts(limit: float) -> None:
+    """As for a solver in another process."""
+
+    def slow(columns: Any, p: Any) -> Any:
+        time.sleep(0.1)
+        return fall(columns, p)
+
+    began = time.perf_counter()
+    result = sf.calibrate(TABLE, replace(MODEL, function=slow), session="round", max_seconds=limit, progress=False)
+    assert (result.verdict == "effect") == (limit == 60)
+    assert time.perf_counter() - began < min(limit + 2, 20)
+    assert any(caveat.startswith("provisional") for caveat in result.caveats) == (limit == 2)
+
+
+def test_a_long_table_ends_with_its_limit() -> None:
+    table = pd.concat([TABLE] * 1000, ignore_index=True)
+    table["v"] *= np.exp(0.02 * np.random.default_rng(1).standard_normal(len(table)))
+    began = time.process_time()
+    assert sf.calibrate(table, MODEL, session="round", max_seconds=2, progress=False).runs.y.size == 45_000
+    assert time.process_time() - began < 15
+    many = table.assign(d=np.random.default_rng(2).uniform(0.02, 0.12, len(table)))
+    with pytest.raises(InputError, match="45000 settings in 45000 rows are more than can be tested"):
+        sf.calibrate(many, MODEL, session="round", progress=False)
