@@ -27,6 +27,7 @@ from scipy.stats import t as student
 from scipy.stats import wilcoxon
 
 from calibration.attribution.refits import Candidate, left_out_residual, left_out_residuals, left_out_rows
+from calibration.statistics.budget import skipped
 from calibration.statistics.fit import Fit, birge, fit
 from calibration.statistics.statistical_model import Parameter
 from calibration.statistics.study import Study
@@ -115,6 +116,8 @@ def at_theory(study: Study, base: Fit) -> list[Form]:
     together = [sum(known, ())] if len(known) > 1 else []
     forms = []
     for some in (*known, *together):
+        if skipped("forms at the size of theory"):
+            break
         start = {**base.parameters, **{e.name: e.theory for e in some}}
         form = Form(some, fit(study.model, start, base.names, study.split.fitted, title=""), True)
         if np.isfinite(form.fit.prediction).all():  # the model can be solved there

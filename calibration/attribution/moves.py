@@ -35,7 +35,7 @@ from calibration.statistics.residual_tests import TESTABLE, Directions, examine_
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import Experiment, Parameter, Runs
 from calibration.statistics.study import Study
-from common.arrays import Flags
+from common.arrays import Flags, Integers
 
 CERTAIN = 5.0  # standard deviations
 CREDIBLE = 10.0  # tolerances of a number: a camera may be bumped, but no head is a third shorter on a day
@@ -104,18 +104,17 @@ def groups_that_may_differ(runs: Runs) -> list[tuple[str, Flags]]:
         (f"since session {names[by_time[k]]}", np.isin(session, by_time[k:])) for k in range(2, len(present) - 1)
     ]
     distinct: list[tuple[str, Flags]] = []
+    settings = np.unique(runs.partners.round(9), axis=0, return_inverse=True)[1].reshape(-1)
     for words, rows in found:
         same = any(np.array_equal(rows, other) or np.array_equal(rows, ~other) for _, other in distinct)
-        if not same and min(rows.sum(), (~rows).sum()) >= _FEWEST and _has_partners(runs, rows):
+        if not same and min(rows.sum(), (~rows).sum()) >= _FEWEST and _has_partners(settings, rows):
             distinct.append((words, rows))
     return distinct
 
 
-def _has_partners(runs: Runs, rows: Flags) -> bool:
-    """Tell whether the settings that runs must share are outside a group, too."""
-    settings = runs.partners
-    inside, outside = (set(map(tuple, settings[part].round(9).tolist())) for part in (rows, ~rows))
-    return inside <= outside
+def _has_partners(settings: Integers, rows: Flags) -> bool:
+    """Tell whether the settings that runs must share, numbered (n,), are outside a group, too."""
+    return set(settings[rows].tolist()) <= set(settings[~rows].tolist())
 
 
 def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[LocalShift, ...]]:
@@ -132,7 +131,7 @@ def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[LocalShift, .
     ]
     numbers = (*plain.coefficients, *plain.nuisances, *(e for e in plain.effects if e.name in base.names))
     moves: tuple[LocalShift, ...] = ()
-    while groups and len(moves) < _MOST:
+    while groups and len(moves) < _MOST and not skipped("numbers that differ in some runs"):
         fits: list[tuple[LocalShift, Study, Fit]] = []
         for move in _clearest(study, base, groups, numbers):
             if move.name in base.names:  # with a grid it has the score of another number

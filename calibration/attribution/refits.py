@@ -20,7 +20,6 @@ If no single effect is kept, a second one is looked for beside each of the best 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -29,7 +28,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from calibration.statistics.budget import skipped
+from calibration.statistics.budget import clock, skipped
 from calibration.statistics.fit import Fit, UnsolvedError, fit
 from calibration.statistics.gls import Noise, solve_normal
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
@@ -206,7 +205,7 @@ def examine(
             size[effect.second.name] = float(misfit.second[j]) if local else effect.second.start
         start = {**(base.parameters if local else start_values(study.model)), **size}
         names = (*base.names, *size)
-        target, began = study.noise_at_most(len(names)), time.process_time()
+        target, began = study.noise_at_most(len(names)), clock()
         try:
             refit = fit(study.model, start, names, study.split.fitted, target=target, title="")
         except UnsolvedError:
@@ -214,7 +213,7 @@ def examine(
             continue
         examined.append(judge(study, candidate, base, refit, directions.without(j)))
         if after_first:
-            after_first(reasons.count(None), time.process_time() - began)
+            after_first(reasons.count(None), clock() - began)
             after_first = None
     return examined
 

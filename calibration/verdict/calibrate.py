@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import math
 import sys
-import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -53,7 +52,7 @@ from calibration.attribution.wrong_numbers import (
     pulls,
     without_wrong_priors,
 )
-from calibration.statistics.budget import Budget, limited, seconds_left
+from calibration.statistics.budget import Budget, clock, limited, seconds_left, skipped
 from calibration.statistics.checks import predict_as_given
 from calibration.statistics.excluded import caveat_of_excluded
 from calibration.statistics.fit import Fit, fit, profile_end, profile_intervals
@@ -120,11 +119,11 @@ def calibrate(
             provisional, and says what was not tried.
         progress: show progress bars.
     """
-    began = time.process_time()
+    began = clock()
     model, differences = with_differences(model, held_out, level=level, seed=seed)
     study, base, uncalibrated = first_fit(model, held_out, level=level, seed=seed, draws=draws, progress=progress)
     model, split = cast(Experiment, study.model), study.split
-    used = time.process_time() - began
+    used = max(clock() - began, max_seconds - seconds_left())  # where the limit began before
     laws = None
     turns: tuple[LoopTurn, ...] = ()
     withdrawn: list[Withdrawn] = []
@@ -218,6 +217,8 @@ def _both_intervals(
 
 def _forms(study: Study, found: Attribution) -> tuple[Form, ...]:
     """List the forms that left-out runs cannot tell from what is claimed or adopted; none if it stands alone."""
+    if found.best and skipped("forms of what is claimed"):
+        return ()
     if found.nearest:
         forms: Sequence[Form] = found.nearest.forms
     else:
@@ -267,7 +268,7 @@ def _explain_with_moves(study: Study, base: Fit) -> tuple[Study, Attribution, tu
     named = explained.final if explained.best else explained.unkept
     if named:
         moved, beside, moves = find_moves(study, named)
-        if moves:
+        if moves and not skipped("effects beside what differs between runs"):
             changes = {move.name: beside.parameters[move.name] for move in moves}
             start, names = {**base.parameters, **changes}, (*base.names, *changes)
             with_moves = fit(moved.model, start, names, study.split.fitted, title="")
@@ -291,12 +292,12 @@ def _fit_moves(study: Study, plain: Experiment, found: Attribution) -> tuple[Fit
 def explain(study: Study, base: Fit) -> Attribution:
     """Test the residual of the fit without effects, and look for what explains it, from the simplest on."""
     model, level = study.model, study.level
-    began = time.process_time()
+    began = clock()
     title = "derivatives" if study.progress else ""
     tangents = directions(model, base.parameters, study.effects, title=title)
-    derived = time.process_time()
+    derived = clock()
     misfit = examine_residual(study, base, tangents)
-    tested = time.process_time()
+    tested = clock()
     if misfit.p_value >= level or not model.runs.noise_known:
         scored = tuple(unexamined(misfit, study.effects, misfit.critical_z))
         return Attribution(base, misfit, tangents, scored, noise_known=model.runs.noise_known)
@@ -356,9 +357,11 @@ def _duration(seconds: float) -> str:
 def _intervals(model: ForwardModel, fitted: Fit, used: Flags, title: str) -> dict[str, tuple[float, float]]:
     """Compute 95 % intervals by profile deviance; by the covariance where the model breaks down at their ends."""
     try:
-        return profile_intervals(model, fitted, used, title=title)
+        if not skipped("intervals by profile deviance", 2 * len(fitted.names)):
+            return profile_intervals(model, fitted, used, title=title)
     except InputError:
-        return {name: fitted.interval(name) for name in fitted.names}
+        pass
+    return {name: fitted.interval(name) for name in fitted.names}
 
 
 def _handed_on(study: Study, found: Attribution, *, falls: bool) -> FinalRefit:
@@ -373,7 +376,7 @@ def _handed_on(study: Study, found: Attribution, *, falls: bool) -> FinalRefit:
 def _next_runs(rivals: tuple[Rival, ...], seed: int) -> dict[str, Any]:
     """Plan the runs that would tell rivals apart; none without rivals, or if one breaks down at such runs."""
     with suppress(InputError):
-        if rivals:
+        if rivals and not skipped("next runs"):
             return dict(zip(("next_runs", "next_batch"), next_runs(rivals, seed=seed), strict=True))
     return {"next_runs": (), "next_batch": None}
 
