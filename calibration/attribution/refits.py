@@ -287,7 +287,7 @@ def ebic(study: Study, refit: Fit, count: int) -> float:
 
     Source: Chen and Chen (2008), γ = 1.
     """
-    sets = math.comb(len(study.effects), count)
+    sets = max(math.comb(len(study.effects), count), 1)  # a number may stand for an effect
     numbers = len(refit.names) + len(refit.wrong_numbers)
     return refit.deviance + numbers * math.log(study.values) + 2 * math.log(sets)
 
