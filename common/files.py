@@ -53,6 +53,21 @@ def refuse_kept(folder: str | Path, names: Iterable[str]) -> None:
             )
 
 
+def refuse_unwritable(folder: str | Path) -> None:
+    """Refuse a folder, which need not be there, if no files can be written into it; nothing is made.
+
+    Raises:
+        InputError: it, or a folder around it, is a file, or may not be written.
+    """
+    target = Path(folder)
+    with refusals(target):
+        there = next(path for path in (target, *target.absolute().parents) if path.exists())
+        if not there.is_dir():
+            raise InputError(f"cannot make the folder {folder}: {there} is a file; give another folder")
+        if not os.access(there, os.W_OK | os.X_OK):
+            raise InputError(f"cannot write into {there}: no permission; give another folder")
+
+
 def refuse_folder(path: str | Path) -> None:
     """Refuse a folder where a file is to be written."""
     if Path(path).is_dir():

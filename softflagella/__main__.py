@@ -86,8 +86,9 @@ def _calibrate(
         raise InputError("--path and --no-path exclude each other")
     refuse_missing(*filter(None, (table, model)))
     from calibration.report.saved_verdict import FILES  # loads SciPy
-    from common.files import refuse_kept
+    from common.files import refuse_kept, refuse_unwritable
 
+    refuse_unwritable(out)
     refuse_kept(out, ["table.csv", *FILES] if films else FILES)  # before hours of work
     if films and view and robot:
         table = _filmed(films, view, robot, out)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 
 from calibration.own_model.function_model import NOT_ABOVE_0, FunctionModel, evaluate
@@ -11,11 +13,13 @@ from calibration.statistics.statistical_model import FEWEST_REPEATS, Parameter, 
 from common.arrays import Flags, Floats
 from common.errors import InputError
 
+_FEWEST = 4  # rows, some of which are held out
 _FAR = 100.0  # factor between what was measured and the model with its start values
 _OTHER_UNITS = (  # factor, units of an output in which it is a mistake, what the table then has
     (100.0, ("1", "%"), "per cent"),
     (180 / np.pi, ("1", "rad", "deg", "°"), "degrees"),
 )
+_SMALL, _PROPORTIONAL = 1e-3, 1e-5  # change of a number, in its typical size; share by which slopes differ
 _NEXT = 0.01  # change of a number, in its typical size, with which a fit begins
 _NEAR = 1.3  # factor between another unit and what is found
 _TOGETHER = 0.9  # least correlation, about 0, of what is compared as a difference
@@ -32,8 +36,12 @@ def check_function(model: FunctionModel, *, title: str = "") -> None:
     if runs.sigma is None and repeat_count(runs.apart) >= FEWEST_REPEATS:
         refuse_equal_repeats(runs, runs.apart, runs.outputs)
     parameters, start = model.model.parameters, start_values(model)
-    if runs.values(np.ones(len(runs), dtype=bool)) <= len(model.coefficients):
-        raise InputError(f"{len(runs)} usable rows for {len(model.coefficients)} numbers to fit; give more rows")
+    count = len(model.coefficients)
+    if len(runs) < _FEWEST or runs.values(np.ones(len(runs), dtype=bool)) <= count:
+        least = max(_FEWEST, count + 1)
+        raise InputError(
+            f"{len(runs)} usable rows for {count} numbers to fit; give {least} rows, better many more"
+        )
     sets = [start, *({**start, p.name: _changed(p)} for p in parameters)]
     given, *changed = model.returned(sets, title=title)
     _check_values(model, given, changed)
@@ -51,6 +59,7 @@ def check_function(model: FunctionModel, *, title: str = "") -> None:
                 f"{parameter.words} changes nothing in these runs, whether it is {parameter.start:g} or "
                 f"{_changed(parameter):g}: use p[{parameter.name!r}] in the function, or leave it out of the model"
             )
+    _refuse_inseparable(model, start)
     for place, (name, output) in enumerate(model.model.outputs.items()):
         measured, predicted = runs.y[:, place], given[:, place]
         ratio = output.kind == "ratio"
@@ -74,6 +83,30 @@ def _changed(parameter: Parameter) -> float:
     step = 0.1 if parameter.logarithmic else parameter.typical
     up, down = (float(parameter.moved(parameter.start, by)) for by in (step, -step))
     return up if up != parameter.start else down
+
+
+def _refuse_inseparable(model: FunctionModel, start: dict[str, float]) -> None:
+    """Refuse free numbers that change the outputs in proportion, at the start and elsewhere: as a product does."""
+    free = model.coefficients
+    elsewhere = {**start, **{p.name: _changed(p) for p in free}}
+    alike = [f"{p.name} and {q.name}" for p, q in combinations(free, 2)
+             if all(_in_proportion(model, at, p, q) for at in (start, elsewhere))]  # fmt: skip
+    if alike:
+        raise InputError(
+            f"{alike[0]} cannot be told apart: they change the outputs in proportion, as in a product; leave one "
+            "of them out of numbers=[…], or give it a sigma"
+        )
+
+
+def _in_proportion(model: FunctionModel, at: dict[str, float], one: Parameter, other: Parameter) -> bool:
+    """Say whether small changes of two numbers change the prediction in proportion."""
+    sets = [{**at, p.name: p.moved(at[p.name], by * p.typical)} for p in (one, other) for by in (_SMALL, -_SMALL)]
+    up, down, up_other, down_other = model.predict(sets)
+    slopes = np.stack([(up - down).ravel(), (up_other - down_other).ravel()], 1)
+    lengths = np.sqrt((slopes**2).sum(0))
+    if not (np.isfinite(slopes).all() and lengths.all()):
+        return False
+    return bool(np.linalg.svd(slopes / lengths, compute_uv=False)[1] < _PROPORTIONAL)
 
 
 def _solved_near(model: FunctionModel, parameter: Parameter, start: dict[str, float]) -> bool:

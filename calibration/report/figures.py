@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
 from textwrap import fill
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
@@ -37,6 +39,7 @@ _SCALES = {"ω": (30 / math.pi, "motor speed ω [rpm]"), "l": (100.0, "tail leng
 _LONG = 0.45  # of an arrow, in l
 _LINE = 24  # letters in a line of a label
 _SAMPLES, _CORNER = 1500, 6  # rows, and numbers that are drawn in pairs
+_WIDEST = 1e3  # samples, over their middle
 _TICKS = (3.0, 10.0, 30.0, 100.0, 300.0)
 _LAW = (
     "On what it depends. Line and band: the law. Points: the factor that the runs at this input ask for, "
@@ -47,28 +50,43 @@ Drawn = tuple[Figure, str, str]  # with a description and a caption
 
 
 def draw_all(result: Verdict, paths: Sequence[PathError]) -> dict[str, list[Drawn]]:
-    """Draw the figures of a report, by their names in the template."""
-    kind, drawn = result.runs.drawn[1][0], [error for error in paths if error.carried_out]
-    figures: dict[str, list[Drawn]] = {
-        "summary": [(draw_summary(result), "residual of each output over the noise, for each model",
-                     "The same on the runs that were fitted, for each output.")],
-        "residuals": [(figure, f"residuals by output and {kind}, {model}", model)
-                      for figure, model in draw_residuals(result)],
-        "maps": [(figure, f"map of the residual over the runs' inputs, {model}", model)
-                 for figure, model in draw_maps(result)],
+    """Draw the figures of a report, by their names in the template; one that fails is left out with a warning."""
+    kind, nearest, law = result.runs.drawn[1][0], result.nearest, result.law
+    carried_out = [error for error in paths if error.carried_out]
+    figures: dict[str, Callable[[], list[Drawn]]] = {
+        "summary": lambda: [(draw_summary(result), "residual of each output over the noise, for each model",
+                             "The same on the runs that were fitted, for each output.")],
+        "residuals": lambda: [(figure, f"residuals by output and {kind}, {model}", model)
+                              for figure, model in draw_residuals(result)],
+        "maps": lambda: [(figure, f"map of the residual over the runs' inputs, {model}", model)
+                         for figure, model in draw_maps(result)],
     }  # fmt: skip
-    if result.found.candidates:
-        figures["evidence"] = [(draw_evidence(result), "score of each effect against what a claim needs", "")]
-    if corner := draw_corner(result):
-        figures["corner"] = [(corner, "samples of the fitted numbers and effects in pairs, by form", "")]
-    if drawn:
-        words = "the wanted path, and the tracks of both schedules on the corrected robot"
-        figures["paths"] = [(draw_paths(drawn), words, "")]
-    if result.nearest and result.nearest.sizes:
-        words = f"size of {result.nearest.effect.title} for each specimen"
-        figures["sizes"] = [(draw_sizes(result.nearest), words, "")]
-    if result.law and result.law.kept:
-        figures["law"] = _figures_of_law(result.law.kept[0], result.split.fitted)
+    if result.found.misfit.critical_z > 0:  # else no effect can be told from the numbers
+        words = "score of each effect against what a claim needs"
+        figures["evidence"] = lambda: [(draw_evidence(result), words, "")]
+    title = "samples of the fitted numbers and effects in pairs, by form"
+    figures["corner"] = lambda: [(figure, title, "") for figure in [draw_corner(result)] if figure]
+    if carried_out:
+        of_paths = "the wanted path, and the tracks of both schedules on the corrected robot"
+        figures["paths"] = lambda: [(draw_paths(carried_out), of_paths, "")]
+    if nearest and nearest.sizes:
+        of_sizes = f"size of {nearest.effect.title} for each specimen"
+        figures["sizes"] = lambda: [(draw_sizes(nearest), of_sizes, "")]
+    if law and law.kept:
+        figures["law"] = lambda: _figures_of_law(law.kept[0], result.split.fitted)
+    drawn = {name: _drawn(name, draw) for name, draw in figures.items()}
+    return {name: each for name, each in drawn.items() if each}
+
+
+def _drawn(name: str, draw: Callable[[], list[Drawn]]) -> list[Drawn]:
+    """Draw figures as they are written; none, with a warning, if that fails."""
+    try:
+        figures = draw()
+        for figure, _, _ in figures:
+            figure.draw_without_rendering()
+    except (ValueError, ArithmeticError, RuntimeError) as reason:
+        warnings.warn(f"the report is without its figure {name!r}: {reason}", stacklevel=2)
+        return []
     return figures
 
 
@@ -123,6 +141,7 @@ def draw_residuals(result: Verdict) -> list[tuple[Figure, str]]:
     data, used = result.runs, result.split.fitted
     residuals = {label: (data.y - prediction)[used] for label, prediction in compared(result)}
     limits = 1.1 * np.max([np.abs(residual).max(0) for residual in residuals.values()], 0)
+    limits = np.where(limits > 0, limits, 1.0)  # also where no run departs
     return [(_draw_residual(residual, limits, used, data), label) for label, residual in residuals.items()]
 
 
@@ -168,7 +187,7 @@ def draw_maps(result: Verdict) -> list[tuple[Figure, str]]:
         final = final_model(result.verdict, result.nearest, result.effects)
         maps.append((final, result.explaining[0].refit_misfit))
     limit = max(4.0, float(np.abs(result.found.misfit.scores.shapes).max(initial=0.0)))
-    return [(_draw_map(misfit, result.runs, limit), label) for label, misfit in maps]
+    return [(_draw_map(misfit, result.runs, limit), label) for label, misfit in maps if misfit.scores.shapes.size]
 
 
 def _draw_map(misfit: Misfit, data: Runs, limit: float) -> Figure:
@@ -216,7 +235,7 @@ def draw_corner(result: Verdict) -> Figure | None:
     forms = open_forms(result)
     samples = draw_samples(forms, _SAMPLES, seed=0)
     fitted = {p.name: p for refit in forms.values() for p in refit.fitted if p.sigma is None}
-    free = [p for p in fitted.values() if samples[p.name].nunique() > 1][:_CORNER]
+    free = [p for p in fitted.values() if _can_be_drawn(samples[p.name])][:_CORNER]
     if len(free) < 2:
         return None
     figure = Figure(figsize=(_WIDTH, _WIDTH))
@@ -249,6 +268,12 @@ def draw_corner(result: Verdict) -> Figure | None:
         figure.legend(fontsize=8, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     figure.tight_layout(h_pad=0.2, w_pad=0.2)
     return figure
+
+
+def _can_be_drawn(sampled: pd.Series) -> bool:
+    """Say whether samples differ, and within few orders of magnitude."""
+    low, middle, high = np.quantile(sampled, (0, 0.5, 1))
+    return bool(low < high and high - low < _WIDEST * max(abs(middle), np.ptp(np.quantile(sampled, (0.25, 0.75)))))
 
 
 def _with_unit(number: Parameter) -> str:

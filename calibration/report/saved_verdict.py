@@ -87,14 +87,14 @@ class SavedVerdict(Shown, Verdict):
         return verdict_record(self, table=self.table, path=paths or None)
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Write verdict.json, report.html and what is corrected, all or none, and return their paths.
+        """Write verdict.json and what is corrected, both or neither, then report.html, and return their paths.
 
         Raises:
             InputError: the files cannot be written.
         """
         (name, corrected), record = self._corrected_file(), self.to_dict()
         with files_together(folder, FILES) as temporary:
-            write_report(self, record, temporary / "report.html", paths=self.paths)
             write_text(temporary / name, corrected)
             write_text(temporary / "verdict.json", json.dumps(record, indent=1) + "\n")
+        write_report(self, record, Path(folder, "report.html"), paths=self.paths)
         return [Path(folder, each) for each in (*FILES[:2], name)]

@@ -23,6 +23,7 @@ _FEATURES = {  # what words of a feature's name read as
 }  # fmt: skip
 _RESOLVED = 2.01  # over the number of draws and one more: the bootstrap resolves no smaller p
 _NEARLY_ALL = 0.995
+_MANY_TIMES = math.log(100)
 
 
 def output_label(record: Record, output: str) -> str:
@@ -208,9 +209,16 @@ def detectable(value: float, of: Record) -> str:
 
 def direction_in_words(direction: Mapping[str, float], error: float) -> str:
     """Say how coefficients change together along a direction in their logarithms, by one standard deviation."""
-    changes = {name: 100 * math.expm1(part * error) for name, part in direction.items() if abs(part) > 0.1}
-    words = [f"{name} {plain(abs(c), 2)} % {'larger' if c > 0 else 'smaller'}" for name, c in changes.items()]
+    changes = {name: part * error for name, part in direction.items() if abs(part) > 0.1}
+    words = [f"{name} {_changed_by(change)}" for name, change in changes.items()]
     return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
+
+
+def _changed_by(change: float) -> str:
+    """Say a change of a logarithm."""
+    if abs(change) > _MANY_TIMES:
+        return f"more than {math.exp(_MANY_TIMES):.0f} times {'larger' if change > 0 else 'smaller'}"
+    return f"{plain(100 * abs(math.expm1(change)), 2)} % {'larger' if change > 0 else 'smaller'}"
 
 
 def ranges_in_words(settings: Mapping[str, tuple[float, float, str]]) -> str:
