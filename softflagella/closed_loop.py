@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Literal
 
@@ -101,8 +102,10 @@ def calibrate(
         >>> result = sf.plan(sf.circle(2.0), verdict)  # doctest: +SKIP
         >>> verdict.samples(1000)["C_t"].quantile([0.025, 0.975])  # doctest: +SKIP
     """
-    if max_seconds is not None and not max_seconds > 0:
-        raise InputError(f"max_seconds: {max_seconds:g}; give a positive number of seconds")
+    if max_seconds is not None and not (isinstance(max_seconds, Real) and max_seconds > 0):
+        raise InputError(f"max_seconds: {max_seconds}; give a positive number of seconds")
+    if not (isinstance(seed, Integral) and seed >= 0):
+        raise InputError(f"seed: {seed}; give a whole number from 0")
     roles = Roles(session, specimen, held_out, noise, notes)
     if isinstance(robot, Model):
         _refuse(

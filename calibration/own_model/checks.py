@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -19,14 +19,15 @@ _OTHER_UNITS = (  # factor, units of an output in which it is a mistake, what th
     (100.0, ("1", "%"), "per cent"),
     (180 / np.pi, ("1", "rad", "deg", "°"), "degrees"),
 )
-_SMALL, _PROPORTIONAL = 1e-3, 1e-5  # change of a number, in its typical size; share by which slopes differ
+_SMALL = 1e-3  # change of a parameter, in its typical size
+_ROUGHLY = 0.2  # share by which large changes differ that may be in proportion
 _NEXT = 0.01  # change of a number, in its typical size, with which a fit begins
 _NEAR = 1.3  # factor between another unit and what is found
 _TOGETHER = 0.9  # least correlation, about 0, of what is compared as a difference
 
 
-def check_function(model: FunctionModel, *, title: str = "") -> None:
-    """Check the function with its start values, and with each parameter changed.
+def check_function(model: FunctionModel, *, title: str = "") -> tuple[str, ...]:
+    """Check the function with its start values, and with each parameter changed, and say what runs cannot tell.
 
     Raises:
         InputError: there are fewer values than numbers, a prediction cannot be compared, a parameter changes
@@ -59,7 +60,13 @@ def check_function(model: FunctionModel, *, title: str = "") -> None:
                 f"{parameter.words} changes nothing in these runs, whether it is {parameter.start:g} or "
                 f"{_changed(parameter):g}: use p[{parameter.name!r}] in the function, or leave it out of the model"
             )
-    _refuse_inseparable(model, start)
+    alike = _inseparable(model, {p.name: each - given for p, each in zip(parameters, changed, strict=True)})
+    for number, second in alike:
+        if second in model.coefficients:
+            raise InputError(
+                f"{number.name} and {second.name} cannot be told apart: they change the outputs in proportion, as in "
+                "a product; leave one of them out of numbers=[…], or give it a sigma"
+            )
     for place, (name, output) in enumerate(model.model.outputs.items()):
         measured, predicted = runs.y[:, place], given[:, place]
         ratio = output.kind == "ratio"
@@ -76,6 +83,7 @@ def check_function(model: FunctionModel, *, title: str = "") -> None:
                 f"({', '.join(f'{n.name} = {n.start:g}' for n in model.model.numbers)}): check the units of both, "
                 f"and give start values that come within a factor of {_FAR:g}"
             )
+    return tuple(f"these runs cannot tell {effect.words} from {number.words}" for number, effect in alike)
 
 
 def _changed(parameter: Parameter) -> float:
@@ -85,28 +93,36 @@ def _changed(parameter: Parameter) -> float:
     return up if up != parameter.start else down
 
 
-def _refuse_inseparable(model: FunctionModel, start: dict[str, float]) -> None:
-    """Refuse free numbers that change the outputs in proportion, at the start and elsewhere: as a product does."""
-    free = model.coefficients
+def _inseparable(model: FunctionModel, changes: dict[str, Floats]) -> list[tuple[Parameter, Parameter]]:
+    """List free numbers, and effects, that change the outputs in proportion to another number, as in a product.
+
+    They do so at the start and elsewhere; `changes` are those of larger steps, which tell what need not be tried.
+    """
+    start, free = start_values(model), model.coefficients
     elsewhere = {**start, **{p.name: _changed(p) for p in free}}
-    alike = [f"{p.name} and {q.name}" for p, q in combinations(free, 2)
-             if all(_in_proportion(model, at, p, q) for at in (start, elsewhere))]  # fmt: skip
-    if alike:
-        raise InputError(
-            f"{alike[0]} cannot be told apart: they change the outputs in proportion, as in a product; leave one "
-            "of them out of numbers=[…], or give it a sigma"
+    pairs = [*combinations(free, 2), *product(free, model.effects)]
+    return [
+        (p, q)
+        for p, q in pairs
+        if _in_proportion(changes[p.name], changes[q.name], _ROUGHLY)
+        and all(
+            _in_proportion(_slope_along(model, at, p), _slope_along(model, at, q)) for at in (start, elsewhere)
         )
+    ]
 
 
-def _in_proportion(model: FunctionModel, at: dict[str, float], one: Parameter, other: Parameter) -> bool:
-    """Say whether small changes of two numbers change the prediction in proportion."""
-    sets = [{**at, p.name: p.moved(at[p.name], by * p.typical)} for p in (one, other) for by in (_SMALL, -_SMALL)]
-    up, down, up_other, down_other = model.predict(sets)
-    slopes = np.stack([(up - down).ravel(), (up_other - down_other).ravel()], 1)
+def _slope_along(model: FunctionModel, at: dict[str, float], of: Parameter) -> Floats:
+    """Return how the prediction changes with a small change of a parameter to either side."""
+    up, down = model.predict([{**at, of.name: of.moved(at[of.name], by * of.typical)} for by in (_SMALL, -_SMALL)])
+    return np.asarray(up - down)
+
+
+def _in_proportion(one: Floats, other: Floats, within: float = 1e-5) -> bool:
+    """Say whether two changes of a prediction are in proportion."""
+    slopes = np.stack([one.ravel(), other.ravel()], 1)
     lengths = np.sqrt((slopes**2).sum(0))
-    if not (np.isfinite(slopes).all() and lengths.all()):
-        return False
-    return bool(np.linalg.svd(slopes / lengths, compute_uv=False)[1] < _PROPORTIONAL)
+    known = bool(np.isfinite(slopes).all() and lengths.all())
+    return known and bool(np.linalg.svd(slopes / lengths, compute_uv=False)[1] < within)
 
 
 def _solved_near(model: FunctionModel, parameter: Parameter, start: dict[str, float]) -> bool:

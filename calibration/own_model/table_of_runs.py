@@ -6,7 +6,9 @@ counts with the others. Columns that nobody asks for are notes, unless an output
 
 from __future__ import annotations
 
+import re
 from collections.abc import Container, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, NamedTuple, cast
 
@@ -26,6 +28,7 @@ from calibration.statistics.excluded import MANY, Faults
 from calibration.statistics.gaps import filled, gaps_in_words, is_missing, with_outputs, without_gaps
 from calibration.statistics.gls import repeat_count
 from calibration.statistics.statistical_model import FEWEST_REPEATS
+from calibration.statistics.study import middle_session
 from common.arrays import Flags, Floats, Integers, Words
 from common.errors import InputError, naming
 from common.quantities import numbers_of
@@ -33,6 +36,7 @@ from common.tables import LINE, read_table, row_name
 
 Noise = Mapping[str, float | str] | Literal["unknown"]
 _FOLLOWS = 0.98  # correlation of ranks among repeats with an output that was computed from a column
+_SESSION = re.compile("session|day|date|round|series|batch|trial|repeat|lot")  # in names of columns
 _MOST = 200_000_000  # rows times settings
 _TRUE = ("true", "yes", "1", "1.0")
 
@@ -62,14 +66,20 @@ def read_runs_of(
         result = _read(
             table, model, roles._replace(session=roles.session or ("session" in table and "session") or None)
         )
-        check_function(result, title=title)
-        return result, _held_out(roles.held_out, result)
+        caveats = check_function(result, title=title)
+        held_out = _held_out(roles.held_out, result)
+        if held_out is None and not middle_session(result.runs).any():
+            raise InputError(
+                "all rows have one setting and one session, so none can be held out; give more of them"
+            )
+        advice = _advice(table, result, roles)
+        return replace(result, runs=replace(result.runs, caveats=(*caveats, *advice))), held_out
 
 
 def _read(table: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
     own = [name for name in (roles.session, roles.specimen) if name]
-    for name in (*model.outputs, *(model.settings or ()), *own, *(roles.notes or ())):
-        if name not in table:
+    for name in (*model.outputs, *(model.settings or ()), *own, *_names(roles.notes)):
+        if not isinstance(name, str) or name not in table:
             raise InputError(f"the table has no column {name!r}; it has {', '.join(table.columns)}")
     outputs = table[list(model.outputs)].apply(numbers_of)
     columns = AskedColumns({name: _values(table[name]) for name in table.columns if name not in outputs})
@@ -150,6 +160,26 @@ def _as_numbers(values: Floats | Words) -> Floats:
     return np.asarray(numbers, dtype=float)
 
 
+def _advice(table: pd.DataFrame, model: FunctionModel, roles: Roles) -> list[str]:
+    """Say what the table has and was not told, and what keeps its rows from being repeats."""
+    runs, advice = model.runs, []
+    settings = [name.removeprefix("ln ") for name in runs.input_names]
+    unknown = [name for name in model.columns if name not in (*settings, roles.specimen)]
+    alike = [name for name in unknown if _SESSION.search(name.lower())]
+    free = [name for name in alike if 1 < table[name].nunique() <= len(table) / 2]
+    if roles.session is None and len(runs.session_names) == 1 and free:
+        advice.append(f"no session was given; column {free[0]} looks like one (--session {free[0]})")
+    if runs.repeated(slice(None)) or runs.sigma is not None or not runs.noise_known:
+        return advice
+    advice.append('without repeats the noise is unknown; declare it: sigma="2 %" of the Output, or noise=')
+    for role in ("specimen", "session"):
+        if name := getattr(roles, role):
+            others = [column for column in settings if column != name]
+            if len(table) - len(table[others].drop_duplicates()) >= FEWEST_REPEATS:
+                advice.append(f"rows of equal settings differ in {name} (--{role}), so they are no repeats")
+    return advice
+
+
 def _levels(name: str | None, columns: AskedColumns) -> tuple[Integers, tuple[str, ...]]:
     """Number the distinct values of a column, (n,), and name each; a number goes with the name of the column."""
     if name is None:
@@ -208,7 +238,7 @@ def _notes(
 ) -> dict[str, Floats | Words]:
     """Return the columns that are wanted as notes; default: all others from which no output was computed."""
     if wanted is not None:
-        return {name: columns[name] for name in wanted}
+        return {name: columns[name] for name in _names(wanted)}
     notes = {name: v for name, v in columns.items() if name not in known and not is_missing(v).all()}
     if repeat_count(condition) < FEWEST_REPEATS:
         return notes
@@ -233,6 +263,8 @@ def _sigma(model: Model, noise: Noise | None) -> Floats | None:
 
 
 def _names(given: str | Sequence[str] | None) -> list[str]:
+    if not isinstance(given, str | Iterable | None):
+        raise InputError(f'held_out, notes: {given!r}; give a name as text, such as "{given}", or a list of names')
     return [given] if isinstance(given, str) else list(map(str, given or ()))
 
 

@@ -211,6 +211,15 @@ def test_a_fault_of_a_table_is_named() -> None:
     assert "45 of 45 runs are held out" in said(MODEL, TABLE.assign(test=True), held_out="test")
     assert "above 0 for each output, v" in said(MODEL, noise={"w": 1.0})
     assert "give 'unknown'" in said(MODEL, noise="large")
+    for options, words in (
+        ({"noise": {"v": "a"}}, "noise of v = 'a'; give a number in its unit"),
+        ({"held_out": 3}, 'held_out, notes: 3; give a name as text, such as "3"'),
+        ({"seed": -1}, "seed: -1; give a whole number from 0"),
+        ({"max_seconds": "long"}, "max_seconds: long; give a positive number"),
+    ):
+        assert words in said(MODEL, **options)
+    assert "all rows have one setting and one session" in said(MODEL.without("wall"), TABLE[::9].assign(round=1))
+    assert "2 usable rows for 1 numbers to fit; give 4 rows" in said(MODEL, TABLE[:2])
     assert "2 usable rows for 2 numbers" in said(
         replace(MODEL, numbers=[*MODEL.numbers, sf.Number("power", 2.0)]), TABLE[:2]
     )
@@ -225,6 +234,19 @@ def test_a_tolerance_is_in_the_unit_of_its_number() -> None:
 def test_a_unit_and_a_title_may_be_empty() -> None:
     assert sf.Number("k", 1.0, unit="").parameter.unit == "1"
     assert sf.Effect("wall", "", low=0, high=1, unit=" ").parameter.title == "wall"
+
+
+def test_what_would_make_rows_repeats_is_said() -> None:
+    columns = TABLE.drop(columns=["round", "day"]).assign(day=TABLE["round"], ball=np.arange(45))
+
+    def caveats(**options: Any) -> str:
+        return " | ".join(sf.calibrate(columns, MODEL, progress=False, **options).caveats)
+
+    assert "no session was given; column day looks like one (--session day)" in caveats()
+    assert "looks like" not in caveats(session="day")
+    alone = caveats(session="day", specimen="ball")
+    assert 'declare it: sigma="2 %" of the Output, or noise=' in alone
+    assert "rows of equal settings differ in ball (--specimen), so they are no repeats" in alone
 
 
 def test_what_is_for_robots_is_refused_for_a_model_and_the_other_way_round() -> None:

@@ -79,6 +79,13 @@ def test_numbers_that_act_together_only_are_named(together: Any) -> None:
     assert sf.calibrate(TABLE, known, session="round", progress=False).effects == ("wall",)
 
 
+def test_an_effect_that_acts_as_a_number_does_is_said() -> None:
+    model = replace(of(lambda v, p: v / (1 + p["k"])), effects=[SCALE, *MODEL.effects])
+    result = sf.calibrate(TABLE, model, session="round", progress=False)
+    assert result.effects == ("wall",)
+    assert "these runs cannot tell scale (k) from v1 (v1)" in result.caveats
+
+
 def test_numbers_that_act_apart_are_fitted() -> None:
     model = replace(MODEL, function=lambda c, p: {"v": p["v1"] * c["d"] ** p["power"]}, effects=[])
     numbers = [NUMBER, sf.Number("power", 2.0, low=1, high=3)]
