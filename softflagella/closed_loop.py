@@ -114,7 +114,7 @@ def calibrate(
         limit = MAX_SECONDS if max_seconds is None else max_seconds
         with limited(limit):
             experiment, rows = read_runs_of(table, robot, roles, title="checks" if progress else "")
-            for line in lines_of_excluded(experiment.runs):
+            for line in (*experiment.runs.converted, *lines_of_excluded(experiment.runs)):
                 tell(line)
             verdict = find_what_is_missing(
                 experiment, held_out=rows, seed=seed, max_seconds=limit, progress=progress

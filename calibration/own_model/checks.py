@@ -64,8 +64,8 @@ def check_function(model: FunctionModel, *, title: str = "") -> tuple[str, ...]:
     for number, second in alike:
         if second in model.coefficients:
             raise InputError(
-                f"{number.name} and {second.name} cannot be told apart: they change the outputs in proportion, as in "
-                "a product; leave one of them out of numbers=[…], or give it a sigma"
+                f"{number.name} and {second.name} cannot be told apart: they change the outputs in proportion, as "
+                "in a product; leave one of them out of numbers=[…], or give it a sigma"
             )
     for place, (name, output) in enumerate(model.model.outputs.items()):
         measured, predicted = runs.y[:, place], given[:, place]

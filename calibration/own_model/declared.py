@@ -12,7 +12,7 @@ from typing import Any, Literal, Self
 from calibration.statistics.checks import names_once
 from calibration.statistics.statistical_model import Parameter
 from common.errors import InputError
-from common.units import find_unit, from_si
+from common.units import find_unit, from_si, split
 from sim.model.uncertainty import parse_sigma
 
 Function = Callable[[Mapping[str, Any], Mapping[str, float]], Mapping[str, Any]]  # columns, parameters -> outputs
@@ -212,8 +212,14 @@ class Model:
     numbers: Sequence[Number]
     effects: Sequence[ModelEffect] = field(default=())
     settings: Sequence[str] | None = None  # columns that repeats share; default: all for which the function asks
+    # In which the function asks for columns, {"length": "m"}; the table may have length_cm.
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        for name, unit in self.units.items():
+            known = find_unit(unit)
+            if known is None or split(name).unit not in (None, known):
+                raise InputError(f"units: {name!r} in {unit!r}; give a unit that is known, such as m, deg or Pa s")
         for what, kind in (("outputs", Output), ("numbers", Number), ("effects", ModelEffect)):
             given = getattr(self, what)
             each = list(given.values() if what == "outputs" and isinstance(given, Mapping) else given)

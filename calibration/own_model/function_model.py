@@ -51,6 +51,7 @@ class TableRuns(Runs):
     """Runs of a table of any columns; what was set is their inputs."""
 
     words: frozenset[str] = field(default=frozenset(), kw_only=True)  # inputs that number words
+    converted: tuple[str, ...] = field(default=(), kw_only=True)  # columns in other units, in words
 
     @property
     def settings(self) -> dict[str, tuple[Floats, str]]:

@@ -31,8 +31,9 @@ from calibration.statistics.statistical_model import FEWEST_REPEATS
 from calibration.statistics.study import middle_session
 from common.arrays import Flags, Floats, Integers, Words
 from common.errors import InputError, naming
-from common.quantities import numbers_of
+from common.quantities import convert_columns, numbers_of
 from common.tables import LINE, read_table, row_name
+from common.units import find_unit, split
 
 Noise = Mapping[str, float | str] | Literal["unknown"]
 _FOLLOWS = 0.98  # correlation of ranks among repeats with an output that was computed from a column
@@ -76,7 +77,21 @@ def read_runs_of(
         return replace(result, runs=replace(result.runs, caveats=(*caveats, *advice))), held_out
 
 
+def _in_its_units(table: pd.DataFrame, model: Model) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """Convert columns to the units in which a model asks for them, and say which."""
+    outputs = {name: o.unit for name, o in model.outputs.items() if name not in table and find_unit(o.unit)}
+    told: list[str] = []
+    for name, word in {**outputs, **model.units}.items():
+        unit = find_unit(word)
+        column = name if unit is None or split(name).unit else f"{name}_{unit.suffix}"
+        table, notes = convert_columns(table.rename(columns={name: column}), [column], "the table")
+        table = table.rename(columns={column: name})
+        told += notes
+    return table, tuple(told)
+
+
 def _read(table: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
+    table, converted = _in_its_units(table, model)
     own = [name for name in (roles.session, roles.specimen) if name]
     for name in (*model.outputs, *(model.settings or ()), *own, *_names(roles.notes)):
         if not isinstance(name, str) or name not in table:
@@ -133,6 +148,7 @@ def _read(table: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
         unit_checked={name: o.unit_checked for name, o in kinds},
         lines=table.index.to_numpy()[keep] if table.index.name == LINE else None,
         words=frozenset(words),
+        converted=converted,
     )
     return FunctionModel(model, with_outputs(runs, range(len(runs.outputs))), columns)
 

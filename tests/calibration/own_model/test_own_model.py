@@ -18,7 +18,7 @@ from calibration.own_model.table_of_runs import Roles, read_runs_of
 from calibration.verdict.calibrate import calibrate
 from common.errors import InputError, run_command
 from softflagella.__main__ import main
-from tests.calibration.own_model.test_faults import MODEL, TABLE, fall
+from tests.calibration.own_model.test_faults import MODEL, TABLE, fall, said
 
 REAL = Path(__file__).parents[4] / "shared/measured/real"
 NAMES = {"rho_ball_kg_m3": "rho_ball", "rho_fluid_kg_m3": "rho_oil"}
@@ -42,6 +42,24 @@ def test_tables_are_read_as_all_tables_are(tmp_path: Path) -> None:
     assert runs.row_name(0) == "row 1 (line 3)"
     assert expected.input_names == ("ln d",)
     assert expected.settings["d"][0] == pytest.approx(TABLE["d"])
+
+
+def test_columns_are_converted_to_the_units_of_the_model() -> None:
+    model, told = replace(MODEL, units={"d": "m"}), list[str]()
+    for name, factor in {"d_mm": 1000, "d [cm]": 100, "d_m": 1, "d": 1}.items():
+        table = TABLE.drop(columns=["d", "v"]).assign(**{name: factor * TABLE["d"], "v_cm_s": 100 * TABLE["v"]})
+        runs = runs_of(table, model)
+        np.testing.assert_allclose(runs.y, runs_of(TABLE).y)
+        assert runs.settings["d"][0] == pytest.approx(TABLE["d"])
+    sf.calibrate(table.rename(columns={"d": "d_m"}), model, session="round", progress=False, tell=told.append)
+    assert told == ["column v_cm_s converted from cm/s to m/s (v_m_s)"]
+    assert "d_m and d_mm are the same quantity" in said(model, TABLE.assign(d_mm=1.0))
+    angles = replace(MODEL, function=lambda c, p: fall({"d": c["a"]}, p), units={"a": "rad"})
+    degrees = TABLE.rename(columns={"d": "a_deg"}).assign(a_deg=np.degrees(TABLE["d"]))
+    assert runs_of(degrees, angles).settings["a"][0] == pytest.approx(TABLE["d"])
+    for units in {"d": "ell"}, {"d_mm": "m"}:
+        with pytest.raises(InputError, match="give a unit that is known"):
+            replace(MODEL, units=units)
 
 
 def test_rows_that_lack_what_is_needed_are_excluded_and_said() -> None:
