@@ -18,7 +18,7 @@ from calibration.report.model_verdict import ModelVerdict
 from calibration.report.robot_verdict import RobotVerdict, read_runs
 from calibration.statistics.budget import limited
 from calibration.statistics.statistical_model import lines_of_excluded
-from calibration.swimmer.possible_runs import Owned, owned
+from calibration.swimmer.possible_runs import Owned, owned, read_owned
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate as find_what_is_missing
 from common.errors import InputError
@@ -53,7 +53,7 @@ def calibrate(
 ) -> RobotVerdict | ModelVerdict:
     """Fit a table of measured runs, find what the model lacks, and correct the robot, or a model of your own.
 
-    `protocol`, `own`, `laws`, `paths` and `unit` are for a robot; `session`, `specimen`, `held_out`, `noise` and
+    `protocol`, `laws`, `paths` and `unit` are for a robot; `session`, `specimen`, `held_out`, `noise` and
     `notes` are for a model of your own.
 
     Args:
@@ -64,8 +64,8 @@ def calibrate(
         protocol: what is fitted: all sessions but one ("session"), or N = 3 and 4 as in the paper ("paper").
         seed: of the bootstrap; the same seed gives the same result.
         own: KEY=VALUES, what the lab can set in the next runs that the verdict proposes, such as l_cm=5,7,9; for
-            `N`, `l_cm` and `omega_rpm` (both directions). Default: the table's range. In Python a list of such
-            words, or `{"l_cm": (5, 7, 9)}`.
+            `N`, `l_cm` and `omega_rpm` (both directions), or the settings of a model of your own. Default: the
+            table's range. In Python a list of such words, or `{"l_cm": (5, 7, 9)}`.
         laws: look for laws where no effect explains the runs.
         paths: files or shapes, such as `("square:24cm",)`, on which the error with the robot as given and with the
             corrected one is stated; `verdict.paths` has it.
@@ -108,12 +108,11 @@ def calibrate(
         raise InputError(f"seed: {seed}; give a whole number from 0")
     roles = Roles(session, specimen, held_out, noise, notes)
     if isinstance(robot, Model):
-        _refuse(
-            "a model of your own", own=own, laws=not laws, paths=paths, unit=unit, protocol=protocol != "session"
-        )
+        _refuse("a model of your own", laws=not laws, paths=paths, unit=unit, protocol=protocol != "session")
         limit = MAX_SECONDS if max_seconds is None else max_seconds
+        given = own if isinstance(own, Mapping) else read_owned(own or ())
         with limited(limit):
-            experiment, rows = read_runs_of(table, robot, roles, title="checks" if progress else "")
+            experiment, rows = read_runs_of(table, robot, roles, own=given, title="checks" if progress else "")
             for line in (*experiment.runs.converted, *lines_of_excluded(experiment.runs)):
                 tell(line)
             verdict = find_what_is_missing(

@@ -73,6 +73,7 @@ class FunctionModel:
     columns: AskedColumns  # of the runs
     untestable: Mapping[str, str] = field(default_factory=dict)
     about: Floats | None = None  # (n, k) within half a turn of which angles are predicted; None: the measured ones
+    own: Mapping[str, Sequence[float]] = field(default_factory=dict)  # settings that the lab can set, by column
     known: dict[tuple[float, ...], Floats] = field(default_factory=dict)  # parameters -> (n, k), the latest
     unsolved: dict[str, None] = field(
         default_factory=dict
@@ -161,13 +162,17 @@ class FunctionModel:
         return start
 
     def possible(self) -> tuple[FunctionModel, list[dict[str, Any]]]:
-        """Return a run for each of the table's conditions, named by its columns."""
+        """Return a run for each of the table's conditions, with what the lab can set, named by its columns."""
         first = np.unique(self.runs.condition, return_index=True)[1]
-        session = np.zeros(len(first), dtype=np.int64)
-        runs = replace(self.runs.subset(first), session=session, session_names=("next",))
-        names = [name.removeprefix("ln ") for name in self.runs.input_names]
-        settings = [{name: self.columns[name][row].item() for name in names} for row in first]
-        return replace(self, runs=runs, columns=self.columns.rows(first), known={}), settings
+        table = pd.DataFrame({name: values[first] for name, values in self.columns.items()}).assign(row=first)
+        for name, own in self.own.items():
+            table = table.drop(columns=name).merge(pd.Series(own, name=name, dtype=float), how="cross")
+        table = table.drop_duplicates(names := [name.removeprefix("ln ") for name in self.runs.input_names])
+        runs = self.runs.subset(table.pop("row").to_numpy())
+        runs = replace(runs, session=np.zeros(len(runs), dtype=np.int64), session_names=("next",))
+        values = {name: table[name].to_numpy().astype(old.dtype) for name, old in self.columns.items()}
+        settings = [{name: values[name][row].item() for name in names} for row in range(len(runs))]
+        return replace(self, runs=runs, columns=AskedColumns(values, self.columns.asked), known={}), settings
 
 
 def within_half_a_turn(values: Any, about: Any, turns: Any) -> Any:

@@ -53,7 +53,12 @@ class Roles(NamedTuple):
 
 
 def read_runs_of(
-    source: str | Path | pd.DataFrame, model: Model, roles: Roles, *, title: str = ""
+    source: str | Path | pd.DataFrame,
+    model: Model,
+    roles: Roles,
+    *,
+    own: Mapping[str, Sequence[float]] | None = None,
+    title: str = "",
 ) -> tuple[FunctionModel, Flags | None]:
     """Read the runs of a model from a file or a table, check both, and say which are held out, (n,).
 
@@ -74,7 +79,10 @@ def read_runs_of(
                 "all rows have one setting and one session, so none can be held out; give more of them"
             )
         advice = _advice(table, result, roles)
-        return replace(result, runs=replace(result.runs, caveats=(*caveats, *advice))), held_out
+        settings = [name for name in result.runs.settings if name not in result.runs.words]
+        if own and (unknown := [name for name in own if name not in settings]):
+            raise InputError(f"own: {unknown[0]!r} is no setting of this table; there are {', '.join(settings)}")
+        return replace(result, own=own or {}, runs=replace(result.runs, caveats=(*caveats, *advice))), held_out
 
 
 def _in_its_units(table: pd.DataFrame, model: Model) -> tuple[pd.DataFrame, tuple[str, ...]]:

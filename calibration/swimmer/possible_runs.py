@@ -78,7 +78,14 @@ def _all_spins(factor: float) -> str:
 
 
 def owned(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:
-    """Read the settings that a lab has from entries such as "l_cm=5,7,9", by the columns of a table."""
+    """Read the settings that a lab has, of a robot."""
+    settings = read_owned(entries)
+    check_owned(settings)
+    return settings
+
+
+def read_owned(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:
+    """Read settings from entries such as "l_cm=5,7,9", by the columns of a table."""
     settings: dict[str, tuple[float, ...]] = {}
     for entry in entries:
         name, _, values = entry.partition("=")
@@ -86,7 +93,6 @@ def owned(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:
             settings[name] = tuple(float(v) for v in values.split(","))
         except ValueError:
             raise InputError(f"--own {entry!r}; write COLUMN=VALUE,VALUE,… such as l_cm=5,7,9") from None
-    check_owned(settings)
     return settings
 
 

@@ -250,7 +250,7 @@ def test_what_would_make_rows_repeats_is_said() -> None:
 
 
 def test_what_is_for_robots_is_refused_for_a_model_and_the_other_way_round() -> None:
-    assert "own, laws, paths is not for a model" in said(MODEL, own=("N=2",), laws=False, paths=("square:3l",))
+    assert "laws, paths is not for a model" in said(MODEL, laws=False, paths=("square:3l",))
     with pytest.raises(InputError, match="session, noise is not for a robot"):
         sf.calibrate(TABLE, "paper-control", session="round", noise="unknown")
 

@@ -135,6 +135,30 @@ def test_the_next_runs_are_named_by_the_columns_of_the_table() -> None:
     others, settings = model.possible()
     assert settings == [{"d": d} for d in TABLE["d"][:9]]
     assert len(others.runs) == 9
+    wider = read_runs_of(TABLE, MODEL, Roles(session="round"), own={"d": (0.05, 0.5)})[0].possible()
+    assert wider[1] == [{"d": 0.05}, {"d": 0.5}]
+    start = {"v1": 300.0, "wall": 1.0}
+    np.testing.assert_allclose(
+        np.exp(wider[0].predict([start])).ravel(), fall({"d": np.array([0.05, 0.5])}, start)["v"]
+    )
+
+
+def test_what_the_lab_can_set_may_tell_explanations_apart() -> None:
+    """Within the table's diameters the two do not differ, far beyond them they do."""
+    steeper = sf.Effect("steeper", "steeper", low=-1, high=4)
+    model = replace(
+        MODEL,
+        function=lambda c, p: {"v": fall(c, p)["v"] * np.exp(-2.0 * p["steeper"] * c["d"])},
+        effects=[*MODEL.effects, steeper],
+    )
+    result, wider = (
+        sf.calibrate(TABLE, model, session="round", progress=False, own=own) for own in (None, ["d=0.05,0.5,2"])
+    )
+    assert result.verdict == wider.verdict == "ambiguous"
+    assert wider.next_batch.decides > result.next_batch.decides
+    assert {run["d"] for run in wider.next_batch.settings} <= {0.05, 0.5, 2.0}
+    with pytest.raises(InputError, match="'b' is no setting of this table; there are d"):
+        sf.calibrate(TABLE, model, session="round", progress=False, own={"b": (1.0,)})
 
 
 def test_a_model_is_saved_with_its_numbers(tmp_path: Path) -> None:
