@@ -23,7 +23,7 @@ from tests.shared import shared
 Record = dict[str, Any]
 
 OF_A_ROBOT = re.compile(
-    r"robot|\btails?\b|tank|camera|motor|swim|--own|softflagella|corrected\.toml|slip angle|heading", re.IGNORECASE
+    r"robot|\btails?\b|tank|camera|motor|swim|softflagella|corrected\.toml|slip angle|heading", re.IGNORECASE
 )
 P_VALUE = re.compile(r"\bp [=≤]")
 SPOILT = re.compile(r"\bNone\b|\bnan\b|Undefined|  |\.\.|[.,;:] [.,;]|\(\)| [.,;)]|\( ")
