@@ -12,6 +12,13 @@ equal in two of them with probability
 the density of their difference at 0, times d. A row whose outputs all equal those of an earlier row of the same
 condition is a copy if less than `_CHANCE` such pairs are expected in the whole table: (pairs of repeats) × ∏ p.
 Outputs in coarse steps may agree by chance, and their rows are kept. Outputs are taken as independent.
+
+Whole rows, all columns of the table, tell more: rows that are pasted come together. They are copies, however
+coarse the outputs, where
+
+- every row is there 2 times, or 4, 6, …, or 3, 6, …, and at least `_MANY_ROWS` are distinct;
+- a block of rows in order equals one before it, so long that of rows of which half agree less than `_CHANCE` such
+  blocks are expected, and of the other rows at this distance with equal settings no more than half agree.
 """
 
 from __future__ import annotations
@@ -23,10 +30,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from common.arrays import Flags, Floats
+from common.arrays import Flags, Floats, Integers
 from common.tables import row_name
 
 COPY = "a copy of an earlier row, equal in all inputs and outputs{}"
+_MANY_ROWS, _DISTANCES = 10, 5  # distinct rows; distances that are tried
 _CHANCE = 0.01  # equal pairs that are expected by chance
 _ROUNDING = 1e-9  # relative difference below which two numbers are one, converted from another unit
 _TYPICAL = 0.01  # relative standard deviation that is assumed where no repeats but copies are left
@@ -67,7 +75,14 @@ class Faults(dict[int, Excluded]):
     def add_copies(self, inputs: Floats, outputs: Floats) -> None:
         """Add the usable rows with all outputs (n, k) that are copies of an earlier one."""
         whole = np.flatnonzero(self.usable & np.isfinite(outputs).all(axis=1))
-        for place, earlier in find_copies(inputs[whole], outputs[whole]).items():
+        rows = self.table.iloc[whole].astype(str)
+        number = rows.groupby([*rows], sort=False, dropna=False).ngroup()
+        copies = pasted(number.to_numpy().astype(np.int64), inputs[whole])
+        kept = ~np.isin(np.arange(len(whole)), list(copies))
+        places = np.flatnonzero(kept).tolist()
+        again = find_copies(inputs[whole][kept], outputs[whole][kept])
+        copies |= {places[place]: places[earlier] for place, earlier in again.items()}
+        for place, earlier in copies.items():
             name, original = (row_name(self.table, int(whole[at])) for at in (place, earlier))
             self[int(whole[place])] = Excluded(COPY, name, f" ({original})")
 
@@ -119,6 +134,31 @@ def caveat_of_excluded(excluded: Sequence[Excluded], total: int) -> tuple[str, .
         f"{count} of {total} rows ({100 * count / total:.0f} %) were excluded: see why, and whether the rest is a "
         "fair sample of the runs",
     )
+
+
+def pasted(number: Integers, inputs: Floats) -> dict[int, int]:
+    """Find rows that were pasted whole, by the numbers (n,) of distinct ones: place -> place of the first one."""
+    counts = np.bincount(number)
+    times = int(np.gcd.reduce(counts, initial=0))
+    first = np.full(len(counts), len(number))
+    np.minimum.at(first, number, np.arange(len(number)))
+    if times > 1 and len(counts) >= _MANY_ROWS:
+        nth = pd.Series(number).groupby(number).cumcount().to_numpy()
+        return {
+            place: int(first[number[place]]) for place in np.flatnonzero(nth >= counts[number] // times).tolist()
+        }
+    before = pd.Series(np.arange(len(number))).groupby(number).diff().dropna().astype(int)
+    copies: dict[int, int] = {}
+    for distance in before.value_counts().index[:_DISTANCES].tolist():
+        same = number[distance:] == number[:-distance]
+        settings = (inputs[distance:] == inputs[:-distance]).all(axis=1)
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
+        for start, end in ends.reshape(-1, 2).tolist():
+            others = settings.sum() - (end - start)
+            agree = same.sum() - (end - start)
+            if settings.sum() * 0.5 ** (end - start) < _CHANCE and 2 * agree <= others:
+                copies |= {place + distance: int(first[number[place]]) for place in range(start, end)}
+    return copies
 
 
 def find_copies(inputs: Floats, outputs: Floats) -> dict[int, int]:

@@ -18,7 +18,7 @@ from calibration.own_model.table_of_runs import Roles, read_runs_of
 from calibration.verdict.calibrate import calibrate
 from common.errors import InputError, run_command
 from softflagella.__main__ import main
-from tests.calibration.own_model.test_faults import MODEL, TABLE, fall, said
+from tests.calibration.own_model.test_faults import DIAMETER, MODEL, TABLE, fall, said
 
 REAL = Path(__file__).parents[4] / "shared/measured/real"
 NAMES = {"rho_ball_kg_m3": "rho_ball", "rho_fluid_kg_m3": "rho_oil"}
@@ -278,3 +278,32 @@ def test_a_long_table_ends_with_its_limit() -> None:
     many = table.assign(d=np.random.default_rng(2).uniform(0.02, 0.12, len(table)))
     with pytest.raises(InputError, match="45000 settings in 45000 rows are more than can be tested"):
         sf.calibrate(many, MODEL, session="round", progress=False)
+
+
+def pasted(table: pd.DataFrame, how: str) -> pd.DataFrame:
+    parts = {"whole": [table] * 5, "a block": [table, table[10:30]], "twice": [table, table[5:25], table[5:25]]}
+    if how == "each row":
+        return table.loc[table.index.repeat(3)].reset_index(drop=True)
+    if how == "shuffled":
+        return pd.concat([table] * 2).sample(frac=1, random_state=1).reset_index(drop=True)
+    return pd.concat(parts[how], ignore_index=True)
+
+
+@pytest.mark.parametrize("digits", [2, 6], ids=["few digits", "many digits"])
+@pytest.mark.parametrize("how", ["whole", "each row", "shuffled", "a block", "twice"])
+def test_pasted_rows_are_no_repeats(how: str, digits: int) -> None:
+    table = TABLE.assign(v=TABLE["v"].round(digits))
+    runs = runs_of(pasted(table, how))
+    assert len(runs) == 45
+    assert all("a copy of an earlier row" in str(each) for each in runs.excluded)
+    np.testing.assert_allclose(np.sort(runs.y[:, 0]), np.sort(np.log(table["v"])))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_repeats_of_few_digits_may_be_equal(seed: int) -> None:
+    """Rows without a number of the trial: honest repeats agree in all columns."""
+    noise = 1 + 0.02 * np.random.default_rng(seed).standard_normal(180)
+    diameters = np.tile(DIAMETER, 4)
+    table = pd.DataFrame({"d": diameters, "round": 1, "v": (3000 * diameters**2 * noise).round()})
+    assert table.duplicated().sum() > 60
+    assert len(runs_of(table)) == 180
