@@ -22,6 +22,7 @@ _FEATURES = {  # what words of a feature's name read as
     "tank_diameter": "diameter of the tank", "course_x": "x of the course", "course_y": "y of the course",
 }  # fmt: skip
 _RESOLVED = 2.01  # over the number of draws and one more: the bootstrap resolves no smaller p
+_SEVERAL = "over all outputs"  # in the place of a unit, where they have several
 _NEARLY_ALL = 0.995
 _MANY_TIMES = math.log(100)
 
@@ -38,12 +39,16 @@ def output_error(record: Record, error: float, output: str) -> str:
     return f"{number}{_after_number(unit)}".rstrip()
 
 
-def error_in_words(record: Record, error: float) -> str:
+def error_in_words(record: Record, error: float, of: str = "") -> str:
     """Write an error over all outputs in the unit that they share; in per cent where all are relative or angles.
 
-    Over outputs in several units it has none.
+    Over outputs in several units it has none; then those of each output `of` a model, or of "noise", are written.
     """
     scale, unit = _shared_scale(record)
+    if unit == _SEVERAL:
+        each = {**record["errors_by_output"], "noise": record["scatter_of_a_run"]}.get(of) or {}
+        words = [f"{output_label(record, name)} {output_error(record, one, name)}" for name, one in each.items()]
+        return " and ".join(words) or f"{plain(error)} {unit}"
     return percent(error) if unit == "%" else f"{plain(scale * error)}{_after_number(unit)}".rstrip()
 
 
@@ -52,7 +57,7 @@ def _shared_scale(record: Record) -> tuple[float, str]:
     scales = {(scale, unit) for scale, unit in record.get("output_scales", {}).values()} or {(100.0, "%")}
     if len(scales) == 1:
         return scales.pop()
-    return (100.0, "%") if all(scale != 1 or unit in ("", "rad") for scale, unit in scales) else (1.0, "")
+    return (100.0, "%") if all(scale != 1 for scale, _ in scales) else (1.0, _SEVERAL)
 
 
 def feature_in_words(name: str) -> str:
