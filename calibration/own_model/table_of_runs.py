@@ -78,7 +78,7 @@ def read_runs_of(
             raise InputError(
                 "all rows have one setting and one session, so none can be held out; give more of them"
             )
-        advice = _advice(table, result, roles)
+        advice = _advice(result, roles)
         settings = [name for name in result.runs.settings if name not in result.runs.words]
         if own and (unknown := [name for name in own if name not in settings]):
             raise InputError(f"own: {unknown[0]!r} is no setting of this table; there are {', '.join(settings)}")
@@ -184,12 +184,12 @@ def _as_numbers(values: Floats | Words) -> Floats:
     return np.asarray(numbers, dtype=float)
 
 
-def _advice(table: pd.DataFrame, model: FunctionModel, roles: Roles) -> list[str]:
+def _advice(model: FunctionModel, roles: Roles) -> list[str]:
     """Say what the table has and was not told, and what keeps its rows from being repeats."""
-    runs, advice = model.runs, []
+    runs, advice, table = model.runs, [], pd.DataFrame(dict(model.columns.items()))
     settings = [name.removeprefix("ln ") for name in runs.input_names]
-    unknown = [name for name in model.columns if name not in (*settings, roles.specimen)]
-    alike = [name for name in unknown if _SESSION.search(name.lower())]
+    alike = [name for name in table.columns.difference([*settings, roles.specimen], sort=False)
+             if _SESSION.search(name.lower())]  # fmt: skip
     free = [name for name in alike if 1 < table[name].nunique() <= len(table) / 2]
     if roles.session is None and len(runs.session_names) == 1 and free:
         advice.append(f"no session was given; column {free[0]} looks like one (--session {free[0]})")

@@ -51,8 +51,15 @@ def test_columns_are_converted_to_the_units_of_the_model() -> None:
         runs = runs_of(table, model)
         np.testing.assert_allclose(runs.y, runs_of(TABLE).y)
         assert runs.settings["d"][0] == pytest.approx(TABLE["d"])
-    sf.calibrate(table.rename(columns={"d": "d_m"}), model, session="round", progress=False, tell=told.append)
-    assert told == ["column v_cm_s converted from cm/s to m/s (v_m_s)"]
+    sf.calibrate(
+        table.rename(columns={"d": "d_mm"}).assign(d_mm=1000 * TABLE["d"]),
+        model,
+        session="round",
+        progress=False,
+        tell=told.append,
+    )
+    assert told[1:] == ["column d_mm converted from mm to m (d_m)"]
+    assert told[:1] == ["column v_cm_s converted from cm/s to m/s (v_m_s)"]
     assert "d_m and d_mm are the same quantity" in said(model, TABLE.assign(d_mm=1.0))
     angles = replace(MODEL, function=lambda c, p: fall({"d": c["a"]}, p), units={"a": "rad"})
     degrees = TABLE.rename(columns={"d": "a_deg"}).assign(a_deg=np.degrees(TABLE["d"]))
