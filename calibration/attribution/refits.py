@@ -56,7 +56,7 @@ class Judgement(StrEnum):
     WRONG_SIGN = "its score has a sign that the effect cannot have"
     LEAVES_MUCH = "leaves far more than noise, by its score"
     NO_TIME = "no time was left for its fit"
-    NOT_SOLVED = "with it the motion of some runs is not found directly"
+    NOT_SOLVED = "with it the model of some runs is not solved directly"
     NOT_CONVERGED = "its fit did not converge"
     LEAVES_RESIDUAL = "leaves a residual"
     INCLUDES_NULL = "its interval includes the null"
