@@ -75,9 +75,7 @@ class FunctionModel:
     about: Floats | None = None  # (n, k) within half a turn of which angles are predicted; None: the measured ones
     own: Mapping[str, Sequence[float]] = field(default_factory=dict)  # settings that the lab can set, by column
     known: dict[tuple[float, ...], Floats] = field(default_factory=dict)  # parameters -> (n, k), the latest
-    unsolved: dict[str, None] = field(
-        default_factory=dict
-    )  # parameters with which a value is not finite, in words
+    unsolved: dict[str, None] = field(default_factory=dict)  # parameters with values that are not finite, in words
 
     @property
     def coefficients(self) -> tuple[Parameter, ...]:
@@ -218,7 +216,7 @@ def evaluate(model: Model, columns: AskedColumns, parameters: Mapping[str, Any])
 def _real(name: str, value: Any, count: int) -> Floats:
     """Return an output as an array of real numbers, a Series by its index."""
     if isinstance(value, pd.Series) and len(value) == count:
-        if not np.array_equal(np.sort(value.index), np.arange(count)):
+        if set(value.index) != set(range(count)):
             raise InputError(
                 f"the model's function returns {name!r} as a Series whose index does not number the {count} rows "
                 "from 0; return an array"
