@@ -1,4 +1,4 @@
-"""Command line of the planner: plan a path, go to a goal, visit places, hold one, write the page, compile."""
+"""Command line of the planner: robots to edit; plans for paths, goals, tours and places to hold; the page."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import sys
 from typing import TYPE_CHECKING, Any, TypedDict
 
 from common.commands import Call, Program
+from common.errors import InputError
 from planner.paths.units import in_lab
 from planner.progress import progress_bar
 
@@ -89,6 +90,31 @@ def _goal(
 @program.command("tour", of="planner.jobs.tour:tour", robot="--robot", camera=CAMERA, back="return")
 def _job(job: Call, *, out: str, **folders: Unpack[BoardOptions]) -> None:
     _write(planned(job, folders), out, **folders)
+
+
+@program.command("robot")
+def _robot(preset: str, *, out: str) -> None:
+    """Write a preset robot, or a vehicle of five measured numbers, as TOML to edit.
+
+    Args:
+        preset: paper-control, paper-triangle or paper-measured; or vehicle.
+        out: robot.toml, or vehicle.toml.
+    """
+    from common.changes import changes_of
+    from common.files import write_text
+    from planner.vehicle.measured import EXAMPLE
+    from sim.inputs import load_robot, save_robot
+    from sim.model.presets import PRESETS
+
+    if preset not in (*PRESETS, "vehicle"):
+        raise InputError(f"no preset {preset!r}; there are {', '.join(PRESETS)} and vehicle")
+    if preset != "vehicle":
+        save_robot(load_robot(preset), out)
+    elif changes_of(preset):
+        raise InputError(f"--set changes presets; leave it out, and edit {out}")
+    else:
+        write_text(out, EXAMPLE)
+    print(f"{preset} -> {out}")
 
 
 @program.command("page", of="planner.page.write_page:write_page", path="", robot="--robot", paths="path")

@@ -1,4 +1,4 @@
-"""Command line of the simulator: `steady`, `film`, `robot`, `check`, `compile`."""
+"""Command line of the simulator: `steady`, `film`, `check`, `compile`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from sim.model.robot import Robot
     from sim.robot_rows import RobotRows
 
-program = Program("sim", "simulate robots: steady motion, films, presets")
+program = Program("sim", "simulate robots: steady motion, films")
 main = program.main
 
 
@@ -137,23 +137,6 @@ def _film(plan: str, *, out: str, speed: float | None = None, width: int = 640) 
     with tqdm(total=len(schedule.dwells), desc="simulating", unit="dwell", delay=1.0, disable=None) as bar:
         count = write_film(read_plan_file(plan), schedule, out, film, progress=bar.update)
     print(f"{count} pictures at {film.speed:g} times the robot's speed -> {out}")
-
-
-@program.command("robot")
-def _robot(preset: str, *, out: str) -> None:
-    """Write a preset robot as TOML, to start from.
-
-    Args:
-        preset: paper-control, paper-triangle or paper-measured.
-        out: robot.toml.
-    """
-    from sim.inputs import load_robot, save_robot
-    from sim.model.presets import PRESETS
-
-    if preset not in PRESETS:
-        raise InputError(f"no preset {preset!r}; there are {', '.join(PRESETS)}")
-    save_robot(load_robot(preset), out)
-    print(f"{preset} -> {out}")
 
 
 @program.command("check")

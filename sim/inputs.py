@@ -21,7 +21,7 @@ from common.files import write_text
 from common.keywords import checks_keywords
 from common.reading import read_toml
 from common.run_columns import RUN, RUN_SYNONYMS
-from common.units import to_si
+from common.units import split, to_si
 from sim.effects import catalogue, check_effects, effect_named, is_effect
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, checked_values
 from sim.model.learnt_range import read_learnt_range
@@ -153,6 +153,11 @@ def robot_of(content: Mapping[str, Any], name: str) -> Robot:
     Raises:
         InputError: it describes none.
     """
+    if describes_vehicle(content):
+        raise InputError(
+            "a vehicle has no simulation, no look-up table and no page, only plan, goal, tour, hold and track; "
+            f"here give a robot.toml or one of {', '.join(PRESETS)}"
+        )
     tables = dict(content)
     name = str(tables.pop("name", name))
     tables.pop("calibration", None)  # read by sim.knowledge
@@ -165,6 +170,11 @@ def robot_of(content: Mapping[str, Any], name: str) -> Robot:
     values = read_robot(tables)
     check_effects(effects)
     return Robot(name=name, effects=dict(effects), learnt_from=learnt_from, **values)
+
+
+def describes_vehicle(content: Mapping[str, Any]) -> bool:
+    """Tell whether the content of a TOML file is that of a measured vehicle, by its speed; a robot has none."""
+    return any(split(key).quantity == "speed" for key in content)
 
 
 @checks_keywords

@@ -17,7 +17,8 @@ from common.reading import refuse_missing
 from softflagella.shadowing import COMMANDED
 
 _IMPORTANT = (
-    ("sim", "robot steady effects"),
+    ("planner", "robot"),
+    ("sim", "steady effects"),
     ("planner", "plan goal tour hold"),
     ("tracking", "track"),
     ("planner", "page"),

@@ -67,7 +67,7 @@ def names(folder: Path) -> set[str]:
 def made() -> Path:
     """Make a robot, points, a plan with its replay, and a data set, all by commands; return their folder."""
     folder = Path(mkdtemp(dir=FOLDER))
-    done("sim", "robot", "paper-control", "--out", folder / "robot.toml")
+    done("planner", "robot", "paper-control", "--out", folder / "robot.toml")
     groups = PRESETS["paper-control"].group_values()
     pd.DataFrame([{**groups, "omega_bar": speed} for speed in (8.0, -12.0)]).to_csv(
         folder / "points.csv", index=False
@@ -109,8 +109,8 @@ def tracking_replay(made: Path, out: Path) -> str:
     return f"2 dwells, {format_time(end.time_s)}, ends at ({end.x_cm:.2f}, {end.y_cm:.2f}) cm = "
 
 
-def sim_robot(made: Path, out: Path) -> str:
-    done("sim", "robot", "paper-triangle", "--out", out / "robot.toml")
+def planner_robot(made: Path, out: Path) -> str:
+    done("planner", "robot", "paper-triangle", "--out", out / "robot.toml")
     assert load_robot(out / "robot.toml") == PRESETS["paper-triangle"]
     return "paper-triangle -> "
 

@@ -27,7 +27,7 @@ from planner.paths.dubins import shortest_paths
 from planner.paths.nearest_path import nearest_poses, tracked_points
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D, arc_length, points_at, runs_of
-from planner.paths.tractrix import Drift, Reference
+from planner.paths.tractrix import Drift, Reference, closest
 from planner.paths.tractrix import reference as follow_path
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.conditions import BlockedError, Detour
@@ -166,7 +166,7 @@ class Detours:
                 np.stack([x, y, angle], 1), target, rod, self.limits.radius, drift=self.drift, shares=shares,
                 hindrance=Hindered(self.limits.body, self.limits.space, margin, angle[[0, -1]]),
             )  # fmt: skip
-            parts += [reference.p[done:first], tracked_points(poses, rod)]
+            parts += [reference.p[done:first], tracked_points(poses, rod, closest(rod, _SPACING))]
             done = last + 1
         points = np.concatenate([*parts, reference.p[done:]])
         path = Path2D.of(points, closed=reference.closed)

@@ -7,7 +7,7 @@ import { CONSTANTS } from "./constants.js";
 import { largest, largestSize } from "./math.js";
 import { nearestPath, poseSpacing } from "./nearest_path.js";
 import { CORNER, extent, fillet, kinks, largestFillet, pathLength, polyline, scaled, smoothed } from "./path.js";
-import { reference, twoSided } from "./reference.js";
+import { closest, reference, twoSided } from "./reference.js";
 import { inLab, placeInLab } from "./units.js";
 import { pivotRadius, turnRadius } from "./vehicle.js";
 import { DECLARING, REMEDY, InputError, fixed, general, quoted } from "./words.js";
@@ -53,7 +53,8 @@ function changed(raw, feasibility, way, progress = null) {
   else if (pathLength(raw) < FEWEST_POSES * poseSpacing(raw, radius)) return null;
   else {
     path = nearestPath(raw, Math.max(rod, 0), radius, {
-      drift, minimax: corner === "minimax", timeWeight, progress: (share) => progress?.(DECLARING, share),
+      drift, minimax: corner === "minimax", timeWeight, apart: closest(rod, spacingOf(raw)),
+      progress: (share) => progress?.(DECLARING, share),
     });
   }
   return acceptedReference(raw, reference(path, rod, spacingOf(path), drift), feasibility);
@@ -69,11 +70,12 @@ function sharpness({ q, heading, curvature }) {
 }
 
 /* Accept a reference that turns wide enough and keeps the shape of the drawn path. */
-function acceptedReference(raw, followed, { vehicle }) {
+function acceptedReference(raw, followed, { vehicle, corner }) {
   const [x, y] = followed.p[0], still = followed.p.every((point) => point[0] === x && point[1] === y);
   if (still || largest(sharpness(followed)) > TIGHTEST / pivotRadius(vehicle)) return null;
   const [offDrawn, missed] = twoSided(followed.p, polyline(raw));
-  const lost = Math.min(LOST * Math.max(...extent(raw)), turnRadius(vehicle));
+  const far = LOST * Math.max(...extent(raw)); // arcs leave out the tip of a sharp corner, however large the path
+  const lost = corner === "fillet" ? far : Math.min(far, turnRadius(vehicle));
   return Math.max(offDrawn, missed) > lost ? null : { reference: followed, offDrawn, missed };
 }
 
@@ -119,18 +121,19 @@ function placeOfLargest(values) {
 /* Round corners by the smallest radius that leaves the pivot some room. */
 function rounded(raw, { vehicle, rod, drift }) {
   const limit = FILLET_ROOM / pivotRadius(vehicle);
+  const roundedBy = (radius) => fillet(raw, radius, closest(rod, spacingOf(raw)));
   const tightest = (radius) => {
-    const path = fillet(raw, radius);
+    const path = roundedBy(radius);
     return largestSize(reference(path, rod, spacingOf(path), drift).curvature);
   };
   let low = 0, high = Math.min(largestFillet(raw), Math.sqrt(rod ** 2 + (1 / limit) ** 2));
-  if (tightest(high) > limit) return fillet(raw, high);
+  if (tightest(high) > limit) return roundedBy(high);
   for (let n = 0; n < 12; n++) {
     const middle = (low + high) / 2;
     if (tightest(middle) <= limit) high = middle;
     else low = middle;
   }
-  return fillet(raw, high);
+  return roundedBy(high);
 }
 
 /* Choose the path that the robot will follow: {reference, curvature, offDrawn, missed, warnings}.

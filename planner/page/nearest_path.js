@@ -3,7 +3,7 @@
  * Poses are columns {x, y, heading}; a task is {target, sides, shares, distance, radius, drift, spacing, timeWeight,
  * turn}, with `sides` the columns of directions along the path and across it. Lengths in l, angles in rad. */
 import { CONSTANTS } from "./constants.js";
-import { clip, column, convolved, halfTurn, interp, largest, mean, unwrap } from "./math.js";
+import { clip, column, convolved, differences, halfTurn, interp, largest, mean, unwrap } from "./math.js";
 import { pathLength, pathOf, polyline, resample } from "./path.js";
 import { STILL } from "./reference.js";
 
@@ -15,9 +15,9 @@ const { EVEN, SHORT, SHORTEST_STEP } = CONSTANTS.nearest_path;
  *
  * pivotDistance: from the pivot to the tracked point, at least 0. radius: smallest radius of the pivot's track.
  * minimax: nearest by the largest distance, not by the root mean square. timeWeight: what time counts beside the
- * distance [l²]. progress: called now and then with the share that is done. */
+ * distance [l²]. apart: how far neighbours among its points may be from each other, about. progress: called now and then with the share that is done. */
 function nearestPath(raw, pivotDistance, radius, options = {}) {
-  const { drift = STILL, minimax = false, timeWeight = 0, progress = null } = options;
+  const { drift = STILL, minimax = false, timeWeight = 0, apart = Infinity, progress = null } = options;
   const line = resample(polyline(raw), poseSpacing(raw, radius)), spacing = pathLength(raw) / (line.length - 1);
   const target = raw.closed ? line.slice(0, -1) : line, start = firstPoses(target, pivotDistance, raw.closed);
   const shares = new Float64Array(target.length).fill(1), sides = sidesOf(target, raw.closed);
@@ -32,21 +32,23 @@ function nearestPath(raw, pivotDistance, radius, options = {}) {
   });
   if (minimax) poses = smallestDistance(poses, task, told);
   if (task.turn !== null) poses = wholeLap(poses, task.turn);
-  const points = trackedPoints(poses, pivotDistance);
+  const points = trackedPoints(poses, pivotDistance, apart);
   return pathOf(raw.closed ? points.slice(0, -1) : points, raw.closed);
 }
 
 /* Interpolate between poses of the pivot, and return the points of the tracked point. */
-function trackedPoints(poses, pivotDistance) {
-  const steps = poses.x.length - 1, knots = Float64Array.from({ length: steps + 1 }, (_, i) => i);
-  const at = Float64Array.from({ length: POINTS_A_POSE * steps + 1 }, (_, i) => i / POINTS_A_POSE);
+function trackedPoints(poses, pivotDistance, apart) {
+  const steps = poses.x.length - 1, chords = differences(poses.x).map((x, i) => {
+    return Math.hypot(x, poses.y[i + 1] - poses.y[i]);
+  });
+  const pieces = Math.max(POINTS_A_POSE, Math.ceil(mean(chords) / apart)), knots = Float64Array.from({ length: steps + 1 }, (_, i) => i);
+  const at = Float64Array.from({ length: pieces * steps + 1 }, (_, i) => i / pieces);
   const [x, y, heading] = [poses.x, poses.y, poses.heading].map((values) => interp(at, knots, values));
   return Array.from(at, (place, i) => {
     const j = Math.floor(place), share = place - j, c = Math.cos(heading[i]), s = Math.sin(heading[i]);
     let off = 0; // between two poses the pivot moves on an arc, which lies off its chord
     if (share > 0) {
-      const chord = Math.hypot(poses.x[j + 1] - poses.x[j], poses.y[j + 1] - poses.y[j]);
-      off = (-(poses.heading[j + 1] - poses.heading[j]) * chord * share * (1 - share)) / 2;
+      off = (-(poses.heading[j + 1] - poses.heading[j]) * chords[j] * share * (1 - share)) / 2;
     }
     return [x[i] - off * s + pivotDistance * c, y[i] + off * c + pivotDistance * s];
   });

@@ -168,9 +168,10 @@ function largestFillet(path) {
 }
 
 /* Replace corners by arcs of `radius`, tangent to the edges; at most `largestFillet`. */
-function fillet(path, radius) {
+function fillet(path, radius, apart) {
   const angles = kinks(path), line = polyline(path), lengths = stepLengths(line);
   if (radius === 0) return path;
+  const step = Math.min(FINE, apart / radius);
   const points = path.points.flatMap((point, i) => {
     const angle = angles[i], before = i ? i - 1 : lengths.length - 1;
     if (!(Math.abs(angle) > CORNER)) return [point];
@@ -179,7 +180,7 @@ function fillet(path, radius) {
     const start = point.map((value, k) => value - reach * into[k]);
     const centre = [start[0] - inward * into[1], start[1] + inward * into[0]];
     const x = start[0] - centre[0], y = start[1] - centre[1];
-    return Array.from(linspace(0, angle, Math.max(FEWEST, stepsOf(Math.abs(angle), FINE))), (turned) => {
+    return Array.from(linspace(0, angle, Math.max(FEWEST, stepsOf(Math.abs(angle), step))), (turned) => {
       const c = Math.cos(turned), s = Math.sin(turned);
       return [centre[0] + (c * x - s * y), centre[1] + (s * x + c * y)];
     });

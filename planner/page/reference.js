@@ -7,7 +7,7 @@ import { TAU, clip, column, differences, halfTurn, largest, linspace, smallest, 
 import { arcLength, pointsAt, polyline, resample, stepLengths, stepsOf } from "./path.js";
 import { InputError } from "./words.js";
 
-const { LAPS, MOST_SLIP } = CONSTANTS.tractrix;
+const { LAPS, MOST_SLIP, POINTS_A_ROD } = CONSTANTS.tractrix;
 const { TIE } = CONSTANTS.distance; // difference of distances that are equal
 const STILL = { sideways: 0, current: [0, 0] };
 const RUN = 16; // segments in a box
@@ -65,6 +65,11 @@ function draggedHeading(tangent, length, pivotDistance, closed, drift) {
   return heading;
 }
 
+/* How close the points of an arc must be for a reference to turn as the arc does, not as its kinks do. */
+function closest(pivotDistance, spacing) {
+  return Math.max(pivotDistance, spacing) / POINTS_A_ROD;
+}
+
 /* The total turn of a closed path: a multiple of 2π. */
 function turning(tangent) {
   const first = tangent[0], last = tangent[tangent.length - 1];
@@ -100,7 +105,7 @@ function drag(tangent, length, pivotDistance, start, drift) {
   for (let i = 0; i < tangent.length; i++) {
     const gap = halfTurn(tangent[i] - now), decay = Math.exp(-length[i] / pivotDistance);
     now += gap - 2 * Math.atan(Math.tan(gap / 2) * decay);
-    if (!still) now -= (ratio(now, drift) * Math.max(Math.cos(gap), 0) * length[i]) / pivotDistance;
+    if (!still) now -= ratio(now, drift) * Math.max(Math.cos(gap), 0) * (1 - decay);
     heading[i + 1] = now;
   }
   return heading;
@@ -168,4 +173,4 @@ function filled(line) {
   return pointsAt(line, lengths, Float64Array.from(new Set([...linspace(0, end, count), ...lengths])).sort());
 }
 
-export { STILL, reference, referenceOfPivot, slipOf, ratio, distanceTo, nearest, twoSided };
+export { STILL, reference, referenceOfPivot, slipOf, ratio, distanceTo, nearest, twoSided, closest };

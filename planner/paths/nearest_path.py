@@ -42,7 +42,7 @@ _COARSEST = 0.075  # spacing in l
 _WEIGHTS = (0.3, 3.0, 30.0, 300.0, 1000.0)  # of what the robot cannot do, one stage after another
 _ITERATIONS = 20  # in each stage
 _ALONG = 0.6  # of distances along the path beside those across: a robot that is late is still on it
-_POINTS_A_POSE = 4  # points of the path for each pose
+_POINTS_A_POSE = 4  # points of the path for each pose, at least
 _ROUNDS = 12  # of growing weights
 _LEAST = 0.01  # share of the mean weight that every point keeps
 _HINDERED = (30.0, 30.0, 30.0, 100.0, 100.0, 300.0, 300.0, 1000.0)  # the same as _WEIGHTS, with a hindrance
@@ -62,6 +62,7 @@ def nearest_path(
     drift: Drift = STILL,
     minimax: bool = False,
     time_weight: float = 0.0,
+    apart: float = math.inf,
     progress: Callable[[float], object] | None = None,
 ) -> Path2D:
     """Find the path of the tracked point that is nearest to `raw` among those that the robot can follow.
@@ -73,6 +74,7 @@ def nearest_path(
         drift: what carries the robot off its heading.
         minimax: nearest by the largest distance, not by the root mean square.
         time_weight: what time counts beside the distance, w of the module [l²].
+        apart: how far neighbours among its points may be from each other, about.
         progress: called now and then with the share that is done.
     """
     target = resample(raw.polyline(), pose_spacing(raw, radius))
@@ -97,7 +99,7 @@ def nearest_path(
         poses = _minimax(poses, task, told)
     if turn is not None:
         poses = whole_lap(poses, turn)
-    points = tracked_points(poses, pivot_distance)
+    points = tracked_points(poses, pivot_distance, apart)
     return Path2D.of(points[:-1] if raw.closed else points, closed=raw.closed)
 
 
@@ -134,13 +136,15 @@ def nearest_poses(
     return poses
 
 
-def tracked_points(poses: Floats, pivot_distance: float) -> Floats:
+def tracked_points(poses: Floats, pivot_distance: float, apart: float = math.inf) -> Floats:
     """Interpolate between poses (m, 3) of the pivot, and return the points (k, 2) of the tracked point."""
-    at = np.arange(_POINTS_A_POSE * (len(poses) - 1) + 1) / _POINTS_A_POSE
+    chords = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    pieces = max(_POINTS_A_POSE, math.ceil(float(chords.mean()) / apart))
+    at = np.arange(pieces * (len(poses) - 1) + 1) / pieces
     x, y, heading = (np.interp(at, np.arange(len(poses)), column) for column in poses.T)
     # Between two poses the pivot moves on an arc, which lies off its chord.
-    turned = np.append(np.repeat(np.diff(poses[:, 2]), _POINTS_A_POSE), 0.0)
-    chord = np.append(np.repeat(np.hypot(*np.diff(poses[:, :2], axis=0).T), _POINTS_A_POSE), 0.0)
+    turned = np.append(np.repeat(np.diff(poses[:, 2]), pieces), 0.0)
+    chord = np.append(np.repeat(chords, pieces), 0.0)
     off = -turned * chord * (at % 1) * (1 - at % 1) / 2
     points = np.stack([x - off * np.sin(heading), y + off * np.cos(heading)], 1)
     return points + pivot_distance * axis_at(heading)

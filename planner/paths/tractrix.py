@@ -31,6 +31,7 @@ _LAPS = 6
 _MOST_SLIP = 3.0  # sideways by forward motion
 _BACK = 1e-9  # l that a pivot may move back in a step, by rounding
 _STRAIGHT = 1e-6  # rad; smaller turns are rounding
+_POINTS_A_ROD = 8  # of an arc, within the length over which the pivot turns at a kink
 _TOO_FAST = (
     "the current, or the difference of left and right turns, is as fast as the robot's net motion; use a longer "
     "dwell or a faster motor"
@@ -188,6 +189,14 @@ def reference(path: Path2D, pivot_distance: float, spacing: float, drift: Drift 
     return Reference.of_path(p, heading, pivot_distance, closed=path.closed)
 
 
+def closest(pivot_distance: float, spacing: float) -> float:
+    """Say how close the points of an arc must be for a reference to turn as the arc does, not as its kinks do.
+
+    At a kink the pivot turns within the length of the rod, or of a step of the reference where that is longer.
+    """
+    return max(pivot_distance, spacing) / _POINTS_A_ROD
+
+
 def _whole_turns(angle: float) -> float:
     return 2 * math.pi * round(angle / (2 * math.pi))
 
@@ -226,12 +235,10 @@ def _drag(tangent: Floats, length: Floats, pivot_distance: float, start: float, 
     heading[0] = now = float(start)
     decay = np.exp(-length / pivot_distance)
     still, turn = drift.none, 2 * math.pi
-    for i, (direction, factor, step) in enumerate(
-        zip(tangent.tolist(), decay.tolist(), length.tolist(), strict=True)
-    ):
+    for i, (direction, factor) in enumerate(zip(tangent.tolist(), decay.tolist(), strict=True)):
         gap = (direction - now + math.pi) % turn - math.pi
         now += gap - 2 * math.atan(math.tan(gap / 2) * factor)
         if not still:
-            now -= _ratio(now, drift) * max(math.cos(gap), 0.0) * step / pivot_distance
+            now -= _ratio(now, drift) * max(math.cos(gap), 0.0) * (1 - factor)
         heading[i + 1] = now
     return heading

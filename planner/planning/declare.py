@@ -28,7 +28,7 @@ from common.errors import InputError
 from planner.paths.distance import two_sided
 from planner.paths.nearest_path import nearest_path, pose_spacing
 from planner.paths.path import Path2D, smoothed, steps_of
-from planner.paths.tractrix import Drift, Reference, reference
+from planner.paths.tractrix import Drift, Reference, closest, reference
 from planner.paths.units import LONGEST, Scales, extent, in_lab, place_in_lab
 from planner.planning.conditions import Detour
 from planner.planning.request import DECLARING, REMEDY, Corner, ProgressCallback, tell
@@ -142,7 +142,8 @@ def changed(
     else:
         path = nearest_path(
             raw, max(rod, 0.0), vehicle.pivot_radius / way, drift=drift, minimax=corner == "minimax",
-            time_weight=feasibility.time_weight, progress=lambda share: tell(progress, DECLARING, share),
+            time_weight=feasibility.time_weight, apart=closest(rod, spacing(raw)),
+            progress=lambda share: tell(progress, DECLARING, share),
         )  # fmt: skip
     return _accepted(raw, reference(path, rod, spacing(path), drift), feasibility)
 
@@ -153,7 +154,9 @@ def _accepted(raw: Path2D, followed: Reference, feasibility: Feasibility) -> Fea
     if curvature > TIGHTEST / feasibility.vehicle.pivot_radius or not np.ptp(followed.p, axis=0).any():
         return None
     declared = FeasiblePath(followed, curvature, *two_sided(followed.p, raw.polyline()))
-    lost = min(LOST * max(extent(raw)), feasibility.vehicle.turn_radius)
+    lost = LOST * max(extent(raw))
+    if feasibility.corner != "fillet":  # arcs leave out the tip of a sharp corner, however large the path
+        lost = min(lost, feasibility.vehicle.turn_radius)
     return None if max(declared.off_drawn, declared.missed) > lost else declared
 
 
@@ -207,16 +210,19 @@ def _rounded(raw: Path2D, feasibility: Feasibility) -> Path2D:
     limit = _FILLET_ROOM / feasibility.vehicle.pivot_radius
     low, high = 0.0, min(largest_fillet(raw), math.hypot(feasibility.rod, 1 / limit))
 
+    def rounded(radius: float) -> Path2D:
+        return fillet(raw, radius, closest(feasibility.rod, spacing(raw)))
+
     def tightest(radius: float) -> float:
-        path = fillet(raw, radius)
+        path = rounded(radius)
         return float(np.abs(reference(path, feasibility.rod, spacing(path), feasibility.drift).curvature).max())
 
     if tightest(high) > limit:
-        return fillet(raw, high)
+        return rounded(high)
     for _ in range(12):
         middle = (low + high) / 2
         low, high = (low, middle) if tightest(middle) <= limit else (middle, high)
-    return fillet(raw, high)
+    return rounded(high)
 
 
 def kinks(path: Path2D) -> Floats:
@@ -240,14 +246,18 @@ def largest_fillet(path: Path2D) -> float:
     return float(fits.min()) if len(fits) else math.inf
 
 
-def fillet(path: Path2D, radius: float) -> Path2D:
-    """Replace corners by arcs of `radius`, tangent to the edges; at most `largest_fillet`."""
+def fillet(path: Path2D, radius: float, apart: float = math.inf) -> Path2D:
+    """Replace corners by arcs of `radius`, tangent to the edges; at most `largest_fillet`.
+
+    Neighbours among the points of an arc are at most `apart` from each other.
+    """
     angle = kinks(path)
     corner = np.abs(angle) > CORNER
     if radius == 0 or not corner.any():
         return path
     points = path.points
     count = len(points)
+    step = min(math.radians(2), apart / radius)
     reach = np.where(corner, radius * np.tan(np.abs(angle) / 2), 0.0)
     edges = np.diff(path.polyline(), axis=0)
     lengths = np.linalg.norm(edges, axis=1)
@@ -260,7 +270,7 @@ def fillet(path: Path2D, radius: float) -> Path2D:
         start = points[i] - reach[i] * into
         inward = math.copysign(1.0, angle[i]) * np.array([-into[1], into[0]])
         centre = start + radius * inward
-        steps = np.linspace(0, angle[i], max(8, steps_of(abs(angle[i]), math.radians(2))))
+        steps = np.linspace(0, angle[i], max(8, steps_of(abs(angle[i]), step)))
         spoke = start - centre
         c, s = np.cos(steps), np.sin(steps)
         rounded.append(centre + np.stack([c * spoke[0] - s * spoke[1], s * spoke[0] + c * spoke[1]], 1))

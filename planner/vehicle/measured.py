@@ -31,6 +31,7 @@ from common.errors import InputError, naming
 from common.reading import read_toml
 from common.units import UNITS, of_kind, split, to_si
 from planner.vehicle.vehicle import BEFORE_KNOTS, STEP, TIMES, Mode, Vehicle
+from sim.inputs import describes_vehicle
 from sim.mechanics import planar
 
 Measured = float | tuple[float, float]  # a value, and its standard deviation where it is known
@@ -43,6 +44,16 @@ _LINES = {  # of a vehicle.toml, with the unit that messages propose
     "speed": "cm_s", "turn_left": "deg_s", "turn_right": "deg_s", "slip": "deg", "lag": "s",
     "length": "cm", "width": "cm",
 }  # fmt: skip
+EXAMPLE = """\
+name = "buggy"
+speed_cm_s = [25, 0.5]         # of the tracked point on its circle: [value, standard deviation]
+turn_left_deg_s = [40, 1]
+turn_right_deg_s = [35, 1]
+# slip_deg = [0, 1]            # from the heading to the velocity, towards the inside of the turn
+lag_s = 0.2                    # until 63 % of a change have passed; a number alone is exact
+# length_cm = 30               # of the body, about the tracked point
+# width_cm = 18
+"""
 _NEEDED = ("speed", "turn_left", "turn_right")
 _SPREADS = (*_NEEDED, "slip", "lag")
 
@@ -170,13 +181,9 @@ class MeasuredVehicle:
 
     @staticmethod
     def is_in(path: str | Path) -> bool:
-        """Tell whether a TOML file describes a vehicle, by its speed; a robot has none."""
+        """Tell whether a TOML file describes a vehicle."""
         file = Path(path)
-        return (
-            file.suffix == ".toml"
-            and file.is_file()
-            and any(split(key).quantity == "speed" for key in read_toml(path))
-        )
+        return file.suffix == ".toml" and file.is_file() and describes_vehicle(read_toml(path))
 
     @staticmethod
     def load(path: str | Path) -> MeasuredVehicle:

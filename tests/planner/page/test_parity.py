@@ -128,6 +128,8 @@ CASES: dict[str, Callable[[], ParityCase]] = {
     "in a current": lambda: ParityCase(polygon(6, 4.0), ("in a current", 0.1), {**SHORT, "corner": "fillet"}),
     "minimax": lambda: ParityCase(SQUARE, ("symmetric", 0.0),
                             {"objective": "flips", "tolerance": 0.1, "corner": "minimax"}),
+    "bend, pivot": lambda: ParityCase(BEND, CONTROL, {**SHORT, "point": "pivot"}),
+    "rounded, pivot": lambda: ParityCase(SQUARE, CONTROL, {**SHORT, "point": "pivot", "corner": "fillet"}),
     "own circle": lambda: ParityCase(circle(0.95), CONTROL, SHORT),
     "smaller than the rod": lambda: ParityCase(circle(0.94), lab_robot(np.random.default_rng(56005)), SHORT),
     "drawing.svg": lambda: opened_case("drawing.svg"),
@@ -150,7 +152,7 @@ CASES: dict[str, Callable[[], ParityCase]] = {
     "star": lambda: ParityCase(PATHS["star"], MEASURED, {"objective": "flips", "time_weight": 0.05}),
     "long dwells": lambda: ParityCase(PATHS["eight"].scaled(2), TRIANGLE, {"minimum_seconds": 3.0}),
 }  # fmt: skip
-QUICK = 12  # cases of `make test`; the others run with the rates
+QUICK = 14  # cases of `make test`; the others run with the rates
 CASE_MARKS = [pytest.param(name, marks=[] if i < QUICK else pytest.mark.rates) for i, name in enumerate(CASES)]
 ERRORS = {"stated": "stated", "guaranteed": "guaranteed", "predicted_rms": "predictedRms",
           "predicted_max": "predictedMax", "drawn_rms": "drawnRms", "drawn_max": "drawnMax"}  # fmt: skip

@@ -15,7 +15,7 @@ from planner.jobs.plan import plan
 from planner.paths.distance import distance_to, nearest, two_sided
 from planner.paths.nearest_path import nearest_path
 from planner.paths.path import Path2D, circle, polygon, resample, smoothed
-from planner.paths.tractrix import STILL, Drift, Reference, reference
+from planner.paths.tractrix import STILL, Drift, Reference, closest, reference
 from planner.planning.declare import fillet, largest_fillet
 from tests.planner.plans import CONTROL
 
@@ -141,6 +141,19 @@ def test_it_is_nearer_than_rounded_corners_or_has_a_smaller_largest_distance(raw
     assert off(one, raw) < 0.7 * off(fillet(raw, followed), raw)
     assert max(two_sided(other.polyline(), raw.polyline())) < 0.95 * max(two_sided(one.polyline(), raw.polyline()))
     assert off(one, raw) < off(other, raw) < 2 * off(one, raw)
+
+
+@pytest.mark.parametrize("rod", [0.0, 1e-4, 0.005, 0.02, 0.1])
+def test_a_pivot_near_its_point_turns_as_the_arc_does_not_as_its_chords(rod: float) -> None:
+    apart = closest(rod, 0.02)
+    for found in (nearest_path(polygon(4, 9.0), rod, 1.2, apart=apart), fillet(polygon(4, 9.0), 1.2, apart)):
+        assert reference(found, rod, 0.02).sharpness.max() == pytest.approx(1 / 1.2, rel=0.15)
+
+
+@pytest.mark.parametrize("rod", [0.0, 1e-4, 0.01, 0.9])
+def test_a_drift_leans_any_rod_by_the_same_angle(rod: float) -> None:
+    straight = reference(Path2D.of([[0, 0], [9, 0]]), rod, 0.02, Drift(0.1))
+    assert straight.heading == pytest.approx(-math.atan(0.1), abs=1e-3)
 
 
 def test_a_path_that_can_be_followed_is_left_as_it_is() -> None:

@@ -19,6 +19,8 @@ from planner.planning.plan import Plan
 from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.vehicle import Switches, Vehicle, roll_out
 from sim.mechanics import planar
+from softflagella.__main__ import main
+from tests.processes import ROOT
 
 NUMBERS = ("speed", "turn_left", "turn_right", "slip", "lag")
 SWIMMER = MeasuredVehicle(
@@ -113,6 +115,20 @@ def test_a_file_holds_the_same_vehicle(tmp_path: Path) -> None:
     assert fish.measured("turn_left") == pytest.approx((math.radians(20), 0.0))
 
 
+def test_the_example_is_that_of_the_page_and_is_a_vehicle_alone(tmp_path: Path) -> None:
+    file = tmp_path / "vehicle.toml"
+    main(["robot", "vehicle", "--out", str(file)])
+    assert MeasuredVehicle.load(file).measured("speed") == pytest.approx((0.25, 0.005))
+    assert file.read_text() in (ROOT / "docs/howto/vehicle.md").read_text()
+    for words in (["steady", str(file)], ["page", "--robot", str(file), "--out", str(tmp_path / "page.html")]):
+        with pytest.raises(InputError, match=r"vehicle.toml: a vehicle has no simulation.*give a robot.toml or"):
+            main(words)
+    with pytest.raises(InputError, match="--set changes presets"):
+        main(["robot", "vehicle", "--set", "speed_cm_s=3", "--out", str(file)])
+    with pytest.raises(InputError, match=r"there are paper-control, .* and vehicle"):
+        main(["robot", "car", "--out", str(file)])
+
+
 @pytest.mark.parametrize(
     ("lines", "words"),
     [
@@ -149,6 +165,21 @@ def test_the_stated_error_holds_for_vehicles_within_the_tolerances(path: Path2D)
     largest = np.array([distance_to(result.reference, track / SWIMMER.length_scale).max() for track in tracks])
     assert (largest <= result.stated_error).mean() >= 0.85
     assert np.quantile(largest, 0.95) > 0.6 * result.stated_error  # not by a large margin
+
+
+@pytest.mark.parametrize("slip", [0.0, 0.1, 0.5, 2.0, 5.0])
+@pytest.mark.parametrize("corner", ["nearest", "minimax", "fillet"])
+@pytest.mark.parametrize(
+    "path",
+    [polygon(4, 50.0), polygon(3, 5.0), Path2D.of([[0, 0], [5, 0], [5, 5]])],
+    ids=["square", "triangle", "L"],
+)
+def test_a_car_rounds_corners_by_about_its_turn_radius(path: Path2D, corner: Any, slip: float) -> None:
+    car = MeasuredVehicle(speed=0.25, turn_left=0.6, turn_right=0.5, slip=math.radians(slip))
+    declared = plan(path, car, corner=corner, objective="flips").declared
+    radius = car.motion().pivot_radius
+    assert 0.6 / radius < declared.curvature <= 0.95 / radius
+    assert max(declared.off_drawn, declared.missed) < (1.5 if corner == "fillet" else 1.0) * radius  # of 120°
 
 
 def _moved(numbers: np.ndarray, seconds: np.ndarray, sign: int, start: Sequence[float]) -> np.ndarray:
