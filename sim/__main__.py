@@ -60,9 +60,14 @@ def _steady(
 
 def _write_motion(rows: RobotRows, motion: dict[str, Any], out: str | None) -> None:
     """Say and write what was simulated."""
+    import numpy as np
+
     from sim.motion.steady_motion import describe_motion
     from sim.robot_rows import write_motion
 
+    if not np.isfinite(motion["v_z"]).any():
+        which = f"none of the {len(motion['note'])} robots" if rows.file else rows.robots[0].name
+        raise InputError(f"{which}: no steady motion was found: {motion['note'][0]}")
     if rows.file:
         said = _counts(rows.columns, motion)
     else:

@@ -136,6 +136,8 @@ def write_variations(
     variations = [read_variation(each) for each in words]
     table = vary(source, variations, solve)
     doubtful, none = (int(flags.sum()) for flags in doubts(table))
+    if none == len(table):
+        raise InputError(f"--vary {words[0]}: no steady motion was found: {table['note'].iloc[0]}")
     said = f"{len(table)} robot{'s' * (len(table) > 1)}"
     said += f", {doubtful} without a reliable answer" * bool(doubtful)
     said += f", {none} that cannot be simulated" * bool(none)

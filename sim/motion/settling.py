@@ -25,7 +25,7 @@ from sim.mechanics.balance import motor_gain
 from sim.mechanics.tail_contact import tail_gap
 from sim.model.body import Body
 from sim.model.groups import Groups
-from sim.motion.run import BROKE_DOWN, Resolution, SteppedRobot, steps_in
+from sim.motion.run import BROKE_DOWN, MOST_WORK, TOO_MUCH, Resolution, SteppedRobot, steps_in
 from sim.motion.shapes import state_on_orbit
 from sim.motion.steady_motion import STEPPING, Steady
 from sim.solve.assembly import bodies
@@ -40,6 +40,8 @@ _CHUNK = 0.25  # time units after which the means are compared
 _MEANS = [PHASE, YAW, SWAY, SURGE]
 _SILENT = 3.0  # s, before a robot that is stepped says so
 _VERY_FAST = 1000.0  # ω̄; the robots of the paper have 10 to 33
+_OF_VERY_FAST = 0.1  # share of the work that a row may take: its units are doubtful
+TOO_FAST = f"ω̄ above {_VERY_FAST:g} is so fast that time stepping takes too long: are all units right?"
 _BAR = "{desc}: {n:.2f} time units, {elapsed}"
 _GAP_SHAPES = 12  # shapes of the last revolution in which the gap between tails is measured
 
@@ -96,17 +98,19 @@ def _drift_note(settled: Settled) -> str:
 
 def settle_one(body: Body, tails: int, resolution: Resolution) -> Settled:
     """Step one robot with N tails from rest until its motion is steady."""
-    run = SteppedRobot(body, tails, resolution)
+    very_fast = abs(body.omega) > _VERY_FAST
+    run = SteppedRobot(body, tails, resolution, most_work=MOST_WORK * (_OF_VERY_FAST if very_fast else 1.0))
 
     def lost() -> Settled:
-        return Settled(np.full(4, np.nan), np.nan, False, run.failed, np.nan, run.state)
+        failed = TOO_FAST if very_fast and run.failed == TOO_MUCH else run.failed
+        return Settled(np.full(4, np.nan), np.nan, False, failed, np.nan, run.state)
 
-    if not run.can_afford(SETTLED):
+    if not run.can_afford(SETTLED + 2 * _WINDOW):  # the first drift is known then, or later
         return lost()
     dt = run.time_step
     count = int(steps_in(_CHUNK, dt))
     poses = [np.zeros((1, 6))]
-    doubt = ", which is very fast: are all units right?" if abs(body.omega) > _VERY_FAST else ""
+    doubt = ", which is very fast: are all units right?" if very_fast else ""
     words = f"stepping in time at ω̄ = {abs(body.omega):.3g}{doubt}"
     hidden = parent_process() is not None or None  # None: a bar on a terminal, not in a file
     with tqdm(desc=words, delay=_SILENT, bar_format=_BAR, leave=False, disable=hidden) as bar:

@@ -18,7 +18,7 @@ from sim.effects import check_effects
 from sim.effects.tail_contact import EFFECT as CONTACT
 from sim.model.groups import Groups
 from sim.motion.run import Resolution
-from sim.motion.settling import settle
+from sim.motion.settling import TOO_FAST, settle
 from sim.motion.stability import QUICK, growths
 from sim.motion.steady_motion import DIRECT, Steady, joined
 from sim.solve import assembly
@@ -32,6 +32,7 @@ GROWS_IN_CONTACT = -0.12  # the same where tails touch: the mesh's error is larg
 SAME = 0.02  # relative difference up to which a stepped motion counts as the direct one
 _NEAR = 1.1  # gap from which tails cannot touch, given the error of the gap
 _OTHER_MOTION = "straight tails reach another motion than the one in which they move alike"
+_UNKNOWN = "straight tails may reach another motion than the one in which they move alike"
 
 
 @np.errstate(all="ignore")  # robots that overflow are flagged
@@ -63,8 +64,10 @@ def steady(groups: Groups, *, stability: bool = True) -> Steady:
     doubtful = np.flatnonzero(~motion.failed & (quick | grows))
     if len(doubtful):
         reached = settle(groups.select(doubtful), resolution=Resolution.for_settling)
-        changed = doubtful[difference(motion.means[doubtful], reached.means) > SAME]
-        motion = _with_stepped(motion, groups, changed, np.full(len(groups), _OTHER_MOTION))
+        unknown = reached.note == TOO_FAST
+        changed = doubtful[(difference(motion.means[doubtful], reached.means) > SAME) | unknown]
+        notes = np.where(np.isin(np.arange(len(groups)), doubtful[unknown]), _UNKNOWN, _OTHER_MOTION)
+        motion = _with_stepped(motion, groups, changed, notes)
     lost = np.flatnonzero(motion.failed & (motion.method == DIRECT))
     return _with_stepped(motion, groups, lost, motion.note)
 

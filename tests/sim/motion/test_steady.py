@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 import pandas as pd
@@ -12,7 +13,7 @@ import pytest
 
 import sim.motion.settling
 import sim.motion.steady
-from common.errors import run_command
+from common.errors import InputError, run_command
 from sim.__main__ import _counts, main
 from sim.inputs import save_robot
 from sim.model.presets import INDEPENDENT, PRESETS
@@ -210,3 +211,21 @@ def test_what_the_command_says_without_a_file(
     ):  # fmt: skip
         assert run_command(main, ["steady", words]) == 2
         assert refusal in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ("motor.speed_rpm=6e4", "may reach another motion.*is so fast that time stepping.*are all units right"),
+        ("fluid.viscosity_Pa_s=1e99", "did not converge from straight tails; .*are all units right"),
+        ("fluid.viscosity_Pa_s=1e-300", "the tails do not complete a revolution"),
+        ("tails.youngs_modulus_Pa=1e-9", "are all units right"),
+    ],
+)
+def test_a_robot_without_a_steady_motion_is_refused_in_seconds(changes: str, reason: str) -> None:
+    began = perf_counter()
+    key, value = changes.split("=")
+    for words in (["--set", changes], ["--vary", f"{key}={value},{2 * float(value)}"]):
+        with pytest.raises(InputError, match=f"no steady motion was found: .*{reason}"):
+            main(["steady", "paper-control", *words])
+    assert perf_counter() - began < 20
