@@ -29,6 +29,7 @@ from sim.model.robot import Robot
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
 from sim.motion.response import longer_memory, responses
+from sim.motion.settling import VERY_FAST
 from sim.motion.steady import steady
 from sim.motion.steady_motion import STEADY_OUTPUTS, Steady
 from surrogate.robot_table import RobotTable
@@ -60,6 +61,8 @@ def tabulate(robot: Robot) -> RobotTable:
         True
     """
     values = robot.group_values()
+    if values["omega_bar"] > VERY_FAST:
+        raise InputError(f"{robot.name}: omega_bar is above {VERY_FAST:g}, too fast for flips: are all units right?")
     directions = {name: np.array([value, value]) for name, value in values.items()}
     directions["omega_bar"] = directions["omega_bar"] * [1.0, -1.0]
     groups = Groups.from_columns(directions)

@@ -39,9 +39,9 @@ _WINDOW = 0.5  # shortest averaging time
 _CHUNK = 0.25  # time units after which the means are compared
 _MEANS = [PHASE, YAW, SWAY, SURGE]
 _SILENT = 3.0  # s, before a robot that is stepped says so
-_VERY_FAST = 1000.0  # ω̄; the robots of the paper have 10 to 33
-_OF_VERY_FAST = 0.1  # share of the work that a row may take: its units are doubtful
-TOO_FAST = f"ω̄ above {_VERY_FAST:g} is so fast that time stepping takes too long: are all units right?"
+VERY_FAST = 1000.0  # ω̄; the robots of the paper have 10 to 33
+_SHARE = 0.1  # share of the work that a row may take: its units are doubtful
+TOO_FAST = f"ω̄ above {VERY_FAST:g} is so fast that time stepping takes too long: are all units right?"
 _BAR = "{desc}: {n:.2f} time units, {elapsed}"
 _GAP_SHAPES = 12  # shapes of the last revolution in which the gap between tails is measured
 
@@ -98,8 +98,8 @@ def _drift_note(settled: Settled) -> str:
 
 def settle_one(body: Body, tails: int, resolution: Resolution) -> Settled:
     """Step one robot with N tails from rest until its motion is steady."""
-    very_fast = abs(body.omega) > _VERY_FAST
-    run = SteppedRobot(body, tails, resolution, most_work=MOST_WORK * (_OF_VERY_FAST if very_fast else 1.0))
+    very_fast = abs(body.omega) > VERY_FAST
+    run = SteppedRobot(body, tails, resolution, most_work=MOST_WORK * (_SHARE if very_fast else 1.0))
 
     def lost() -> Settled:
         failed = TOO_FAST if very_fast and run.failed == TOO_MUCH else run.failed
