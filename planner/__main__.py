@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypedDict
 from common.commands import Call, Program
 from common.errors import InputError
 from planner.paths.units import in_lab
-from planner.progress import progress_bar
+from planner.progress import plan_bar
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -51,7 +51,7 @@ def planned(call: Call, folders: BoardOptions, **further: Any) -> Plan:
 
     for board, folder in folders.items():
         check_folder(board, str(folder))
-    with progress_bar() as progress:
+    with plan_bar() as progress:
         plan: Plan = call(progress=progress, **further)
     return plan
 

@@ -1,23 +1,20 @@
-"""A bar on a terminal, for plans that take long."""
+"""A bar for plans that take long."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from common.progress import progress_bar
+
 
 @contextmanager
-def progress_bar() -> Iterator[Callable[[float], object]]:
-    """Show a bar on a terminal, for plans that take long."""
-    from tqdm import tqdm
-
+def plan_bar() -> Iterator[Callable[[float], object]]:
+    """Show the stage of a plan, how far it is, and when it ends."""
     from planner.planning.request import Progress
 
-    style = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}"
-    with tqdm(
-        total=100, leave=False, delay=1.0, miniters=0, bar_format=style, disable=not sys.stderr.isatty()
-    ) as bar:
+    style = "{desc}: {percentage:3.0f}%|{bar:10}| {elapsed}, {remaining} left"
+    with progress_bar("preparing", total=100, miniters=0, bar_format=style) as bar:
 
         def show(share: float) -> None:
             if isinstance(share, Progress):

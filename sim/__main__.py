@@ -54,7 +54,7 @@ def _steady(
         _write_steady_shapes(rows.robots, shapes)
     with rows.journal(out, {**steady.given, "jobs": None}) as kept:
         with rows.naming():
-            motion = steady_columns(rows.columns, title="steady" if rows.file else "", kept=kept, **steady.given)
+            motion = steady_columns(rows.columns, kept=kept, **steady.given)
         _write_motion(rows, motion, out)
 
 
@@ -130,8 +130,7 @@ def _film(plan: str, *, out: str, speed: float | None = None, width: int = 640) 
         speed: how many times faster than the robot (default: so that the film takes about 15 s).
         width: pixels.
     """
-    from tqdm import tqdm
-
+    from common.progress import progress_bar
     from sim.model.schedule import load_schedule, read_plan_file
     from sim.motion.film import FilmSettings, fitting_speed, write_film
 
@@ -139,7 +138,7 @@ def _film(plan: str, *, out: str, speed: float | None = None, width: int = 640) 
         raise InputError(f"--width {width}; give 100 to 2000 pixels")
     schedule = load_schedule(plan)
     film = FilmSettings(speed or fitting_speed(schedule), width=width)
-    with tqdm(total=len(schedule.dwells), desc="simulating", unit="dwell", delay=1.0, disable=None) as bar:
+    with progress_bar("simulating", total=len(schedule.dwells), unit="dwell") as bar:
         count = write_film(read_plan_file(plan), schedule, out, film, progress=bar.update)
     print(f"{count} pictures at {film.speed:g} times the robot's speed -> {out}")
 

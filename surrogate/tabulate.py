@@ -62,7 +62,7 @@ def tabulate(robot: Robot) -> RobotTable:
     """
     values = robot.group_values()
     if values["omega_bar"] > VERY_FAST:
-        raise InputError(f"{robot.name}: omega_bar is above {VERY_FAST:g}, too fast for flips: are all units right?")
+        raise InputError(f"{robot.name}: omega_bar is above {VERY_FAST:g}, too fast to flip: are all units right?")
     directions = {name: np.array([value, value]) for name, value in values.items()}
     directions["omega_bar"] = directions["omega_bar"] * [1.0, -1.0]
     groups = Groups.from_columns(directions)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable
-from contextlib import nullcontext, redirect_stdout
+from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 program = Program("tracking", "keep robots on their paths, replay plans, check tracks")
 main = program.main
-BAR_AFTER = 1.0  # s
 
 
 @program.command("track", of="planner.jobs.plan:plan", robot="--robot")
@@ -57,7 +56,7 @@ def _track(
     """
     from planner.files.saved_plan import is_plan
     from planner.paths.units import read_length, read_pose
-    from planner.progress import progress_bar
+    from planner.progress import plan_bar
     from tracking.pipe import answers
     from tracking.tracker import Tracker
 
@@ -77,7 +76,7 @@ def _track(
         elif robot is None:
             raise InputError(f"{path} is no saved plan, so --robot is needed: a robot.toml or a preset")
         else:
-            with progress_bar() as progress:
+            with plan_bar() as progress:
                 plan = plan_path(progress=progress, path=path, robot=robot, tell=print)
     unit, scale = plan_path.given.get("unit"), plan.robot.time_scale
     deviations = (read_length(noise, unit, plan.robot, "--noise", above_zero=True), noise_rad)
@@ -175,9 +174,8 @@ def _replay(
         shapes: the shape of the robot and the forces on it in time: .npz, or .pvd for ParaView.
         every: s between the shapes (default: a 24th of a motor revolution).
     """
-    from tqdm import tqdm
-
     from common.files import write_csv
+    from common.progress import progress_bar
     from sim.inputs import load_robot
     from sim.model.schedule import load_schedule, read_plan_file
     from sim.motion.replay import replay, replay_error
@@ -192,9 +190,9 @@ def _replay(
     planned, swimmer = load_schedule(plan), None if robot is None else load_robot(robot)
     schedule = planned if swimmer is None else planned.swum_by(swimmer)
 
-    def bar(what: str) -> Any:
-        """Show how many dwells are done, on a terminal alone."""
-        return tqdm(total=len(schedule.dwells), desc=what, unit="dwell", delay=BAR_AFTER, disable=None)
+    def bar(what: str) -> AbstractContextManager[Any]:
+        """Show how many dwells are done."""
+        return progress_bar(what, total=len(schedule.dwells), unit="dwell")
 
     if shapes is None:
         with bar("replay") as shown:

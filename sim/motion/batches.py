@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
-from tqdm import tqdm
 
 from common.arrays import Floats, Integers
 from common.errors import InputError
 from common.journal import Journal
+from common.progress import progress_bar
 from sim.inputs import check_columns
 from sim.model.groups import Groups
 from sim.motion.run import Resolution
@@ -72,9 +72,8 @@ def in_batches(
     before = sum(len(batches[k]) for k in results)
     with (
         one_thread(),  # a setting of the process: set once, not in each thread
-        tqdm(total=len(columns["N"]), initial=before, desc=title, unit="row", delay=1.0,
-             disable=not title or None) as bar,
-    ):  # fmt: skip
+        progress_bar(title, total=len(columns["N"]), initial=before, unit="row", disable=not title) as bar,
+    ):
         for k, part in zip(left, in_threads(work, parts, jobs), strict=True):
             results[k] = part
             if kept is not None:

@@ -232,11 +232,8 @@ def test_a_goal_trip_is_tracked_from_its_goal_json(
     assert second.split()[0] in ("1", "-1")
 
 
-def test_another_robot_carries_out_a_plan_and_its_tracking_error_is_told(
-    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_robot_carries_out_a_plan_and_its_tracking_error_is_told(tmp_path: Path, capsys: Capture) -> None:
     """Its track is in the plan's tail lengths; without a terminal no bar is written."""
-    monkeypatch.setattr("tracking.__main__.BAR_AFTER", 0.0)
     result = planned("circle:1l", objective="flips")
     other = replace(CONTROL, name="other", tail_length=0.9 * CONTROL.tail_length)
     write_plan(result, tmp_path)
@@ -278,3 +275,9 @@ def test_a_plan_needs_no_loops_but_those_that_are_compiled_beforehand(tmp_path: 
         [sys.executable, "-c", _COMPILED, str(tmp_path)], capture_output=True, text=True, timeout=LIMIT
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_a_motor_too_fast_to_simulate_its_flips_is_refused_at_once(tmp_path: Path, capsys: Capture) -> None:
+    words = ["plan", "circle:3l", "--robot", "paper-control", "--set", "motor.speed_rpm=6000"]
+    assert run_command(main, [*words, "--out", str(tmp_path / "p")]) == 2
+    assert "too fast to flip: are all units right?" in capsys.readouterr().err
