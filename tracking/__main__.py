@@ -14,6 +14,7 @@ from common.errors import InputError
 from common.units import format_length, format_time
 
 if TYPE_CHECKING:
+    from camera.view import View
     from planner.planning.plan import Plan
     from tracking.tracker import Tracker
 
@@ -112,27 +113,32 @@ def _live(
     """Follow a plan with a camera and a motor; print the track."""
     from tracking.live import Motor, Pictures, Ride, Sight, ending_on_signals, steer, watch
     from tracking.live_page import LivePage
+    from tracking.printer import Printer
 
     length = plan.robot.length_scale
-    page = LivePage(plan.reference, length)
+    page, told, rows = LivePage(plan.reference, length), Printer(sys.stderr), Printer(sys.stdout)
 
     def row(sight: Sight, direction: int, error: float, alarm: bool, flip_in: float) -> None:
         page.show(sight, direction, error, alarm, flip_in)
         if sight.pose is not None:
             x, y, heading = sight.pose
             place = f"{100 * length * x:.4f},{100 * length * y:.4f},{math.degrees(heading):.3f}"
-            print(f"{sight.time:.4f},{place},{direction},{100 * length * error:.4f},{alarm:d}", flush=True)
+            rows(f"{sight.time:.4f},{place},{direction},{100 * length * error:.4f},{alarm:d}")
 
     def tell(line: str) -> None:
         page.tell(line)
-        print(line, file=sys.stderr, flush=True)
+        told(line)
 
-    sights, ride = watch(source, view, plan.robot.name, length, latency, page.see), Ride()
-    with ending_on_signals(), page if show else nullcontext():
+    def see(picture: Any, view: View) -> None:
+        if line := page.see(picture, view):
+            tell(line)
+
+    sights, ride = watch(source, view, plan.robot.name, length, latency, see), Ride()
+    with told, rows, ending_on_signals(), page if show else nullcontext():
         if show:
-            print(f"live page: {page.address}", file=sys.stderr, flush=True)
+            told(f"live page: {page.address}")
         motor = Motor(port)
-        print("time_s,x_cm,y_cm,heading_deg,direction,error_cm,alarm", flush=True)
+        rows("time_s,x_cm,y_cm,heading_deg,direction,error_cm,alarm")
         try:
             with Pictures(sights) as pictures, motor:  # which stops first
                 steer(ride, pictures, motor, begin, plan.robot.time_scale, lost=lost, row=row, tell=tell,

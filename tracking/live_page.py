@@ -48,6 +48,7 @@ class LivePage:
         self.stopped = threading.Event()  # by the button
         self._path, self._length = path[:: max(1, len(path) // _POINTS)] * length, length
         self._seen: tuple[Any, View] | None = None  # the newest picture, and the camera's view
+        self._compared = False  # the path, with the view
         self._state: dict[str, Any] = {"why": "no picture yet"}
         self._flip_at = math.nan
         self._lines: list[str] = []
@@ -64,9 +65,15 @@ class LivePage:
         self._server.shutdown()
         self._server.server_close()
 
-    def see(self, picture: Any, view: View) -> None:
-        """Take the newest picture."""
+    def see(self, picture: Any, view: View) -> str:
+        """Take the newest picture; say once, where the view is known, how much of the path it cannot show."""
         self._seen = picture, view
+        if self._compared or view.homography is None:
+            return ""
+        self._compared = True
+        places, size = view.to_picture(self._path), picture.shape[1::-1]
+        share = ((places < 0) | (places > size)).any(1).mean()
+        return f"{100 * share:.2g} % of the path lies outside the picture" if share else ""
 
     def tell(self, line: str) -> None:
         """Take a line that the user should know."""

@@ -314,12 +314,12 @@ def tank_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def tracking(folder: Path, port: str, *more: str) -> subprocess.Popen[str]:
+def tracking(folder: Path, port: str, *more: str, stdout: int = subprocess.PIPE) -> subprocess.Popen[str]:
     """Begin to track the robot of the film."""
     words = ["--camera", str(folder / "film.avi"), "--view", str(folder / "view.toml"), "--serial", port, *more]
     return subprocess.Popen(
         [sys.executable, "-m", "softflagella", "track", str(folder / "plan.json"), *words],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT,
+        stdout=stdout, stderr=subprocess.PIPE, text=True, cwd=ROOT,
         preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),  # ignored in the background of a shell
     )  # fmt: skip
 

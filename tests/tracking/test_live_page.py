@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import http.client
 import json
+import os
+import signal
 import subprocess
 import threading
+import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -183,3 +189,61 @@ def test_a_lab_looks_at_the_robot_and_stops_it(browser: Any, tank_files: Path) -
     assert page.locator("#stop").is_disabled()
     assert "stopped on the live page" in told
     assert "Traceback" not in told
+
+
+@pytest.mark.slow
+def test_a_program_that_hangs_is_not_shown_as_if_it_steered(browser: Any, tank_files: Path) -> None:
+    from tests.oracles import tank
+
+    tank.Tank().film(tank_files / "film.avi", lambda time: (*swum(time), 0.0, 0.0), 30.0, 5.0, codec="MJPG")
+    process = tracking(tank_files, pseudo_terminal()[1], "--show")
+    page = browser.new_page()
+    page.set_default_timeout(1000 * LIMIT)
+    page.goto(address_of(process))
+    page.locator("#facts", has_text="forward (+)").wait_for()
+    process.send_signal(signal.SIGSTOP)
+    try:
+        page.locator("#alarm", has_text="does not answer").wait_for(timeout=5000)
+        assert page.locator("#facts").inner_text() == ""
+    finally:
+        process.send_signal(signal.SIGCONT)
+    page.locator("#facts", has_text="forward (+)").wait_for()
+    page.click("#stop")
+    process.communicate(timeout=LIMIT)
+    assert process.returncode == 0
+
+
+@pytest.mark.slow
+def test_a_stop_comes_through_where_nobody_reads_the_rows(tank_files: Path) -> None:
+    master, port = pseudo_terminal()
+    reads, full = os.pipe()
+    os.set_blocking(full, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(full, b"#" * 4096)
+    os.set_blocking(full, True)
+    process = tracking(tank_files, port, "--show", stdout=full)
+    address, orders = urlsplit(address_of(process)), b""
+    while not {b"F", b"B"} & set(orders.split()) and process.poll() is None:
+        time.sleep(0.1)
+        orders += sent(master)
+    connection = http.client.HTTPConnection(address.netloc, timeout=LIMIT)
+    connection.request("POST", f"{address.path}stop")
+    assert connection.getresponse().status == 200
+    connection.close()
+    _, told = process.communicate(timeout=LIMIT)
+    assert process.returncode == 0, told
+    assert "stopped on the live page" in told
+    assert (orders + sent(master)).split()[-1] == b"S"
+    for end in (reads, full):
+        os.close(end)
+
+
+def test_a_path_that_leaves_the_picture_is_told_of_once(page: LivePage) -> None:
+    picture = np.zeros((100, 200, 3), np.uint8)
+    places = np.linspace([0, 50], [250, 50], len(page._path))
+    view: Any = SimpleNamespace(homography=None, to_picture=lambda path: places)
+    assert page.see(picture, view) == ""
+    view.homography = np.eye(3)
+    assert page.see(picture, view) == "20 % of the path lies outside the picture"
+    assert page.see(picture, view) == ""
