@@ -35,6 +35,7 @@ from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.picture import REPLAYED, label_points
 from planner.planning.plan import Job, Plan
+from planner.planning.request import ProgressCallback
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -144,7 +145,7 @@ def tour(
     task, setting = _Tour(visited, any_start, back), preferred_setting(tracked, request)
     margin = 1.5 * setting.straight.largest
     for _ in range(_MARGINS):
-        found = task.ordered(Travel.of(setting, request.space, margin))
+        found = task.ordered(Travel.of(setting, request.space, margin), options.get("progress"))
         plan = plan_track(partial(task.track, found), setting, request, options.get("progress"))
         if plan.kept_clear is None or not plan.kept_clear.detours or plan.kept_clear.margin <= margin:
             break
@@ -179,7 +180,7 @@ class _Tour(NamedTuple):
     any_start: bool
     back: bool
 
-    def ordered(self, travel: Travel) -> _Ordered:
+    def ordered(self, travel: Travel, progress: ProgressCallback | None) -> _Ordered:
         """Find the order, and refine the directions of motion."""
         count = len(self.places)
         exact = count - (not self.any_start) <= EXACT and travel.limits.space.empty
@@ -195,7 +196,7 @@ class _Tour(NamedTuple):
                 "every heading the robot touches what it must keep clear of; move the place away from it"
             )
         flat = poses.reshape(-1, 3)
-        costs = travel.times(np.repeat(flat, len(flat), 0), np.tile(flat, (len(flat), 1)))
+        costs = travel.times(np.repeat(flat, len(flat), 0), np.tile(flat, (len(flat), 1)), progress)
         costs = costs.reshape(count, options, count, options)
         closing = costs.min(-1).transpose(2, 0, 1) if self.back else np.zeros((count, count, options))
         if self.any_start:

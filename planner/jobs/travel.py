@@ -23,14 +23,14 @@ from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import check_size
 from planner.planning.declare import AS_DRAWN, FeasiblePath
 from planner.planning.plan import Plan
-from planner.planning.request import PlanRequest, ProgressCallback
+from planner.planning.request import ORDERING, PlanRequest, ProgressCallback, tell
 from planner.planning.solve import PathTask, Trial, solve
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.zigzag import dwells_for
 
 WORDS = 3  # tried among obstacles
 DETOUR = 6.0  # turn radii that a blocked track counts longer
-_BLOCK = 50_000  # pairs of poses at once
+_BLOCK, _BLOCK_BESIDE = 50_000, 500  # pairs of poses at once, without obstacles and with some
 _STEP = 0.15  # l, between the places where a track is checked
 SLACK = 0.02  # l, by which clearances between these places may be smaller
 _SPACING = 0.02  # l, of the reference's points
@@ -67,11 +67,17 @@ class Travel:
     def radius(self) -> float:
         return self.limits.radius
 
-    def times(self, start: Floats, goal: Floats) -> Floats:
+    def times(self, start: Floats, goal: Floats, progress: ProgressCallback | None = None) -> Floats:
         """Compute the shortest times (M,) between M pairs of poses (M, 3): places and courses of the pivot."""
-        blocks = [slice(i, i + _BLOCK) for i in range(0, len(start), _BLOCK)]
-        margin = self.margin + SLACK  # so that tracks which are chosen for their times are free for certain
-        return np.concatenate([self._best(start[rows], goal[rows], margin)[1] for rows in blocks])
+        times, margin = (
+            [],
+            self.margin + SLACK,
+        )  # so that tracks which are chosen for their times are free for sure
+        block = _BLOCK if self.limits.space.empty else _BLOCK_BESIDE
+        for first in range(0, len(start), block):
+            tell(progress, ORDERING, first / len(start))
+            times.append(self._best(start[first : first + block], goal[first : first + block], margin)[1])
+        return np.concatenate(times)
 
     def tracks(self, start: Floats, goal: Floats) -> DubinsPaths:
         """Find the quickest tracks between M pairs of poses."""

@@ -15,7 +15,8 @@ const { EVEN, SHORT, SHORTEST_STEP } = CONSTANTS.nearest_path;
  *
  * pivotDistance: from the pivot to the tracked point, at least 0. radius: smallest radius of the pivot's track.
  * minimax: nearest by the largest distance, not by the root mean square. timeWeight: what time counts beside the
- * distance [l²]. apart: how far neighbours among its points may be from each other, about. progress: called now and then with the share that is done. */
+ * distance [l²]. apart: how far neighbours among its points may be from each other, about. progress: called now and
+ * then with the share that is done. */
 function nearestPath(raw, pivotDistance, radius, options = {}) {
   const { drift = STILL, minimax = false, timeWeight = 0, apart = Infinity, progress = null } = options;
   const line = resample(polyline(raw), poseSpacing(raw, radius)), spacing = pathLength(raw) / (line.length - 1);
@@ -41,7 +42,8 @@ function trackedPoints(poses, pivotDistance, apart) {
   const steps = poses.x.length - 1, chords = differences(poses.x).map((x, i) => {
     return Math.hypot(x, poses.y[i + 1] - poses.y[i]);
   });
-  const pieces = Math.max(POINTS_A_POSE, Math.ceil(mean(chords) / apart)), knots = Float64Array.from({ length: steps + 1 }, (_, i) => i);
+  const pieces = Math.max(POINTS_A_POSE, Math.ceil(mean(chords) / apart));
+  const knots = Float64Array.from({ length: steps + 1 }, (_, i) => i);
   const at = Float64Array.from({ length: pieces * steps + 1 }, (_, i) => i / pieces);
   const [x, y, heading] = [poses.x, poses.y, poses.heading].map((values) => interp(at, knots, values));
   return Array.from(at, (place, i) => {

@@ -22,6 +22,7 @@ from sim.mechanics.planar import POSE
 
 Corner = Literal["nearest", "minimax", "fillet", "error"]
 DECLARING = "finding the nearest path that can be followed"
+ORDERING = "comparing the ways between places"
 REMEDY = "too tight: looking for a change that helps"
 FOLLOWING = "following the path"
 ERRORS = "computing the error of the path"

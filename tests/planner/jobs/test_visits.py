@@ -15,6 +15,7 @@ from planner.jobs.tour import tour
 from planner.jobs.travel import Travel
 from planner.paths.distance import distance_to
 from planner.paths.obstacles import Circle, FreeSpace
+from planner.planning.request import ORDERING
 from planner.planning.solve import Trial
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import dwells_for
@@ -154,3 +155,12 @@ def test_the_simulator_visits_all_places() -> None:
     track = replay(result.schedule())
     points = track[["x_over_l", "y_over_l"]].to_numpy(float)
     assert distance_to(points, np.array(PLACES[:3])).max() < result.stated_error + 0.05
+
+
+def test_the_search_for_an_order_among_obstacles_tells_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("planner.jobs.travel._BLOCK_BESIDE", 200)
+    told: list[Any] = []
+    tour(PLACES[:3], tracked(), **QUICK, keep_out=[Circle(2.0, 30.0, 0.5)], progress=told.append)
+    shares = [share.done for share in told if share.stage == ORDERING]
+    assert len(shares) > 5
+    assert shares == sorted(shares)
