@@ -63,7 +63,7 @@ def refuse_unwritable(folder: str | Path) -> None:
     with refusals(target):
         there = next(path for path in (target, *target.absolute().parents) if path.exists())
         if not there.is_dir():
-            raise InputError(f"cannot make the folder {folder}: {there} is a file; give another folder")
+            raise InputError(f"cannot make {folder}: {there} is a file; give a folder")
         if not os.access(there, os.W_OK | os.X_OK):
             raise InputError(f"cannot write into {there}: no permission; give another folder")
 

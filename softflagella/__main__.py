@@ -158,8 +158,6 @@ def _filmed(films: str, view: str, robot: str, out: str) -> str:
     from common.files import make_folder, write_csv
     from sim.inputs import load_robot
 
-    if Path(out).is_file():  # before films are tracked, which takes a while
-        raise InputError(f"{out} is a file; give a folder")
     measured = measure_films(films, view, load_robot(robot), tell=to_stderr)
     for line in (*measured.converted, *(f"excluded: {line}" for line in measured.excluded)):
         to_stderr(line)

@@ -106,7 +106,7 @@ def test_a_place_that_cannot_be_written_is_refused_first(
         run_command(main, ["calibrate", str(tmp_path / "runs.csv"), *arguments, "--out", f"{tmp_path}/{place}"])
         == 2
     )
-    assert f"{tmp_path}/file is a file; give another folder" in capsys.readouterr().err
+    assert f"{tmp_path}/file is a file; give a folder" in capsys.readouterr().err
 
 
 def test_a_verdict_is_not_saved_into_a_file(tmp_path: Path) -> None:
