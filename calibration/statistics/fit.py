@@ -70,6 +70,8 @@ _SHORT = 0.1  # after a shorter step, in ln C or ε, the Jacobian is used once m
 _SMALL = 0.01  # the iteration ends at a step that is expected to reduce rᵀ Σ⁻¹ r by less, over that of noise
 _LARGEST = 0.7  # change of ln C in one step
 _PASSES = 3  # iterations for the scatter of the sessions
+_ESTIMATES = 4  # of that scatter in a search
+_NEAR = 10.0  # a fit is near its solution if a step is expected to reduce rᵀ Σ⁻¹ r by less, over that of noise
 _DAMPING = (0.0, *(10.0 ** (e / 2) for e in range(-6, 17)))  # λ; a step is up to √10 shorter than it may be
 _NEARER = 5  # starts that are tried
 _PROBE = 0.1  # share of a step at which the curvature of the model is seen
@@ -258,9 +260,8 @@ def fit(
     run, repeats = data.noise(used)
     problem = _Problem(model, fitted, used, run, in_sigma, title)
     with limited_as_one():
-        point = _descend(problem, problem.first(dict(start)), target)
+        point, share = _descend(problem, problem.first(dict(start)), target)
         stopped = spent()
-    share = point.products.share(passes=_PASSES)
     ahead = bounded_step(fitted, point.parameters, problem.normal(point, share))
     free = np.where(ahead.held, 0.0, point.derivative)
     residual = (data.y - point.prediction)[used]
@@ -414,8 +415,8 @@ class _FitStep(NamedTuple):
     damping: int  # place of its λ in _DAMPING
 
 
-def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
-    """Find the least rᵀ Σ⁻¹ r from `point`; steps to where the model cannot be solved quickly are too long.
+def _descend(problem: _Problem, point: _Point, target: float) -> tuple[_Point, Floats]:
+    """Find the least rᵀ W r from `point`, with its ρ; steps to where the model cannot be solved quickly are too long.
 
     A wrong model crawls along a bent valley far above the noise. The search ends there as soon as all steps that
     are left, with what the present one promises, would not come down to `target`.
@@ -424,12 +425,16 @@ def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
     least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
     refused = False  # whether the step before did not improve the fit
     solved = True  # whether the model could be solved wherever it was tried
+    share, estimates = point.products.share(passes=0), 0
     for count in range(1, _MOST_STEPS + 1):
-        # The scatter of the sessions comes from the residuals of the fit, but only near the solution. Far from it
-        # every session looks shifted, and with a large ρ the search would stop there.
-        share = point.products.share(passes=0 if count == 1 else _PASSES)
         normal = problem.normal(point, share)
         step = _step(fitted, point.parameters, normal, least)
+        # The scatter of the sessions comes from the residuals of the fit, but only near the solution: far from it
+        # every session looks shifted, and with a large ρ the search would stop there. It settles, or is kept.
+        if estimates < _ESTIMATES and step.promise < _NEAR * problem.noise_level(normal) and count > 1:
+            share, estimates = point.products.share(passes=_PASSES), estimates + 1
+            normal = problem.normal(point, share)
+            step = _step(fitted, point.parameters, normal, least)
         small = _SMALL * problem.noise_level(normal)
         if step.promise < small and count > 1:
             break
@@ -459,7 +464,7 @@ def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
             least, refused = max(step.damping + 1 + refused, 2), True  # each costs as much as one that does
             if least >= len(_DAMPING):
                 break
-    return point
+    return point, share
 
 
 def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, least: int) -> _FitStep:
