@@ -416,7 +416,7 @@ class _FitStep(NamedTuple):
 
 
 def _descend(problem: _Problem, point: _Point, target: float) -> tuple[_Point, Floats]:
-    """Find the least rᵀ W r from `point`, with its ρ; steps to where the model cannot be solved quickly are too long.
+    """Find the least rᵀ W r from `point`, with its ρ; steps to where a model cannot be solved quickly are too long.
 
     A wrong model crawls along a bent valley far above the noise. The search ends there as soon as all steps that
     are left, with what the present one promises, would not come down to `target`.

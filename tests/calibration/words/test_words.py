@@ -198,3 +198,21 @@ def test_an_entry_that_is_missing_is_no_empty_text() -> None:
     del record["p_value"]
     with pytest.raises(UndefinedError, match="p_value"):
         sentence(record)
+
+
+def test_what_all_explanations_share_is_told_from_what_is_undecided() -> None:
+    record = stored("ambiguous")
+    name = next(iter(record["parameters"]))
+    said = sentence({**record, "certain": [name], "undecided": ["tail sag", "inertia", ""]})
+    size = record["parameters"][name]
+    assert f"consistent with {size['title']} ({name}), size" in said
+    assert (
+        "which is certain among these explanations; undecided is tail sag or inertia or neither beside it" in said
+    )
+
+
+def test_an_effect_without_a_fit_is_named_with_the_reason() -> None:
+    said = sentence(
+        {**stored("effect"), "not_fitted": [{"title": "inertia", "reason": "its fit did not converge"}]}
+    )
+    assert "Nothing is concluded about inertia (its fit did not converge)." in said
