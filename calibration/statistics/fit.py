@@ -81,6 +81,7 @@ _BLIND = 1e-12  # share of the largest eigenvalue below which a combination of p
 _NEARLY_CERTAIN = 1e-6  # standard deviation of a parameter that is held, in typical sizes
 _KEPT = 0.25  # share of the promised fall below which the next step is damped
 _UNSETTLED = 1.0  # a fit has not converged if one more step is expected to reduce it by more
+_EXACT = 1e-12  # of a guessed variance: what runs without noise leave
 _PROFILE = 0.05  # share of a size to which an end of its interval is found
 _FLAT = 0.05  # share of the expected rise; if the rise is smaller, the deviance is flat and the end stays
 _STEEP = 5.0  # if it is larger, the others were not refitted along a bent valley, and the end stays
@@ -345,7 +346,7 @@ class _Problem:
         """
         runs = self.model.runs
         level = float(normal[-1, -1]) / max(runs.values(self.used) - len(self.fitted), 1)
-        return max(level, 1.0) if runs.noise_known else level
+        return max(level, 1.0 if runs.noise_known else _EXACT)
 
     def first(self, parameters: dict[str, float]) -> _Point:
         """Run the model at the start; effects move towards their null while it cannot be solved quickly there."""
@@ -390,13 +391,12 @@ class _Problem:
 
         Source: geodesic acceleration, Transtrum and Sethna (2012).
         """
-        either = [
-            derivatives(self.model, apply_step(self.fitted, point.parameters, side * step.change), [], quick=True)[
-                0
-            ]
-            for side in (_PROBE, -_PROBE)
-        ]
-        curvature = (either[0] + either[1] - 2 * point.prediction) / _PROBE**2
+
+        def beside(share_of_step: float) -> Floats:
+            there = apply_step(self.fitted, point.parameters, share_of_step * step.change)
+            return derivatives(self.model, there, [], quick=True)[0]
+
+        curvature = (beside(_PROBE) + beside(-_PROBE) - 2 * point.prediction) / _PROBE**2
         if not np.isfinite(curvature).all():
             return step
         normal = self.weighted(self.products(point.derivative, -curvature[self.used] / 2), share)
@@ -416,7 +416,7 @@ class _FitStep(NamedTuple):
 
 
 def _descend(problem: _Problem, point: _Point, target: float) -> tuple[_Point, Floats]:
-    """Find the least rᵀ W r from `point`, with its ρ; steps to where a model cannot be solved quickly are too long.
+    """Find the least rᵀ W r from `point`, with its ρ; a step to where a model cannot be solved quickly is too long.
 
     A wrong model crawls along a bent valley far above the noise. The search ends there as soon as all steps that
     are left, with what the present one promises, would not come down to `target`.
@@ -521,7 +521,7 @@ def birge(runs: Runs, fitted: Fit, used: Flags) -> float:
     priors = sum(p.sigma is not None for p in fitted.fitted)
     freedom = runs.values(used) + priors - len(fitted.names)
     ratio = float(fitted.normal(runs, used)[-1, -1]) / max(freedom, 1)
-    return max(1.0 if runs.noise_known else 1e-12, ratio)
+    return max(1.0 if runs.noise_known else _EXACT, ratio)
 
 
 def _inflation(repeats: float, outputs: int) -> float:
