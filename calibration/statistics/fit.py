@@ -416,7 +416,7 @@ class _FitStep(NamedTuple):
 
 
 def _descend(problem: _Problem, point: _Point, target: float) -> tuple[_Point, Floats]:
-    """Find the least rᵀ W r from `point`, with its ρ; a step to where a model cannot be solved quickly is too long.
+    """Find the least rᵀ W r from `point`, and its ρ. A step to where the model is not solved quickly is too long.
 
     A wrong model crawls along a bent valley far above the noise. The search ends there as soon as all steps that
     are left, with what the present one promises, would not come down to `target`.
