@@ -60,6 +60,7 @@ from calibration.statistics.statistical_model import (
     Runs,
     prior_offsets,
     regression,
+    start_values,
 )
 from calibration.statistics.study import FinalRefit, Study
 from common.arrays import Flags, Floats, Integers
@@ -262,8 +263,9 @@ def _promising(base: Fit, least: float, candidates: Sequence[Candidate]) -> list
 def _converged(study: Study, base: Fit, candidate: Candidate) -> Fit:
     """Fit an effect to its end: the search for explanations stops where noise is out of reach.
 
-    A fit that is held at an end of the effect's range, or does not converge, may be in a valley of its own: then
-    it is made again from a typical size and from that of theory, on the side of the score.
+    It is fitted from where the score points to, and from the model as given with a typical size of every effect.
+    Where this ends at an end of an effect's range, or does not converge, it may be in a valley of its own, and the
+    fit is made again from a typical size and from that of theory.
     """
     effect, refit = candidate.effect, candidate.refit
     names = (*base.names, effect.name, *((effect.second.name,) if effect.second else ()))
@@ -277,11 +279,20 @@ def _converged(study: Study, base: Fit, candidate: Candidate) -> Fit:
         refit = fitted_from(base.parameters, base.parameters[effect.name] + step)
     elif not refit.converged:
         refit = fitted_from(refit.parameters, refit.parameters[effect.name])
-    if refit.converged and not refit.held[names.index(effect.name)]:
-        return refit
-    sizes = {effect.start + math.copysign(effect.typical, candidate.z), effect.theory} - {None}
-    again = [fitted_from(base.parameters, cast(float, size)) for size in sizes if not spent()]
-    return min((refit, *again), key=lambda one: (not one.converged, one.deviance))
+    added = [e for e in study.model.effects if e.name in names]
+    typical = effect.start + math.copysign(effect.typical, candidate.z)
+    sides = {e.name: math.copysign(e.typical, refit.parameters[e.name] - e.start) for e in added}
+    as_given = {**start_values(study.model), **{e.name: e.start + sides[e.name] for e in added}}
+    starts = [(as_given, typical), (base.parameters, typical), (base.parameters, effect.theory)]
+    fits = [refit]
+    for start, size in starts:
+        if size is not None and not spent():
+            fits.append(fitted_from(start, size))
+        best = min(fits, key=lambda one: (not one.converged, one.deviance))
+        at_ends = np.isclose([[best.parameters[e.name]] * 2 for e in added], [e.bounds for e in added]).any()
+        if best.converged and not at_ends:
+            break
+    return best
 
 
 def _with_spread(study: Study, constant: Fit, effect: Parameter) -> tuple[Shifted, Fit, float]:

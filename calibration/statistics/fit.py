@@ -31,6 +31,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -81,6 +82,7 @@ _BLIND = 1e-12  # share of the largest eigenvalue below which a combination of p
 _NEARLY_CERTAIN = 1e-6  # standard deviation of a parameter that is held, in typical sizes
 _KEPT = 0.25  # share of the promised fall below which the next step is damped
 _UNSETTLED = 1.0  # a fit has not converged if one more step is expected to reduce it by more
+_LONG = 0.3  # step in ln C or typical sizes along which a model may not be linear
 _EXACT = 1e-12  # of a guessed variance: what runs without noise leave
 _PROFILE = 0.05  # share of a size to which an end of its interval is found
 _FLAT = 0.05  # share of the expected rise; if the rise is smaller, the deviance is flat and the end stays
@@ -144,6 +146,7 @@ class UnsolvedError(Exception):
 class Fit:
     """A fitted model; arrays over all runs of the table, used or not."""
 
+    model: ForwardModel
     parameters: dict[str, float]  # name -> fitted value
     fitted: tuple[Parameter, ...]  # in the order of the covariance
     names: tuple[str, ...]  # of these
@@ -206,7 +209,10 @@ class Fit:
         return linear.products(residual, run, prior_offsets(self.fitted, self.parameters))
 
     def refitted(self, runs: Runs, rows: Flags, *, for_test: bool = False) -> Fit:
-        """Fit again to the runs in `rows` (n,), by one linear step; for a test, by least squares in Σ."""
+        """Fit again to the runs in `rows` (n,): by one linear step, and from its start where that is long.
+
+        For a test it is one linear step of least squares in Σ.
+        """
         products = self.products(runs, rows)
         refit = products.solve(passes=_PASSES)
         normal, covariance = products.for_fit(refit.share)[0], refit.covariance
@@ -214,12 +220,20 @@ class Fit:
             normal = products.at(refit.share)
             covariance = solve_normal(normal)[1]
         step = bounded_step(self.fitted, self.parameters, normal).change
+        if not for_test and self.beyond_linear(step):
+            with suppress(UnsolvedError, InputError):
+                names, numbers = self.names, self.wrong_numbers
+                return fit(self.model, self.parameters, names, rows, wrong_numbers=numbers, title="")
         return replace(
             self,
             parameters=apply_step(self.fitted, self.parameters, step),
             prediction=self.prediction + self.tangents @ step,
             covariance=self.inflation * certain_where_held(covariance, self.held, self.fitted),
         )
+
+    def beyond_linear(self, step: Floats) -> bool:
+        """Tell whether a step (p,) is so long that the model may not be linear along it."""
+        return bool((np.abs(step) > _LONG * typical_sizes(self.fitted)).any())
 
     def normal(self, runs: Runs, rows: Flags) -> Floats:
         """Return them in the noise of the fit, (p + 1, p + 1)."""
@@ -276,6 +290,7 @@ def fit(
     offsets = [p.offset(point.parameters[p.name]) if p.name in nuisances else 0.0 for p in fitted]
     inflation = _inflation(repeats, len(run))
     return Fit(
+        model=model,
         parameters=point.parameters,
         fitted=fitted,
         names=names,

@@ -55,7 +55,7 @@ from calibration.attribution.wrong_numbers import (
 from calibration.statistics.budget import Budget, clock, limited, seconds_left, skipped
 from calibration.statistics.checks import predict_as_given
 from calibration.statistics.excluded import caveat_of_excluded
-from calibration.statistics.fit import Fit, fit, profile_end, profile_intervals
+from calibration.statistics.fit import Fit, UnsolvedError, fit, profile_end, profile_intervals
 from calibration.statistics.offsets import Offsets, with_differences
 from calibration.statistics.residual_tests import directions, examine_residual
 from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values, with_runs
@@ -369,7 +369,18 @@ def _handed_on(study: Study, found: Attribution, *, falls: bool) -> FinalRefit:
     nearest, final = found.nearest, found.final
     if nearest and not falls:
         nearest, final = None, found.base
-    refit = final_refit(final.refitted(study.model.runs, study.split.kept))
+    try:
+        of_all = fit(
+            final.model,
+            final.parameters,
+            final.names,
+            study.split.kept,
+            wrong_numbers=final.wrong_numbers,
+            title="",
+        )
+    except (UnsolvedError, InputError):  # where the model breaks down on the way
+        of_all = final.refitted(study.model.runs, study.split.kept)
+    refit = final_refit(of_all)
     return nearest.handed_on(refit) if nearest else refit
 
 
@@ -399,7 +410,7 @@ def _adopt_in_turns(
     """Adopt the nearest form, and, where something is still missing with it in the base, a further one beside it.
 
     A form that the held-out runs refute is withdrawn, and another one is looked for. Where the noise is unknown,
-    no pair of effects can explain the residual, so pairs of forms are tried where no single one is adopted.
+    no pair of effects can explain the residual, so pairs of forms compete with the single ones.
     """
     runs, test, tangents, misfit = study.model.runs, study.split.test, found.tangents, found.misfit
     base, candidates = found.base, found.candidates
@@ -411,8 +422,8 @@ def _adopt_in_turns(
         if len(turns) == 1:
             seen = {c.effect.name: c for c in (*found.candidates, *candidates)}
             found = replace(found, candidates=tuple(seen.values()))
-            if form is None and not runs.noise_known:
-                first, form = _nearest_pair(study, base, candidates)
+            if not runs.noise_known:
+                first, form = _nearest_pair(study, base, candidates, form)
         if form is None:
             break
         place = next(i for i, e in enumerate(study.effects) if e.name == form.effect.name)
@@ -446,9 +457,9 @@ def _adopt_in_turns(
 
 
 def _nearest_pair(
-    study: Study, base: Fit, candidates: Sequence[Candidate]
+    study: Study, base: Fit, candidates: Sequence[Candidate], single: AdoptedForm | None
 ) -> tuple[Candidate | None, AdoptedForm | None]:
-    """Find two forms that together are adopted where neither is alone; two times None if there are none."""
+    """Find two forms that together predict left-out runs better than a single one; else return that one alone."""
     pairs_of_forms = []
     for first in candidates:
         if first.refit is None or not first.refit.converged:
@@ -458,9 +469,12 @@ def _nearest_pair(
         misfit = examine_residual(beside, first.refit, tangents)
         scored = unexamined(misfit, beside.effects, misfit.critical_z, (first.effect,))
         form = adopt_nearest(beside, first.refit, misfit, scored, tangents)[0]
-        if form and paired_gain(study, form.fit, base).certain:
+        if form and paired_gain(study, form.fit, single.fit if single else base).certain:
             pairs_of_forms.append((first, form))
-    return min(pairs_of_forms, key=lambda pair: pair[1].fit.deviance, default=(None, None))
+    best = min(pairs_of_forms, key=lambda pair: pair[1].fit.deviance, default=None)
+    if best is None or (single and single.effect in (best[0].effect, best[1].effect)):  # a turn adds the other one
+        return None, single
+    return best
 
 
 def _caveats(

@@ -5,17 +5,18 @@ or of the specimens (`study.quarter_of_conditions`), tells whether a model predi
 again without them, by one linear step. The choice of the effect has seen them; its numbers have not.
 
 **Withdrawn claims.** A claim is withdrawn if with it the error on one of these sets rises, and these runs reject
-the model that has it (p < `REJECTED`). The search goes on as if the effect were not in the catalogue. Each
-withdrawal has looked at the held-out runs once more, which is stated. A form that fits also predicts the same
-conditions, so this works on extrapolation alone; `calibration.attribution.forms` compares forms elsewhere.
+the model that has it (p < `REJECTED`; where the noise is unknown, in that which the model leaves). The search goes
+on as if the effect were not in the catalogue. Each withdrawal has looked at the held-out runs once more, which is
+stated. A form that fits also predicts the same conditions, so this works on extrapolation alone;
+`calibration.attribution.forms` compares forms elsewhere.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from calibration.statistics.fit import Fit
+from calibration.statistics.fit import Fit, birge
 from calibration.statistics.study import (
     Study,
     error_interval,
@@ -102,17 +103,27 @@ def errors_of_conditions(study: Study, before: Fit, final: Fit) -> ConditionErro
         return None
     fits = [fitted.refitted(runs, used & ~out) for fitted in (before, final)]
     rms_before, rms_after = (errors(runs, fitted.prediction, out)[0] for fitted in fits)
-    return ConditionErrors(names, rms_before, rms_after, held_out_p_value(fits[1], runs, out, seed=study.seed + 7))
+    p = held_out_p_value(_in_its_noise(study, fits[1]), runs, out, seed=study.seed + 7)
+    return ConditionErrors(names, rms_before, rms_after, p)
 
 
 def refuted(study: Study, before: Fit, claim: Fit, title: str, effects: tuple[str, ...]) -> Withdrawn | None:
     """Withdraw a claim that held-out runs refute; None if they do not."""
     runs, test = study.model.runs, study.split.test
     rms_before, rms_after = (errors(runs, fitted.prediction, test)[0] for fitted in (before, claim))
-    p = held_out_p_value(claim, runs, test, seed=study.seed + 3) if rms_after > rms_before else 1.0
+    own = _in_its_noise(study, claim)
+    p = held_out_p_value(own, runs, test, seed=study.seed + 3) if rms_after > rms_before else 1.0
     on_sessions = ConditionErrors(study.split.names, rms_before, rms_after, p)
     for one in filter(None, (on_sessions, errors_of_conditions(study, before, claim))):
-        # Where the noise is unknown, no p-value means anything, and the rise decides.
-        if one.after > one.before and (one.p_value < REJECTED or not runs.noise_known):
+        if one.after > one.before and one.p_value < REJECTED:
             return Withdrawn(title, effects, one.names, one.before, one.after)
     return None
+
+
+def _in_its_noise(study: Study, fitted: Fit) -> Fit:
+    """Return a fit in the noise that it leaves, where none is known."""
+    if study.model.runs.noise_known:
+        return fitted
+    b = birge(study.model.runs, fitted, study.split.fitted)
+    noise = replace(fitted.noise, run_covariance=b * fitted.noise.run_covariance)
+    return replace(fitted, noise=noise, covariance=b * fitted.covariance)
