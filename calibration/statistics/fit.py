@@ -44,6 +44,7 @@ from calibration.statistics.forward import derivatives
 from calibration.statistics.gls import (
     Noise,
     NormalEquations,
+    inverse_root,
     schur_complement,
     solve_normal,
 )
@@ -82,7 +83,7 @@ _BLIND = 1e-12  # share of the largest eigenvalue below which a combination of p
 _NEARLY_CERTAIN = 1e-6  # standard deviation of a parameter that is held, in typical sizes
 _KEPT = 0.25  # share of the promised fall below which the next step is damped
 _UNSETTLED = 1.0  # a fit has not converged if one more step is expected to reduce it by more
-_LONG = 0.3  # step in ln C or typical sizes along which a model may not be linear
+_BENDS = 0.01  # departure from a linear model, in the variance of the noise
 _EXACT = 1e-12  # of a guessed variance: what runs without noise leave
 _PROFILE = 0.05  # share of a size to which an end of its interval is found
 _FLAT = 0.05  # share of the expected rise; if the rise is smaller, the deviance is flat and the end stays
@@ -209,7 +210,7 @@ class Fit:
         return linear.products(residual, run, prior_offsets(self.fitted, self.parameters))
 
     def refitted(self, runs: Runs, rows: Flags, *, for_test: bool = False) -> Fit:
-        """Fit again to the runs in `rows` (n,): by one linear step, and from its start where that is long.
+        """Fit again to the runs in `rows` (n,): by one linear step, unless the model is not linear along it.
 
         For a test it is one linear step of least squares in Σ.
         """
@@ -220,20 +221,26 @@ class Fit:
             normal = products.at(refit.share)
             covariance = solve_normal(normal)[1]
         step = bounded_step(self.fitted, self.parameters, normal).change
-        if not for_test and self.beyond_linear(step):
+        parameters, prediction = (
+            apply_step(self.fitted, self.parameters, step),
+            self.prediction + self.tangents @ step,
+        )
+        if not for_test and self._bends(parameters, prediction):
             with suppress(UnsolvedError, InputError):
                 names, numbers = self.names, self.wrong_numbers
                 return fit(self.model, self.parameters, names, rows, wrong_numbers=numbers, title="")
         return replace(
             self,
-            parameters=apply_step(self.fitted, self.parameters, step),
-            prediction=self.prediction + self.tangents @ step,
+            parameters=parameters,
+            prediction=prediction,
             covariance=self.inflation * certain_where_held(covariance, self.held, self.fitted),
         )
 
-    def beyond_linear(self, step: Floats) -> bool:
-        """Tell whether a step (p,) is so long that the model may not be linear along it."""
-        return bool((np.abs(step) > _LONG * typical_sizes(self.fitted)).any())
+    def _bends(self, parameters: Parameters, linear: Floats) -> bool:
+        """Tell whether the model departs from a linear prediction (n, k) by what the noise would show."""
+        actual = derivatives(self.model, parameters, [], quick=True)[0]
+        white = (actual - linear) @ inverse_root(self.noise.run_covariance).T
+        return bool(np.mean(white**2) > _BENDS)
 
     def normal(self, runs: Runs, rows: Flags) -> Floats:
         """Return them in the noise of the fit, (p + 1, p + 1)."""

@@ -5,10 +5,11 @@ or of the specimens (`study.quarter_of_conditions`), tells whether a model predi
 again without them, by one linear step. The choice of the effect has seen them; its numbers have not.
 
 **Withdrawn claims.** A claim is withdrawn if with it the error on one of these sets rises, and these runs reject
-the model that has it (p < `REJECTED`; where the noise is unknown, in that which the model leaves). The search goes
-on as if the effect were not in the catalogue. Each withdrawal has looked at the held-out runs once more, which is
-stated. A form that fits also predicts the same conditions, so this works on extrapolation alone;
-`calibration.attribution.forms` compares forms elsewhere.
+the model that has it (p < `REJECTED`; where the noise is unknown, in that which the model leaves). Conditions
+without which a number of the model runs to a bound say nothing about a claim. The search goes on as if the effect
+were not in the catalogue. Each withdrawal has looked at the held-out runs once more, which is stated. A form that
+fits also predicts the same conditions, so this works on extrapolation alone; `calibration.attribution.forms`
+compares forms elsewhere.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ class ConditionErrors:
     before: float
     after: float
     p_value: float  # agreement with the final model
+    determined: bool = True  # no number of it runs to a bound without these conditions
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,8 @@ def errors_of_conditions(study: Study, before: Fit, final: Fit) -> ConditionErro
     fits = [fitted.refitted(runs, used & ~out) for fitted in (before, final)]
     rms_before, rms_after = (errors(runs, fitted.prediction, out)[0] for fitted in fits)
     p = held_out_p_value(_in_its_noise(study, fits[1]), runs, out, seed=study.seed + 7)
-    return ConditionErrors(names, rms_before, rms_after, p)
+    determined = not (fits[1].held & ~final.held).any()
+    return ConditionErrors(names, rms_before, rms_after, p, determined)
 
 
 def refuted(study: Study, before: Fit, claim: Fit, title: str, effects: tuple[str, ...]) -> Withdrawn | None:
@@ -115,7 +118,7 @@ def refuted(study: Study, before: Fit, claim: Fit, title: str, effects: tuple[st
     p = held_out_p_value(own, runs, test, seed=study.seed + 3) if rms_after > rms_before else 1.0
     on_sessions = ConditionErrors(study.split.names, rms_before, rms_after, p)
     for one in filter(None, (on_sessions, errors_of_conditions(study, before, claim))):
-        if one.after > one.before and one.p_value < REJECTED:
+        if one.after > one.before and one.p_value < REJECTED and one.determined:
             return Withdrawn(title, effects, one.names, one.before, one.after)
     return None
 
