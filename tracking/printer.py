@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+from contextlib import suppress
 from queue import SimpleQueue
 from typing import TextIO
 
@@ -11,10 +12,12 @@ _PATIENCE = 1.0  # s at the end for what is not printed yet
 
 
 class Printer:
-    """Prints lines on a stream, past its buffer: a lock on that would keep the program from ending."""
+    """Prints lines on a stream, past the buffer of a file: a lock on that would keep the program from ending."""
 
     def __init__(self, stream: TextIO):
-        self._file, self._encoding = stream.fileno(), stream.encoding
+        self._stream, self._file = stream, -1
+        with suppress(OSError):  # a notebook's stream is no file
+            self._file = stream.fileno()
         self._lines = SimpleQueue[str | None]()
         self._failed: OSError | None = None
         self._thread = threading.Thread(target=self._print, daemon=True)
@@ -36,7 +39,10 @@ class Printer:
     def _print(self) -> None:
         try:
             while (line := self._lines.get()) is not None:
-                left = f"{line}\n".encode(self._encoding, "replace")
+                if self._file < 0:
+                    print(line, file=self._stream, flush=True)
+                    continue
+                left = f"{line}\n".encode(self._stream.encoding, "replace")
                 while left:
                     left = left[os.write(self._file, left) :]
         except OSError as failed:
