@@ -87,10 +87,10 @@ class Form:
     error: float = math.nan  # relative rms on left-out runs
 
     @property
-    def held(self) -> bool:
-        """Whether one of the effects is held at an end of its range."""
-        names = {e.name for e in self.effects}
-        return any(p.name in names and held for p, held in zip(self.fit.fitted, self.fit.held, strict=True))
+    def at_an_end(self) -> bool:
+        """Whether the fitted size of one of the effects is at an end of its range."""
+        fitted = [e for e in self.effects if e.name in self.fit.names]
+        return any(np.isclose(self.fit.parameters[e.name], e.bounds, atol=0.0).any() for e in fitted)
 
     @property
     def title(self) -> str:

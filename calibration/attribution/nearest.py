@@ -231,7 +231,7 @@ def adopt_nearest(
     largest = max(adopted, key=lambda form: form.gain)
     together = [form for form in of_theory if len(form.effects) > 1]
     alike = as_good(study, largest.form, [*(a.form for a in adopted), *together])
-    alike = [form for form in alike if not form.held] or alike
+    alike = [form for form in alike if not form.at_an_end] or alike
     alike.sort(key=lambda form: not form.at_theory)
     as_well = [a for a in adopted if any(a.fit is form.fit for form in alike)]
     best = max(as_well or [largest], key=lambda form: (form.at_theory, form.gain))
@@ -263,9 +263,9 @@ def _promising(base: Fit, least: float, candidates: Sequence[Candidate]) -> list
 def _converged(study: Study, base: Fit, candidate: Candidate) -> Fit:
     """Fit an effect to its end: the search for explanations stops where noise is out of reach.
 
-    It is fitted from where the score points to, and from the model as given with a typical size of every effect.
-    Where this ends at an end of an effect's range, or does not converge, it may be in a valley of its own, and the
-    fit is made again from a typical size and from that of theory.
+    It is fitted from where the score points to. Where this ends at an end of an effect's range, or does not
+    converge, or goes on from a form of an earlier turn, it may be in a valley of its own, and is fitted again:
+    from the model as given with a typical size of every effect, from a typical size, and from that of theory.
     """
     effect, refit = candidate.effect, candidate.refit
     names = (*base.names, effect.name, *((effect.second.name,) if effect.second else ()))
@@ -279,20 +279,18 @@ def _converged(study: Study, base: Fit, candidate: Candidate) -> Fit:
         refit = fitted_from(base.parameters, base.parameters[effect.name] + step)
     elif not refit.converged:
         refit = fitted_from(refit.parameters, refit.parameters[effect.name])
-    added = [e for e in study.model.effects if e.name in names]
+    added = tuple(e for e in study.model.effects if e.name in names)
     typical = effect.start + math.copysign(effect.typical, candidate.z)
     sides = {e.name: math.copysign(e.typical, refit.parameters[e.name] - e.start) for e in added}
     as_given = {**start_values(study.model), **{e.name: e.start + sides[e.name] for e in added}}
-    starts = [(as_given, typical), (base.parameters, typical), (base.parameters, effect.theory)]
-    fits = [refit]
-    for start, size in starts:
-        if size is not None and not spent():
-            fits.append(fitted_from(start, size))
+    starts = [(as_given, typical), (base.parameters, typical)]
+    starts += [] if effect.theory is None else [(base.parameters, effect.theory)]
+    fits = [refit] if len(added) == 1 else [refit, fitted_from(*starts.pop(0))]
+    while True:
         best = min(fits, key=lambda one: (not one.converged, one.deviance))
-        at_ends = np.isclose([[best.parameters[e.name]] * 2 for e in added], [e.bounds for e in added]).any()
-        if best.converged and not at_ends:
-            break
-    return best
+        if (best.converged and not Form(added, best, False).at_an_end) or not starts or spent():
+            return best
+        fits.append(fitted_from(*starts.pop(0)))
 
 
 def _with_spread(study: Study, constant: Fit, effect: Parameter) -> tuple[Shifted, Fit, float]:

@@ -152,6 +152,7 @@ class Fit:
     fitted: tuple[Parameter, ...]  # in the order of the covariance
     names: tuple[str, ...]  # of these
     covariance: Floats  # (p, p) of (ln C, ε)
+    repeats: float  # degrees of freedom of S
     inflation: float  # factor in the covariance, because S is estimated
     freedom: Floats  # (p,) degrees of freedom of the intervals
     prediction: Floats  # (n, k)
@@ -227,13 +228,23 @@ class Fit:
         )
         if not for_test and self._bends(parameters, prediction):
             with suppress(UnsolvedError, InputError):
-                names, numbers = self.names, self.wrong_numbers
-                return fit(self.model, self.parameters, names, rows, wrong_numbers=numbers, title="")
+                return self.refitted_fully(rows)
         return replace(
             self,
             parameters=parameters,
             prediction=prediction,
             covariance=self.inflation * certain_where_held(covariance, self.held, self.fitted),
+        )
+
+    def refitted_fully(self, rows: Flags) -> Fit:
+        """Fit again to the runs in `rows` (n,) in the same S, from where this fit ended.
+
+        Raises:
+            UnsolvedError, InputError: the model cannot be solved on the way.
+        """
+        estimated, numbers = (self.noise.run_covariance, self.repeats), self.wrong_numbers
+        return fit(
+            self.model, self.parameters, self.names, rows, wrong_numbers=numbers, estimated=estimated, title=""
         )
 
     def _bends(self, parameters: Parameters, linear: Floats) -> bool:
@@ -261,6 +272,7 @@ def fit(
     wrong_numbers: tuple[tuple[Pull, ...], ...] = (),
     target: float = math.inf,
     in_sigma: bool = False,
+    estimated: tuple[Floats, float] | None = None,
     title: str = "fit",
 ) -> Fit:
     """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay.
@@ -271,6 +283,7 @@ def fit(
             the first of each is fitted without its prior.
         in_sigma: fit with the weights of tests, Σ⁻¹. A common misfit bends such a fit less, so what is missing is
             found more easily near it.
+        estimated: S (k, k) with its degrees of freedom; default: of the runs in `used`.
 
     Raises:
         UnsolvedError: the model cannot be solved quickly with the effects among `names`, however small.
@@ -279,7 +292,7 @@ def fit(
     freed = {alike[0].parameter.name for alike in wrong_numbers}
     fitted = tuple(parameter(model, name) for name in names)
     fitted = tuple(replace(p, sigma=None) if p.name in freed else p for p in fitted)
-    run, repeats = data.noise(used)
+    run, repeats = estimated or data.noise(used)
     problem = _Problem(model, fitted, used, run, in_sigma, title)
     with limited_as_one():
         point, share = _descend(problem, problem.first(dict(start)), target)
@@ -302,6 +315,7 @@ def fit(
         fitted=fitted,
         names=names,
         covariance=inflation * certain_where_held(linear.covariance, ahead.held, fitted),
+        repeats=repeats,
         inflation=inflation,
         freedom=_freedom(products, linear.share, len(names)),
         prediction=point.prediction,

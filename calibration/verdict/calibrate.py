@@ -370,14 +370,7 @@ def _handed_on(study: Study, found: Attribution, *, falls: bool) -> FinalRefit:
     if nearest and not falls:
         nearest, final = None, found.base
     try:
-        of_all = fit(
-            final.model,
-            final.parameters,
-            final.names,
-            study.split.kept,
-            wrong_numbers=final.wrong_numbers,
-            title="",
-        )
+        of_all = final.refitted_fully(study.split.kept)
     except (UnsolvedError, InputError):  # where the model breaks down on the way
         of_all = final.refitted(study.model.runs, study.split.kept)
     refit = final_refit(of_all)
