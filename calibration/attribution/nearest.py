@@ -297,12 +297,14 @@ def _with_spread(study: Study, constant: Fit, effect: Parameter) -> tuple[Shifte
     """Fit an effect whose size differs between specimens, with the likeliest τ of the linear model, in turn."""
     used = study.split.fitted
     logarithmic = effect.start in effect.bounds
-    spread = 1.0 if logarithmic else max(abs(constant.parameters[effect.name]) / 2, effect.typical / 10)
-    least = 1e-3 * (1.0 if logarithmic else effect.typical)
+    spread = 1.0 if logarithmic else max(abs(constant.parameters[effect.name]) / 2, abs(effect.typical) / 10)
+    least = 1e-3 * (1.0 if logarithmic else abs(effect.typical))
     departures = [s.parameter.name for s in varying(study.model, effect, spread).shifts]
     start = {**constant.parameters, **dict.fromkeys(departures, 0.0)}
     if logarithmic:
-        start[effect.name] = math.copysign(max(abs(start[effect.name]), effect.typical / 100), start[effect.name])
+        start[effect.name] = math.copysign(
+            max(abs(start[effect.name]), abs(effect.typical) / 100), start[effect.name]
+        )
     names = (*constant.names, *departures)
     b = _birge(study, constant)
     for _ in range(_ROUNDS):
