@@ -55,7 +55,7 @@ from calibration.attribution.wrong_numbers import (
 from calibration.statistics.budget import Budget, clock, limited, seconds_left, skipped
 from calibration.statistics.checks import predict_as_given
 from calibration.statistics.excluded import caveat_of_excluded
-from calibration.statistics.fit import Fit, UnsolvedError, fit, profile_end, profile_intervals
+from calibration.statistics.fit import Fit, UnsolvedError, birge, fit, profile_end, profile_intervals
 from calibration.statistics.offsets import Offsets, with_differences
 from calibration.statistics.residual_tests import directions, examine_residual
 from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values, with_runs
@@ -204,10 +204,11 @@ def _both_intervals(
     if found.final is not found.base:
         model = found.nearest.model if found.nearest else study.model
         final = _intervals(model, found.final, study.split.fitted, title)
-    for effect in found.best[0].claimed if found.best else ():
+    b = birge(study.model.runs, found.final, study.split.fitted)
+    for effect in (e for e in study.model.effects if e.name in final):
         low, high = final[effect.name]
         if low <= effect.start <= high:
-            end = profile_end(study.model, found.final, effect.name, study.split.fitted)
+            end = profile_end(found.final.model, found.final, effect.name, study.split.fitted, b)
             if end is not None:
                 final[effect.name] = (end, high) if end > effect.start else (low, end)
     if found.nearest:
