@@ -72,6 +72,7 @@ _DRAWS = 400  # of the bootstrap, for what the form leaves
 _LARGEST = 300.0  # half width, so that its exponential is a number
 _VAGUE = math.log(100.0)  # half width of the interval of a logarithm, which says nothing
 _ROUNDS, _SETTLED = 12, 0.03  # of the estimate of τ; its last relative change
+_WORTH = 0.1  # share of what is beyond noise that a form removes, or may by its score, to be fitted again
 _WIDEST = 100.0  # factor by which τ may grow in a round
 
 
@@ -286,6 +287,9 @@ def _converged(study: Study, base: Fit, candidate: Candidate) -> Fit:
     starts = [(as_given, typical), (base.parameters, typical)]
     starts += [] if effect.theory is None else [(base.parameters, effect.theory)]
     fits = [refit] if len(added) == 1 else [refit, fitted_from(*starts.pop(0))]
+    gain = max(candidate.z**2, base.deviance - refit.deviance)
+    if gain < _WORTH * (base.deviance - study.values):  # far from what a form must remove
+        starts = []
     while True:
         best = min(fits, key=lambda one: (not one.converged, one.deviance))
         if (best.converged and not Form(added, best, False).at_an_end) or not starts or spent():
