@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from calibration.laws.law_model import with_law
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.next_runs import Decision, read_explanations
@@ -43,4 +44,4 @@ def decide(
     else:
         explanations, before = read_explanations(verdict)
     model = SwimmerModel(one_robot(robot), read_measurements(table), jobs)
-    return decide_between(model, explanations, before)
+    return decide_between(model, explanations, before, with_law)

@@ -16,6 +16,8 @@ from collections.abc import Collection, Iterable
 from functools import cache
 from typing import Any, Literal, NamedTuple, get_args
 
+from common.errors import InputError
+
 
 class Unit(NamedTuple):
     """A unit: a value v in it is (v + zero) · times / over in SI units."""
@@ -221,3 +223,26 @@ def column_units(names: Iterable[object]) -> dict[str, str]:
         elif unit is not None:
             units[name] = unit.text
     return units
+
+
+class Sigma(NamedTuple):
+    """One standard deviation of a number: in its own unit, or as a share of it."""
+
+    size: float  # one standard deviation
+    relative: bool  # a share of the number
+
+    def of(self, value: float) -> float:
+        """Compute σ in the unit of `value`."""
+        return self.size * abs(value) if self.relative else self.size
+
+
+def parse_sigma(given: object, entry: str) -> Sigma:
+    """Read σ from a number, or a text like "10 %", whatever it belongs to; `entry` names its place."""
+    try:
+        if isinstance(given, str) and given.strip().endswith("%"):
+            return Sigma(float(given.strip()[:-1]) / 100, True)
+        if isinstance(given, int | float) and not isinstance(given, bool):
+            return Sigma(float(given), False)
+        raise ValueError
+    except (ValueError, OverflowError):
+        raise InputError(f'{entry} = {given!r}; give a number in its unit, or a text like "10 %"') from None

@@ -82,6 +82,14 @@ def test_statistics_and_networks_know_no_robot() -> None:
         assert not {name.split(".")[0] for name in imported(file)} & {"planner", "tracking"}, file
 
 
+def test_the_engine_of_a_verdict_knows_no_robot() -> None:
+    code = "import sys, calibration.verdict.calibrate; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=LIMIT)
+    loaded = {name.partition(".")[0] for name in done.stdout.split()}
+    assert "calibration" in loaded, done.stderr
+    assert not loaded & {"sim", "camera", "surrogate", "planner", "tracking", "softflagella"}
+
+
 LIBRARIES = {"jinja2", "joblib", "matplotlib", "numba", "numpy", "pandas", "pyarrow", "safetensors", "scipy",
              "svgelements", "torch", "tqdm"}  # fmt: skip
 SOLVERS = {"sim.linear", "sim.motion", "sim.solve"}

@@ -8,10 +8,10 @@ for a claim of strength Λ (standard deviations) leaves Λ √(1/a − 1). Less 
 *imitability index* of a claim, or of a pair, is the share of draws that it would not notice. The absorbable shares
 depend on the design alone, not on what was measured.
 
-Something outside the catalogue can look like an effect at some runs. It depends on N and l in another way, so that
-the size which fits short tails is wrong for long ones. In the *transfer test* the model with the claim is fitted
-again, by one linear step, to the runs with at most the median tail length and one of the `FEWEST` smallest numbers
-of tails. Then the other runs are judged as the held-out ones are.
+Something outside the catalogue can look like an effect at some runs. It depends on the settings in another way,
+so that the size which fits short tails, say, is wrong for long ones. In the *transfer test* the model with the
+claim is fitted again, by one linear step, to the runs at one end of the settings (`Runs.nearer`). Then the other
+runs are judged as the held-out ones are. Of several such sets the smallest p-value counts, times their number.
 
 Where the index is above `refits.IMITABLE`, or the p-value of the test below `refits.SURE`, the verdict says "or
 something outside the catalogue that looks like it".
@@ -34,11 +34,10 @@ from calibration.statistics.study import Study, held_out_p_value
 from common.arrays import Flags, Floats
 
 SEEN = 6.0  # standard deviations of a remainder that the tests notice nearly always
-FEWEST = 3  # numbers of tails that are fitted
 _DRAWS = 200
 _SPREAD = 0.5  # of ln of a signal
-_INPUTS = ("N", "ln l")
 _ENOUGH = 2  # values a parameter
+_MOST = 0.999  # p-value of the transfer test; 1 means that it was not made
 
 
 @dataclass(frozen=True)
@@ -126,21 +125,10 @@ def transfer_p(study: Study, fitted: Fit) -> float:
 
     It is 1 where runs are too few or too much alike.
     """
-    runs, used = study.model.runs, study.split.fitted
-    near = fitted_again(runs, used)
-    others = used & ~near
-    values = runs.values(near)
-    if not others.any() or values < _ENOUGH * len(fitted.names):
-        return 1.0
-    return held_out_p_value(fitted.refitted(runs, near, for_test=True), runs, others, seed=study.seed)
-
-
-def fitted_again(runs: Runs, used: Flags) -> Flags:
-    """Choose the runs (n,) with short tails and few of them; all of `used` where that is not an input."""
-    near = used.copy()
-    for name in _INPUTS:
-        if name in runs.input_names:
-            values = runs.inputs[:, runs.input_names.index(name)].round(9)
-            kinds = np.unique(values[used])
-            near &= values <= (kinds[min(FEWEST, len(kinds)) - 1] if name == "N" else np.median(kinds))
-    return np.asarray(near)
+    runs, used, p = study.model.runs, study.split.fitted, []
+    for near in runs.nearer(used):
+        others = used & ~near
+        if others.any() and runs.values(near) >= _ENOUGH * len(fitted.names):
+            refit = fitted.refitted(runs, near, for_test=True)
+            p.append(held_out_p_value(refit, runs, others, seed=study.seed))
+    return min(_MOST, len(p) * min(p)) if p else 1.0

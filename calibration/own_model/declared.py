@@ -12,8 +12,7 @@ from typing import Any, Literal, Self
 from calibration.statistics.checks import names_once
 from calibration.statistics.statistical_model import Parameter
 from common.errors import InputError
-from common.units import find_unit, from_si, split
-from sim.model.uncertainty import parse_sigma
+from common.units import find_unit, from_si, parse_sigma, split
 
 Function = Callable[[Mapping[str, Any], Mapping[str, float]], Mapping[str, Any]]  # columns, parameters -> outputs
 _WIDE = 1000.0  # factor to the ends of the range of a number for which none is given

@@ -38,6 +38,7 @@ _LARGEST = 100.0  # change of ln C, so that C stays a number
 _DIFFER = 0.001  # p-value below which repeats differ with sessions or notes
 FEWEST_REPEATS = 8  # runs, for a covariance from repeats alone
 _LEAST_OF_A_DESIGN = 1.5  # degrees of freedom, per output, that a design of repeats must leave
+_KINDS = 3  # values of an input of which some can predict the others
 _CUBIC = 0.2  # share of a cube that lower powers must leave
 
 
@@ -224,6 +225,21 @@ class Runs:
         mirrored, direction = self.mirrored
         odd = direction[rows, None] * np.column_stack([np.ones(len(self)), self.inputs])[rows]
         return np.column_stack([_levels(mirrored[rows]), _levels(self.session[rows]), odd])
+
+    @property
+    def subject(self) -> str:
+        """What the runs are of, in a word: "model", or "robot"."""
+        return "model"
+
+    def nearer(self, used: Flags) -> list[Flags]:
+        """List sets of runs (n,) among `used` at one end of the settings; a claim must carry over to the rest.
+
+        Of each input of three values or more, those up to the median.
+        """
+        columns = self.inputs.T.round(9)
+        kinds = [np.unique(column[used]) for column in columns]
+        several = [(c, float(np.median(k))) for c, k in zip(columns, kinds, strict=True) if len(k) >= _KINDS]
+        return [used & (column <= middle) for column, middle in several]
 
     @property
     def mirrored(self) -> tuple[Integers, Floats]:

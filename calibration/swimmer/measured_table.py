@@ -91,6 +91,16 @@ class Measurements(Runs):
     converted: tuple[str, ...]  # columns that were renamed, converted, or are tested as groupings, in words
 
     @property
+    def subject(self) -> str:
+        return "robot"
+
+    def nearer(self, used: Flags) -> list[Flags]:
+        """Choose the runs (n,) with short tails, up to the median, and few of them, the three smallest numbers."""
+        kinds, lengths = np.unique(self.tails[used]), self.length.round(9)
+        few = self.tails <= kinds[min(3, len(kinds)) - 1]
+        return [used & few & (lengths <= np.median(np.unique(lengths[used])))]
+
+    @property
     def noted_of_repeats(self) -> Floats:
         """Temperature and course, by which a current acts on the speed, as its share, and on the slip angle."""
         noted = dict(zip(self.noted_names, self.noted.T, strict=True))

@@ -27,7 +27,7 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from calibration.attribution.claim_checks import check_number, with_checks
 from calibration.attribution.forms import Form, envelope, forms_of_claims, paired_gain
@@ -78,16 +78,13 @@ from calibration.statistics.weights import (
     noise_of_any_run,
     rows_of_little_weight,
 )
-from calibration.verdict.findings import Attribution, LoopTurn
+from calibration.verdict.findings import Attribution, Description, LoopTurn
 from calibration.verdict.held_out import HeldOutErrors, Withdrawn, held_out_errors, refuted
 from calibration.verdict.next_runs import Explanation, next_runs
 from calibration.verdict.verdict import Verdict
 from common.arrays import Flags, Floats
 from common.errors import InputError
 from common.provenance import fingerprint
-
-if TYPE_CHECKING:
-    from calibration.laws.laws import Laws
 
 _SEARCH, _DESCRIBED = 0.6, 0.85  # shares of the time after which effects and descriptions are no longer looked for
 _MOST_TURNS = 4  # of the loop
@@ -98,7 +95,7 @@ def calibrate(
     model: Experiment,
     *,
     held_out: Flags | None = None,
-    describe: Callable[..., Laws | None] | None = None,
+    describe: Callable[..., Description | None] | None = None,
     level: float = LEVEL,
     seed: int = 0,
     draws: int = DRAWS,
@@ -386,7 +383,7 @@ def _next_runs(rivals: tuple[Rival, ...], seed: int) -> dict[str, Any]:
     return {"next_runs": (), "next_batch": None}
 
 
-def _errors(study: Study, found: Attribution, uncalibrated: Floats, laws: Laws | None) -> HeldOutErrors:
+def _errors(study: Study, found: Attribution, uncalibrated: Floats, laws: Description | None) -> HeldOutErrors:
     """State the errors of every model on the held-out runs."""
     base, final = found.base, found.final
     predictions = {"uncalibrated": uncalibrated, "before": base.prediction, "after": final.prediction}

@@ -10,7 +10,9 @@ seen (`calibration.attribution.nearest`). It is adopted as a description, and cl
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 from calibration.attribution.claim_checks import NumberCheck
 from calibration.attribution.forms import Form
@@ -18,7 +20,6 @@ from calibration.attribution.moves import StatedMove
 from calibration.attribution.nearest import AdoptedForm
 from calibration.attribution.refits import Candidate, Rival
 from calibration.attribution.wrong_numbers import wrong_number
-from calibration.laws.laws import Laws
 from calibration.statistics.between_repeats import Difference
 from calibration.statistics.excluded import Excluded, count_of_rows, summary_of_excluded
 from calibration.statistics.fit import Fit, Pull
@@ -27,9 +28,42 @@ from calibration.statistics.statistical_model import Experiment, Parameter, Runs
 from calibration.statistics.study import FinalRefit, Split
 from calibration.verdict.held_out import REJECTED, HeldOutErrors, Withdrawn
 from calibration.verdict.next_runs import Batch, Explanation, NextRun
+from common.arrays import Floats
 
 _HALF = 0.5  # of an error on left-out runs
 _LAWS_TOLD_APART = 3  # beside a claim; the more there are, the fewer runs tell all of them apart
+
+
+class Description(Protocol):
+    """What describes a residual that nothing explains, such as laws (`calibration.laws`)."""
+
+    @property
+    def kept(self) -> Sequence[Any]:
+        """Those that are kept, best first."""
+        ...
+
+    @property
+    def complete(self) -> bool:
+        """Whether the best one leaves no more than noise."""
+        ...
+
+    @property
+    def prediction(self) -> Floats:
+        """(n, k) of the best one."""
+        ...
+
+    @property
+    def rivals(self) -> tuple[Rival, ...]:
+        """Those that the runs cannot tell apart; none if there are not two."""
+        ...
+
+    def as_good_as(self, claim: Fit) -> tuple[Rival, ...]:
+        """List those that fit as well as a claimed effect."""
+        ...
+
+    def to_dict(self, claim: Fit | None = None) -> dict[str, Any]:
+        """Return the record for verdict.json."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -114,7 +148,7 @@ class Findings:
     final_intervals: dict[str, tuple[float, float]]  # the same, of the final model
     pulls: tuple[Pull, ...]  # of every nuisance parameter in the final model, the farthest first
     final_refit: FinalRefit  # the final model, fitted to all runs
-    law: Laws | None  # laws, where they were looked for
+    law: Description | None  # laws, where they were looked for
     explanations: tuple[Explanation, ...]  # that the runs cannot tell apart, best first; none if there are not two
     next_runs: tuple[NextRun, ...]  # single settings that would, the best first
     next_batch: Batch | None  # the same, for several runs together

@@ -25,24 +25,23 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import ndtr
 
 from calibration.attribution.refits import Rival
-from calibration.laws.law_model import with_law
 from calibration.statistics.forward import derivatives
 from calibration.statistics.gls import Noise
 from calibration.statistics.statistical_model import ForwardModel, Runs, start_values
-from calibration.swimmer.swimmer import SwimmerModel
 from common.arrays import Flags, Floats
 from common.errors import InputError
 from common.reading import expecting, read_json
 
+WithLaw = Callable[[Any, Mapping[str, Any]], ForwardModel]
 STOP = 25.0  # ratio of likelihoods at which an explanation is given up, 1/α of the sequence of batches
 GIVEN_UP = 2 * math.log(STOP)  # the same as a difference of deviances
 BATCH = 8  # runs
@@ -255,8 +254,10 @@ def new_runs(runs: Runs, before: set[str]) -> Flags:
     return new
 
 
-def standings(model: ForwardModel, explanations: Sequence[Explanation], new: Flags) -> list[Standing]:
-    """Judge explanations by the new runs in `new` (n,), best first.
+def standings(
+    model: ForwardModel, explanations: Sequence[Explanation], new: Flags, with_law: WithLaw | None = None
+) -> list[Standing]:
+    """Judge explanations by the new runs in `new` (n,), best first; `with_law` makes the model of a law.
 
     It takes up where `calibration.verdict.findings.Attribution.verdict` says "ambiguous", and where several laws
     describe what nothing explains.
@@ -266,7 +267,7 @@ def standings(model: ForwardModel, explanations: Sequence[Explanation], new: Fla
     """
     data, scores = model.runs, []
     for explanation in explanations:
-        subject = with_law(cast(SwimmerModel, model), explanation.law) if explanation.law else model
+        subject = with_law(model, explanation.law) if with_law and explanation.law else model
         known = start_values(subject)
         if explanation.outputs != data.outputs:
             raise InputError(
@@ -318,7 +319,12 @@ class Decision:
         return f"Not decided between {' and '.join(titles)}: make more runs."
 
 
-def decide(model: ForwardModel, explanations: Sequence[Explanation], before: set[str]) -> Decision:
+def decide(
+    model: ForwardModel,
+    explanations: Sequence[Explanation],
+    before: set[str],
+    with_law: WithLaw | None = None,
+) -> Decision:
     """Judge explanations by the runs of sessions that were not among those `before`, see `standings`."""
     new = new_runs(model.runs, before)
-    return Decision(tuple(standings(model, explanations, new)), int(new.sum()))
+    return Decision(tuple(standings(model, explanations, new, with_law)), int(new.sum()))

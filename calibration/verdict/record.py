@@ -22,7 +22,6 @@ from calibration.verdict.findings import Findings
 from calibration.words.quantities import difference_in_words
 from calibration.words.render import next_steps, sentence
 from common.provenance import provenance
-from surrogate.domain import COEFFICIENTS
 
 MODELS = ("uncalibrated", "before", "after", "law", "new_specimen")  # with stated errors
 _REPEATED = 5  # settings that are proposed for repeats where nothing explains the residual
@@ -91,7 +90,7 @@ def _fitted(result: Findings) -> dict[str, Any]:
             for name, interval in result.base_intervals.items()
         },
         "least_determined": _least_determined(final),
-        "subject": "robot" if set(COEFFICIENTS) <= set(result.base.names) else "model",
+        "subject": result.runs.subject,
     }
 
 

@@ -15,11 +15,11 @@ from typing import Any
 
 from common.errors import InputError
 from common.notebook import Shown
-from common.units import UNITS, format_length, from_si
+from common.units import UNITS, Sigma, format_length, from_si
 from sim.model.entries import ENTRIES
 from sim.model.groups import Groups, check_finite, check_positive, check_slenderness, check_tails
 from sim.model.learnt_range import LearntRange
-from sim.model.uncertainty import DEFAULTS, Sigma
+from sim.model.uncertainty import DEFAULTS
 
 
 def bending_stiffness(numbers: Mapping[str, Any]) -> Any:

@@ -15,11 +15,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from common.errors import InputError
-from common.units import UNITS, from_si, kinematic_words, of_kind, split, to_si
+from common.units import UNITS, Sigma, from_si, kinematic_words, of_kind, split, to_si
 from sim.model.entries import ENTRIES, Entry
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
-from sim.model.uncertainty import DEFAULTS, Sigma, read_sigma, sigma_text
+from sim.model.uncertainty import DEFAULTS, read_sigma, sigma_text
 
 _SIGMA = "_sigma"
 _LARGEST = 1e100  # of a number, whatever its unit

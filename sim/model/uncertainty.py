@@ -7,22 +7,9 @@ bending test, a viscometer, a caliper and a ruler. A number with σ = 0 is taken
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from common.errors import InputError
-from common.units import to_si
-
-
-class Sigma(NamedTuple):
-    """One standard deviation of a number: in its own unit, or as a share of it."""
-
-    size: float  # one standard deviation
-    relative: bool  # a share of the number
-
-    def of(self, value: float) -> float:
-        """Compute σ in the unit of `value`."""
-        return self.size * abs(value) if self.relative else self.size
-
+from common.units import Sigma, parse_sigma, to_si
 
 DEFAULTS = {
     "youngs_modulus": Sigma(0.10, True),
@@ -54,18 +41,6 @@ def read_sigma(given: object, value: float, entry: str, suffix: str = "") -> Sig
     if not (math.isfinite(sigma.size) and 0 <= sigma.of(value) <= _LARGEST * abs(value)):
         raise InputError(f"{entry} = {given!r}; a standard deviation lies from 0 to half of the number itself")
     return sigma
-
-
-def parse_sigma(given: object, entry: str) -> Sigma:
-    """Read σ from a number, or a text like "10 %", whatever it belongs to; `entry` names its place."""
-    try:
-        if isinstance(given, str) and given.strip().endswith("%"):
-            return Sigma(float(given.strip()[:-1]) / 100, True)
-        if isinstance(given, int | float) and not isinstance(given, bool):
-            return Sigma(float(given), False)
-        raise ValueError
-    except (ValueError, OverflowError):
-        raise InputError(f'{entry} = {given!r}; give a number in its unit, or a text like "10 %"') from None
 
 
 def sigma_text(sigma: Sigma) -> str:

@@ -18,9 +18,9 @@ from matplotlib.figure import Figure
 
 import softflagella as sf
 from common.errors import InputError
+from common.units import Sigma
 from dataset.build import build
 from dataset.data_set import read
-from sim.model.uncertainty import Sigma
 from tests.dataset.sweeps import design
 from tests.planner.plans import CONTROL
 from tests.shared import shared

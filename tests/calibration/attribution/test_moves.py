@@ -27,8 +27,9 @@ from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.record import facts, verdict_record
 from calibration.words.render import next_steps
 from common.arrays import Floats
+from common.units import Sigma
 from sim.inputs import load_robot
-from sim.model.uncertainty import DEFAULTS, Sigma
+from sim.model.uncertainty import DEFAULTS
 from softflagella.closed_loop import calibrate
 from tests.calibration.own_model.test_faults import DIAMETER, ROUND, TABLE, hand_made
 from tests.calibration.toy_tables import (

@@ -15,7 +15,6 @@ from calibration.attribution import wrong_numbers
 from calibration.attribution.claim_checks import (
     SEEN,
     absorbable_shares,
-    fitted_again,
     imitability,
     transfer_p,
 )
@@ -34,7 +33,7 @@ from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record
 from common.arrays import Flags, Floats
 from common.errors import InputError
-from sim.model.uncertainty import Sigma
+from common.units import Sigma
 from tests.calibration.toy_tables import (
     DRAG,
     FEW_DRAWS,
@@ -83,7 +82,8 @@ def test_a_strong_claim_is_hard_to_imitate_and_a_weak_one_is_not() -> None:
 
 
 def test_an_effect_carries_over_from_short_tails_and_few_and_a_mimic_does_not() -> None:
-    runs, near = PLAIN.runs, fitted_again(PLAIN.runs, EVERY)
+    runs = PLAIN.runs
+    (near,) = runs.nearer(EVERY)
     assert set(np.unique(runs.tails[near])) == {2, 3, 4}
     assert set(np.unique(runs.length[near].round(3))) == {0.05, 0.08}
     assert near.sum() == len(near) // 2

@@ -21,9 +21,9 @@ from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import errors
 from calibration.swimmer.measured_table import read_measurements
 from common.arrays import Floats
+from common.units import Sigma
 from sim.effects import effect_named
 from sim.inputs import group_columns
-from sim.model.uncertainty import Sigma
 from tests.calibration import toy
 from tests.calibration.toy_tables import (
     FEW_PLACES,

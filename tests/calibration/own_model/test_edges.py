@@ -14,9 +14,13 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import softflagella as sf
-from calibration.statistics.study import far_readings
+from calibration.attribution.claim_checks import transfer_p
+from calibration.attribution.refits import SURE
+from calibration.statistics.fit import fit
+from calibration.statistics.study import Study, far_readings
 from calibration.verdict.record import facts
 from calibration.words.render import next_steps
+from tests.calibration.own_model.test_faults import hand_made
 from tests.calibration.statistics.test_fit import runs_of
 from tests.shared import shared
 
@@ -192,3 +196,14 @@ def test_noise_alone_points_at_no_reading() -> None:
             residual = rng.normal(size=(count, 1))
             said += bool(far_readings(runs_of(residual, np.zeros(count, dtype=np.int64)), residual))
     assert said <= 6
+
+
+def test_a_claim_of_a_model_of_ones_own_must_carry_over_to_the_other_half_of_its_settings() -> None:
+    model = hand_made()
+    every = np.ones(len(model.runs.y), dtype=bool)
+    (near,) = model.runs.nearer(every)
+    assert model.runs.inputs[near].max() < model.runs.inputs[~near].min()
+    for far, carries in ((0.0, True), (0.3, False)):
+        changed = hand_made(y=model.runs.y + far * ~near[:, None])
+        claim = fit(changed, {"v1": 100.0, "wall": 0.5}, ("v1", "wall"), every, title="")
+        assert (transfer_p(Study.fitted_to(changed, every, seed=1), claim) >= SURE) == carries

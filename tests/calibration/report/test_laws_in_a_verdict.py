@@ -215,7 +215,7 @@ def test_new_runs_decide_between_two_laws() -> None:
     new = toy_swimmer(toy_table(9, lengths_cm=FOUR, **HIDDEN["Mz_wh"]))
     records = [json.loads(json.dumps(Explanation.from_rival(rival).record())) for rival in rivals]
     explanations = [Explanation.read(record) for record in records]
-    standing = standings(new, explanations, np.ones(len(new.runs), dtype=bool))
+    standing = standings(new, explanations, np.ones(len(new.runs), dtype=bool), with_law)
     assert standing[0].title == "Mz_wh"
     assert standing[1].behind > 0
 

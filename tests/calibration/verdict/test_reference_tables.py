@@ -20,8 +20,9 @@ from calibration.verdict.calibrate import calibrate
 from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
 from common.errors import run_command
+from common.units import Sigma
 from sim.inputs import load_robot
-from sim.model.uncertainty import DEFAULTS, Sigma
+from sim.model.uncertainty import DEFAULTS
 from softflagella.__main__ import main
 from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, FEW_DRAWS, START, install_few_candidates
 from tests.oracles.falling_balls import spheres

@@ -16,6 +16,7 @@ import softflagella as sf
 from common.errors import InputError
 from common.provenance import code_version
 from common.reading import sealed
+from common.units import Sigma
 from planner.files.headers import schedule_template
 from planner.files.plan_files import write_plan
 from planner.files.saved_plan import load_plan, restore_plan
@@ -28,7 +29,6 @@ from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml
 from sim.model.schedule import plan_id
-from sim.model.uncertainty import Sigma
 from tests.planner.page.cases import CONTROL, PATHS, followed, shipped
 from tests.planner.page.page_core import (
     TABLE,

@@ -14,12 +14,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from common.errors import InputError, InputWarning
+from common.units import Sigma
 from sim.inputs import load_robot, save_robot
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import ENTRIES, doubtful, read_robot, robot_toml
-from sim.model.uncertainty import DEFAULTS, Sigma
+from sim.model.uncertainty import DEFAULTS
 
 CONTROL, MEASURED = PRESETS["paper-control"], PRESETS["paper-measured"]
 LAB = """\
