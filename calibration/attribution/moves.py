@@ -165,15 +165,18 @@ def _is_real(runs: Runs, used: Flags, move: LocalShift, base: Fit, fitted: Fit) 
     """
     certain = abs(move.z) >= CERTAIN * math.sqrt(birge(runs, fitted, used))
     gains = base.deviance - fitted.deviance >= INDISTINGUISHABLE
-    return fitted.converged and certain and gains and _credible(move.shift.of, fitted.parameters[move.name])
+    return fitted.converged and certain and gains and _credible(move, fitted)
 
 
-def _credible(number: Parameter, change: float) -> bool:
-    """Tell whether a number may differ by so much."""
+def _credible(move: LocalShift, fitted: Fit) -> bool:
+    """Tell whether a number may differ by so much; half a turn may be a little more by its error."""
+    number, change = move.shift.of, fitted.parameters[move.name]
     if number.sigma is None:
         return True
-    low, high = number.plausible or (-CREDIBLE * number.sigma, CREDIBLE * number.sigma)
-    return low <= change <= high
+    if number.plausible:
+        low, high = fitted.interval(move.name)
+        return low <= number.plausible[1] and high >= number.plausible[0]
+    return abs(change) <= CREDIBLE * number.sigma
 
 
 def _tolerances(move: LocalShift, fitted: Fit) -> float:
