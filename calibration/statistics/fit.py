@@ -297,7 +297,8 @@ def fit(
     with limited_as_one():
         point, share = _descend(problem, problem.first(dict(start)), target)
         stopped = spent()
-    ahead = bounded_step(fitted, point.parameters, problem.normal(point, share))
+    at_end = problem.normal(point, share)
+    ahead = bounded_step(fitted, point.parameters, at_end)
     free = np.where(ahead.held, 0.0, point.derivative)
     residual = (data.y - point.prediction)[used]
     products = regression(data, used, free, fitted).products(
@@ -322,7 +323,7 @@ def fit(
         jacobian=point.derivative,
         noise=Noise(run, linear.share),
         deviance=float(normal[-1, -1] + products.determinant(linear.share)),
-        converged=ahead.promise < _UNSETTLED * problem.noise_level(problem.normal(point, share)),
+        converged=ahead.promise < _UNSETTLED * problem.noise_level(at_end),
         held=ahead.held,
         full_normal=point.products.for_fit(linear.share)[0],
         wrong_numbers=wrong_numbers,
@@ -436,8 +437,7 @@ class _Problem:
         if not np.isfinite(curvature).all():
             return step
         normal = self.weighted(self.products(point.derivative, -curvature[self.used] / 2), share)
-        normal[:-1, :-1] += np.diag(_DAMPING[step.damping] / typical_sizes(self.fitted) ** 2)
-        further = bounded_step(self.fitted, step.parameters, normal).change
+        further = bounded_step(self.fitted, step.parameters, _damped(self.fitted, normal, step.damping)).change
         turn, length = (np.linalg.norm(c / typical_sizes(self.fitted)) for c in (further, step.change))
         if turn > _MOST_BENT * length:
             return step
@@ -505,14 +505,21 @@ def _descend(problem: _Problem, point: _Point, target: float) -> tuple[_Point, F
 
 def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, least: int) -> _FitStep:
     """Compute a step from `parameters`, with a λ at the place `least` of _DAMPING or behind it."""
-    damped, scale = normal.copy(), typical_sizes(fitted) ** -2
     for place in range(least, len(_DAMPING)):
-        np.fill_diagonal(damped, np.diag(normal) + np.append(_DAMPING[place] * scale, 0.0))
-        change = bounded_step(fitted, parameters, damped).change
+        change = bounded_step(fitted, parameters, _damped(fitted, normal, place)).change
         if all(abs(c) <= _LARGEST for c, p in zip(change, fitted, strict=True) if p.logarithmic):
             break
-    promise = 2 * change @ normal[:-1, -1] - change @ normal[:-1, :-1] @ change
-    return _FitStep(change, apply_step(fitted, parameters, change), float(promise), place)
+    return _FitStep(change, apply_step(fitted, parameters, change), _promise(change, normal), place)
+
+
+def _damped(fitted: Sequence[Parameter], normal: Floats, place: int) -> Floats:
+    """Add the λ at a place of _DAMPING to normal equations (p + 1, p + 1)."""
+    return normal + np.diag(np.append(_DAMPING[place] / typical_sizes(fitted) ** 2, 0.0))
+
+
+def _promise(change: Floats, normal: Floats) -> float:
+    """Compute by how much a change (p,) reduces rᵀ Σ⁻¹ r if the model is linear."""
+    return float(2 * change @ normal[:-1, -1] - change @ normal[:-1, :-1] @ change)
 
 
 class BoundedStep(NamedTuple):
@@ -536,9 +543,8 @@ def bounded_step(fitted: Sequence[Parameter], parameters: Parameters, normal: Fl
     low, high = room(fitted, parameters)
     solved = lsq_linear(root, right, (low * scale, high * scale), method="bvls")
     change = solved.x / scale
-    promise = 2 * change @ normal[:-1, -1] - change @ normal[:-1, :-1] @ change
     on_bound = np.minimum(-low, high) < _ON_BOUND * typical_sizes(fitted)
-    return BoundedStep(change, float(promise), on_bound & (solved.active_mask != 0))
+    return BoundedStep(change, _promise(change, normal), on_bound & (solved.active_mask != 0))
 
 
 def room(fitted: Sequence[Parameter], parameters: Parameters) -> tuple[Floats, Floats]:
