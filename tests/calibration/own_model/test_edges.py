@@ -207,3 +207,29 @@ def test_a_claim_of_a_model_of_ones_own_must_carry_over_to_the_other_half_of_its
         changed = hand_made(y=model.runs.y + far * ~near[:, None])
         claim = fit(changed, {"v1": 100.0, "wall": 0.5}, ("v1", "wall"), every, title="")
         assert (transfer_p(Study.fitted_to(changed, every, seed=1), claim) >= SURE) == carries
+
+
+def test_conditions_that_alone_determine_a_size_refute_no_claim() -> None:
+    """Without the first minutes, which are held out as an end of the settings, the mug may be any."""
+    table = cooled(seed=0, T0=82.31, k=0.01698, room=22.41, mug=6.46, drift=3.44)
+    verdict = sf.calibrate(table, mug(0.1), progress=False)
+    assert set(verdict.effects) == {"mug", "drift"}
+    assert not verdict.withdrawn
+
+
+@pytest.mark.parametrize(
+    ("sigma", "seed", "truth"),
+    [
+        (0.1, 4, {"T0": 92.16, "k": 0.0093, "room": 20.18, "hot": 2.40, "drift": 2.07}),
+        (None, 1, {"T0": 95.92, "k": 0.02168, "room": 24.64, "hot": 2.58, "drift": -2.55}),
+    ],
+    ids=["a valley that a linear step leaves", "a valley of an earlier turn"],
+)
+def test_what_is_handed_on_is_fitted_to_all_runs(sigma: float | None, seed: int, truth: dict[str, float]) -> None:
+    table = cooled(seed=seed, **truth)
+    corrected = sf.calibrate(table, mug(sigma), progress=False).corrected
+    left = (
+        water(table, {"hot": 0.0, "mug": 0.0, "drift": 0.0, **corrected})["temperature_C"] - table["temperature_C"]
+    )
+    assert set(corrected) >= {"hot", "drift"}
+    assert np.sqrt(np.mean(left**2)) < 0.11  # of noise 0.1
