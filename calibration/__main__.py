@@ -15,7 +15,7 @@ main = program.main
 @program.command("decide", of="calibration.api:decide", robot="--robot")
 def _decide(decide: Call, table: str) -> None:
     refuse_missing(table)
-    from calibration.verdict.next_runs import GIVEN_UP
+    from calibration.findings.next_runs import GIVEN_UP
 
     decision = decide(table=table)
     print(f"{decision.new_runs} new runs. An explanation that is behind by more than {GIVEN_UP:.1f} is given up.")

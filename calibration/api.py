@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pandas as pd
 
+from calibration.findings.next_runs import Decision, read_explanations
+from calibration.findings.next_runs import decide as decide_between
 from calibration.laws.law_model import with_law
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
-from calibration.verdict.next_runs import Decision, read_explanations
-from calibration.verdict.next_runs import decide as decide_between
 from calibration.verdict.verdict import Verdict
 from common.keywords import checks_keywords
 from sim.robot_rows import OneRobot, one_robot

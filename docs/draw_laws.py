@@ -17,6 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from calibration.laws.group_factors import group_factors
+from calibration.laws.law_model import law_model
 from calibration.laws.laws import Laws
 from calibration.report.figures import draw_factors, draw_place
 from calibration.swimmer.synthetic_table import make_table
@@ -34,8 +35,9 @@ def main(path: str = "docs/tutorial/laws.png") -> None:
     laws = verdict.law
     assert isinstance(laws, Laws)
     best = laws.kept[0]
-    inputs = group_factors(best.model, best.fit, verdict.split.fitted)
-    parts = [_pixels(draw_place(best.model.robot, best.place)), _pixels(draw_factors(inputs))]
+    model = law_model(best)
+    inputs = group_factors(model, best.fitted, verdict.split.fitted)
+    parts = [_pixels(draw_place(model.robot, model.place)), _pixels(draw_factors(inputs))]
     width = max(part.shape[1] for part in parts)
     image.imsave(Path(path), np.concatenate([_wide(part, width) for part in parts]))
 

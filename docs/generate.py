@@ -1,4 +1,4 @@
-"""Generate pages from the code: the table of effects, columns of a data set, fields of objects, the commands."""
+"""Generate pages from the code: effects, columns, fields of objects, commands, terms, rules of a verdict."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import softflagella
+from calibration.attribution.hypothesis import Origin
+from calibration.attribution.rules import RULES, Stage
+from calibration.laws.laws import LAW_RULES
 from common.glossary import TERMS
 from dataset.schema import FLAGS, INPUTS, OUTPUTS
 from sim.effects import catalogue
@@ -24,7 +27,7 @@ from softflagella.shadowing import PACKAGES
 def write_generated_pages(folder: Path) -> None:
     """Write what pages of the same names include into `folder`, where it has changed."""
     folder.mkdir(parents=True, exist_ok=True)
-    for make in (effects_page, columns_page, objects_page, commands_page, glossary_page):
+    for make in (effects_page, columns_page, objects_page, commands_page, glossary_page, rules_page):
         page, text = folder / f"{make.__name__.removesuffix('_page')}.md", "\n\n".join(filter(None, make())) + "\n"
         if not page.exists() or page.read_text() != text:
             page.write_text(text)
@@ -64,6 +67,19 @@ def columns_page() -> Iterator[str]:
     for title, columns in (("Inputs", INPUTS), ("Outputs", OUTPUTS), ("Flags", FLAGS)):
         rows = [(f"`{c.name}`", str(c.type), c.unit, c.meaning) for c in columns]
         yield f"## {title}\n\n{table(('column', 'type', 'unit', 'meaning'), rows)}"
+
+
+def rules_page() -> Iterator[str]:
+    """Tabulate the rules by which hypotheses are judged, in order, with the origins to which each applies."""
+    for stage in Stage:
+        rules = [rule for rule in (*RULES, *LAW_RULES) if rule.stage is stage]
+        origins = [origin for origin in Origin if any(origin in rule.origins for rule in rules)]
+        rows = [(rule.reason, rule.text, *(_mark(origin in rule.origins) for origin in origins)) for rule in rules]
+        yield f"## {stage.capitalize()}\n\n{table(('reason', 'if', *origins), rows)}"
+
+
+def _mark(applies: bool) -> str:
+    return "×" if applies else ""
 
 
 def objects_page() -> Iterator[str]:

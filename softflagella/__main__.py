@@ -86,7 +86,7 @@ def _calibrate(
     if no_path and paths:
         raise InputError("--path and --no-path exclude each other")
     refuse_missing(*filter(None, (table, model)))
-    from calibration.report.saved_verdict import FILES  # loads SciPy
+    from calibration.verdict.verdict import FILES  # loads SciPy
     from common.files import refuse_kept, refuse_unwritable
 
     refuse_unwritable(out)

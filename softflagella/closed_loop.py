@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Literal
@@ -12,10 +13,10 @@ import pandas as pd
 
 from calibration.laws.laws import find_laws
 from calibration.own_model.declared import Model
+from calibration.own_model.model_verdict import ModelVerdict
 from calibration.own_model.table_of_runs import Noise, Roles, read_runs_of
-from calibration.report.corrected_robot import check_given
-from calibration.report.model_verdict import ModelVerdict
-from calibration.report.robot_verdict import RobotVerdict, read_runs
+from calibration.robot.corrected_robot import check_given
+from calibration.robot.robot_verdict import RobotVerdict, read_runs
 from calibration.statistics.budget import limited
 from calibration.statistics.statistical_model import lines_of_excluded
 from calibration.swimmer.possible_runs import Owned, owned, read_owned
@@ -115,11 +116,11 @@ def calibrate(
             experiment, rows = read_runs_of(table, robot, roles, own=given, title="checks" if progress else "")
             for line in (*experiment.runs.converted, *lines_of_excluded(experiment.runs)):
                 tell(line)
+            of_model = partial(ModelVerdict, model=robot, table=_name(table))
             verdict = find_what_is_missing(
-                experiment, held_out=rows, seed=seed, max_seconds=limit, progress=progress
+                experiment, held_out=rows, seed=seed, max_seconds=limit, progress=progress, verdict=of_model
             )
-        verdict = replace(verdict, caveats=(*verdict.caveats, *experiment.caveats))
-        return ModelVerdict(**vars(verdict), model=robot, table=_name(table))
+        return replace(verdict, caveats=(*verdict.caveats, *experiment.caveats))
     _refuse("a robot", **roles._asdict())
     robot = one_robot(robot)
     check_given(robot)
@@ -128,15 +129,15 @@ def calibrate(
     settings = own if isinstance(own, Mapping) else owned(own or ())
     data, rows = read_runs(table, protocol, tell)
     model = SwimmerModel(robot, data, jobs, own=settings)
-    verdict = find_what_is_missing(
+    result = find_what_is_missing(
         model,
         held_out=rows,
         describe=find_laws if laws else None,
         seed=seed,
         max_seconds=limit,
         progress=progress,
+        verdict=partial(RobotVerdict, robot=robot, table=_name(table)),
     )
-    result = RobotVerdict(**vars(verdict), robot=robot, table=_name(table))
     return replace(result, paths=path_errors(wanted, robot, result.corrected, result.knowledge))
 
 

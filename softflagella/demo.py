@@ -11,7 +11,6 @@ training and calibration) run side by side, one process for each core.
 
 from __future__ import annotations
 
-import json
 import os
 import shlex
 import shutil
@@ -23,17 +22,17 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from tqdm import tqdm
 
-from calibration.report.corrected_robot import as_toml, corrected_robot, handed_on
-from calibration.report.report import write_report
+from calibration.robot.corrected_robot import corrected_robot
+from calibration.robot.robot_verdict import RobotVerdict
 from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
 from common.files import whole_file, write_csv, write_text
 from dataset.data_set import read
@@ -203,7 +202,7 @@ def steer(models: Mapping[str, Robot], truth: Robot, path: Path2D) -> dict[str, 
     return runs
 
 
-def _calibrate(folder: Path, name: str) -> tuple[Verdict, Measurements]:
+def _calibrate(folder: Path, name: str) -> tuple[RobotVerdict, Measurements]:
     start = PRESETS["paper-measured"]
     effects = HIDDEN_EFFECT if name == "hidden effect" else {}
     truth = replace(start, **HIDDEN, effects=effects)  # type: ignore[arg-type]
@@ -213,10 +212,8 @@ def _calibrate(folder: Path, name: str) -> tuple[Verdict, Measurements]:
     case.mkdir(exist_ok=True)
     write_csv(table, case / "table.csv", digits=6)
     data = read_measurements(case / "table.csv")
-    verdict = calibrate(SwimmerModel(start, data))
-    record = verdict_record(verdict, table="table.csv")
-    write_text(case / "verdict.json", json.dumps(record, indent=1) + "\n")
-    write_report(verdict, record | {"table": f"table with {name}"}, case / "report.html")
-    write_text(case / "corrected.toml", as_toml(*handed_on(start, verdict.final_refit)))
+    of_robot = partial(RobotVerdict, robot=start, table=f"table with {name}")
+    verdict = calibrate(SwimmerModel(start, data), verdict=of_robot)
+    verdict.save(case)
     print(f"  {name}: {verdict.sentence}")
     return verdict, data

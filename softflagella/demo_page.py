@@ -82,7 +82,7 @@ class Results:
     plans: dict[str, Swum]  # by the name of the path
     rows: pd.DataFrame  # of the sweep
     small: NeuralTable  # trained on them
-    loops: dict[str, tuple[Verdict, Measurements]]  # calibrations by name; the folder's name has dashes
+    loops: Mapping[str, tuple[Verdict, Measurements]]  # calibrations by name; the folder's name has dashes
     steered: dict[str, Swum]  # by the name of the model
     seconds: float
 

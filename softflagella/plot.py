@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from calibration.report.saved_verdict import SavedVerdict
+    from calibration.verdict.verdict import Verdict
     from planner.planning.plan import Plan
     from sim.model.robot import Robot
 
@@ -83,6 +83,6 @@ def sweep(
 
 
 @checks_types
-def verdict(result: SavedVerdict, *, ax: Axes | None = None) -> Axes:
+def verdict(result: Verdict, *, ax: Axes | None = None) -> Axes:
     """Draw the residual of each output of a verdict, before and after, over the noise of a run."""
     return result.plot(given_axes(ax))

@@ -14,7 +14,6 @@ import pandas as pd
 import pytest
 
 from calibration.statistics.statistical_model import start_values
-from calibration.verdict.record import verdict_record
 from camera.view import read_setup
 from common.errors import InputError, run_command
 from common.units import format_time
@@ -316,7 +315,7 @@ def calibration_tracks(made: Path, out: Path) -> str:
 
 
 def calibration_decide(made: Path, out: Path) -> str:
-    (out / "verdict.json").write_text(json.dumps(verdict_record(ambiguous(), table="t.csv")))
+    (out / "verdict.json").write_text(json.dumps(ambiguous().to_dict()))
     before = toy_table(1, lengths_cm=(8.0,), **{DRAG: 4.0})
     new = toy_table(2, lengths_cm=(5.0, 11.0), **{DRAG: 4.0}).assign(session="new")
     pd.concat([before, new.head(10)]).to_csv(out / "more.csv", index=False)

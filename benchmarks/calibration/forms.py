@@ -18,6 +18,7 @@ import numpy as np
 from benchmarks.common import heading, in_parallel, per_cent, row
 from calibration.statistics.residual_tests import directions, examine_residual
 from calibration.verdict.calibrate import calibrate, first_fit
+from calibration.verdict.verdict import Verdict
 from tests.oracles.drawn_falls import EFFECTS, falls, model_of
 
 NAMES = tuple(effect.name for effect in EFFECTS)
@@ -75,13 +76,13 @@ def said(case: FormsCase, seed: int) -> Said:
     planted: dict[str, Any] = {truth: size}
     table = falls(seed, rounds=case.rounds, scatter=case.scatter, **planted)
     catalogue = [name for name in NAMES if case.in_catalogue or name != truth]
-    verdict = calibrate(model_of(table, catalogue), draws=300, seed=seed, progress=False)
+    verdict: Verdict = calibrate(model_of(table, catalogue), draws=300, seed=seed, progress=False)
     named = {*verdict.effects, *([verdict.nearest.effect.name] if verdict.nearest else [])}
     alone, joined = verdict.final.interval("viscosity"), verdict.final_intervals["viscosity"]
     gain = verdict.errors.gain_interval
     return Said(
         case.label, bool(named), truth in named, alone[0] < 1.0 < alone[1], joined[0] < 1.0 < joined[1],
-        joined[1] / joined[0] - 1, any(truth in claim.effects for claim in verdict.withdrawn),
+        joined[1] / joined[0] - 1, any(e.name == truth for claim in verdict.withdrawn for e in claim.added),
         bool(named - {truth}) and truth not in named and gain is not None and gain[1] < 0,
     )  # fmt: skip
 

@@ -157,8 +157,8 @@ def _seen(robot: Robot, hardware: Hardware) -> np.ndarray:
 
 def answer(verdict: Verdict, case: HardwareCase) -> str:
     """Say whether a verdict names what is off."""
-    claims = (*verdict.explaining, *verdict.found.rival_effects)
-    names = [e.name for c in claims for e in c.claimed] + [move.words for move in verdict.moves]
+    claims = (*verdict.claims, *verdict.found.rival_effects)
+    names = [e.name for c in claims for e in c.added] + [move.effect.title for move in verdict.moves]
     claimed = bool(names) or bool(verdict.wrong_numbers)
     names += [verdict.nearest.effect.name] if verdict.nearest else []  # a description, and no claim
     if any(word in name for word in case.named for name in names) or not (case.named or claimed):
@@ -166,8 +166,8 @@ def answer(verdict: Verdict, case: HardwareCase) -> str:
     if not claimed:
         return "silent"
     in_form = set(verdict.in_form_only)  # "something in form like"
-    sure = [c for c in verdict.explaining if not (c.uncertain or in_form & {e.name for e in c.claimed})]
-    return "wrong" if len(sure) == len(verdict.explaining) == 1 or not claims else "warned"
+    sure = [c for c in verdict.claims if not (c.doubts or in_form & {e.name for e in c.added})]
+    return "wrong" if len(sure) == len(verdict.claims) == 1 or not claims else "warned"
 
 
 def calibrated(case: HardwareCase, place: int, seed: int) -> dict[str, Any]:

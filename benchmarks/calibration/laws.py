@@ -26,7 +26,8 @@ import numpy as np
 from benchmarks.calibration.foreign_laws import DESIGN, foreign
 from benchmarks.calibration.law_truths import Design, Truth, hidden_law
 from benchmarks.common import Records, heading, per_cent, row
-from calibration.laws.laws import Laws, find_laws
+from calibration.laws.law_model import law_model
+from calibration.laws.laws import Laws, elsewhere, find_laws
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.study import errors
 from calibration.swimmer.measured_table import read_measurements
@@ -45,18 +46,20 @@ def record_of(truth: Truth, seed: int) -> dict[str, Any]:
     found: Laws | None = find_laws(study, base) if missing else None
     laws = found.kept if found else ()
     before, noise = errors(model.runs, base.prediction, study.split.test)[0], base.noise.rms
+    after = errors(model.runs, found.prediction, study.split.test)[0] if found and laws else float("nan")
     hidden = truth.kind == "hidden"  # a side force whose lever is not told from none is at the disc and elsewhere
-    law = next((one for one in laws if one.place.name in truth.places), None)
-    intervals = {n: law.fit.interval(n) for n in truth.exponents if n in law.fit.names} if law else {}
+    law = next((one for one in laws if law_model(one).place.name in truth.places), None)
+    others = found.fitted if found and hidden else ()
+    intervals = {n: law.fitted.interval(n) for n in truth.exponents if n in law.fitted.names} if law else {}
     return {
         "kind": truth.kind,
         "score": truth.score,
         "true": truth.places,
         "described": bool(found and found.complete),
-        "named": [one.place.name for law in laws for one in (law, *(law.elsewhere if hidden else ()))],
-        "kept": [law.place.name for law in laws],
+        "named": [law_model(one).place.name for law in laws for one in (law, *elsewhere(law, others))],
+        "kept": [law_model(law).place.name for law in laws],
         "before": before / noise,
-        "after": laws[0].error / noise if laws else float("nan"),
+        "after": after / noise,
         "numbers": len(intervals),
         "covered": sum(low <= truth.exponents[n] <= high for n, (low, high) in intervals.items()),
     }

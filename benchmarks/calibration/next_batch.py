@@ -54,7 +54,7 @@ def close(all_runs: LinearSwimmer, signal: Floats, seed: int, *parts: Integers) 
 
 
 def outcome(verdict: Verdict, truth: str) -> str:
-    sets = [{e.name for e in c.claimed} for c in verdict.explaining]
+    sets = [{e.name for e in c.added} for c in verdict.claims]
     if not sets:
         return verdict.verdict
     if {truth} not in sets:
@@ -69,7 +69,7 @@ def decided(model: LinearSwimmer, count: int, effect: int, size: float, seed: in
     if first.verdict != "ambiguous" or outcome(first, truth) == "wrong" or first.next_batch is None:
         return None
     batch = np.array([s["run"] for s in first.next_batch.settings]) + count
-    said = " or ".join("+".join(e.name for e in c.claimed) for c in first.explaining)
+    said = " or ".join("+".join(e.name for e in c.added) for c in first.claims)
     return f"{truth}: {said}", outcome(close(model, signal, seed, made, batch), truth)
 
 

@@ -23,7 +23,6 @@ from scipy.optimize import minimize_scalar
 import softflagella as sf
 from benchmarks.common import heading, row
 from calibration.own_model.model_file import load_model
-from calibration.verdict.record import facts
 from tests.oracles.others import MODELS, SETS, calibrated, named
 
 _ERRORS = ("error_before", "error_after")
@@ -59,7 +58,7 @@ def compare_laws() -> None:
     model, rows = load_model(MODELS / "tube.py", MODELS / "data/tube-2019.csv")
     for title, laws in (("Faxén, Oseen", model.function), ("Ladenburg, Schiller and Naumann", by_fits)):
         viscosity, rms = of_theory(laws, rows)
-        record = facts(sf.calibrate(rows, replace(model, function=laws), session="repeat", progress=False))
+        record = sf.calibrate(rows, replace(model, function=laws), session="repeat", progress=False).facts
         print(f"{title}: both at theory {viscosity:.4f} Pa s, {100 * rms:.1f} %; named {named(record)}")
 
 
@@ -77,7 +76,7 @@ def main(picture: str = "", ship: str = "") -> None:
     print(heading("set", "withheld", "named", "sessions, %", "conditions, %", "noise, %", "number", "known"))
     drawn = {}
     for name, verdict in verdicts.items():
-        record, measured = facts(verdict), SETS[name]
+        record, measured = verdict.facts, SETS[name]
         of_conditions = record["errors_of_conditions"]
         errors = (*(record[e] for e in _ERRORS), of_conditions["before"], of_conditions["after"])
         noise = record["noise_ceiling"] if verdict.runs.noise_known else np.nan

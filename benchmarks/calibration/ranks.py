@@ -19,8 +19,9 @@ from scipy.stats import binom, kstest
 
 from benchmarks.calibration.forms import NAMES, PLANTED, FormsCase, length
 from benchmarks.common import heading, in_parallel, per_cent, row
+from calibration.findings.samples import draw_samples, open_forms
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.samples import draw_samples, open_forms
+from calibration.verdict.verdict import Verdict
 from common.arrays import Floats
 from tests.oracles.drawn_falls import falls, model_of
 
@@ -44,7 +45,7 @@ def ranks(planted: bool, seed: int) -> list[TrueRank]:
     size = float(random.uniform(*_CASE.strength)) / length(truth, _CASE) if planted else 0.0
     effects: dict[str, Any] = {truth: size}
     table = falls(seed, rounds=_CASE.rounds, scatter=_CASE.scatter, **effects)
-    verdict = calibrate(model_of(table, NAMES), draws=300, seed=seed, progress=False)
+    verdict: Verdict = calibrate(model_of(table, NAMES), draws=300, seed=seed, progress=False)
     samples = draw_samples(open_forms(verdict), _SAMPLES, seed)
     said = [TrueRank(_EFFECT if planted else _NOTHING, float((samples["viscosity"] < 1.0).mean()))]
     if planted and truth in samples:

@@ -84,16 +84,16 @@ class Result(NamedTuple):
 
 def answers(verdict: Verdict, case: RateCase) -> dict[str, bool]:
     """Answer every question that can be asked of a verdict."""
-    sets = [{e.name for e in c.claimed} for c in verdict.explaining]
-    beside = [{e.name for e in c.claimed} for c in verdict.found.rival_effects]
+    sets = [{e.name for e in c.added} for c in verdict.claims]
+    beside = [{e.name for e in c.added} for c in verdict.found.rival_effects]
     name, value = case.planted
     found = {
         _CLAIMED: bool(sets),
-        _CLAIMED_PLAINLY: bool(sets) and not any(c.uncertain for c in verdict.explaining),
+        _CLAIMED_PLAINLY: bool(sets) and not any(c.doubts for c in verdict.claims),
         _WRONG: verdict.verdict == "number" or bool(verdict.found.rival_numbers),
         _UNEXPLAINED: verdict.verdict == "unexplained",
         _MOVED: bool(verdict.moves),
-        _MOVED_NAMED: any(case.planted[0] in move.words for move in verdict.moves),
+        _MOVED_NAMED: any(case.planted[0] in move.effect.title for move in verdict.moves),
         _ADOPTED: verdict.nearest is not None,
         _RISES: verdict.nearest is not None and not verdict.held_out_error_falls,
         _NAMED: {name} in (*sets, *beside),
@@ -110,7 +110,7 @@ def results(case: RateCase, seeds: list[int]) -> list[Result]:
     done = []
     for model in case.tables(seeds):
         began = time.process_time()
-        verdict = calibrate(model, progress=False)
+        verdict: Verdict = calibrate(model, progress=False)
         ratio = verdict.error_after / verdict.noise_ceiling
         done.append(Result(case.label, answers(verdict, case), ratio, time.process_time() - began))
     return done

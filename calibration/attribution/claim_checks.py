@@ -13,7 +13,7 @@ so that the size which fits short tails, say, is wrong for long ones. In the *tr
 claim is fitted again, by one linear step, to the runs at one end of the settings (`Runs.nearer`). Then the other
 runs are judged as the held-out ones are. Of several such sets the smallest p-value counts, times their number.
 
-Where the index is above `refits.IMITABLE`, or the p-value of the test below `refits.SURE`, the verdict says "or
+Where the index is above `rules.IMITABLE`, or the p-value of the test below `rules.SURE`, the verdict says "or
 something outside the catalogue that looks like it".
 """
 
@@ -21,12 +21,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from calibration.attribution.refits import IMITABLE, SURE, Candidate
-from calibration.attribution.wrong_numbers import IMPLAUSIBLE, pulls
+from calibration.attribution.hypothesis import Hypothesis
+from calibration.attribution.rules import RULES, Trial, doubted
 from calibration.statistics.fit import Fit
 from calibration.statistics.gls import schur_complement
 from calibration.statistics.statistical_model import Runs, regression
@@ -40,52 +40,24 @@ _ENOUGH = 2  # values a parameter
 _MOST = 0.999  # p-value of the transfer test; 1 means that it was not made
 
 
-@dataclass(frozen=True)
-class NumberCheck:
-    """What speaks against a wrong nuisance parameter as the explanation."""
-
-    imitable: float  # imitability index
-    transfer: float  # p-value that the fit with it carries over to other runs
-    tolerances: float  # by how many of its tolerances it is off
-
-    @property
-    def implausible(self) -> bool:
-        """Whether it is off by more of its tolerances than an error of measurement makes credible."""
-        return self.tolerances > IMPLAUSIBLE
-
-    @property
-    def uncertain(self) -> bool:
-        """Whether it may be something outside the catalogue that looks like it."""
-        return self.imitable > IMITABLE or self.transfer < SURE or self.implausible
-
-    def record(self) -> dict[str, float | bool]:
-        return {**vars(self), "implausible": self.implausible, "uncertain": self.uncertain}
-
-
-def with_checks(study: Study, claims: Sequence[Candidate], base: Fit) -> list[Candidate]:
-    """Add to each claim its imitability index and its transfer test.
+def with_checks(study: Study, claims: Sequence[Hypothesis], base: Fit) -> tuple[Hypothesis, ...]:
+    """Add to each claim, of effects or of a wrong number, its imitability index and its transfer test.
 
     The strength of a claim is what it takes from the deviance of `base`.
     """
-    checked = []
-    for claim in claims:
-        assert claim.refit is not None
-        strength = math.sqrt(max(base.deviance - claim.refit.deviance, 0.0))
-        seconds = (e.second.name for e in claim.claimed if e.second)
-        names = (*(e.name for e in claim.claimed), *seconds)
-        shares = absorbable_shares(study, claim.refit, names)
-        transfer = transfer_p(replace(study, seed=study.seed + 4), claim.refit)
-        checked.append(replace(claim, imitable=imitability(shares, strength), transfer=transfer))
-    return checked
 
+    def imitable(claim: Hypothesis) -> float:
+        strength = math.sqrt(max(base.deviance - claim.fitted.deviance, 0.0))
+        seconds = (e.second.name for e in claim.added if e.second)
+        return imitability(
+            absorbable_shares(study, claim.fitted, (*(e.name for e in claim.added), *seconds)), strength
+        )
 
-def check_number(study: Study, number: Fit, base: Fit) -> NumberCheck:
-    """Check the claim that nuisance parameters are wrong, as claims of effects are."""
-    strength = math.sqrt(max(base.deviance - number.deviance, 0.0))
-    shares = absorbable_shares(study, number, [alike[0].parameter.name for alike in number.wrong_numbers])
-    off = [pull for pull in pulls(number, study.model.nuisances) if pull.freed]
-    transfer = transfer_p(replace(study, seed=study.seed + 4), number)
-    return NumberCheck(imitability(shares, strength), transfer, max(pull.tolerances for pull in off))
+    def transfer(claim: Hypothesis) -> float:
+        return transfer_p(replace(study, seed=study.seed + 4), claim.fitted)
+
+    trial = Trial(study, base, {"imitable": imitable, "transfer": transfer})
+    return tuple(doubted(claim, trial, RULES) for claim in claims)
 
 
 def absorbable_shares(study: Study, fitted: Fit, names: Sequence[str]) -> Floats:

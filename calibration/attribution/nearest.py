@@ -18,7 +18,7 @@ A form is adopted if
 
 1. nothing explains the residual, and its fit converged;
 2. its gain on left-out groups of runs, paired over conditions, has a 95 % interval above zero, or is consistent
-   over them (`calibration.attribution.forms`). The size of a specimen that is left out as a whole is the mean;
+   over them (`calibration.attribution.left_out`). The size of a specimen that is left out as a whole is the mean;
 3. on these left-out runs it removes at least half of what the model without it leaves beyond noise, if that is
    known;
 4. its mean size differs from the null. With one size, its interval says so; with several, a t-test over the sizes
@@ -35,17 +35,20 @@ range is as good.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, cast
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import cast
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.stats import norm as normal
 from scipy.stats import t as student
 
-from calibration.attribution.forms import Form, as_good, at_theory, gain_of_residuals
-from calibration.attribution.refits import FIRST, Candidate, Judgement, left_out_residuals
+from calibration.attribution.effects import FIRST
+from calibration.attribution.forms import as_good, at_theory
+from calibration.attribution.hypothesis import Evidence, Hypothesis, Origin, Reason
+from calibration.attribution.left_out import gain_of_residuals, left_out_residuals
+from calibration.attribution.rules import RULES, Trial, judge
 from calibration.statistics.budget import skipped, spent
 from calibration.statistics.fit import Fit, UnsolvedError, birge, fit, profile_end
 from calibration.statistics.forward import derivatives
@@ -65,103 +68,13 @@ from calibration.statistics.statistical_model import (
 from calibration.statistics.study import FinalRefit, Study
 from common.arrays import Flags, Floats, Integers
 
-_REMOVED = 0.5  # least share of what is beyond noise
 _DIFFERS = 2.71  # ½ χ²₁ at 5 %
 _FEWEST = 3  # specimens, for sizes that differ
 _DRAWS = 400  # of the bootstrap, for what the form leaves
 _LARGEST = 300.0  # half width, so that its exponential is a number
-_VAGUE = math.log(100.0)  # half width of the interval of a logarithm, which says nothing
 _ROUNDS, _SETTLED = 12, 0.03  # of the estimate of τ; its last relative change
 _WORTH = 0.1  # share of what is beyond noise that a form removes, or may by its score, to be fitted again
 _WIDEST = 100.0  # factor by which τ may grow in a round
-
-
-@dataclass(frozen=True)
-class AdoptedForm:
-    """An effect that is adopted as a description of what no effect explains."""
-
-    effect: Parameter
-    model: ForwardModel  # the study's own, or `Shifted` with a shift for each specimen
-    fit: Fit
-    spread: float  # τ, on the scale of the fit; 0: one size
-    birge: float  # b
-    interval: tuple[float, float]  # 95 % of the mean size
-    sizes: Mapping[str, tuple[float, float, float]]  # of each fitted specimen, with its interval; empty: one size
-    gain: float  # on left-out groups, in log likelihood
-    gain_error: float
-    removed: float  # share of what is beyond noise that it removes there
-    remainder: float  # relative rms that it leaves there beyond noise
-    at_theory: bool = False  # its size is that of theory, and not fitted
-    forms: tuple[Form, ...] = ()  # that left-out runs cannot tell from it, itself among them
-    misfit: Misfit | None = None  # tests of what it leaves
-
-    @property
-    def form(self) -> Form:
-        """It as one of several forms."""
-        return Form((self.effect,), self.fit, self.at_theory)
-
-    @property
-    def size(self) -> float:
-        """The mean size."""
-        return float(self.fit.parameters[self.effect.name])
-
-    @property
-    def logarithmic(self) -> bool:
-        """Whether its sizes vary in their logarithm."""
-        return bool(self.sizes) and next(p for p in self.fit.fitted if p.name == self.effect.name).logarithmic
-
-    @property
-    def _departures(self) -> tuple[str, ...]:
-        """Names of u_g."""
-        return tuple(s.parameter.name for s in cast(Shifted, self.model).shifts) if self.sizes else ()
-
-    def of_new_specimen(self) -> Floats:
-        """Predict (n, k) all runs with the mean size."""
-        none = dict.fromkeys(self._departures, 0.0)
-        return self.model.predict([{**self.fit.parameters, **none}])[0]
-
-    @property
-    def largest_along(self) -> str:
-        """The output and the feature of the inputs along which most is left."""
-        assert self.misfit is not None
-        return largest_along(self.misfit, self.model.runs)
-
-    def record(self) -> dict[str, Any]:
-        assert self.misfit is not None
-        return {
-            "effect": self.effect.name,
-            "mean": self.size,
-            "interval": list(self.interval),
-            "spread": self.spread,
-            "scale": "logarithm" if self.logarithmic else "as it is",
-            "sizes": {name: list(size) for name, size in self.sizes.items()},
-            "removed_share": self.removed,
-            "session_gain": [self.gain, self.gain_error],
-            "birge": self.birge,
-            "remainder": self.remainder,
-            "remainder_p": self.misfit.p_value,
-            "largest_along": self.largest_along,
-            "as_well": [form.title for form in self.forms if form.fit is not self.fit],
-            "at_theory": self.at_theory,
-        }
-
-    def handed_on(self, refit: FinalRefit) -> FinalRefit:
-        """Return the refit to all runs for a new specimen: the mean size, with the spread in its variance."""
-        own = self._departures
-        kept = [i for i, p in enumerate(refit.fitted) if p.name not in own]
-        fitted = [refit.fitted[i] for i in kept]
-        covariance = self.birge * refit.covariance[np.ix_(kept, kept)]
-        parameters = {name: value for name, value in refit.parameters.items() if name not in own}
-        if self.at_theory:
-            return FinalRefit(parameters, tuple(fitted), covariance)
-        place = next(i for i, p in enumerate(fitted) if p.name == self.effect.name)
-        covariance[place, place] += self.spread**2
-        if fitted[place].logarithmic:  # corrected.toml states the size itself
-            slope = np.ones(len(kept))
-            slope[place] = refit.parameters[self.effect.name]
-            covariance *= np.outer(slope, slope)
-            fitted[place] = self.effect
-        return FinalRefit(parameters, tuple(fitted), covariance)
 
 
 def specimens(runs: Runs) -> tuple[Integers, tuple[str, ...]]:
@@ -195,14 +108,15 @@ def sizes_of(model: Shifted, parameters: Parameters) -> Floats:
 
 
 def adopt_nearest(
-    study: Study, base: Fit, misfit: Misfit, candidates: Sequence[Candidate], tangents: Directions
-) -> tuple[AdoptedForm | None, tuple[Candidate, ...]]:
+    study: Study, base: Fit, misfit: Misfit, candidates: Sequence[Hypothesis], tangents: Directions
+) -> tuple[Hypothesis | None, tuple[Hypothesis, ...], tuple[Hypothesis, ...]]:
     """Find the form that describes best what no effect explains in the fit `base`; None if none does.
 
     Returns:
-        The form, and the candidates, the most promising ones with the fit and the left-out error that they have.
+        The form; all forms that left-out runs cannot tell from it, itself among them; and the candidates, the most
+        promising ones with the fit and the left-out error that they have as forms.
     """
-    adopted: list[AdoptedForm] = []
+    adopted: list[Hypothesis] = []
     tried = {c.effect.name: c for c in candidates}
     noise_known = study.model.runs.noise_known
     for candidate in _promising(base, misfit.critical_z if noise_known else 0.0, candidates):
@@ -213,62 +127,75 @@ def adopt_nearest(
             tried[candidate.effect.name] = _as_form(study, base, candidate, constant)
             if constant.parameters[candidate.effect.name] == candidate.effect.start:  # held at its null
                 continue
-            forms: list[tuple[ForwardModel, Fit, float]] = [(study.model, constant, 0.0)]
-            if len(np.unique(specimens(study.model.runs)[0][study.split.fitted])) >= _FEWEST:
-                forms.append(_with_spread(study, constant, candidate.effect))
+            varied = _with_spread(study, constant, candidate.effect)
         except UnsolvedError:
-            tried[candidate.effect.name] = replace(candidate, judgement=Judgement.NOT_SOLVED)
+            tried[candidate.effect.name] = replace(candidate, reason=Reason.NOT_SOLVED)
             continue
-        b = _birge(study, forms[-1][1])
-        if len(forms) > 1 and not _sizes_differ(study, candidate.effect, constant, forms[1][1], b):
-            forms.pop()
-        judged = [_judged(study, base, candidate.effect, *form) for form in reversed(forms)]
-        adopted += [form for form in judged if form][:1]
+        form = _judged(study, base, candidate.effect, *varied) if varied else None
+        if form is None or not form.kept:
+            form = _judged(study, base, candidate.effect, constant)
+        adopted += [form] if form.kept else []
     of_theory = at_theory(study, base)
-    single = (form for form in of_theory if len(form.effects) == 1)
-    adopted += [a for f in single if (a := _judged(study, base, f.effects[0], study.model, f.fit, 0.0))]
+    single = (_judged(study, base, form.effect, form.fitted) for form in of_theory if len(form.added) == 1)
+    adopted += [form for form in single if form.kept]
     if not adopted:
-        return None, tuple(tried.values())
-    largest = max(adopted, key=lambda form: form.gain)
-    together = [form for form in of_theory if len(form.effects) > 1]
-    alike = as_good(study, largest.form, [*(a.form for a in adopted), *together])
+        return None, (), tuple(tried.values())
+    best, alike = _best(study, adopted, [form for form in of_theory if len(form.added) > 1])
+    index = next(i for i, e in enumerate(study.effects) if e.name == best.effect.name)
+    again = replace(study, seed=study.seed + 5)
+    remainder = examine_residual(again, best.fitted, tangents.without(index), draws=_DRAWS)
+    return best.seen(remainder=remainder), alike, tuple(tried.values())
+
+
+def _best(
+    study: Study, adopted: Sequence[Hypothesis], together: Sequence[Hypothesis]
+) -> tuple[Hypothesis, tuple[Hypothesis, ...]]:
+    """Choose one of the forms that may be adopted, and list those that left-out runs cannot tell from the best.
+
+    Args:
+        together: several effects at the sizes of theory, which only compete.
+    """
+    largest = max(adopted, key=_gain)
+    alike = as_good(study, largest, [*adopted, *together])
     alike = [form for form in alike if not form.at_an_end] or alike
     alike.sort(key=lambda form: not form.at_theory)
     as_well = [a for a in adopted if any(a.fit is form.fit for form in alike)]
-    best = max(as_well or [largest], key=lambda form: (form.at_theory, form.gain))
-    place = next(i for i, e in enumerate(study.effects) if e.name == best.effect.name)
-    left = examine_residual(replace(study, seed=study.seed + 5), best.fit, tangents.without(place), draws=_DRAWS)
-    return replace(best, forms=tuple(alike), misfit=left), tuple(tried.values())
+    return max(as_well or [largest], key=lambda form: (form.at_theory, _gain(form))), tuple(alike)
 
 
-def _as_form(study: Study, base: Fit, candidate: Candidate, fitted: Fit) -> Candidate:
+def _gain(form: Hypothesis) -> float:
+    assert form.evidence.paired is not None
+    return form.evidence.paired.gain
+
+
+def _as_form(study: Study, base: Fit, candidate: Hypothesis, fitted: Fit) -> Hypothesis:
     """Describe a candidate by its fit as a form, and by its error on left-out runs."""
     before, after = left_out_residuals(study, base, fitted)
     left_out = float(np.linalg.norm(after) / np.linalg.norm(before))
-    judgement = candidate.judgement if fitted.converged else Judgement.NOT_CONVERGED
+    reason = candidate.reason if fitted.converged else Reason.NOT_CONVERGED
     if fitted.converged and candidate.no_fit:
-        judgement = Judgement.LEAVES_RESIDUAL
-    return replace(candidate, refit=fitted, judgement=judgement, left_out=left_out)
+        reason = Reason.LEAVES_RESIDUAL
+    return replace(candidate, fit=fitted, reason=reason).seen(left_out=left_out)
 
 
 def _birge(study: Study, fitted: Fit) -> float:
     return birge(study.model.runs, fitted, study.split.fitted)
 
 
-def _promising(base: Fit, least: float, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Choose effects with |z| above `least` that remove most by their refits, or by their scores without one."""
-    tested = [c for c in candidates if abs(c.z) > least and c.survived >= TESTABLE]
-    return sorted(tested, key=lambda c: c.refit.deviance if c.refit else base.deviance - c.z**2)[:FIRST]
+def _promising(base: Fit, least: float, candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Choose effects with |z| above `least` that remove most by their fits, or by their scores without one."""
+    tested = [c for c in candidates if abs(c.score) > least and (c.evidence.survived or 0.0) >= TESTABLE]
+    return sorted(tested, key=lambda c: c.fit.deviance if c.fit else base.deviance - c.score**2)[:FIRST]
 
 
-def _converged(study: Study, base: Fit, candidate: Candidate) -> Fit:
+def _converged(study: Study, base: Fit, candidate: Hypothesis) -> Fit:
     """Fit an effect to its end: the search for explanations stops where noise is out of reach.
 
     It is fitted from where the score points to. Where this ends at an end of an effect's range, or does not
     converge, or goes on from a form of an earlier turn, it may be in a valley of its own, and is fitted again:
     from the model as given with a typical size of every effect, from a typical size, and from that of theory.
     """
-    effect, refit = candidate.effect, candidate.refit
+    effect, refit, score = candidate.effect, candidate.fit, candidate.score
     names = (*base.names, effect.name, *((effect.second.name,) if effect.second else ()))
 
     def fitted_from(start: Parameters, size: float) -> Fit:
@@ -276,30 +203,36 @@ def _converged(study: Study, base: Fit, candidate: Candidate) -> Fit:
         return fit(study.model, {**start, effect.name: size}, names, study.split.fitted, title="")
 
     if refit is None:
-        step = math.copysign(candidate.detectable, candidate.z)
+        step = math.copysign(candidate.evidence.detectable or effect.typical, score)
         refit = fitted_from(base.parameters, base.parameters[effect.name] + step)
     elif not refit.converged:
         refit = fitted_from(refit.parameters, refit.parameters[effect.name])
     added = tuple(e for e in study.model.effects if e.name in names)
-    typical = effect.start + math.copysign(effect.typical, candidate.z)
+    typical = effect.start + math.copysign(effect.typical, score)
     sides = {e.name: math.copysign(e.typical, refit.parameters[e.name] - e.start) for e in added}
     as_given = {**start_values(study.model), **{e.name: e.start + sides[e.name] for e in added}}
     starts = [(as_given, typical), (base.parameters, typical)]
     starts += [] if effect.theory is None else [(base.parameters, effect.theory)]
     fits = [refit] if len(added) == 1 else [refit, fitted_from(*starts.pop(0))]
-    gain = max(candidate.z**2, base.deviance - refit.deviance)
+    gain = max(score**2, base.deviance - refit.deviance)
     if gain < _WORTH * (base.deviance - study.values):  # far from what a form must remove
         starts = []
     while True:
         best = min(fits, key=lambda one: (not one.converged, one.deviance))
-        if (best.converged and not Form(added, best, False).at_an_end) or not starts or spent():
+        if (best.converged and not Hypothesis(Origin.FORM, added, best).at_an_end) or not starts or spent():
             return best
         fits.append(fitted_from(*starts.pop(0)))
 
 
-def _with_spread(study: Study, constant: Fit, effect: Parameter) -> tuple[Shifted, Fit, float]:
-    """Fit an effect whose size differs between specimens, with the likeliest τ of the linear model, in turn."""
+def _with_spread(study: Study, constant: Fit, effect: Parameter) -> tuple[Fit, float] | None:
+    """Fit an effect whose size differs between specimens, with the likeliest τ of the linear model, in turn.
+
+    Returns:
+        The fit and τ; None where specimens are few or their sizes do not differ.
+    """
     used = study.split.fitted
+    if len(np.unique(specimens(study.model.runs)[0][used])) < _FEWEST:
+        return None
     logarithmic = effect.start in effect.bounds
     spread = 1.0 if logarithmic else max(abs(constant.parameters[effect.name]) / 2, abs(effect.typical) / 10)
     least = 1e-3 * (1.0 if logarithmic else abs(effect.typical))
@@ -321,7 +254,7 @@ def _with_spread(study: Study, constant: Fit, effect: Parameter) -> tuple[Shifte
         spread, b = new, new_b
         if settled or spread == least or spent():
             break
-    return model, fitted, spread
+    return (fitted, spread) if _sizes_differ(study, effect, constant, fitted, _birge(study, fitted)) else None
 
 
 def _sizes_differ(study: Study, effect: Parameter, constant: Fit, varied: Fit, b: float) -> bool:
@@ -375,51 +308,66 @@ def _laplace(normal: Floats, held: Flags, b: float) -> float:
     return float(least + np.linalg.slogdet(normal[:-1, :-1])[1])
 
 
-def _judged(
-    study: Study, base: Fit, effect: Parameter, model: ForwardModel, fitted: Fit, spread: float
-) -> AdoptedForm | None:
-    """Describe a form by its left-out runs; None if it is not adopted."""
-    size, free = fitted.parameters[effect.name], effect.name in fitted.names
-    if not fitted.converged:
-        return None
+def _judged(study: Study, base: Fit, effect: Parameter, fitted: Fit, spread: float = 0.0) -> Hypothesis:
+    """Judge an effect as a description, by left-out runs and its size, which is that of theory if not fitted."""
+    origin = Origin.FORM if effect.name in fitted.names else Origin.THEORY
     b = _birge(study, fitted)
-    before, after = left_out_residuals(study, base, fitted)
-    paired = gain_of_residuals(study, before, after, b)
+    form = Hypothesis(origin, (effect,), fitted, Evidence(birge=b, spread=spread))
+    if fitted.converged:
+        form = _on_left_out_runs(study, base, form)
+    seen = np.unique(specimens(study.model.runs)[0][study.split.fitted])
+    if spread and fitted.converged:
+        form = form.seen(sizes=_sizes(form, seen))
+    measures = {
+        "differs": lambda h: _differs_from_null(study, h.fitted, seen) if spread else True,
+        "interval": lambda h: _interval_of_mean(h, len(seen)) if spread else _interval_of_size(study, h),
+    }
+    return judge(form, Trial(study, base, measures), RULES)
+
+
+def _on_left_out_runs(study: Study, base: Fit, form: Hypothesis) -> Hypothesis:
+    """Add what left-out runs say of a form: its paired gain, what it removes, and what it leaves."""
+    before, after = left_out_residuals(study, base, form.fitted)
     values = len(after)
     beyond = float((before**2).sum()) - values
     removed = float((before**2 - after**2).sum()) / max(beyond, 1e-9)
-    if not (paired.certain or paired.consistent) or (removed < _REMOVED and study.model.runs.noise_known):
-        return None
     leaves = math.sqrt(max(float((after**2).sum()) / values - 1, 0.0))
-    left, gain = leaves * fitted.noise.rms, (paired.gain, paired.error, min(removed, 1.0))
-    if not free:
-        return AdoptedForm(effect, model, fitted, 0.0, b, (size, size), {}, *gain, left, at_theory=True)
-    place = fitted.names.index(effect.name)
-    sigma = math.sqrt(b * fitted.covariance[place, place])
-    half = float(normal.ppf(0.975)) * sigma
-    sizes = {}
-    if spread:
-        assert isinstance(model, Shifted)
-        seen = np.unique(specimens(study.model.runs)[0][study.split.fitted])
-        if not _differs_from_null(study, model, fitted, seen):
-            return None
-        half = float(student.ppf(0.975, len(seen) - 1)) * max(sigma, spread / math.sqrt(len(seen)))
-        sizes = _sizes(model, fitted, b, seen)
-    if fitted.fitted[place].logarithmic and half > _VAGUE:
-        return None
-    held = fitted.held[place]
-    low, high = fitted.interval(effect.name, b) if held else _ends(fitted.fitted[place], size, half)
-    if not spread and low <= effect.start <= high:
-        end = profile_end(study.model, fitted, effect.name, study.split.fitted, b)
-        if end is None:
-            return None
-        low, high = (end, high) if size > effect.start else (low, end)
-    return AdoptedForm(effect, model, fitted, spread, b, (low, high), sizes, *gain, left)
+    paired = gain_of_residuals(study, before, after, form.evidence.birge)
+    return form.seen(paired=paired, removed=removed, remaining=leaves * form.fitted.noise.rms)
 
 
-def _differs_from_null(study: Study, model: Shifted, fitted: Fit, seen: Integers) -> bool:
+def size_interval(form: Hypothesis) -> tuple[float, float]:
+    """Return the 95 % interval of the size of a form; that of theory has none."""
+    return form.evidence.interval or (form.size, form.size)
+
+
+def _interval_of_mean(form: Hypothesis, count: int) -> tuple[float, float]:
+    """Compute the 95 % interval of the mean of sizes of `count` specimens."""
+    index = form.fitted.names.index(form.effect.name)
+    sigma = math.sqrt(form.evidence.birge * form.fitted.covariance[index, index])
+    half = float(student.ppf(0.975, count - 1)) * max(sigma, form.evidence.spread / math.sqrt(count))
+    if form.fitted.held[index]:
+        return form.fitted.interval(form.effect.name, form.evidence.birge)
+    return _ends(form.fitted.fitted[index], form.size, min(half, _LARGEST))
+
+
+def _interval_of_size(study: Study, form: Hypothesis) -> tuple[float, float]:
+    """Compute the 95 % interval of one size; where it has the null by the covariance, by the deviance there."""
+    name, b = form.effect.name, form.evidence.birge
+    index = form.fitted.names.index(name)
+    half = float(normal.ppf(0.975)) * math.sqrt(b * form.fitted.covariance[index, index])
+    held = form.fitted.held[index]
+    low, high = form.fitted.interval(name, b) if held else _ends(form.fitted.fitted[index], form.size, half)
+    if low <= form.effect.start <= high:
+        end = profile_end(study.model, form.fitted, name, study.split.fitted, b)
+        if end is not None:
+            return (end, high) if form.size > form.effect.start else (low, end)
+    return low, high
+
+
+def _differs_from_null(study: Study, fitted: Fit, seen: Integers) -> bool:
     """Tell by a t-test whether the mean of the sizes that specimens ask for on their own is not the null."""
-    runs, used = study.model.runs, study.split.fitted
+    runs, used, model = study.model.runs, study.split.fitted, cast(Shifted, fitted.model)
     effect = model.shifts[0].of
     own = {effect.name, *(s.parameter.name for s in model.shifts)}
     kept = [i for i, name in enumerate(fitted.names) if name not in own]
@@ -437,17 +385,47 @@ def _differs_from_null(study: Study, model: Shifted, fitted: Fit, seen: Integers
     return bool(abs(asked.mean()) > student.ppf(0.975, len(seen) - 1) * error)
 
 
-def _sizes(model: Shifted, fitted: Fit, b: float, seen: Integers) -> dict[str, tuple[float, float, float]]:
+def _sizes(form: Hypothesis, seen: Integers) -> dict[str, tuple[float, float, float]]:
     """Compute the size of each fitted specimen, and its interval."""
+    fitted, model = form.fitted, cast(Shifted, form.model)
     effect, names, sizes = model.shifts[0].of, specimens(model.runs)[1], sizes_of(model, fitted.parameters)
     mean = fitted.names.index(effect.name)
     stated = {}
     for g in seen.tolist():
-        place = fitted.names.index(model.shifts[g].parameter.name)
-        pair = fitted.covariance[np.ix_([mean, place], [mean, place])].sum()
-        half = min(float(normal.ppf(0.975)) * math.sqrt(b * pair), _LARGEST)
+        index = fitted.names.index(model.shifts[g].parameter.name)
+        pair = fitted.covariance[np.ix_([mean, index], [mean, index])].sum()
+        half = min(float(normal.ppf(0.975)) * math.sqrt(form.evidence.birge * pair), _LARGEST)
         stated[names[g]] = (float(sizes[g]), *_ends(effect, float(sizes[g]), half))
     return stated
+
+
+def of_new_specimen(form: Hypothesis) -> Floats:
+    """Predict (n, k) all runs with the mean of sizes that differ."""
+    return form.model.predict([{**form.fitted.parameters, **dict.fromkeys(_departures(form), 0.0)}])[0]
+
+
+def _departures(form: Hypothesis) -> tuple[str, ...]:
+    """Return the names of u_g."""
+    return tuple(s.parameter.name for s in cast(Shifted, form.model).shifts) if form.evidence.sizes else ()
+
+
+def for_new_specimen(form: Hypothesis, refit: FinalRefit) -> FinalRefit:
+    """Return the refit of a form to all runs for a new specimen: the mean size, its variance with the spread."""
+    own = _departures(form)
+    kept = [i for i, p in enumerate(refit.fitted) if p.name not in own]
+    fitted = [refit.fitted[i] for i in kept]
+    covariance = form.evidence.birge * refit.covariance[np.ix_(kept, kept)]
+    parameters = {name: value for name, value in refit.parameters.items() if name not in own}
+    if form.at_theory:
+        return FinalRefit(parameters, tuple(fitted), covariance)
+    index = next(i for i, p in enumerate(fitted) if p.name == form.effect.name)
+    covariance[index, index] += form.evidence.spread**2
+    if fitted[index].logarithmic:  # corrected.toml states the size itself
+        slope = np.ones(len(kept))
+        slope[index] = refit.parameters[form.effect.name]
+        covariance *= np.outer(slope, slope)
+        fitted[index] = form.effect
+    return FinalRefit(parameters, tuple(fitted), covariance)
 
 
 def _ends(parameter: Parameter, size: float, half: float) -> tuple[float, float]:

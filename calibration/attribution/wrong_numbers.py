@@ -15,25 +15,27 @@ standard deviations. If the fit then leaves no more than noise, the wrong number
 effect is claimed for it. An effect is claimed only if it fits better than the freed number by more than one
 parameter can gain by chance. A smaller pull is mentioned only if it is notable among so many (`notable_pull`).
 
-A number that would have to be off by more than `IMPLAUSIBLE` of its standard deviations does not come ahead of
-effects that explain as much (`implausible`). They come first, and the number is named after them.
+A number that would have to be off by more than is credible (`rules.IMPLAUSIBLE`) does not come ahead of effects
+that explain as much. They come first, and the number is named after them.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from scipy.stats import norm as normal
 
-from calibration.attribution.refits import INDISTINGUISHABLE, Candidate, ebic, judge, lowest_ebic
+from calibration.attribution.effects import lowest_ebic, measures_of
+from calibration.attribution.hypothesis import Evidence, Hypothesis, Origin
+from calibration.attribution.rules import INDISTINGUISHABLE, RULES, Trial, judge
 from calibration.statistics.budget import skipped
 from calibration.statistics.fit import Fit, Pull, UnsolvedError, fit
-from calibration.statistics.residual_tests import Directions
+from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import Parameter
 from calibration.statistics.study import Study
 
-IMPLAUSIBLE = 5.0  # standard deviations of its prior: a ruler is seldom wrong by so many
 _NOTABLE = 0.05  # share of tables with nothing wrong whose verdict names a nuisance parameter, at most
 _MOST = 2  # numbers that may be wrong together
 _TRIED = 3  # effects that are fitted once more beside wrong numbers
@@ -86,9 +88,19 @@ def notable_pull(count: int) -> float:
     return float(normal.isf((1 - (1 - _NOTABLE) ** (1 / count)) / 2))
 
 
-def implausible(freed: Sequence[Pull]) -> bool:
-    """Tell whether one of the freed parameters is further off than its stated tolerance makes credible."""
-    return any(pull.tolerances > IMPLAUSIBLE for pull in freed)
+def wrong_number_as_hypothesis(study: Study, base: Fit, tangents: Directions) -> Hypothesis | None:
+    """Fit without the priors of wrong numbers, and judge whether they explain the residual; None if none is wrong.
+
+    Args:
+        tangents: the directions of the effects.
+    """
+    freed = without_wrong_priors(study, base)
+    if freed is base:
+        return None
+    off = tuple(p for p in pulls(freed, study.model.nuisances) if p.freed)
+    wrong = tuple(alike[0].parameter for alike in freed.wrong_numbers)
+    measures = {"remainder": lambda h: examine_residual(study, h.fitted, tangents)}
+    return judge(Hypothesis(Origin.NUMBER, wrong, freed, Evidence(pulls=off)), Trial(study, base, measures), RULES)
 
 
 def without_wrong_priors(study: Study, fitted: Fit, *, target: float = math.inf) -> Fit:
@@ -104,46 +116,46 @@ def without_wrong_priors(study: Study, fitted: Fit, *, target: float = math.inf)
 
 
 def beside_wrong_numbers(
-    study: Study, base: Fit, candidates: Sequence[Candidate], directions: Directions
-) -> list[Candidate]:
-    """Refit the most promising effects once more, without the priors of nuisance parameters that they contradict.
+    study: Study, base: Fit, candidates: Sequence[Hypothesis], directions: Directions
+) -> list[Hypothesis]:
+    """Fit the most promising effects once more, without the priors of nuisance parameters that they contradict.
 
-    An effect beside a wrong number is a pair. It is returned only if its EBIC is lower than that of every single
-    effect with all priors.
+    An effect beside a wrong number is a pair: its extended BIC must be lower than that of every single effect with
+    all priors.
     """
-    names = [e.name for e in study.effects]
+    names, trial = [e.name for e in study.effects], Trial(study, base, single=lowest_ebic(study, candidates))
     promising = []
     for candidate in candidates:
-        if candidate.refit is not None and not candidate.refit.stopped:
-            alike = wrong_number(pulls(candidate.refit, study.model.nuisances))
+        if candidate.fit is not None and not candidate.fit.stopped:
+            alike = wrong_number(pulls(candidate.fit, study.model.nuisances))
             if alike:
-                promising.append((candidate.refit.deviance - alike[0].z ** 2, candidate.effect.name, candidate))
+                promising.append((candidate.fit.deviance - alike[0].z ** 2, candidate.effect.name, candidate))
     judged = []
     for _, name, candidate in sorted(promising, key=lambda p: p[:2])[:_TRIED]:
-        assert candidate.refit is not None
         if skipped(f"{candidate.title} beside a wrong number"):
             continue
-        target = study.noise_at_most(len(candidate.refit.names))
+        target = study.noise_at_most(len(candidate.fitted.names))
         try:
-            refit = without_wrong_priors(study, candidate.refit, target=target)
+            refit = without_wrong_priors(study, candidate.fitted, target=target)
         except UnsolvedError:
             continue
-        judged.append(judge(study, candidate, base, refit, directions.without(names.index(name))))
-    single = lowest_ebic(study, candidates)
-    return [c for c in judged if c.refit and ebic(study, c.refit, len(c.refit.wrong_numbers) + 1) < single]
+        measures = measures_of(study, base, directions.without(names.index(name)))
+        beside = replace(candidate, origin=Origin.PAIR, fit=refit, evidence=candidate.evidence.of_score())
+        judged.append(judge(beside, replace(trial, measures=measures), RULES))
+    return judged
 
 
-def as_good_as_number(candidates: Sequence[Candidate], number: Fit, level: float) -> list[Candidate]:
+def as_good_as_number(candidates: Sequence[Hypothesis], number: Fit, level: float) -> list[Hypothesis]:
     """Return the effects that leave no more than noise and fit as well as a wrong number, best first.
 
     If the best of them does, so do those that cannot be told from it.
     """
     near = sorted(
-        (c.refit.deviance, place)
-        for place, c in enumerate(candidates)
-        if c.refit and c.refit.converged and c.refit_misfit and c.refit_misfit.p_value >= level / 2
+        (c.fit.deviance, index)
+        for index, c in enumerate(candidates)
+        if c.fit and c.fit.converged and c.evidence.remainder and c.evidence.remainder.p_value >= level / 2
     )
     if not near or near[0][0] >= number.deviance + INDISTINGUISHABLE:
         return []
     most = max(number.deviance, near[0][0]) + INDISTINGUISHABLE
-    return [candidates[place] for deviance, place in near if deviance < most]
+    return [candidates[index] for deviance, index in near if deviance < most]

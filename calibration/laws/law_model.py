@@ -14,10 +14,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
+from calibration.attribution.hypothesis import Hypothesis
 from calibration.laws.places import Place, place_named
 from calibration.laws.readings import EXPONENTS, INPUTS, NOTED, logarithms, noted_values, parameter_of
 from calibration.statistics.statistical_model import Parameter, Parameters
@@ -175,3 +176,8 @@ def with_law(model: SwimmerModel, record: Mapping[str, Any]) -> LawModel:
     except (KeyError, TypeError, ValueError, OverflowError):
         raise InputError("the record of a law cannot be read: calibrate the table again") from None
     return LawModel.of(model, place, typical, centre, noted)
+
+
+def law_model(law: Hypothesis) -> LawModel:
+    """Return the model of a law."""
+    return cast(LawModel, law.model)

@@ -14,17 +14,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
-from calibration.attribution.nearest import AdoptedForm
-from calibration.attribution.refits import UNSEEN
+from calibration.attribution.hypothesis import Hypothesis
+from calibration.attribution.nearest import size_interval
+from calibration.attribution.rules import UNSEEN
+from calibration.findings.findings import Findings
+from calibration.findings.samples import FORM, draw_samples, open_forms
 from calibration.laws.group_factors import GroupFactors, group_factors
-from calibration.laws.law_model import LEVER
-from calibration.laws.laws import FittedLaw
+from calibration.laws.law_model import LEVER, law_model
 from calibration.laws.places import Place
 from calibration.report.path_error import WORDS, Model, PathError
 from calibration.statistics.residual_tests import Misfit
 from calibration.statistics.statistical_model import Parameter, Runs
-from calibration.verdict.samples import FORM, draw_samples, open_forms
-from calibration.verdict.verdict import Verdict
 from calibration.words.quantities import feature_in_words, final_model
 from common.arrays import Flags, Floats
 from common.pages import BLUE, GREEN, INK, ORANGE, PALE, RED, VIOLET
@@ -49,10 +49,10 @@ _LAW = (
 Drawn = tuple[Figure, str, str]  # with a description and a caption
 
 
-def draw_all(result: Verdict, paths: Sequence[PathError]) -> dict[str, list[Drawn]]:
+def draw_all(result: Findings) -> dict[str, list[Drawn]]:
     """Draw the figures of a report, by their names in the template; one that fails is left out with a warning."""
-    kind, nearest, law = result.runs.drawn[1][0], result.nearest, result.law
-    carried_out = [error for error in paths if error.carried_out]
+    kind, adopted, law = result.runs.drawn[1][0], result.nearest, result.law
+    carried_out = [error for error in getattr(result, "paths", ()) if error.carried_out]  # of a robot
     figures: dict[str, Callable[[], list[Drawn]]] = {
         "summary": lambda: [(draw_summary(result), "residual of each output over the noise, for each model",
                              "The same on the runs that were fitted, for each output.")],
@@ -69,9 +69,9 @@ def draw_all(result: Verdict, paths: Sequence[PathError]) -> dict[str, list[Draw
     if carried_out:
         of_paths = "the wanted path, and the tracks of both schedules on the corrected robot"
         figures["paths"] = lambda: [(draw_paths(carried_out), of_paths, "")]
-    if nearest and nearest.sizes:
-        of_sizes = f"size of {nearest.effect.title} for each specimen"
-        figures["sizes"] = lambda: [(draw_sizes(nearest), of_sizes, "")]
+    if adopted and adopted.evidence.sizes:
+        of_sizes = f"size of {adopted.effect.title} for each specimen"
+        figures["sizes"] = lambda: [(draw_sizes(adopted), of_sizes, "")]
     if law and law.kept:
         figures["law"] = lambda: _figures_of_law(law.kept[0], result.split.fitted)
     drawn = {name: _drawn(name, draw) for name, draw in figures.items()}
@@ -90,16 +90,17 @@ def _drawn(name: str, draw: Callable[[], list[Drawn]]) -> list[Drawn]:
     return figures
 
 
-def _figures_of_law(law: FittedLaw, used: Flags) -> list[Drawn]:
+def _figures_of_law(law: Hypothesis, used: Flags) -> list[Drawn]:
     """Draw where a law acts, and on what it depends in the runs `used` (n,)."""
-    place = draw_place(law.model.robot, law.place, law.fit.parameters.get(LEVER, 0.0))
-    drawn = [(place, f"where it acts: {law.place.words}", "Where it acts (red).")]
-    if inputs := group_factors(law.model, law.fit, used):
+    model = law_model(law)
+    place = draw_place(model.robot, model.place, law.fitted.parameters.get(LEVER, 0.0))
+    drawn = [(place, f"where it acts: {model.place.words}", "Where it acts (red).")]
+    if inputs := group_factors(model, law.fitted, used):
         drawn.append((draw_factors(inputs), "the factor of the load against each input", _LAW))
     return drawn
 
 
-def compared(result: Verdict) -> list[tuple[str, Floats]]:
+def compared(result: Findings) -> list[tuple[str, Floats]]:
     """List the models whose residuals are drawn, with their predictions (n, k)."""
     models = [("calibrated", result.base.prediction)]
     if final := final_model(result.verdict, result.nearest, result.effects):
@@ -109,7 +110,7 @@ def compared(result: Verdict) -> list[tuple[str, Floats]]:
     return models
 
 
-def draw_summary(result: Verdict) -> Figure:
+def draw_summary(result: Findings) -> Figure:
     """Draw the residual of each output for each model, as rms over the fitted runs, in units of the noise."""
     figure = Figure(figsize=(_WIDTH, 0.9 + 0.42 * len(result.runs.outputs)))
     plot_summary(figure.add_subplot(), result)
@@ -118,7 +119,7 @@ def draw_summary(result: Verdict) -> Figure:
     return figure
 
 
-def plot_summary(axes: Axes, result: Verdict) -> None:
+def plot_summary(axes: Axes, result: Findings) -> None:
     """Draw the bars of `draw_summary`, without a legend."""
     data = result.runs
     noise = np.sqrt(np.diag(result.base.noise.run_covariance))
@@ -136,7 +137,7 @@ def plot_summary(axes: Axes, result: Verdict) -> None:
     axes.tick_params(axis="x", labelsize=8)
 
 
-def draw_residuals(result: Verdict) -> list[tuple[Figure, str]]:
+def draw_residuals(result: Findings) -> list[tuple[Figure, str]]:
     """Draw measured minus model against a setting, a figure for each model; return each with its model."""
     data, used = result.runs, result.split.fitted
     residuals = {label: (data.y - prediction)[used] for label, prediction in compared(result)}
@@ -180,12 +181,12 @@ def _name_kinds(axes: Axes, kinds: Sequence[str]) -> None:
     axes.legend(fontsize=8, frameon=False, ncols=min(len(kinds), 5), loc="lower center", bbox_to_anchor=(0.5, 1.0))
 
 
-def draw_maps(result: Verdict) -> list[tuple[Figure, str]]:
+def draw_maps(result: Findings) -> list[tuple[Figure, str]]:
     """Draw z of every output along every feature of the inputs, a figure for each model; each with its model."""
     maps = [("calibrated", result.found.misfit)]
-    if result.explaining and result.explaining[0].refit_misfit is not None:
+    if result.claims and result.claims[0].evidence.remainder is not None:
         final = final_model(result.verdict, result.nearest, result.effects)
-        maps.append((final, result.explaining[0].refit_misfit))
+        maps.append((final, result.claims[0].evidence.remainder))
     limit = max(4.0, float(np.abs(result.found.misfit.scores.shapes).max(initial=0.0)))
     return [(_draw_map(misfit, result.runs, limit), label) for label, misfit in maps if misfit.scores.shapes.size]
 
@@ -207,27 +208,27 @@ def _draw_map(misfit: Misfit, data: Runs, limit: float) -> Figure:
     return figure
 
 
-def draw_sizes(nearest: AdoptedForm) -> Figure:
+def draw_sizes(form: Hypothesis) -> Figure:
     """Draw the size of an adopted form for each specimen, with its interval, and the interval of the mean."""
-    figure = Figure(figsize=(_WIDTH, 0.9 + 0.3 * len(nearest.sizes)))
+    figure = Figure(figsize=(_WIDTH, 0.9 + 0.3 * len(form.evidence.sizes)))
     axes = figure.add_subplot()
-    axes.axvspan(*nearest.interval, color=PALE, label="mean, 95 %")
-    ranked = sorted(nearest.sizes.items(), key=lambda item: item[1][0])
+    axes.axvspan(*size_interval(form), color=PALE, label="mean, 95 %")
+    ranked = sorted(form.evidence.sizes.items(), key=lambda item: item[1][0])
     for place, (_, (value, low, high)) in enumerate(ranked):
         axes.plot([low, high], [place, place], color=GREEN, lw=1.6)
         axes.plot(value, place, "o", ms=5, color=GREEN)
     axes.set_yticks(range(len(ranked)), [name for name, _ in ranked], fontsize=8)
-    if nearest.logarithmic:
+    if form.logarithmic:
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.set_xlabel(_with_unit(nearest.effect), fontsize=9)
+    axes.set_xlabel(_with_unit(form.effect), fontsize=9)
     axes.tick_params(axis="x", labelsize=8)
     axes.legend(fontsize=8, frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     figure.tight_layout()
     return figure
 
 
-def draw_corner(result: Verdict) -> Figure | None:
+def draw_corner(result: Findings) -> Figure | None:
     """Draw samples of numbers and effects in pairs, and alone on the diagonal; None where fewer than two are free.
 
     Numbers that were given to a tolerance are left out, and of the others all but the first _CORNER.
@@ -282,19 +283,19 @@ def _with_unit(number: Parameter) -> str:
     return fill(f"{number.title}{unit}", _LINE)
 
 
-def draw_evidence(result: Verdict) -> Figure:
+def draw_evidence(result: Findings) -> Figure:
     """Draw the score of every effect that these runs can show, with the critical score; what explains is green."""
-    named = {name for c in result.explaining for name in (e.name for e in c.claimed)}
-    seen = [c for c in result.found.candidates if c.detectable < UNSEEN]
-    ranked = sorted(seen, key=lambda c: abs(c.z))
+    named = {e.name for c in result.claims for e in c.added}
+    seen = [c for c in result.found.candidates if (c.evidence.detectable or 0.0) < UNSEEN]
+    ranked = sorted(seen, key=lambda c: abs(c.score))
     critical = result.found.misfit.critical_z
     figure = Figure(figsize=(_WIDTH, 0.7 + 0.36 * len(ranked)))
     axes = figure.add_subplot()
-    limit = 1.15 * max([critical, *(abs(c.z) for c in ranked)])
+    limit = 1.15 * max([critical, *(abs(c.score) for c in ranked)])
     for place, candidate in enumerate(ranked):
-        tested = candidate.refit is not None
+        tested = candidate.fit is not None
         colour = GREEN if candidate.effect.name in named else ORANGE if tested else PALE
-        axes.barh(place - 0.2, candidate.z, color=colour, height=0.4)
+        axes.barh(place - 0.2, candidate.score, color=colour, height=0.4)
         beside_frame = axes.get_yaxis_transform()
         axes.text(0.02, place + 0.2, candidate.effect.title, fontsize=8, va="center", transform=beside_frame)
         axes.vlines([-critical, critical], place - 0.45, place, color=INK, lw=0.8, ls="--")

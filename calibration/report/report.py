@@ -9,23 +9,20 @@ from typing import Any
 
 from markupsafe import Markup
 
-from calibration.attribution.refits import IMITABLE, SURE
+from calibration.attribution.rules import IMITABLE, SURE
+from calibration.findings.findings import Findings
+from calibration.findings.next_runs import STOP
 from calibration.report.figures import Drawn, draw_all
-from calibration.report.path_error import PathError
 from calibration.statistics.fit import WRONG
-from calibration.verdict.next_runs import STOP
-from calibration.verdict.verdict import Verdict
 from calibration.words.render import rendered
 from common.pages import Page, figures_markup, inline
 from common.provenance import code_version
 
 
-def write_report(
-    result: Verdict, record: Mapping[str, Any], out: str | Path, *, paths: Sequence[PathError] = ()
-) -> None:
-    """Write report.html from a verdict and its record, with the figures of the errors on `paths`."""
+def write_report(result: Findings, record: Mapping[str, Any], out: str | Path) -> None:
+    """Write report.html from a verdict and its record."""
     page = Page(f"Calibration: {record['table']}", record["sentence"])
-    page.add(sections(record, draw_all(result, paths)))
+    page.add(sections(record, draw_all(result)))
     page.write(out, f"code {code_version()}; fixed before the data was looked at: {record['fixed_before']}")
 
 

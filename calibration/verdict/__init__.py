@@ -1,1 +1,1 @@
-"""The verdict of a calibration, and the next runs."""
+"""The procedure of a calibration, and its verdict."""

@@ -1,70 +1,51 @@
-"""The whole calibration: split, fit, test, attribute, refit, and open the held-out test once.
+"""The whole calibration: prepare, explain, describe, and conclude, with the held-out test opened once.
 
 0. Repeats are compared by what the model does not know, and columns with each other
    (`calibration.statistics.between_repeats`). What differs becomes a number of every fit.
 1. Whole sessions are held out before any run is compared with the model (by default the middle one).
    Outliers are excluded (`calibration.statistics.study`).
 2. The coefficients and the nuisance parameters are fitted to the other sessions, with weights of the runs if
-   some were tracked worse than others (`calibration.statistics.weights`), and the residual is tested.
-3. What explains it is looked for (`explain`). A nuisance parameter that leaves its prior is freed, and comes ahead
-   of every effect unless it would be far outside its prior (`calibration.attribution.wrong_numbers`). Single
-   effects (`calibration.attribution.refits`), effects beside a wrong number, and pairs follow, each only if
-   nothing before explains the residual.
-4. The verdict (`calibration.verdict.findings.Attribution`).
-5. If several explanations are left, next runs that would tell them apart (`calibration.verdict.next_runs`).
-   If nothing explains the residual, laws that describe it (`describe`). Where none does, the nearest form is
-   adopted (`calibration.attribution.nearest`). If something outside the catalogue could imitate what is claimed,
-   laws that fit as well.
-6. Errors on the held-out runs: as given, calibrated, with the effect, and from noise alone. Whether the held-out
-   runs agree with the final model (`calibration.statistics.study`).
-7. For use, the model is fitted once more to all runs, the held-out ones included.
+   some were tracked worse than others (`calibration.statistics.weights`).
+3. The residual is tested, and what explains it is looked for (`calibration.verdict.explain`): numbers that are
+   wrong, or differ in some runs; effects; pairs. Each is a hypothesis, judged by `calibration.attribution.rules`.
+   What the held-out runs refute is withdrawn.
+4. If nothing explains the residual, laws that describe it are looked for (`describe`). Where none does, the
+   nearest form is adopted (`calibration.verdict.describe`). If something outside the catalogue could imitate what
+   is claimed, laws that fit as well are looked for.
+5. The verdict (`calibration.attribution.attribution.Attribution.verdict`), with errors on the held-out runs: as
+   given, calibrated, with the effect, and from noise alone. If several explanations are left, next runs that would
+   tell them apart (`calibration.findings.next_runs`).
+6. For use, the model is fitted once more to all runs, the held-out ones included.
 """
 
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
-from calibration.attribution.claim_checks import check_number, with_checks
-from calibration.attribution.forms import Form, envelope, forms_of_claims, paired_gain
-from calibration.attribution.moves import LocalShift, StatedMove, find_moves, groups_that_may_differ
-from calibration.attribution.nearest import AdoptedForm, adopt_nearest, largest_along
-from calibration.attribution.refits import (
-    FIRST,
-    INDISTINGUISHABLE,
-    Candidate,
-    Rival,
-    coefficients_within_range,
-    ebic,
-    examine,
-    explaining,
-    pairs,
-    unexamined,
-)
-from calibration.attribution.wrong_numbers import (
-    as_good_as_number,
-    beside_wrong_numbers,
-    implausible,
-    pulls,
-    without_wrong_priors,
-)
+from calibration.attribution.attribution import Attribution
+from calibration.attribution.effects import coefficients_within_range
+from calibration.attribution.forms import envelope
+from calibration.attribution.hypothesis import Hypothesis
+from calibration.attribution.nearest import for_new_specimen, of_new_specimen, size_interval
+from calibration.attribution.wrong_numbers import pulls
+from calibration.findings.findings import Description
+from calibration.findings.held_out import HeldOutErrors, held_out_errors
+from calibration.findings.next_runs import Explanation, next_runs
 from calibration.statistics.budget import Budget, clock, limited, seconds_left, skipped
 from calibration.statistics.checks import predict_as_given
-from calibration.statistics.excluded import caveat_of_excluded
-from calibration.statistics.fit import Fit, UnsolvedError, birge, fit, profile_end, profile_intervals
+from calibration.statistics.excluded import caveat_of_excluded, count_of_rows
+from calibration.statistics.fit import Fit, UnsolvedError, birge, profile_end, profile_intervals
 from calibration.statistics.offsets import Offsets, with_differences
-from calibration.statistics.residual_tests import directions, examine_residual
 from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values, with_runs
 from calibration.statistics.study import (
     DRAWS,
     LEVEL,
     FinalRefit,
     Study,
-    errors,
     far_readings,
     final_refit,
     find_outliers,
@@ -78,17 +59,17 @@ from calibration.statistics.weights import (
     noise_of_any_run,
     rows_of_little_weight,
 )
-from calibration.verdict.findings import Attribution, Description, LoopTurn
-from calibration.verdict.held_out import HeldOutErrors, Withdrawn, held_out_errors, refuted
-from calibration.verdict.next_runs import Explanation, next_runs
+from calibration.verdict.describe import adopt_in_turns, forms_in_question
+from calibration.verdict.explain import explain_and_refute, fit_moves
 from calibration.verdict.verdict import Verdict
 from common.arrays import Flags, Floats
 from common.errors import InputError
 from common.provenance import fingerprint
 
+V = TypeVar("V", bound=Verdict)
+Intervals = dict[str, tuple[float, float]]
 _SEARCH, _DESCRIBED = 0.6, 0.85  # shares of the time after which effects and descriptions are no longer looked for
-_MOST_TURNS = 4  # of the loop
-_SHARE_OF_TEST = 0.2  # of the time of the first tests, for those of what an effect leaves, with fewer draws
+_LAWS_TOLD_APART = 3  # beside a claim; the more there are, the fewer runs tell all of them apart
 
 
 def calibrate(
@@ -101,7 +82,8 @@ def calibrate(
     draws: int = DRAWS,
     max_seconds: float = math.inf,
     progress: bool = True,
-) -> Verdict:
+    verdict: Callable[..., V] = Verdict,  # type: ignore[assignment]
+) -> V:
     """Calibrate a model with its runs, and find what it lacks.
 
     Args:
@@ -115,74 +97,70 @@ def calibrate(
         max_seconds: of processor time for the search for explanations and descriptions; then the verdict is
             provisional, and says what was not tried.
         progress: show progress bars.
+        verdict: makes the verdict of what was found, such as one with the corrected robot.
     """
-    began = clock()
+    began, given = clock(), model
     model, differences = with_differences(model, held_out, level=level, seed=seed)
     study, base, uncalibrated = first_fit(model, held_out, level=level, seed=seed, draws=draws, progress=progress)
-    model, split = cast(Experiment, study.model), study.split
+    model = cast(Experiment, study.model)  # with the weights of its runs
     used = max(clock() - began, max_seconds - seconds_left())  # where the limit began before
-    laws = None
-    turns: tuple[LoopTurn, ...] = ()
-    withdrawn: list[Withdrawn] = []
     # Explanations come first; what is left of the time is for descriptions of what nothing explains.
     with limited(_DESCRIBED * max_seconds - used) as budget:
         with limited(_SEARCH * max_seconds - used):
-            study, found, moves = _explain_with_moves(study, base)
-            # Where a number differs in the held-out runs, they refute nothing: it is found in all runs.
-            while (refutation := _refuted_claim(study, found)) and not _fit_moves(study, model, found)[1]:
-                withdrawn.append(refutation)
-                given = replace(study, model=model, settled=study.settled | set(refutation.effects[-1:]))
-                study, found, moves = _explain_with_moves(given, base)
-        unexplained = found.verdict(level) == "unexplained" or not study.model.runs.noise_known
-        uncertain = any(c.uncertain for c in found.best)
-        wanted = study.model.runs.noise_known and (unexplained or uncertain)
-        beside = _beside_what_no_law_is_sought(study, model) if describe and wanted else ""
-        if describe and wanted and not beside:
-            laws = describe(study, found.base, beside_claim=uncertain)
-        described = laws if laws and unexplained and laws.complete else None
-        if unexplained and not described:
-            found, turns, refuted_forms = _adopt_in_turns(study, found)
-            withdrawn += refuted_forms
-        of_all, moves_of_all = _fit_moves(study, model, found)
-    moves, with_moves = (moves_of_all, of_all) if of_all else (moves, found.base)
+            study, found = explain_and_refute(study, base)
+        wanted = describe if _law_is_wanted(study, found) else None
+        beside = _beside_what_no_law_is_sought(study, model) if wanted else ""
+        laws = wanted(study, found.base, beside_claim=bool(found.claims)) if wanted and not beside else None
+        if _unexplained(study, found) and not (laws and laws.complete):
+            found = adopt_in_turns(study, found)
+        of_all, moves = fit_moves(study, model, found)
+    # A number that differs is stated as all runs show it, the held-out ones included.
+    with_moves, moves = (of_all, moves) if of_all else (found.base, found.moves)
+    found = replace(found, moves=tuple(replace(move, fit=with_moves) for move in moves))
     errors = _errors(study, found, uncalibrated, laws)
-    falls = errors.rms["after"] < errors.rms["before"]
-    as_good = laws.as_good_as(found.final) if laws and uncertain else ()
-    rivals = described.rivals if described else found.rivals(cast(Experiment, study.model), as_good)
-    # The next runs are not weighted, so they have the noise of any run.
-    rivals = tuple(replace(r, fit=replace(r.fit, noise=noise_of_any_run(study, r.fit.noise))) for r in rivals)
+    rivals = _rivals(study, found, laws)
     base_intervals, final_intervals = _both_intervals(study, found, progress=progress)
-    forms = _forms(study, found)
-    for name, (low, high) in envelope(study, found.base.names, forms).items():
-        if name in final_intervals:
-            final_intervals[name] = (min(low, final_intervals[name][0]), max(high, final_intervals[name][1]))
-    fixed = {"level": level, "seed": seed, "catalogue": [e.name for e in model.effects], "locked": split.names}
-    verdict = Verdict(
+    found = replace(found, forms=forms_in_question(study, found))
+    refit = final_refit(of_all) if of_all else _handed_on(study, found, errors)
+    fixed = {
+        "level": level,
+        "seed": seed,
+        "catalogue": [e.name for e in model.effects],
+        "locked": study.split.names,
+    }
+    return verdict(
         verdict=found.verdict(level),
         runs=model.runs,
-        split=split,
+        split=study.split,
         found=found,
         differences=differences,
-        moves=tuple(StatedMove(move.words(with_moves), move.record(with_moves)) for move in moves),
         errors=errors,
         base_intervals=base_intervals,
-        final_intervals=final_intervals,
+        final_intervals=_over_forms(study, found, final_intervals),
         pulls=pulls(found.final, study.model.nuisances),
-        final_refit=final_refit(of_all) if of_all else _handed_on(study, found, falls=falls),
+        final_refit=refit,
         law=laws,
-        explanations=tuple(map(Explanation.from_rival, rivals)),
+        explanations=tuple(map(Explanation.of, rivals)),
         **_next_runs(rivals, seed),
+        numbers=tuple(p.name for p in (*given.coefficients, *given.nuisances)),
+        catalogue=tuple(e.name for e in given.effects),
         untestable=dict(model.untestable),
         draws=draws,
         fixed_before=fingerprint(fixed),
         little_weight=rows_of_little_weight(study),
         not_tried=tuple(budget.not_tried),
-        forms=forms,
-        turns=turns,
-        withdrawn=tuple(withdrawn),
-        caveats=(),
+        caveats=_caveats(study, model, found, budget, max_seconds, beside),
     )
-    return replace(verdict, caveats=_caveats(verdict, model, budget, max_seconds, beside))
+
+
+def _unexplained(study: Study, found: Attribution) -> bool:
+    return found.verdict(study.level) == "unexplained" or not study.model.runs.noise_known
+
+
+def _law_is_wanted(study: Study, found: Attribution) -> bool:
+    """Tell whether a law may describe what nothing explains, or imitate an uncertain claim."""
+    uncertain = any(claim.doubts for claim in found.claims)
+    return study.model.runs.noise_known and (_unexplained(study, found) or uncertain)
 
 
 def _beside_what_no_law_is_sought(study: Study, model: Experiment) -> str:
@@ -192,15 +170,26 @@ def _beside_what_no_law_is_sought(study: Study, model: Experiment) -> str:
     return "" if study.model is model else "a number that differs in some runs"
 
 
-def _both_intervals(
-    study: Study, found: Attribution, *, progress: bool
-) -> tuple[dict[str, tuple[float, float]], dict[str, tuple[float, float]]]:
+def _rivals(study: Study, found: Attribution, laws: Description | None) -> tuple[Hypothesis, ...]:
+    """List what the runs cannot tell apart, laws last; none if there are not two."""
+    rivals = found.explanations
+    if laws and found.verdict(study.level) == "unexplained":
+        rivals = laws.rivals
+    elif laws and any(claim.doubts for claim in found.claims):
+        rivals = (*rivals, *laws.as_good_as(found.final)[:_LAWS_TOLD_APART])
+    if len(rivals) < 2:
+        return ()
+    # The next runs are not weighted, so they have the noise of any run.
+    fits = [replace(rival.fitted, noise=noise_of_any_run(study, rival.fitted.noise)) for rival in rivals]
+    return tuple(replace(rival, fit=fit) for rival, fit in zip(rivals, fits, strict=True))
+
+
+def _both_intervals(study: Study, found: Attribution, *, progress: bool) -> tuple[Intervals, Intervals]:
     """Compute the 95 % intervals of the calibrated model, and of the final one."""
     title = "intervals" if progress else ""
-    base = final = _intervals(study.model, found.base, study.split.fitted, title)
+    base = final = _intervals(found.base, study.split.fitted, title)
     if found.final is not found.base:
-        model = found.nearest.model if found.nearest else study.model
-        final = _intervals(model, found.final, study.split.fitted, title)
+        final = _intervals(found.final, study.split.fitted, title)
     b = birge(study.model.runs, found.final, study.split.fitted)
     for effect in (e for e in study.model.effects if e.name in final):
         low, high = final[effect.name]
@@ -209,27 +198,17 @@ def _both_intervals(
             if end is not None:
                 final[effect.name] = (end, high) if end > effect.start else (low, end)
     if found.nearest:
-        final[found.nearest.effect.name] = found.nearest.interval
+        final[found.nearest.effect.name] = size_interval(found.nearest)
     return base, final
 
 
-def _forms(study: Study, found: Attribution) -> tuple[Form, ...]:
-    """List the forms that left-out runs cannot tell from what is claimed or adopted; none if it stands alone."""
-    if found.best and skipped("forms of what is claimed"):
-        return ()
-    if found.nearest:
-        forms: Sequence[Form] = found.nearest.forms
-    else:
-        forms = forms_of_claims(study, found.base, found.best, found.candidates) if found.best else ()
-    return tuple(forms) if len(forms) > 1 else ()
-
-
-def _refuted_claim(study: Study, found: Attribution) -> Withdrawn | None:
-    """Return the claim that the held-out runs refute; None if there is none."""
-    claim = found.best[0] if found.best else None
-    if claim is None or claim.refit is None:
-        return None
-    return refuted(study, found.base, claim.refit, claim.title, tuple(e.name for e in claim.claimed))
+def _over_forms(study: Study, found: Attribution, intervals: Intervals) -> Intervals:
+    """Widen the intervals of numbers by those that they have with other forms."""
+    wider = {}
+    for name, (low, high) in envelope(study, found.base.names, found.forms).items():
+        if name in intervals:
+            wider[name] = (min(low, intervals[name][0]), max(high, intervals[name][1]))
+    return {**intervals, **wider}
 
 
 def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any) -> tuple[Study, Fit, Floats]:
@@ -248,134 +227,30 @@ def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any)
     return *fit_weighted(study, model.guess(start, study.split.fitted)), given
 
 
-def _explain_with_moves(study: Study, base: Fit) -> tuple[Study, Attribution, tuple[LocalShift, ...]]:
-    """Explain the residual, with numbers that differ in some runs, unless effects do without them as well.
-
-    Such numbers are looked for before the effects, and again beside those that are named, or, where nothing
-    explains the residual, beside those that come nearest.
-    """
-    if not study.model.runs.noise_known:  # a guess cannot tell what is beyond noise
-        return study, explain(study, base), ()
-    moved, with_moves, moves = find_moves(study, base)
-    beside_moves = explain(moved, with_moves) if moves else None
-    explained = explain(study, base)
-    if beside_moves:
-        if explained.best and explained.final.deviance < with_moves.deviance + INDISTINGUISHABLE:
-            return study, explained, ()
-        return moved, beside_moves, moves
-    named = explained.final if explained.best else explained.unkept
-    if named:
-        moved, beside, moves = find_moves(study, named)
-        if moves and not skipped("effects beside what differs between runs"):
-            changes = {move.name: beside.parameters[move.name] for move in moves}
-            start, names = {**base.parameters, **changes}, (*base.names, *changes)
-            with_moves = fit(moved.model, start, names, study.split.fitted, title="")
-            beside_moves = explain(moved, with_moves)
-            if explained.best or beside_moves.best:
-                return moved, beside_moves, moves
-    return study, explained, ()
-
-
-def _fit_moves(study: Study, plain: Experiment, found: Attribution) -> tuple[Fit | None, tuple[LocalShift, ...]]:
-    """Fit the final model to all runs, with the numbers that differ in some of them; None if none does."""
-    if not groups_that_may_differ(plain.runs) or not plain.runs.noise_known:
-        return None, ()
-    final = found.base if found.nearest else found.final
-    names = tuple(name for name in final.names if name in start_values(plain))
-    every = Study.fitted_to(plain, study.split.kept, level=study.level, seed=study.seed)
-    _, fitted, moves = find_moves(every, fit(plain, final.parameters, names, study.split.kept, title=""))
-    return fitted if moves else None, moves
-
-
-def explain(study: Study, base: Fit) -> Attribution:
-    """Test the residual of the fit without effects, and look for what explains it, from the simplest on."""
-    model, level = study.model, study.level
-    began = clock()
-    title = "derivatives" if study.progress else ""
-    tangents = directions(model, base.parameters, study.effects, title=title)
-    derived = clock()
-    misfit = examine_residual(study, base, tangents)
-    tested = clock()
-    if misfit.p_value >= level or not model.runs.noise_known:
-        scored = tuple(unexamined(misfit, study.effects, misfit.critical_z))
-        return Attribution(base, misfit, tangents, scored, noise_known=model.runs.noise_known)
-    freed = without_wrong_priors(study, base)
-    number_is_wrong = freed is not base
-    number_explains = number_is_wrong and examine_residual(study, freed, tangents).p_value >= level
-    threshold = misfit.critical_z
-    if number_is_wrong:  # every effect that may explain as much as the wrong number does
-        gain = base.deviance - freed.deviance
-        threshold = min(threshold, math.sqrt(max(gain - INDISTINGUISHABLE, 1.0)))
-
-    def forecast(count: int, seconds: float) -> None:
-        if study.progress:
-            single = count * max(seconds, _SHARE_OF_TEST * (tested - derived))
-            print(_forecast(count, single, FIRST * (tested - began + single)), file=sys.stderr)
-
-    candidates = examine(study, base, misfit, tangents, threshold=threshold, after_first=forecast)
-    best = explaining(candidates)
-    refit = best[0].refit if best else None
-    if number_explains and not (refit and refit.deviance < freed.deviance - INDISTINGUISHABLE):
-        return _explained_by_number(study, Attribution(base, misfit, tangents, tuple(candidates)), freed)
-    # From the simplest on: one effect, one beside a wrong number, two effects.
-    best = best or explaining(beside_wrong_numbers(study, base, candidates, tangents))
-    second = [] if best else pairs(study, candidates)
-    best = best or explaining(second)
-    tried = [(ebic(study, c.refit, len(c.claimed)), c.refit) for c in (*candidates, *second) if c.refit]
-    unkept = min(tried, key=lambda each: each[0])[1] if tried and not best else None
-    checked = tuple(with_checks(study, best, base))
-    return Attribution(base, misfit, tangents, tuple(candidates), checked, unkept=unkept)
-
-
-def _explained_by_number(study: Study, found: Attribution, freed: Fit) -> Attribution:
-    """Name a wrong number, `freed` in a fit, unless an effect explains as much and it is implausibly far off."""
-    rival_effects = tuple(as_good_as_number(list(found.candidates), freed, study.level))
-    claims = [c for c in rival_effects if c.kept]
-    off = tuple(p for p in pulls(freed, study.model.nuisances) if p.freed)
-    if claims and implausible(off):
-        checked = tuple(with_checks(study, claims, found.base))
-        return replace(found, best=checked, number=freed, rival_numbers=off)
-    check = check_number(study, freed, found.base)
-    return replace(found, number=freed, rival_effects=rival_effects, number_check=check)
-
-
-def _forecast(count: int, single: float, pairs_at_most: float) -> str:
-    """Say how many seconds of processor time `count` effects take, and pairs."""
-    ends = f"; the search ends after {_duration(seconds_left())}" * (seconds_left() < math.inf)
-    return (
-        f"there is more than noise: {count} effects to fit take {_duration(single)} of processor time; if none "
-        f"explains the runs, pairs follow, {_duration(pairs_at_most)} at most, mostly much less{ends}"
-    )
-
-
-def _duration(seconds: float) -> str:
-    return f"{max(seconds, 1):.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
-
-
-def _intervals(model: ForwardModel, fitted: Fit, used: Flags, title: str) -> dict[str, tuple[float, float]]:
+def _intervals(fitted: Fit, used: Flags, title: str) -> Intervals:
     """Compute 95 % intervals by profile deviance; by the covariance where the model breaks down at their ends."""
     try:
         if not skipped("intervals by profile deviance", 2 * len(fitted.names)):
-            return profile_intervals(model, fitted, used, title=title)
+            return profile_intervals(fitted.model, fitted, used, title=title)
     except InputError:
         pass
     return {name: fitted.interval(name) for name in fitted.names}
 
 
-def _handed_on(study: Study, found: Attribution, *, falls: bool) -> FinalRefit:
+def _handed_on(study: Study, found: Attribution, errors: HeldOutErrors) -> FinalRefit:
     """Fit the final model to all runs, an adopted form only where it lowers the error on the held-out ones."""
-    nearest, final = found.nearest, found.final
-    if nearest and not falls:
-        nearest, final = None, found.base
+    adopted, final = found.nearest, found.final
+    if adopted and not errors.fall:
+        adopted, final = None, found.base
     try:
         of_all = final.refitted_fully(study.split.kept)
     except (UnsolvedError, InputError):  # where the model breaks down on the way
         of_all = final.refitted(study.model.runs, study.split.kept)
     refit = final_refit(of_all)
-    return nearest.handed_on(refit) if nearest else refit
+    return for_new_specimen(adopted, refit) if adopted else refit
 
 
-def _next_runs(rivals: tuple[Rival, ...], seed: int) -> dict[str, Any]:
+def _next_runs(rivals: tuple[Hypothesis, ...], seed: int) -> dict[str, Any]:
     """Plan the runs that would tell rivals apart; none without rivals, or if one breaks down at such runs."""
     with suppress(InputError):
         if rivals and not skipped("next runs"):
@@ -389,106 +264,32 @@ def _errors(study: Study, found: Attribution, uncalibrated: Floats, laws: Descri
     predictions = {"uncalibrated": uncalibrated, "before": base.prediction, "after": final.prediction}
     if laws is not None:
         predictions["law"] = laws.prediction
-    if found.nearest and found.nearest.sizes:
+    if found.nearest and found.nearest.evidence.sizes:
         with suppress(InputError):  # the simulation may break down at the mean size
-            predictions["new_specimen"] = found.nearest.of_new_specimen()
+            predictions["new_specimen"] = of_new_specimen(found.nearest)
     return held_out_errors(study, predictions, base, final)
 
 
-def _adopt_in_turns(
-    study: Study, found: Attribution
-) -> tuple[Attribution, tuple[LoopTurn, ...], tuple[Withdrawn, ...]]:
-    """Adopt the nearest form, and, where something is still missing with it in the base, a further one beside it.
-
-    A form that the held-out runs refute is withdrawn, and another one is looked for. Where the noise is unknown,
-    no pair of effects can explain the residual, so pairs of forms compete with the single ones.
-    """
-    runs, test, tangents, misfit = study.model.runs, study.split.test, found.tangents, found.misfit
-    base, candidates = found.base, found.candidates
-    turns = [LoopTurn(errors(runs, base.prediction, test)[0], "", largest_along(misfit, runs))]
-    withdrawn: list[Withdrawn] = []
-    while len(turns) <= _MOST_TURNS:
-        form, candidates = adopt_nearest(study, base, misfit, candidates, tangents)
-        first = None
-        if len(turns) == 1:
-            seen = {c.effect.name: c for c in (*found.candidates, *candidates)}
-            found = replace(found, candidates=tuple(seen.values()))
-            if not runs.noise_known:
-                first, form = _nearest_pair(study, base, candidates, form)
-        if form is None:
-            break
-        place = next(i for i, e in enumerate(study.effects) if e.name == form.effect.name)
-        names = (*([first.effect.name] if first else []), form.effect.name)
-        title = " and ".join((*([first.title] if first else []), form.effect.title))
-        study = replace(study, settled=study.settled | set(names))
-        refutation = refuted(study, base, form.fit, title, names)
-        if refutation and first:
-            withdrawn.append(refutation)
-            break
-        if refutation:
-            withdrawn.append(refutation)
-            tangents, candidates = tangents.without(place), tuple(c for c in candidates if c.effect != form.effect)
-            misfit = misfit.without(place)
-            continue
-        found = replace(found, nearest=form)
-        if first and first.refit:
-            turns.append(
-                LoopTurn(errors(runs, first.refit.prediction, test)[0], first.title, largest_along(misfit, runs))
-            )
-        assert form.misfit is not None
-        beyond = form.misfit.p_value < study.level or not runs.noise_known
-        left = form.largest_along if beyond else ""
-        turns.append(LoopTurn(errors(runs, form.fit.prediction, test)[0], form.effect.title, left))
-        if form.sizes or not left:  # sizes that differ between specimens describe what is left by themselves
-            break
-        base, misfit = form.fit, form.misfit
-        tangents = directions(study.model, base.parameters, study.effects)
-        candidates = tuple(unexamined(misfit, study.effects, misfit.critical_z))
-    return found, tuple(turns) if found.nearest else (), tuple(withdrawn)
-
-
-def _nearest_pair(
-    study: Study, base: Fit, candidates: Sequence[Candidate], single: AdoptedForm | None
-) -> tuple[Candidate | None, AdoptedForm | None]:
-    """Find two forms that together predict left-out runs better than a single one; else return that one alone."""
-    pairs_of_forms = []
-    for first in candidates:
-        if first.refit is None or not first.refit.converged:
-            continue
-        beside = replace(study, settled=study.settled | {first.effect.name})
-        tangents = directions(study.model, first.refit.parameters, beside.effects)
-        misfit = examine_residual(beside, first.refit, tangents)
-        scored = unexamined(misfit, beside.effects, misfit.critical_z, (first.effect,))
-        form = adopt_nearest(beside, first.refit, misfit, scored, tangents)[0]
-        if form and paired_gain(study, form.fit, single.fit if single else base).certain:
-            pairs_of_forms.append((first, form))
-    best = min(pairs_of_forms, key=lambda pair: pair[1].fit.deviance, default=None)
-    if best is None or (single and single.effect in (best[0].effect, best[1].effect)):  # a turn adds the other one
-        return None, single
-    return best
-
-
 def _caveats(
-    verdict: Verdict, model: ForwardModel, budget: Budget, max_seconds: float, beside: str
+    study: Study, model: ForwardModel, found: Attribution, budget: Budget, max_seconds: float, beside: str
 ) -> tuple[str, ...]:
     """Say what weakens the conclusion: what was left out or not tried, and why a fit may not be the best one."""
-    runs, split, base, final = verdict.runs, verdict.split, verdict.base, verdict.final
+    runs, split, base, final = model.runs, study.split, found.base, found.final
     ended = f"after {max_seconds:.0f} s of processor time" if budget.left > -math.inf else "at Ctrl-C"
     not_tried = f"provisional: the search ended {ended}, and did not try {', '.join(budget.not_tried)}"
-    little = verdict.little_weight
+    little = rows_of_little_weight(study)
     held = [p for p, on_bound in zip(final.fitted, final.held, strict=True) if on_bound]
-    far = far_readings(
-        with_runs(model, weight=None).runs.subset(split.kept), (runs.y - final.prediction)[split.kept]
-    )
+    unweighted = with_runs(model, weight=None).runs.subset(split.kept)
+    far = far_readings(unweighted, (runs.y - final.prediction)[split.kept])
     vague = [
         p.name
-        for place, p in enumerate(final.fitted)
-        if p.logarithmic and p.sigma is None and final.half_width(place) > math.log(2) and p not in held
+        for index, p in enumerate(final.fitted)
+        if p.logarithmic and p.sigma is None and final.half_width(index) > math.log(2) and p not in held
     ]
     outside = not coefficients_within_range(model, base.parameters)
     unknown = "there are neither repeats nor a declared noise, so no residual can be told from noise"
     of_fits = (
-        (not verdict.runs.noise_known, unknown),
+        (not runs.noise_known, unknown),
         (beside, f"no law was looked for: laws are not fitted beside {beside}"),
         (vague, f"these runs determine {' and '.join(vague)} to no better than a factor of two"),
         (outside, "without effects the coefficients run to the end of their range, so every effect was refitted "
@@ -497,7 +298,7 @@ def _caveats(
     )  # fmt: skip
     return (
         *runs.caveats,
-        *caveat_of_excluded(verdict.excluded, verdict.rows),
+        *caveat_of_excluded((*runs.excluded, *split.outliers), len(runs) + count_of_rows(runs.excluded)),
         *split.caveats,
         *([not_tried] if budget.not_tried else []),
         *caveat_of_weights(little, int(split.kept.sum()), alike(runs, little)),

@@ -1,7 +1,7 @@
 """Numbers of a calibration as people read them: outputs, nuisance parameters and sizes, in the lab's units.
 
 Outputs that are compared as ratios are logarithms inside a calibration: their residuals are relative. The record
-(`calibration.verdict.record`) has titles of outputs, and factors and units of their residuals. That of a nuisance
+(`calibration.findings.record`) has titles of outputs, and factors and units of their residuals. That of a nuisance
 parameter or of an effect has the `unit` in which it is shown, and the factor to it, `shown`.
 """
 
@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from calibration.attribution.refits import UNSEEN
+from calibration.attribution.rules import UNSEEN
+from calibration.statistics.fit import two_digits
 
 Record = Mapping[str, Any]  # a part of verdict.json, or all of it
 
@@ -92,6 +93,20 @@ def difference_in_words(record: Record, difference: Record) -> str:
         changes = "changes by ±" if where.startswith("over ") else "falls by" if size < 0 else "rises by"
         words = f"the {output_label(record, output)} {changes} {by} {where}"
     return f"{words} ({difference['z']:.1f} σ)"
+
+
+def move_in_words(move: Record, title: str, shown: float, unit: str) -> str:
+    """Say by how much a number differs in some runs, with its 95 % interval; `title` says where, too.
+
+    Args:
+        shown: factor to the `unit` in which the number is shown.
+    """
+    sizes = np.array([move["change"], *move["interval"]])
+    sizes, unit = (100 * np.expm1(sizes), "%") if move["scale"] == "logarithm" else (sizes * shown, unit)
+    value, low, high = map(two_digits, (abs(float(sizes[0])), *sorted(np.abs(sizes[1:]).tolist())))
+    others = f", or {' or '.join(move['instead'])} differs" if move["instead"] else ""
+    side, sigmas = "above" if sizes[0] > 0 else "below", abs(move["score"])
+    return f"{title} is {value} {unit} ({low} to {high}) {side} that of the other runs ({sigmas:.1f} σ){others}"
 
 
 def plain(value: float, digits: int = 3) -> str:

@@ -15,7 +15,6 @@ from calibration.statistics.forward import by_differences, derivatives
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import start_values
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.record import facts, verdict_record
 from calibration.verdict.verdict import Verdict
 from calibration.words.render import next_steps
 from softflagella.__main__ import main
@@ -84,13 +83,15 @@ def test_a_form_whose_size_differs_is_adopted_and_not_claimed() -> None:
     assert nearest.effect.name == "linear_drag"
     assert result.error_after < 1.5 * result.noise_ceiling < 0.5 * result.error_before
     true_sizes = 0.4 * np.exp(0.6 * hidden_normals(3))
-    low, high = nearest.interval
+    low, high = nearest.evidence.interval
     assert low < np.exp(np.log(true_sizes).mean()) < high
-    inside = [low < size < high for size, (_, low, high) in zip(true_sizes, nearest.sizes.values(), strict=True)]
+    inside = [
+        low < size < high for size, (_, low, high) in zip(true_sizes, nearest.evidence.sizes.values(), strict=True)
+    ]
     assert sum(inside) >= len(inside) - 2
     refit = result.final_refit  # of a new specimen: the mean size, with the spread in its variance
     place = [p.name for p in refit.fitted].index("linear_drag")
-    assert refit.covariance[place, place] > (nearest.spread * refit.parameters["linear_drag"]) ** 2
+    assert refit.covariance[place, place] > (nearest.evidence.spread * refit.parameters["linear_drag"]) ** 2
     assert not any(" of " in name for name in refit.parameters)
 
 
@@ -126,11 +127,11 @@ def test_a_form_that_the_held_out_runs_refute_is_withdrawn() -> None:
     ruined = replace(model, runs=replace(model.runs, y=np.where(test[:, None], model.runs.y + 0.9, model.runs.y)))
     result = calibrate(ruined, draws=200, progress=False)
     assert (result.verdict, result.nearest) == ("unexplained", None)
-    assert next(claim.effects for claim in result.withdrawn) == ("linear_drag",)
-    assert all(claim.after > claim.before for claim in result.withdrawn)
-    assert facts(result)["withdrawn"][0]["on"] == result.split.names
+    first, *_ = withdrawn = result.facts["withdrawn"]
+    assert (first["effects"], first["on"]) == (["linear_drag"], result.split.names)
+    assert all(claim["error_after"] > claim["error_before"] for claim in withdrawn)
     assert "linear_drag" not in {p.name for p in result.final_refit.fitted}
-    assert next_steps(facts(result)) != next_steps(facts(differing()))
+    assert next_steps(result.facts) != next_steps(differing().facts)
 
 
 @pytest.mark.parametrize("truth", [*NULLS, *OUTSIDE])
@@ -138,7 +139,7 @@ def test_nothing_is_adopted_where_no_form_is_like_it(truth: str) -> None:
     for seed in (0, 1):
         result = verdict(truth, seed, without=("quadratic_drag",))
         assert result.nearest is None
-        assert verdict_record(result, table="t")["nearest"] is None
+        assert result.to_dict()["nearest"] is None
 
 
 @pytest.mark.parametrize("truth", ["linear drag, one rate", "quadratic drag, one C_D"])

@@ -17,7 +17,6 @@ from calibration.statistics.fit import fit, profile_intervals
 from calibration.statistics.gls import Noise
 from calibration.statistics.statistical_model import start_values
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
 from common.arrays import Floats, Integers
 from tests.oracles.falling_balls import SPHERES_MODEL
@@ -103,14 +102,14 @@ def twins(truth: dict[str, float], seed: int) -> Verdict:
     result = calibrate(small_beads(truth, seed), progress=False)
     assert result.verdict == "ambiguous"
     assert set(result.effects) == {"wall", "inertia"}
-    assert [len(c.claimed) for c in result.explaining] == [1, 1]
+    assert [len(c.added) for c in result.claims] == [1, 1]
     assert "wall of the vessel" in result.sentence
     assert "inertia of the fluid" in result.sentence
     wanted = result.next_runs
     assert [r.separation for r in wanted] == sorted((r.separation for r in wanted), reverse=True)
     assert wanted[0].settings["diam_mm"] > 5.5
     assert all(0.5 < r.decides <= 1 for r in wanted)
-    assert verdict_record(result, table="t")["next_runs"] == [r.record() for r in wanted]
+    assert result.to_dict()["next_runs"] == [r.record() for r in wanted]
     return result
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from calibration.attribution import moves
 from calibration.laws import laws
 from calibration.laws.laws import Laws, find_laws
 from calibration.laws.places import place_named
-from calibration.report.robot_verdict import RobotVerdict
+from calibration.robot.robot_verdict import RobotVerdict
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import Study
@@ -138,7 +138,8 @@ def number() -> Verdict:
 
 def verdict_of(verdict: Verdict) -> RobotVerdict:
     """The verdict with its robot."""
-    return RobotVerdict(**vars(verdict), robot=START, table="runs.csv")
+    given = {f.name: getattr(verdict, f.name) for f in fields(verdict)}
+    return RobotVerdict(**(given | {"table": "runs.csv"}), robot=START)
 
 
 @contextmanager

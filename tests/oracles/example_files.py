@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from calibration.findings.next_runs import Explanation
 from calibration.statistics.gls import Noise
-from calibration.verdict.next_runs import Explanation
 from common.provenance import fingerprint
 from dataset.data_set import sweep_key
 from dataset.schema import rows_version

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from calibration.findings.next_runs import read_explanations
 from calibration.swimmer.measured_table import read_measurements
-from calibration.verdict.next_runs import read_explanations
 from camera.measured_runs import measure_tracks
 from camera.pose_tracks import read_tracks
 from camera.track_options import Source

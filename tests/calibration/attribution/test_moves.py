@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 from calibration.attribution.moves import find_moves, groups_that_may_differ
-from calibration.report.robot_verdict import RobotVerdict
+from calibration.robot.robot_verdict import RobotVerdict
 from calibration.statistics.fit import fit
 from calibration.statistics.forward import by_differences, derivatives
 from calibration.statistics.gls import repeat_count, repeat_covariance
@@ -24,7 +24,6 @@ from calibration.statistics.study import Study
 from calibration.statistics.weights import alike
 from calibration.swimmer.influences import CURRENT
 from calibration.swimmer.measured_table import read_measurements
-from calibration.verdict.record import facts, verdict_record
 from calibration.words.render import next_steps
 from common.arrays import Floats
 from common.units import Sigma
@@ -117,7 +116,7 @@ def test_a_coefficient_that_differs_on_a_day_is_named(day: int) -> None:
     result = moved_on(day, C_r=0.8 * TRUTH.C_r)
     assert result.effects == ()
     assert len(result.moves) == 1
-    record = result.moves[0].record
+    (record,) = result.facts["moves"]
     assert (record["number"], record["where"]) == ("C_r", f"in session day {day}")
     low, high = record["interval"]
     assert low < np.log(0.8) < high
@@ -125,10 +124,10 @@ def test_a_coefficient_that_differs_on_a_day_is_named(day: int) -> None:
     held_out = "The held-out runs (day 3) do not agree with the model"
     assert result.sentence.startswith(held_out if day == 3 else "C_r in session day 2 is ")
     assert f"C_r in session day {day} is" in result.sentence
-    advice, first, *_ = next_steps(facts(result))
+    advice, first, *_ = next_steps(result.facts)
     assert first.startswith(f"Find out what changed in session day {day}")
     assert advice.startswith("Plan with the corrected robot")
-    assert verdict_record(result, table="t")["moves"] == [{"words": result.moves[0].words, **record}]
+    assert result.to_dict()["moves"] == [record]
 
 
 def test_rows_of_little_weight_are_looked_at_together() -> None:
@@ -163,9 +162,9 @@ def test_another_robot_is_named() -> None:
         turned = in_days(table.iloc[::-1].reset_index(drop=True))
         result = calibrate(turned, KNOWN, laws=False, progress=False)
     assert result.effects == ()
-    (move,) = result.moves
-    assert re.search(r"on specimen [AB] is 1", move.words)
-    assert "C_yr on specimen" in move.words
+    (move,) = result.facts["moves"]
+    assert re.search(r"on specimen [AB] is 1", move["words"])
+    assert "C_yr on specimen" in move["words"]
 
 
 def _along_and_left(course: Floats) -> Floats:
@@ -185,7 +184,8 @@ def test_a_camera_that_turns_on_a_day_is_named_whether_that_day_is_held_out_or_f
     table["course_deg"] = course + turn * (table["session"] == f"day {day}")
     result = calibrated(table, few=(*CURRENT, DRAG))
     assert set(result.effects) == set(CURRENT)
-    ((words, record),) = result.moves
+    (record,) = result.facts["moves"]
+    words = record["words"]
     assert (record["number"], record["where"]) == ("course_zero", f"in session day {day}")
     assert abs(record["change"]) == pytest.approx(math.radians(turn), abs=0.2)
     assert words.startswith(f"zero of the course in session day {day} is")
@@ -229,4 +229,4 @@ def test_a_number_with_a_grid_is_no_move_by_the_score_of_another(size: float, mo
     model = replace(plain, runs=replace(plain.runs, sigma=np.array([0.02])))
     study = Study.fitted_to(model, np.ones(len(ROUND), dtype=bool))
     base = fit(model, start_values(model), ("v1", "slope", "zero"), study.split.fitted, title="")
-    assert [move.name for move in find_moves(study, base)[2]] == moved
+    assert [move.effect.name for move in find_moves(study, base)[2]] == moved

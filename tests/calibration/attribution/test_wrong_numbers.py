@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import binom
 
 import calibration.attribution.claim_checks
-from calibration.attribution import wrong_numbers
+from calibration.attribution import rules
 from calibration.attribution.claim_checks import (
     SEEN,
     absorbable_shares,
     imitability,
     transfer_p,
 )
-from calibration.attribution.refits import IMITABLE, SURE, Candidate, ebic
+from calibration.attribution.effects import ebic
+from calibration.attribution.hypothesis import Evidence, Hypothesis, Origin, Reason
+from calibration.attribution.rules import IMITABLE, RULES, SURE, Trial, doubted
 from calibration.attribution.wrong_numbers import notable_pull, pulls
-from calibration.report.corrected_robot import corrected_robot
+from calibration.robot.corrected_robot import corrected_robot
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.forward import by_differences, derivatives
 from calibration.statistics.statistical_model import parameter, start_values
@@ -29,8 +30,8 @@ from calibration.swimmer.influences import CAMERA, HEADING, LENGTH, TACHOMETER
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import COEFFICIENTS, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
+from calibration.verdict import explain
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.record import verdict_record
 from common.arrays import Flags, Floats
 from common.errors import InputError
 from common.units import Sigma
@@ -100,7 +101,7 @@ def test_a_claim_that_does_not_carry_over_says_so(monkeypatch: pytest.MonkeyPatc
         uncertain = calibrate(planted(2.0), draws=FEW_DRAWS, progress=False)
     assert uncertain.effects == (DRAG,)
     assert "or something outside the catalogue" in uncertain.sentence
-    assert verdict_record(uncertain, table="")["transfer_p"] == [0.001]
+    assert uncertain.to_dict()["transfer_p"] == [0.001]
 
 
 def test_an_effect_beside_a_wrong_number_is_in_doubt_and_pairs_pay_for_their_number() -> None:
@@ -108,13 +109,11 @@ def test_an_effect_beside_a_wrong_number_is_in_doubt_and_pairs_pay_for_their_num
     model = PLAIN
     refit = claimed(planted(1.0))
     effect = parameter(model, DRAG)
-    sure = Candidate(effect, (effect,), 8.0, 1.0, 1.0, 1.0, "kept", refit, None, 1.0, 0.1)
-    pull: Any = object()
-    freed = replace(refit, wrong_numbers=((pull,),))
-    assert not sure.uncertain
-    assert replace(sure, claimed=(parameter(model, "disc_drag"), effect)).uncertain
-    assert replace(sure, refit=freed).uncertain
-    study = Study.fitted_to(model, EVERY)
+    study, pull = Study.fitted_to(model, EVERY), object()
+    freed = replace(refit, wrong_numbers=((pull,),))  # type: ignore[arg-type]
+    sure = Hypothesis(Origin.EFFECT, (effect,), refit, Evidence(imitable=0.0, transfer=0.5), Reason.KEPT)
+    assert doubted(sure, Trial(study, refit), RULES).doubts == ()
+    assert doubted(replace(sure, origin=Origin.PAIR), Trial(study, refit), RULES).doubts == (Reason.ONE_OF_MANY,)
     cost = ebic(study, refit, 2) - ebic(study, refit, 1)
     assert cost == pytest.approx(2 * math.log((len(model.effects) - 1) / 2))
     assert ebic(study, freed, 2) - ebic(study, refit, 2) == pytest.approx(math.log(study.values))
@@ -194,7 +193,7 @@ def test_a_number_beyond_its_tolerance_is_a_finding_of_its_own() -> None:
     assert CAMERA in {p.parameter.name for p in result.wrong_numbers[0]}
     assert result.sentence.startswith("The runs ask for another value of a nuisance parameter: ")
     assert "No effect is claimed." in result.sentence
-    record = verdict_record(result, table="t")
+    record = result.to_dict()
     assert record["wrong_numbers"][0] == [p.parameter.name for p in result.wrong_numbers[0]]
     assert result.error_after < 1.25 * result.noise_ceiling
 
@@ -217,16 +216,17 @@ def test_a_number_far_beyond_its_tolerance_is_behind_an_effect(monkeypatch: pyte
     assert result.effects == ("end_over_end_drag",)
     (rival,) = result.found.rival_numbers
     assert rival.parameter.name == "head_length"
-    assert rival.tolerances > wrong_numbers.IMPLAUSIBLE
+    assert rival.tolerances > rules.IMPLAUSIBLE
     assert f"L (head length) that is {rival.departure} (9 of its tolerances)" in result.sentence
     assert result.sentence.index("end-over-end drag") < result.sentence.index("head length")
     titles = [e.title for e in result.explanations]
     assert titles == ["head's end-over-end drag", "the stated value of L (head length) is wrong"]
-    record = verdict_record(result, table="t")
+    record = result.to_dict()
     assert record["numbers_instead"] == ["head_length"]
     assert record["wrong_numbers"] == []
     assert record["next_steps"][2].startswith("Measure L (head length) again")
-    monkeypatch.setattr(wrong_numbers, "IMPLAUSIBLE", 2 * rival.tolerances)
+    for module in (rules, explain):
+        monkeypatch.setattr(module, "IMPLAUSIBLE", 2 * rival.tolerances)
     ahead = calibrated(table, few=True)
     assert ahead.verdict == "number"
     assert [c.effect.name for c in ahead.found.rival_effects] == ["end_over_end_drag"]

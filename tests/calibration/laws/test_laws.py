@@ -11,11 +11,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.attribution.hypothesis import Hypothesis, Reason
 from calibration.laws.law_model import LEVER, SIZE, LawModel, moved_parameter, with_law
-from calibration.laws.laws import UNDETERMINED, FittedLaw, Rejection
+from calibration.laws.laws import UNDETERMINED, elsewhere, gain
 from calibration.laws.places import in_common, place_named, places
 from calibration.laws.readings import EXPONENTS, in_words, logarithms, motion_patterns, readings
-from calibration.report.corrected_robot import law_handed_on, robot_with_law
+from calibration.robot.corrected_robot import law_handed_on, robot_with_law
 from calibration.statistics.forward import by_differences, derivatives
 from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import errors
@@ -85,7 +86,7 @@ def test_derivatives_are_those_by_differences() -> None:
 )
 def test_a_law_is_found_at_its_place_with_its_exponents(name: str, places: tuple[str, ...]) -> None:
     study, base, found = laws_of_toy(4, places=places, **LAWS[name])
-    kept = {law.place.name: law for law in found.kept}
+    kept = {law.model.place.name: law for law in found.kept}
     assert name in kept
     law = kept[name]
     (effect,) = LAWS[name]
@@ -94,10 +95,11 @@ def test_a_law_is_found_at_its_place_with_its_exponents(name: str, places: tuple
         margin = high - low  # the interval is one of 95 %
         assert low - margin / 2 < true < high + margin / 2
     without = errors(law.model.runs, base.prediction, study.split.test)[0]
-    assert law.error < min(0.7 * without, 1.2 * base.noise.rms)
+    assert law.evidence.held_out_error[0] < min(0.7 * without, 1.2 * base.noise.rms)
     assert "described by" in found.sentence
+    record = next(one for one in found.to_dict()["laws"] if one["place"] == name)
     speeds = toy_table(4)["omega_rpm"].abs()
-    assert law.to_dict()["runs"]["omega_rpm"] == pytest.approx([speeds.min(), speeds.max()])
+    assert record["runs"]["omega_rpm"] == pytest.approx([speeds.min(), speeds.max()])
     robot = robot_with_law(START, law, law.fit.parameters)  # it moves as the fit says
     runs = law.model.robots(law.fit.parameters)
     for row in (0, 17):
@@ -142,14 +144,14 @@ def test_a_law_depends_on_what_the_table_notes() -> None:
     table = pd.concat(tables, ignore_index=True).assign(run=range(1, 1 + sum(map(len, tables))))
     study, _, found = laws_of(table, PLACES)
     law = found.kept[0]
-    assert law.place.name == "Cyr"
+    assert law.model.place.name == "Cyr"
     low, high = law.fit.interval("law_temperature_K")
     assert low < WARMER < high < 2 * WARMER
     assert "an exponential of the temperature" in law.words
     assert "per K" in law.words
     robot = law_handed_on(START, law, study.split.kept)[0]
     assert robot.C_yr == pytest.approx(TRUTH.C_yr, rel=0.1)
-    again = with_law(toy_swimmer(toy_table(1)), law.model.record)  # a table that notes no temperature
+    again = with_law(toy_swimmer(toy_table(1)), law.law)  # a table that notes no temperature
     assert again.factor(law.fit.parameters) == pytest.approx(np.ones(len(again.runs)), rel=0.2)
 
 
@@ -166,7 +168,7 @@ def test_a_factor_in_the_speed_of_the_robot_is_read_from_the_inputs() -> None:
             robot = replace(TRUTH, C_yr=TRUTH.C_yr * float(swims / 4.0) ** -0.5)
         parts.append(toy_table(100 + seed, truth=robot, lengths_cm=(length,), design=cell))
     table = pd.concat(parts, ignore_index=True).assign(run=range(sum(map(len, parts))))
-    law = next(law for law in laws_of(table, PLACES).laws.kept if law.place.name == "Cyr")
+    law = next(law for law in laws_of(table, PLACES).laws.kept if law.model.place.name == "Cyr")
     power = re.search(r"\|v\|\^(-[\d.]+) \((-[\d.]+) to (-[\d.]+)\)", law.words)
     _, low, high = map(float, power.groups())
     assert low < -0.5 < high
@@ -175,9 +177,9 @@ def test_a_factor_in_the_speed_of_the_robot_is_read_from_the_inputs() -> None:
 @pytest.mark.slow
 def test_a_side_force_at_the_disc_says_how_far_from_it_it_may_act() -> None:
     laws = laws_of_toy(5, places=("Fx_wt", "Fx_wt_at_l"), law_Fx_wt_speed0_length0_tails1000=4.0).laws
-    law = next(law for law in laws.kept if law.place.name == "Fx_wt")
-    (behind,) = (one for one in law.elsewhere if one.place.name == "Fx_wt_at_l")
-    assert behind.reason is Rejection.NO_LEVER
+    law = next(law for law in laws.kept if law.model.place.name == "Fx_wt")
+    (behind,) = (one for one in elsewhere(law, laws.fitted) if one.model.place.name == "Fx_wt_at_l")
+    assert behind.reason is Reason.NO_LEVER
     low, high = behind.fit.interval(LEVER)
     assert low < 0.0 < high
     assert f"at the disc or up to {-low:.2f} l behind" in law.words
@@ -187,22 +189,26 @@ def test_what_the_runs_do_not_exclude_stays_in_the_set() -> None:
     """A law that fits better, but does not predict sessions, and one whose numbers the runs do not determine."""
     laws = laws_of_toy(4, **LAWS["Cyr"]).laws
     best = laws.kept[0]
-    worse = replace(best, place=place_named("Ct"), gain=best.gain - 1, gain_at_lever=best.gain - 1)
-    far = replace(worse, gain=best.gain - 10, gain_at_lever=best.gain - 10)
+    at_ct = replace(best.fit, model=replace(best.model, place=place_named("Ct")))
+    worse = replace(best, fit=at_ct).seen(bic_gain=gain(best) - 1)
+    far = worse.seen(bic_gain=gain(best) - 10)
 
-    def kept(*fitted: FittedLaw) -> list[str]:
-        return [law.place.name for law in replace(laws, fitted=fitted).kept]
+    def kept(*fitted: Hypothesis, price: float = 0.0) -> list[str]:
+        return [law.model.place.name for law in replace(laws, fitted=fitted, price=price).kept]
 
-    assert kept(replace(best, reason=Rejection.NOT_PREDICTIVE), worse) == ["Ct", "Cyr"]
+    def with_lever(law: Hypothesis) -> Hypothesis:
+        return replace(law, fit=replace(law.fit, names=(*law.fit.names, LEVER)))
+
+    assert kept(replace(best, reason=Reason.NOT_PREDICTIVE), worse) == ["Ct", "Cyr"]
     for reason in UNDETERMINED:
         assert kept(replace(best, reason=reason), worse) == ["Ct", "Cyr"]
         assert kept(best, replace(worse, reason=reason)) == ["Cyr", "Ct"]
         assert kept(best, replace(far, reason=reason)) == ["Cyr"]
-    assert kept(replace(best, reason=Rejection.NO_GAIN), worse) == ["Ct"]
-    assert kept(best, replace(worse, reason=Rejection.NOT_PREDICTIVE)) == ["Cyr"]
+    assert kept(replace(best, reason=Reason.NO_GAIN), worse) == ["Ct"]
+    assert kept(best, replace(worse, reason=Reason.NOT_PREDICTIVE)) == ["Cyr"]
     assert kept(best, far) == ["Cyr"]
-    assert kept(best, replace(far, gain_at_lever=best.gain - 4)) == ["Cyr", "Ct"]
-    assert kept(replace(best, gain_at_lever=best.gain + 7), worse) == ["Cyr", "Ct"]
+    assert kept(best, with_lever(far), price=6.0) == ["Cyr", "Ct"]
+    assert kept(with_lever(best), worse, price=7.0) == ["Cyr", "Ct"]
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,6 @@ from calibration.laws.laws import Laws
 from calibration.laws.places import places
 from calibration.laws.search import LinearModels, Search, search_p_value
 from calibration.report.report import sections
-from calibration.verdict.record import facts
 from common.arrays import Floats
 from tests.calibration.toy_tables import laws_of_toy, none
 
@@ -71,7 +70,7 @@ def test_a_law_is_beyond_all_draws_and_its_place_is_first() -> None:
 
 def in_report(laws: Laws) -> str:
     """The sections of a report with laws."""
-    record = facts(none()) | {"next_steps": [], "laws": {**laws.to_dict(), "beside": ""}, "path": None}
+    record = none().facts | {"next_steps": [], "laws": {**laws.to_dict(), "beside": ""}, "path": None}
     return " ".join(sections(record, {}).split())
 
 

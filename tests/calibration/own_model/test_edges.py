@@ -15,10 +15,9 @@ from scipy.optimize import minimize_scalar
 
 import softflagella as sf
 from calibration.attribution.claim_checks import transfer_p
-from calibration.attribution.refits import SURE
+from calibration.attribution.rules import SURE
 from calibration.statistics.fit import fit
 from calibration.statistics.study import Study, far_readings
-from calibration.verdict.record import facts
 from calibration.words.render import next_steps
 from tests.calibration.own_model.test_faults import hand_made
 from tests.calibration.statistics.test_fit import runs_of
@@ -67,14 +66,14 @@ def test_what_is_handed_on_at_a_bound_is_the_best_fit_there(lever: float, tmp_pa
     verdict.save(tmp_path)
     saved = json.loads((tmp_path / "corrected.json").read_text())
     assert saved["numbers"]["c"]["value"] == pytest.approx(best.x, rel=0.005)
-    assert saved["numbers"]["c"]["interval"] == facts(verdict)["parameters"]["c"]["interval"]
+    assert saved["numbers"]["c"]["interval"] == verdict.facts["parameters"]["c"]["interval"]
 
 
 def test_a_form_at_its_bound_that_leaves_more_than_noise_is_no_explanation() -> None:
     verdict = bar_verdict(-0.195)
     assert verdict.verdict == "partial"
     assert "consistent with" not in verdict.sentence
-    low, high = facts(verdict)["nearest"]["interval"]
+    low, high = verdict.facts["nearest"]["interval"]
     assert low == -0.1 < high < 0
     assert any(
         "lever is another (lever) is held at the end of its range, -0.1" in line for line in verdict.caveats
@@ -84,7 +83,7 @@ def test_a_form_at_its_bound_that_leaves_more_than_noise_is_no_explanation() -> 
 def test_within_its_range_the_same_effect_is_claimed() -> None:
     verdict = sf.calibrate(bent(-0.195), bar(-0.3), progress=False)
     assert verdict.effects == ("lever",)
-    low, high = facts(verdict)["parameters"]["lever"]["interval"]
+    low, high = verdict.facts["parameters"]["lever"]["interval"]
     assert low < -0.195 < high
 
 
@@ -122,7 +121,7 @@ def cooled(changed: Callable[[Any], Any] = lambda t: 0.0, seed: int = 2, **p: fl
 
 
 def named(verdict: sf.ModelVerdict) -> list[str]:
-    return [turn.named for turn in verdict.turns if turn.named]
+    return [turn.named for turn in verdict.found.turns if turn.named]
 
 
 def test_a_flat_valley_that_ends_at_a_bound_is_a_fit() -> None:
@@ -169,10 +168,10 @@ def test_as_given_is_not_advised_while_an_effect_halves_the_error() -> None:
     verdict = sf.calibrate(table, model, progress=False)
     assert not verdict.runs.noise_known
     assert named(verdict) == ["resistance of the ammeter"]
-    low, high = facts(verdict)["nearest"]["interval"]
+    low, high = verdict.facts["nearest"]["interval"]
     assert low < 100 < high
     assert verdict.advice == "corrected"
-    record = facts(verdict)
+    record = verdict.facts
     worse = {**record, "error_corrected": 1.0, "error_uncalibrated": 0.5}
     halved = replace(verdict, errors=replace(verdict.errors, rms={**verdict.errors.rms, "uncalibrated": 0.0}))
     assert halved.advice == "wait"

@@ -72,9 +72,7 @@ def test_a_round_that_is_ten_times_as_fast_can_be_declared_right() -> None:
     assert said(MODEL, table).endswith("; if it is right, declare its Output with unit_checked=True")
     checked = replace(MODEL, outputs={"v": sf.Output("speed", unit="m/s", unit_checked=True)})
     result = sf.calibrate(table, checked, session="round", progress=False)
-    assert [(move.record["number"], move.record["where"]) for move in result.moves] == [
-        ("v1", "in session round 2")
-    ]
+    assert [(move["number"], move["where"]) for move in result.facts["moves"]] == [("v1", "in session round 2")]
 
 
 def test_as_it_should_be_the_wall_is_named() -> None:

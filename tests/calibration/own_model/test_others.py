@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from calibration.verdict.record import facts
 from tests.oracles.others import MODELS, SETS, calibrated, named
 from tests.shared import shared
 
@@ -17,7 +16,7 @@ CAPILLARY = 0.1946  # Pa s, of the oil of 2019
 
 @shared
 def record(name: str) -> dict[str, Any]:
-    return facts(calibrated(name, SHIP if name == "ship" else None))
+    return calibrated(name, SHIP if name == "ship" else None).facts
 
 
 def falls(name: str) -> tuple[float, float]:

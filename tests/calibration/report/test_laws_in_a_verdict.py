@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration.attribution.refits import INDISTINGUISHABLE, Rival
+from calibration.attribution.rules import INDISTINGUISHABLE
+from calibration.findings.next_runs import BATCH, Explanation, next_runs, standings
 from calibration.laws.group_factors import group_factors
 from calibration.laws.law_model import SIZE, LawModel, with_law
 from calibration.laws.laws import Laws, find_laws
 from calibration.laws.places import place_named
 from calibration.laws.readings import EXPONENTS
-from calibration.report.corrected_robot import _slopes, check_given, robot_with_law
 from calibration.report.figures import draw_factors, draw_place
-from calibration.report.robot_verdict import RobotVerdict
+from calibration.robot.corrected_robot import _slopes, check_given, robot_with_law
+from calibration.robot.robot_verdict import RobotVerdict
 from calibration.statistics.study import final_refit
-from calibration.verdict.next_runs import BATCH, Explanation, next_runs, standings
 from common.errors import InputError
 from dataset.robot_inputs import robot_fields
 from sim.effects import effect_named
@@ -88,7 +88,7 @@ def test_a_law_stands_beside_the_verdict_and_its_files_have_its_range_and_covari
     assert "no effect and no pair of effects of the catalogue explains" in verdict.sentence
     assert "The residual is described by" in verdict.sentence
     assert verdict.errors.rms["law"] < 0.7 * verdict.error_before
-    assert place in [law.place.name for law in laws_of(verdict).kept]
+    assert place in [law.model.place.name for law in laws_of(verdict).kept]
     record, report, corrected = verdict.save(tmp_path)
     kept = json.loads(record.read_text())["laws"]["kept"]
     assert place in kept
@@ -109,7 +109,7 @@ def test_an_uncertain_claim_is_set_beside_the_laws_that_fit_as_well(tmp_path: Pa
     verdict = claimed_beside_laws()
     laws, claim = laws_of(verdict), verdict.final
     assert verdict.verdict == "effect"
-    assert verdict.explaining[0].uncertain
+    assert verdict.claims[0].doubts
     assert not verdict.described
     as_good = laws.as_good_as(claim)
     assert len(as_good) > 2
@@ -135,11 +135,12 @@ def test_what_is_no_rival_does_not_weaken_a_claim() -> None:
     """The claim in other words (end-over-end drag is a couple from the yaw rate), and laws that fit less well."""
     verdict = claimed_beside_laws()
     laws = laws_of(verdict)
-    same = next(law for law in laws.kept if law.place.name == "My_wyr")
+    same = next(law for law in laws.kept if law.model.place.name == "My_wyr")
     assert same.fit.deviance == pytest.approx(verdict.final.deviance, abs=0.05)
     assert same.words not in [rival.title for rival in laws.as_good_as(verdict.final)]
+    exponents = {one.place.name: set(one.exponents) for one in laws.ranked}
     for law in laws.fitted:  # each with the numbers of its linear model
-        assert set(law.fit.names) & set(EXPONENTS) == set(law.ranked.exponents)
+        assert set(law.fit.names) & set(EXPONENTS) == exponents[law.model.place.name]
     better = replace(verdict.final, deviance=verdict.final.deviance - 100)
     assert laws.as_good_as(better) == ()
     assert laws.to_dict(better)["beside"] == "No law of the places that were searched describes it as well."
@@ -174,12 +175,12 @@ def test_a_robot_outside_the_runs_is_refused_by_everything(tmp_path: Path) -> No
 @pytest.mark.parametrize("place", ["Mz_wh", pytest.param("Cyr", marks=pytest.mark.rest)])
 def test_the_uncertainty_of_the_exponents_is_that_of_the_load_at_the_robot(place: str) -> None:
     verdict = described(place)
-    law = next(one for one in laws_of(verdict).kept if one.place.name == place)
+    law = next(one for one in laws_of(verdict).kept if one.model.place.name == place)
     assert set(EXPONENTS) - set(law.fit.names) <= {EXPONENTS[2]}
     final = final_refit(law.fit.refitted(law.model.runs, verdict.split.kept))
     robot = robot_with_law(START, law, final.parameters)
     slopes = next(iter(_slopes(robot, law, final).values()))
-    scale = next(iter(robot.effects.values())) if law.place.is_term else 1.0
+    scale = next(iter(robot.effects.values())) if law.model.place.is_term else 1.0
     for name in EXPONENTS:
         loads = []
         for change in (0.1, -0.1):
@@ -207,13 +208,13 @@ def test_a_law_is_the_same_in_a_table_of_other_runs() -> None:
 @pytest.mark.slow
 def test_new_runs_decide_between_two_laws() -> None:
     verdict = described("Mz_wh")
-    fitted = {law.place.name: law for law in laws_of(verdict).fitted}
+    fitted = {law.model.place.name: law for law in laws_of(verdict).fitted}
     pair = [fitted["Mz_wh"], next(law for name, law in fitted.items() if name != "Mz_wh")]
-    rivals = [Rival(law.place.name, law.fit, law.model, law.model.record) for law in pair]
+    rivals = [replace(law, said=law.model.place.name) for law in pair]
     batch = next_runs(rivals)[1]
     assert len(batch.settings) == BATCH
     new = toy_swimmer(toy_table(9, lengths_cm=FOUR, **HIDDEN["Mz_wh"]))
-    records = [json.loads(json.dumps(Explanation.from_rival(rival).record())) for rival in rivals]
+    records = [json.loads(json.dumps(Explanation.of(rival).record())) for rival in rivals]
     explanations = [Explanation.read(record) for record in records]
     standing = standings(new, explanations, np.ones(len(new.runs), dtype=bool), with_law)
     assert standing[0].title == "Mz_wh"
@@ -223,7 +224,7 @@ def test_new_runs_decide_between_two_laws() -> None:
 @pytest.mark.slow
 def test_the_runs_at_each_input_lie_on_the_law() -> None:
     found = laws_of_toy(4, **HIDDEN["Cyr"])
-    law, used = next(one for one in found.laws.kept if one.place.name == "Cyr"), found.study.split.fitted
+    law, used = next(one for one in found.laws.kept if one.model.place.name == "Cyr"), found.study.split.fitted
     inputs = group_factors(law.model, law.fit, used)
     assert [groups.symbol for groups in inputs] == ["ω", "l", "N"]
     pulls = []

@@ -13,13 +13,12 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from calibration.report.corrected_robot import as_toml, calibration_knowledge, corrected_robot, handed_on
 from calibration.report.report import write_report
-from calibration.report.robot_verdict import RobotVerdict
+from calibration.robot.corrected_robot import as_toml, calibration_knowledge, corrected_robot, handed_on
+from calibration.robot.robot_verdict import RobotVerdict
 from calibration.statistics.fit import Pull
 from calibration.swimmer.influences import CURRENT, nuisance_parameters
 from calibration.swimmer.synthetic_table import make_table
-from calibration.verdict.record import facts, verdict_record
 from calibration.verdict.verdict import Verdict
 from calibration.words.quantities import detectable, direction_in_words, plain, size, with_error
 from calibration.words.render import next_steps
@@ -184,7 +183,7 @@ def _swum(schedule: Schedule, planned: Robot, truth: Robot) -> pd.DataFrame:
 
 
 def page(result: Verdict, folder: Path) -> PageText:
-    write_report(result, verdict_record(result, table="t.csv"), folder / "report.html")
+    write_report(result, result.to_dict(), folder / "report.html")
     return PageText(folder / "report.html")
 
 
@@ -205,11 +204,11 @@ def test_a_report_is_in_the_words_and_units_of_a_lab_with_what_to_do_next_first(
     assert "scale of the camera" in seen.text
     assert [c.effect.name for c in result.found.candidates if f"({c.effect.name})" not in seen.text] == []
     assert seen.text.count("tail length [cm]") == 2  # of the calibrated and of the final model
-    record = verdict_record(result, table="t")
+    record = result.to_dict()
     given = {entry["name"]: entry["given"] for entry in record["numbers_as_given"]}
     assert given["youngs_modulus"] == START.youngs_modulus
     assert given["head_length"] == START.head_length
-    assert record["next_steps"] == next_steps(facts(result))
+    assert record["next_steps"] == next_steps(result.facts)
 
 
 def test_numbers_are_written_without_exponents_and_changes_in_words() -> None:

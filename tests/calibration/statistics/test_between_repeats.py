@@ -8,15 +8,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.attribution.refits import Rival
+from calibration.attribution.hypothesis import Hypothesis, Origin
+from calibration.findings.next_runs import Explanation
 from calibration.report.report import sections
 from calibration.statistics.between_repeats import Difference, find_differences, usable
 from calibration.statistics.offsets import Offsets, with_differences
 from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import LEVEL
 from calibration.swimmer.measured_table import Measurements, read_measurements
-from calibration.verdict.next_runs import Explanation
-from calibration.verdict.record import facts, verdict_record
 from calibration.words.render import next_steps
 from tests.calibration.toy_tables import calibrated, fit_all, toy_swimmer, toy_table, verdict_of
 from tests.oracles.misread_tables import CASES, Case, make_table
@@ -136,13 +135,13 @@ def test_the_linear_model_has_the_offset_at_gaps_too():
 
 def test_the_verdict_begins_with_the_difference_and_hands_on_no_offset():
     verdict = calibrated(_misread(3), few=True)
-    record = facts(verdict)
+    record = verdict.facts
     assert verdict.sentence.startswith("Without any model: the yaw rate of operator B is")
     assert "below that of operator A" in verdict.sentence
     assert next_steps(record)[0].startswith("Check operator: the yaw rate of operator B is")
     assert set(record["differences"][0]) >= {"words", "output", "column", "size", "z", "p"}
     assert record["differences"][0]["numbers"] == ["omega_yr, operator B"]
-    report = sections(verdict_record(verdict, table="runs.csv"), {})
+    report = sections(verdict.to_dict(), {})
     assert "<h2>Without any model</h2>" in report
     assert "<td>yaw rate</td><td>operator</td>" in report
     robot = verdict_of(verdict)
@@ -153,7 +152,7 @@ def test_the_verdict_begins_with_the_difference_and_hands_on_no_offset():
 
 def test_runs_that_decide_need_no_offset():
     model, _ = with_differences(toy_swimmer(_misread(3)), None, level=LEVEL)
-    explanation = Explanation.from_rival(Rival("drag", fitted := fit_all(model), model))
+    explanation = Explanation.of(Hypothesis(Origin.NUMBER, (), fitted := fit_all(model)))
     assert set(fitted.names) - set(explanation.parameters) == {"omega_yr, operator B"}
     assert explanation.covariance.shape == (len(fitted.names) - 1,) * 2
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from calibration.attribution import refits
+from calibration.attribution import effects
 from calibration.statistics.budget import limited, limited_as_one, skipped, spent, stopped_by_interrupt
 from calibration.statistics.excluded import Excluded, caveat_of_excluded, count_of_rows, summary_of_excluded
 from calibration.statistics.fit import Fit, fit
@@ -37,7 +37,6 @@ from calibration.statistics.weights import (
     noise_of_any_run,
     rows_of_little_weight,
 )
-from calibration.verdict.record import facts
 from calibration.words.render import next_steps
 from common.arrays import Flags, Floats, Integers
 from tests.calibration.own_model.test_faults import hand_made
@@ -392,16 +391,16 @@ def test_a_search_that_ends_early_leaves_a_provisional_verdict(
         return fit(*arguments, **options)
 
     if seconds > 1:
-        monkeypatch.setattr(refits, "fit", interrupted)
+        monkeypatch.setattr(effects, "fit", interrupted)
     with stopped_by_interrupt():
         verdict = calibrated(toy_table(5, **{DRAG: 5.0}), few=FEW_CANDIDATES, max_seconds=seconds)
     ended = "after 0 s of processor time" if seconds < 1 else "at Ctrl-C"
     assert verdict.verdict == "unexplained"
     assert verdict.caveats[0].startswith(f"provisional: the search ended {ended}")
-    assert next_steps(facts(verdict))
+    assert next_steps(verdict.facts)
     if seconds < 1:
         assert any("end-over-end" in what for what in verdict.not_tried)
-        assert all(c.refit is None for c in verdict.found.candidates)
+        assert all(c.fit is None for c in verdict.found.candidates)
         assert not effect().not_tried
 
 

@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
-from calibration.attribution.refits import Judgement
-from calibration.report.corrected_robot import corrected_robot
+from calibration.attribution.hypothesis import Reason
 from calibration.report.report import write_report
+from calibration.robot.corrected_robot import corrected_robot
 from calibration.statistics.fit import Fit, fit, least_determined
 from calibration.statistics.forward import by_differences
 from calibration.statistics.residual_tests import Directions, directions, examine_residual
@@ -24,7 +24,6 @@ from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import COEFFICIENTS, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
 from common.run_columns import OUTPUTS
 from tests.calibration.toy_tables import (
@@ -183,8 +182,8 @@ def test_an_effect_that_changes_nothing_says_so(tmp_path: Path) -> None:
     """The toy's tails cannot touch: no size of contact shows, and the report has no size for it."""
     result = ambiguous()
     contact = next(c for c in result.found.candidates if c.effect.name == "tail_contact")
-    assert contact.judgement is Judgement.NO_CHANGE
-    write_report(result, verdict_record(result, table="t"), tmp_path / "report.html")
+    assert contact.reason is Reason.NO_CHANGE
+    write_report(result, result.to_dict(), tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text()
     assert "–</td>" in text
     assert "e+150" not in text
@@ -206,7 +205,7 @@ def test_the_held_out_session_has_no_say_judges_and_is_used_in_the_end() -> None
 
 def test_the_result_is_deterministic() -> None:
     first, second = (calibrated(toy_table(3), few=True) for _ in range(2))
-    assert verdict_record(first, table="t") == verdict_record(second, table="t")
+    assert first.to_dict() == second.to_dict()
 
 
 @pytest.mark.rates
@@ -302,7 +301,7 @@ def test_size_and_time_are_recovered_from_the_toy(seed: int) -> None:
     few = (THINNING, DRAG) if seed == 4 else ()
     result = calibrated(toy_table(seed, design={"motor_rpm": SPEEDS}, **HIDDEN), few=few)
     assert THINNING in result.effects
-    recovered(next(c.refit for c in result.explaining if c.effect.name == THINNING))
+    recovered(next(c.fit for c in result.claims if c.effect.name == THINNING))
     assert result.error_after < 1.15 * result.noise_ceiling
 
 
@@ -314,6 +313,6 @@ def test_local_thinning_is_found_by_the_simulator() -> None:
     result = calibrate(SwimmerModel(START, read_measurements(table)), progress=False)
     assert THINNING in result.effects
     assert result.error_after < 1.2 * result.noise_ceiling
-    refit = next(c.refit for c in result.explaining if c.effect.name == THINNING)
+    refit = next(c.fit for c in result.claims if c.effect.name == THINNING)
     recovered(refit)
     assert corrected_robot(START, refit.parameters).effects == {n: refit.parameters[n] for n in HIDDEN}

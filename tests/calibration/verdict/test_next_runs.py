@@ -14,9 +14,7 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
-from calibration.statistics.gls import Noise
-from calibration.statistics.statistical_model import Parameter
-from calibration.verdict.next_runs import (
+from calibration.findings.next_runs import (
     BATCH,
     GIVEN_UP,
     STOP,
@@ -30,7 +28,8 @@ from calibration.verdict.next_runs import (
     read_explanations,
     standings,
 )
-from calibration.verdict.record import verdict_record
+from calibration.statistics.gls import Noise
+from calibration.statistics.statistical_model import Parameter
 from common.errors import InputError
 from tests.calibration.toy_tables import DRAG, ambiguous, toy_swimmer, toy_table
 
@@ -48,7 +47,7 @@ def test_new_runs_decide_for_the_truth_or_nothing(
     seed: int, lengths_cm: tuple[float, ...], given_up: list[bool], said: str, tmp_path: Path
 ) -> None:
     table = toy_table(1, lengths_cm=(8.0,), **{DRAG: 4.0})
-    (tmp_path / "verdict.json").write_text(json.dumps(verdict_record(ambiguous(), table="t")))
+    (tmp_path / "verdict.json").write_text(json.dumps(ambiguous().to_dict()))
     explanations, before = read_explanations(tmp_path / "verdict.json")
     assert len(explanations) == 2
     more = toy_table(seed, lengths_cm=lengths_cm, **{DRAG: 4.0}).assign(session="new")

@@ -17,7 +17,6 @@ from calibration.statistics.gls import repeat_covariance
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.record import verdict_record
 from calibration.verdict.verdict import Verdict
 from common.errors import run_command
 from common.units import Sigma
@@ -99,7 +98,7 @@ def test_rivals_are_all_named_with_the_runs_that_would_tell_them_apart(tmp_path:
     assert len(result.effects) > 1
     assert result.next_runs
     page = tmp_path / "report.html"
-    write_report(result, verdict_record(result, table="t"), page)
+    write_report(result, result.to_dict(), page)
     text = page.read_text()
     assert "Runs to make next" in text
     for run in result.next_runs:
@@ -113,7 +112,7 @@ def test_where_tolerances_are_wide_a_wrong_number_comes_ahead_of_those_rivals() 
     result = calibrated("ambiguous")
     assert result.verdict == "number"
     assert result.effects == ()
-    assert "tail_spin_drag" in {e.name for c in result.found.rival_effects for e in c.claimed}
+    assert "tail_spin_drag" in {e.name for c in result.found.rival_effects for e in c.added}
     assert "If the number is right, " in result.sentence
     assert re.fullmatch("the stated value of .* is wrong", result.explanations[0].title)
 

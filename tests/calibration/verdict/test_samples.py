@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 import softflagella as sf
+from calibration.findings.samples import FORM
 from calibration.report.figures import draw_corner
-from calibration.verdict.samples import FORM
 from tests.shared import shared
 
 _LEVELS = [0.025, 0.975]

@@ -13,7 +13,6 @@ import pytest
 from calibration.statistics.gls import UNKNOWN_SHARE
 from calibration.statistics.study import middle_session
 from calibration.swimmer.measured_table import PROTOCOLS, read_measurements
-from calibration.verdict.record import verdict_record
 from common.errors import InputError, run_command
 from softflagella.__main__ import main
 from tests.calibration.toy_tables import DRAG, calibrated, effect, toy_table
@@ -139,7 +138,7 @@ def test_robots_of_one_kind_are_closed_with_both_limits() -> None:
     assert result.verdict == "none"
     kind, session, level = result.caveats
     assert ("N = 3" in kind, "1 session only" in session, "C_t and C_yr to no better" in level) == (True,) * 3
-    assert verdict_record(result, table="t")["limits"] == [kind, session, level]
+    assert result.to_dict()["limits"] == [kind, session, level]
 
 
 @pytest.mark.parametrize(
@@ -180,7 +179,7 @@ def test_mistracked_runs_have_little_weight_and_are_named() -> None:
     assert len(set(result.little_weight) - set((mistracked + 1).tolist())) <= 1  # one of many is far by chance
     assert len(result.little_weight) >= 2
     assert any("have a weight below one half" in line for line in result.caveats)
-    record = verdict_record(result, table="t")
+    record = result.to_dict()
     assert record["rows_of_little_weight"] == list(result.little_weight)
 
 

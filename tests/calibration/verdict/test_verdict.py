@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from calibration.attribution.claim_checks import NumberCheck
+from calibration.attribution.hypothesis import Evidence, Hypothesis, Origin
+from calibration.attribution.rules import RULES, Trial, doubted
+from calibration.findings.held_out import HeldOutErrors
+from calibration.statistics.study import Study
 from calibration.verdict import calibrate
-from calibration.verdict.findings import Attribution, HeldOutErrors
-from calibration.verdict.record import facts
 from calibration.verdict.verdict import Verdict
 from calibration.words.render import next_steps
 from common.errors import InputError
@@ -33,11 +33,15 @@ from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, ambiguous, calibr
     ],
 )
 def test_the_rule(p_value: float, effects: int, rival_numbers: int, number_explains: bool, verdict: str) -> None:
-    given: Any = SimpleNamespace(
-        misfit=SimpleNamespace(p_value=p_value), best=(None,) * effects, rival_numbers=(None,) * rival_numbers,
-        number=number_explains, nearest=verdict == "partial", noise_known=True,
-    )  # fmt: skip
-    assert Attribution.verdict(given, 0.04) == verdict
+    found = none().found
+    effect = Hypothesis(Origin.EFFECT, (), found.base)
+    number = Hypothesis(Origin.NUMBER, (), found.base, Evidence(pulls=none().pulls[:1]))
+    explanations = (effect,) * effects + (number,) * rival_numbers if effects else (number,) * number_explains
+    nearest = replace(effect, origin=Origin.FORM) if verdict == "partial" else None
+    tested = replace(
+        found, misfit=replace(found.misfit, p_value=p_value), explanations=explanations, nearest=nearest
+    )
+    assert tested.verdict(0.04) == verdict
 
 
 def unexplained(
@@ -53,8 +57,8 @@ def test_a_residual_that_the_held_out_runs_do_not_show_is_harmless() -> None:
     assert small.harmless
     assert "harmless for prediction" in small.sentence
     assert "off by 2.37 %, and noise alone makes 2.36 %" in small.sentence
-    assert next_steps(facts(small))[0].startswith("Plan with the corrected robot")
-    assert "harmless" in next_steps(facts(small))[0]
+    assert next_steps(small.facts)[0].startswith("Plan with the corrected robot")
+    assert "harmless" in next_steps(small.facts)[0]
     assert not unexplained(0.0237, (0.0219, 0.0256), verdict="effect").harmless
     for shown in (
         unexplained(0.0265, (0.0245, 0.0290)),  # the held-out runs show it
@@ -63,7 +67,7 @@ def test_a_residual_that_the_held_out_runs_do_not_show_is_harmless() -> None:
     ):
         assert not shown.harmless
         assert "harmless" not in shown.sentence
-        assert "Look where the residual is large" in next_steps(facts(shown))[1]
+        assert "Look where the residual is large" in next_steps(shown.facts)[1]
 
 
 def test_what_is_claimed_must_lower_the_error() -> None:
@@ -93,8 +97,11 @@ def test_the_model_to_use_is_better_on_the_held_out_runs(
 @pytest.mark.parametrize(("tolerances", "hedged"), [(8.3, True), (4.0, False)])
 def test_a_number_that_is_hardly_an_error_of_measurement_is_hedged(tolerances: float, hedged: bool) -> None:
     said = number()
-    check = NumberCheck(imitable=0.0, transfer=0.5, tolerances=tolerances)
-    sentence = replace(said, found=replace(said.found, number_check=check)).sentence
+    (pull,) = (p for p in said.pulls if p.freed)
+    pull = replace(pull, alone=tolerances * pull.parameter.sigma)
+    claim = said.found.number.seen(imitable=0.0, transfer=0.5, pulls=(pull,))
+    claim = doubted(claim, Trial(Study(said.base.model, said.split), said.base), RULES)
+    sentence = replace(said, found=replace(said.found, explanations=(claim,))).sentence
     assert ("or something outside the catalogue looks like it" in sentence) == hedged
     assert ("off by 8 of its tolerances" in sentence) == hedged
 

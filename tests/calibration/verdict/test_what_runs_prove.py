@@ -11,13 +11,14 @@ import pytest
 from scipy.optimize import least_squares
 
 import softflagella as sf
-from calibration.attribution.forms import Form, envelope, paired_gain
+from calibration.attribution.forms import envelope
+from calibration.attribution.hypothesis import Hypothesis, Origin
+from calibration.attribution.left_out import paired_gain
 from calibration.own_model.table_of_runs import Roles, read_runs_of
 from calibration.statistics.fit import fit
 from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import quarter_of_conditions
 from calibration.verdict.calibrate import calibrate, first_fit
-from calibration.verdict.record import facts
 from calibration.verdict.verdict import Verdict
 from tests.oracles.drawn_falls import DIAMETERS, NOISE, fall, falls, model_of
 
@@ -122,7 +123,7 @@ def test_forms_alike_are_named_and_numbers_have_their_envelope() -> None:
     assert low < 1.0 < high
     for form in result.forms:
         assert low <= form.fit.parameters["viscosity"] <= high
-    record = facts(result)
+    record = result.facts
     assert [form["title"] for form in record["forms"]] == titles
     assert all(0 < form["error"] < 0.1 for form in record["forms"])
 
@@ -137,7 +138,7 @@ def test_a_gain_is_paired_over_conditions() -> None:
     assert gain.gain == pytest.approx(-paired_gain(study, base, wall).gain, rel=0.5)
     same = paired_gain(study, wall, wall)
     assert (same.gain, same.certain) == (0.0, False)
-    joined = envelope(study, ("viscosity",), [Form(model.effects[:1], f, False) for f in (base, wall)])
+    joined = envelope(study, ("viscosity",), [Hypothesis(Origin.FORM, model.effects[:1], f) for f in (base, wall)])
     assert joined["viscosity"][0] < wall.parameters["viscosity"] < joined["viscosity"][1]
     assert joined["viscosity"][0] < base.parameters["viscosity"] < joined["viscosity"][1]
 
@@ -163,7 +164,7 @@ def test_conditions_that_were_not_fitted_have_an_error_of_their_own() -> None:
     left_out = set(np.exp(result.runs.inputs[out, 0]).round(3))
     assert len(left_out) == 2
     assert left_out & {2.0, 9.0}  # an end of the setting
-    assert facts(result)["errors_of_conditions"]["after"] == of_conditions.after
+    assert result.facts["errors_of_conditions"]["after"] == of_conditions.after
 
 
 def test_a_noise_that_is_declared_needs_no_repeats() -> None:
@@ -192,12 +193,12 @@ def test_the_loop_turns_until_only_noise_is_left() -> None:
     """Two effects are missing, and the rest is no noise, so that none and no pair explains the runs."""
     result = verdict(falls(11, rounds=6, repeats=6, wall=1.5, late=1.0, bump=0.03))
     assert result.verdict == "partial"
-    assert len({turn.named for turn in result.turns}) == 3
-    assert result.turns[0].named == ""
-    errors = [turn.error for turn in result.turns]
+    assert len({turn.named for turn in result.found.turns}) == 3
+    assert result.found.turns[0].named == ""
+    errors = [turn.error for turn in result.found.turns]
     assert errors == sorted(errors, reverse=True)
     assert result.errors.rms["after"] == pytest.approx(errors[-1])
-    assert [turn["error"] for turn in facts(result)["turns"]] == errors
+    assert [turn["error"] for turn in result.facts["turns"]] == errors
 
 
 def test_a_pull_without_a_residual_is_no_wrong_number() -> None:

@@ -11,10 +11,9 @@ from typing import Any
 
 import pytest
 
+from calibration.findings.findings import Findings
 from calibration.report.report import sections
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.findings import Findings
-from calibration.verdict.record import verdict_record
 from calibration.words.render import errors_in_words, next_steps, say_laws, sentence
 from tests.calibration.words.test_words import in_report, laws_of_five_places
 from tests.oracles.falling_balls import balls, falls
@@ -64,7 +63,7 @@ EITHER = (False, True)
 def falling_balls() -> Record:
     """The record of a verdict on a model that is no robot."""
     result = calibrate(balls(falls("nothing", 0)), draws=200, progress=False)
-    record: Record = json.loads(json.dumps(verdict_record(result, table="falls.csv")))
+    record: Record = json.loads(json.dumps(result.to_dict()))
     return record
 
 

@@ -11,9 +11,8 @@ from typing import Any
 import pytest
 from jinja2 import UndefinedError
 
+from calibration.findings.next_runs import SELDOM
 from calibration.report.report import sections
-from calibration.verdict.next_runs import SELDOM
-from calibration.verdict.record import facts, verdict_record
 from calibration.words.render import next_steps, say_laws, sentence
 from tests.calibration.toy_tables import ambiguous, effect, none, number
 
@@ -22,7 +21,7 @@ VERDICTS = {"none": none, "number": number, "effect": effect, "ambiguous": ambig
 
 def stored(name: str, **changes: Any) -> dict[str, Any]:
     """Return the content of a verdict.json, with some of its entries changed."""
-    record: dict[str, Any] = json.loads(json.dumps(verdict_record(VERDICTS[name](), table="t.csv")))
+    record: dict[str, Any] = json.loads(json.dumps(VERDICTS[name]().to_dict()))
     assert not changes.keys() - record.keys()
     return record | changes
 
@@ -187,7 +186,7 @@ def test_the_settings_to_repeat_are_those_of_the_largest_departures() -> None:
     runs, used = result.runs, result.split.fitted
     off = used & (runs.condition == runs.condition[used][0])
     moved = replace(result, runs=replace(runs, y=runs.y + 0.5 * off[:, None]))
-    first, *others = facts(moved)["largest_departures"]
+    first, *others = moved.facts["largest_departures"]
     assert first["at"] == [f"{name} = {v[off][0]:.4g}{unit}" for name, (v, unit) in runs.settings.items()]
     assert first["departure"] > 5 * others[0]["departure"]
     assert len(others) == 4

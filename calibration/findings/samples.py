@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from calibration.findings.findings import Findings
 from calibration.statistics.fit import Fit, birge
 from calibration.statistics.study import FinalRefit, final_refit
-from calibration.verdict.findings import Findings
 from common.errors import InputError
 
 FORM = "form"  # the column that names it
@@ -27,7 +27,7 @@ def open_forms(result: Findings) -> dict[str, FinalRefit]:
     if not {p.name for p in handed_on.fitted}.issuperset(result.final.names):  # the form was not kept
         return {"": handed_on}
     forms = sorted(result.forms, key=lambda form: form.fit is not result.final)
-    return {form.title: _refit(result, form.fit) for form in forms} or {"": handed_on}
+    return {form.title: _refit(result, form.fitted) for form in forms} or {"": handed_on}
 
 
 def _refit(result: Findings, fitted: Fit) -> FinalRefit:

@@ -14,31 +14,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from calibration.attribution.claim_checks import NumberCheck
-from calibration.attribution.forms import Form
-from calibration.attribution.moves import StatedMove
-from calibration.attribution.nearest import AdoptedForm
-from calibration.attribution.refits import Candidate, Rival
+from calibration.attribution.attribution import Attribution
+from calibration.attribution.hypothesis import Hypothesis
+from calibration.attribution.rules import REJECTED
 from calibration.attribution.wrong_numbers import wrong_number
+from calibration.findings.held_out import HeldOutErrors
+from calibration.findings.next_runs import Batch, Explanation, NextRun
 from calibration.statistics.between_repeats import Difference
 from calibration.statistics.excluded import Excluded, count_of_rows, summary_of_excluded
 from calibration.statistics.fit import Fit, Pull
-from calibration.statistics.residual_tests import Directions, Misfit
-from calibration.statistics.statistical_model import Experiment, Parameter, Runs
+from calibration.statistics.statistical_model import Parameter, Runs
 from calibration.statistics.study import FinalRefit, Split
-from calibration.verdict.held_out import REJECTED, HeldOutErrors, Withdrawn
-from calibration.verdict.next_runs import Batch, Explanation, NextRun
 from common.arrays import Floats
 
 _HALF = 0.5  # of an error on left-out runs
-_LAWS_TOLD_APART = 3  # beside a claim; the more there are, the fewer runs tell all of them apart
 
 
 class Description(Protocol):
     """What describes a residual that nothing explains, such as laws (`calibration.laws`)."""
 
     @property
-    def kept(self) -> Sequence[Any]:
+    def kept(self) -> Sequence[Hypothesis]:
         """Those that are kept, best first."""
         ...
 
@@ -53,84 +49,17 @@ class Description(Protocol):
         ...
 
     @property
-    def rivals(self) -> tuple[Rival, ...]:
+    def rivals(self) -> tuple[Hypothesis, ...]:
         """Those that the runs cannot tell apart; none if there are not two."""
         ...
 
-    def as_good_as(self, claim: Fit) -> tuple[Rival, ...]:
+    def as_good_as(self, claim: Fit) -> tuple[Hypothesis, ...]:
         """List those that fit as well as a claimed effect."""
         ...
 
     def to_dict(self, claim: Fit | None = None) -> dict[str, Any]:
         """Return the record for verdict.json."""
         ...
-
-
-@dataclass(frozen=True)
-class Attribution:
-    """The fit without effects, its residual, and what explains the residual."""
-
-    base: Fit
-    misfit: Misfit  # of the base
-    tangents: Directions  # of the effects
-    candidates: tuple[Candidate, ...]  # all effects of the catalogue
-    best: tuple[Candidate, ...] = ()  # what explains the residual, best first; more than one: not told apart
-    number: Fit | None = None  # the fit with a wrong nuisance parameter freed, if that explains the residual
-    rival_effects: tuple[Candidate, ...] = ()  # effects that explain as much as the wrong number does
-    rival_numbers: tuple[Pull, ...] = ()  # the wrong numbers, where effects come ahead of them
-    number_check: NumberCheck | None = None  # of the wrong number, where it comes ahead of effects
-    nearest: AdoptedForm | None = None  # the form that is adopted where nothing explains the residual
-    noise_known: bool = True
-    unkept: Fit | None = None  # the best fit with effects, where none explains the residual
-
-    @property
-    def final(self) -> Fit:
-        """The model with the effects of the verdict, with the form that is adopted, or without any."""
-        if self.nearest:
-            return self.nearest.fit
-        if self.best and self.best[0].refit:
-            return self.best[0].refit
-        return self.number or self.base
-
-    def verdict(self, level: float) -> str:
-        """Decide the verdict; this is the rule of the whole calibration.
-
-        A wrong nuisance parameter comes ahead of every effect that is not better, or it is one of several
-        explanations. Without one, a residual within the noise is "none". Beyond it, the number of explanations
-        that the runs cannot tell apart decides. Where the noise is unknown nothing is claimed, but a form may be
-        adopted for its predictions. What new runs say about an "ambiguous" verdict is decided by
-        `calibration.verdict.next_runs.standings`.
-
-        Args:
-            level: α of the residual's p-value.
-        """
-        if self.number and not self.best:
-            return "number"
-        if not self.noise_known:
-            return "partial" if self.nearest else "none"
-        if self.misfit.p_value >= level:
-            return "none"
-        explanations = len(self.best) + bool(self.rival_numbers)
-        return ("partial" if self.nearest else "unexplained", "effect", "ambiguous")[min(explanations, 2)]
-
-    def rivals(self, model: Experiment, laws: tuple[Rival, ...]) -> tuple[Rival, ...]:
-        """List explanations that the runs cannot tell apart, laws last; none if there are not two."""
-        known = [(c.title, c.refit) for c in (*self.best, *self.rival_effects) if c.refit]
-        if self.number and known:
-            wrong = ", ".join(alike[0].parameter.title for alike in self.number.wrong_numbers)
-            number = f"the stated value of {wrong} is wrong", self.number
-            known = [*known, number] if self.best else [number, *known]
-        rivals = (*(Rival(title, refit, model) for title, refit in known), *laws[:_LAWS_TOLD_APART])
-        return rivals if len(rivals) > 1 else ()
-
-
-@dataclass(frozen=True)
-class LoopTurn:
-    """One turn of the loop: what was adopted, and what is left."""
-
-    error: float  # relative rms on the held-out runs
-    named: str  # what was adopted; empty: nothing yet
-    left: str  # output and input along which most is left; empty: no more than noise
 
 
 @dataclass(frozen=True, repr=False)
@@ -142,7 +71,6 @@ class Findings:
     split: Split  # fitted and held-out runs
     found: Attribution  # the residual, and what explains it
     differences: tuple[Difference, ...]  # what repeats and identities say without the model
-    moves: tuple[StatedMove, ...]  # numbers that differ in some runs
     errors: HeldOutErrors  # on the held-out runs
     base_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
     final_intervals: dict[str, tuple[float, float]]  # the same, of the final model
@@ -152,54 +80,74 @@ class Findings:
     explanations: tuple[Explanation, ...]  # that the runs cannot tell apart, best first; none if there are not two
     next_runs: tuple[NextRun, ...]  # single settings that would, the best first
     next_batch: Batch | None  # the same, for several runs together
+    numbers: tuple[str, ...]  # names of the model's own coefficients and nuisance parameters
+    catalogue: tuple[str, ...]  # names of its effects
     untestable: dict[str, str]  # effects that these runs cannot test: what is missing
     draws: int  # of the bootstrap
     fixed_before: str  # hash of what was fixed before the runs were looked at
     little_weight: tuple[int, ...]  # rows of the table whose runs have less than half of the usual weight
     not_tried: tuple[str, ...]  # because no time was left; such a verdict is provisional
-    forms: tuple[Form, ...]  # that left-out runs cannot tell apart, those at the size of theory first
-    turns: tuple[LoopTurn, ...]  # of the loop, where a form was adopted
-    withdrawn: tuple[Withdrawn, ...]  # claims that held-out runs refuted, in order
     caveats: tuple[str, ...]  # what weakens the conclusion, in words
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects that explain the residual."""
-        return tuple(dict.fromkeys(e.name for c in self.explaining for e in c.claimed))
+        return tuple(dict.fromkeys(e.name for c in self.claims for e in c.added))
 
     @property
-    def explaining(self) -> tuple[Candidate, ...]:
+    def claims(self) -> tuple[Hypothesis, ...]:
         """What explains the residual, best first."""
-        return self.found.best
+        return self.found.claims
 
     @property
-    def nearest(self) -> AdoptedForm | None:
+    def nearest(self) -> Hypothesis | None:
         """The form that is adopted, of a partial verdict."""
         return self.found.nearest
 
     @property
-    def not_fitted(self) -> tuple[Candidate, ...]:
+    def forms(self) -> tuple[Hypothesis, ...]:
+        """Forms that left-out runs cannot tell apart, those at the size of theory first; none if there is one."""
+        return self.found.forms
+
+    @property
+    def moves(self) -> tuple[Hypothesis, ...]:
+        """Numbers that differ in some runs."""
+        return self.found.moves
+
+    @property
+    def withdrawn(self) -> tuple[Hypothesis, ...]:
+        """Claims that held-out runs refuted, in order."""
+        return self.found.withdrawn
+
+    @property
+    def not_fitted(self) -> tuple[Hypothesis, ...]:
         """Effects that may be missing, by their scores, of which there is no fit."""
         least = self.found.misfit.critical_z if self.runs.noise_known else 0.0
-        return tuple(c for c in self.found.candidates if c.no_fit and abs(c.z) > least)
+        return tuple(c for c in self.found.candidates if c.no_fit and abs(c.score) > least)
 
     @property
     def halving(self) -> str | None:
         """Title of the form that halves the error on left-out runs, the best one; None if none does."""
-        halving = [c for c in self.found.candidates if c.left_out < _HALF]
-        return min(halving, key=lambda c: c.left_out).title if halving else None
+        left_out = {c.title: c.evidence.left_out for c in self.found.candidates if c.evidence.left_out is not None}
+        best = min(left_out, key=left_out.__getitem__, default=None)
+        return best if best is not None and left_out[best] < _HALF else None
 
     @property
     def certain(self) -> tuple[Parameter, ...]:
         """Effects that all explanations have in common, where they are several."""
-        first, *others = [c.claimed for c in self.explaining] or [()]
+        first, *others = [c.added for c in self.claims] or [()]
         return tuple(e for e in first if others and all(e in claimed for claimed in others))
 
     @property
     def undecided(self) -> tuple[tuple[Parameter, ...], ...]:
         """What each explanation has beside them, where something is certain; nothing: none is needed."""
         certain = self.certain
-        return tuple(tuple(e for e in c.claimed if e not in certain) for c in self.explaining) if certain else ()
+        return tuple(tuple(e for e in c.added if e not in certain) for c in self.claims) if certain else ()
+
+    @property
+    def handed_on(self) -> tuple[Parameter, ...]:
+        """What was fitted to all runs and any other run has, too."""
+        return tuple(p for p in self.final_refit.fitted if p.name in (*self.numbers, *self.catalogue))
 
     @property
     def base(self) -> Fit:
@@ -269,7 +217,7 @@ class Findings:
     @property
     def held_out_error_falls(self) -> bool | None:
         """Whether what is claimed lowers the error on the held-out runs; None where nothing is claimed."""
-        return None if self.verdict in ("none", "unexplained") else self.error_after < self.error_before
+        return None if self.verdict in ("none", "unexplained") else self.errors.fall
 
     @property
     def gain_is_certain(self) -> bool | None:
@@ -319,7 +267,7 @@ class Findings:
     def in_form_only(self) -> tuple[str, ...]:
         """Named effects whose whole interval is outside the sizes that their source allows."""
         names = []
-        for effect in self.explaining[0].claimed if self.explaining else ():
+        for effect in self.claims[0].added if self.claims else ():
             low, high = self.final_intervals[effect.name]
             if effect.plausible and (high < effect.plausible[0] or low > effect.plausible[1]):
                 names.append(effect.name)

@@ -5,18 +5,18 @@ or of the specimens (`study.quarter_of_conditions`), tells whether a model predi
 again without them, by one linear step. The choice of the effect has seen them; its numbers have not.
 
 **Withdrawn claims.** A claim is withdrawn if with it the error on one of these sets rises, and these runs reject
-the model that has it (p < `REJECTED`; where the noise is unknown, in that which the model leaves). Conditions
-without which a number of the model runs to a bound say nothing about a claim. The search goes on as if the effect
-were not in the catalogue. Each withdrawal has looked at the held-out runs once more, which is stated. A form that
-fits also predicts the same conditions, so this works on extrapolation alone; `calibration.attribution.forms`
-compares forms elsewhere.
+the model that has it; where the noise is unknown, in that which the model leaves (`rules.refuting`). The search
+goes on as if the effect were not in the catalogue. Each withdrawal has looked at the held-out runs once more,
+which is stated. A form that fits also predicts the same conditions, so this works on extrapolation alone;
+`calibration.attribution.forms` compares forms elsewhere.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
+from calibration.attribution.hypothesis import Hypothesis, SetErrors
+from calibration.attribution.rules import RULES, Stage, Trial, judge
 from calibration.statistics.fit import Fit, birge
 from calibration.statistics.study import (
     Study,
@@ -27,39 +27,6 @@ from calibration.statistics.study import (
     quarter_of_conditions,
 )
 from common.arrays import Floats
-
-REJECTED = 0.01  # p of held-out runs
-
-
-@dataclass(frozen=True)
-class ConditionErrors:
-    """Relative rms errors on conditions or specimens to which a model was not fitted."""
-
-    names: str
-    before: float
-    after: float
-    p_value: float  # agreement with the final model
-    determined: bool = True  # no number of it runs to a bound without these conditions
-
-
-@dataclass(frozen=True)
-class Withdrawn:
-    """A claim that held-out runs refute."""
-
-    title: str
-    effects: tuple[str, ...]
-    set_names: str  # of the runs that refute it
-    before: float  # relative rms on these
-    after: float
-
-    def record(self) -> dict[str, Any]:
-        return {
-            "title": self.title,
-            "effects": list(self.effects),
-            "on": self.set_names,
-            "error_before": self.before,
-            "error_after": self.after,
-        }
 
 
 @dataclass(frozen=True)
@@ -76,7 +43,12 @@ class HeldOutErrors:
     noise: float  # of a run, from the repeats
     p_value: float  # agreement of the held-out runs with the final model
     gain_interval: tuple[float, float] | None = None  # 95 %, before less after, paired over conditions
-    of_conditions: ConditionErrors | None = None  # None: too few
+    of_conditions: SetErrors | None = None  # None: too few
+
+    @property
+    def fall(self) -> bool:
+        """Whether what is claimed or adopted lowers the error."""
+        return self.rms["after"] < self.rms["before"]
 
 
 def held_out_errors(study: Study, predictions: dict[str, Floats], before: Fit, final: Fit) -> HeldOutErrors:
@@ -97,7 +69,7 @@ def held_out_errors(study: Study, predictions: dict[str, Floats], before: Fit, f
     )
 
 
-def errors_of_conditions(study: Study, before: Fit, final: Fit) -> ConditionErrors | None:
+def errors_of_conditions(study: Study, before: Fit, final: Fit) -> SetErrors | None:
     """State the errors on a quarter of the conditions, of two models fitted without them; None if they are few."""
     runs, used = study.model.runs, study.split.fitted
     out, names = quarter_of_conditions(runs, used)
@@ -107,20 +79,26 @@ def errors_of_conditions(study: Study, before: Fit, final: Fit) -> ConditionErro
     rms_before, rms_after = (errors(runs, fitted.prediction, out)[0] for fitted in fits)
     p = held_out_p_value(_in_its_noise(study, fits[1]), runs, out, seed=study.seed + 7)
     determined = not (fits[1].held & ~final.held).any()
-    return ConditionErrors(names, rms_before, rms_after, p, determined)
+    return SetErrors(names, rms_before, rms_after, p, determined)
 
 
-def refuted(study: Study, before: Fit, claim: Fit, title: str, effects: tuple[str, ...]) -> Withdrawn | None:
-    """Withdraw a claim that held-out runs refute; None if they do not."""
+def tested_on_held_out(study: Study, before: Fit, claim: Hypothesis) -> Hypothesis:
+    """Judge a claim by the runs that it was not fitted to, against the model `before` it."""
+
+    def sets(claim: Hypothesis) -> tuple[SetErrors, ...]:
+        of_conditions = errors_of_conditions(study, before, claim.fitted)
+        return (_errors_of_sessions(study, before, claim.fitted), *([of_conditions] if of_conditions else []))
+
+    return judge(claim, Trial(study, before, {"held_out": sets}), RULES, Stage.HELD_OUT)
+
+
+def _errors_of_sessions(study: Study, before: Fit, final: Fit) -> SetErrors:
+    """State the errors on the held-out sessions, and whether these reject a model with which the error rises."""
     runs, test = study.model.runs, study.split.test
-    rms_before, rms_after = (errors(runs, fitted.prediction, test)[0] for fitted in (before, claim))
-    own = _in_its_noise(study, claim)
+    rms_before, rms_after = (errors(runs, fitted.prediction, test)[0] for fitted in (before, final))
+    own = _in_its_noise(study, final)
     p = held_out_p_value(own, runs, test, seed=study.seed + 3) if rms_after > rms_before else 1.0
-    on_sessions = ConditionErrors(study.split.names, rms_before, rms_after, p)
-    for one in filter(None, (on_sessions, errors_of_conditions(study, before, claim))):
-        if one.after > one.before and one.p_value < REJECTED and one.determined:
-            return Withdrawn(title, effects, one.names, one.before, one.after)
-    return None
+    return SetErrors(study.split.names, rms_before, rms_after, p)
 
 
 def _in_its_noise(study: Study, fitted: Fit) -> Fit:

@@ -30,8 +30,8 @@ from typing import Any
 
 import numpy as np
 
-from calibration.laws.law_model import LEVER, SIZE
-from calibration.laws.laws import FittedLaw
+from calibration.attribution.hypothesis import Hypothesis
+from calibration.laws.law_model import LEVER, SIZE, law_model
 from calibration.laws.readings import EXPONENTS
 from calibration.statistics.statistical_model import Parameters
 from calibration.statistics.study import FinalRefit, final_refit
@@ -147,23 +147,23 @@ def _rounded(value: float, sigma: float, unit: str = "") -> float:
     return to_si(rounded, unit) if unit else rounded
 
 
-def law_handed_on(given: Robot, law: FittedLaw, rows: Flags) -> tuple[Robot, CalibrationKnowledge]:
+def law_handed_on(given: Robot, law: Hypothesis, rows: Flags) -> tuple[Robot, CalibrationKnowledge]:
     """Return the corrected robot with a law, fitted once more to the runs in `rows` (n,), and its covariance."""
-    final = final_refit(law.fit.refitted(law.model.runs, rows))
+    final = final_refit(law.fitted.refitted(law.model.runs, rows))
     robot = robot_with_law(given, law, final.parameters)
     known = calibration_knowledge(given, final, _slopes(robot, law, final))
     return significant(robot, known), known
 
 
-def robot_with_law(given: Robot, law: FittedLaw, parameters: Parameters) -> Robot:
+def robot_with_law(given: Robot, law: Hypothesis, parameters: Parameters) -> Robot:
     """Return the corrected robot with a law as an effect, by parameters of the law's model."""
     effects, factor = effects_of_law(law, parameters)
-    written = dict(parameters)
-    for name, power in law.place.moves:
-        if not law.place.is_term:
+    written, model = dict(parameters), law_model(law)
+    for name, power in model.place.moves:
+        if not model.place.is_term:
             written[name] *= factor**power
     corrected = corrected_robot(given, written)
-    runs = law.model.robots({**written, **dict.fromkeys(law.model.exponents, 0.0)})
+    runs = model.robots({**written, **dict.fromkeys(model.exponents, 0.0)})
     return replace(
         corrected,
         effects={**corrected.effects, **effects},
@@ -171,14 +171,14 @@ def robot_with_law(given: Robot, law: FittedLaw, parameters: Parameters) -> Robo
     )
 
 
-def effects_of_law(law: FittedLaw, parameters: Parameters) -> tuple[dict[str, float], float]:
+def effects_of_law(law: Hypothesis, parameters: Parameters) -> tuple[dict[str, float], float]:
     """Return the sizes of a law's effects, in the order of its moves, and the factor of `LawModel.law`."""
-    model = law.model
+    model = law_model(law)
     at_place, size, factor = model.law(parameters)
-    if not law.place.lever_unit:
+    if not model.place.lever_unit:
         return {at_place.name: size}, factor
-    powers, motion = model.powers(parameters), law.place.motion
-    if law.place.lever_unit == "l":  # l/R is l/l_c times that of the control example
+    powers, motion = model.powers(parameters), model.place.motion
+    if model.place.lever_unit == "l":  # l/R is l/l_c times that of the control example
         couple_powers, arm = replace(powers, length=powers.length + 1), CONTROL.l_over_R
     else:
         couple_powers, arm = powers, model.robot.head_length / model.robot.head_radius
@@ -189,11 +189,11 @@ def effects_of_law(law: FittedLaw, parameters: Parameters) -> tuple[dict[str, fl
     }, factor
 
 
-def _slopes(robot: Robot, law: FittedLaw, final: FinalRefit) -> dict[str, Floats]:
+def _slopes(robot: Robot, law: Hypothesis, final: FinalRefit) -> dict[str, Floats]:
     """Compute how the load at this robot depends on the numbers of its law, (p,) each."""
-    inputs = np.log([robot.motor_speed, robot.tail_length, robot.tails]) - np.array(
-        law.model.centre[: len(EXPONENTS)]
-    )
+    model = law_model(law)
+    centre = np.array(model.centre[: len(EXPONENTS)])
+    inputs = np.log([robot.motor_speed, robot.tail_length, robot.tails]) - centre
     exponents, size, lever = np.zeros((3, len(final.fitted)))
     for place, parameter in enumerate(final.fitted):
         if parameter.name in EXPONENTS:
@@ -202,10 +202,10 @@ def _slopes(robot: Robot, law: FittedLaw, final: FinalRefit) -> dict[str, Floats
             size[place] = 1 / final.parameters[SIZE]
         elif parameter.name == LEVER:
             lever[place] = 1 / final.parameters[LEVER]
-    if not law.place.is_term:
-        return {name: power * exponents for name, power in law.place.moves}
+    if not model.place.is_term:
+        return {name: power * exponents for name, power in model.place.moves}
     names = list(effects_of_law(law, final.parameters)[0])
     slopes = {name: robot.effects[name] * (exponents + size) for name in names}
-    if law.place.lever_unit:
+    if model.place.lever_unit:
         slopes[names[1]] = slopes[names[1]] + robot.effects[names[1]] * lever
     return slopes

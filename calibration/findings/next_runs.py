@@ -28,15 +28,15 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from scipy.special import ndtr
 
-from calibration.attribution.refits import Rival
+from calibration.attribution.hypothesis import Hypothesis
 from calibration.statistics.forward import derivatives
 from calibration.statistics.gls import Noise
-from calibration.statistics.statistical_model import ForwardModel, Runs, start_values
+from calibration.statistics.statistical_model import Experiment, ForwardModel, Runs, start_values
 from common.arrays import Flags, Floats
 from common.errors import InputError
 from common.reading import expecting, read_json
@@ -107,11 +107,11 @@ class Pair(NamedTuple):
     covariance: Floats  # (p, p) of its fit
 
 
-def next_runs(rivals: Sequence[Rival], *, seed: int = 0) -> tuple[tuple[NextRun, ...], Batch]:
+def next_runs(rivals: Sequence[Hypothesis], *, seed: int = 0) -> tuple[tuple[NextRun, ...], Batch]:
     """Find the best experiments to tell (the first four) rivals apart, best first, and the best `BATCH` runs."""
     told_apart = rivals[:_MOST_RIVALS]
-    fits = [rival.fit for rival in told_apart]
-    possible = [rival.model.possible() for rival in told_apart]
+    fits = [rival.fitted for rival in told_apart]
+    possible = [cast(Experiment, rival.model).possible() for rival in told_apart]
     settings = possible[0][1]  # those of all of them
     sides = [derivatives(model, fit.parameters, fit.names) for (model, _), fit in zip(possible, fits, strict=True)]
     pairs = [
@@ -175,9 +175,9 @@ class Explanation:
     law: Mapping[str, Any] = field(default_factory=dict)  # of a rival that is a law, see `with_law`
 
     @staticmethod
-    def from_rival(rival: Rival) -> Explanation:
+    def of(rival: Hypothesis) -> Explanation:
         """Keep of a rival what a decision needs."""
-        fitted = rival.fit
+        fitted = rival.fitted
         kept = [place for place, p in enumerate(fitted.fitted) if not p.of_these_runs]
         parameters = {fitted.names[place]: fitted.parameters[fitted.names[place]] for place in kept}
         covariance, outputs = fitted.covariance[np.ix_(kept, kept)], tuple(rival.model.runs.outputs)
@@ -259,8 +259,8 @@ def standings(
 ) -> list[Standing]:
     """Judge explanations by the new runs in `new` (n,), best first; `with_law` makes the model of a law.
 
-    It takes up where `calibration.verdict.findings.Attribution.verdict` says "ambiguous", and where several laws
-    describe what nothing explains.
+    It takes up where `calibration.attribution.attribution.Attribution.verdict` says "ambiguous", and where several
+    laws describe what nothing explains.
 
     Raises:
         InputError: the table has other outputs than were fitted, or lacks what an effect needs.

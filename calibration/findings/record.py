@@ -6,31 +6,33 @@ Its keys are a format, and older than the names here. `calibration.words` has th
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from calibration.attribution.nearest import largest_along
-from calibration.attribution.refits import UNSEEN, Candidate
+from calibration.attribution.hypothesis import Hypothesis, Reason
+from calibration.attribution.nearest import largest_along, size_interval
+from calibration.attribution.rules import UNSEEN, refuting, shift_of
 from calibration.attribution.wrong_numbers import notable_pull
+from calibration.findings.findings import Findings
 from calibration.statistics.between_repeats import Difference
 from calibration.statistics.excluded import count_of_rows
 from calibration.statistics.fit import Fit, Pull, least_determined
 from calibration.statistics.gls import inverse_root
 from calibration.statistics.statistical_model import Parameter, Runs
-from calibration.verdict.findings import Findings
-from calibration.words.quantities import difference_in_words
+from calibration.words.quantities import difference_in_words, move_in_words
 from calibration.words.render import next_steps, sentence
 from common.provenance import provenance
 
 MODELS = ("uncalibrated", "before", "after", "law", "new_specimen")  # with stated errors
 _REPEATED = 5  # settings that are proposed for repeats where nothing explains the residual
+_NORMAL = 1.959964  # standard deviations to the ends of a 95 % interval
 _NEAR = 0.5  # share of the residual that the best effect must remove to be named where none explains it
 
 
-def verdict_record(result: Findings, *, table: str, path: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Write a verdict as verdict.json has it, with the errors on paths."""
-    record = facts(result)
+def verdict_record(record: Mapping[str, Any], *, table: str) -> dict[str, Any]:
+    """Write the facts of a verdict as verdict.json has them, with its texts; `path` has errors on paths."""
     return {
         **{key: record[key] for key in ("verdict", "effects")},
         "sentence": sentence(record),
@@ -38,7 +40,7 @@ def verdict_record(result: Findings, *, table: str, path: dict[str, Any] | None 
         **record,
         "table": table,
         "provenance": provenance({"table": table}),
-        "path": path,
+        "path": None,
     }
 
 
@@ -52,10 +54,36 @@ def facts(result: Findings) -> dict[str, Any]:
         **_numbers(result),
         **_errors(result),
         **_tests(result),
-        "laws": result.law.to_dict(result.final if result.explaining else None) if result.law else None,
+        "laws": result.law.to_dict(result.final if result.claims else None) if result.law else None,
         "described": result.described,
         **_next(result),
         **_data(result),
+    }
+
+
+def corrected_record(result: Findings) -> dict[str, Any]:
+    """Collect what is handed on, for corrected.json: numbers of the model, its effects, and their covariance."""
+    refit, effects = result.final_refit, set(result.catalogue)
+    values: dict[str, dict[str, Any]] = {"numbers": {}, "effects": {}}
+    indices = [index for index, p in enumerate(refit.fitted) if p in result.handed_on]
+    for index, parameter in zip(indices, result.handed_on, strict=True):
+        half = _NORMAL * math.sqrt(refit.covariance[index, index])
+        value = refit.parameters[parameter.name]
+        alone = [float(parameter.changed(value, end)) for end in (-half, half)]
+        values["effects" if parameter.name in effects else "numbers"][parameter.name] = {
+            "title": parameter.title,
+            "unit": parameter.unit,
+            "value": value,
+            "interval": list(result.final_intervals.get(parameter.name, alone)),
+            "given": parameter.start,
+            "scale": "logarithm" if parameter.logarithmic else "as it is",
+        }
+    covariance = refit.covariance[np.ix_(indices, indices)].tolist()
+    return {
+        **values,
+        "covariance": {"names": [p.name for p in result.handed_on], "on_their_scales": covariance},
+        "forms": [form_record(form) for form in result.forms],
+        "verdict": result.verdict,
     }
 
 
@@ -103,52 +131,108 @@ def _least_determined(final: Fit) -> dict[str, Any] | None:
 
 
 def _claims(result: Findings) -> dict[str, Any]:
-    found, nearest = result.found, result.nearest
+    found, claims = result.found, result.claims
     return {
-        "claims": [
-            {"title": c.title, "words": c.words, "effects": [e.name for e in c.claimed]} for c in result.explaining
-        ],
+        "claims": [{"title": c.title, "words": c.words, "effects": [e.name for e in c.added]} for c in claims],
         "in_form_only": list(result.in_form_only),
-        "imitability": [c.imitable for c in result.explaining],
-        "transfer_p": [c.transfer for c in result.explaining],
-        "imitable": any(c.uncertain for c in result.explaining)
-        or bool(result.explaining and result.gain_is_certain is False),
-        "effects_instead": [[e.name for e in c.claimed] for c in found.rival_effects],
+        "imitability": [c.evidence.imitable for c in claims],
+        "transfer_p": [c.evidence.transfer for c in claims],
+        "imitable": any(c.doubts for c in claims) or bool(claims and result.gain_is_certain is False),
+        "effects_instead": [[e.name for e in c.added] for c in found.rival_effects],
         "claims_instead": [c.title for c in found.rival_effects],
-        "nearest": {**shown(nearest.effect), **nearest.record()} if nearest else None,
+        "nearest": _adopted(result.nearest, found.forms, result.runs) if result.nearest else None,
         "nearest_candidate": _nearest_candidate(result),
-        "not_fitted": [{"title": c.title, "reason": c.reason} for c in result.not_fitted],
+        "not_fitted": [{"title": c.title, "reason": c.why} for c in result.not_fitted],
         "halving": result.halving,
         "certain": [e.name for e in result.certain],
         "undecided": [" and ".join(e.title for e in rest) for rest in result.undecided],
         "candidates": [_candidate(c) for c in found.candidates],
         "untestable": result.untestable,
-        "forms": [form.record() for form in result.forms],
-        "turns": [vars(turn) for turn in result.turns],
+        "forms": [form_record(form) for form in found.forms],
+        "turns": [vars(turn) for turn in found.turns],
     }
 
 
-def _candidate(c: Candidate) -> dict[str, Any]:
+def _candidate(c: Hypothesis) -> dict[str, Any]:
+    evidence = c.evidence
     return {
         "effect": c.effect.name,
         **shown(c.effect),
         "bounds": list(c.effect.bounds),
-        "shows": c.detectable < UNSEEN,
-        "z": c.z,
-        "survived_share": c.survived,
-        "smallest_detectable": c.detectable,
-        "smallest_detectable_if_numbers_were_exact": c.detectable_exact,
-        "size": c.refit.parameters[c.effect.name] if c.refit else None,
-        "deviance": c.refit.deviance if c.refit else None,
-        "session_gain": [c.gain, c.gain_error],
-        "left_out_error_ratio": None if math.isnan(c.left_out) else c.left_out,
-        "verdict": c.reason,
+        "shows": (evidence.detectable or 0.0) < UNSEEN,
+        "z": c.score,
+        "survived_share": evidence.survived,
+        "smallest_detectable": evidence.detectable,
+        "smallest_detectable_if_numbers_were_exact": evidence.detectable_exact,
+        "size": c.size if c.fit else None,
+        "deviance": c.fit.deviance if c.fit else None,
+        "session_gain": evidence.session_gain and list(evidence.session_gain),
+        "left_out_error_ratio": evidence.left_out,
+        "verdict": c.why,
     }
+
+
+def form_record(form: Hypothesis) -> dict[str, Any]:
+    """Write a form: its effects with their sizes, and its error on left-out runs."""
+    return {
+        "title": form.title,
+        "sizes": {e.name: form.fitted.parameters[e.name] for e in form.added},
+        "theory": form.at_theory,
+        "error": form.evidence.left_out_error,
+    }
+
+
+def _adopted(form: Hypothesis, alike: Sequence[Hypothesis], runs: Runs) -> dict[str, Any]:
+    evidence = form.evidence
+    assert evidence.remainder is not None
+    assert evidence.paired is not None
+    return {
+        **shown(form.effect),
+        "effect": form.effect.name,
+        "mean": form.size,
+        "interval": list(size_interval(form)),
+        "spread": evidence.spread,
+        "scale": "logarithm" if form.logarithmic else "as it is",
+        "sizes": {name: list(size) for name, size in evidence.sizes.items()},
+        "removed_share": min(evidence.removed or 0.0, 1.0),
+        "session_gain": [evidence.paired.gain, evidence.paired.error],
+        "birge": evidence.birge,
+        "remainder": evidence.remaining,
+        "remainder_p": evidence.remainder.p_value,
+        "largest_along": largest_along(evidence.remainder, runs),
+        "as_well": [other.title for other in alike if other.fit is not form.fit],
+        "at_theory": form.at_theory,
+    }
+
+
+def _withdrawn(claim: Hypothesis) -> dict[str, Any]:
+    refuted = refuting(claim)[0]
+    return {
+        "title": " and ".join(e.title for e in claim.added),
+        "effects": [e.name for e in claim.added],
+        "on": refuted.names,
+        "error_before": refuted.before,
+        "error_after": refuted.after,
+    }
+
+
+def _move(move: Hypothesis) -> dict[str, Any]:
+    shift, name = shift_of(move), move.effect.name
+    record = {
+        "number": shift.of.name,
+        "where": shift.where,
+        "change": move.size,
+        "interval": list(move.fitted.interval(name)),
+        "scale": "logarithm" if shift.of.logarithmic else "as it is",
+        "score": move.score,
+        "instead": list(move.evidence.instead),
+    }
+    return {"words": move_in_words(record, move.effect.title, shift.of.shown, shift.of.unit), **record}
 
 
 def _nearest_candidate(result: Findings) -> dict[str, Any] | None:
     """Find the single effect that removes most of the residual, if one was refitted and removes much."""
-    refits = [(c.refit.deviance, c.effect.title, c.reason) for c in result.found.candidates if c.refit]
+    refits = [(c.fit.deviance, c.effect.title, c.why) for c in result.found.candidates if c.fit]
     if not refits:
         return None
     (deviance, title, reason), before = min(refits), result.base.deviance
@@ -158,12 +242,12 @@ def _nearest_candidate(result: Findings) -> dict[str, Any] | None:
 
 
 def _numbers(result: Findings) -> dict[str, Any]:
-    pulls = result.pulls
+    pulls, number = result.pulls, result.found.number
     learnt = [p for p in pulls if p.learnt]
     explained = result.verdict not in ("partial", "unexplained")
     notable = explained and learnt and abs(learnt[0].z) > notable_pull(len(learnt))
     return {
-        "number_check": result.found.number_check and result.found.number_check.record(),
+        "number_check": _number_check(number) if number and result.found.number_leads else None,
         "numbers_instead": [p.parameter.name for p in result.found.rival_numbers],
         "rival_numbers": [_number(p) for p in result.found.rival_numbers],
         "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
@@ -171,7 +255,17 @@ def _numbers(result: Findings) -> dict[str, Any]:
         "notable_number": learnt[0].words if notable else None,
         "numbers_as_given": [_number(p) for p in pulls],
         "differences": [_difference(d, result.runs) for d in result.differences],
-        "moves": [{"words": move.words, **move.record} for move in result.moves],
+        "moves": [_move(move) for move in result.moves],
+    }
+
+
+def _number_check(number: Hypothesis) -> dict[str, Any]:
+    return {
+        "imitable": number.evidence.imitable,
+        "transfer": number.evidence.transfer,
+        "tolerances": max(pull.tolerances for pull in number.evidence.pulls),
+        "implausible": Reason.IMPLAUSIBLE in number.doubts,
+        "uncertain": bool(number.doubts),
     }
 
 
@@ -211,7 +305,7 @@ def _errors(result: Findings) -> dict[str, Any]:
         "gain_interval": errors.gain_interval and list(errors.gain_interval),
         "gain_is_certain": result.gain_is_certain,
         "errors_of_conditions": vars(errors.of_conditions) if errors.of_conditions else None,
-        "withdrawn": [claim.record() for claim in result.withdrawn],
+        "withdrawn": [_withdrawn(claim) for claim in result.withdrawn],
         "noise_ceiling": errors.noise,
         "noise_known": result.runs.noise_known,
         "errors_by_output": errors.by_output,

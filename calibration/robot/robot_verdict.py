@@ -6,22 +6,23 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import pandas as pd
 
-from calibration.report.corrected_robot import as_toml, handed_on, law_handed_on
-from calibration.report.saved_verdict import SavedVerdict
+from calibration.findings.samples import open_forms
+from calibration.report.path_error import PathError
+from calibration.robot.corrected_robot import as_toml, handed_on, law_handed_on
 from calibration.statistics.statistical_model import lines_of_excluded
 from calibration.swimmer.measured_table import PROTOCOLS, Measurements, read_measurements
-from calibration.verdict.samples import open_forms
+from calibration.verdict.verdict import Verdict
 from common.arrays import Flags
 from sim.knowledge import CalibrationKnowledge
 from sim.model.robot import Robot
 
 
 @dataclass(frozen=True, repr=False)
-class RobotVerdict(SavedVerdict):
+class RobotVerdict(Verdict):
     """What a measured table says about a robot: a `Verdict` with the robot, its runs, and the corrected robot.
 
     Example:
@@ -32,6 +33,7 @@ class RobotVerdict(SavedVerdict):
     """
 
     robot: Robot = field(kw_only=True)  # as it was given
+    paths: tuple[PathError, ...] = field(default=(), kw_only=True)  # the error on paths, where it was asked for
 
     @property
     def corrected(self) -> Robot:
@@ -42,6 +44,10 @@ class RobotVerdict(SavedVerdict):
     def knowledge(self) -> CalibrationKnowledge:
         """Covariance of what was fitted, and the current in the tank; for `softflagella.plan`."""
         return self._handed_on[1]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of verdict.json."""
+        return {**super().to_dict(), "path": {error.words: error.record() for error in self.paths} or None}
 
     @cached_property
     def _handed_on(self) -> tuple[Robot, CalibrationKnowledge]:

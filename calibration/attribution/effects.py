@@ -1,0 +1,192 @@
+"""Which effects explain the residual: single ones and pairs, refitted and judged.
+
+Every effect that the runs can test is a candidate. If its score exceeds the critical |z|
+(`calibration.statistics.residual_tests`), with a sign that its bounds allow, the effect is fitted together with
+the coefficients, and judged by `calibration.attribution.rules`.
+
+Scores hold near the fit only. If a coefficient ran to an end of its range because an effect is missing, scores say
+nothing. Then every effect is fitted, starting from the model as given.
+
+Kept effects cannot be told apart if their deviances differ by less than one parameter can gain by chance (6.63).
+If no single effect is kept, a second one is looked for beside each of the best few.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from calibration.attribution.hypothesis import Evidence, Hypothesis, Origin, Reason
+from calibration.attribution.left_out import session_gain
+from calibration.attribution.rules import INDISTINGUISHABLE, RULES, Stage, Trial, judge
+from calibration.statistics.budget import clock, skipped
+from calibration.statistics.fit import Fit, UnsolvedError, fit
+from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
+from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, start_values
+from calibration.statistics.study import Study
+
+FIRST = 3  # number of single effects to which a second one is added
+_DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
+
+
+def scored(
+    misfit: Misfit, base: Fit, effects: Sequence[Parameter], threshold: float, beside: tuple[Parameter, ...] = ()
+) -> list[Hypothesis]:
+    """Describe every effect by its score alone; a claim needs a |z| above `threshold`."""
+    scores = misfit.scores
+    length = np.maximum(scores.length, 1e-300)
+    return [
+        Hypothesis(
+            Origin.PAIR if beside else Origin.EFFECT,
+            (*beside, effect),
+            evidence=Evidence(
+                score=float(scores.z[j]),
+                survived=float(scores.survived[j]),
+                detectable=threshold / float(length[j]),
+                detectable_exact=threshold / max(float(misfit.exact_length[j]), 1e-300),
+                expected=base.parameters[effect.name] + float(scores.z[j] / length[j]),
+            ),
+        )
+        for j, effect in enumerate(effects)
+    ]
+
+
+def explaining(candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Return the kept effects that the runs cannot tell from the best one, best first."""
+    kept = sorted((c for c in candidates if c.kept), key=penalised_deviance)
+    return [c for c in kept if penalised_deviance(c) - penalised_deviance(kept[0]) < INDISTINGUISHABLE]
+
+
+def penalised_deviance(candidate: Hypothesis) -> float:
+    """Return the deviance of a fit plus what second numbers cost, because each may gain as much by chance."""
+    seconds = sum(e.second is not None for e in candidate.added)
+    return candidate.fitted.deviance + INDISTINGUISHABLE * seconds
+
+
+def examine(
+    study: Study,
+    base: Fit,
+    misfit: Misfit,
+    directions: Directions,
+    *,
+    threshold: float | None = None,
+    beside: tuple[Parameter, ...] = (),
+    single: float = math.inf,
+    after_first: Callable[[int, float], None] | None = None,
+) -> list[Hypothesis]:
+    """Fit and judge every effect that is not in the model yet, best score first.
+
+    Args:
+        base: the fit without them.
+        misfit: of its residual.
+        directions: of the effects there.
+        threshold: |z| that a fit needs; the critical one of `misfit` if not given.
+        beside: effects that `base` has already.
+        single: extended BIC of the best single effect, which a pair must not cost.
+        after_first: is told, after the first fit, how many there are, and the processor time of this one.
+    """
+    needed = misfit.critical_z if threshold is None else threshold
+    effects = [e for e in study.effects if e not in beside]
+    local = coefficients_within_range(study.model, base.parameters)
+    testable = misfit.scores.survived >= TESTABLE
+    largest = float(np.max(np.abs(misfit.scores.z), where=testable, initial=0.0))
+    trial = Trial(study, base, {}, needed, largest, study.noise_at_most(len(base.names)), single)
+    candidates = scored(misfit, base, effects, needed, beside)
+    if local:
+        candidates = [judge(candidate, trial, RULES, Stage.SCORE) for candidate in candidates]
+    wanted = sum(c.reason is Reason.NOT_NEEDED for c in candidates)
+    examined = []
+    title = " ".join(("effects", *(f"beside {e.title}" for e in beside)))
+    order = np.argsort(-np.abs(misfit.scores.z)).tolist()
+    for j in tqdm(order, desc=title, unit="effect", delay=1.0, disable=not study.progress or None):
+        candidate = candidates[j]
+        if candidate.reason is not Reason.NOT_NEEDED:
+            examined.append(candidate)
+            continue
+        if skipped(f"a second effect beside {beside[0].title}" if beside else candidate.effect.title):
+            examined.append(replace(candidate, reason=Reason.NO_TIME))
+            continue
+        began = clock()
+        try:
+            refit = _fitted(study, base, candidate, float(misfit.second[j]), local=local)
+        except UnsolvedError:
+            examined.append(replace(candidate, reason=Reason.NOT_SOLVED))
+            continue
+        measures = measures_of(study, base, directions.without(j))
+        examined.append(judge(replace(candidate, fit=refit), replace(trial, measures=measures), RULES))
+        if after_first:
+            after_first(wanted, clock() - began)
+            after_first = None
+    return examined
+
+
+def _fitted(study: Study, base: Fit, candidate: Hypothesis, second: float, *, local: bool) -> Fit:
+    """Fit an effect from where its score points to, or from the model as given where scores say nothing."""
+    effect, expected = candidate.effect, candidate.evidence.expected
+    assert expected is not None
+    guess = expected if local else effect.start
+    size = {effect.name: min(max(guess, effect.bounds[0]), effect.bounds[1])}
+    if effect.second is not None:
+        size[effect.second.name] = second if local else effect.second.start
+    start = {**(base.parameters if local else start_values(study.model)), **size}
+    names = (*base.names, *size)
+    target = study.noise_at_most(len(names))
+    return fit(study.model, start, names, study.split.fitted, target=target, title="")
+
+
+def measures_of(study: Study, base: Fit, others: Directions) -> dict[str, Callable[[Hypothesis], Any]]:
+    """Say how the evidence about a fitted effect is measured, in view of the directions of all `others`."""
+    return {
+        "remainder": lambda h: examine_residual(
+            replace(study, seed=study.seed + 1), h.fitted, others, draws=_DRAWS, decide=study.level / 2
+        ),
+        "session_gain": lambda h: session_gain(study, base, h.fitted),
+        "cost": lambda h: ebic(study, h.fitted, len(h.added) + len(h.fitted.wrong_numbers)),
+    }
+
+
+def coefficients_within_range(model: ForwardModel, fitted: Parameters) -> bool:
+    """Tell whether no coefficient ran to an end of its range."""
+    return all(1.5 * p.bounds[0] < fitted[p.name] < p.bounds[1] / 1.5 for p in model.coefficients)
+
+
+def pairs(study: Study, candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Add second effects to the best fits with a single one; of those kept each is worth more than one effect."""
+    again = replace(study, seed=study.seed + 2)
+    title = "second effects" if study.progress else ""
+    single, second = lowest_ebic(study, candidates), []
+    for first in sorted((c for c in candidates if c.fit), key=penalised_deviance)[:FIRST]:
+        if skipped(f"a second effect beside {first.title}"):
+            continue
+        others = [e for e in study.effects if e.name != first.effect.name]
+        tangents = directions(study.model, first.fitted.parameters, others, title=title, quick=True)
+        misfit = examine_residual(again, first.fitted, tangents)
+        second += examine(again, first.fitted, misfit, tangents, beside=first.added, single=single)
+    judged: dict[frozenset[str], Hypothesis] = {}
+    for pair in second:  # each is met from both sides
+        names = frozenset(e.name for e in pair.added)
+        if names not in judged or (pair.kept and not judged[names].kept):
+            judged[names] = pair
+    return list(judged.values())
+
+
+def lowest_ebic(study: Study, candidates: Sequence[Hypothesis]) -> float:
+    """Return the lowest extended BIC of a single effect that was fitted; infinity if none was."""
+    return min((ebic(study, c.fit, 1) for c in candidates if c.fit), default=math.inf)
+
+
+def ebic(study: Study, refit: Fit, count: int) -> float:
+    """Add to the deviance of a fit with `count` effects what they cost: k ln n + 2 ln (number of such sets).
+
+    A nuisance parameter that lost its prior counts once more among the k numbers.
+
+    Source: Chen and Chen (2008), γ = 1.
+    """
+    sets = max(math.comb(len(study.effects), count), 1)  # a number may stand for an effect
+    numbers = len(refit.names) + len(refit.wrong_numbers)
+    return refit.deviance + numbers * math.log(study.values) + 2 * math.log(sets)

@@ -1,0 +1,103 @@
+"""What left-out runs say: each is predicted from the other sessions, by one linear step, and gains are paired.
+
+Two gains share the runs without either model, so their own standard errors say nothing about which one is larger.
+So two models are compared by the difference of the log likelihoods, paired over conditions: with C conditions of
+differences D_c,
+
+    D = Σ_c D_c,   σ_D² = C Var D_c,
+
+and the models are as good as each other while D ≤ t σ_D, with the 97.5 % quantile t of Student's distribution of
+C − 1 degrees of freedom: a few conditions prove little.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import t as student
+from scipy.stats import wilcoxon
+
+from calibration.statistics.fit import Fit
+from calibration.statistics.gls import Noise, solve_normal
+from calibration.statistics.study import Study, groups, leave_one_group_out
+from common.arrays import Floats, Integers
+
+_QUANTILE = 0.975
+
+
+class PairedGain(NamedTuple):
+    """By how much a model predicts left-out runs better than another one, in log likelihood."""
+
+    of_conditions: Floats  # (c,)
+
+    @property
+    def gain(self) -> float:
+        return float(self.of_conditions.sum())
+
+    @property
+    def error(self) -> float:
+        """Standard error, over conditions."""
+        count = len(self.of_conditions)
+        return float(self.of_conditions.std(ddof=1)) * math.sqrt(count) if count > 1 else math.inf
+
+    @property
+    def certain(self) -> bool:
+        """Whether its 95 % interval is above zero."""
+        return self.gain > float(student.ppf(_QUANTILE, max(len(self.of_conditions) - 1, 1))) * self.error
+
+    @property
+    def consistent(self) -> bool:
+        """Whether conditions gain, by a signed-rank test: one that gains far more than others proves no less."""
+        some = self.of_conditions[self.of_conditions != 0]
+        return len(some) > 1 and bool(wilcoxon(some, alternative="greater").pvalue < 1 - _QUANTILE)
+
+
+def paired_gain(study: Study, one: Fit, other: Fit) -> PairedGain:
+    """Compare the predictions of `one` with those of `other`, in the noise of `one`."""
+    return gain_of_residuals(study, *left_out_residuals(study, other, one))
+
+
+def gain_of_residuals(study: Study, before: Floats, after: Floats, b: float = 1.0) -> PairedGain:
+    """Compare two left-out residuals, in the noise b S."""
+    rows = left_out_rows(study)
+    gains = ((before**2 - after**2) / (2 * b)).reshape(len(rows), -1).sum(1)
+    condition = np.unique(study.model.runs.condition[rows], return_inverse=True)[1].reshape(-1)
+    return PairedGain(np.asarray(np.bincount(condition, weights=gains), dtype=float))
+
+
+def session_gain(study: Study, base: Fit, refit: Fit) -> tuple[float, float]:
+    """Sum the gain in log likelihood over left-out sessions, with its standard error (linearised refits).
+
+    With whitened residuals r of the refit and r + d of the base, a session gains ½|d|² + d·r, |d| of it by noise.
+    """
+    before, after = left_out_residuals(study, base, refit)
+    return float(before @ before - after @ after) / 2, float(np.linalg.norm(before - after))
+
+
+def left_out_residuals(study: Study, base: Fit, refit: Fit) -> tuple[Floats, Floats]:
+    """Compute `left_out_residual` of the base and of the refit, both in the noise of the refit."""
+    return left_out_residual(study, base, refit.noise), left_out_residual(study, refit, refit.noise)
+
+
+def left_out_residual(study: Study, fitted: Fit, noise: Noise) -> Floats:
+    """Whiten the residual of all fitted runs, in the order of `left_out_rows`, each from the other sessions."""
+    data, parts = study.model.runs, []
+    for learn, out in leave_one_group_out(groups(data)[0], study.split.fitted):
+        step = solve_normal(fitted.normal_of_fit(data, learn, noise))[0]
+        predicted = (data.y - fitted.prediction)[out] - fitted.tangents[out] @ step
+        parts.append(noise.whitener(data.session[out], data.scale[out])(predicted))
+    return np.concatenate(parts)
+
+
+def left_out_rows(study: Study) -> Integers:
+    """Return the places of the runs of a left-out residual."""
+    left_out = leave_one_group_out(groups(study.model.runs)[0], study.split.fitted)
+    return np.concatenate([np.flatnonzero(out) for _, out in left_out])
+
+
+def left_out_error(study: Study, fitted: Fit) -> float:
+    """Compute the relative rms error on left-out runs, in the noise of the fit."""
+    white = left_out_residual(study, fitted, fitted.noise)
+    return math.sqrt(float((white**2).mean())) * fitted.noise.rms

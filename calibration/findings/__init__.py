@@ -1,0 +1,1 @@
+"""What a calibration found: the numbers, their record, and the next runs."""

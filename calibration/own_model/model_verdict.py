@@ -1,0 +1,27 @@
+"""What a table says about a model of one's own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from calibration.own_model.declared import Model
+from calibration.verdict.verdict import Verdict
+
+
+@dataclass(frozen=True, repr=False)
+class ModelVerdict(Verdict):
+    """What a table says about a model: a `Verdict` with the model, its runs, and what is corrected.
+
+    Example:
+        >>> from softflagella import calibrate
+        >>> verdict = calibrate("falls.csv", MODEL, session="round")  # doctest: +SKIP
+        >>> verdict.corrected  # doctest: +SKIP
+        {'viscosity': 0.19, 'wall': 1.04}
+    """
+
+    model: Model = field(kw_only=True)  # as it was given
+
+    @property
+    def corrected(self) -> dict[str, float]:
+        """Numbers, and effects that are kept, fitted to all runs: name -> value."""
+        return {p.name: self.final_refit.parameters[p.name] for p in self.handed_on}
