@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -17,7 +18,7 @@ from calibration.own_model.model_verdict import ModelVerdict
 from calibration.own_model.table_of_runs import Noise, Roles, read_runs_of
 from calibration.robot.corrected_robot import check_given
 from calibration.robot.robot_verdict import RobotVerdict, read_runs
-from calibration.statistics.budget import limited
+from calibration.statistics.budget import Work, limited
 from calibration.statistics.statistical_model import lines_of_excluded
 from calibration.swimmer.possible_runs import Owned, owned, read_owned
 from calibration.swimmer.swimmer import SwimmerModel
@@ -28,7 +29,8 @@ from common.units import LengthUnit
 from sim.robot_rows import OneRobot, one_robot
 from softflagella.path_error import path_errors, wanted_paths
 
-MAX_SECONDS = 90.0  # of processor time for the search, without laws
+MAX_PREDICTIONS = 300_000  # of one run of a robot, for the search
+MAX_PREDICTIONS_OF_OWN_MODEL = 10_000_000  # a function of one's own predicts many rows at once
 
 
 @checks_keywords
@@ -47,6 +49,7 @@ def calibrate(
     held_out: str | Sequence[str] | None = None,
     noise: Noise | None = None,
     notes: Sequence[str] | None = None,
+    max_predictions: float | None = None,
     max_seconds: float | None = None,
     jobs: int | None = None,
     progress: bool = True,
@@ -81,9 +84,10 @@ def calibrate(
             output where differences are compared.
         notes: COL, a column in which runs may differ without the model's knowledge; columns that are not named
             then are not looked at (default: all others).
-        max_seconds: of processor time for the search (default 90, with laws 180). The verdict then is provisional,
-            and says what was not tried. Of a model of your own the whole calibration counts, and time in which
-            its function waits for another program.
+        max_predictions: of a run, for the search (default 300,000; for a model of your own 10,000,000, over the
+            whole calibration). A verdict that this cuts short is provisional, and says what was not tried.
+        max_seconds: of processor time, for the same (default: no limit), where a model is slow. Time in which a
+            function of your own waits for another program counts. What is cut short depends on the machine then.
         jobs: threads; default all processors.
         progress: show progress bars.
         tell: is told, before the fit, what was converted and what was excluded, a line at a time.
@@ -103,14 +107,16 @@ def calibrate(
         >>> result = sf.plan(sf.circle(2.0), verdict)  # doctest: +SKIP
         >>> verdict.samples(1000)["C_t"].quantile([0.025, 0.975])  # doctest: +SKIP
     """
-    if max_seconds is not None and not (isinstance(max_seconds, Real) and max_seconds > 0):
-        raise InputError(f"max_seconds: {max_seconds}; give a positive number of seconds")
+    for name, most in (("max_predictions", max_predictions), ("max_seconds", max_seconds)):
+        if most is not None and not (isinstance(most, Real) and most > 0):
+            raise InputError(f"{name}: {most}; give a positive number")
+    usual = MAX_PREDICTIONS_OF_OWN_MODEL if isinstance(robot, Model) else MAX_PREDICTIONS
+    limit = Work(max_predictions or usual, max_seconds or math.inf)
     if not (isinstance(seed, Integral) and seed >= 0):
         raise InputError(f"seed: {seed}; give a whole number from 0")
     roles = Roles(session, specimen, held_out, noise, notes)
     if isinstance(robot, Model):
         _refuse("a model of your own", laws=not laws, paths=paths, unit=unit, protocol=protocol != "session")
-        limit = MAX_SECONDS if max_seconds is None else max_seconds
         given = own if isinstance(own, Mapping) else read_owned(own or ())
         with limited(limit):
             experiment, rows = read_runs_of(table, robot, roles, own=given, title="checks" if progress else "")
@@ -118,13 +124,12 @@ def calibrate(
                 tell(line)
             of_model = partial(ModelVerdict, model=robot, table=_name(table))
             verdict = find_what_is_missing(
-                experiment, held_out=rows, seed=seed, max_seconds=limit, progress=progress, verdict=of_model
+                experiment, held_out=rows, limit=limit, seed=seed, progress=progress, verdict=of_model
             )
         return replace(verdict, caveats=(*verdict.caveats, *experiment.caveats))
     _refuse("a robot", **roles._asdict())
     robot = one_robot(robot)
     check_given(robot)
-    limit = MAX_SECONDS * (1 + laws) if max_seconds is None else max_seconds
     wanted = wanted_paths(paths, robot, unit)
     settings = own if isinstance(own, Mapping) else owned(own or ())
     data, rows = read_runs(table, protocol, tell)
@@ -134,7 +139,7 @@ def calibrate(
         held_out=rows,
         describe=find_laws if laws else None,
         seed=seed,
-        max_seconds=limit,
+        limit=limit,
         progress=progress,
         verdict=partial(RobotVerdict, robot=robot, table=_name(table)),
     )

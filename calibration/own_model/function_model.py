@@ -12,7 +12,7 @@ import pandas as pd
 from tqdm import tqdm
 
 from calibration.own_model.declared import Model
-from calibration.statistics.budget import spent, waiting
+from calibration.statistics.budget import count_predictions, spent, waiting
 from calibration.statistics.forward import secants
 from calibration.statistics.statistical_model import Parameter, Parameters, Predict, Runs
 from common.arrays import Flags, Floats, Integers
@@ -185,6 +185,7 @@ def evaluate(model: Model, columns: AskedColumns, parameters: Mapping[str, Any])
         InputError: the function fails, or an output is missing, is no number, or has another shape.
     """
     count, values = len(next(iter(columns.values()))), {name: float(value) for name, value in parameters.items()}
+    count_predictions(count)
     try:
         with np.errstate(all="ignore"), waiting():
             returned = model.function(columns, values)

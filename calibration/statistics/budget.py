@@ -1,11 +1,13 @@
-"""Processor time that a search may take: it ends early, with what it has, and lists what it did not try.
-
-Time in which a function of one's own waits, for a solver in another process say, counts as well (`waiting`).
+"""Work that a search may do: it ends early, with what it has, and lists what it did not try.
 
 A refit of an effect may crawl along a bent valley, and a table that no effect explains is tried with many pairs.
-So a search runs within `limited(seconds)`. Each of its loops asks `skipped` before it tries something, and each
-fit asks before a step. A limit inside another one ends with it at the latest. The first Ctrl-C within
-`stopped_by_interrupt` ends the search; where none is under way, it interrupts the program as always.
+So a search runs within `limited(work)`. Work is counted in predictions of one run, so that every machine comes to
+the same verdict, however fast or busy it is. A limit of processor time can be set as well, for models that take
+long. Time in which a function of one's own waits, for a solver in another process say, counts in it (`waiting`).
+
+Each model says how many runs it predicts (`count_predictions`). Each loop of a search asks `skipped` before it
+tries something, and each fit asks before a step. A limit inside another one ends with it at the latest. The first
+Ctrl-C within `stopped_by_interrupt` ends the search; where none is under way, it interrupts the program as always.
 """
 
 from __future__ import annotations
@@ -25,11 +27,39 @@ _SHARE_OF_ONE = 1 / 3  # of a limit, for one fit
 _LEAST_WAIT = 0.02  # s; the machine interrupts any call for less
 _waited = 0.0  # s, of all calls
 _last_call = 0.0  # s
+_PREDICTED: ContextVar[int] = ContextVar("predicted", default=0)  # runs; a thread counts its own
+
+
+@dataclass(frozen=True)
+class Work:
+    """Work that was done, or that may be; by default any."""
+
+    predictions: float = math.inf  # of one run
+    seconds: float = math.inf  # of processor time, all threads of this process, and of waiting
+
+    def __add__(self, other: Work) -> Work:
+        return Work(self.predictions + other.predictions, self.seconds + other.seconds)
+
+    def __sub__(self, other: Work) -> Work:
+        return Work(self.predictions - other.predictions, self.seconds - other.seconds)
+
+    def __rmul__(self, share: float) -> Work:
+        return Work(share * self.predictions, share * self.seconds)
 
 
 def clock() -> float:
     """Return the seconds of processor time, all threads of this process, and those of waiting."""
     return time.process_time() + _waited
+
+
+def work_done() -> Work:
+    """Return the predictions of this thread up to now, and the time of `clock`."""
+    return Work(_PREDICTED.get(), clock())
+
+
+def count_predictions(runs: int) -> None:
+    """Count the predictions of so many runs."""
+    _PREDICTED.set(_PREDICTED.get() + runs)
 
 
 @contextmanager
@@ -48,56 +78,89 @@ def waiting() -> Iterator[None]:
 
 @dataclass
 class Budget:
-    """Processor time of a search, all threads of this process."""
+    """Work that a search may do."""
 
-    end: float  # of `clock`
-    seconds: float
-    not_tried: list[str] = field(default_factory=list)  # in words; shared with the limits inside
+    limit: Work  # of which the search has a share
+    began: Work
+    end: Work
+    allowed: Work  # at the beginning
+    # What, in words -> when the search had ended, in words; shared with the limits inside.
+    not_tried: dict[str, str] = field(default_factory=dict)
 
     @property
-    def left(self) -> float:
-        """Seconds that are left."""
-        return self.end - clock()
+    def left(self) -> Work:
+        """Work that is left."""
+        return self.end - work_done()
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C has ended the search."""
+        return self.end.predictions == -math.inf
 
 
 _BUDGETS: ContextVar[tuple[Budget, ...]] = ContextVar("budgets", default=())
 
 
 @contextmanager
-def limited(seconds: float) -> Iterator[Budget]:
-    """Limit what runs inside to some seconds of processor time."""
-    outer = _BUDGETS.get()
-    budget = Budget(clock() + seconds, seconds, outer[0].not_tried if outer else [])
-    token = _BUDGETS.set((*outer, budget))
+def limited(limit: Work, share: float = 1.0, began: Work | None = None) -> Iterator[Budget]:
+    """Limit what runs inside to a share of some work, which began before or begins here."""
+    outer, now = _BUDGETS.get(), work_done()
+    began = began or now
+    end = began + share * limit
+    token = _BUDGETS.set((*outer, Budget(limit, began, end, end - now, outer[0].not_tried if outer else {})))
     try:
-        yield budget
+        yield _BUDGETS.get()[-1]
     finally:
         _BUDGETS.reset(token)
 
 
 def limited_as_one() -> AbstractContextManager[object]:
-    """Limit what runs inside to the share of a search's time that one fit may take, if this is a search."""
+    """Limit what runs inside to the share of a search's work that one fit may do, if this is a search."""
     outer = _BUDGETS.get()
-    return limited(_SHARE_OF_ONE * outer[-1].seconds) if len(outer) > 1 else nullcontext()
+    return limited(outer[-1].allowed, _SHARE_OF_ONE) if len(outer) > 1 else nullcontext()
 
 
-def seconds_left() -> float:
-    """Return the processor time that is left; infinite without a limit."""
-    return min((budget.left for budget in _BUDGETS.get()), default=math.inf)
+def beginning() -> Work:
+    """Return where the outermost limit began; without one, where the work is now."""
+    outer = _BUDGETS.get()
+    return outer[0].began if outer else work_done()
+
+
+def work_left() -> Work:
+    """Return the work that may still be done; infinite without a limit."""
+    left = [budget.left for budget in _BUDGETS.get()]
+    return Work(
+        min((each.predictions for each in left), default=math.inf),
+        min((each.seconds for each in left), default=math.inf),
+    )
+
+
+def seconds_left(since: Work) -> float:
+    """Estimate the processor time that is left, at the pace since some work was done; infinite without a limit."""
+    done, left = work_done() - since, work_left()
+    return min(left.seconds, left.predictions * done.seconds / max(done.predictions, 1))
 
 
 def spent() -> bool:
-    """Tell whether no processor time is left."""
-    return seconds_left() <= 0
+    """Tell whether nothing more may be done."""
+    return _ended(0) != ""
 
 
 def skipped(what: str, calls: int = 0) -> bool:
-    """Tell whether no time is left for something, or for so many calls as the last one, and note what it is."""
-    if out := seconds_left() <= calls * _last_call:
-        not_tried = _BUDGETS.get()[0].not_tried
-        if what not in not_tried:
-            not_tried.append(what)
-    return out
+    """Tell whether nothing more may be done, or not so many calls as the last one, and note what was to do."""
+    if ended := _ended(calls):
+        _BUDGETS.get()[0].not_tried.setdefault(what, ended)
+    return ended != ""
+
+
+def _ended(calls: int) -> str:
+    """Say in words where the search ended, before some calls as long as the last one; empty if it goes on."""
+    outer, left = _BUDGETS.get(), work_left()
+    if any(budget.interrupted for budget in outer):
+        return "at Ctrl-C"
+    if left.predictions <= 0:
+        return f"after {outer[0].limit.predictions:,.0f} predictions of a run"
+    return f"after {outer[0].limit.seconds:,.0f} s of processor time" if left.seconds <= calls * _last_call else ""
 
 
 @contextmanager
@@ -109,7 +172,7 @@ def stopped_by_interrupt() -> Iterator[None]:
         if not budgets or spent():
             raise KeyboardInterrupt
         for budget in budgets:
-            budget.end = -math.inf
+            budget.end = Work(-math.inf, -math.inf)
         print("\nthe search ends here; the provisional verdict follows (Ctrl-C once more: none)", file=sys.stderr)
 
     if threading.current_thread() is not threading.main_thread():

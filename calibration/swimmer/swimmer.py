@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from calibration.statistics.budget import count_predictions
 from calibration.statistics.forward import either_side, secants, stacked
 from calibration.statistics.gls import Noise, repeat_covariance
 from calibration.statistics.statistical_model import Parameter, Parameters, Predict
@@ -51,6 +52,7 @@ from surrogate.table_file import load
 
 SANE = (0.1, 20.0)  # range of the coefficients; at its ends the model lacks something
 
+_SLOPES = 2  # predictions that cost as much as the derivatives of a run: of local effects one, of others three
 _STEP = 0.05  # finite-difference step in ln C, with the look-up table
 _MOST_GUESSES = 12
 _STARTS = (1.0, 0.6, 1.6)  # factors on the coefficients as given, for several starts
@@ -147,6 +149,7 @@ class SwimmerModel:
         if lookup is not None:
             found: Mapping[str, Floats] = lookup.query(distinct)
         else:
+            count_predictions(len(distinct["N"]))
             found = self.solver.steady(distinct, jobs=self.jobs, title=title)
         table = inputs.view.see({name: column[same] for name, column in found.items()})
         if not np.isfinite(table).all():
@@ -170,6 +173,7 @@ class SwimmerModel:
         # Non-local effects at their null may need more phases than the motion; with effects at work it has them.
         reaching = any(is_effect(name) and effect_named(name).reach == "nonlocal" for name in moved)
         phases = PHASES_FOR_SLOPES if reaching and not at_work else PHASES
+        count_predictions(len(distinct["N"]) * (1 + _SLOPES * bool(moved)))
         found = self.solver.slopes(distinct, moved, phases=phases, jobs=self.jobs, title=title)
         motions, slopes = (
             {k: table[same[0]] for k, table in of.items()} for of in (found.values, found.derivatives)

@@ -21,7 +21,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any, TypeVar, cast
@@ -35,7 +35,7 @@ from calibration.attribution.wrong_numbers import pulls
 from calibration.findings.findings import Description
 from calibration.findings.held_out import HeldOutErrors, held_out_errors
 from calibration.findings.next_runs import Explanation, next_runs
-from calibration.statistics.budget import Budget, clock, limited, seconds_left, skipped
+from calibration.statistics.budget import Work, beginning, limited, skipped
 from calibration.statistics.checks import predict_as_given
 from calibration.statistics.excluded import caveat_of_excluded, count_of_rows
 from calibration.statistics.fit import Fit, UnsolvedError, birge, profile_end, profile_intervals
@@ -68,7 +68,7 @@ from common.provenance import fingerprint
 
 V = TypeVar("V", bound=Verdict)
 Intervals = dict[str, tuple[float, float]]
-_SEARCH, _DESCRIBED = 0.6, 0.85  # shares of the time after which effects and descriptions are no longer looked for
+_SEARCH, _DESCRIBED = 0.6, 0.85  # shares of the limit after which no effects and no descriptions are looked for
 _LAWS_TOLD_APART = 3  # beside a claim; the more there are, the fewer runs tell all of them apart
 
 
@@ -80,7 +80,7 @@ def calibrate(
     level: float = LEVEL,
     seed: int = 0,
     draws: int = DRAWS,
-    max_seconds: float = math.inf,
+    limit: Work | None = None,
     progress: bool = True,
     verdict: Callable[..., V] = Verdict,  # type: ignore[assignment]
 ) -> V:
@@ -94,19 +94,18 @@ def calibrate(
         level: α of every claim.
         seed: of the bootstrap; the same seed gives the same result.
         draws: of the bootstrap. It resolves no smaller p-value than 2/(draws + 1).
-        max_seconds: of processor time for the search for explanations and descriptions; then the verdict is
-            provisional, and says what was not tried.
+        limit: of the search for explanations and descriptions; then the verdict is provisional, and says what was
+            not tried. Default: none.
         progress: show progress bars.
         verdict: makes the verdict of what was found, such as one with the corrected robot.
     """
-    began, given = clock(), model
+    limit, began, given = limit or Work(), beginning(), model
     model, differences = with_differences(model, held_out, level=level, seed=seed)
     study, base, uncalibrated = first_fit(model, held_out, level=level, seed=seed, draws=draws, progress=progress)
     model = cast(Experiment, study.model)  # with the weights of its runs
-    used = max(clock() - began, max_seconds - seconds_left())  # where the limit began before
-    # Explanations come first; what is left of the time is for descriptions of what nothing explains.
-    with limited(_DESCRIBED * max_seconds - used) as budget:
-        with limited(_SEARCH * max_seconds - used):
+    # Explanations come first; what is left of the limit is for descriptions of what nothing explains.
+    with limited(limit, _DESCRIBED, began) as budget:
+        with limited(limit, _SEARCH, began):
             study, found = explain_and_refute(study, base)
         wanted = describe if _law_is_wanted(study, found) else None
         beside = _beside_what_no_law_is_sought(study, model) if wanted else ""
@@ -149,7 +148,7 @@ def calibrate(
         fixed_before=fingerprint(fixed),
         little_weight=rows_of_little_weight(study),
         not_tried=tuple(budget.not_tried),
-        caveats=_caveats(study, model, found, budget, max_seconds, beside),
+        caveats=_caveats(study, model, found, budget.not_tried, beside),
     )
 
 
@@ -271,12 +270,12 @@ def _errors(study: Study, found: Attribution, uncalibrated: Floats, laws: Descri
 
 
 def _caveats(
-    study: Study, model: ForwardModel, found: Attribution, budget: Budget, max_seconds: float, beside: str
+    study: Study, model: ForwardModel, found: Attribution, ended: Mapping[str, str], beside: str
 ) -> tuple[str, ...]:
     """Say what weakens the conclusion: what was left out or not tried, and why a fit may not be the best one."""
     runs, split, base, final = model.runs, study.split, found.base, found.final
-    ended = f"after {max_seconds:.0f} s of processor time" if budget.left > -math.inf else "at Ctrl-C"
-    not_tried = f"provisional: the search ended {ended}, and did not try {', '.join(budget.not_tried)}"
+    when = next(iter(ended.values()), "")
+    not_tried = f"provisional: the search ended {when}, and did not try {', '.join(ended)}"
     little = rows_of_little_weight(study)
     held = [p for p, on_bound in zip(final.fitted, final.held, strict=True) if on_bound]
     unweighted = with_runs(model, weight=None).runs.subset(split.kept)
@@ -300,7 +299,7 @@ def _caveats(
         *runs.caveats,
         *caveat_of_excluded((*runs.excluded, *split.outliers), len(runs) + count_of_rows(runs.excluded)),
         *split.caveats,
-        *([not_tried] if budget.not_tried else []),
+        *([not_tried] if ended else []),
         *caveat_of_weights(little, int(split.kept.sum()), alike(runs, little)),
         *(f"{p.title} ({p.name}) is held at the end of its range, {final.parameters[p.name]:g}" for p in held),
         *([f"look at single readings again: {'; '.join(far)}"] if far else []),

@@ -30,7 +30,7 @@ from calibration.attribution.wrong_numbers import (
     wrong_number_as_hypothesis,
 )
 from calibration.findings.held_out import tested_on_held_out
-from calibration.statistics.budget import clock, seconds_left, skipped
+from calibration.statistics.budget import Work, clock, seconds_left, skipped, work_done
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.residual_tests import directions, examine_residual
 from calibration.statistics.statistical_model import Experiment, start_values
@@ -100,7 +100,7 @@ def fit_moves(
 
 def explain(study: Study, base: Fit) -> Attribution:
     """Test the residual of the fit without effects, and look for what explains it, from the simplest on."""
-    began = clock()
+    began = work_done()
     title = "derivatives" if study.progress else ""
     tangents = directions(study.model, base.parameters, study.effects, title=title)
     derived = clock()
@@ -116,7 +116,7 @@ def explain(study: Study, base: Fit) -> Attribution:
     if number:  # every effect that may explain as much as the wrong number does
         gain = base.deviance - number.fitted.deviance
         threshold = min(threshold, math.sqrt(max(gain - INDISTINGUISHABLE, 1.0)))
-    forecast = _forecast(study, tested - began, _SHARE_OF_TEST * (tested - derived))
+    forecast = _forecast(study, began, tested - began.seconds, _SHARE_OF_TEST * (tested - derived))
     candidates = examine(study, base, misfit, tangents, threshold=threshold, after_first=forecast)
     found = replace(found, candidates=tuple(candidates))
     best = explaining(candidates)
@@ -145,12 +145,13 @@ def _number_or_effects(study: Study, found: Attribution, number: Hypothesis) -> 
     return (*with_checks(study, [number], found.base), *effects)
 
 
-def _forecast(study: Study, of_first_tests: float, of_a_test: float) -> Callable[[int, float], None]:
+def _forecast(study: Study, began: Work, of_first_tests: float, of_a_test: float) -> Callable[[int, float], None]:
     """Return what says, after the first fit, how many seconds of processor time all fits take, and pairs."""
 
     def forecast(count: int, seconds: float) -> None:
         single = count * max(seconds, of_a_test)
-        ends = f"; the search ends after {_duration(seconds_left())}" * (seconds_left() < math.inf)
+        left = seconds_left(began)
+        ends = f"; the search ends after about {_duration(left)}" * (left < math.inf)
         if study.progress:
             print(
                 f"there is more than noise: {count} effects to fit take {_duration(single)} of processor time; if "

@@ -214,6 +214,7 @@ def test_a_fault_of_a_table_is_named() -> None:
         ({"held_out": 3}, 'held_out, notes: 3; give a name as text, such as "3"'),
         ({"seed": -1}, "seed: -1; give a whole number from 0"),
         ({"max_seconds": "long"}, "max_seconds: long; give a positive number"),
+        ({"max_predictions": 0}, "max_predictions: 0; give a positive number"),
     ):
         assert words in said(MODEL, **options)
     assert "all rows have one setting and one session" in said(MODEL.without("wall"), TABLE[::9].assign(round=1))

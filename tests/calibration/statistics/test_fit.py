@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import signal
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -16,7 +17,18 @@ import pytest
 from scipy.stats import binom
 
 from calibration.attribution import effects
-from calibration.statistics.budget import limited, limited_as_one, skipped, spent, stopped_by_interrupt
+from calibration.statistics import budget
+from calibration.statistics.budget import (
+    Work,
+    count_predictions,
+    limited,
+    limited_as_one,
+    seconds_left,
+    skipped,
+    spent,
+    stopped_by_interrupt,
+    work_done,
+)
 from calibration.statistics.excluded import Excluded, caveat_of_excluded, count_of_rows, summary_of_excluded
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.forward import derivatives
@@ -369,36 +381,92 @@ def test_excluded_rows_of_one_reason_are_one_line() -> None:
 
 
 def test_limits_end_with_those_around_them() -> None:
-    with limited(1e6) as outer:
-        with limited(-1.0):
-            assert spent()
-            assert skipped("a drag")
-            assert skipped("a drag")
+    with limited(Work(1000, 1e6)) as outer:
+        for limit in (Work(seconds=-1.0), Work(predictions=0)):
+            with limited(limit):
+                assert spent()
+                assert skipped("a drag")
+                assert skipped("a drag")
         assert not skipped("a couple")
-        with limited_as_one():
-            outer.end = 0.0
-            assert spent()
-    assert outer.not_tried == ["a drag"]
+        with limited(Work(), 0.5), limited_as_one():
+            count_predictions(999)
+            assert not spent()
+            count_predictions(1)
+            assert skipped("a couple")
+    assert outer.not_tried == {
+        "a drag": "after 1,000,000 s of processor time",
+        "a couple": "after 1,000 predictions of a run",
+    }
     assert not spent()
 
 
-@pytest.mark.parametrize("seconds", [1e-9, math.inf], ids=["without time", "interrupted"])
+def test_one_fit_has_a_third_of_what_is_left() -> None:
+    with limited(Work(1500)) as outer:
+        count_predictions(100)
+        with limited(Work(1500), 2 / 3, outer.began):
+            with limited_as_one():
+                count_predictions(299)
+                assert not spent()
+                count_predictions(1)
+                assert spent()
+            assert not spent()
+            count_predictions(600)
+            assert spent()
+        assert not spent()
+
+
+def test_the_time_to_the_limit_is_told_by_the_pace(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 0.0
+    monkeypatch.setattr(budget, "clock", lambda: now)
+    began = work_done()
+    assert seconds_left(began) == math.inf
+    with limited(Work(1000, 60)):
+        count_predictions(100)
+        now = 2.0
+        assert seconds_left(began) == pytest.approx(18)
+        now = 50.0
+        assert seconds_left(began) == 10
+
+
+def test_a_limit_of_predictions_ends_at_the_same_place_on_a_slow_machine(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    table = toy_table(5, **{DRAG: 5.0})
+    before = work_done()
+    calibrated(table, few=FEW_CANDIDATES)
+    limit = Work(0.7 * (work_done() - before).predictions)
+    quick = calibrated(table, few=FEW_CANDIDATES, limit=limit)
+    monkeypatch.setattr(budget, "clock", lambda: 1e6 * time.process_time())
+    slow = calibrated(table, few=FEW_CANDIDATES, limit=limit)
+    assert quick.not_tried
+    assert facts(slow) == facts(quick)
+
+
+@pytest.mark.parametrize(
+    ("limit", "ended"),
+    [
+        (Work(predictions=2), "after 2 predictions of a run"),
+        (Work(seconds=1e-9), "after 0 s of processor time"),
+        (Work(), "at Ctrl-C"),
+    ],
+    ids=["without predictions", "without time", "interrupted"],
+)
 def test_a_search_that_ends_early_leaves_a_provisional_verdict(
-    seconds: float, monkeypatch: pytest.MonkeyPatch
+    limit: Work, ended: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupted(*arguments: Any, **options: Any) -> Any:
         os.kill(os.getpid(), signal.SIGINT)
         return fit(*arguments, **options)
 
-    if seconds > 1:
+    interrupts = limit == Work()
+    if interrupts:
         monkeypatch.setattr(effects, "fit", interrupted)
     with stopped_by_interrupt():
-        verdict = calibrated(toy_table(5, **{DRAG: 5.0}), few=FEW_CANDIDATES, max_seconds=seconds)
-    ended = "after 0 s of processor time" if seconds < 1 else "at Ctrl-C"
+        verdict = calibrated(toy_table(5, **{DRAG: 5.0}), few=FEW_CANDIDATES, limit=limit)
     assert verdict.verdict == "unexplained"
     assert verdict.caveats[0].startswith(f"provisional: the search ended {ended}")
     assert next_steps(verdict.facts)
-    if seconds < 1:
+    if not interrupts:
         assert any("end-over-end" in what for what in verdict.not_tried)
         assert all(c.fit is None for c in verdict.found.candidates)
         assert not effect().not_tried
@@ -409,7 +477,7 @@ def test_further_interrupts_and_those_outside_a_search_end_the_program() -> None
     with stopped_by_interrupt():
         with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGINT)
-        with limited(1e6):
+        with limited(Work(seconds=1e6)):
             os.kill(os.getpid(), signal.SIGINT)
             assert spent()
             with pytest.raises(KeyboardInterrupt):
