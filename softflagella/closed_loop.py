@@ -8,26 +8,24 @@ from dataclasses import replace
 from functools import partial
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import pandas as pd
 
-from calibration.laws.laws import find_laws
 from calibration.own_model.declared import Model
 from calibration.own_model.model_verdict import ModelVerdict
 from calibration.own_model.table_of_runs import Noise, Roles, read_runs_of
-from calibration.robot.corrected_robot import check_given
-from calibration.robot.robot_verdict import RobotVerdict, read_runs
 from calibration.statistics.budget import Work, limited
+from calibration.statistics.owned import Owned, read_owned
 from calibration.statistics.statistical_model import lines_of_excluded
-from calibration.swimmer.possible_runs import Owned, owned, read_owned
-from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate as find_what_is_missing
 from common.errors import InputError
 from common.keywords import checks_keywords
 from common.units import LengthUnit
-from sim.robot_rows import OneRobot, one_robot
-from softflagella.path_error import path_errors, wanted_paths
+
+if TYPE_CHECKING:
+    from calibration.robot.robot_verdict import RobotVerdict
+    from sim.robot_rows import OneRobot
 
 MAX_PREDICTIONS = 300_000  # of one run of a robot, for the search
 MAX_PREDICTIONS_OF_OWN_MODEL = 10_000_000  # a function of one's own predicts many rows at once
@@ -128,22 +126,23 @@ def calibrate(
             )
         return replace(verdict, caveats=(*verdict.caveats, *experiment.caveats))
     _refuse("a robot", **roles._asdict())
-    robot = one_robot(robot)
-    check_given(robot)
-    wanted = wanted_paths(paths, robot, unit)
-    settings = own if isinstance(own, Mapping) else owned(own or ())
-    data, rows = read_runs(table, protocol, tell)
-    model = SwimmerModel(robot, data, jobs, own=settings)
-    result = find_what_is_missing(
-        model,
-        held_out=rows,
-        describe=find_laws if laws else None,
+    from softflagella.robot_loop import calibrate_robot  # loads the simulator, matplotlib and what plans
+
+    return calibrate_robot(
+        table,
+        robot,
+        name=_name(table),
+        protocol=protocol,
         seed=seed,
+        own=own,
+        laws=laws,
+        paths=paths,
+        unit=unit,
         limit=limit,
+        jobs=jobs,
         progress=progress,
-        verdict=partial(RobotVerdict, robot=robot, table=_name(table)),
+        tell=tell,
     )
-    return replace(result, paths=path_errors(wanted, robot, result.corrected, result.knowledge))
 
 
 def _refuse(what: str, **keywords: object) -> None:

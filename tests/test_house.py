@@ -90,6 +90,16 @@ def test_the_engine_of_a_verdict_knows_no_robot() -> None:
     assert not loaded & {"sim", "camera", "surrogate", "planner", "tracking", "softflagella"}
 
 
+def test_an_own_model_is_calibrated_without_what_robots_and_reports_need() -> None:
+    """One that no effect explains, so that forms are adopted."""
+    code = "import sys; from tests.oracles.others import calibrated; calibrated('tube-2017'); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=LIMIT)
+    loaded = set(done.stdout.split())
+    assert "calibration.attribution.nearest" in loaded, done.stderr
+    assert not loaded & {"jinja2", "matplotlib", "numba", "scipy.stats", "calibration.laws", "calibration.swimmer"}
+    assert not loaded & {"camera", "planner", "surrogate", "tracking", "sim.effects", "sim.motion", "sim.solve"}
+
+
 LIBRARIES = {"jinja2", "joblib", "matplotlib", "numba", "numpy", "pandas", "pyarrow", "safetensors", "scipy",
              "svgelements", "torch", "tqdm"}  # fmt: skip
 SOLVERS = {"sim.linear", "sim.motion", "sim.solve"}

@@ -16,11 +16,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import t as student
-from scipy.stats import wilcoxon
+from scipy.special import stdtrit
 
 from calibration.statistics.fit import Fit
 from calibration.statistics.gls import Noise, solve_normal
+from calibration.statistics.signed_ranks import signed_rank_p
 from calibration.statistics.study import Study, groups, leave_one_group_out
 from common.arrays import Floats, Integers
 
@@ -45,13 +45,13 @@ class PairedGain(NamedTuple):
     @property
     def certain(self) -> bool:
         """Whether its 95 % interval is above zero."""
-        return self.gain > float(student.ppf(_QUANTILE, max(len(self.of_conditions) - 1, 1))) * self.error
+        return self.gain > float(stdtrit(max(len(self.of_conditions) - 1, 1), _QUANTILE)) * self.error
 
     @property
     def consistent(self) -> bool:
         """Whether conditions gain, by a signed-rank test: one that gains far more than others proves no less."""
         some = self.of_conditions[self.of_conditions != 0]
-        return len(some) > 1 and bool(wilcoxon(some, alternative="greater").pvalue < 1 - _QUANTILE)
+        return len(some) > 1 and signed_rank_p(some) < 1 - _QUANTILE
 
 
 def paired_gain(study: Study, one: Fit, other: Fit) -> PairedGain:

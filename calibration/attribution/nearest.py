@@ -41,8 +41,7 @@ from typing import cast
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.stats import norm as normal
-from scipy.stats import t as student
+from scipy.special import ndtri, stdtrit
 
 from calibration.attribution.effects import FIRST
 from calibration.attribution.forms import as_good, at_theory
@@ -345,7 +344,7 @@ def _interval_of_mean(form: Hypothesis, count: int) -> tuple[float, float]:
     """Compute the 95 % interval of the mean of sizes of `count` specimens."""
     index = form.fitted.names.index(form.effect.name)
     sigma = math.sqrt(form.evidence.birge * form.fitted.covariance[index, index])
-    half = float(student.ppf(0.975, count - 1)) * max(sigma, form.evidence.spread / math.sqrt(count))
+    half = float(stdtrit(count - 1, 0.975)) * max(sigma, form.evidence.spread / math.sqrt(count))
     if form.fitted.held[index]:
         return form.fitted.interval(form.effect.name, form.evidence.birge)
     return _ends(form.fitted.fitted[index], form.size, min(half, _LARGEST))
@@ -355,7 +354,7 @@ def _interval_of_size(study: Study, form: Hypothesis) -> tuple[float, float]:
     """Compute the 95 % interval of one size; where it has the null by the covariance, by the deviance there."""
     name, b = form.effect.name, form.evidence.birge
     index = form.fitted.names.index(name)
-    half = float(normal.ppf(0.975)) * math.sqrt(b * form.fitted.covariance[index, index])
+    half = float(ndtri(0.975)) * math.sqrt(b * form.fitted.covariance[index, index])
     held = form.fitted.held[index]
     low, high = form.fitted.interval(name, b) if held else _ends(form.fitted.fitted[index], form.size, half)
     if low <= form.effect.start <= high:
@@ -382,7 +381,7 @@ def _differs_from_null(study: Study, fitted: Fit, seen: Integers) -> bool:
     )
     asked = sizes - effect.start + solve_normal(normal)[0][len(kept) :]
     error = asked.std(ddof=1) / math.sqrt(len(seen))
-    return bool(abs(asked.mean()) > student.ppf(0.975, len(seen) - 1) * error)
+    return bool(abs(asked.mean()) > stdtrit(len(seen) - 1, 0.975) * error)
 
 
 def _sizes(form: Hypothesis, seen: Integers) -> dict[str, tuple[float, float, float]]:
@@ -394,7 +393,7 @@ def _sizes(form: Hypothesis, seen: Integers) -> dict[str, tuple[float, float, fl
     for g in seen.tolist():
         index = fitted.names.index(model.shifts[g].parameter.name)
         pair = fitted.covariance[np.ix_([mean, index], [mean, index])].sum()
-        half = min(float(normal.ppf(0.975)) * math.sqrt(form.evidence.birge * pair), _LARGEST)
+        half = min(float(ndtri(0.975)) * math.sqrt(form.evidence.birge * pair), _LARGEST)
         stated[names[g]] = (float(sizes[g]), *_ends(effect, float(sizes[g]), half))
     return stated
 

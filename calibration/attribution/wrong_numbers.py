@@ -25,7 +25,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from scipy.stats import norm as normal
+from scipy.special import ndtri
 
 from calibration.attribution.effects import lowest_ebic, measures_of
 from calibration.attribution.hypothesis import Evidence, Hypothesis, Origin
@@ -85,7 +85,7 @@ def notable_pull(count: int) -> float:
 
     Šidák (1967): the probability is at most that of independent pulls, also where pulls are correlated.
     """
-    return float(normal.isf((1 - (1 - _NOTABLE) ** (1 / count)) / 2))
+    return float(-ndtri((1 - (1 - _NOTABLE) ** (1 / count)) / 2))
 
 
 def wrong_number_as_hypothesis(study: Study, base: Fit, tangents: Directions) -> Hypothesis | None:

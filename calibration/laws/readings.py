@@ -37,7 +37,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from calibration.swimmer.measured_table import Measurements
 from common.arrays import Floats
@@ -143,7 +143,7 @@ def readings(
 ) -> list[Reading]:
     """List the powers of one quantity that agree with exponents (q,) of covariance (q, q), the nearest first."""
     precision = np.linalg.inv(covariance)
-    limit = float(chi2.ppf(_AGREES, max(len(inputs) - 1, 1)))
+    limit = float(chdtri(max(len(inputs) - 1, 1), 1 - _AGREES))
     agreeing = []
     for symbol, pattern in quantities.items():
         g = np.array([pattern[INPUTS.index(name)] for name in inputs])

@@ -37,7 +37,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq, lsq_linear
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from calibration.statistics.budget import limited_as_one, skipped, spent
 from calibration.statistics.forward import derivatives
@@ -174,7 +174,7 @@ class Fit:
 
     def half_width(self, place: int) -> float:
         """Compute half of the 95 % interval of a parameter that is free, on its own scale."""
-        return float(student.ppf(0.975, self.freedom[place])) * math.sqrt(self.covariance[place, place])
+        return float(stdtrit(self.freedom[place], 0.975)) * math.sqrt(self.covariance[place, place])
 
     def interval(self, name: str, variance_ratio: float = 1.0) -> tuple[float, float]:
         """Compute the 95 % interval of a parameter; of one that is held, it ends at the bound.
@@ -192,7 +192,7 @@ class Fit:
 
     def risen(self, name: str) -> float:
         """Return by how much the deviance has risen at the ends of the 95 % interval of a parameter."""
-        return self.inflation * float(student.ppf(0.975, self.freedom[self.names.index(name)])) ** 2
+        return self.inflation * float(stdtrit(self.freedom[self.names.index(name)], 0.975)) ** 2
 
     def _inward(self, place: int, variance_ratio: float) -> float:
         """Compute the step from a bound at which rᵀ W r has risen by t², the others refitted: 2 |g| δ + a δ²."""

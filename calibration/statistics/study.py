@@ -19,8 +19,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm as normal
-from scipy.stats import t as student
+from scipy.special import ndtri, stdtrit
 
 from calibration.statistics.excluded import Excluded
 from calibration.statistics.fit import Fit
@@ -331,5 +330,5 @@ class FinalRefit:
 
 def final_refit(fitted: Fit) -> FinalRefit:
     """Hand on a fit to all runs; its intervals, those of Student's t, become those of a normal distribution."""
-    wider = student.ppf(0.975, fitted.freedom) / normal.ppf(0.975)
+    wider = stdtrit(fitted.freedom, 0.975) / ndtri(0.975)
     return FinalRefit(fitted.parameters, fitted.fitted, fitted.covariance * np.outer(wider, wider))

@@ -11,11 +11,12 @@ to be built, and its fastest speed and slower ones. A lab says what it has as "N
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from calibration.statistics.owned import Owned, read_owned
 from calibration.swimmer.measured_table import Measurements
 from common.arrays import Floats
 from common.errors import InputError
@@ -27,12 +28,9 @@ SHORTEST, LONGEST, FASTEST = 0.5, 50, 1000  # tails in head radii, ω̄
 SLIPS = 3.0  # factor of the spins' sum
 _SPINS = 4.0  # factor of the yaw rate beyond which all other spins may be in another unit
 
-
 SETTINGS = ("N", "l_cm", "omega_rpm")
 _LENGTHS = 6  # of many, spread evenly
 _SPEEDS = (0.4, 0.7, 1.0)  # of the fastest
-
-Owned = Mapping[str, tuple[float, ...]]
 
 
 def check_inputs(robot: Robot, runs: Measurements) -> None:
@@ -81,18 +79,6 @@ def owned(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:
     """Read the settings that a lab has, of a robot."""
     settings = read_owned(entries)
     check_owned(settings)
-    return settings
-
-
-def read_owned(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:
-    """Read settings from entries such as "l_cm=5,7,9", by the columns of a table."""
-    settings: dict[str, tuple[float, ...]] = {}
-    for entry in entries:
-        name, _, values = entry.partition("=")
-        try:
-            settings[name] = tuple(float(v) for v in values.split(","))
-        except ValueError:
-            raise InputError(f"--own {entry!r}; write COLUMN=VALUE,VALUE,… such as l_cm=5,7,9") from None
     return settings
 
 

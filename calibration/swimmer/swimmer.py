@@ -19,6 +19,7 @@ import numpy as np
 from calibration.statistics.budget import count_predictions
 from calibration.statistics.forward import either_side, secants, stacked
 from calibration.statistics.gls import Noise, repeat_covariance
+from calibration.statistics.owned import Owned
 from calibration.statistics.statistical_model import Parameter, Parameters, Predict
 from calibration.swimmer.influences import (
     CAMERA,
@@ -38,7 +39,7 @@ from calibration.swimmer.influences import (
 )
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.observation import Observation
-from calibration.swimmer.possible_runs import Owned, check_inputs, check_outputs, check_owned, possible_settings
+from calibration.swimmer.possible_runs import check_inputs, check_outputs, check_owned, possible_settings
 from common.arrays import Flags, Floats, Integers
 from common.errors import InputError
 from sim.effects import effect_named, is_effect

@@ -19,11 +19,11 @@ from calibration.laws.laws import Laws, find_laws
 from calibration.laws.places import place_named
 from calibration.robot.robot_verdict import RobotVerdict
 from calibration.statistics.fit import Fit, fit
+from calibration.statistics.owned import Owned
 from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import Study
 from calibration.swimmer.influences import influences
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.possible_runs import Owned
 from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate, first_fit

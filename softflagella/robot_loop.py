@@ -1,0 +1,57 @@
+"""The part of `softflagella.calibrate` for a robot, which loads the simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+import pandas as pd
+
+from calibration.laws.laws import find_laws
+from calibration.robot.corrected_robot import check_given
+from calibration.robot.robot_verdict import RobotVerdict, read_runs
+from calibration.statistics.budget import Work
+from calibration.statistics.owned import Owned
+from calibration.swimmer.possible_runs import owned
+from calibration.swimmer.swimmer import SwimmerModel
+from calibration.verdict.calibrate import calibrate
+from common.units import LengthUnit
+from sim.robot_rows import OneRobot, one_robot
+from softflagella.path_error import path_errors, wanted_paths
+
+
+def calibrate_robot(
+    table: str | Path | pd.DataFrame,
+    robot: OneRobot,
+    *,
+    name: str,
+    protocol: Literal["session", "paper"],
+    seed: int,
+    own: Owned | Sequence[str] | None,
+    laws: bool,
+    paths: Sequence[str],
+    unit: LengthUnit | None,
+    limit: Work,
+    jobs: int | None,
+    progress: bool,
+    tell: Callable[[str], object],
+) -> RobotVerdict:
+    """Calibrate a robot with the table called `name`, see `softflagella.closed_loop.calibrate`."""
+    robot = one_robot(robot)
+    check_given(robot)
+    wanted = wanted_paths(paths, robot, unit)
+    settings = own if isinstance(own, Mapping) else owned(own or ())
+    data, rows = read_runs(table, protocol, tell)
+    result = calibrate(
+        SwimmerModel(robot, data, jobs, own=settings),
+        held_out=rows,
+        describe=find_laws if laws else None,
+        limit=limit,
+        seed=seed,
+        progress=progress,
+        verdict=partial(RobotVerdict, robot=robot, table=name),
+    )
+    return replace(result, paths=path_errors(wanted, robot, result.corrected, result.knowledge))
